@@ -1,0 +1,44 @@
+//! This file says where the register regions stand in the processing system's address map.
+//!
+//! ```text
+//! 0xA000_0000  AXI DMA 0   64 KiB  -+
+//! 0xA001_0000  AXI DMA 1   64 KiB   |
+//! 0xA002_0000  AXI DMA 2   64 KiB   |  M_AXI_HPM0_FPD
+//! 0xA003_0000  AXI DMA 3   64 KiB   |
+//! 0xA004_0000  control      4 KiB  -+
+//! ```
+//!
+//! Source: UG1085 (M_AXI_HPM0_FPD window); the placement inside it is this project's.
+
+/// Physical address of AXI DMA 0.
+pub const DMA_BASE: u64 = 0xA000_0000;
+/// Distance from one AXI DMA to the next, bytes.
+pub const DMA_STRIDE: u64 = 0x1_0000;
+/// Length of one AXI DMA's register region, bytes.
+pub const DMA_BYTES: u32 = 0x1_0000;
+/// The largest number of AXI DMAs beside one accelerator (a UIO node carries five regions).
+pub const DMA_COUNT_MAX: usize = 4;
+/// Physical address of the accelerator's control block.
+pub const CONTROL_BASE: u64 = 0xA004_0000;
+/// Length of the control block's region, bytes.
+pub const CONTROL_BYTES: u32 = 0x1000;
+/// Device-tree number of the one level interrupt (SPI, `pl_ps_irq0[0]`; the GIC's ID is 32 more).
+pub const INTERRUPT_SPI: u32 = 89;
+
+/// Name of the UIO node that carries all regions.
+pub const UIO_NODE: &str = "pgs";
+/// Names of the UIO maps of the AXI DMAs.
+pub const UIO_DMA_MAPS: [&str; DMA_COUNT_MAX] = ["dma0", "dma1", "dma2", "dma3"];
+/// Name of the UIO map of the control block.
+pub const UIO_CONTROL_MAP: &str = "control";
+
+/// Where low DDR begins and ends: 2 GiB on the ZCU102.
+pub const DDR_LOW: core::ops::Range<u64> = 0..0x8000_0000;
+/// Where high DDR begins and ends on the ZCU102: the other 2 GiB of its 4.
+pub const DDR_HIGH: core::ops::Range<u64> = 0x8_0000_0000..0x8_8000_0000;
+
+/// Physical address of AXI DMA `k`.
+#[must_use]
+pub const fn dma_base(k: usize) -> u64 {
+    DMA_BASE + k as u64 * DMA_STRIDE
+}

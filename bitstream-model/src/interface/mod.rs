@@ -1,0 +1,13 @@
+//! The contract between the driver and the bitstream: constants and nothing else.
+//!
+//! Every address, offset, bit, record layout and profile stands here once. The driver and the
+//! emulated board are two implementations of these files; what they share is this module alone.
+//! `bitstream-model/README.md` is the specification in prose.
+
+pub mod address_map;
+pub mod axi_dma;
+pub mod control;
+pub mod descriptor;
+pub mod profile;
+pub mod record;
+pub mod register;

@@ -1,0 +1,130 @@
+//! This file says what a body is, and how a caller's own arrays are seen as bodies.
+//!
+//! A step reads bodies and writes them back through [`Bodies`]. `[Body]` and `Vec<Body>` implement
+//! it (array of structures), [`BodyArrays`] implements it over separate arrays, and an engine with
+//! a layout of its own implements its two methods: nothing is copied in between.
+
+/// Position and orientation of a body, world frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Centre of mass, m.
+    pub position: [f32; 3],
+    /// Unit quaternion x, y, z, w.
+    pub orientation: [f32; 4],
+}
+
+/// Linear and angular velocity of a body, world frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Velocity {
+    /// Velocity of the centre of mass, m/s.
+    pub linear: [f32; 3],
+    /// Angular velocity about world axes, rad/s.
+    pub angular: [f32; 3],
+}
+
+/// A rigid body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Body {
+    /// Where it is.
+    pub pose: Pose,
+    /// How it moves; zero for a static body.
+    pub velocity: Velocity,
+    /// Index into the shapes given to `Accelerator::set_shapes`.
+    pub shape: u32,
+}
+
+/// The bodies of a step, in whatever layout the caller keeps them.
+///
+/// A step calls [`body`](Self::body) for every index below [`len`](Self::len), any number of
+/// times, and, only when it has succeeded, [`commit`](Self::commit) once for each.
+pub trait Bodies {
+    /// Number of bodies.
+    fn len(&self) -> usize;
+
+    /// Body `index`, which is below [`len`](Self::len).
+    fn body(&self, index: usize) -> Body;
+
+    /// Stores the new state of body `index`.
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity);
+
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl Bodies for [Body] {
+    fn len(&self) -> usize {
+        <[Body]>::len(self)
+    }
+
+    fn body(&self, index: usize) -> Body {
+        self[index]
+    }
+
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        let body = &mut self[index];
+        body.pose = pose;
+        body.velocity = velocity;
+    }
+}
+
+impl Bodies for Vec<Body> {
+    fn len(&self) -> usize {
+        self.as_slice().len()
+    }
+
+    fn body(&self, index: usize) -> Body {
+        self[index]
+    }
+
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        self.as_mut_slice().commit(index, pose, velocity);
+    }
+}
+
+/// Bodies kept in separate arrays of one length.
+///
+/// The number of bodies is that of the shortest array.
+#[derive(Debug)]
+pub struct BodyArrays<'a> {
+    /// Centres of mass, m.
+    pub positions: &'a mut [[f32; 3]],
+    /// Unit quaternions x, y, z, w.
+    pub orientations: &'a mut [[f32; 4]],
+    /// Linear velocities, m/s.
+    pub linear_velocities: &'a mut [[f32; 3]],
+    /// Angular velocities, rad/s.
+    pub angular_velocities: &'a mut [[f32; 3]],
+    /// Indices into the shape table.
+    pub shapes: &'a [u32],
+}
+
+impl Bodies for BodyArrays<'_> {
+    fn len(&self) -> usize {
+        self.positions
+            .len()
+            .min(self.orientations.len())
+            .min(self.linear_velocities.len())
+            .min(self.angular_velocities.len())
+            .min(self.shapes.len())
+    }
+
+    fn body(&self, index: usize) -> Body {
+        Body {
+            pose: Pose { position: self.positions[index], orientation: self.orientations[index] },
+            velocity: Velocity {
+                linear: self.linear_velocities[index],
+                angular: self.angular_velocities[index],
+            },
+            shape: self.shapes[index],
+        }
+    }
+
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        self.positions[index] = pose.position;
+        self.orientations[index] = pose.orientation;
+        self.linear_velocities[index] = velocity.linear;
+        self.angular_velocities[index] = velocity.angular;
+    }
+}

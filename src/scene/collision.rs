@@ -1,0 +1,98 @@
+//! This file says what a collision is, and how a caller's own arrays are seen as collisions.
+
+/// Contact points of a collision, at most.
+pub use bitstream_model::interface::record::CONTACT_POINTS;
+
+/// One point at which two bodies touch.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Contact {
+    /// The point on body B's surface, world frame, m.
+    pub point: [f32; 3],
+    /// Signed distance along the normal, m; negative is penetration.
+    pub distance: f32,
+}
+
+/// Two bodies in contact at one to four points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Collision {
+    /// Index of body A.
+    pub body_a: u32,
+    /// Index of body B.
+    pub body_b: u32,
+    /// Unit normal, world frame, pointing from B to A.
+    pub normal: [f32; 3],
+    /// Number of contact points, 1 to [`CONTACT_POINTS`].
+    pub count: u32,
+    /// The contact points; those from `count` on are ignored.
+    pub contacts: [Contact; CONTACT_POINTS],
+}
+
+/// The collisions of a step, in whatever layout the caller keeps them.
+///
+/// `[Collision]` and `Vec<Collision>` implement it, [`CollisionArrays`] implements it over separate
+/// arrays. The solver takes the collisions in the order of their index.
+pub trait Collisions {
+    /// Number of collisions.
+    fn len(&self) -> usize;
+
+    /// Collision `index`, which is below [`len`](Self::len).
+    fn collision(&self, index: usize) -> Collision;
+
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl Collisions for [Collision] {
+    fn len(&self) -> usize {
+        <[Collision]>::len(self)
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        self[index]
+    }
+}
+
+impl Collisions for Vec<Collision> {
+    fn len(&self) -> usize {
+        self.as_slice().len()
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        self[index]
+    }
+}
+
+/// Collisions kept in separate arrays of one length.
+///
+/// The number of collisions is that of the shortest array.
+#[derive(Debug, Clone, Copy)]
+pub struct CollisionArrays<'a> {
+    /// Indices of bodies A and B.
+    pub bodies: &'a [[u32; 2]],
+    /// Unit normals from B to A.
+    pub normals: &'a [[f32; 3]],
+    /// Numbers of contact points.
+    pub counts: &'a [u32],
+    /// Contact points: x, y, z on B's surface, and signed distance, m.
+    pub contacts: &'a [[[f32; 4]; CONTACT_POINTS]],
+}
+
+impl Collisions for CollisionArrays<'_> {
+    fn len(&self) -> usize {
+        self.bodies.len().min(self.normals.len()).min(self.counts.len()).min(self.contacts.len())
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        let [body_a, body_b] = self.bodies[index];
+        Collision {
+            body_a,
+            body_b,
+            normal: self.normals[index],
+            count: self.counts[index],
+            contacts: self.contacts[index]
+                .map(|[x, y, z, distance]| Contact { point: [x, y, z], distance }),
+        }
+    }
+}

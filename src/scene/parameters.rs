@@ -1,0 +1,48 @@
+//! This file holds the parameters of a step.
+
+use std::time::Duration;
+
+/// Parameters of a step. The default is Bullet's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct StepParameters {
+    /// Time step, s.
+    pub time_step: f32,
+    /// Penetration that is left alone, m (Bullet: position drift).
+    pub position_drift: f32,
+    /// Share of the penetration that a step takes away (Bullet: position coefficient).
+    pub position_coefficient: f32,
+    /// Friction coefficient of every contact.
+    pub friction: f32,
+    /// What is left of the angular velocity after a step.
+    pub angular_damping: f32,
+    /// Gravity, m/s².
+    pub gravity: [f32; 3],
+    /// Passes of the contact solver over all collisions.
+    pub contact_iterations: u32,
+    /// Passes of the friction solver over all collisions.
+    pub friction_iterations: u32,
+    /// Whether to integrate after the solver. Without it the poses come back unchanged, with the
+    /// velocities that the solver left (undamped, without gravity).
+    pub integrate: bool,
+    /// How long a step may take on the accelerator; `None` follows from the work: four times what
+    /// it takes if every collision waits for the one before it, and 10 ms.
+    pub deadline: Option<Duration>,
+}
+
+impl Default for StepParameters {
+    fn default() -> Self {
+        Self {
+            time_step: 1.0 / 60.0,
+            position_drift: 0.005,
+            position_coefficient: 0.2,
+            friction: 0.7,
+            angular_damping: 0.99,
+            gravity: [0.0, -9.8, 0.0],
+            contact_iterations: 4,
+            friction_iterations: 4,
+            integrate: true,
+            deadline: None,
+        }
+    }
+}

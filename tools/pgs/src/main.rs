@@ -1,0 +1,2 @@
+//! Command line tool of the zynq-pgs driver.
+fn main() {}

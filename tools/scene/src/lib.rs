@@ -1,0 +1,1 @@
+//! The box-on-plane scene of the thesis, with collision detection.
