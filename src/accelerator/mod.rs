@@ -1,0 +1,5 @@
+//! The accelerator's control block.
+
+mod identity;
+
+pub use identity::Capabilities;
