@@ -363,7 +363,7 @@ mod tests {
 
     #[test]
     fn a_file_is_what_numpy_writes() {
-        // Made by numpy.save of numpy.array([[1, -0.0, 2.5]], dtype="<f4"), NumPy 1.26.
+        // The layout of the golden vectors' files: header padded with spaces to 128 bytes.
         let mut expected = b"\x93NUMPY\x01\x00\x76\x00{'descr': '<f4', 'fortran_order': False, \
             'shape': (1, 3), }"
             .to_vec();
