@@ -5,3 +5,39 @@
 //! of the driver.
 
 pub mod interface;
+
+#[cfg(feature = "emulation")]
+mod accelerator;
+#[cfg(feature = "emulation")]
+mod axi_dma;
+#[cfg(feature = "emulation")]
+mod board;
+#[cfg(feature = "emulation")]
+mod bus;
+#[cfg(feature = "emulation")]
+mod config;
+#[cfg(feature = "emulation")]
+mod fault;
+#[cfg(feature = "emulation")]
+mod handle;
+#[cfg(feature = "emulation")]
+mod interrupt;
+#[cfg(feature = "emulation")]
+mod memory;
+#[cfg(feature = "emulation")]
+mod stream;
+#[cfg(feature = "emulation")]
+pub mod timing;
+#[cfg(feature = "emulation")]
+mod violation;
+
+#[cfg(feature = "emulation")]
+pub use {
+    axi_dma::Direction,
+    board::Counts,
+    config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, Subnormals},
+    fault::Fault,
+    handle::{CpuPort, EmulatedBoard},
+    memory::{Denied, DeviceAccess, MemoryError},
+    violation::{RegisterAccess, Violation, ViolationKind},
+};

@@ -134,7 +134,7 @@ impl Profile {
 /// Constants of the solver that are wired into the pipeline, as f32.
 pub mod solver {
     /// A normal with a larger |z| takes its first tangent in the yz plane (Bullet).
-    pub const TANGENT_Z: f32 = 0.707_106_78;
+    pub const TANGENT_Z: f32 = std::f32::consts::FRAC_1_SQRT_2;
     /// Cosine between B - A and contact centre - A above which the spin is damped (Bullet).
     pub const SPIN_COSINE: f32 = 0.95;
     /// Share of the spin about the normal that one friction pass takes away (Bullet).

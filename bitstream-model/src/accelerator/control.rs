@@ -1,0 +1,321 @@
+//! This file holds the registers of the control block and what reading and writing them does.
+
+use crate::config::{BoardConfig, Hazards, Subnormals};
+use crate::interface::control::{
+    ANGULAR_DAMPING, AP_CTRL, BODIES, BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY,
+    COLLISIONS, CONTACT_DEPTH, CONTACT_ITERATIONS, CYCLES_HI, CYCLES_LO, DMA, ERROR, ERROR_DETAIL,
+    ErrorCode, FEATURES, FLAGS, FRICTION, FRICTION_DEPTH, FRICTION_ITERATIONS, GIE, GRAVITY_X,
+    GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO, ISR, ISSUE,
+    MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE,
+    RESET, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE,
+    SHAPE_TABLE, STALL_CYCLES, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, ap_ctrl,
+    channels, depth, dma, error, features, flags, irq, issue, memory_per_record,
+};
+use crate::interface::profile::Depth;
+
+use super::integrate::Integration;
+use super::solver::{Mass, SolverParameters};
+
+/// What the accelerator has counted in a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Counters {
+    pub(super) cycles: u64,
+    pub(super) stalls: u64,
+    pub(super) waits: u64,
+    pub(super) hazards: u64,
+    pub(super) sum_received: u32,
+    pub(super) sum_sent: u32,
+    pub(super) impulse_sum: u64,
+}
+
+/// The arguments of a step, as they are taken at the start.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Arguments {
+    pub(super) bodies: u32,
+    pub(super) collisions: u32,
+    pub(super) contact_iterations: u32,
+    pub(super) friction_iterations: u32,
+    pub(super) integrate: bool,
+    pub(super) solver: SolverParameters,
+    pub(super) integration: Integration,
+}
+
+/// Writable words between AP_CTRL and the capabilities.
+const ARGUMENT_WORDS: usize = 32;
+
+/// What a write asks of the accelerator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Request {
+    None,
+    Start,
+    Reset,
+}
+
+/// The register file.
+#[derive(Debug)]
+pub(super) struct Registers {
+    arguments: [u32; ARGUMENT_WORDS],
+    gie: bool,
+    ier: u32,
+    isr: u32,
+    done: bool,
+    ready: bool,
+    pub(super) error: u32,
+    pub(super) error_detail: u32,
+    shapes: Vec<Mass>,
+    pub(super) counters: Counters,
+}
+
+/// The arguments, which live in `Registers::arguments` at a quarter of their offset.
+const ARGUMENTS: [u32; 13] = [
+    BODIES.offset,
+    COLLISIONS.offset,
+    CONTACT_ITERATIONS.offset,
+    FRICTION_ITERATIONS.offset,
+    FLAGS.offset,
+    TIME_STEP.offset,
+    POSITION_DRIFT.offset,
+    POSITION_COEFFICIENT.offset,
+    FRICTION.offset,
+    ANGULAR_DAMPING.offset,
+    GRAVITY_X.offset,
+    GRAVITY_Y.offset,
+    GRAVITY_Z.offset,
+];
+
+const _: () = assert!(GRAVITY_Z.offset as usize / 4 < ARGUMENT_WORDS);
+
+impl Registers {
+    pub(super) fn new(config: &BoardConfig) -> Self {
+        Self {
+            arguments: [0; ARGUMENT_WORDS],
+            gie: false,
+            ier: 0,
+            isr: 0,
+            done: false,
+            ready: false,
+            error: 0,
+            error_detail: 0,
+            shapes: vec![Mass::default(); config.profile.shape_capacity as usize],
+            counters: Counters::default(),
+        }
+    }
+
+    /// What a reset leaves: the counters of the last step stay readable.
+    pub(super) fn reset(&mut self) {
+        self.arguments = [0; ARGUMENT_WORDS];
+        self.gie = false;
+        self.ier = 0;
+        self.isr = 0;
+        self.done = false;
+        self.ready = false;
+        self.error = 0;
+        self.error_detail = 0;
+        self.shapes.fill(Mass::default());
+    }
+
+    fn argument(&self, offset: u32) -> u32 {
+        self.arguments[offset as usize / 4]
+    }
+
+    fn number(&self, offset: u32) -> f32 {
+        f32::from_bits(self.argument(offset))
+    }
+
+    pub(super) fn arguments(&self) -> Arguments {
+        let time_step = self.number(TIME_STEP.offset);
+        Arguments {
+            bodies: self.argument(BODIES.offset),
+            collisions: self.argument(COLLISIONS.offset),
+            contact_iterations: self.argument(CONTACT_ITERATIONS.offset),
+            friction_iterations: self.argument(FRICTION_ITERATIONS.offset),
+            integrate: flags::INTEGRATE.is_set(self.argument(FLAGS.offset)),
+            solver: SolverParameters {
+                time_step,
+                drift: self.number(POSITION_DRIFT.offset),
+                coefficient: self.number(POSITION_COEFFICIENT.offset),
+                friction: self.number(FRICTION.offset),
+            },
+            integration: Integration {
+                time_step,
+                angular_damping: self.number(ANGULAR_DAMPING.offset),
+                gravity: [GRAVITY_X, GRAVITY_Y, GRAVITY_Z]
+                    .map(|register| self.number(register.offset)),
+            },
+        }
+    }
+
+    pub(super) fn shapes(&self) -> &[Mass] {
+        &self.shapes
+    }
+
+    /// A step has ended.
+    pub(super) fn finish(&mut self) {
+        self.done = true;
+        self.ready = true;
+        self.raise(irq::DONE.mask() | irq::READY.mask());
+    }
+
+    /// Sets the sticky error; the first one stays.
+    pub(super) fn fail(&mut self, code: ErrorCode, channel: usize, detail: u32) {
+        if self.error == 0 {
+            // Eight streams at most.
+            self.error = error::CHANNEL.put(code as u32, channel as u32);
+            self.error_detail = detail;
+        }
+        self.raise(irq::ERROR.mask());
+    }
+
+    fn raise(&mut self, bits: u32) {
+        self.isr |= bits & self.ier;
+    }
+
+    pub(super) fn interrupt(&self) -> bool {
+        self.gie && self.isr != 0
+    }
+
+    fn control(&mut self, busy: bool) -> u32 {
+        let mut value = 0;
+        value = ap_ctrl::START.put(value, u32::from(busy));
+        value = ap_ctrl::DONE.put(value, u32::from(self.done));
+        value = ap_ctrl::IDLE.put(value, u32::from(!busy));
+        value = ap_ctrl::READY.put(value, u32::from(self.ready));
+        self.done = false;
+        self.ready = false;
+        value
+    }
+
+    pub(super) fn read(
+        &mut self,
+        config: &BoardConfig,
+        offset: u32,
+        busy: bool,
+        resetting: bool,
+    ) -> Option<u32> {
+        let profile = config.profile;
+        // Streams are few and their widths small: what is counted here fits its field.
+        let widths = |streams: &[u32]| {
+            streams
+                .iter()
+                .enumerate()
+                .fold(0, |value, (k, bits)| value | ((bits / 8).ilog2() << (4 * k as u32)))
+        };
+        let pipeline = |kind: Depth| {
+            // The check of the configuration keeps a window below 2^16 cycles.
+            let window = config.window_cycles(kind.window) as u32;
+            depth::WINDOW.put(depth::FILL.put(0, kind.fill), window)
+        };
+        let counters = &self.counters;
+        let saturated = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
+        let memory = profile.memory;
+        if let Some((index, at)) = self.shape_at(offset) {
+            let shape = self.shapes[index];
+            return Some(match at {
+                SHAPE_INVERSE_MASS => shape.inverse_mass.to_bits(),
+                SHAPE_INVERSE_INERTIA => shape.inverse_inertia.to_bits(),
+                _ => 0,
+            });
+        }
+        Some(match offset {
+            _ if offset == AP_CTRL.offset => self.control(busy),
+            _ if offset == GIE.offset => u32::from(self.gie),
+            _ if offset == IER.offset => self.ier,
+            _ if offset == ISR.offset => self.isr,
+            _ if ARGUMENTS.contains(&offset) => self.argument(offset),
+            _ if offset == IDENTIFICATION.offset => IDENTIFICATION.reset,
+            _ if offset == VERSION.offset => VERSION.reset,
+            _ if offset == PROFILE.offset => profile.id,
+            _ if offset == FEATURES.offset => {
+                features::CHECKSUMS.mask()
+                    | features::IMPULSE_SUM.mask()
+                    | features::INTERLOCKED
+                        .put(0, u32::from(config.hazards == Hazards::Interlocked))
+                    | features::FLUSH_SUBNORMALS
+                        .put(0, u32::from(config.subnormals == Subnormals::Flush))
+            }
+            _ if offset == CHANNELS.offset => {
+                let mm2s = profile.mm2s_widths.len() as u32;
+                let s2mm = profile.s2mm_widths.len() as u32;
+                channels::S2MM.put(channels::MM2S.put(0, mm2s), s2mm)
+            }
+            _ if offset == MM2S_WIDTHS.offset => widths(profile.mm2s_widths),
+            _ if offset == S2MM_WIDTHS.offset => widths(profile.s2mm_widths),
+            _ if offset == ISSUE.offset => issue::COLLISIONS.put(
+                issue::INTERVAL.put(0, profile.initiation_interval),
+                profile.collisions_per_issue,
+            ),
+            _ if offset == CONTACT_DEPTH.offset => pipeline(profile.contact),
+            _ if offset == FRICTION_DEPTH.offset => pipeline(profile.friction),
+            _ if offset == CLOCK_KHZ.offset => profile.clock_khz,
+            _ if offset == BODY_CAPACITY.offset => profile.body_capacity,
+            _ if offset == COLLISION_CAPACITY.offset => memory.bytes / memory.bytes_per_collision,
+            _ if offset == SHAPE_CAPACITY.offset => profile.shape_capacity,
+            _ if offset == MEMORY_BYTES.offset => memory.bytes,
+            _ if offset == MEMORY_PER_RECORD.offset => memory_per_record::COLLISION.put(
+                memory_per_record::BODY.put(0, memory.bytes_per_body),
+                memory.bytes_per_collision,
+            ),
+            _ if offset == DMA.offset => dma::ADDRESS_WIDTH
+                .put(dma::LENGTH_WIDTH.put(0, config.length_width), config.address_width),
+            _ if offset == ERROR.offset => self.error,
+            _ if offset == ERROR_DETAIL.offset => self.error_detail,
+            // Halves of 64-bit counters; the casts cut on purpose.
+            _ if offset == CYCLES_LO.offset => counters.cycles as u32,
+            _ if offset == CYCLES_HI.offset => (counters.cycles >> 32) as u32,
+            _ if offset == STALL_CYCLES.offset => saturated(counters.stalls),
+            _ if offset == WAIT_CYCLES.offset => saturated(counters.waits),
+            _ if offset == HAZARDS.offset => saturated(counters.hazards),
+            _ if offset == SUM_RECEIVED.offset => counters.sum_received,
+            _ if offset == SUM_SENT.offset => counters.sum_sent,
+            _ if offset == IMPULSE_SUM_LO.offset => counters.impulse_sum as u32,
+            _ if offset == IMPULSE_SUM_HI.offset => (counters.impulse_sum >> 32) as u32,
+            _ if offset == RESET.offset => u32::from(resetting),
+            _ => return None,
+        })
+    }
+
+    /// The shape and the offset in its entry, if `offset` lies in the table.
+    fn shape_at(&self, offset: u32) -> Option<(usize, u32)> {
+        let at = offset.checked_sub(SHAPE_TABLE)?;
+        let index = (at / SHAPE_STRIDE) as usize;
+        (index < self.shapes.len()).then_some((index, at % SHAPE_STRIDE))
+    }
+
+    /// Whether a write there is an error while a step runs.
+    pub(super) fn is_argument(&self, offset: u32) -> bool {
+        ARGUMENTS.contains(&offset) || self.shape_at(offset).is_some()
+    }
+
+    /// Writes a register; `None` where there is none.
+    pub(super) fn write(&mut self, offset: u32, value: u32) -> Option<Request> {
+        if let Some((index, at)) = self.shape_at(offset) {
+            match at {
+                SHAPE_INVERSE_MASS => self.shapes[index].inverse_mass = f32::from_bits(value),
+                SHAPE_INVERSE_INERTIA => self.shapes[index].inverse_inertia = f32::from_bits(value),
+                _ => {}
+            }
+            return Some(Request::None);
+        }
+        match offset {
+            _ if offset == AP_CTRL.offset && ap_ctrl::START.is_set(value) => {
+                return Some(Request::Start);
+            }
+            _ if offset == AP_CTRL.offset => {}
+            _ if offset == GIE.offset => self.gie = value & 1 != 0,
+            _ if offset == IER.offset => {
+                self.ier = value & (irq::DONE.mask() | irq::READY.mask() | irq::ERROR.mask());
+            }
+            _ if offset == ISR.offset => self.isr ^= value & self.ier,
+            _ if ARGUMENTS.contains(&offset) => self.arguments[offset as usize / 4] = value,
+            _ if offset == RESET.offset && value & 1 != 0 => return Some(Request::Reset),
+            _ => {
+                // The rest is read-only or does not exist.
+                return crate::interface::control::REGISTERS
+                    .iter()
+                    .any(|register| register.offset == offset)
+                    .then_some(Request::None);
+            }
+        }
+        Some(Request::None)
+    }
+}

@@ -1,0 +1,94 @@
+//! This file moves one body by one time step.
+//!
+//! Source: Bullet (integrateTransforms of the OpenCL pipeline): position first, then gravity.
+
+use super::number::Number;
+use super::solver::Velocity;
+use super::vector::Vec3;
+use crate::interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
+
+/// Position and orientation of a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pose {
+    pub(super) position: [f32; 3],
+    pub(super) orientation: [f32; 4],
+}
+
+/// Parameters of the integration.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Integration {
+    pub(super) time_step: f32,
+    pub(super) angular_damping: f32,
+    pub(super) gravity: [f32; 3],
+}
+
+/// The state of a moving body one time step later.
+pub(super) fn integrate<N: Number>(
+    parameters: &Integration,
+    pose: &Pose,
+    velocity: &Velocity,
+) -> (Pose, Velocity) {
+    let n = N::new;
+    let dt = n(parameters.time_step);
+    let half = n(0.5);
+    let v = Vec3::<N>::new(velocity.linear);
+    let w = Vec3::<N>::new(velocity.angular) * n(parameters.angular_damping);
+
+    let mut speed = w.dot(w).sqrt();
+    if (speed * dt).value() > ROTATION_LIMIT {
+        speed = n(ROTATION_LIMIT) / dt;
+    }
+    let h = if speed.value() < SERIES_BELOW {
+        w * (half * dt - ((((dt * dt) * dt) * n(SERIES_TERM)) * speed) * speed)
+    } else {
+        w * (n(libm::sinf(((half * speed) * dt).value())) / speed)
+    };
+    let Vec3(x, y, z) = h;
+    let c = n(libm::cosf(((speed * dt) * half).value()));
+
+    let [qx, qy, qz, qw] = pose.orientation.map(n);
+    let rx = ((c * qx + x * qw) + y * qz) - z * qy;
+    let ry = ((c * qy + y * qw) + z * qx) - x * qz;
+    let rz = ((c * qz + z * qw) + x * qy) - y * qx;
+    let rw = ((c * qw - x * qx) - y * qy) - z * qz;
+    let scale = n(1.0) / (((rx * rx + ry * ry) + rz * rz) + rw * rw).sqrt();
+
+    let position = Vec3::<N>::new(pose.position) + v * dt;
+    let linear = v + Vec3::<N>::new(parameters.gravity) * dt;
+    (
+        Pose {
+            position: position.values(),
+            orientation: [rx, ry, rz, rw].map(|r| (r * scale).value()),
+        },
+        Velocity { linear: linear.values(), angular: w.values() },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::number::Keep;
+    use super::*;
+
+    const AT_ORIGIN: Pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+    const STEP: Integration =
+        Integration { time_step: 0.5, angular_damping: 1.0, gravity: [0.0, -8.0, 0.0] };
+
+    #[test]
+    fn the_position_moves_with_the_velocity_before_gravity() {
+        let velocity = Velocity { linear: [1.0, 2.0, 0.0], angular: [0.0; 3] };
+        let (pose, after) = integrate::<Keep>(&STEP, &AT_ORIGIN, &velocity);
+        assert_eq!(pose.position, [0.5, 1.0, 0.0]);
+        assert_eq!(after.linear, [1.0, -2.0, 0.0]);
+        assert_eq!(pose.orientation, AT_ORIGIN.orientation);
+    }
+
+    #[test]
+    fn a_fast_spin_turns_a_quarter_of_pi_and_keeps_its_velocity() {
+        let velocity = Velocity { linear: [0.0; 3], angular: [0.0, 1000.0, 0.0] };
+        let (pose, after) = integrate::<Keep>(&STEP, &AT_ORIGIN, &velocity);
+        assert_eq!(after.angular, [0.0, 1000.0, 0.0]);
+        let [x, y, z, w] = pose.orientation;
+        assert_eq!([x, z], [0.0, 0.0]);
+        assert!((y * y + w * w - 1.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,297 @@
+//! This file solves one collision in one pass: contact or friction, as Bullet's host code does.
+//!
+//! The conversion from the raw contact to the constraint row (effective mass, bias) is part of
+//! both, so that a pass needs nothing but the collision, the velocities and the accumulated
+//! impulses.
+//!
+//! Source: Bullet (b3ContactSolver of the OpenCL pipeline's host reference), in the order of
+//! evaluation that the golden vectors were made with.
+
+use super::decode::Collision;
+use super::number::Number;
+use super::vector::Vec3;
+use crate::interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
+use crate::interface::record::CONTACT_POINTS;
+
+/// Mass properties of a body.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Mass {
+    pub(super) inverse_mass: f32,
+    pub(super) inverse_inertia: f32,
+}
+
+/// Velocities of a body, as they lie in block RAM.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Velocity {
+    pub(super) linear: [f32; 3],
+    pub(super) angular: [f32; 3],
+}
+
+/// Accumulated impulses of a collision, as they lie in block RAM: four normal impulses during the
+/// contact passes; during the friction passes their sum, then the two friction impulses.
+pub(super) type Impulses = [f32; CONTACT_POINTS];
+
+/// Parameters that both solvers need.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct SolverParameters {
+    pub(super) time_step: f32,
+    pub(super) drift: f32,
+    pub(super) coefficient: f32,
+    pub(super) friction: f32,
+}
+
+/// One body while a collision is being solved.
+#[derive(Debug, Clone, Copy)]
+struct Moving<N> {
+    v: Vec3<N>,
+    w: Vec3<N>,
+    m: N,
+    k: N,
+}
+
+impl<N: Number> Moving<N> {
+    #[inline]
+    fn new(velocity: &Velocity, mass: Mass) -> Self {
+        Self {
+            v: Vec3::new(velocity.linear),
+            w: Vec3::new(velocity.angular),
+            m: N::new(mass.inverse_mass),
+            k: N::new(mass.inverse_inertia),
+        }
+    }
+
+    #[inline]
+    fn velocity(&self) -> Velocity {
+        Velocity { linear: self.v.values(), angular: self.w.values() }
+    }
+}
+
+/// One constraint row: a direction, and the lever arms' moments about it.
+#[derive(Debug, Clone, Copy)]
+struct Row<N> {
+    direction: Vec3<N>,
+    moment_a: Vec3<N>,
+    moment_b: Vec3<N>,
+    /// Effective mass, negative.
+    jacobian: N,
+}
+
+impl<N: Number> Row<N> {
+    #[inline]
+    fn new(
+        direction: Vec3<N>,
+        arm_a: Vec3<N>,
+        arm_b: Vec3<N>,
+        a: &Moving<N>,
+        b: &Moving<N>,
+    ) -> Self {
+        let moment_a = arm_a.cross(direction);
+        let moment_b = -arm_b.cross(direction);
+        let denominator =
+            ((a.m + (moment_a * a.k).dot(moment_a)) + b.m) + (moment_b * b.k).dot(moment_b);
+        Self { direction, moment_a, moment_b, jacobian: N::new(-1.0) / denominator }
+    }
+
+    /// Relative velocity along the row.
+    #[inline]
+    fn speed(&self, a: &Moving<N>, b: &Moving<N>) -> N {
+        ((self.direction.dot(a.v) + self.moment_a.dot(a.w)) + (-self.direction).dot(b.v))
+            + self.moment_b.dot(b.w)
+    }
+
+    #[inline]
+    fn apply(&self, impulse: N, a: &mut Moving<N>, b: &mut Moving<N>) {
+        a.v = a.v + (self.direction * a.m) * impulse;
+        a.w = a.w + (self.moment_a * a.k) * impulse;
+        b.v = b.v + ((-self.direction) * b.m) * impulse;
+        b.w = b.w + (self.moment_b * b.k) * impulse;
+    }
+}
+
+/// Two unit vectors across `n`.
+#[inline]
+fn tangents<N: Number>(n: Vec3<N>) -> [Vec3<N>; 2] {
+    let one = N::new(1.0);
+    let Vec3(x, y, z) = n;
+    let absolute_z = if z.value() < 0.0 { -z } else { z };
+    if absolute_z.value() > TANGENT_Z {
+        let s = y * y + z * z;
+        let k = one / s.sqrt();
+        let t0 = Vec3(N::new(0.0), -z * k, y * k);
+        let t1 = Vec3(s * k, -x * t0.2, x * t0.1);
+        [t0, t1]
+    } else {
+        let s = x * x + y * y;
+        let k = one / s.sqrt();
+        let t0 = Vec3(-y * k, x * k, N::new(0.0));
+        let t1 = Vec3(-z * t0.1, z * t0.0, s * k);
+        [t0, t1]
+    }
+}
+
+/// One contact pass over one collision.
+#[inline]
+pub(super) fn contact<N: Number>(
+    collision: &Collision,
+    parameters: &SolverParameters,
+    masses: [Mass; 2],
+    velocities: &mut [Velocity; 2],
+    impulses: &mut Impulses,
+) {
+    let mut a = Moving::<N>::new(&velocities[0], masses[0]);
+    let mut b = Moving::<N>::new(&velocities[1], masses[1]);
+    let n = Vec3::<N>::new(collision.normal);
+    let position_a = Vec3::<N>::new(collision.position_a);
+    let position_b = Vec3::<N>::new(collision.position_b);
+    let per_second = N::new(1.0) / N::new(parameters.time_step);
+    let drift = N::new(parameters.drift);
+    let coefficient = N::new(parameters.coefficient);
+    for i in 0..collision.count {
+        let [x, y, z, distance] = collision.contacts[i];
+        let point = Vec3::<N>::new([x, y, z]);
+        let row = Row::new(n, point - position_a, point - position_b, &a, &b);
+        if row.jacobian.is_zero() {
+            continue;
+        }
+        let bias = ((N::new(distance) + drift) * coefficient) * per_second;
+        let wanted = (row.speed(&a, &b) + bias) * row.jacobian;
+        let before = N::new(impulses[i]);
+        let after = (before + wanted).larger(N::new(0.0));
+        impulses[i] = after.value();
+        row.apply(after - before, &mut a, &mut b);
+    }
+    *velocities = [a.velocity(), b.velocity()];
+}
+
+/// Sum of the four normal impulses, as the friction passes use it.
+#[inline]
+pub(super) fn normal_sum<N: Number>(impulses: &Impulses) -> f32 {
+    let [l0, l1, l2, l3] = impulses.map(N::new);
+    (((l0 + l1) + l2) + l3).value()
+}
+
+/// One friction pass over one collision; `impulses` holds the normal sum and the two friction
+/// impulses.
+#[inline]
+pub(super) fn friction<N: Number>(
+    collision: &Collision,
+    parameters: &SolverParameters,
+    masses: [Mass; 2],
+    velocities: &mut [Velocity; 2],
+    impulses: &mut Impulses,
+) {
+    let mut a = Moving::<N>::new(&velocities[0], masses[0]);
+    let mut b = Moving::<N>::new(&velocities[1], masses[1]);
+    let q = -Vec3::<N>::new(collision.normal);
+    let position_a = Vec3::<N>::new(collision.position_a);
+    let position_b = Vec3::<N>::new(collision.position_b);
+    let point = |i: usize| {
+        let [x, y, z, _] = collision.contacts[i];
+        Vec3::<N>::new([x, y, z])
+    };
+    let mut sum = point(0);
+    for i in 1..collision.count {
+        sum = sum + point(i);
+    }
+    // At most four points: exact.
+    let centre = sum * (N::new(1.0) / N::new(collision.count as f32));
+    let arm_a = centre - position_a;
+    let arm_b = centre - position_b;
+    let limit = N::new(parameters.friction) * N::new(impulses[0]);
+    for (t, accumulated) in tangents(q).into_iter().zip(&mut impulses[1..3]) {
+        let row = Row::new(t, arm_a, arm_b, &a, &b);
+        if row.jacobian.is_zero() {
+            continue;
+        }
+        let wanted = row.speed(&a, &b) * row.jacobian;
+        let before = N::new(*accumulated);
+        let after = (before + wanted).larger(-limit).smaller(limit);
+        *accumulated = after.value();
+        row.apply(after - before, &mut a, &mut b);
+    }
+    let damped = a.m.is_zero()
+        || b.m.is_zero()
+        || (position_b - position_a).unit().dot(arm_a.unit()).value() > SPIN_COSINE;
+    if damped {
+        let share = N::new(SPIN_DAMPING);
+        let spin_a = q.dot(a.w);
+        let spin_b = q.dot(b.w);
+        a.w = a.w - q * (spin_a * share);
+        b.w = b.w - q * (spin_b * share);
+    }
+    *velocities = [a.velocity(), b.velocity()];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::number::Keep;
+    use super::*;
+
+    const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: 0.0 };
+    const GROUND: Mass = Mass { inverse_mass: 0.0, inverse_inertia: 0.0 };
+    const PARAMETERS: SolverParameters =
+        SolverParameters { time_step: 0.5, drift: 0.0, coefficient: 0.0, friction: 0.5 };
+
+    /// A point mass above the ground, normal from B (the mass) down to A (the ground).
+    fn on_the_ground() -> Collision {
+        Collision {
+            body_a: 0,
+            body_b: 1,
+            count: 1,
+            normal: [0.0, -1.0, 0.0],
+            position_a: [0.0, -1.0, 0.0],
+            position_b: [0.0, 1.0, 0.0],
+            contacts: [[0.0; 4]; CONTACT_POINTS],
+        }
+    }
+
+    fn falling(linear: [f32; 3]) -> [Velocity; 2] {
+        [Velocity::default(), Velocity { linear, angular: [0.0; 3] }]
+    }
+
+    #[test]
+    fn a_contact_takes_the_approaching_velocity_away() {
+        let mut velocities = falling([0.0, -3.0, 0.0]);
+        let mut impulses = [0.0; 4];
+        let masses = [GROUND, UNIT];
+        contact::<Keep>(&on_the_ground(), &PARAMETERS, masses, &mut velocities, &mut impulses);
+        assert_eq!(velocities[1].linear, [0.0, 0.0, 0.0]);
+        assert_eq!(impulses, [3.0, 0.0, 0.0, 0.0]);
+        assert_eq!(velocities[0], Velocity::default());
+    }
+
+    #[test]
+    fn a_contact_does_not_pull() {
+        let mut velocities = falling([0.0, 3.0, 0.0]);
+        let mut impulses = [0.0; 4];
+        let masses = [GROUND, UNIT];
+        contact::<Keep>(&on_the_ground(), &PARAMETERS, masses, &mut velocities, &mut impulses);
+        assert_eq!(velocities[1].linear, [0.0, 3.0, 0.0]);
+        assert_eq!(impulses, [0.0; 4]);
+    }
+
+    #[test]
+    fn friction_stops_at_its_share_of_the_normal_impulse() {
+        let mut velocities = falling([5.0, 0.0, 0.0]);
+        let mut impulses = [3.0, 0.0, 0.0, 0.0];
+        let masses = [GROUND, UNIT];
+        friction::<Keep>(&on_the_ground(), &PARAMETERS, masses, &mut velocities, &mut impulses);
+        assert_eq!(velocities[1].linear, [3.5, 0.0, 0.0]);
+        let before = velocities;
+        friction::<Keep>(&on_the_ground(), &PARAMETERS, masses, &mut velocities, &mut impulses);
+        assert_eq!(velocities, before, "the limit is used up");
+    }
+
+    #[test]
+    fn tangents_are_unit_and_across_the_normal_in_both_branches() {
+        for n in [[0.0, -1.0, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, -1.0], [0.48, 0.6, 0.64]] {
+            let normal = Vec3::<Keep>::new(n);
+            let [t0, t1] = tangents(normal);
+            for t in [t0, t1] {
+                assert!((t.dot(t).value() - 1.0).abs() < 1e-6, "{n:?}");
+                assert!(t.dot(normal).value().abs() < 1e-6, "{n:?}");
+            }
+            assert!(t0.dot(t1).value().abs() < 1e-6, "{n:?}");
+        }
+    }
+}

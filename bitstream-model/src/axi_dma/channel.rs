@@ -1,0 +1,349 @@
+//! This file holds the registers of one DMA channel and what reading and writing them does.
+
+use super::{Build, Direction};
+use crate::interface::axi_dma::{
+    ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, TAILDESC,
+    TAILDESC_MSB, dmacr, dmasr,
+};
+use crate::interface::descriptor;
+use crate::violation::{Log, ViolationKind};
+
+/// Clocks of one tick of the delay timer.
+const DELAY_TICK: u64 = 125;
+
+/// What the engine is doing.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Work {
+    /// Nothing: stopped, idle, or never started.
+    None,
+    /// Waiting for a descriptor.
+    Fetch { address: u64, ready_at: u64 },
+    /// Moving the data of a descriptor.
+    Descriptor(Descriptor),
+    /// Moving a direct transfer.
+    Direct { moved: u32 },
+}
+
+/// A fetched descriptor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Descriptor {
+    pub(super) address: u64,
+    pub(super) next: u64,
+    pub(super) buffer: u64,
+    pub(super) length: u32,
+    pub(super) moved: u32,
+    pub(super) eof: bool,
+    /// S2MM: the packet's first beat went into this descriptor.
+    pub(super) rxsof: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Transition {
+    Run,
+    Halt,
+}
+
+/// One direction of a core.
+#[derive(Debug)]
+pub(crate) struct Channel {
+    pub(super) direction: Direction,
+    /// DMACR as last written, without Reset.
+    pub(super) control: u32,
+    /// Error and interrupt bits of DMASR.
+    latched: u32,
+    packets_to_go: u32,
+    delay_until: Option<u64>,
+    halted: bool,
+    transition: Option<(u64, Transition)>,
+    pub(super) idle: bool,
+    pub(super) current: u64,
+    pub(super) tail: u64,
+    pub(super) address: u64,
+    pub(super) length: u32,
+    pub(super) work: Work,
+    /// The descriptor after the last completed one.
+    pub(super) resume: Option<u64>,
+    /// A packet has begun and not ended.
+    pub(super) in_packet: bool,
+    /// The engine's clock; it may run a little behind the board's.
+    pub(super) time: u64,
+    stalled: bool,
+    pub(super) decode_error_due: bool,
+    stall_due: bool,
+}
+
+impl Channel {
+    pub(super) fn new(direction: Direction) -> Self {
+        Self {
+            direction,
+            control: DMACR.reset,
+            latched: 0,
+            packets_to_go: dmacr::IRQ_THRESHOLD.of(DMACR.reset),
+            delay_until: None,
+            halted: true,
+            transition: None,
+            idle: false,
+            current: 0,
+            tail: 0,
+            address: 0,
+            length: 0,
+            work: Work::None,
+            resume: None,
+            in_packet: false,
+            time: 0,
+            stalled: false,
+            decode_error_due: false,
+            stall_due: false,
+        }
+    }
+
+    pub(crate) fn inject_decode_error(&mut self) {
+        self.decode_error_due = true;
+    }
+
+    pub(crate) fn inject_stall(&mut self) {
+        self.stall_due = true;
+    }
+
+    /// Whether an injected stall holds the engine; it begins with the first beat to be moved.
+    pub(super) fn stalls(&mut self) -> bool {
+        self.stalled |= std::mem::take(&mut self.stall_due);
+        self.stalled
+    }
+
+    pub(super) fn stop(&mut self) {
+        self.work = Work::None;
+    }
+
+    pub(super) fn has(&self, at: u32) -> bool {
+        CHANNEL_REGISTERS.iter().any(|register| register.offset == at)
+    }
+
+    fn status(&self, build: &Build) -> u32 {
+        let mut value = self.latched;
+        value = dmasr::HALTED.put(value, u32::from(self.halted));
+        value = dmasr::IDLE.put(value, u32::from(self.idle && !self.halted));
+        value = dmasr::SG_INCLD.put(value, u32::from(build.scatter_gather));
+        value = dmasr::IRQ_THRESHOLD_STS.put(value, self.packets_to_go);
+        match self.delay_until {
+            Some(until) => {
+                let ticks = until.saturating_sub(self.time).div_ceil(DELAY_TICK).min(255);
+                // At most 255, checked in the line above.
+                dmasr::IRQ_DELAY_STS.put(value, ticks as u32)
+            }
+            None => value,
+        }
+    }
+
+    pub(super) fn read(&self, build: &Build, at: u32) -> Option<u32> {
+        // Halves of 64-bit addresses; the casts cut on purpose.
+        let low = |value: u64| value as u32;
+        let high = |value: u64| (value >> 32) as u32;
+        Some(match at {
+            _ if at == DMACR.offset => self.control,
+            _ if at == DMASR.offset => self.status(build),
+            _ if at == CURDESC.offset => low(self.current),
+            _ if at == CURDESC_MSB.offset => high(self.current),
+            _ if at == TAILDESC.offset => low(self.tail),
+            _ if at == TAILDESC_MSB.offset => high(self.tail),
+            _ if at == ADDRESS.offset => low(self.address),
+            _ if at == ADDRESS_MSB.offset => high(self.address),
+            _ if at == LENGTH.offset => self.length,
+            _ => return None,
+        })
+    }
+
+    pub(super) fn write(
+        &mut self,
+        build: &Build,
+        now: u64,
+        at: u32,
+        value: u32,
+        log: &mut Log,
+    ) -> Option<bool> {
+        let wide = build.address_width > 32;
+        let high_mask =
+            if build.address_width >= 64 { u64::MAX } else { (1_u64 << build.address_width) - 1 };
+        let set_low = |old: u64, mask: u32| (old & !0xFFFF_FFFF) | u64::from(value & mask);
+        let set_high = |old: u64| ((old & 0xFFFF_FFFF) | (u64::from(value) << 32)) & high_mask;
+        let descriptor_mask = !(descriptor::BYTES as u32 - 1);
+        let mut doorbell = false;
+        match at {
+            _ if at == DMACR.offset => self.write_control(build, now, value, log),
+            _ if at == DMASR.offset => self.latched &= !(value & dmasr::IRQS),
+            _ if at == CURDESC.offset || at == CURDESC_MSB.offset => {
+                if !self.halted || dmacr::RS.is_set(self.control) {
+                    let (core, direction) = (build.core, self.direction);
+                    log.violation(ViolationKind::CurdescWhileRunning { core, direction });
+                } else if at == CURDESC.offset {
+                    self.current = set_low(self.current, descriptor_mask);
+                } else if wide {
+                    self.current = set_high(self.current);
+                }
+            }
+            _ if at == TAILDESC.offset => {
+                self.tail = set_low(self.tail, descriptor_mask);
+                if !wide {
+                    doorbell = self.ring(build, now, log);
+                }
+            }
+            _ if at == TAILDESC_MSB.offset => {
+                if wide {
+                    self.tail = set_high(self.tail);
+                    doorbell = self.ring(build, now, log);
+                }
+            }
+            _ if at == ADDRESS.offset => self.address = set_low(self.address, u32::MAX),
+            _ if at == ADDRESS_MSB.offset => {
+                if wide {
+                    self.address = set_high(self.address);
+                }
+            }
+            _ if at == LENGTH.offset => doorbell = self.write_length(build, now, value, log),
+            _ => return None,
+        }
+        Some(doorbell)
+    }
+
+    fn write_control(&mut self, build: &Build, now: u64, value: u32, log: &mut Log) {
+        let was_running = dmacr::RS.is_set(self.control);
+        let threshold = match dmacr::IRQ_THRESHOLD.of(value) {
+            0 => dmacr::IRQ_THRESHOLD.of(self.control),
+            new => new,
+        };
+        if threshold != dmacr::IRQ_THRESHOLD.of(self.control) {
+            self.packets_to_go = threshold;
+        }
+        let writable = dmacr::RS.mask()
+            | dmacr::KEYHOLE.mask()
+            | dmacr::CYCLIC_BD.mask()
+            | dmacr::IOC_IRQ_EN.mask()
+            | dmacr::DLY_IRQ_EN.mask()
+            | dmacr::ERR_IRQ_EN.mask()
+            | dmacr::IRQ_DELAY.mask();
+        self.control =
+            dmacr::IRQ_THRESHOLD.put(value & writable, threshold) | dmacr::ALWAYS_ONE.mask();
+        let runs = dmacr::RS.is_set(self.control);
+        if runs && self.latched & dmasr::ERRORS != 0 {
+            let (core, direction) = (build.core, self.direction);
+            log.violation(ViolationKind::StartWithError { core, direction });
+            self.control &= !dmacr::RS.mask();
+        } else if runs != was_running {
+            let what = if runs { Transition::Run } else { Transition::Halt };
+            self.transition = Some((now + build.delays.halt, what));
+        }
+    }
+
+    /// A doorbell in scatter-gather mode: starts or resumes the engine, or moves its pause point.
+    fn ring(&mut self, build: &Build, now: u64, log: &mut Log) -> bool {
+        let (core, direction) = (build.core, self.direction);
+        if self.halted || !dmacr::RS.is_set(self.control) {
+            log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
+            return false;
+        }
+        if !build.scatter_gather {
+            log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
+            return false;
+        }
+        if matches!(self.work, Work::None) {
+            self.idle = false;
+            let address = self.resume.unwrap_or(self.current);
+            self.work = Work::Fetch { address, ready_at: now + build.delays.descriptor_fetch };
+        }
+        true
+    }
+
+    fn write_length(&mut self, build: &Build, now: u64, value: u32, log: &mut Log) -> bool {
+        let (core, direction) = (build.core, self.direction);
+        let mask = u32::MAX >> (32 - build.length_width);
+        if self.halted {
+            // All ones, and the 0 that undoes it, are how a driver learns the register's width.
+            self.length = value & mask;
+            if value != u32::MAX && value != 0 {
+                log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
+            }
+            return false;
+        }
+        if build.scatter_gather || !matches!(self.work, Work::None) {
+            log.violation(ViolationKind::LengthWhileBusy { core, direction });
+            return false;
+        }
+        if value & !mask != 0 {
+            let width = build.length_width;
+            log.violation(ViolationKind::LengthTooWide { core, direction, wanted: value, width });
+        }
+        if value & mask == 0 {
+            return false;
+        }
+        self.length = value & mask;
+        self.idle = false;
+        self.time = now;
+        self.work = Work::Direct { moved: 0 };
+        true
+    }
+
+    pub(super) fn tick(&mut self, now: u64) {
+        if let Some((at, what)) = self.transition
+            && at <= now
+        {
+            self.transition = None;
+            match what {
+                Transition::Run => self.halted = false,
+                Transition::Halt => {
+                    self.halted = true;
+                    self.idle = false;
+                    self.work = Work::None;
+                    self.resume = None;
+                    self.in_packet = false;
+                }
+            }
+        }
+        if self.delay_until.is_some_and(|until| until <= now) {
+            self.delay_until = None;
+            self.latched |= dmasr::DLY_IRQ.mask();
+            self.packets_to_go = dmacr::IRQ_THRESHOLD.of(self.control);
+        }
+    }
+
+    pub(super) fn next_event(&self) -> Option<u64> {
+        let fetch = match self.work {
+            Work::Fetch { ready_at, .. } => Some(ready_at),
+            _ => None,
+        };
+        [self.transition.map(|(at, _)| at), self.delay_until, fetch].into_iter().flatten().min()
+    }
+
+    pub(super) fn interrupt(&self) -> bool {
+        // Enables and status stand at the same bits of DMACR and DMASR.
+        self.latched & self.control & dmasr::IRQS != 0
+    }
+
+    /// A packet has ended at the engine's time.
+    pub(super) fn packet_done(&mut self) {
+        self.packets_to_go = self.packets_to_go.saturating_sub(1);
+        if self.packets_to_go == 0 {
+            self.latched |= dmasr::IOC_IRQ.mask();
+            self.packets_to_go = dmacr::IRQ_THRESHOLD.of(self.control);
+        }
+        let delay = dmacr::IRQ_DELAY.of(self.control);
+        if delay != 0 {
+            self.delay_until = Some(self.time + u64::from(delay) * DELAY_TICK);
+        }
+    }
+
+    /// A direct transfer has ended: one interrupt each, whatever the threshold.
+    pub(super) fn direct_done(&mut self) {
+        self.latched |= dmasr::IOC_IRQ.mask();
+        self.idle = true;
+        self.work = Work::None;
+        self.in_packet = false;
+    }
+
+    /// An error stops the channel; only a reset revives it.
+    pub(super) fn fail(&mut self, build: &Build, bit: u32) {
+        self.latched |= bit | dmasr::ERR_IRQ.mask();
+        self.control &= !dmacr::RS.mask();
+        self.work = Work::None;
+        self.transition = Some((self.time + build.delays.halt, Transition::Halt));
+    }
+}

@@ -1,0 +1,179 @@
+//! The emulated AXI DMA core: two channels, one reset.
+//!
+//! `channel.rs` holds the registers of one channel and their side effects, `mover.rs` the engine
+//! that fetches descriptors and moves beats. Both directions are one piece of code.
+//!
+//! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
+
+mod channel;
+mod mover;
+
+use std::fmt;
+
+use crate::config::{BoardConfig, Delays};
+use crate::interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
+use crate::memory::Memory;
+use crate::stream::Stream;
+use crate::violation::Log;
+
+use channel::Channel;
+
+/// One of the two channels of a core.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// Memory-mapped to stream: the device reads memory.
+    Mm2s,
+    /// Stream to memory-mapped: the device writes memory.
+    S2mm,
+}
+
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Mm2s => "MM2S",
+            Self::S2mm => "S2MM",
+        })
+    }
+}
+
+/// How a core was built.
+#[derive(Debug, Clone, Copy)]
+struct Build {
+    core: usize,
+    length_width: u32,
+    address_width: u32,
+    scatter_gather: bool,
+    delays: Delays,
+}
+
+/// What the core's engines have done, for the observer.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Moved {
+    pub(crate) beats_read: u64,
+    pub(crate) beats_written: u64,
+    pub(crate) descriptors: u64,
+}
+
+/// What the engines move beats with.
+pub(crate) struct Surroundings<'a> {
+    pub(crate) memory: &'a mut Memory,
+    pub(crate) log: &'a mut Log,
+    pub(crate) moved: &'a mut Moved,
+}
+
+/// One AXI DMA.
+#[derive(Debug)]
+pub(crate) struct Core {
+    build: Build,
+    mm2s: Channel,
+    s2mm: Channel,
+    reset_until: Option<u64>,
+}
+
+impl Core {
+    pub(crate) fn new(core: usize, config: &BoardConfig) -> Self {
+        let build = Build {
+            core,
+            length_width: config.length_width,
+            address_width: config.address_width,
+            scatter_gather: config.scatter_gather,
+            delays: config.delays,
+        };
+        Self {
+            build,
+            mm2s: Channel::new(Direction::Mm2s),
+            s2mm: Channel::new(Direction::S2mm),
+            reset_until: None,
+        }
+    }
+
+    pub(crate) fn channel(&mut self, direction: Direction) -> &mut Channel {
+        match direction {
+            Direction::Mm2s => &mut self.mm2s,
+            Direction::S2mm => &mut self.s2mm,
+        }
+    }
+
+    /// The channel that an offset belongs to, and the offset in MM2S terms.
+    fn decode(offset: u32) -> (Direction, u32) {
+        if offset < S2MM_OFFSET {
+            (Direction::Mm2s, offset)
+        } else {
+            (Direction::S2mm, offset - S2MM_OFFSET)
+        }
+    }
+
+    /// Reads a register; `None` where there is none.
+    pub(crate) fn read(&mut self, offset: u32) -> Option<u32> {
+        let (direction, at) = Self::decode(offset);
+        let resetting = self.reset_until.is_some();
+        let build = self.build;
+        let value = self.channel(direction).read(&build, at)?;
+        Some(if resetting && at == DMACR.offset { value | dmacr::RESET.mask() } else { value })
+    }
+
+    /// Writes a register. Returns whether it was a doorbell, or `None` where there is no register.
+    pub(crate) fn write(
+        &mut self,
+        now: u64,
+        offset: u32,
+        value: u32,
+        log: &mut Log,
+    ) -> Option<bool> {
+        let (direction, at) = Self::decode(offset);
+        if self.reset_until.is_some() {
+            // The core is deaf until the reset has ended.
+            return self.channel(direction).has(at).then_some(false);
+        }
+        if at == DMACR.offset && dmacr::RESET.is_set(value) {
+            self.reset_until = Some(now + self.build.delays.reset);
+            self.mm2s.stop();
+            self.s2mm.stop();
+            return Some(false);
+        }
+        let build = self.build;
+        self.channel(direction).write(&build, now, at, value, log)
+    }
+
+    /// Lets the states change that change by time alone.
+    pub(crate) fn tick(&mut self, now: u64) {
+        if self.reset_until.is_some_and(|until| until <= now) {
+            self.reset_until = None;
+            self.mm2s = Channel::new(Direction::Mm2s);
+            self.s2mm = Channel::new(Direction::S2mm);
+        }
+        self.mm2s.tick(now);
+        self.s2mm.tick(now);
+    }
+
+    /// When the next state changes by time alone.
+    pub(crate) fn next_event(&self) -> Option<u64> {
+        [self.reset_until, self.mm2s.next_event(), self.s2mm.next_event()]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// Whether an enabled interrupt stands.
+    pub(crate) fn interrupt(&self) -> bool {
+        self.reset_until.is_none() && (self.mm2s.interrupt() || self.s2mm.interrupt())
+    }
+
+    /// Moves up to `limit` beats of one channel until the clock shows `end`; returns how many, and
+    /// whether anything happened at all.
+    pub(crate) fn run(
+        &mut self,
+        direction: Direction,
+        start: u64,
+        end: u64,
+        limit: usize,
+        stream: &mut Stream,
+        with: &mut Surroundings<'_>,
+    ) -> (usize, bool) {
+        if self.reset_until.is_some() {
+            return (0, false);
+        }
+        let build = self.build;
+        self.channel(direction).run(&build, start, end, limit, stream, with)
+    }
+}

@@ -1,0 +1,323 @@
+//! This file moves beats: it fetches descriptors, reads or writes memory and writes status back.
+//!
+//! An engine moves at most one beat a clock, what its port can carry. It keeps a clock of its own
+//! that follows the board's, so that a stretch of many clocks is moved in a few block copies.
+
+use super::channel::{Channel, Descriptor, Work};
+use super::{Build, Direction, Surroundings};
+use crate::interface::axi_dma::{dmacr, dmasr};
+use crate::interface::descriptor::{
+    self, BUFFER, BUFFER_MSB, BYTES, CONTROL, FETCHED_WORDS, NXTDESC, NXTDESC_MSB, STATUS, status,
+};
+use crate::interface::record::BEAT_BYTES;
+use crate::memory::Denied;
+use crate::stream::Stream;
+use crate::violation::ViolationKind;
+use std::sync::atomic::Ordering;
+
+const BEAT: u32 = BEAT_BYTES as u32;
+const KEYHOLE_BEATS: usize = 1;
+
+impl Channel {
+    /// Moves up to `limit` beats between the clocks `start` and `end`. Returns how many, and
+    /// whether any state changed.
+    pub(super) fn run(
+        &mut self,
+        build: &Build,
+        start: u64,
+        end: u64,
+        limit: usize,
+        stream: &mut Stream,
+        with: &mut Surroundings<'_>,
+    ) -> (usize, bool) {
+        self.time = self.time.max(start);
+        let mut moved = 0;
+        let mut changed = false;
+        loop {
+            match self.work {
+                Work::None => {
+                    if self.overrun(stream) {
+                        self.fail(build, dmasr::DMA_INT_ERR.mask());
+                        changed = true;
+                    }
+                    break;
+                }
+                Work::Fetch { address, ready_at } => {
+                    if ready_at > end {
+                        break;
+                    }
+                    self.time = self.time.max(ready_at);
+                    self.fetch(build, address, with);
+                    changed = true;
+                }
+                Work::Descriptor(mut bd) => {
+                    let left = bd.length - bd.moved;
+                    let n = self.portion(left, end, limit - moved, stream);
+                    if n == 0 || self.stalls() {
+                        break;
+                    }
+                    let at = bd.buffer + u64::from(bd.moved);
+                    let Some(ended) = self.transfer(build, at, left, n, bd.eof, stream, with)
+                    else {
+                        changed = true;
+                        break;
+                    };
+                    moved += n;
+                    self.time += n as u64;
+                    bd.rxsof |= !self.in_packet;
+                    self.in_packet = true;
+                    // A portion never exceeds what is left, which is a u32.
+                    bd.moved += left.min((n * BEAT_BYTES) as u32);
+                    self.work = Work::Descriptor(bd);
+                    if ended || bd.moved == bd.length {
+                        self.complete(build, bd, ended, with);
+                        changed = true;
+                    }
+                }
+                Work::Direct { moved: done } => {
+                    let left = self.length - done;
+                    let n = self.portion(left, end, limit - moved, stream);
+                    if n == 0 {
+                        if left == 0 {
+                            // The buffer is full and the packet goes on.
+                            if stream.len() > 0 {
+                                self.fail(build, dmasr::DMA_INT_ERR.mask());
+                                changed = true;
+                            }
+                        }
+                        break;
+                    }
+                    if self.stalls() {
+                        break;
+                    }
+                    let at = self.address + u64::from(done);
+                    let Some(ended) = self.transfer(build, at, left, n, true, stream, with) else {
+                        changed = true;
+                        break;
+                    };
+                    moved += n;
+                    self.time += n as u64;
+                    let done = done + left.min((n * BEAT_BYTES) as u32);
+                    self.work = Work::Direct { moved: done };
+                    if ended {
+                        if self.direction == Direction::S2mm {
+                            self.length = done;
+                        }
+                        self.direct_done();
+                        changed = true;
+                    }
+                }
+            }
+        }
+        (moved, changed || moved > 0)
+    }
+
+    /// S2MM in scatter-gather mode: the chain has ended in the middle of a packet and more comes.
+    fn overrun(&self, stream: &Stream) -> bool {
+        self.direction == Direction::S2mm && self.idle && self.in_packet && stream.len() > 0
+    }
+
+    /// Beats that can be moved now.
+    fn portion(&self, left: u32, end: u64, limit: usize, stream: &Stream) -> usize {
+        let clocks = usize::try_from(end.saturating_sub(self.time)).unwrap_or(usize::MAX);
+        let stream_beats = match self.direction {
+            Direction::Mm2s => stream.space(),
+            Direction::S2mm => match stream.next_last() {
+                Some(last) => stream.len().min(last + 1),
+                None => stream.len(),
+            },
+        };
+        let keyhole = if dmacr::KEYHOLE.is_set(self.control) { KEYHOLE_BEATS } else { usize::MAX };
+        (left.div_ceil(BEAT) as usize).min(clocks).min(stream_beats).min(limit).min(keyhole)
+    }
+
+    /// Moves `n` beats. `left` counts the bytes that the descriptor or transfer still has; `last`
+    /// says whether its end is the packet's. Returns whether the packet ended, or `None` on an
+    /// error, which has been dealt with.
+    #[expect(clippy::too_many_arguments, reason = "the state of one transfer, used here alone")]
+    fn transfer(
+        &mut self,
+        build: &Build,
+        at: u64,
+        left: u32,
+        n: usize,
+        last: bool,
+        stream: &mut Stream,
+        with: &mut Surroundings<'_>,
+    ) -> Option<bool> {
+        let at = if dmacr::KEYHOLE.is_set(self.control) { self.keyhole_address(at) } else { at };
+        // Without a realignment engine the low address bits do not exist: the data is wrong, and
+        // the violation was recorded when the descriptor was fetched.
+        let at = at & !(u64::from(BEAT) - 1);
+        let injected = std::mem::take(&mut self.decode_error_due);
+        let denied = match self.direction {
+            Direction::Mm2s => match with.memory.beats(at, n) {
+                Ok(beats) if !injected => {
+                    stream.push(beats);
+                    with.moved.beats_read += n as u64;
+                    None
+                }
+                Ok(_) => Some(None),
+                Err(denied) => Some(Some(denied)),
+            },
+            Direction::S2mm => match with.memory.beats_mut(at, n) {
+                Ok(beats) if !injected => {
+                    let ends = stream.next_last() == Some(n - 1);
+                    stream.pop_into(beats);
+                    with.moved.beats_written += n as u64;
+                    return Some(ends);
+                }
+                Ok(_) => Some(None),
+                Err(denied) => Some(Some(denied)),
+            },
+        };
+        if let Some(denied) = denied {
+            self.denied(build, at, n, denied, with);
+            return None;
+        }
+        let whole = left as usize <= n * BEAT_BYTES;
+        if whole && last {
+            stream.mark_last();
+        }
+        if whole && !left.is_multiple_of(BEAT) {
+            stream.mark_partial();
+        }
+        Some(whole && last)
+    }
+
+    fn keyhole_address(&self, at: u64) -> u64 {
+        match self.work {
+            Work::Descriptor(bd) => bd.buffer,
+            Work::Direct { .. } => self.address,
+            Work::None | Work::Fetch { .. } => at,
+        }
+    }
+
+    fn denied(
+        &mut self,
+        build: &Build,
+        at: u64,
+        n: usize,
+        denied: Option<Denied>,
+        with: &mut Surroundings<'_>,
+    ) {
+        if let Some(denied) = denied {
+            with.log.violation(ViolationKind::OutsideGrant {
+                core: build.core,
+                direction: self.direction,
+                address: at,
+                bytes: (n * BEAT_BYTES) as u64,
+                denied,
+            });
+        }
+        if let Work::Descriptor(bd) = self.work {
+            let word = status::DMA_DEC_ERR.put(bd.moved, 1);
+            // The channel fails anyway; whether the descriptor can tell is of no matter.
+            let _ = with.memory.write_word(bd.address + 4 * STATUS as u64, word);
+        }
+        self.fail(build, dmasr::DMA_DEC_ERR.mask());
+    }
+
+    fn fetch(&mut self, build: &Build, address: u64, with: &mut Surroundings<'_>) {
+        let (core, direction) = (build.core, self.direction);
+        self.current = address;
+        if !address.is_multiple_of(BYTES as u64) {
+            with.log.violation(ViolationKind::MisalignedDescriptor { core, direction, address });
+        }
+        let address = address & !(BYTES as u64 - 1);
+        let mut words = [0_u32; FETCHED_WORDS];
+        match with.memory.words(address, FETCHED_WORDS) {
+            Ok(memory) => {
+                for (word, from) in words.iter_mut().zip(memory) {
+                    *word = from.load(Ordering::Acquire);
+                }
+            }
+            Err(denied) => {
+                with.log.violation(ViolationKind::OutsideGrant {
+                    core,
+                    direction,
+                    address,
+                    bytes: (FETCHED_WORDS * 4) as u64,
+                    denied,
+                });
+                self.fail(build, dmasr::SG_DEC_ERR.mask());
+                return;
+            }
+        }
+        let wide = build.address_width > 32;
+        let join = |low: usize, high: usize| {
+            u64::from(words[low]) | if wide { u64::from(words[high]) << 32 } else { 0 }
+        };
+        let cyclic = dmacr::CYCLIC_BD.is_set(self.control);
+        if status::CMPLTED.is_set(words[STATUS]) && !cyclic {
+            with.log.violation(ViolationKind::StaleDescriptor { core, direction, address });
+            self.fail(build, dmasr::SG_INT_ERR.mask());
+            return;
+        }
+        let wanted = descriptor::control::LENGTH.of(words[CONTROL]);
+        let length = wanted & (u32::MAX >> (32 - build.length_width));
+        if length != wanted {
+            let width = build.length_width;
+            with.log.violation(ViolationKind::LengthTooWide { core, direction, wanted, width });
+        }
+        if length == 0 {
+            with.log.violation(ViolationKind::ZeroLength { core, direction, address });
+            let _ = with.memory.write_word(address + 4 * STATUS as u64, status::DMA_INT_ERR.mask());
+            self.fail(build, dmasr::DMA_INT_ERR.mask());
+            return;
+        }
+        let sof = descriptor::control::SOF.is_set(words[CONTROL]);
+        let eof = descriptor::control::EOF.is_set(words[CONTROL]);
+        if direction == Direction::Mm2s && sof == self.in_packet {
+            with.log.violation(ViolationKind::UnpairedPacket { core, direction, address });
+        }
+        let buffer = join(BUFFER, BUFFER_MSB);
+        let whole_beats = length.is_multiple_of(BEAT) || (direction == Direction::Mm2s && eof);
+        if !buffer.is_multiple_of(u64::from(BEAT)) || !whole_beats {
+            let kind = ViolationKind::Misaligned { core, direction, address: buffer, length };
+            with.log.violation(kind);
+        }
+        let next = join(NXTDESC, NXTDESC_MSB);
+        self.work = Work::Descriptor(Descriptor {
+            address,
+            next,
+            buffer,
+            length,
+            moved: 0,
+            eof,
+            rxsof: false,
+        });
+    }
+
+    /// A descriptor is done: writes its status and goes on, or pauses at the tail.
+    fn complete(
+        &mut self,
+        build: &Build,
+        bd: Descriptor,
+        ended: bool,
+        with: &mut Surroundings<'_>,
+    ) {
+        let mut word = status::CMPLTED.put(bd.moved, 1);
+        if self.direction == Direction::S2mm {
+            word = status::RXSOF.put(word, u32::from(bd.rxsof));
+            word = status::RXEOF.put(word, u32::from(ended));
+        }
+        if with.memory.write_word(bd.address + 4 * STATUS as u64, word).is_err() {
+            self.fail(build, dmasr::SG_DEC_ERR.mask());
+            return;
+        }
+        with.moved.descriptors += 1;
+        if ended {
+            self.in_packet = false;
+            self.packet_done();
+        }
+        self.resume = Some(bd.next);
+        if bd.address == self.tail && !dmacr::CYCLIC_BD.is_set(self.control) {
+            self.idle = true;
+            self.work = Work::None;
+        } else {
+            // Fetched ahead while the data of this one moved.
+            self.work = Work::Fetch { address: bd.next, ready_at: self.time };
+        }
+    }
+}

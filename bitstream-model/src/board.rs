@@ -1,0 +1,292 @@
+//! This file puts the parts together: DMAs, streams, accelerator, memory, one clock.
+//!
+//! Time is virtual. It passes with each register access, and when the CPU waits; nothing happens
+//! inside a register write. The clock is the accelerator's; the DMAs run on it too.
+
+use crate::accelerator::Accelerator;
+use crate::axi_dma::{Core, Direction, Moved, Surroundings};
+use crate::bus::{self, Target};
+use crate::config::{Bandwidth, BoardConfig};
+use crate::fault::Fault;
+use crate::interface::record::BEAT_BYTES;
+use crate::interrupt::InterruptLine;
+use crate::memory::Memory;
+use crate::stream::Stream;
+use crate::violation::{Log, RegisterAccess, ViolationKind};
+
+/// Beats that an engine moves before the next one has its turn at the memory: an AXI burst.
+const BURST_BEATS: u64 = 16;
+/// Cycles after which an accelerator that waits looks at its streams again.
+const STARVED_CYCLES: u64 = 64;
+
+/// What happened on a board since it was built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct Counts {
+    /// Register reads by the CPU.
+    pub register_reads: u64,
+    /// Register writes by the CPU.
+    pub register_writes: u64,
+    /// Writes that started something: TAILDESC, LENGTH, `ap_start`.
+    pub doorbells: u64,
+    /// Rising edges of the interrupt line.
+    pub interrupts: u64,
+    /// Beats read from memory by the DMAs.
+    pub beats_read: u64,
+    /// Beats written to memory by the DMAs.
+    pub beats_written: u64,
+    /// Descriptors completed.
+    pub descriptors: u64,
+    /// Violations, also those of which no record was kept.
+    pub violations: u64,
+    /// Clock cycles since the board was built.
+    pub cycles: u64,
+}
+
+/// The board's state.
+#[derive(Debug)]
+pub(crate) struct Board {
+    pub(crate) config: BoardConfig,
+    pub(crate) now: u64,
+    pub(crate) memory: Memory,
+    pub(crate) interrupt: InterruptLine,
+    pub(crate) log: Log,
+    cores: Vec<Core>,
+    accelerator: Accelerator,
+    inputs: Vec<Stream>,
+    outputs: Vec<Stream>,
+    moved: Moved,
+    counts: Counts,
+    /// What the memory can still deliver at once, in bytes times the clock in kHz.
+    credit: u64,
+    /// The engine that has the first turn at the memory.
+    turn: usize,
+}
+
+impl Board {
+    pub(crate) fn new(config: BoardConfig) -> Self {
+        let profile = config.profile;
+        let streams = |widths: &[u32]| {
+            widths.iter().map(|_| Stream::new(config.delays.fifo_beats)).collect::<Vec<_>>()
+        };
+        let inputs = streams(profile.mm2s_widths);
+        let outputs = streams(profile.s2mm_widths);
+        let cores = inputs.len().max(outputs.len());
+        Self {
+            config,
+            now: 0,
+            memory: Memory::new(config.address_width),
+            interrupt: InterruptLine::default(),
+            log: Log::new(),
+            cores: (0..cores).map(|core| Core::new(core, &config)).collect(),
+            accelerator: Accelerator::new(&config),
+            inputs,
+            outputs,
+            moved: Moved::default(),
+            counts: Counts::default(),
+            credit: 0,
+            turn: 0,
+        }
+    }
+
+    pub(crate) fn counts(&self) -> Counts {
+        Counts {
+            interrupts: self.interrupt.rising_edges,
+            beats_read: self.moved.beats_read,
+            beats_written: self.moved.beats_written,
+            descriptors: self.moved.descriptors,
+            violations: self.log.count,
+            cycles: self.now,
+            ..self.counts
+        }
+    }
+
+    pub(crate) fn inject(&mut self, fault: Fault) {
+        match fault {
+            Fault::DecodeError { core, direction } => {
+                if let Some(core) = self.cores.get_mut(core) {
+                    core.channel(direction).inject_decode_error();
+                }
+            }
+            Fault::Stall { core, direction } => {
+                if let Some(core) = self.cores.get_mut(core) {
+                    core.channel(direction).inject_stall();
+                }
+            }
+            Fault::AcceleratorError { code } => self.accelerator.inject(code),
+        }
+    }
+
+    /// A strict board is dead after its first violation.
+    fn dead(&self) -> bool {
+        self.config.strict && self.log.count > 0
+    }
+
+    fn access_cycles(&self) -> u64 {
+        let cycles =
+            self.config.delays.register_access_ns * u64::from(self.config.profile.clock_khz);
+        cycles.div_ceil(1_000_000)
+    }
+
+    fn record(&mut self, address: u64, write: bool, value: u32) {
+        self.log.access(RegisterAccess { cycle: self.now, address, write, value });
+    }
+
+    pub(crate) fn read32(&mut self, address: u64) -> u32 {
+        self.counts.register_reads += 1;
+        self.advance(self.now + self.access_cycles(), false);
+        let found = match bus::decode(address, self.cores.len()) {
+            Target::Dma { core, offset } => {
+                self.cores[core].read(offset).ok_or(ViolationKind::ReservedRegister { address })
+            }
+            Target::Control { offset } => {
+                self.accelerator.read(offset).ok_or(ViolationKind::ReservedRegister { address })
+            }
+            Target::Nothing => Err(ViolationKind::UnmappedRegister { address }),
+            Target::Unaligned => Err(ViolationKind::UnalignedRegister { address }),
+        };
+        let value = found.as_ref().copied().unwrap_or(0);
+        self.record(address, false, value);
+        if let Err(kind) = found {
+            self.log.violation(kind);
+        }
+        self.update_interrupt();
+        if self.dead() { u32::MAX } else { value }
+    }
+
+    pub(crate) fn write32(&mut self, address: u64, value: u32) {
+        self.counts.register_writes += 1;
+        self.advance(self.now + self.access_cycles(), false);
+        self.record(address, true, value);
+        if self.dead() {
+            return;
+        }
+        let (now, log) = (self.now, &mut self.log);
+        let done = match bus::decode(address, self.cores.len()) {
+            Target::Dma { core, offset } => self.cores[core]
+                .write(now, offset, value, log)
+                .ok_or(ViolationKind::ReservedRegister { address }),
+            Target::Control { offset } => self
+                .accelerator
+                .write(now, offset, value, log)
+                .ok_or(ViolationKind::ReservedRegister { address }),
+            Target::Nothing => Err(ViolationKind::UnmappedRegister { address }),
+            Target::Unaligned => Err(ViolationKind::UnalignedRegister { address }),
+        };
+        match done {
+            Ok(doorbell) => self.counts.doorbells += u64::from(doorbell),
+            Err(kind) => self.log.violation(kind),
+        }
+        self.update_interrupt();
+    }
+
+    fn update_interrupt(&mut self) {
+        let level = !self.dead()
+            && (self.accelerator.interrupt() || self.cores.iter().any(Core::interrupt));
+        self.interrupt.set(level);
+    }
+
+    /// Lets time pass until `until`, or until the interrupt wants attention if `watch` says so.
+    pub(crate) fn advance(&mut self, until: u64, watch: bool) {
+        while self.now < until && !(watch && self.interrupt.pending()) {
+            self.log.at(self.now);
+            if self.dead() {
+                self.now = until;
+                break;
+            }
+            self.tick();
+            let event = self.next_event().map_or(until, |event| event.min(until));
+            let limit = event - self.now;
+            let ran = self.accelerator.run(limit, &mut self.inputs, &mut self.outputs);
+            let waits = ran.cycles == 0;
+            let mut slice = if waits { limit.min(STARVED_CYCLES) } else { ran.cycles };
+            if waits && ran.progressed {
+                slice = 0;
+            }
+            let moved = self.move_beats(self.now, self.now + slice);
+            if waits && !ran.progressed && !moved {
+                // Nothing will change before the next event.
+                slice = limit;
+            }
+            if waits && slice > 0 && self.accelerator.running() {
+                self.accelerator.starve(slice);
+            }
+            self.now += slice;
+            self.tick();
+            self.update_interrupt();
+        }
+        self.log.at(self.now);
+    }
+
+    fn tick(&mut self) {
+        for core in &mut self.cores {
+            core.tick(self.now);
+        }
+        if self.accelerator.tick(self.now) {
+            self.inputs.iter_mut().chain(&mut self.outputs).for_each(Stream::clear);
+        }
+    }
+
+    /// The next time after now at which something changes by itself.
+    fn next_event(&self) -> Option<u64> {
+        self.cores
+            .iter()
+            .map(Core::next_event)
+            .chain([self.accelerator.next_event()])
+            .flatten()
+            .filter(|event| *event > self.now)
+            .min()
+    }
+
+    /// Lets every DMA engine work between two clocks; returns whether any did something.
+    fn move_beats(&mut self, start: u64, end: u64) -> bool {
+        match self.config.bandwidth {
+            Bandwidth::Unlimited => {
+                let mut any = false;
+                for engine in 0..2 * self.cores.len() {
+                    any |= self.run_engine(engine, start, end, usize::MAX).1;
+                }
+                any
+            }
+            Bandwidth::BytesPerSecond(bytes) => self.share_memory(start, end, bytes),
+        }
+    }
+
+    /// Gives every engine a burst in turn until the memory's bandwidth is used up.
+    fn share_memory(&mut self, start: u64, end: u64, bytes_per_second: u64) -> bool {
+        let engines = 2 * self.cores.len();
+        let beat_cost = BEAT_BYTES as u64 * u64::from(self.config.profile.clock_khz);
+        let income = (end - start).saturating_mul(bytes_per_second / 1000);
+        let reserve = BURST_BEATS * engines as u64 * beat_cost;
+        self.credit = self.credit.min(reserve).saturating_add(income);
+        let mut any = false;
+        let mut without_beats = 0;
+        while without_beats < engines {
+            let beats = (self.credit / beat_cost).min(BURST_BEATS);
+            if beats == 0 {
+                // The bandwidth is what holds the engines up: time alone brings progress.
+                return true;
+            }
+            // At most a burst.
+            let (moved, changed) = self.run_engine(self.turn, start, end, beats as usize);
+            any |= changed;
+            self.credit -= moved as u64 * beat_cost;
+            self.turn = (self.turn + 1) % engines;
+            without_beats = if moved == 0 { without_beats + 1 } else { 0 };
+        }
+        any
+    }
+
+    fn run_engine(&mut self, engine: usize, start: u64, end: u64, limit: usize) -> (usize, bool) {
+        let number = engine / 2;
+        let (direction, stream) = if engine.is_multiple_of(2) {
+            (Direction::Mm2s, self.inputs.get_mut(number))
+        } else {
+            (Direction::S2mm, self.outputs.get_mut(number))
+        };
+        let Some(stream) = stream else { return (0, false) };
+        let mut with =
+            Surroundings { memory: &mut self.memory, log: &mut self.log, moved: &mut self.moved };
+        self.cores[number].run(direction, start, end, limit, stream, &mut with)
+    }
+}

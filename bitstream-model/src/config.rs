@@ -1,0 +1,169 @@
+//! This file says how an emulated board can be built: the choices that a bitstream, a block design
+//! and a device tree fix on a real one.
+
+use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+use crate::interface::profile::{FLOAT, Profile};
+
+/// What the pipeline does when a collision needs a velocity that is still being computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hazards {
+    /// It waits: right, and slow on an unfavourable order.
+    Interlocked,
+    /// It reads the stale velocity, and the later write-back overwrites the earlier one, as in the
+    /// thesis (§5.4.4).
+    Unchecked,
+}
+
+/// What the arithmetic does with subnormal numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Subnormals {
+    /// IEEE 754.
+    Keep,
+    /// Subnormal operands count as zero and results that are subnormal after rounding become zero,
+    /// with their sign, as in the vendor's floating-point operators.
+    Flush,
+}
+
+/// What the memory delivers to all streams together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bandwidth {
+    /// Every stream always has data, as the thesis assumes.
+    Unlimited,
+    /// Bytes per second, reads and writes together.
+    BytesPerSecond(u64),
+}
+
+impl Bandwidth {
+    /// Peak of the ZCU102 preset, DDR4-2133 at 64 bit: 17.07 GB/s.
+    pub const ZCU102_PEAK: Self = Self::BytesPerSecond(17_070_000_000);
+    /// What a published measurement sustains on the ZCU102, about 75 % of the peak: 12.8 GB/s.
+    pub const ZCU102_SUSTAINED: Self = Self::BytesPerSecond(12_800_000_000);
+}
+
+/// Delays and depths of the emulated parts, clock cycles unless said otherwise.
+///
+/// None of them is a property of a real board that somebody measured: they are there so that a
+/// driver meets every intermediate state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Delays {
+    /// A register access by the CPU, ns (AXI-Lite through the HPM port: 100 to 200 ns).
+    pub register_access_ns: u64,
+    /// RS written to Halted following it.
+    pub halt: u64,
+    /// Reset of a DMA core, or of the accelerator, to its end.
+    pub reset: u64,
+    /// First fetch of a descriptor after a doorbell; later ones are fetched ahead.
+    pub descriptor_fetch: u64,
+    /// Depth of the FIFO between a DMA channel and the accelerator, beats.
+    pub fifo_beats: usize,
+}
+
+impl Default for Delays {
+    fn default() -> Self {
+        Self {
+            register_access_ns: 150,
+            halt: 100,
+            reset: 200,
+            descriptor_fetch: 60,
+            fifo_beats: 512,
+        }
+    }
+}
+
+/// How to build an emulated board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BoardConfig {
+    /// The bitstream.
+    pub profile: &'static Profile,
+    /// Behaviour on read-after-write hazards.
+    pub hazards: Hazards,
+    /// Hazard window of both solvers in issue slots, instead of the profile's cycles.
+    pub window_slots: Option<u32>,
+    /// Arithmetic on subnormal numbers.
+    pub subnormals: Subnormals,
+    /// Memory bandwidth.
+    pub bandwidth: Bandwidth,
+    /// Width of the DMA length registers, 8 to 26 bits.
+    pub length_width: u32,
+    /// Width of the DMA's memory addresses, 32 to 64 bits.
+    pub address_width: u32,
+    /// Whether the DMAs have the scatter-gather engine.
+    pub scatter_gather: bool,
+    /// Whether the board goes dead after the first violation, as a test wants it.
+    pub strict: bool,
+    /// Delays and depths.
+    pub delays: Delays,
+}
+
+impl Default for BoardConfig {
+    /// The `float` profile, interlocked, sustained bandwidth of the ZCU102, 26-bit lengths, 40-bit
+    /// addresses, strict.
+    fn default() -> Self {
+        Self {
+            profile: &FLOAT,
+            hazards: Hazards::Interlocked,
+            window_slots: None,
+            subnormals: Subnormals::Keep,
+            bandwidth: Bandwidth::ZCU102_SUSTAINED,
+            length_width: LENGTH_WIDTH_MAX,
+            address_width: 40,
+            scatter_gather: true,
+            strict: true,
+            delays: Delays::default(),
+        }
+    }
+}
+
+/// A board that cannot be built.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// A number outside its range.
+    #[error("{what} is {found}, expected {low} to {high}")]
+    OutOfRange {
+        /// Which number.
+        what: &'static str,
+        /// What was asked for.
+        found: u64,
+        /// Smallest value.
+        low: u64,
+        /// Largest value.
+        high: u64,
+    },
+}
+
+impl BoardConfig {
+    /// Hazard window of one kind of pass, cycles.
+    pub(crate) fn window_cycles(&self, profile_window: u32) -> u64 {
+        match self.window_slots {
+            Some(slots) => u64::from(slots) * u64::from(self.profile.initiation_interval),
+            None => u64::from(profile_window),
+        }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let range = |what, found: u64, low: u64, high: u64| {
+            if (low..=high).contains(&found) {
+                Ok(())
+            } else {
+                Err(ConfigError::OutOfRange { what, found, low, high })
+            }
+        };
+        range(
+            "length register width",
+            self.length_width.into(),
+            LENGTH_WIDTH_MIN.into(),
+            LENGTH_WIDTH_MAX.into(),
+        )?;
+        range("address width", self.address_width.into(), 32, 64)?;
+        // The capability register carries the window in cycles in 16 bits.
+        let slots_max = u64::from(u16::MAX) / u64::from(self.profile.initiation_interval);
+        range("hazard window in slots", self.window_slots.unwrap_or(1).into(), 1, slots_max)?;
+        range("FIFO depth in beats", self.delays.fifo_beats as u64, 16, 1 << 20)?;
+        range("register access time in ns", self.delays.register_access_ns, 1, 1_000_000)?;
+        if let Bandwidth::BytesPerSecond(bytes) = self.bandwidth {
+            range("memory bandwidth in bytes per second", bytes, 1_000_000, 1_000_000_000_000)?;
+        }
+        Ok(())
+    }
+}

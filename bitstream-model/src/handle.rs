@@ -1,0 +1,164 @@
+//! This file gives a board its two handles: what a driver may touch, and what its builder may see.
+
+use std::sync::atomic::AtomicU32;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use crate::board::{Board, Counts};
+use crate::config::{BoardConfig, ConfigError};
+use crate::fault::Fault;
+use crate::interface::record::Beat;
+use crate::memory::{DeviceAccess, MemoryError};
+use crate::violation::Violation;
+
+fn lock(board: &Mutex<Board>) -> MutexGuard<'_, Board> {
+    // A panic elsewhere leaves numbers, never a broken structure.
+    board.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An emulated board, as its builder sees it.
+#[derive(Debug, Clone)]
+pub struct EmulatedBoard(Arc<Mutex<Board>>);
+
+impl EmulatedBoard {
+    /// Builds a board.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if a number is outside its range.
+    pub fn new(config: BoardConfig) -> Result<Self, ConfigError> {
+        config.check()?;
+        Ok(Self(Arc::new(Mutex::new(Board::new(config)))))
+    }
+
+    /// What a driver of this board may touch.
+    #[must_use]
+    pub fn cpu_port(&self) -> CpuPort {
+        CpuPort(Arc::clone(&self.0))
+    }
+
+    /// How the board was built.
+    #[must_use]
+    pub fn config(&self) -> BoardConfig {
+        lock(&self.0).config
+    }
+
+    /// What the driver did wrong, oldest first; the first 64 are kept.
+    #[must_use]
+    pub fn violations(&self) -> Vec<Violation> {
+        lock(&self.0).log.violations().to_vec()
+    }
+
+    /// What has happened so far.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        lock(&self.0).counts()
+    }
+
+    /// Makes the board fail once. A fault of a DMA that does not exist never happens.
+    pub fn inject(&self, fault: Fault) {
+        lock(&self.0).inject(fault);
+    }
+}
+
+/// An emulated board, as the CPU sees it: registers, memory, an interrupt and time.
+#[derive(Debug, Clone)]
+pub struct CpuPort(Arc<Mutex<Board>>);
+
+impl CpuPort {
+    /// Reads the register at a physical address.
+    #[must_use]
+    pub fn read32(&self, address: u64) -> u32 {
+        lock(&self.0).read32(address)
+    }
+
+    /// Writes the register at a physical address.
+    pub fn write32(&self, address: u64, value: u32) {
+        lock(&self.0).write32(address, value);
+    }
+
+    /// Virtual time since the board was built.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        let board = lock(&self.0);
+        let nanoseconds =
+            u128::from(board.now) * 1_000_000 / u128::from(board.config.profile.clock_khz);
+        Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
+    }
+
+    /// Lets virtual time pass.
+    pub fn pause(&self, duration: Duration) {
+        let mut board = lock(&self.0);
+        let until = deadline(&board, duration);
+        board.advance(until, false);
+    }
+
+    /// Waits for the interrupt as a read of a UIO file does: an event masks the line and returns
+    /// the number of events so far; `None` after `timeout`.
+    #[must_use]
+    pub fn wait_interrupt(&self, timeout: Duration) -> Option<u32> {
+        let mut board = lock(&self.0);
+        let until = deadline(&board, timeout);
+        board.advance(until, true);
+        board.interrupt.take()
+    }
+
+    /// Lets the next event through, as a write of 1 to a UIO file does.
+    pub fn unmask_interrupt(&self) {
+        lock(&self.0).interrupt.unmask();
+    }
+
+    /// Allocates contiguous memory for DMA: its bus address, and the beats, which the CPU owns.
+    ///
+    /// # Errors
+    /// [`MemoryError::Exhausted`] if there is no room below the DMA's address limit.
+    pub fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), MemoryError> {
+        lock(&self.0).memory.allocate(beats)
+    }
+
+    /// Allocates memory for descriptors, which both sides may touch at any time.
+    ///
+    /// # Errors
+    /// [`MemoryError::Exhausted`] if there is no room below the DMA's address limit.
+    pub fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), MemoryError> {
+        lock(&self.0).memory.allocate_shared(words)
+    }
+
+    /// Moves a buffer to the device.
+    ///
+    /// # Errors
+    /// [`MemoryError`] if nothing was allocated at `address`, or the CPU does not own it, or its
+    /// length is another.
+    pub fn hand_over(
+        &self,
+        address: u64,
+        beats: Box<[Beat]>,
+        access: DeviceAccess,
+    ) -> Result<(), MemoryError> {
+        lock(&self.0).memory.hand_over(address, beats, access)
+    }
+
+    /// Moves a buffer back to the CPU.
+    ///
+    /// # Errors
+    /// [`MemoryError`] if nothing was allocated at `address`, or the device does not own it.
+    pub fn take_back(&self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
+        lock(&self.0).memory.take_back(address)
+    }
+
+    /// Gives memory back; from then on the device may not touch it.
+    ///
+    /// # Errors
+    /// [`MemoryError::Unknown`] if nothing was allocated at `address`.
+    pub fn release(&self, address: u64) -> Result<(), MemoryError> {
+        lock(&self.0).memory.release(address)
+    }
+}
+
+/// The clock at which a time from now has passed.
+fn deadline(board: &Board, duration: Duration) -> u64 {
+    let cycles = duration
+        .as_nanos()
+        .saturating_mul(board.config.profile.clock_khz.into())
+        .div_ceil(1_000_000);
+    board.now.saturating_add(u64::try_from(cycles).unwrap_or(u64::MAX))
+}

@@ -1,0 +1,312 @@
+//! This file is the board's physical memory: who may touch what, checked on every access.
+//!
+//! Memory for DMA is allocated in ranges. A range of beats belongs to the CPU or to the device. What
+//! the CPU owns is not here at all: handing a buffer over *moves* it into the board, so that an
+//! access of the device to a buffer of the CPU is a decode error by construction. Ranges of words
+//! (descriptors) are shared for good.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::interface::address_map::{DDR_HIGH, DDR_LOW};
+use crate::interface::record::{BEAT_BYTES, Beat};
+
+/// What the device may do with a buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeviceAccess {
+    /// Read it (MM2S).
+    Read,
+    /// Write it (S2MM).
+    Write,
+}
+
+/// A request of the CPU that the memory cannot meet.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MemoryError {
+    /// No room for the range.
+    #[error("no contiguous memory for {bytes} bytes below {limit:#x}")]
+    Exhausted {
+        /// Bytes asked for.
+        bytes: u64,
+        /// The end of the addresses that the DMAs can carry.
+        limit: u64,
+    },
+    /// No range begins there.
+    #[error("no buffer was allocated at {address:#x}")]
+    Unknown {
+        /// The address.
+        address: u64,
+    },
+    /// The range belongs to the other side, or has another length.
+    #[error("the buffer at {address:#x} is not in the state for this: {state}")]
+    State {
+        /// The address.
+        address: u64,
+        /// What it is.
+        state: &'static str,
+    },
+}
+
+/// Why the device may not touch an address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Denied {
+    /// No buffer there.
+    #[error("no buffer is granted there")]
+    Unmapped,
+    /// The access leaves the buffer in which it begins.
+    #[error("it runs past the end of its buffer")]
+    PastEnd,
+    /// The CPU owns the buffer.
+    #[error("the CPU owns the buffer")]
+    CpuOwned,
+    /// The buffer was granted for the other direction.
+    #[error("the buffer was granted for the other direction")]
+    Direction,
+    /// Descriptors where data is expected, or data where descriptors are.
+    #[error("descriptor memory and data buffers are not interchangeable")]
+    Kind,
+}
+
+#[derive(Debug)]
+enum Content {
+    Cpu,
+    Device(Box<[Beat]>, DeviceAccess),
+    Words(Arc<[AtomicU32]>),
+}
+
+#[derive(Debug)]
+struct Region {
+    bytes: u64,
+    content: Content,
+}
+
+/// Ranges are kept apart by this much, so that running off an end meets nothing.
+const GUARD: u64 = 4096;
+
+/// Physical memory.
+#[derive(Debug)]
+pub(crate) struct Memory {
+    regions: BTreeMap<u64, Region>,
+    low: Range<u64>,
+    high: Range<u64>,
+    address_limit: u64,
+    next_is_high: bool,
+}
+
+impl Memory {
+    /// Memory for DMAs with addresses of that many bits.
+    pub(crate) fn new(address_width: u32) -> Self {
+        // The kernel and the rest of the system keep the lower gigabyte of each part.
+        const SYSTEM: u64 = 1 << 30;
+        Self {
+            regions: BTreeMap::new(),
+            low: DDR_LOW.start + SYSTEM..DDR_LOW.end,
+            high: DDR_HIGH.start + SYSTEM..DDR_HIGH.end,
+            address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
+            next_is_high: false,
+        }
+    }
+
+    fn place(&mut self, bytes: u64, content: Content) -> Result<u64, MemoryError> {
+        let take = bytes.next_multiple_of(GUARD) + GUARD;
+        let limit = self.address_limit;
+        let fits = |part: &Range<u64>| part.end - part.start >= take && part.end <= limit;
+        // In turn from both sides of 4 GiB, so that no driver gets by on 32 bits by luck.
+        let use_high = if self.next_is_high { fits(&self.high) } else { !fits(&self.low) };
+        self.next_is_high = !self.next_is_high;
+        let part = if use_high { &mut self.high } else { &mut self.low };
+        if !fits(part) {
+            return Err(MemoryError::Exhausted { bytes, limit });
+        }
+        let address = part.start;
+        part.start += take;
+        self.regions.insert(address, Region { bytes, content });
+        Ok(address)
+    }
+
+    pub(crate) fn allocate(&mut self, beats: usize) -> Result<(u64, Box<[Beat]>), MemoryError> {
+        let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
+        if bytes > DDR_LOW.end {
+            return Err(MemoryError::Exhausted { bytes, limit: self.address_limit });
+        }
+        let address = self.place(bytes, Content::Cpu)?;
+        Ok((address, vec![Beat::default(); beats].into()))
+    }
+
+    pub(crate) fn allocate_shared(
+        &mut self,
+        words: usize,
+    ) -> Result<(u64, Arc<[AtomicU32]>), MemoryError> {
+        let bytes = (words as u64).saturating_mul(4);
+        if bytes > DDR_LOW.end {
+            return Err(MemoryError::Exhausted { bytes, limit: self.address_limit });
+        }
+        let shared: Arc<[AtomicU32]> = (0..words).map(|_| AtomicU32::new(0)).collect();
+        let address = self.place(bytes, Content::Words(Arc::clone(&shared)))?;
+        Ok((address, shared))
+    }
+
+    fn region_at(&mut self, address: u64) -> Result<&mut Region, MemoryError> {
+        self.regions.get_mut(&address).ok_or(MemoryError::Unknown { address })
+    }
+
+    pub(crate) fn hand_over(
+        &mut self,
+        address: u64,
+        beats: Box<[Beat]>,
+        access: DeviceAccess,
+    ) -> Result<(), MemoryError> {
+        let region = self.region_at(address)?;
+        if !matches!(region.content, Content::Cpu) {
+            return Err(MemoryError::State { address, state: "the CPU does not own it" });
+        }
+        if (beats.len() * BEAT_BYTES) as u64 != region.bytes {
+            return Err(MemoryError::State { address, state: "its length is another" });
+        }
+        region.content = Content::Device(beats, access);
+        Ok(())
+    }
+
+    pub(crate) fn take_back(&mut self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
+        let region = self.region_at(address)?;
+        match std::mem::replace(&mut region.content, Content::Cpu) {
+            Content::Device(beats, _) => Ok(beats),
+            other => {
+                region.content = other;
+                Err(MemoryError::State { address, state: "the device does not own it" })
+            }
+        }
+    }
+
+    pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
+        self.regions.remove(&address).map(|_| ()).ok_or(MemoryError::Unknown { address })
+    }
+
+    /// The range that holds `address`, and the offset in it.
+    fn find(&self, address: u64, bytes: u64) -> Result<(&Region, u64), Denied> {
+        let (start, region) = self.regions.range(..=address).next_back().ok_or(Denied::Unmapped)?;
+        let offset = address - start;
+        if offset >= region.bytes {
+            return Err(Denied::Unmapped);
+        }
+        if bytes > region.bytes - offset {
+            return Err(Denied::PastEnd);
+        }
+        Ok((region, offset))
+    }
+
+    /// Beats that the device reads. The address is a multiple of a beat.
+    pub(crate) fn beats(&self, address: u64, count: usize) -> Result<&[Beat], Denied> {
+        let (region, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
+        match &region.content {
+            Content::Cpu => Err(Denied::CpuOwned),
+            Content::Words(_) => Err(Denied::Kind),
+            Content::Device(_, DeviceAccess::Write) => Err(Denied::Direction),
+            Content::Device(beats, DeviceAccess::Read) => {
+                let first = (offset / BEAT_BYTES as u64) as usize;
+                beats.get(first..first + count).ok_or(Denied::PastEnd)
+            }
+        }
+    }
+
+    /// Beats that the device writes. The address is a multiple of a beat.
+    pub(crate) fn beats_mut(&mut self, address: u64, count: usize) -> Result<&mut [Beat], Denied> {
+        let (_, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
+        let (_, region) = self.regions.range_mut(..=address).next_back().ok_or(Denied::Unmapped)?;
+        match &mut region.content {
+            Content::Cpu => Err(Denied::CpuOwned),
+            Content::Words(_) => Err(Denied::Kind),
+            Content::Device(_, DeviceAccess::Read) => Err(Denied::Direction),
+            Content::Device(beats, DeviceAccess::Write) => {
+                let first = (offset / BEAT_BYTES as u64) as usize;
+                beats.get_mut(first..first + count).ok_or(Denied::PastEnd)
+            }
+        }
+    }
+
+    /// Words of a descriptor that the device fetches or updates. The address is a multiple of 4.
+    pub(crate) fn words(&self, address: u64, count: usize) -> Result<&[AtomicU32], Denied> {
+        let (region, offset) = self.find(address, (count * 4) as u64)?;
+        match &region.content {
+            Content::Words(words) => {
+                let first = (offset / 4) as usize;
+                words.get(first..first + count).ok_or(Denied::PastEnd)
+            }
+            _ => Err(Denied::Kind),
+        }
+    }
+
+    pub(crate) fn read_word(&self, address: u64) -> Result<u32, Denied> {
+        Ok(self.words(address, 1)?[0].load(Ordering::Acquire))
+    }
+
+    pub(crate) fn write_word(&self, address: u64, value: u32) -> Result<(), Denied> {
+        self.words(address, 1)?[0].store(value, Ordering::Release);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_buffer_of_the_cpu_is_out_of_the_devices_reach() {
+        let mut memory = Memory::new(40);
+        let (address, beats) = memory.allocate(4).expect("fits");
+        assert_eq!(memory.beats(address, 1).err(), Some(Denied::CpuOwned));
+        memory.hand_over(address, beats, DeviceAccess::Read).expect("the CPU owns it");
+        assert_eq!(memory.beats(address, 4).map(<[Beat]>::len), Ok(4));
+        assert_eq!(memory.beats_mut(address, 1).err(), Some(Denied::Direction));
+        memory.take_back(address).expect("the device owns it");
+        assert_eq!(memory.beats(address, 1).err(), Some(Denied::CpuOwned));
+    }
+
+    #[test]
+    fn one_beat_past_the_end_is_denied() {
+        let mut memory = Memory::new(40);
+        let (address, beats) = memory.allocate(4).expect("fits");
+        memory.hand_over(address, beats, DeviceAccess::Read).expect("the CPU owns it");
+        assert_eq!(memory.beats(address + 48, 2).err(), Some(Denied::PastEnd));
+        assert_eq!(memory.beats(address + 64, 1).err(), Some(Denied::Unmapped));
+        assert_eq!(memory.beats(address - 16, 1).err(), Some(Denied::Unmapped));
+    }
+
+    #[test]
+    fn a_released_buffer_is_gone_and_its_address_is_not_reused() {
+        let mut memory = Memory::new(40);
+        let (address, beats) = memory.allocate(4).expect("fits");
+        memory.hand_over(address, beats, DeviceAccess::Write).expect("the CPU owns it");
+        memory.release(address).expect("it is there");
+        assert_eq!(memory.beats_mut(address, 1).err(), Some(Denied::Unmapped));
+        for _ in 0..8 {
+            assert_ne!(memory.allocate(4).expect("fits").0, address);
+        }
+    }
+
+    #[test]
+    fn buffers_stand_on_both_sides_of_4_gib_unless_addresses_have_32_bits() {
+        let mut memory = Memory::new(40);
+        let addresses: Vec<_> = (0..4).map(|_| memory.allocate(1).expect("fits").0).collect();
+        assert!(addresses.iter().any(|a| *a < 1 << 32) && addresses.iter().any(|a| *a >= 1 << 32));
+        let mut memory = Memory::new(32);
+        assert!((0..4).all(|_| memory.allocate(1).expect("fits").0 < 1 << 32));
+        let too_much = (1_usize << 30) / BEAT_BYTES;
+        assert!(matches!(memory.allocate(too_much), Err(MemoryError::Exhausted { .. })));
+    }
+
+    #[test]
+    fn descriptors_are_shared_and_are_no_data() {
+        let mut memory = Memory::new(40);
+        let (address, words) = memory.allocate_shared(16).expect("fits");
+        words[3].store(7, Ordering::Relaxed);
+        assert_eq!(memory.read_word(address + 12), Ok(7));
+        assert_eq!(memory.beats(address, 1).err(), Some(Denied::Kind));
+        memory.write_word(address + 4, 9).expect("granted");
+        assert_eq!(words[1].load(Ordering::Relaxed), 9);
+    }
+}

@@ -1,0 +1,157 @@
+//! This file is a 128-bit AXI4-Stream with a FIFO: beats, TLAST, back-pressure.
+
+use std::collections::VecDeque;
+
+use crate::interface::record::Beat;
+
+/// A FIFO of beats between a DMA channel and the accelerator.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    ring: Box<[Beat]>,
+    depth: usize,
+    /// Beats taken out and put in since reset.
+    taken: u64,
+    put: u64,
+    /// Beat numbers that carry TLAST, and those with invalid bytes (TKEEP).
+    lasts: VecDeque<u64>,
+    partials: VecDeque<u64>,
+}
+
+impl Stream {
+    pub(crate) fn new(depth: usize) -> Self {
+        Self {
+            ring: vec![Beat::default(); depth.next_power_of_two()].into(),
+            depth,
+            taken: 0,
+            put: 0,
+            lasts: VecDeque::with_capacity(64),
+            partials: VecDeque::new(),
+        }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.taken = 0;
+        self.put = 0;
+        self.lasts.clear();
+        self.partials.clear();
+    }
+
+    /// Beats in the FIFO.
+    pub(crate) fn len(&self) -> usize {
+        // Never more than the depth, which is a usize.
+        (self.put - self.taken) as usize
+    }
+
+    pub(crate) fn space(&self) -> usize {
+        self.depth - self.len()
+    }
+
+    fn slot(&self, number: u64) -> usize {
+        // The ring's length is a power of two that fits a usize.
+        (number & (self.ring.len() as u64 - 1)) as usize
+    }
+
+    /// Puts beats in; there must be space for them.
+    pub(crate) fn push(&mut self, beats: &[Beat]) {
+        assert!(beats.len() <= self.space(), "the sender looks at the space first");
+        let at = self.slot(self.put);
+        let first = beats.len().min(self.ring.len() - at);
+        self.ring[at..at + first].copy_from_slice(&beats[..first]);
+        self.ring[..beats.len() - first].copy_from_slice(&beats[first..]);
+        self.put += beats.len() as u64;
+    }
+
+    /// Marks the newest beat with TLAST.
+    pub(crate) fn mark_last(&mut self) {
+        self.lasts.push_back(self.put - 1);
+    }
+
+    /// Marks the newest beat as having invalid bytes.
+    pub(crate) fn mark_partial(&mut self) {
+        self.partials.push_back(self.put - 1);
+    }
+
+    /// The beat `ahead` places behind the front; it must be in the FIFO.
+    #[inline]
+    pub(crate) fn peek(&self, ahead: usize) -> Beat {
+        debug_assert!(ahead < self.len(), "the receiver looks at the length first");
+        self.ring[self.slot(self.taken + ahead as u64)]
+    }
+
+    /// How far behind the front the next TLAST is.
+    pub(crate) fn next_last(&self) -> Option<usize> {
+        // A mark lies within the FIFO, whose length is a usize.
+        self.lasts.front().map(|number| (number - self.taken) as usize)
+    }
+
+    /// How far behind the front the next beat with invalid bytes is.
+    pub(crate) fn next_partial(&self) -> Option<usize> {
+        self.partials.front().map(|number| (number - self.taken) as usize)
+    }
+
+    /// Takes `beats` beats out, with their marks.
+    pub(crate) fn pop(&mut self, beats: usize) {
+        assert!(beats <= self.len(), "the receiver looks at the length first");
+        self.taken += beats as u64;
+        for marks in [&mut self.lasts, &mut self.partials] {
+            while marks.front().is_some_and(|number| *number < self.taken) {
+                marks.pop_front();
+            }
+        }
+    }
+
+    /// Copies the front beats out and takes them.
+    pub(crate) fn pop_into(&mut self, to: &mut [Beat]) {
+        let at = self.slot(self.taken);
+        let first = to.len().min(self.ring.len() - at);
+        let (head, tail) = to.split_at_mut(first);
+        head.copy_from_slice(&self.ring[at..at + first]);
+        tail.copy_from_slice(&self.ring[..tail.len()]);
+        self.pop(to.len());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beat(number: u32) -> Beat {
+        Beat([number; 4])
+    }
+
+    #[test]
+    fn beats_leave_in_the_order_they_came_across_the_ring_end() {
+        let mut stream = Stream::new(6);
+        let mut next_in = 0;
+        let mut next_out = 0;
+        for round in 0..50_usize {
+            let n = (round % 5) + 1;
+            let n = n.min(stream.space());
+            let beats: Vec<_> = (0..n as u32).map(|i| beat(next_in + i)).collect();
+            next_in += n as u32;
+            stream.push(&beats);
+            let mut out = vec![Beat::default(); stream.len().min(3)];
+            stream.pop_into(&mut out);
+            for got in out {
+                assert_eq!(got, beat(next_out));
+                next_out += 1;
+            }
+        }
+        assert!(next_out > 60);
+    }
+
+    #[test]
+    fn tlast_travels_with_its_beat() {
+        let mut stream = Stream::new(8);
+        stream.push(&[beat(0), beat(1)]);
+        stream.mark_last();
+        stream.push(&[beat(2)]);
+        assert_eq!(stream.next_last(), Some(1));
+        stream.pop(1);
+        assert_eq!(stream.next_last(), Some(0));
+        stream.pop(1);
+        assert_eq!(stream.next_last(), None);
+        assert_eq!(stream.peek(0), beat(2));
+        assert_eq!(stream.space(), 7);
+    }
+}
