@@ -13,6 +13,8 @@ pub(crate) use control::Control;
 pub(crate) use counters::{Counters, StickyError};
 pub use identity::{Capabilities, IdentityError};
 pub(crate) use identity::identify;
+#[cfg(test)]
+pub(crate) use identity::fake;
 
 /// Why the accelerator could not be brought into a state.
 #[derive(Debug, Error)]

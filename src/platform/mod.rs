@@ -26,7 +26,7 @@ pub use uio::{UIO_CLASS, UioMap, UioNode, uio_nodes};
 pub(crate) use wait::{Deadline, poll_until};
 pub(crate) use window::{AccessCounts, RegisterMap, RegisterWindow, Window, fields};
 #[cfg(test)]
-pub(crate) use window::fake;
+pub(crate) use {uio::fake as uio_fake, window::fake};
 
 /// What the device will do with a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
