@@ -166,7 +166,7 @@ mod tests {
             self.next = 0;
         }
 
-        fn is_empty(self) -> bool {
+        fn has_ended(self) -> bool {
             self.channels.into_iter().all(|mut channel| channel.next().is_none())
         }
     }
@@ -240,7 +240,7 @@ mod tests {
                 let [x, y, z] = bits3(body.velocity.angular);
                 prop_assert_eq!(reader.beat(), [x, y, z, 0]);
             }
-            prop_assert!(reader.is_empty());
+            prop_assert!(reader.has_ended());
         }
 
         #[test]
@@ -258,7 +258,7 @@ mod tests {
                 prop_assert_eq!(reader.beat(), [x, y, z, 0]);
                 prop_assert_eq!(reader.beat(), body.pose.orientation.map(f32::to_bits));
             }
-            prop_assert!(reader.is_empty());
+            prop_assert!(reader.has_ended());
         }
 
         #[test]
@@ -287,7 +287,7 @@ mod tests {
                     prop_assert_eq!(reader.beat(), expected);
                 }
             }
-            prop_assert!(reader.is_empty());
+            prop_assert!(reader.has_ended());
         }
 
         #[test]

@@ -168,8 +168,7 @@ mod tests {
             validated(&bodies[..2], &[collision(0, 1), collision(1, 1)]),
             Err(InputError::SelfCollision { collision: 1, body: 1 })
         );
-        let mut parameters = StepParameters::default();
-        parameters.contact_iterations = 256;
+        let parameters = StepParameters { contact_iterations: 256, ..StepParameters::default() };
         assert_eq!(
             validate(&bodies[..2], &[][..], &SHAPES, &parameters, &FLOAT),
             Err(InputError::TooManyIterations { solver: "contact", found: 256 })
