@@ -1,7 +1,7 @@
 //! This file refuses collisions that cannot be solved.
 
 use super::{all_finite, first};
-use crate::scene::{CONTACT_POINTS, Collision, InputError};
+use crate::scene::{CONTACT_POINTS, Collision, Contact, InputError};
 
 /// Checks what a collision says by itself; returns the indices of its two bodies.
 #[inline]
@@ -33,29 +33,35 @@ pub(super) fn check_collision(
     if (length - 1.0).abs() > InputError::NORMAL_TOLERANCE {
         return Err(InputError::NormalLength { collision: index, length });
     }
-    for (ordinal, contact) in collision.contacts[..count].iter().enumerate() {
-        let fields: [(&'static str, &[f32]); 2] =
-            [("point", &contact.point), ("distance", &[contact.distance])];
-        for (field, values) in fields {
-            if !all_finite(values) {
-                let (component, found) = first(values, |value| !value.is_finite());
-                return Err(InputError::ContactNotFinite {
-                    collision: index,
-                    contact: ordinal,
-                    field,
-                    component,
-                    found,
-                });
-            }
-        }
+    // All four points without a branch: counts follow no pattern that could be predicted.
+    let mut finite = true;
+    for (ordinal, Contact { point, distance }) in collision.contacts.iter().enumerate() {
+        finite &= (all_finite(point) & distance.is_finite()) | (ordinal >= count);
+    }
+    if !finite {
+        return Err(contact_not_finite(index, &collision.contacts[..count]));
     }
     Ok(pair)
+}
+
+/// Names the number of these contact points that is known not to be finite.
+#[cold]
+fn contact_not_finite(collision: usize, contacts: &[Contact]) -> InputError {
+    let mut values =
+        contacts.iter().enumerate().flat_map(|(contact, Contact { point, distance })| {
+            let [x, y, z] = *point;
+            [("point", 0, x), ("point", 1, y), ("point", 2, z), ("distance", 0, *distance)]
+                .map(|(field, component, found)| (contact, field, component, found))
+        });
+    let (contact, field, component, found) = values
+        .find(|(.., found)| !found.is_finite())
+        .expect("a number of these contact points was found not to be finite");
+    InputError::ContactNotFinite { collision, contact, field, component, found }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Contact;
 
     const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
     const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
