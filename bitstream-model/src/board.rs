@@ -6,6 +6,7 @@
 use crate::accelerator::Accelerator;
 use crate::axi_dma::{Core, Direction, Moved, Surroundings};
 use crate::bus::{self, Target};
+use crate::cast::index;
 use crate::config::{Bandwidth, BoardConfig};
 use crate::fault::Fault;
 use crate::interface::record::BEAT_BYTES;
@@ -267,8 +268,7 @@ impl Board {
                 // The bandwidth is what holds the engines up: time alone brings progress.
                 return true;
             }
-            // At most a burst.
-            let (moved, changed) = self.run_engine(self.turn, start, end, beats as usize);
+            let (moved, changed) = self.run_engine(self.turn, start, end, index(beats));
             any |= changed;
             self.credit -= moved as u64 * beat_cost;
             self.turn = (self.turn + 1) % engines;

@@ -15,6 +15,8 @@ mod board;
 #[cfg(feature = "emulation")]
 mod bus;
 #[cfg(feature = "emulation")]
+mod cast;
+#[cfg(feature = "emulation")]
 mod config;
 #[cfg(feature = "emulation")]
 mod fault;

@@ -10,6 +10,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use crate::cast::index;
 use crate::interface::address_map::{DDR_HIGH, DDR_LOW};
 use crate::interface::record::{BEAT_BYTES, Beat};
 
@@ -207,7 +208,7 @@ impl Memory {
             Content::Words(_) => Err(Denied::Kind),
             Content::Device(_, DeviceAccess::Write) => Err(Denied::Direction),
             Content::Device(beats, DeviceAccess::Read) => {
-                let first = (offset / BEAT_BYTES as u64) as usize;
+                let first = index(offset / BEAT_BYTES as u64);
                 beats.get(first..first + count).ok_or(Denied::PastEnd)
             }
         }
@@ -222,7 +223,7 @@ impl Memory {
             Content::Words(_) => Err(Denied::Kind),
             Content::Device(_, DeviceAccess::Read) => Err(Denied::Direction),
             Content::Device(beats, DeviceAccess::Write) => {
-                let first = (offset / BEAT_BYTES as u64) as usize;
+                let first = index(offset / BEAT_BYTES as u64);
                 beats.get_mut(first..first + count).ok_or(Denied::PastEnd)
             }
         }
@@ -233,15 +234,11 @@ impl Memory {
         let (region, offset) = self.find(address, (count * 4) as u64)?;
         match &region.content {
             Content::Words(words) => {
-                let first = (offset / 4) as usize;
+                let first = index(offset / 4);
                 words.get(first..first + count).ok_or(Denied::PastEnd)
             }
             _ => Err(Denied::Kind),
         }
-    }
-
-    pub(crate) fn read_word(&self, address: u64) -> Result<u32, Denied> {
-        Ok(self.words(address, 1)?[0].load(Ordering::Acquire))
     }
 
     pub(crate) fn write_word(&self, address: u64, value: u32) -> Result<(), Denied> {
@@ -304,7 +301,8 @@ mod tests {
         let mut memory = Memory::new(40);
         let (address, words) = memory.allocate_shared(16).expect("fits");
         words[3].store(7, Ordering::Relaxed);
-        assert_eq!(memory.read_word(address + 12), Ok(7));
+        let third = memory.words(address + 12, 1).expect("granted");
+        assert_eq!(third[0].load(Ordering::Relaxed), 7);
         assert_eq!(memory.beats(address, 1).err(), Some(Denied::Kind));
         memory.write_word(address + 4, 9).expect("granted");
         assert_eq!(words[1].load(Ordering::Relaxed), 9);

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use crate::cast::index;
 use crate::interface::record::Beat;
 
 /// A FIFO of beats between a DMA channel and the accelerator.
@@ -38,8 +39,7 @@ impl Stream {
 
     /// Beats in the FIFO.
     pub(crate) fn len(&self) -> usize {
-        // Never more than the depth, which is a usize.
-        (self.put - self.taken) as usize
+        index(self.put - self.taken)
     }
 
     pub(crate) fn space(&self) -> usize {
@@ -47,8 +47,7 @@ impl Stream {
     }
 
     fn slot(&self, number: u64) -> usize {
-        // The ring's length is a power of two that fits a usize.
-        (number & (self.ring.len() as u64 - 1)) as usize
+        index(number & (self.ring.len() as u64 - 1))
     }
 
     /// Puts beats in; there must be space for them.
@@ -80,13 +79,12 @@ impl Stream {
 
     /// How far behind the front the next TLAST is.
     pub(crate) fn next_last(&self) -> Option<usize> {
-        // A mark lies within the FIFO, whose length is a usize.
-        self.lasts.front().map(|number| (number - self.taken) as usize)
+        self.lasts.front().map(|number| index(number - self.taken))
     }
 
     /// How far behind the front the next beat with invalid bytes is.
     pub(crate) fn next_partial(&self) -> Option<usize> {
-        self.partials.front().map(|number| (number - self.taken) as usize)
+        self.partials.front().map(|number| index(number - self.taken))
     }
 
     /// Takes `beats` beats out, with their marks.
@@ -125,10 +123,9 @@ mod tests {
         let mut next_in = 0;
         let mut next_out = 0;
         for round in 0..50_usize {
-            let n = (round % 5) + 1;
-            let n = n.min(stream.space());
-            let beats: Vec<_> = (0..n as u32).map(|i| beat(next_in + i)).collect();
-            next_in += n as u32;
+            let n = stream.space().min((round % 5) + 1);
+            let beats: Vec<_> = (next_in..).take(n).map(beat).collect();
+            next_in += u32::try_from(n).expect("at most 5");
             stream.push(&beats);
             let mut out = vec![Beat::default(); stream.len().min(3)];
             stream.pop_into(&mut out);

@@ -1,5 +1,37 @@
-//! The accelerator's control block.
+//! The accelerator's control block: identity, arguments, shape table, counters.
 
+mod control;
+mod counters;
 mod identity;
+mod shapes;
 
-pub use identity::Capabilities;
+use thiserror::Error;
+
+use crate::platform::PlatformError;
+
+pub(crate) use control::Control;
+pub(crate) use counters::{Counters, StickyError};
+pub use identity::{Capabilities, IdentityError};
+pub(crate) use identity::identify;
+#[cfg(test)]
+pub(crate) use identity::fake;
+
+/// Why the accelerator could not be brought into a state.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ControlError {
+    /// A register reads all ones.
+    #[error("the control block reads all ones: is the bitstream still loaded and its clock running?")]
+    Gone,
+    /// The reset did not end in time.
+    #[error("the accelerator was expected to be out of reset within {limit:?}, RESET reads {found:#010x}")]
+    Reset {
+        /// How long.
+        limit: std::time::Duration,
+        /// What the register reads.
+        found: u32,
+    },
+    /// Its registers could not be reached.
+    #[error(transparent)]
+    Platform(#[from] PlatformError),
+}

@@ -1,9 +1,16 @@
 //! One step, from the caller's bodies to the caller's bodies.
 
 mod board;
+mod completion;
+mod device;
+mod fault;
+mod lane;
+mod plan;
+mod recovery;
 mod report;
 mod solver;
 
 pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
+pub use fault::{Fault, RegisterDump};
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
 pub use solver::Accelerator;

@@ -16,7 +16,9 @@ pub struct StepCycles {
     pub waits: u64,
 }
 
-/// Host time of a step, by phase, on the platform's clock (virtual on the emulated board).
+/// Host time of a step, by phase, on the host's clock.
+///
+/// With the emulated board, `wait` is the time that the emulation takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct HostTimes {
     /// Checking the input.

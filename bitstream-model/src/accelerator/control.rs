@@ -1,5 +1,6 @@
 //! This file holds the registers of the control block and what reading and writing them does.
 
+use crate::cast::{high, low, register};
 use crate::config::{BoardConfig, Hazards, Subnormals};
 use crate::interface::control::{
     ANGULAR_DAMPING, AP_CTRL, BODIES, BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY,
@@ -140,7 +141,7 @@ impl Registers {
                 time_step,
                 angular_damping: self.number(ANGULAR_DAMPING.offset),
                 gravity: [GRAVITY_X, GRAVITY_Y, GRAVITY_Z]
-                    .map(|register| self.number(register.offset)),
+                    .map(|argument| self.number(argument.offset)),
             },
         }
     }
@@ -159,8 +160,7 @@ impl Registers {
     /// Sets the sticky error; the first one stays.
     pub(super) fn fail(&mut self, code: ErrorCode, channel: usize, detail: u32) {
         if self.error == 0 {
-            // Eight streams at most.
-            self.error = error::CHANNEL.put(code as u32, channel as u32);
+            self.error = error::CHANNEL.put(code as u32, register(channel));
             self.error_detail = detail;
         }
         self.raise(irq::ERROR.mask());
@@ -193,20 +193,17 @@ impl Registers {
         resetting: bool,
     ) -> Option<u32> {
         let profile = config.profile;
-        // Streams are few and their widths small: what is counted here fits its field.
         let widths = |streams: &[u32]| {
             streams
                 .iter()
                 .enumerate()
-                .fold(0, |value, (k, bits)| value | ((bits / 8).ilog2() << (4 * k as u32)))
+                .fold(0, |value, (k, bits)| value | ((bits / 8).ilog2() << (4 * register(k))))
         };
         let pipeline = |kind: Depth| {
-            // The check of the configuration keeps a window below 2^16 cycles.
-            let window = config.window_cycles(kind.window) as u32;
+            let window = register(config.window_cycles(kind.window));
             depth::WINDOW.put(depth::FILL.put(0, kind.fill), window)
         };
         let counters = &self.counters;
-        let saturated = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
         let memory = profile.memory;
         if let Some((index, at)) = self.shape_at(offset) {
             let shape = self.shapes[index];
@@ -234,8 +231,8 @@ impl Registers {
                         .put(0, u32::from(config.subnormals == Subnormals::Flush))
             }
             _ if offset == CHANNELS.offset => {
-                let mm2s = profile.mm2s_widths.len() as u32;
-                let s2mm = profile.s2mm_widths.len() as u32;
+                let mm2s = register(profile.mm2s_widths.len());
+                let s2mm = register(profile.s2mm_widths.len());
                 channels::S2MM.put(channels::MM2S.put(0, mm2s), s2mm)
             }
             _ if offset == MM2S_WIDTHS.offset => widths(profile.mm2s_widths),
@@ -259,16 +256,15 @@ impl Registers {
                 .put(dma::LENGTH_WIDTH.put(0, config.length_width), config.address_width),
             _ if offset == ERROR.offset => self.error,
             _ if offset == ERROR_DETAIL.offset => self.error_detail,
-            // Halves of 64-bit counters; the casts cut on purpose.
-            _ if offset == CYCLES_LO.offset => counters.cycles as u32,
-            _ if offset == CYCLES_HI.offset => (counters.cycles >> 32) as u32,
-            _ if offset == STALL_CYCLES.offset => saturated(counters.stalls),
-            _ if offset == WAIT_CYCLES.offset => saturated(counters.waits),
-            _ if offset == HAZARDS.offset => saturated(counters.hazards),
+            _ if offset == CYCLES_LO.offset => low(counters.cycles),
+            _ if offset == CYCLES_HI.offset => high(counters.cycles),
+            _ if offset == STALL_CYCLES.offset => register(counters.stalls),
+            _ if offset == WAIT_CYCLES.offset => register(counters.waits),
+            _ if offset == HAZARDS.offset => register(counters.hazards),
             _ if offset == SUM_RECEIVED.offset => counters.sum_received,
             _ if offset == SUM_SENT.offset => counters.sum_sent,
-            _ if offset == IMPULSE_SUM_LO.offset => counters.impulse_sum as u32,
-            _ if offset == IMPULSE_SUM_HI.offset => (counters.impulse_sum >> 32) as u32,
+            _ if offset == IMPULSE_SUM_LO.offset => low(counters.impulse_sum),
+            _ if offset == IMPULSE_SUM_HI.offset => high(counters.impulse_sum),
             _ if offset == RESET.offset => u32::from(resetting),
             _ => return None,
         })

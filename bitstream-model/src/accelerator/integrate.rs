@@ -65,6 +65,7 @@ pub(super) fn integrate<N: Number>(
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "the expected values are exact")]
 mod tests {
     use super::super::number::Keep;
     use super::*;

@@ -17,6 +17,7 @@ mod segment;
 mod solver;
 mod vector;
 
+use crate::cast::register;
 use crate::config::{BoardConfig, Hazards, Subnormals};
 use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, IMPULSE_SUM_FRACTION_BITS,
@@ -56,6 +57,12 @@ enum Phase {
     /// The last results are on their way out.
     Ending,
     Failed,
+}
+
+/// The integer part, toward zero and stopped at the ends, as the accumulator takes it.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+fn to_fixed(value: f64) -> u64 {
+    value as u64
 }
 
 /// What [`Accelerator::run`] did.
@@ -283,8 +290,7 @@ impl Accelerator {
             return;
         }
         if needed > u64::from(memory.bytes) {
-            let needed = u32::try_from(needed).unwrap_or(u32::MAX);
-            self.fail(ErrorCode::Capacity, 0, needed);
+            self.fail(ErrorCode::Capacity, 0, register(needed));
             return;
         }
         let bodies = arguments.bodies as usize;
@@ -335,8 +341,7 @@ impl Accelerator {
                 return Err(PacketError {
                     code: ErrorCode::ShapeIndex,
                     channel: 0,
-                    // Below the body capacity.
-                    beat: body as u32,
+                    beat: register(body),
                 });
             };
             self.velocities[body] = velocity;
@@ -468,9 +473,8 @@ impl Accelerator {
             if pass + 1 == contacts {
                 let sum = f64::from(solver::normal_sum::<N>(impulses));
                 let unit = f64::from(1_u32 << IMPULSE_SUM_FRACTION_BITS);
-                // Rounds toward zero and stops at the ends, as the accumulator does.
-                let fixed = (sum * unit) as u64;
-                self.counters.impulse_sum = self.counters.impulse_sum.saturating_add(fixed);
+                self.counters.impulse_sum =
+                    self.counters.impulse_sum.saturating_add(to_fixed(sum * unit));
             }
         } else {
             if pass == contacts {
@@ -500,8 +504,7 @@ impl Accelerator {
         collision: &Collision,
         sides: [usize; 2],
     ) -> Result<[Mass; 2], PacketError> {
-        // Below the memory's capacity.
-        let error = |code| PacketError { code, channel: 0, beat: index as u32 };
+        let error = |code| PacketError { code, channel: 0, beat: register(index) };
         if collision.count > CONTACT_POINTS {
             return Err(error(ErrorCode::ContactCount));
         }

@@ -7,6 +7,7 @@
 //! are no hazard.
 
 use super::solver::Velocity;
+use crate::cast::index;
 use crate::config::Hazards;
 
 /// A write-back that is under way.
@@ -82,9 +83,8 @@ impl Pipeline {
             // Slots of the previous pass lie at least a window back.
             self.slot_base += 1;
             let depth = self.depth() * self.per_issue;
-            // A window is some hundred slots.
             self.under_way.clear();
-            self.under_way.resize(depth as usize, WriteBack::default());
+            self.under_way.resize(index(depth), WriteBack::default());
         }
     }
 
@@ -124,7 +124,7 @@ impl Pipeline {
 
     fn retire_to(&mut self, due: u64, velocities: &mut [Velocity]) {
         while self.retired < due.min(self.collisions) {
-            let slot = (self.retired % self.under_way.len() as u64) as usize;
+            let slot = index(self.retired % self.under_way.len() as u64);
             let entry = self.under_way[slot];
             for side in 0..2 {
                 if entry.moving[side] {
@@ -158,7 +158,7 @@ impl Pipeline {
     }
 
     fn put(&mut self, write_back: WriteBack) {
-        let at = (self.collisions % self.under_way.len() as u64) as usize;
+        let at = index(self.collisions % self.under_way.len() as u64);
         self.under_way[at] = write_back;
         self.collisions += 1;
     }

@@ -1,6 +1,7 @@
 //! This file reads one segment of beats from the streams: which stream the next beat is on, how many
 //! whole records have arrived, and whether TLAST comes where it must.
 
+use crate::cast::register;
 use crate::interface::control::ErrorCode;
 use crate::interface::record::Beat;
 use crate::stream::Stream;
@@ -103,8 +104,7 @@ impl Segment {
             let packet = self.beats_after(self.records, k);
             let now = self.beats_after(self.done + records, k) - self.taken[k];
             let ends = now > 0 && self.taken[k] + now == packet;
-            // A packet's length is below 2^32 beats, being below the memory's size.
-            let error = |code, beat| PacketError { code, channel: k, beat: beat as u32 };
+            let error = |code, beat| PacketError { code, channel: k, beat: register(beat) };
             match stream.next_last() {
                 Some(last) if last < now && !(ends && last == now - 1) => {
                     return Err(error(ErrorCode::TlastEarly, self.taken[k] + last));

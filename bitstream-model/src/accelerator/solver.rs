@@ -146,8 +146,8 @@ pub(super) fn contact<N: Number>(
     let per_second = N::new(1.0) / N::new(parameters.time_step);
     let drift = N::new(parameters.drift);
     let coefficient = N::new(parameters.coefficient);
-    for i in 0..collision.count {
-        let [x, y, z, distance] = collision.contacts[i];
+    let contacts = &collision.contacts[..collision.count];
+    for ([x, y, z, distance], impulse) in contacts.iter().copied().zip(impulses) {
         let point = Vec3::<N>::new([x, y, z]);
         let row = Row::new(n, point - position_a, point - position_b, &a, &b);
         if row.jacobian.is_zero() {
@@ -155,9 +155,9 @@ pub(super) fn contact<N: Number>(
         }
         let bias = ((N::new(distance) + drift) * coefficient) * per_second;
         let wanted = (row.speed(&a, &b) + bias) * row.jacobian;
-        let before = N::new(impulses[i]);
+        let before = N::new(*impulse);
         let after = (before + wanted).larger(N::new(0.0));
-        impulses[i] = after.value();
+        *impulse = after.value();
         row.apply(after - before, &mut a, &mut b);
     }
     *velocities = [a.velocity(), b.velocity()];
@@ -223,6 +223,7 @@ pub(super) fn friction<N: Number>(
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "the expected values are exact")]
 mod tests {
     use super::super::number::Keep;
     use super::*;

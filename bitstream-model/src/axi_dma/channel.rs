@@ -1,6 +1,7 @@
 //! This file holds the registers of one DMA channel and what reading and writing them does.
 
 use super::{Build, Direction};
+use crate::cast::{high, low, register};
 use crate::interface::axi_dma::{
     ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, TAILDESC,
     TAILDESC_MSB, dmacr, dmasr,
@@ -116,7 +117,7 @@ impl Channel {
     }
 
     pub(super) fn has(&self, at: u32) -> bool {
-        CHANNEL_REGISTERS.iter().any(|register| register.offset == at)
+        CHANNEL_REGISTERS.iter().any(|row| row.offset == at)
     }
 
     fn status(&self, build: &Build) -> u32 {
@@ -128,17 +129,13 @@ impl Channel {
         match self.delay_until {
             Some(until) => {
                 let ticks = until.saturating_sub(self.time).div_ceil(DELAY_TICK).min(255);
-                // At most 255, checked in the line above.
-                dmasr::IRQ_DELAY_STS.put(value, ticks as u32)
+                dmasr::IRQ_DELAY_STS.put(value, register(ticks))
             }
             None => value,
         }
     }
 
     pub(super) fn read(&self, build: &Build, at: u32) -> Option<u32> {
-        // Halves of 64-bit addresses; the casts cut on purpose.
-        let low = |value: u64| value as u32;
-        let high = |value: u64| (value >> 32) as u32;
         Some(match at {
             _ if at == DMACR.offset => self.control,
             _ if at == DMASR.offset => self.status(build),
@@ -166,7 +163,7 @@ impl Channel {
             if build.address_width >= 64 { u64::MAX } else { (1_u64 << build.address_width) - 1 };
         let set_low = |old: u64, mask: u32| (old & !0xFFFF_FFFF) | u64::from(value & mask);
         let set_high = |old: u64| ((old & 0xFFFF_FFFF) | (u64::from(value) << 32)) & high_mask;
-        let descriptor_mask = !(descriptor::BYTES as u32 - 1);
+        let descriptor_mask = !(register(descriptor::BYTES) - 1);
         let mut doorbell = false;
         match at {
             _ if at == DMACR.offset => self.write_control(build, now, value, log),

@@ -5,6 +5,7 @@
 
 use super::channel::{Channel, Descriptor, Work};
 use super::{Build, Direction, Surroundings};
+use crate::cast::register;
 use crate::interface::axi_dma::{dmacr, dmasr};
 use crate::interface::descriptor::{
     self, BUFFER, BUFFER_MSB, BYTES, CONTROL, FETCHED_WORDS, NXTDESC, NXTDESC_MSB, STATUS, status,
@@ -15,6 +16,7 @@ use crate::stream::Stream;
 use crate::violation::ViolationKind;
 use std::sync::atomic::Ordering;
 
+#[expect(clippy::cast_possible_truncation, reason = "it is 16")]
 const BEAT: u32 = BEAT_BYTES as u32;
 const KEYHOLE_BEATS: usize = 1;
 
@@ -66,8 +68,7 @@ impl Channel {
                     self.time += n as u64;
                     bd.rxsof |= !self.in_packet;
                     self.in_packet = true;
-                    // A portion never exceeds what is left, which is a u32.
-                    bd.moved += left.min((n * BEAT_BYTES) as u32);
+                    bd.moved += left.min(register(n * BEAT_BYTES));
                     self.work = Work::Descriptor(bd);
                     if ended || bd.moved == bd.length {
                         self.complete(build, bd, ended, with);
@@ -97,7 +98,7 @@ impl Channel {
                     };
                     moved += n;
                     self.time += n as u64;
-                    let done = done + left.min((n * BEAT_BYTES) as u32);
+                    let done = done + left.min(register(n * BEAT_BYTES));
                     self.work = Work::Direct { moved: done };
                     if ended {
                         if self.direction == Direction::S2mm {

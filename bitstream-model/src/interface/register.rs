@@ -43,6 +43,9 @@ impl Field {
     }
 
     /// `width` bits from `lsb` upward.
+    ///
+    /// # Panics
+    /// If the bits do not lie within 32; the rows are constants, so that it is a compile error.
     #[must_use]
     pub const fn bits(name: &'static str, lsb: u32, width: u32, access: Access) -> Self {
         assert!(width >= 1 && lsb + width <= 32, "a field lies inside 32 bits");
