@@ -87,7 +87,10 @@ pub(crate) fn parse(
             !common && is_argument && given()
         });
         if let Some(id) = stray {
-            let message = format!("--{id} belongs behind the verb: pgs {verb} --{id} ...", id = id.as_str().replace('_', "-"));
+            let message = format!(
+                "--{id} belongs behind the verb: pgs {verb} --{id} ...",
+                id = id.as_str().replace('_', "-")
+            );
             return Err(command.error(clap::error::ErrorKind::ArgumentConflict, message));
         }
     }
@@ -111,7 +114,12 @@ mod tests {
 
     #[test]
     fn run_is_the_default_verb_with_its_options() {
-        for line in ["pgs --steps 5", "pgs run --steps 5", "pgs --json --steps 5", "pgs --json run --steps 5"] {
+        for line in [
+            "pgs --steps 5",
+            "pgs run --steps 5",
+            "pgs --json --steps 5",
+            "pgs --json run --steps 5",
+        ] {
             let command = parsed(line).expect(line);
             assert!(matches!(command.verb, Verb::Run(RunArgs { steps: 5, .. })), "{line}");
         }
@@ -130,7 +138,10 @@ mod tests {
     #[test]
     fn options_of_run_before_another_verb_are_refused() {
         assert_eq!(parsed("pgs --steps 5 list").expect_err("stray"), ErrorKind::ArgumentConflict);
-        assert_eq!(parsed("pgs --hazards unchecked solve x").expect_err("stray"), ErrorKind::ArgumentConflict);
+        assert_eq!(
+            parsed("pgs --hazards unchecked solve x").expect_err("stray"),
+            ErrorKind::ArgumentConflict
+        );
     }
 
     #[test]

@@ -53,18 +53,20 @@ pub(crate) fn open(name: BoardName, build: &BuildArgs) -> Result<Opened, Failure
     }
     if let Some(option) = build.given() {
         let error = format!("{option} says how to build an emulated board, this one is real");
-        return Err(Failure::input(error).next(format!("leave out {option}, or add --board emulated")));
+        return Err(
+            Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
+        );
     }
     let board = BoardChoice::Uio { node: UIO_NODE.to_owned() };
     Ok(Opened { accelerator: accelerator(board)?, observer: None, reason })
 }
 
 fn accelerator(board: BoardChoice) -> Result<Accelerator, Failure> {
-    let mut options = OpenOptions::default();
-    options.board = board;
+    let options = OpenOptions { board, ..OpenOptions::default() };
     Accelerator::open(options).map_err(|error| {
-        Failure::new(Cause::NoBoard, error)
-            .next("see what there is with `pgs list`, or use the emulated board with --board emulated")
+        Failure::new(Cause::NoBoard, error).next(
+            "see what there is with `pgs list`, or use the emulated board with --board emulated",
+        )
     })
 }
 
@@ -74,11 +76,10 @@ impl Opened {
         if error.is_input() {
             return Failure::input(error);
         }
-        let next = if error.must_reopen() {
-            "the board could not be brought back: run the command again, and load the bitstream \
-             again if that does not help"
+        let next = if error.may_retry() {
+            "run the command again"
         } else {
-            "the board was brought back and nothing was changed: run the command again"
+            "run the command again; load the bitstream anew if that does not help"
         };
         let violations = self.observer.as_ref().map(EmulatedBoard::violations).unwrap_or_default();
         let seen: String = violations.iter().map(|violation| format!("\n{violation}")).collect();

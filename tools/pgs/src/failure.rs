@@ -71,11 +71,6 @@ impl Failure {
         self
     }
 
-    #[cfg(test)]
-    pub(crate) fn cause(&self) -> Cause {
-        self.cause
-    }
-
     fn is_closed_pipe(&self) -> bool {
         let io = self.error.downcast_ref::<io::Error>();
         self.cause == Cause::Output && io.is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)

@@ -12,9 +12,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
-use zynq_pgs::{
-    Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity,
-};
+use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 
 use crate::npy::{self, Dimensions, Element, NpyError};
 
@@ -58,18 +56,45 @@ pub(crate) struct Folder {
     pub(crate) parameters: StepParameters,
 }
 
-/// The state of all bodies, one array a property.
-pub(crate) const RESULTS: [(&str, usize); 4] =
-    [("out_pos.npy", 3), ("out_quat.npy", 4), ("out_linvel.npy", 3), ("out_angvel.npy", 3)];
+/// A property of a body that a step changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum State {
+    Position,
+    Orientation,
+    Linear,
+    Angular,
+}
 
-/// The numbers of all bodies that one of [`RESULTS`] consists of.
-pub(crate) fn result<'a>(bodies: &'a [Body], name: &str) -> Box<dyn Iterator<Item = f32> + 'a> {
-    match name {
-        "out_pos.npy" => Box::new(bodies.iter().flat_map(|body| body.pose.position)),
-        "out_quat.npy" => Box::new(bodies.iter().flat_map(|body| body.pose.orientation)),
-        "out_linvel.npy" => Box::new(bodies.iter().flat_map(|body| body.velocity.linear)),
-        "out_angvel.npy" => Box::new(bodies.iter().flat_map(|body| body.velocity.angular)),
-        _ => unreachable!("RESULTS has no other names"),
+impl State {
+    pub(crate) const ALL: [Self; 4] =
+        [Self::Position, Self::Orientation, Self::Linear, Self::Angular];
+
+    /// The array of a folder that holds it after the step.
+    pub(crate) const fn file(self) -> &'static str {
+        match self {
+            Self::Position => "out_pos.npy",
+            Self::Orientation => "out_quat.npy",
+            Self::Linear => "out_linvel.npy",
+            Self::Angular => "out_angvel.npy",
+        }
+    }
+
+    /// Numbers a body.
+    pub(crate) const fn width(self) -> usize {
+        match self {
+            Self::Orientation => 4,
+            Self::Position | Self::Linear | Self::Angular => 3,
+        }
+    }
+
+    /// The numbers of all bodies.
+    pub(crate) fn of(self, bodies: &[Body]) -> Box<dyn Iterator<Item = f32> + '_> {
+        match self {
+            Self::Position => Box::new(bodies.iter().flat_map(|body| body.pose.position)),
+            Self::Orientation => Box::new(bodies.iter().flat_map(|body| body.pose.orientation)),
+            Self::Linear => Box::new(bodies.iter().flat_map(|body| body.velocity.linear)),
+            Self::Angular => Box::new(bodies.iter().flat_map(|body| body.velocity.angular)),
+        }
     }
 }
 
@@ -98,8 +123,7 @@ impl Folder {
     pub(crate) fn load(path: &Path) -> Result<Self, NpyError> {
         let one = |name: &str, n| npy::read::<f32>(&path.join(name), &Dimensions(vec![n]));
         let (_, params) = one(PARAMS, Some(8))?;
-        let (_, iterations) =
-            npy::read::<u32>(&path.join(ITERATIONS), &Dimensions(vec![Some(2)]))?;
+        let (_, iterations) = npy::read::<u32>(&path.join(ITERATIONS), &Dimensions(vec![Some(2)]))?;
 
         let positions: Vec<[f32; 3]> = rows(path, BODY_POSITION, None)?;
         let n = Some(positions.len());
@@ -119,8 +143,7 @@ impl Folder {
 
         let pairs: Vec<[u32; 2]> = rows(path, COLLISION_BODIES, None)?;
         let m = Some(pairs.len());
-        let (_, counts) =
-            npy::read::<u32>(&path.join(COLLISION_COUNT), &Dimensions(vec![m]))?;
+        let (_, counts) = npy::read::<u32>(&path.join(COLLISION_COUNT), &Dimensions(vec![m]))?;
         let normals: Vec<[f32; 3]> = rows(path, COLLISION_NORMAL, m)?;
         let shape = Dimensions(vec![m, Some(CONTACT_POINTS), Some(4)]);
         let (_, points) = npy::read::<f32>(&path.join(COLLISION_POINTS), &shape)?;
@@ -189,14 +212,14 @@ fn distinct(
     (shapes, first_bodies, shape_of)
 }
 
-/// Writes the state of all bodies as the four arrays of [`RESULTS`].
+/// Writes the state of all bodies as the four arrays of [`State`].
 pub(crate) fn write_results(path: &Path, bodies: &[Body]) -> Result<(), NpyError> {
     std::fs::create_dir_all(path).map_err(|error| NpyError {
         path: path.to_path_buf(),
         problem: npy::Problem::Write(error),
     })?;
-    for (name, width) in RESULTS {
-        npy::write(&path.join(name), &[bodies.len(), width], result(bodies, name))?;
+    for state in State::ALL {
+        npy::write(&path.join(state.file()), &[bodies.len(), state.width()], state.of(bodies))?;
     }
     Ok(())
 }
@@ -212,6 +235,6 @@ mod tests {
         let (shapes, first_bodies, shape_of) = distinct(&masses, &inertias);
         assert_eq!(shape_of, [0, 1, 2, 1, 3]);
         assert_eq!(first_bodies, [0, 1, 2, 4]);
-        assert_eq!(shapes[3].inverse_inertia, [1.5, 1.5, 2.0]);
+        assert_eq!(shapes[3].inverse_inertia.map(f32::to_bits), [1.5, 1.5, 2.0].map(f32::to_bits));
     }
 }

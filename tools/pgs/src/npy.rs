@@ -13,7 +13,7 @@
 //! Written here because the crate `npyz` brings a parser generator and a type system for records,
 //! of which two element types are needed.
 //!
-//! Source: NEP 1, "A Simple File Format for NumPy Arrays".
+//! Source: NEP 1, "A Simple File Format for `NumPy` Arrays".
 
 use std::fmt;
 use std::fs::File;
@@ -58,14 +58,18 @@ impl Element for u32 {
     }
 }
 
-/// A shape, written as NumPy writes it; a dimension that may have any length is `*`.
+/// A shape, written as `NumPy` writes it; a dimension that may have any length is `*`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Dimensions(pub(crate) Vec<Option<usize>>);
 
 impl Dimensions {
     fn fit(&self, shape: &[usize]) -> bool {
         self.0.len() == shape.len()
-            && self.0.iter().zip(shape).all(|(expected, found)| expected.is_none_or(|e| e == *found))
+            && self
+                .0
+                .iter()
+                .zip(shape)
+                .all(|(expected, found)| expected.is_none_or(|e| e == *found))
     }
 }
 
@@ -109,7 +113,9 @@ pub(crate) enum Problem {
     FortranOrder,
     #[error("expected shape {expected}, found {found}")]
     Shape { expected: Dimensions, found: Dimensions },
-    #[error("expected {expected} bytes of data by its shape {shape}, found {found}: is it cut off?")]
+    #[error(
+        "expected {expected} bytes of data by its shape {shape}, found {found}: is it cut off?"
+    )]
     Length { shape: Dimensions, expected: u128, found: u64 },
 }
 
@@ -348,7 +354,10 @@ mod tests {
         bytes
     }
 
-    fn decoded<T: Element>(bytes: &[u8], expected: &Dimensions) -> Result<(usize, Vec<T>), Problem> {
+    fn decoded<T: Element>(
+        bytes: &[u8],
+        expected: &Dimensions,
+    ) -> Result<(usize, Vec<T>), Problem> {
         decode(bytes, bytes.len() as u64, expected)
     }
 

@@ -79,7 +79,9 @@ pub(crate) fn bandwidth(text: &str) -> Result<Bandwidth, String> {
         return Ok(Bandwidth::Unlimited);
     }
     let wrong = || {
-        format!("expected a number of GB/s from {BANDWIDTH_MIN} to {BANDWIDTH_MAX}, or \"unlimited\"")
+        format!(
+            "expected a number of GB/s from {BANDWIDTH_MIN} to {BANDWIDTH_MAX}, or \"unlimited\""
+        )
     };
     let number: f64 = text.parse().map_err(|_| wrong())?;
     if !(BANDWIDTH_MIN..=BANDWIDTH_MAX).contains(&number) {

@@ -1,6 +1,5 @@
 //! This file says which array of a folder the driver complains about.
 
-use std::error::Error;
 use std::path::Path;
 
 use thiserror::Error;
@@ -23,18 +22,11 @@ pub(crate) struct Located {
 
 /// Names the array, and for a shape the first body that has it.
 pub(crate) fn locate(source: zynq_pgs::Error, folder: &Folder) -> Located {
-    let place = input_error(&source).map_or_else(
-        || folder.path.display().to_string(),
-        |input| place(input, &folder.path, &folder.shape_bodies),
-    );
+    let place = match &source {
+        zynq_pgs::Error::Input(input) => place(input, &folder.path, &folder.shape_bodies),
+        _ => folder.path.display().to_string(),
+    };
     Located { place, source }
-}
-
-fn input_error(error: &zynq_pgs::Error) -> Option<&InputError> {
-    match error {
-        zynq_pgs::Error::Input(input) => Some(input),
-        other => other.source()?.downcast_ref(),
-    }
 }
 
 fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {

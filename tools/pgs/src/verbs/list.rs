@@ -30,7 +30,9 @@ fn obstacle(node: &UioNode) -> Option<String> {
         return Some("another device".to_owned());
     }
     if !node.maps.iter().any(|map| map.name == UIO_CONTROL_MAP) {
-        return Some(format!("no map named {UIO_CONTROL_MAP:?}: is this the accelerator's overlay?"));
+        return Some(format!(
+            "no map named {UIO_CONTROL_MAP:?}: is this the accelerator's overlay?"
+        ));
     }
     let path = Path::new("/dev").join(&node.device);
     let error = OpenOptions::new().read(true).write(true).open(&path).err()?;

@@ -63,9 +63,8 @@ impl Estimate {
         step: &StepShape,
         bandwidths: &[Bandwidth],
     ) -> Self {
-        let time = |bandwidth: &Bandwidth| {
-            (*bandwidth, StepTime::new(profile, words, step, *bandwidth))
-        };
+        let time =
+            |bandwidth: &Bandwidth| (*bandwidth, StepTime::new(profile, words, step, *bandwidth));
         Self {
             format,
             cycles: StepCycles::new(profile, words, step),

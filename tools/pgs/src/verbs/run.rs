@@ -159,8 +159,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let options =
-        SceneOptions { grid: args.grid, drop: args.drop, inertia: args.inertia.into() };
+    let options = SceneOptions { grid: args.grid, drop: args.drop, inertia: args.inertia.into() };
     let mut opened = board::open(common.board, &args.build)?;
     check_size(args.grid, &opened)?;
     let mut scene = Scene::new(&options).map_err(Failure::input)?;

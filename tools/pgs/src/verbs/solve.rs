@@ -1,7 +1,7 @@
 //! The verb `solve`: one step from a folder of arrays, and its comparison with expected arrays.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use scene::kinetic_energy;
@@ -16,7 +16,7 @@ use crate::board;
 use crate::compare::{self, Difference};
 use crate::digest;
 use crate::failure::{Failure, Verdict};
-use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, RESULTS};
+use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use crate::npy::{self, Dimensions};
 use crate::options::BuildArgs;
 use crate::origin;
@@ -42,7 +42,7 @@ pub(crate) struct SolveArgs {
     /// Folder of .npy arrays.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Write out_pos, out_quat, out_linvel and out_angvel to this folder.
+    /// Write the results as arrays to this folder: `out_pos`, `out_quat`, `out_linvel`, `out_angvel`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Compare bit by bit with the folder's own results; exit code 1 on a difference. With
@@ -88,8 +88,8 @@ struct Expected {
 }
 
 enum Kind {
-    /// One of [`RESULTS`].
-    State(&'static str),
+    /// One property.
+    State(State),
     /// Linear and angular velocities in turn.
     Velocities,
 }
@@ -100,8 +100,9 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let mut folder = Folder::load(&args.folder)
-        .map_err(|error| Failure::input(error).next("`pgs solve --help` lists the arrays of a folder"))?;
+    let mut folder = Folder::load(&args.folder).map_err(|error| {
+        Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
+    })?;
     let parameters = args.parameters(&folder.parameters);
     let expected = match args.compare {
         true => expected(&folder, &parameters)?,
@@ -161,7 +162,10 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
     let all_contact = contact == own.contact_iterations;
     let n = folder.bodies.len();
     if parameters.integrate && all_contact && friction == own.friction_iterations {
-        return RESULTS.into_iter().map(|(name, width)| state(folder, name, name, n, width)).collect();
+        return State::ALL
+            .into_iter()
+            .map(|property| state(folder, property.file(), property))
+            .collect();
     }
     let (name, passes, pass) = if !parameters.integrate
         && friction == 0
@@ -200,31 +204,25 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
         Expected { name: format!("{name}[{}]", pass - 1), values, kind: Kind::Velocities };
     Ok(vec![
         velocities,
-        state(folder, BODY_POSITION, "out_pos.npy", n, 3)?,
-        state(folder, BODY_ORIENTATION, "out_quat.npy", n, 4)?,
+        state(folder, BODY_POSITION, State::Position)?,
+        state(folder, BODY_ORIENTATION, State::Orientation)?,
     ])
 }
 
-/// The array in `file`, which the property that `result` names must equal.
-fn state(
-    folder: &Folder,
-    file: &str,
-    result: &'static str,
-    n: usize,
-    width: usize,
-) -> Result<Expected, Failure> {
-    let path: &Path = &folder.path.join(file);
-    let shape = Dimensions(vec![Some(n), Some(width)]);
+/// The array in `file`, which that property must equal after the step.
+fn state(folder: &Folder, file: &str, property: State) -> Result<Expected, Failure> {
+    let path = &folder.path.join(file);
+    let shape = Dimensions(vec![Some(folder.bodies.len()), Some(property.width())]);
     let (_, values) = npy::read::<f32>(path, &shape).map_err(Failure::input)?;
     compare::check(path, &values).map_err(Failure::input)?;
-    Ok(Expected { name: file.to_owned(), values, kind: Kind::State(result) })
+    Ok(Expected { name: file.to_owned(), values, kind: Kind::State(property) })
 }
 
 fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
     expected
         .iter()
         .map(|Expected { name, values, kind }| match kind {
-            Kind::State(result) => compare::compare(name, folder::result(bodies, result), values),
+            Kind::State(property) => compare::compare(name, property.of(bodies), values),
             Kind::Velocities => compare::compare(name, folder::velocities(bodies), values),
         })
         .collect()
