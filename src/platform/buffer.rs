@@ -56,8 +56,7 @@ impl Allocation {
         bytes: u64,
         address_width: u32,
     ) -> Result<Self, PlatformError> {
-        let this =
-            Self { platform: Arc::clone(platform), address, bytes, owner: Owner::Cpu };
+        let this = Self { platform: Arc::clone(platform), address, bytes, owner: Owner::Cpu };
         let reachable = match 1u64.checked_shl(address_width) {
             Some(end) => address.checked_add(bytes).is_some_and(|last| last <= end),
             None => address.checked_add(bytes).is_some(),

@@ -295,10 +295,7 @@ impl Accelerator {
 
 fn finite(pose: &Pose, velocity: &Velocity) -> bool {
     let all = |numbers: &[f32]| numbers.iter().all(|number| number.is_finite());
-    all(&pose.position)
-        && all(&pose.orientation)
-        && all(&velocity.linear)
-        && all(&velocity.angular)
+    all(&pose.position) && all(&pose.orientation) && all(&velocity.linear) && all(&velocity.angular)
 }
 
 /// Host time by laps.
