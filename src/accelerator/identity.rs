@@ -109,7 +109,7 @@ pub enum IdentityError {
     },
 }
 
-/// Stream width of 128 bits in MM2S_WIDTHS and S2MM_WIDTHS: log2(16 bytes).
+/// Stream width of 128 bits in `MM2S_WIDTHS` and `S2MM_WIDTHS`: log2(16 bytes).
 const WIDTH_128: u32 = 4;
 
 /// Reads and checks what a bitstream says of itself. Only reads.

@@ -10,7 +10,7 @@ use bitstream_model::interface::{axi_dma, control};
 use super::PlatformError;
 
 /// One register region of a board: aligned 32-bit accesses inside `bytes`.
-pub(crate) trait RegisterWindow: fmt::Debug + Send {
+pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
     /// Length of the region, bytes.
     fn bytes(&self) -> u64;
     /// One read; `at` is a multiple of 4 inside the region.

@@ -149,10 +149,12 @@ fn bodies_without_collisions_and_collisions_without_passes_are_steps_too() {
     let report = accelerator.step(&mut one, &none[..], &parameters).expect("one body falls");
     assert_eq!((report.doorbells, report.descriptors), (1 + 4 + 2, 4 + 4));
     assert!(one[0].velocity.linear[1] < bodies[1].velocity.linear[1]);
-    let mut parameters = StepParameters::default();
-    parameters.contact_iterations = 0;
-    parameters.friction_iterations = 0;
-    parameters.integrate = false;
+    let parameters = StepParameters {
+        contact_iterations: 0,
+        friction_iterations: 0,
+        integrate: false,
+        ..StepParameters::default()
+    };
     let before = bits(&bodies);
     accelerator.step(&mut bodies, &collisions, &parameters).expect("no passes");
     assert_eq!(bits(&bodies), before, "nothing solved, nothing integrated");
@@ -425,8 +427,8 @@ fn a_board_that_is_no_board_any_more_must_be_opened_again() {
 fn a_deadline_that_is_too_short_says_what_was_awaited() {
     let (_, mut accelerator) = open(BoardConfig::default());
     let (mut bodies, collisions) = scene(20);
-    let mut parameters = StepParameters::default();
-    parameters.deadline = Some(Duration::from_nanos(1));
+    let deadline = Some(Duration::from_nanos(1));
+    let parameters = StepParameters { deadline, ..StepParameters::default() };
     let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("no time");
     let Error::Step { fault, .. } = &error else { panic!("{error}") };
     let text = fault.to_string();
