@@ -2,6 +2,7 @@
 //!
 //! The emulated board is asked for nothing on the heap either: what is counted is everything that
 //! happens during the call.
+#![cfg(feature = "emulation")]
 #![allow(unsafe_code, reason = "an allocator that counts is an unsafe trait")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
