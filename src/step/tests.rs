@@ -1,7 +1,7 @@
 //! Whole steps on the emulated board, which goes dead at the first thing that the driver does wrong.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bitstream_model::interface::control::ErrorCode;
@@ -245,8 +245,33 @@ struct BadlyWired {
     /// Flips this bit of the first word of the next buffer that goes to, or comes from, the device.
     flip_going: AtomicU32,
     flip_coming: AtomicU32,
-    /// Waits for the interrupt so far.
-    waits: AtomicU64,
+    /// Every register write: region (the control block is 4), offset.
+    writes: Writes,
+}
+
+type Writes = Arc<Mutex<Vec<(usize, u32)>>>;
+
+/// A register region that notes what is written.
+#[derive(Debug)]
+struct Noted {
+    inner: Box<dyn RegisterWindow>,
+    region: usize,
+    writes: Writes,
+}
+
+impl RegisterWindow for Noted {
+    fn bytes(&self) -> u64 {
+        self.inner.bytes()
+    }
+
+    fn read32(&self, at: u32) -> u32 {
+        self.inner.read32(at)
+    }
+
+    fn write32(&self, at: u32, value: u32) {
+        self.writes.lock().expect("no test panics with the lock").push((self.region, at));
+        self.inner.write32(at, value);
+    }
 }
 
 impl BadlyWired {
@@ -256,7 +281,7 @@ impl BadlyWired {
             deaf: AtomicBool::default(),
             flip_going: AtomicU32::default(),
             flip_coming: AtomicU32::default(),
-            waits: AtomicU64::default(),
+            writes: Writes::default(),
         })
     }
 
@@ -278,11 +303,13 @@ impl BadlyWired {
 
 impl Platform for BadlyWired {
     fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        self.inner.dma_window(core)
+        let (inner, writes) = (self.inner.dma_window(core)?, Arc::clone(&self.writes));
+        Ok(Box::new(Noted { inner, region: core, writes }))
     }
 
     fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        self.inner.control_window()
+        let (inner, writes) = (self.inner.control_window()?, Arc::clone(&self.writes));
+        Ok(Box::new(Noted { inner, region: 4, writes }))
     }
 
     fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), PlatformError> {
@@ -324,7 +351,6 @@ impl Platform for BadlyWired {
     }
 
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
-        self.waits.fetch_add(1, Ordering::Relaxed);
         if !self.deaf.load(Ordering::Relaxed) {
             return self.inner.wait_interrupt(timeout);
         }
@@ -360,6 +386,21 @@ fn without_interrupts_steps_are_found_by_looking_and_soon_more_often() {
     let report = step(&mut accelerator, 20).0.expect("a step");
     assert_eq!((report.interrupts, report.register_reads + report.register_writes), (1, 38));
     assert_eq!(board.violations(), []);
+}
+
+#[test]
+fn receivers_start_before_the_accelerator_and_it_before_the_senders() {
+    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+    let wired = BadlyWired::new(&board);
+    let mut accelerator = wired.open();
+    step(&mut accelerator, 20).0.expect("the first step");
+    wired.writes.lock().expect("unpoisoned").clear();
+    step(&mut accelerator, 20).0.expect("a step");
+    // Low word, then the upper word, which starts; last the acknowledgement of the completion.
+    let tails = |low, high| (0..4).flat_map(move |core| [(core, low), (core, high)]);
+    let expected: Vec<_> =
+        tails(0x40, 0x44).chain([(4, 0x00)]).chain(tails(0x10, 0x14)).chain([(3, 0x34)]).collect();
+    assert_eq!(*wired.writes.lock().expect("unpoisoned"), expected);
 }
 
 #[test]
