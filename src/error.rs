@@ -142,17 +142,6 @@ pub enum OpenError {
     Emulation(#[from] bitstream_model::ConfigError),
 }
 
-macro_rules! opening {
-    ($($source:ty),*) => {
-        $(impl From<$source> for Error {
-            fn from(source: $source) -> Self {
-                Self::Open(source.into())
-            }
-        })*
-    };
-}
-opening!(PlatformError, IdentityError, DmaError, ControlError);
-
 #[cfg(test)]
 mod tests {
     use super::*;

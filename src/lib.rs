@@ -1,4 +1,4 @@
-//! Userspace driver for an FPGA Projected Gauss-Seidel accelerator on the Zynq UltraScale+.
+//! Userspace driver for an FPGA Projected Gauss-Seidel accelerator on the Zynq `UltraScale+`.
 //!
 //! ```text
 //! caller -> records -> beats -> channels -> device -> results -> caller

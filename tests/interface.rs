@@ -159,6 +159,7 @@ fn control_registers_stand_at_their_published_offsets() {
     assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 0));
     assert_eq!(control::VERSION.reset, 0x0001_0000);
     assert_eq!(control::IMPULSE_SUM_FRACTION_BITS, 20);
+    assert_eq!(control::ITERATIONS_MAX, 255);
 }
 
 #[test]

@@ -25,12 +25,7 @@ impl fmt::Display for StickyError {
             Some(known) => write!(f, "{}", known.describe())?,
             None => f.write_str("a code that this driver does not know")?,
         }
-        write!(
-            f,
-            " (code {code}, stream {}, detail {})",
-            error::CHANNEL.of(self.raw),
-            self.detail
-        )
+        write!(f, " (code {code}, stream {}, detail {})", error::CHANNEL.of(self.raw), self.detail)
     }
 }
 
@@ -67,8 +62,7 @@ impl Control {
         let cycles = wide(self.read(&CYCLES_HI), low);
         let stalls = self.read(&STALL_CYCLES);
         let waits = self.read(&WAIT_CYCLES);
-        let sums =
-            capabilities.checksums.then(|| (self.read(&SUM_RECEIVED), self.read(&SUM_SENT)));
+        let sums = capabilities.checksums.then(|| (self.read(&SUM_RECEIVED), self.read(&SUM_SENT)));
         let impulse_sum = capabilities.impulse_sum.then(|| {
             let low = self.read(&IMPULSE_SUM_LO);
             impulse(wide(self.read(&IMPULSE_SUM_HI), low))

@@ -96,7 +96,9 @@ pub enum IdentityError {
         found: u32,
     },
     /// A capability register that makes no sense, or asks for something that this driver cannot do.
-    #[error("{register} is {found:#010x}, expected {expected}: the bitstream is not one for this driver")]
+    #[error(
+        "{register} is {found:#010x}, expected {expected}: the bitstream is not one for this driver"
+    )]
     Capability {
         /// Which register.
         register: &'static str,
@@ -107,7 +109,7 @@ pub enum IdentityError {
     },
 }
 
-/// Stream width of 128 bits in MM2S_WIDTHS and S2MM_WIDTHS: log2(16 bytes).
+/// Stream width of 128 bits in `MM2S_WIDTHS` and `S2MM_WIDTHS`: log2(16 bytes).
 const WIDTH_128: u32 = 4;
 
 /// Reads and checks what a bitstream says of itself. Only reads.
@@ -142,10 +144,12 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let interval = checked(window, &ISSUE, "an interval and a number above 0", |word| {
         issue::INTERVAL.of(word) > 0 && issue::COLLISIONS.of(word) > 0
     })?;
-    let shape_capacity =
-        checked(window, &SHAPE_CAPACITY, "1 to as many as the control block has room for", |word| {
-            (1..=(CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE).contains(&word)
-        })?;
+    let shape_capacity = checked(
+        window,
+        &SHAPE_CAPACITY,
+        "1 to as many as the control block has room for",
+        |word| (1..=(CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE).contains(&word),
+    )?;
     let widths = checked(window, &DMA, "length 8 to 26 bits, addresses 32 to 64 bits", |word| {
         (LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&dma::LENGTH_WIDTH.of(word))
             && (32..=64).contains(&dma::ADDRESS_WIDTH.of(word))
@@ -202,7 +206,6 @@ fn checked(
 pub(crate) mod fake {
     //! The capability registers of a well-formed bitstream.
 
-    use super::*;
     use crate::platform::fake::FakeRegisters;
 
     /// Fills in the registers of the profile `float`, typed out from the specification.

@@ -10,21 +10,25 @@ use thiserror::Error;
 use crate::platform::PlatformError;
 
 pub(crate) use control::Control;
-pub(crate) use counters::{Counters, StickyError};
-pub use identity::{Capabilities, IdentityError};
-pub(crate) use identity::identify;
+pub(crate) use counters::Counters;
 #[cfg(test)]
 pub(crate) use identity::fake;
+pub(crate) use identity::identify;
+pub use identity::{Capabilities, IdentityError};
 
 /// Why the accelerator could not be brought into a state.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ControlError {
     /// A register reads all ones.
-    #[error("the control block reads all ones: is the bitstream still loaded and its clock running?")]
+    #[error(
+        "the control block reads all ones: is the bitstream still loaded and its clock running?"
+    )]
     Gone,
     /// The reset did not end in time.
-    #[error("the accelerator was expected to be out of reset within {limit:?}, RESET reads {found:#010x}")]
+    #[error(
+        "the accelerator was expected to be out of reset within {limit:?}, RESET reads {found:#010x}"
+    )]
     Reset {
         /// How long.
         limit: std::time::Duration,

@@ -35,9 +35,6 @@ mod tests {
         let mut control = Control::new(registers.window(RegisterMap::Control));
         control.load_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 1.5)]);
         let second: Vec<_> = registers.with(|state| state.writes[4..].to_vec());
-        assert_eq!(
-            second,
-            [(0x410, 0x3F80_0000), (0x414, 0x3FC0_0000), (0x418, 0), (0x41C, 0)]
-        );
+        assert_eq!(second, [(0x410, 0x3F80_0000), (0x414, 0x3FC0_0000), (0x418, 0), (0x41C, 0)]);
     }
 }

@@ -58,7 +58,9 @@ pub enum DmaError {
         found: String,
     },
     /// The core was built without scatter-gather.
-    #[error("{channel} was built without scatter-gather (status {found}): build the bitstream with it")]
+    #[error(
+        "{channel} was built without scatter-gather (status {found}): build the bitstream with it"
+    )]
     NoScatterGather {
         /// Which channel.
         channel: String,

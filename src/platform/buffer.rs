@@ -1,9 +1,9 @@
 //! This file keeps DMA memory in the hands of either the CPU or the device, by type.
 //!
 //! ```text
-//! CpuBuffer --to_device--> DeviceBuffer     no slice of it exists, only bus addresses
+//! CpuBuffer --into_device--> DeviceBuffer     no slice of it exists, only bus addresses
 //!     ^                        |
-//!     +-------- to_cpu --------+            once the device has finished with it
+//!     +------- into_cpu -------+            once the device has finished with it
 //! ```
 //!
 //! A dropped [`CpuBuffer`] is freed. A dropped [`DeviceBuffer`] is not: the device may still reach
@@ -56,8 +56,7 @@ impl Allocation {
         bytes: u64,
         address_width: u32,
     ) -> Result<Self, PlatformError> {
-        let this =
-            Self { platform: Arc::clone(platform), address, bytes, owner: Owner::Cpu };
+        let this = Self { platform: Arc::clone(platform), address, bytes, owner: Owner::Cpu };
         let reachable = match 1u64.checked_shl(address_width) {
             Some(end) => address.checked_add(bytes).is_some_and(|last| last <= end),
             None => address.checked_add(bytes).is_some(),
@@ -124,7 +123,7 @@ impl CpuBuffer {
     }
 
     /// Gives the buffer to the device.
-    pub(crate) fn to_device(self, access: Access) -> Result<DeviceBuffer, PlatformError> {
+    pub(crate) fn into_device(self, access: Access) -> Result<DeviceBuffer, PlatformError> {
         let Self { beats, mut allocation } = self;
         release_to_device();
         allocation.owner = Owner::Device;
@@ -148,7 +147,7 @@ impl DeviceBuffer {
 
     /// Takes the buffer back. Only for a buffer whose descriptors are all complete, or whose core
     /// was reset.
-    pub(crate) fn to_cpu(self) -> Result<CpuBuffer, PlatformError> {
+    pub(crate) fn into_cpu(self) -> Result<CpuBuffer, PlatformError> {
         let Self { mut allocation } = self;
         let beats = allocation.platform.take_back(allocation.address)?;
         allocation.owner = Owner::Cpu;
@@ -217,9 +216,9 @@ mod tests {
         let (fake, platform) = platform();
         let mut buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
         buffer.beats_mut()[3] = Beat([1, 2, 3, 4]);
-        let device = buffer.to_device(Access::Read).expect("handed over");
+        let device = buffer.into_device(Access::Read).expect("handed over");
         assert_eq!(fake.device.lock().expect("unpoisoned").len(), 1);
-        let back = device.to_cpu().expect("handed over before");
+        let back = device.into_cpu().expect("handed over before");
         assert_eq!(back.beats()[3], Beat([1, 2, 3, 4]));
         drop(back);
         assert_eq!(*fake.released.lock().expect("unpoisoned"), [0x8_0000_0000]);
@@ -229,7 +228,7 @@ mod tests {
     fn a_buffer_dropped_with_the_device_is_not_freed() {
         let (fake, platform) = platform();
         let buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
-        drop(buffer.to_device(Access::Write).expect("handed over"));
+        drop(buffer.into_device(Access::Write).expect("handed over"));
         assert!(fake.released.lock().expect("unpoisoned").is_empty());
     }
 
@@ -237,7 +236,7 @@ mod tests {
     fn an_address_outside_the_buffer_cannot_be_made() {
         let (_, platform) = platform();
         let buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
-        let device = buffer.to_device(Access::Read).expect("handed over");
+        let device = buffer.into_device(Access::Read).expect("handed over");
         let address = device.range(16, 48).expect("inside");
         assert_eq!((address.low(), address.high()), (16, 8));
         assert!(matches!(device.range(16, 49), Err(PlatformError::OutOfBuffer { .. })));

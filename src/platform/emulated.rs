@@ -86,9 +86,11 @@ impl Platform for EmulatedPlatform {
             Access::Read => DeviceAccess::Read,
             Access::Write => DeviceAccess::Write,
         };
-        self.port
-            .hand_over(address, beats, access)
-            .map_err(refused("hand over", "address", address))
+        self.port.hand_over(address, beats, access).map_err(refused(
+            "hand over",
+            "address",
+            address,
+        ))
     }
 
     fn take_back(&self, address: u64) -> Result<Box<[Beat]>, PlatformError> {

@@ -32,7 +32,8 @@ impl MappedWindow {
             .open(path)
             .map_err(|source| error("open", source))?;
         let invalid = || {
-            let text = format!("a region of {bytes} bytes at {start} is not one of 32-bit registers");
+            let text =
+                format!("a region of {bytes} bytes at {start} is not one of 32-bit registers");
             error("map", std::io::Error::new(std::io::ErrorKind::InvalidData, text))
         };
         let length = start.checked_add(bytes).ok_or_else(invalid)?;
@@ -89,13 +90,12 @@ mod tests {
     #[test]
     fn registers_are_the_little_endian_words_of_the_mapping() {
         let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
-        let page: Vec<u8> = (0..4096u32).map(|k| u8::try_from(k % 251).expect("below 251")).collect();
+        let page: Vec<u8> =
+            (0..4096u32).map(|k| u8::try_from(k % 251).expect("below 251")).collect();
         file.write_all(&page).expect("written");
         let window = MappedWindow::open(file.path(), 0, 0x100, 0x40).expect("mapped");
         assert_eq!(window.bytes(), 0x40);
-        let word = |at: usize| {
-            u32::from_le_bytes(page[at..at + 4].try_into().expect("four bytes"))
-        };
+        let word = |at: usize| u32::from_le_bytes(page[at..at + 4].try_into().expect("four bytes"));
         assert_eq!(window.read32(0), word(0x100));
         assert_eq!(window.read32(0x3C), word(0x13C));
         window.write32(8, 0x0403_0201);

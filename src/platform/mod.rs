@@ -113,7 +113,9 @@ pub enum PlatformError {
         buffer_bytes: u64,
     },
     /// A register region is too short.
-    #[error("register region {region} has {found} bytes, at least {expected} are needed: is this the device tree of the bitstream?")]
+    #[error(
+        "register region {region} has {found} bytes, at least {expected} are needed: is this the device tree of the bitstream?"
+    )]
     ShortRegion {
         /// Name of the region.
         region: String,

@@ -130,8 +130,11 @@ fn numbered(directory: &Path, prefix: &str) -> Result<Vec<(u32, PathBuf)>, Platf
 }
 
 fn read(path: &Path) -> Result<String, PlatformError> {
-    let text = fs::read_to_string(path)
-        .map_err(|source| PlatformError::File { act: "read", path: path.to_owned(), source })?;
+    let text = fs::read_to_string(path).map_err(|source| PlatformError::File {
+        act: "read",
+        path: path.to_owned(),
+        source,
+    })?;
     Ok(text.trim().to_owned())
 }
 

@@ -10,7 +10,7 @@ use bitstream_model::interface::{axi_dma, control};
 use super::PlatformError;
 
 /// One register region of a board: aligned 32-bit accesses inside `bytes`.
-pub(crate) trait RegisterWindow: fmt::Debug + Send {
+pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
     /// Length of the region, bytes.
     fn bytes(&self) -> u64;
     /// One read; `at` is a multiple of 4 inside the region.
@@ -66,13 +66,12 @@ impl RegisterMap {
     }
 
     fn register(self, at: u32) -> Option<(&'static str, Register)> {
-        let find = |rows: &[Register], offset| rows.iter().find(|row| row.offset == offset).copied();
+        let find =
+            |rows: &[Register], offset| rows.iter().find(|row| row.offset == offset).copied();
         match self {
             Self::Control => find(control::REGISTERS, at).map(|row| ("", row)),
             Self::Dma(_) => match at.checked_sub(axi_dma::S2MM_OFFSET) {
-                Some(offset) => {
-                    find(&axi_dma::CHANNEL_REGISTERS, offset).map(|row| (" S2MM", row))
-                }
+                Some(offset) => find(&axi_dma::CHANNEL_REGISTERS, offset).map(|row| (" S2MM", row)),
                 None => find(&axi_dma::CHANNEL_REGISTERS, at).map(|row| (" MM2S", row)),
             },
         }
@@ -133,11 +132,6 @@ impl Window {
             });
         }
         Ok(Self { registers, map, counts })
-    }
-
-    /// Which region this is.
-    pub(crate) fn map(&self) -> RegisterMap {
-        self.map
     }
 
     fn check(&self, at: u32) {
@@ -236,7 +230,8 @@ pub(crate) mod fake {
 
     impl FakePlatform {
         fn address(&self, bytes: usize) -> u64 {
-            0x8_0000_0000 + self.next.fetch_add(bytes.next_multiple_of(64) as u64, Ordering::Relaxed)
+            0x8_0000_0000
+                + self.next.fetch_add(bytes.next_multiple_of(64) as u64, Ordering::Relaxed)
         }
     }
 

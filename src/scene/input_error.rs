@@ -289,5 +289,5 @@ impl InputError {
     /// How far from 1 a normal's length may be.
     pub const NORMAL_TOLERANCE: f32 = 1e-3;
     /// Passes of each solver that a step takes.
-    pub const MAX_ITERATIONS: u32 = 255;
+    pub const MAX_ITERATIONS: u32 = bitstream_model::interface::control::ITERATIONS_MAX;
 }

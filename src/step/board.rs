@@ -167,10 +167,8 @@ mod tests {
 
     /// A system with the nodes `fabric` and `pgs`, whose control block says what `describe` makes it.
     fn system_with(describe: impl Fn(&FakeRegisters)) -> (tempfile::TempDir, tempfile::TempDir) {
-        let (class, dev) = (
-            tempfile::tempdir().expect("a directory"),
-            tempfile::tempdir().expect("a directory"),
-        );
+        let (class, dev) =
+            (tempfile::tempdir().expect("a directory"), tempfile::tempdir().expect("a directory"));
         uio_fake::add_node(class.path(), 0, "fabric");
         uio_fake::add_node(class.path(), 1, "pgs");
         let registers = FakeRegisters::default();

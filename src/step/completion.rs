@@ -137,7 +137,8 @@ impl Device {
         let mut next = 0;
         let ended = poll_until(&**platform, &grace, || {
             // Lanes that were complete are not looked at again.
-            for place in next..s2mm.len() + mm2s.len() {
+            while next < s2mm.len() + mm2s.len() {
+                let place = next;
                 let (lane, expected) = match s2mm.get_mut(place) {
                     Some(lane) => (lane, Some(bytes(plan.results(place)))),
                     None => (&mut mm2s[place - s2mm.len()], None),
@@ -155,7 +156,7 @@ impl Device {
                 if ended.is_some() {
                     return Some(ended);
                 }
-                next = place + 1;
+                next += 1;
             }
             Some(None)
         });

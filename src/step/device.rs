@@ -14,7 +14,7 @@ use crate::axi_dma::{
     Channel, Direction, DmaError, Dmacr, Dmasr, detect_length_width, largest_piece, reset_core,
 };
 use crate::error::OpenError;
-use crate::platform::{AccessCounts, Access, Platform, RegisterMap, Window, release_to_device};
+use crate::platform::{Access, AccessCounts, Platform, RegisterMap, Window, release_to_device};
 use crate::scene::StepParameters;
 
 /// Status registers of all channels: S2MM first, then MM2S.
@@ -43,11 +43,8 @@ impl Device {
         length_width: Option<u32>,
     ) -> Result<Self, OpenError> {
         let counts = Arc::<AccessCounts>::default();
-        let window = Window::new(
-            platform.control_window()?,
-            RegisterMap::Control,
-            Arc::clone(&counts),
-        )?;
+        let window =
+            Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;
         let mut capabilities = identify(&window)?;
         if let Some(found) = length_width {
             if !(LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&found) {
@@ -73,8 +70,7 @@ impl Device {
             mm2s.push(Lane::new(sender, Access::Read, Dmacr::RUNNING));
             // The last beat of the results goes to the last channel: its completion is the step's.
             let completion = core + 1 == cores;
-            let running =
-                if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
+            let running = if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
             s2mm.push(Lane::new(receiver, Access::Write, running));
         }
         control.reset(&*platform)?;
@@ -119,11 +115,7 @@ impl Device {
     }
 
     /// Hands the buffers over, queues all descriptors, and starts; the number of doorbells.
-    pub(super) fn start(
-        &mut self,
-        plan: &Plan,
-        parameters: &StepParameters,
-    ) -> Result<u64, Fault> {
+    pub(super) fn start(&mut self, plan: &Plan, parameters: &StepParameters) -> Result<u64, Fault> {
         let largest = self.largest;
         for (channel, lane) in self.s2mm.iter_mut().enumerate() {
             lane.hand_over()?;
@@ -206,8 +198,7 @@ impl Device {
         // Every core is tried, even if one does not come back: the others stop moving data.
         let mut result = Ok(());
         for (sender, receiver) in self.mm2s.iter_mut().zip(&mut self.s2mm) {
-            let reset =
-                reset_core(&*self.platform, &mut sender.channel, &mut receiver.channel);
+            let reset = reset_core(&*self.platform, &mut sender.channel, &mut receiver.channel);
             result = result.and(reset);
         }
         result?;
@@ -252,9 +243,8 @@ impl Drop for Device {
                 continue;
             }
             let stopped = sender.stop(&**platform).and_then(|()| receiver.stop(&**platform));
-            let stopped = stopped.or_else(|_| {
-                reset_core(&**platform, &mut sender.channel, &mut receiver.channel)
-            });
+            let stopped = stopped
+                .or_else(|_| reset_core(&**platform, &mut sender.channel, &mut receiver.channel));
             for lane in [sender, receiver] {
                 if let Err(error) = &stopped {
                     log::error!("a channel could not be stopped: {error}");

@@ -14,7 +14,9 @@ use crate::platform::PlatformError;
 #[non_exhaustive]
 pub enum Fault {
     /// A DMA channel stopped with an error.
-    #[error("{channel} stopped with {status} at the descriptor at {descriptor:#x}; all channels: {registers}")]
+    #[error(
+        "{channel} stopped with {status} at the descriptor at {descriptor:#x}; all channels: {registers}"
+    )]
     Dma {
         /// Which channel.
         channel: String,
@@ -46,7 +48,9 @@ pub enum Fault {
         registers: RegisterDump,
     },
     /// Nothing happened in time.
-    #[error("{awaited} did not come within {limit:?}: give the step a longer deadline, or look at what the channels wait for: {registers}")]
+    #[error(
+        "{awaited} did not come within {limit:?}: give the step a longer deadline, or look at what the channels wait for: {registers}"
+    )]
     Deadline {
         /// What was awaited.
         awaited: &'static str,
@@ -56,7 +60,9 @@ pub enum Fault {
         registers: RegisterDump,
     },
     /// Words were changed on the way.
-    #[error("the words {direction} add up to {found:#010x}, expected {expected:#010x}: memory or a stream is corrupt")]
+    #[error(
+        "the words {direction} add up to {found:#010x}, expected {expected:#010x}: memory or a stream is corrupt"
+    )]
     Checksum {
         /// "to the accelerator" or "from the accelerator".
         direction: &'static str,
@@ -76,7 +82,9 @@ pub enum Fault {
         found: u64,
     },
     /// A result is not a number.
-    #[error("the result of body {body} is not finite: the scene diverges (shorten the time step), or the accelerator computes wrongly")]
+    #[error(
+        "the result of body {body} is not finite: the scene diverges (shorten the time step), or the accelerator computes wrongly"
+    )]
     NotFinite {
         /// The first such body.
         body: usize,

@@ -104,7 +104,7 @@ impl Lane {
     /// Gives the buffer to the device.
     pub(super) fn hand_over(&mut self) -> Result<(), PlatformError> {
         if let Held::Cpu(buffer) = std::mem::take(&mut self.held) {
-            self.held = Held::Device(buffer.to_device(self.access)?);
+            self.held = Held::Device(buffer.into_device(self.access)?);
         }
         Ok(())
     }
@@ -113,7 +113,7 @@ impl Lane {
     /// reset.
     pub(super) fn take_back(&mut self) -> Result<(), PlatformError> {
         match std::mem::take(&mut self.held) {
-            Held::Device(buffer) => self.held = Held::Cpu(buffer.to_cpu()?),
+            Held::Device(buffer) => self.held = Held::Cpu(buffer.into_cpu()?),
             held => self.held = held,
         }
         Ok(())

@@ -9,6 +9,8 @@ mod plan;
 mod recovery;
 mod report;
 mod solver;
+#[cfg(all(test, feature = "emulation"))]
+mod tests;
 
 pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
 pub use fault::{Fault, RegisterDump};

@@ -141,12 +141,11 @@ mod tests {
     fn the_deadline_follows_from_the_work_unless_it_is_given() {
         let registers = FakeRegisters::default();
         fake::describe(&registers);
-        let capabilities =
-            identify(&registers.window(RegisterMap::Control)).expect("well formed");
+        let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
         let mut parameters = StepParameters::default();
-        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.7271 s.
+        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.727066 s.
         let limit = FOUR.deadline(&parameters, &capabilities);
-        assert_eq!(limit.as_micros(), 4_727_098 + 10_000);
+        assert_eq!(limit.as_micros(), 4_727_066 + 10_000);
         parameters.deadline = Some(Duration::from_millis(3));
         assert_eq!(FOUR.deadline(&parameters, &capabilities), Duration::from_millis(3));
     }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::record::Beat;
 
-use super::board::{self, BoardDescription, OpenOptions, System};
+use super::board::{self, BoardDescription, Found, OpenOptions, System};
 use super::device::Device;
 use super::fault::Fault;
 use super::plan::Plan;
@@ -53,6 +53,11 @@ impl Accelerator {
         let OpenOptions { board: choice, length_width } = options;
         let system = System { class: Path::new(UIO_CLASS), dev: Path::new("/dev") };
         let found = board::find(&choice, system)?;
+        Self::on(found, length_width)
+    }
+
+    /// Opens the accelerator of a board that was found.
+    pub(super) fn on(found: Found, length_width: Option<u32>) -> Result<Self, Error> {
         let device = Device::open(found.platform, length_width)?;
         let Capabilities { profile_id, version, clock_khz, .. } = device.capabilities;
         log::info!(
@@ -295,10 +300,7 @@ impl Accelerator {
 
 fn finite(pose: &Pose, velocity: &Velocity) -> bool {
     let all = |numbers: &[f32]| numbers.iter().all(|number| number.is_finite());
-    all(&pose.position)
-        && all(&pose.orientation)
-        && all(&velocity.linear)
-        && all(&velocity.angular)
+    all(&pose.position) && all(&pose.orientation) && all(&velocity.linear) && all(&velocity.angular)
 }
 
 /// Host time by laps.

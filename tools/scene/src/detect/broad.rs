@@ -107,13 +107,8 @@ fn entry(index: u32, body: &Body) -> Option<Entry> {
 
 /// Number of the cell in which a coordinate lies; it grows with the coordinate.
 fn cell_number(coordinate: f32) -> u64 {
-    let mut cell = (coordinate / CELL).floor();
-    if cell > CELLS {
-        cell = CELLS;
-    }
-    if cell < -CELLS {
-        cell = -CELLS;
-    }
+    // Never NaN, and the sign of a zero does not matter here.
+    let cell = (coordinate / CELL).floor().clamp(-CELLS, CELLS);
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

@@ -52,6 +52,7 @@ pub(super) fn collide(index: u32, body: &Body) -> Option<Collision> {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "the normal is a constant")]
 mod tests {
     use zynq_pgs::{Pose, Velocity};
 
