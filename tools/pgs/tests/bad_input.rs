@@ -23,6 +23,9 @@ const FILES: [(&str, usize); 12] = [
     ("contact_points.npy", 32),
 ];
 
+/// A file, the index of a value in its array, and the bytes to put there.
+type Patch<'a> = (&'a str, usize, [u8; 4]);
+
 fn solve(folder: &TempDir) -> Ran {
     let output = pgs().arg("solve").arg(folder.path()).arg("--compare").output();
     Ran::from(output.expect("it starts"))
@@ -39,7 +42,7 @@ fn assert_refused(folder: &TempDir, said: &[&str]) {
     }
 }
 
-fn two_cubes(patches: &[(&str, usize, [u8; 4])]) -> TempDir {
+fn two_cubes(patches: &[Patch]) -> TempDir {
     let folder = copy("two_cubes");
     for (file, index, bytes) in patches {
         patch(&folder, file, *index, *bytes);
@@ -99,7 +102,7 @@ fn each_wrong_type_is_named_with_the_expected_one() {
 
 #[test]
 fn each_bad_value_is_named_with_file_and_index() {
-    let cases: &[(&[(&str, usize, [u8; 4])], &[&str])] = &[
+    let cases: &[(&[Patch], &[&str])] = &[
         (&[("params.npy", 0, f(f32::NAN))], &["params.npy", "time step", "NaN"]),
         (&[("iterations.npy", 0, u(1000))], &["iterations.npy", "1000", "255"]),
         (&[("body_pos.npy", 4, f(f32::NAN))], &["body_pos.npy", "body 1", "position[1]", "NaN"]),

@@ -1,5 +1,7 @@
 //! The command line keeps its promises: help, exit codes, JSON, closed pipes, Ctrl-C.
 
+#![allow(clippy::print_stdout, reason = "a test says aloud what it skips")]
+
 mod common;
 
 use std::io::{BufRead, BufReader};
