@@ -7,7 +7,7 @@ use bitstream_model::interface::address_map::UIO_NODE;
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
-use zynq_pgs::{Accelerator, BoardChoice, BoardKind, OpenOptions, UIO_CLASS, uio_nodes};
+use zynq_pgs::{Accelerator, BoardChoice, BoardKind, Fault, OpenOptions, UIO_CLASS, uio_nodes};
 
 use crate::args::BoardName;
 use crate::failure::{Cause, Failure};
@@ -75,6 +75,12 @@ impl Opened {
     pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {
         if error.is_input() {
             return Failure::input(error);
+        }
+        let diverged = matches!(&error, zynq_pgs::Error::Step { fault, .. }
+            if matches!(**fault, Fault::NotFinite { .. }));
+        if diverged && self.observer.is_some() {
+            // The emulated board does not miscalculate: the numbers given were too large.
+            return Failure::input(error).next("give smaller velocities, or a shorter time step");
         }
         let next = if error.may_retry() {
             "run the command again"

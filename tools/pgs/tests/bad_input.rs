@@ -141,6 +141,12 @@ fn each_bad_value_is_named_with_file_and_index() {
 }
 
 #[test]
+fn a_step_that_overflows_is_bad_input_on_the_emulated_board() {
+    let folder = two_cubes(&[("body_angvel.npy", 5, f(f32::MAX))]);
+    assert_refused(&folder, &["body 1", "not finite", "next: "]);
+}
+
+#[test]
 fn a_pair_of_two_static_bodies_is_refused() {
     let folder = two_cubes(&[("body_inv_mass.npy", 1, f(0.0))]);
     for k in 3..6 {
@@ -190,7 +196,7 @@ fn more_collisions_than_the_memory_holds_are_refused() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn broken_arrays_never_break_the_command(
