@@ -33,7 +33,7 @@ const ROWS: u32 = 15;
 #[command(after_help = EXAMPLES)]
 pub(crate) struct RunArgs {
     /// Steps of 1/60 s.
-    #[arg(long, value_name = "N", default_value_t = 150, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: u32,
     /// Cubes along each axis; y is up.
     #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
