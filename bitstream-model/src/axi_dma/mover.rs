@@ -115,7 +115,9 @@ impl Channel {
 
     /// S2MM in scatter-gather mode: the chain has ended in the middle of a packet and more comes.
     fn overrun(&self, stream: &Stream) -> bool {
-        self.direction == Direction::S2mm && self.idle && self.in_packet && stream.len() > 0
+        // A channel that has failed already is on its way to Halted.
+        let runs = dmacr::RS.is_set(self.control);
+        runs && self.direction == Direction::S2mm && self.idle && self.in_packet && stream.len() > 0
     }
 
     /// Beats that can be moved now.
