@@ -305,7 +305,12 @@ impl Channel {
             word = status::RXSOF.put(word, u32::from(bd.rxsof));
             word = status::RXEOF.put(word, u32::from(ended));
         }
-        if with.memory.write_word(bd.address + 4 * STATUS as u64, word).is_err() {
+        let address = bd.address + 4 * STATUS as u64;
+        if let Err(denied) = with.memory.write_word(address, word) {
+            let (core, direction) = (build.core, self.direction);
+            let kind =
+                ViolationKind::OutsideGrant { core, direction, address, bytes: 4, denied };
+            with.log.violation(kind);
             self.fail(build, dmasr::SG_DEC_ERR.mask());
             return;
         }
