@@ -275,8 +275,8 @@ impl Channel {
         }
         self.length = value & mask;
         let beat = BEAT_BYTES as u64;
-        let whole_beats = self.direction == Direction::Mm2s
-            || u64::from(self.length).is_multiple_of(beat);
+        let whole_beats =
+            self.direction == Direction::Mm2s || u64::from(self.length).is_multiple_of(beat);
         if !self.address.is_multiple_of(beat) || !whole_beats {
             let (address, length) = (self.address, self.length);
             log.violation(ViolationKind::Misaligned { core, direction, address, length });

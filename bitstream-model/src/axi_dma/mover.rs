@@ -308,8 +308,7 @@ impl Channel {
         let address = bd.address + 4 * STATUS as u64;
         if let Err(denied) = with.memory.write_word(address, word) {
             let (core, direction) = (build.core, self.direction);
-            let kind =
-                ViolationKind::OutsideGrant { core, direction, address, bytes: 4, denied };
+            let kind = ViolationKind::OutsideGrant { core, direction, address, bytes: 4, denied };
             with.log.violation(kind);
             self.fail(build, dmasr::SG_DEC_ERR.mask());
             return;
