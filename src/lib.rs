@@ -1,9 +1,132 @@
-//! Userspace driver for an FPGA Projected Gauss-Seidel accelerator on the Zynq UltraScale+.
+//! Userspace driver for an FPGA Projected Gauss-Seidel accelerator on the Zynq `UltraScale+`.
+//!
+//! ```text
+//! caller -> records -> beats -> channels -> device -> results -> caller
+//! ```
+//!
+//! [`Accelerator::open`] finds a board, [`Accelerator::set_shapes`] loads the mass properties, and
+//! [`Accelerator::step`] solves the contacts of one time step and integrates it. Without a board
+//! all of it runs on a software-emulated one (feature `emulation`, on by default).
+//!
+//! # A cube on the ground
+//!
+//! Bodies and collisions may be arrays of structures:
+//!
+//! ```
+//! use zynq_pgs::{Accelerator, Body, Collision, Contact, OpenOptions, Pose, Shape};
+//! use zynq_pgs::{StepParameters, Velocity};
+//!
+//! # fn main() -> Result<(), zynq_pgs::Error> {
+//! let mut accelerator = Accelerator::open(OpenOptions::default())?;
+//! accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 1.5)])?;
+//!
+//! let at = |y, shape, speed| Body {
+//!     pose: Pose { position: [0.0, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+//!     velocity: Velocity { linear: [0.0, speed, 0.0], angular: [0.0; 3] },
+//!     shape,
+//! };
+//! let mut bodies = vec![at(-1.0, 0, 0.0), at(0.99, 1, -2.0)];
+//!
+//! // The cube is B, its four lower corners are 0.01 m deep in the ground, which is A.
+//! let corner = |x, z| Contact { point: [x, -0.01, z], distance: -0.01 };
+//! let collisions = vec![Collision {
+//!     body_a: 0,
+//!     body_b: 1,
+//!     normal: [0.0, -1.0, 0.0],
+//!     count: 4,
+//!     contacts: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)],
+//! }];
+//!
+//! let report = accelerator.step(&mut bodies, &collisions, &StepParameters::default())?;
+//! assert!(bodies[1].velocity.linear[1] > -0.2, "the ground has stopped the cube");
+//! assert!(report.impulse_sum.is_some_and(|sum| sum > 0.0));
+//! println!("{} cycles on {}", report.cycles.total, accelerator.board());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! or separate arrays, without a copy in between and with the same bits:
+//!
+//! ```
+//! use zynq_pgs::{Accelerator, BodyArrays, CollisionArrays, OpenOptions, Shape, StepParameters};
+//! # use zynq_pgs::{Body, Collision, Contact, Pose, Velocity};
+//!
+//! # fn main() -> Result<(), zynq_pgs::Error> {
+//! let mut accelerator = Accelerator::open(OpenOptions::default())?;
+//! accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 1.5)])?;
+//!
+//! let mut positions = [[0.0, -1.0, 0.0], [0.0, 0.99, 0.0]];
+//! let mut orientations = [[0.0, 0.0, 0.0, 1.0]; 2];
+//! let mut linear_velocities = [[0.0; 3], [0.0, -2.0, 0.0]];
+//! let mut angular_velocities = [[0.0; 3]; 2];
+//! let mut bodies = BodyArrays {
+//!     positions: &mut positions,
+//!     orientations: &mut orientations,
+//!     linear_velocities: &mut linear_velocities,
+//!     angular_velocities: &mut angular_velocities,
+//!     shapes: &[0, 1],
+//! };
+//! let collisions = CollisionArrays {
+//!     bodies: &[[0, 1]],
+//!     normals: &[[0.0, -1.0, 0.0]],
+//!     counts: &[4],
+//!     contacts: &[[
+//!         [-1.0, -0.01, -1.0, -0.01],
+//!         [1.0, -0.01, -1.0, -0.01],
+//!         [-1.0, -0.01, 1.0, -0.01],
+//!         [1.0, -0.01, 1.0, -0.01],
+//!     ]],
+//! };
+//! accelerator.step(&mut bodies, &collisions, &StepParameters::default())?;
+//! # // The same scene as an array of structures.
+//! # let at = |y, shape, speed| Body {
+//! #     pose: Pose { position: [0.0, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+//! #     velocity: Velocity { linear: [0.0, speed, 0.0], angular: [0.0; 3] },
+//! #     shape,
+//! # };
+//! # let mut structures = vec![at(-1.0, 0, 0.0), at(0.99, 1, -2.0)];
+//! # let corner = |x, z| Contact { point: [x, -0.01, z], distance: -0.01 };
+//! # let contacts =
+//! #     [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)];
+//! # let normal = [0.0, -1.0, 0.0];
+//! # let same = vec![Collision { body_a: 0, body_b: 1, normal, count: 4, contacts }];
+//! # accelerator.step(&mut structures, &same, &StepParameters::default())?;
+//! # for (index, body) in structures.iter().enumerate() {
+//! #     assert_eq!(body.pose.position.map(f32::to_bits), positions[index].map(f32::to_bits));
+//! #     assert_eq!(body.pose.orientation.map(f32::to_bits), orientations[index].map(f32::to_bits));
+//! #     let Velocity { linear, angular } = body.velocity;
+//! #     assert_eq!(linear.map(f32::to_bits), linear_velocities[index].map(f32::to_bits));
+//! #     assert_eq!(angular.map(f32::to_bits), angular_velocities[index].map(f32::to_bits));
+//! # }
+//! assert!(linear_velocities[1][1] > -0.2, "the ground has stopped the cube");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # When something fails
+//!
+//! Every error says what was expected, what was found and what to do; the bodies are as they were.
+//! [`Error::is_input`], [`Error::may_retry`] and [`Error::must_reopen`] say how to go on.
 
+mod accelerator;
+mod axi_dma;
+mod beat;
+mod error;
+mod platform;
+mod record;
 pub mod scene;
+mod step;
 
+pub use accelerator::{Capabilities, ControlError, IdentityError};
+pub use axi_dma::DmaError;
 pub use bitstream_model::interface;
+pub use error::{Aftermath, Error, OpenError};
+pub use platform::{PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes};
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
-    Pose, Shape, StepParameters, Velocity,
+    InputError, Pose, Shape, StepParameters, Velocity,
+};
+pub use step::{
+    Accelerator, BoardChoice, BoardDescription, BoardKind, Fault, HostTimes, Limit, OpenOptions,
+    RegisterDump, StepCycles, StepReport,
 };

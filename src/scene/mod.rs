@@ -2,10 +2,13 @@
 
 mod body;
 mod collision;
+mod input_error;
 mod parameters;
 mod shape;
+pub(crate) mod validate;
 
 pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
 pub use collision::{CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact};
+pub use input_error::InputError;
 pub use parameters::StepParameters;
 pub use shape::Shape;

@@ -21,6 +21,7 @@ use crate::cast::register;
 use crate::config::{BoardConfig, Hazards, Subnormals};
 use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, IMPULSE_SUM_FRACTION_BITS,
+    ITERATIONS_MAX,
 };
 use crate::interface::record::{Beat, CONTACT_POINTS, collision, pose, result, velocity};
 use crate::stream::Stream;
@@ -33,9 +34,6 @@ use number::{Flush, Keep, Number};
 use pipeline::{Entry, Pipeline};
 use segment::{PacketError, Segment, Striping};
 use solver::{Impulses, Mass, Velocity};
-
-/// Passes of one kind that the pass counters hold.
-const ITERATIONS_MAX: u32 = 255;
 
 /// What kind of pass runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -299,6 +299,9 @@ pub const IMPULSE_SUM_HI: Register = read_only("IMPULSE_SUM_HI", 0x1A8, &[]);
 /// Soft reset of the accelerator.
 pub const RESET: Register = row("RESET", 0x1C0, Access::SelfClearing, 0, &[reset::RESET], OURS);
 
+/// Most passes of each kind that the pass counters hold.
+pub const ITERATIONS_MAX: u32 = 255;
+
 /// Fraction bits of the impulse sum.
 pub const IMPULSE_SUM_FRACTION_BITS: u32 = 20;
 

@@ -1,2 +1,41 @@
-//! Command line tool of the zynq-pgs driver.
-fn main() {}
+//! Command line tool of the zynq-pgs driver: steps scenes and folders of arrays on a board, real
+//! or emulated.
+//!
+//! Results go to stdout, everything else to stderr. The exit codes are those of [`failure`].
+
+#![forbid(unsafe_code)]
+
+mod args;
+mod board;
+mod compare;
+mod digest;
+mod failure;
+mod folder;
+mod interrupt;
+mod npy;
+mod options;
+mod origin;
+mod verbs;
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
+    let command = match args::parse(std::env::args_os()) {
+        Ok(command) => command,
+        Err(message) => {
+            // Help goes to stdout with code 0, a usage error to stderr with code 2. Nobody is left
+            // to tell if either is closed.
+            let _ = message.print();
+            return failure::usage_code(&message);
+        }
+    };
+    let mut out = io::stdout().lock();
+    let done = verbs::run(&command, &mut out)
+        .and_then(|verdict| out.flush().map(|()| verdict).map_err(failure::Failure::from));
+    match done {
+        Ok(verdict) => verdict.code(),
+        Err(failure) => failure.report(&mut io::stderr().lock()),
+    }
+}

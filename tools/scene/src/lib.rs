@@ -1,1 +1,44 @@
 //! The box-on-plane scene of the thesis, with collision detection.
+//!
+//! A grid of cubes above a plane, as Bullet's demo `box on plane` builds it. A [`Scene`] holds the
+//! bodies and the collisions of their current poses; the accelerator steps them:
+//!
+//! ```
+//! use scene::{Grid, Scene, SceneOptions};
+//!
+//! let options = SceneOptions { grid: "3x2x3".parse::<Grid>()?, drop: 0.0, ..Default::default() };
+//! let mut scene = Scene::new(&options)?;
+//! assert_eq!(scene.detect().len(), 9 + 25); // on the ground, and one layer on the other
+//! let (bodies, collisions) = scene.parts_mut();
+//! // accelerator.step(bodies, collisions, &StepParameters::default())?;
+//! # assert_eq!((bodies.len(), collisions.len()), (19, 34));
+//! # Ok::<(), scene::SceneError>(())
+//! ```
+//!
+//! The bits of every result are the same on every architecture and with every number of threads:
+//! arithmetic is f32 in a written order, parry3d is built with `enhanced-determinism`, and threads
+//! never decide an order.
+
+#![forbid(unsafe_code)]
+
+mod build;
+mod detect;
+mod error;
+mod grid;
+mod measure;
+mod rotation;
+
+pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
+pub use detect::MARGIN;
+pub use error::SceneError;
+pub use grid::Grid;
+pub use measure::{ground_pairs, kinetic_energy};
+
+/// Index of the static ground among the bodies.
+pub const GROUND: u32 = 0;
+
+/// Half the edge of a cube, m.
+pub const CUBE_HALF_EXTENT: f32 = 1.0;
+
+/// Half the edge of the ground's box, m. Its top is the plane y = 0.
+pub const GROUND_HALF_EXTENT: f32 = 400.0;

@@ -1,0 +1,107 @@
+//! This file reads what the accelerator counted in a step, and its sticky error.
+
+use std::fmt;
+
+use bitstream_model::interface::control::{
+    CYCLES_HI, CYCLES_LO, ERROR, ERROR_DETAIL, ErrorCode, HAZARDS, IMPULSE_SUM_FRACTION_BITS,
+    IMPULSE_SUM_HI, IMPULSE_SUM_LO, STALL_CYCLES, SUM_RECEIVED, SUM_SENT, WAIT_CYCLES, error,
+};
+
+use super::{Capabilities, Control};
+
+/// The accelerator's sticky error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct StickyError {
+    /// The register.
+    pub(crate) raw: u32,
+    /// What it is about.
+    pub(crate) detail: u32,
+}
+
+impl fmt::Display for StickyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let code = error::CODE.of(self.raw);
+        match ErrorCode::from_register(self.raw) {
+            Some(known) => write!(f, "{}", known.describe())?,
+            None => f.write_str("a code that this driver does not know")?,
+        }
+        write!(f, " (code {code}, stream {}, detail {})", error::CHANNEL.of(self.raw), self.detail)
+    }
+}
+
+/// What was counted in the last step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Counters {
+    /// From start to done.
+    pub(crate) cycles: u64,
+    /// Of it, waiting for velocities.
+    pub(crate) stalls: u32,
+    /// Of it, waiting for streams.
+    pub(crate) waits: u32,
+    /// Collisions that met a hazard.
+    pub(crate) hazards: u32,
+    /// Sums of the words received and sent, if the bitstream has them.
+    pub(crate) sums: Option<(u32, u32)>,
+    /// Sum of the accumulated normal impulses, N s, if the bitstream has it.
+    pub(crate) impulse_sum: Option<f64>,
+}
+
+impl Control {
+    /// The sticky error, if one is set.
+    pub(crate) fn sticky_error(&self) -> Option<StickyError> {
+        let raw = self.read(&ERROR);
+        // The detail is read only where there is one: a good step costs one access.
+        (raw != 0).then(|| StickyError { raw, detail: self.read(&ERROR_DETAIL) })
+    }
+
+    /// What was counted in the step that has ended.
+    pub(crate) fn counters(&self, capabilities: &Capabilities) -> Counters {
+        let wide = |high: u32, low: u32| (u64::from(high) << 32) | u64::from(low);
+        let hazards = self.read(&HAZARDS);
+        let low = self.read(&CYCLES_LO);
+        let cycles = wide(self.read(&CYCLES_HI), low);
+        let stalls = self.read(&STALL_CYCLES);
+        let waits = self.read(&WAIT_CYCLES);
+        let sums = capabilities.checksums.then(|| (self.read(&SUM_RECEIVED), self.read(&SUM_SENT)));
+        let impulse_sum = capabilities.impulse_sum.then(|| {
+            let low = self.read(&IMPULSE_SUM_LO);
+            impulse(wide(self.read(&IMPULSE_SUM_HI), low))
+        });
+        Counters { cycles, stalls, waits, hazards, sums, impulse_sum }
+    }
+}
+
+/// Fixed point to N s. Sums above 2^53 units (8.6e9 N s) are rounded.
+#[allow(clippy::cast_precision_loss, reason = "rounding of sums above 2^53 is documented")]
+fn impulse(units: u64) -> f64 {
+    units as f64 / f64::from(1u32 << IMPULSE_SUM_FRACTION_BITS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::platform::RegisterMap;
+    use crate::platform::fake::FakeRegisters;
+
+    #[test]
+    fn an_error_is_told_with_code_stream_and_detail() {
+        let registers = FakeRegisters::default();
+        let control = Control::new(registers.window(RegisterMap::Control));
+        assert_eq!(control.sticky_error(), None);
+        registers.with(|state| {
+            state.values.insert(0x180, 0x0203);
+            state.values.insert(0x184, 17);
+        });
+        let error = control.sticky_error().expect("set").to_string();
+        assert_eq!(error, "TLAST before the end of the packet (code 3, stream 2, detail 17)");
+        let unknown = StickyError { raw: 0xEE, detail: 0 }.to_string();
+        assert!(unknown.contains("does not know (code 238"), "{unknown}");
+    }
+
+    #[test]
+    #[allow(clippy::float_cmp, reason = "both are exact in binary")]
+    fn impulses_are_counted_in_units_of_two_to_the_minus_twenty() {
+        assert_eq!(impulse(1 << 20), 1.0);
+        assert_eq!(impulse((1 << 32) + (1 << 19)), 4096.5);
+    }
+}

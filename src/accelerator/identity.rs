@@ -1,0 +1,299 @@
+//! This file reads what a bitstream says of itself, and refuses what the driver does not know.
+
+use bitstream_model::interface::address_map::{CONTROL_BYTES, DMA_COUNT_MAX};
+use bitstream_model::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+use bitstream_model::interface::control::{
+    BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY, CONTACT_DEPTH, DMA, FEATURES,
+    FRICTION_DEPTH, IDENTIFICATION, IDENTIFICATION_VALUE, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD,
+    MM2S_WIDTHS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_STRIDE, SHAPE_TABLE, VERSION,
+    VERSION_MAJOR, channels, depth, dma, features, issue, memory_per_record, version,
+};
+use bitstream_model::interface::profile::{Depth, NumberFormat, Profile};
+use bitstream_model::interface::register::Register;
+use thiserror::Error;
+
+use crate::platform::Window;
+
+/// What a bitstream says of itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Capabilities {
+    /// Identifier of the [profile](bitstream_model::interface::profile::Profile).
+    pub profile_id: u32,
+    /// Interface version, major and minor.
+    pub version: (u32, u32),
+    /// Whether the pipeline waits on a hazard; without it, it reads stale velocities.
+    pub interlocked: bool,
+    /// Whether words received and sent are summed, which detects a corrupted beat.
+    pub checksums: bool,
+    /// Whether subnormal numbers count as zero.
+    pub flush_subnormals: bool,
+    /// Whether accumulated normal impulses are summed.
+    pub impulse_sum: bool,
+    /// Streams into the accelerator.
+    pub mm2s_channels: usize,
+    /// Streams out of the accelerator.
+    pub s2mm_channels: usize,
+    /// Cycles from one issue to the next.
+    pub initiation_interval: u32,
+    /// Collisions that enter the pipeline together.
+    pub collisions_per_issue: u32,
+    /// Depth of the contact pipeline, cycles.
+    pub contact: Depth,
+    /// Depth of the friction pipeline, cycles.
+    pub friction: Depth,
+    /// Clock of the accelerator and its streams, kHz.
+    pub clock_khz: u32,
+    /// Largest number of bodies.
+    pub body_capacity: u32,
+    /// Largest number of collisions, were there no bodies.
+    pub collision_capacity: u32,
+    /// Entries of the shape table.
+    pub shape_capacity: u32,
+    /// On-chip memory that bodies and collisions share, bytes.
+    pub memory_bytes: u32,
+    /// What a body takes of it, bytes.
+    pub bytes_per_body: u32,
+    /// What a collision takes of it, bytes.
+    pub bytes_per_collision: u32,
+    /// Width of the DMA cores' length registers, bits.
+    pub length_width: u32,
+    /// Width of memory addresses, bits.
+    pub address_width: u32,
+}
+
+/// Why a bitstream was refused. Nothing was written to it.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum IdentityError {
+    /// All ones: nobody answers.
+    #[error("the control block reads all ones: is a bitstream loaded and its clock running?")]
+    Gone,
+    /// Another design.
+    #[error(
+        "expected the identification {IDENTIFICATION_VALUE:#010x} (\"PGS1\"), found {found:#010x}: \
+         load the accelerator's bitstream, or correct the control block's address"
+    )]
+    Identification {
+        /// What was found.
+        found: u32,
+    },
+    /// An interface that this driver does not know.
+    #[error(
+        "expected interface version {VERSION_MAJOR}.x, found {major}.{minor}: use the driver that \
+         belongs to the bitstream"
+    )]
+    Version {
+        /// Major version found.
+        major: u32,
+        /// Minor version found.
+        minor: u32,
+    },
+    /// A profile that this driver does not know.
+    #[error("unknown profile {found}: use the driver that belongs to the bitstream")]
+    Profile {
+        /// Identifier found.
+        found: u32,
+    },
+    /// A capability register that makes no sense, or asks for something that this driver cannot do.
+    #[error(
+        "{register} is {found:#010x}, expected {expected}: the bitstream is not one for this driver"
+    )]
+    Capability {
+        /// Which register.
+        register: &'static str,
+        /// What it says.
+        found: u32,
+        /// What it may say.
+        expected: &'static str,
+    },
+}
+
+/// Stream width of 128 bits in `MM2S_WIDTHS` and `S2MM_WIDTHS`: log2(16 bytes).
+const WIDTH_128: u32 = 4;
+
+/// Reads and checks what a bitstream says of itself. Only reads.
+pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
+    let read = |register: &Register| window.read32(register.offset);
+    match read(&IDENTIFICATION) {
+        IDENTIFICATION_VALUE => {}
+        u32::MAX => return Err(IdentityError::Gone),
+        found => return Err(IdentityError::Identification { found }),
+    }
+    let word = read(&VERSION);
+    let (major, minor) = (version::MAJOR.of(word), version::MINOR.of(word));
+    if major != VERSION_MAJOR {
+        return Err(IdentityError::Version { major, minor });
+    }
+    let profile_id = read(&PROFILE);
+    let profile = Profile::by_id(profile_id).ok_or(IdentityError::Profile { found: profile_id })?;
+    if profile.numbers != NumberFormat::F32 {
+        return Err(IdentityError::Profile { found: profile_id });
+    }
+
+    let streams = checked(window, &CHANNELS, "1 to 4 streams each way", |word| {
+        let fits = |count: u32| (1..=DMA_COUNT_MAX).contains(&(count as usize));
+        fits(channels::MM2S.of(word)) && channels::S2MM.of(word) == channels::MM2S.of(word)
+    })?;
+    let count = channels::MM2S.of(streams);
+    for register in [&MM2S_WIDTHS, &S2MM_WIDTHS] {
+        checked(window, register, "128 bits (4) for every stream", |word| {
+            (0..count).all(|stream| (word >> (4 * stream)) & 0xF == WIDTH_128)
+        })?;
+    }
+    let interval = checked(window, &ISSUE, "an interval and a number above 0", |word| {
+        issue::INTERVAL.of(word) > 0 && issue::COLLISIONS.of(word) > 0
+    })?;
+    let shape_capacity = checked(
+        window,
+        &SHAPE_CAPACITY,
+        "1 to as many as the control block has room for",
+        |word| (1..=(CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE).contains(&word),
+    )?;
+    let widths = checked(window, &DMA, "length 8 to 26 bits, addresses 32 to 64 bits", |word| {
+        (LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&dma::LENGTH_WIDTH.of(word))
+            && (32..=64).contains(&dma::ADDRESS_WIDTH.of(word))
+    })?;
+    let clock_khz = checked(window, &CLOCK_KHZ, "a clock above 0", |word| word > 0)?;
+    let memory = checked(window, &MEMORY_PER_RECORD, "bytes above 0", |word| {
+        memory_per_record::BODY.of(word) > 0 && memory_per_record::COLLISION.of(word) > 0
+    })?;
+    let able = read(&FEATURES);
+    let depth_of = |register: &Register| {
+        let word = read(register);
+        Depth { fill: depth::FILL.of(word), window: depth::WINDOW.of(word) }
+    };
+    Ok(Capabilities {
+        profile_id,
+        version: (major, minor),
+        interlocked: features::INTERLOCKED.is_set(able),
+        checksums: features::CHECKSUMS.is_set(able),
+        flush_subnormals: features::FLUSH_SUBNORMALS.is_set(able),
+        impulse_sum: features::IMPULSE_SUM.is_set(able),
+        mm2s_channels: count as usize,
+        s2mm_channels: channels::S2MM.of(streams) as usize,
+        initiation_interval: issue::INTERVAL.of(interval),
+        collisions_per_issue: issue::COLLISIONS.of(interval),
+        contact: depth_of(&CONTACT_DEPTH),
+        friction: depth_of(&FRICTION_DEPTH),
+        clock_khz,
+        body_capacity: read(&BODY_CAPACITY),
+        collision_capacity: read(&COLLISION_CAPACITY),
+        shape_capacity,
+        memory_bytes: read(&MEMORY_BYTES),
+        bytes_per_body: memory_per_record::BODY.of(memory),
+        bytes_per_collision: memory_per_record::COLLISION.of(memory),
+        length_width: dma::LENGTH_WIDTH.of(widths),
+        address_width: dma::ADDRESS_WIDTH.of(widths),
+    })
+}
+
+/// A capability register whose value passes `good`.
+fn checked(
+    window: &Window,
+    register: &Register,
+    expected: &'static str,
+    good: impl Fn(u32) -> bool,
+) -> Result<u32, IdentityError> {
+    let found = window.read32(register.offset);
+    if !good(found) {
+        return Err(IdentityError::Capability { register: register.name, found, expected });
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+pub(crate) mod fake {
+    //! The capability registers of a well-formed bitstream.
+
+    use crate::platform::fake::FakeRegisters;
+
+    /// Fills in the registers of the profile `float`, typed out from the specification.
+    pub(crate) fn describe(registers: &FakeRegisters) {
+        registers.with(|state| {
+            state.values.extend([
+                (0x100, 0x5047_5331),
+                (0x104, 0x0001_0000),
+                (0x108, 1),
+                (0x10C, 0xB),
+                (0x110, 0x0404),
+                (0x114, 0x4444),
+                (0x118, 0x4444),
+                (0x11C, 0x0001_0002),
+                (0x120, (316 << 16) | 364),
+                (0x124, (182 << 16) | 306),
+                (0x128, 275_000),
+                (0x12C, 131_072),
+                (0x130, 262_144),
+                (0x134, 64),
+                (0x138, 4 << 20),
+                (0x13C, (16 << 16) | 24),
+                (0x140, (40 << 8) | 26),
+            ]);
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::platform::RegisterMap;
+    use crate::platform::fake::FakeRegisters;
+
+    fn identify_with(changes: &[(u32, u32)]) -> Result<Capabilities, IdentityError> {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        registers.with(|state| state.values.extend(changes.iter().copied()));
+        let result = identify(&registers.window(RegisterMap::Control));
+        assert!(registers.with(|state| state.writes.is_empty()), "identifying only reads");
+        result
+    }
+
+    #[test]
+    fn a_known_bitstream_is_described() {
+        let found = identify_with(&[]).expect("well formed");
+        assert_eq!((found.profile_id, found.version), (1, (1, 0)));
+        assert!(found.checksums && found.interlocked && found.impulse_sum);
+        assert!(!found.flush_subnormals);
+        assert_eq!((found.mm2s_channels, found.s2mm_channels), (4, 4));
+        assert_eq!(found.contact, Depth { fill: 364, window: 316 });
+        assert_eq!((found.bytes_per_body, found.bytes_per_collision), (24, 16));
+        assert_eq!((found.length_width, found.address_width), (26, 40));
+    }
+
+    #[test]
+    fn another_design_and_another_major_version_are_refused() {
+        assert!(matches!(
+            identify_with(&[(0x100, 0x1234)]),
+            Err(IdentityError::Identification { found: 0x1234 })
+        ));
+        assert!(matches!(identify_with(&[(0x100, u32::MAX)]), Err(IdentityError::Gone)));
+        assert!(matches!(
+            identify_with(&[(0x104, 0x0002_0001)]),
+            Err(IdentityError::Version { major: 2, minor: 1 })
+        ));
+        assert!(identify_with(&[(0x104, 0x0001_0007)]).is_ok(), "minor versions are compatible");
+    }
+
+    #[test]
+    fn what_the_driver_cannot_do_is_refused_by_register() {
+        let cases = [
+            (0x108, 99, "unknown profile 99"),
+            (0x110, 0x0505, "CHANNELS"),
+            (0x110, 0x0304, "CHANNELS"),
+            (0x114, 0x4344, "MM2S_WIDTHS"),
+            (0x118, 0x0444, "S2MM_WIDTHS"),
+            (0x11C, 0x0001_0000, "ISSUE"),
+            (0x128, 0, "CLOCK_KHZ"),
+            (0x134, 0, "SHAPE_CAPACITY"),
+            (0x134, 193, "SHAPE_CAPACITY"),
+            (0x13C, 24, "MEMORY_PER_RECORD"),
+            (0x140, (40 << 8) | 7, "DMA"),
+            (0x140, (31 << 8) | 26, "DMA"),
+        ];
+        for (at, value, named) in cases {
+            let error = identify_with(&[(at, value)]).expect_err(named).to_string();
+            assert!(error.contains(named), "{error}");
+        }
+    }
+}

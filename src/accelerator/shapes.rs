@@ -1,0 +1,40 @@
+//! This file loads the shape table.
+
+use bitstream_model::interface::control::{
+    SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,
+};
+
+use super::Control;
+use crate::scene::Shape;
+
+impl Control {
+    /// Loads shapes that were checked to be isotropic, and not more than the table has entries.
+    pub(crate) fn load_shapes(&mut self, shapes: &[Shape]) {
+        for (entry, shape) in (SHAPE_TABLE..).step_by(SHAPE_STRIDE as usize).zip(shapes) {
+            for offset in (0..SHAPE_STRIDE).step_by(4) {
+                let value = match offset {
+                    SHAPE_INVERSE_MASS => shape.inverse_mass.to_bits(),
+                    SHAPE_INVERSE_INERTIA => shape.inverse_inertia[0].to_bits(),
+                    _ => 0,
+                };
+                self.write(entry + offset, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::platform::RegisterMap;
+    use crate::platform::fake::FakeRegisters;
+
+    #[test]
+    fn an_entry_is_mass_inertia_and_two_zeros() {
+        let registers = FakeRegisters::default();
+        let mut control = Control::new(registers.window(RegisterMap::Control));
+        control.load_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 1.5)]);
+        let second: Vec<_> = registers.with(|state| state.writes[4..].to_vec());
+        assert_eq!(second, [(0x410, 0x3F80_0000), (0x414, 0x3FC0_0000), (0x418, 0), (0x41C, 0)]);
+    }
+}

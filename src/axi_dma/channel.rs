@@ -1,0 +1,269 @@
+//! This file drives one direction of a DMA core; both directions are this one piece of code.
+
+use std::fmt;
+use std::sync::Arc;
+
+use bitstream_model::interface::axi_dma::{
+    CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, S2MM_OFFSET, TAILDESC, TAILDESC_MSB,
+};
+use bitstream_model::interface::register::Register;
+
+use super::{ChannelName, DmaError, Dmacr, Dmasr, STATE_CHANGE};
+use crate::platform::{BusAddress, Deadline, Platform, Window, poll_until};
+
+/// Which way data goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Direction {
+    /// Memory to stream.
+    Mm2s,
+    /// Stream to memory.
+    S2mm,
+}
+
+impl Direction {
+    const fn offset(self) -> u32 {
+        match self {
+            Self::Mm2s => 0,
+            Self::S2mm => S2MM_OFFSET,
+        }
+    }
+}
+
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Mm2s => "MM2S",
+            Self::S2mm => "S2MM",
+        })
+    }
+}
+
+/// One direction of one DMA core, in scatter-gather mode.
+#[derive(Debug)]
+pub(crate) struct Channel {
+    window: Arc<Window>,
+    name: ChannelName,
+    address_width: u32,
+    control: Dmacr,
+}
+
+impl Channel {
+    /// A channel of a core that was reset.
+    pub(crate) fn new(
+        window: Arc<Window>,
+        core: usize,
+        direction: Direction,
+        address_width: u32,
+    ) -> Self {
+        let name = ChannelName { core, direction };
+        Self { window, name, address_width, control: Dmacr::STOPPED }
+    }
+
+    /// Which channel this is.
+    pub(crate) fn name(&self) -> ChannelName {
+        self.name
+    }
+
+    fn read(&self, register: &Register) -> u32 {
+        self.window.read32(register.offset + self.name.direction.offset())
+    }
+
+    fn write(&mut self, register: &Register, value: u32) {
+        self.window.write32(register.offset + self.name.direction.offset(), value);
+    }
+
+    /// Low half first: with addresses above 32 bits the upper half is what acts.
+    fn write_address(&mut self, low: &Register, high: &Register, address: BusAddress) {
+        self.write(low, address.low());
+        if self.address_width > 32 {
+            self.write(high, address.high());
+        }
+    }
+
+    /// The status register.
+    pub(crate) fn status(&self) -> Dmasr {
+        Dmasr(self.read(&DMASR))
+    }
+
+    /// The control register.
+    pub(crate) fn control(&self) -> Dmacr {
+        Dmacr(self.read(&DMACR))
+    }
+
+    /// The interrupt bits of `status` that reach the line.
+    pub(crate) fn pending(&self, status: Dmasr) -> u32 {
+        status.interrupts() & self.control.enabled()
+    }
+
+    /// Acknowledges the interrupts that `status` shows, and no later ones.
+    pub(crate) fn acknowledge(&mut self, status: Dmasr) {
+        self.write(&DMASR, status.interrupts());
+    }
+
+    /// The descriptor in work, or the one that failed.
+    pub(crate) fn current_descriptor(&self) -> u64 {
+        let high = if self.address_width > 32 { self.read(&CURDESC_MSB) } else { 0 };
+        (u64::from(high) << 32) | u64::from(self.read(&CURDESC))
+    }
+
+    /// Starts a halted channel at a descriptor, and waits until it runs.
+    pub(crate) fn start(
+        &mut self,
+        platform: &dyn Platform,
+        first: BusAddress,
+        control: Dmacr,
+    ) -> Result<(), DmaError> {
+        // CURDESC can be written only now: it is ignored without a word while the channel runs.
+        self.wait_for(platform, "halted", Dmasr::halted)?;
+        self.write_address(&CURDESC, &CURDESC_MSB, first);
+        self.write(&DMACR, control.0);
+        self.control = control;
+        self.wait_for(platform, "running", |status| !status.halted())
+    }
+
+    /// Stops the channel, and waits until it has.
+    pub(crate) fn stop(&mut self, platform: &dyn Platform) -> Result<(), DmaError> {
+        self.write(&DMACR, Dmacr::STOPPED.0);
+        self.control = Dmacr::STOPPED;
+        self.wait_for(platform, "halted", Dmasr::halted)
+    }
+
+    /// Takes note that the core was reset.
+    pub(crate) fn was_reset(&mut self) {
+        self.control = Dmacr::STOPPED;
+    }
+
+    /// Moves the tail; the engine runs up to and including the descriptor there.
+    pub(crate) fn ring_doorbell(&mut self, tail: BusAddress) {
+        self.write_address(&TAILDESC, &TAILDESC_MSB, tail);
+    }
+
+    /// Resets the whole core, this direction and the other.
+    pub(super) fn request_reset(&mut self) {
+        self.write(&DMACR, Dmacr::RESET.0);
+        self.control = Dmacr::STOPPED;
+    }
+
+    fn wait_for(
+        &self,
+        platform: &dyn Platform,
+        awaited: &'static str,
+        reached: impl Fn(Dmasr) -> bool,
+    ) -> Result<(), DmaError> {
+        let deadline = Deadline::after(platform, STATE_CHANGE);
+        let mut found = Dmasr(0);
+        let seen = poll_until(platform, &deadline, || {
+            found = self.status();
+            (found.gone() || reached(found)).then_some(())
+        });
+        if found.gone() {
+            return Err(DmaError::Gone { channel: self.name.to_string() });
+        }
+        seen.ok_or_else(|| DmaError::State {
+            channel: self.name.to_string(),
+            awaited,
+            limit: deadline.limit(),
+            found: found.to_string(),
+        })
+    }
+}
+
+/// The width of a halted channel's length register: all ones are written, what exists reads back.
+///
+/// A write while halted starts nothing (PG021, LENGTH); 0 is restored.
+pub(crate) fn detect_length_width(channel: &mut Channel) -> Result<u32, DmaError> {
+    channel.write(&LENGTH, u32::MAX);
+    let found = channel.read(&LENGTH);
+    channel.write(&LENGTH, 0);
+    let width = found.trailing_ones();
+    if found == u32::MAX {
+        return Err(DmaError::Gone { channel: channel.name.to_string() });
+    }
+    if width == 0 || width != found.count_ones() {
+        return Err(DmaError::NotALength { channel: channel.name.to_string(), found });
+    }
+    Ok(width)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::platform::fake::{FakePlatform, FakeRegisters};
+    use crate::platform::{RegisterMap, SharedWords};
+
+    fn channel(registers: &FakeRegisters, direction: Direction, address_width: u32) -> Channel {
+        let window = Arc::new(registers.window(RegisterMap::Dma(1)));
+        Channel::new(window, 1, direction, address_width)
+    }
+
+    fn address() -> BusAddress {
+        let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
+        let words = SharedWords::allocate(&platform, 64, 40).expect("allocated");
+        words.range(16, 16).expect("inside")
+    }
+
+    #[test]
+    fn the_low_word_is_written_before_the_one_that_starts() {
+        let registers = FakeRegisters::default();
+        channel(&registers, Direction::S2mm, 40).ring_doorbell(address());
+        assert_eq!(registers.with(|state| state.writes.clone()), [(0x40, 0x40), (0x44, 8)]);
+    }
+
+    #[test]
+    fn short_addresses_are_one_write() {
+        let registers = FakeRegisters::default();
+        channel(&registers, Direction::Mm2s, 32).ring_doorbell(address());
+        assert_eq!(registers.with(|state| state.writes.clone()), [(0x10, 0x40)]);
+    }
+
+    #[test]
+    fn a_channel_that_does_not_halt_is_not_given_a_descriptor() {
+        let registers = FakeRegisters::default();
+        let platform = FakePlatform::default();
+        let error = channel(&registers, Direction::Mm2s, 40)
+            .start(&platform, address(), Dmacr::RUNNING)
+            .expect_err("never halted");
+        assert!(error.to_string().contains("dma1 MM2S was expected to be halted"), "{error}");
+        assert!(registers.with(|state| state.writes.is_empty()));
+    }
+
+    #[test]
+    fn a_start_waits_for_the_channel_to_run() {
+        let registers = FakeRegisters::default();
+        registers.with(|state| state.scripted.insert(0x04, vec![1, 1, 1, 0]));
+        channel(&registers, Direction::Mm2s, 40)
+            .start(&FakePlatform::default(), address(), Dmacr::RUNNING)
+            .expect("runs at the third look");
+        assert_eq!(
+            registers.with(|state| state.writes.clone()),
+            [(0x08, 0x40), (0x0C, 8), (0x00, 0x0001_4003)]
+        );
+        assert!(registers.with(|state| state.scripted[&0x04].is_empty()));
+    }
+
+    #[test]
+    fn a_board_that_is_gone_is_said_to_be() {
+        let registers = FakeRegisters::default();
+        registers.with(|state| state.values.insert(0x34, u32::MAX));
+        let error = channel(&registers, Direction::S2mm, 40).stop(&FakePlatform::default());
+        assert!(matches!(error, Err(DmaError::Gone { .. })));
+    }
+
+    #[test]
+    fn only_what_was_seen_is_acknowledged() {
+        let registers = FakeRegisters::default();
+        channel(&registers, Direction::S2mm, 40).acknowledge(Dmasr(0x0001_5002));
+        assert_eq!(registers.with(|state| state.writes.clone()), [(0x34, 0x5000)]);
+    }
+
+    #[test]
+    fn the_length_width_is_what_reads_back() {
+        let registers = FakeRegisters::default();
+        registers.with(|state| state.kept_bits.insert(0x28, 0x3FFF));
+        let mut channel = channel(&registers, Direction::Mm2s, 40);
+        assert_eq!(detect_length_width(&mut channel).expect("a row of ones"), 14);
+        assert_eq!(registers.with(|state| state.values[&0x28]), 0);
+        registers.with(|state| state.kept_bits.insert(0x28, 0x3FF0));
+        assert!(matches!(detect_length_width(&mut channel), Err(DmaError::NotALength { .. })));
+    }
+}

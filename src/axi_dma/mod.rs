@@ -1,0 +1,94 @@
+//! The AXI DMA cores: registers, descriptors, rings, reset.
+
+mod channel;
+mod descriptor;
+mod registers;
+mod reset;
+mod ring;
+
+use std::fmt;
+use std::time::Duration;
+
+use thiserror::Error;
+
+pub(crate) use channel::{Channel, Direction, detect_length_width};
+pub(crate) use descriptor::{Descriptor, largest_piece, pieces};
+pub(crate) use registers::{Dmacr, Dmasr};
+pub(crate) use reset::reset_core;
+pub(crate) use ring::{Progress, Ring};
+
+use crate::platform::PlatformError;
+
+/// How long a DMA core may take to reset, to start or to stop.
+pub(crate) const STATE_CHANGE: Duration = Duration::from_millis(10);
+
+/// One direction of one DMA core, for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ChannelName {
+    pub(crate) core: usize,
+    pub(crate) direction: Direction,
+}
+
+impl fmt::Display for ChannelName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "dma{} {}", self.core, self.direction)
+    }
+}
+
+/// Why a DMA core could not be brought into a state.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DmaError {
+    /// A register reads all ones.
+    #[error("{channel} reads all ones: is the bitstream still loaded and its clock running?")]
+    Gone {
+        /// Which channel.
+        channel: String,
+    },
+    /// A state was not reached in time.
+    #[error("{channel} was expected to be {awaited} within {limit:?}, found {found}")]
+    State {
+        /// Which channel.
+        channel: String,
+        /// The state that was awaited.
+        awaited: &'static str,
+        /// How long.
+        limit: Duration,
+        /// The register that shows the state, decoded.
+        found: String,
+    },
+    /// The core was built without scatter-gather.
+    #[error(
+        "{channel} was built without scatter-gather (status {found}): build the bitstream with it"
+    )]
+    NoScatterGather {
+        /// Which channel.
+        channel: String,
+        /// Its status, decoded.
+        found: String,
+    },
+    /// The length register has another width than was said.
+    #[error(
+        "{channel} has a length register of {found} bits, {expected} were expected: correct the \
+         bitstream's DMA capability register or the length width given at opening"
+    )]
+    LengthWidth {
+        /// Which channel.
+        channel: String,
+        /// Width as given, bits.
+        expected: u32,
+        /// Width as found, bits.
+        found: u32,
+    },
+    /// The length register reads back something that is not a row of ones.
+    #[error("{channel} LENGTH reads {found:#010x} after all ones were written: not an AXI DMA?")]
+    NotALength {
+        /// Which channel.
+        channel: String,
+        /// What was read.
+        found: u32,
+    },
+    /// Memory for descriptors.
+    #[error(transparent)]
+    Platform(#[from] PlatformError),
+}

@@ -1,0 +1,270 @@
+//! This file keeps the descriptors of one channel in a ring that is linked once and never stopped.
+//!
+//! ```text
+//!   first            tail   spare
+//!     v               v       v
+//!   [BD]-[BD]-[BD]-[BD]-[BD]-[BD]-.      one step's chain; the next begins after the tail
+//!     ^-----------------------------'
+//! ```
+//!
+//! The engine pauses after the tail and may have fetched the tail's link long before: so the links
+//! never change. One descriptor stays free, so that the tail never meets the engine from behind.
+
+use std::sync::Arc;
+
+use bitstream_model::interface::descriptor::{NXTDESC, NXTDESC_MSB, STATUS, WORDS};
+
+use super::descriptor::{Descriptor, DescriptorStatus};
+use crate::platform::{BusAddress, Platform, PlatformError, SharedWords};
+
+/// How far the engine is with a chain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Progress {
+    /// Descriptors are still outstanding.
+    Running,
+    /// All are complete; so many bytes were moved.
+    Complete {
+        /// Sum of the descriptors' byte counts.
+        bytes: u64,
+        /// Whether a received packet ended with the last.
+        packet_ended: bool,
+    },
+    /// A received packet ended before the chain did.
+    Short {
+        /// Bytes received.
+        bytes: u64,
+    },
+    /// A descriptor failed.
+    Failed {
+        /// Its place in the chain, from 0.
+        index: usize,
+        /// Its status.
+        status: DescriptorStatus,
+    },
+}
+
+/// A ring of descriptors, and the chain of the current step in it.
+#[derive(Debug)]
+pub(crate) struct Ring {
+    words: SharedWords,
+    count: usize,
+    /// First descriptor of the chain.
+    first: usize,
+    /// Descriptors in the chain.
+    used: usize,
+    /// Descriptors at the head of the chain that were seen complete, and their bytes.
+    seen: (usize, u64),
+}
+
+impl Ring {
+    /// A linked ring that takes chains of up to `chain` descriptors.
+    pub(crate) fn new(
+        platform: &Arc<dyn Platform>,
+        chain: usize,
+        address_width: u32,
+    ) -> Result<Self, PlatformError> {
+        let count = chain.max(1) + 1;
+        let words = SharedWords::allocate(platform, count * WORDS, address_width)?;
+        let ring = Self { words, count, first: 0, used: 0, seen: (0, 0) };
+        for index in 0..count {
+            let next = ring.address_of((index + 1) % count)?;
+            ring.words.write(index * WORDS + NXTDESC, next.low());
+            ring.words.write(index * WORDS + NXTDESC_MSB, next.high());
+        }
+        Ok(ring)
+    }
+
+    fn address_of(&self, index: usize) -> Result<BusAddress, PlatformError> {
+        self.words.range(index * WORDS, WORDS)
+    }
+
+    /// Descriptors that a chain may have.
+    pub(crate) fn capacity(&self) -> usize {
+        self.count - 1
+    }
+
+    /// Descriptors in the chain.
+    pub(crate) fn used(&self) -> usize {
+        self.used
+    }
+
+    /// Starts a new chain after the last one, all of which is complete.
+    pub(crate) fn begin(&mut self) {
+        self.first = (self.first + self.used) % self.count;
+        self.used = 0;
+        self.seen = (0, 0);
+    }
+
+    /// Forgets every chain: the engine was stopped and will start at [`Self::start`].
+    pub(crate) fn rewind(&mut self) {
+        self.first = 0;
+        self.used = 0;
+        self.seen = (0, 0);
+        for index in 0..self.count {
+            self.words.write(index * WORDS + STATUS, 0);
+        }
+    }
+
+    /// Appends a descriptor to the chain.
+    pub(crate) fn push(&mut self, descriptor: &Descriptor) {
+        assert!(self.used < self.capacity(), "the ring was sized for the chain before it began");
+        let index = (self.first + self.used) % self.count;
+        for (word, value) in descriptor.words() {
+            self.words.write(index * WORDS + word, value);
+        }
+        self.used += 1;
+    }
+
+    /// Where the chain begins.
+    pub(crate) fn start(&self) -> Result<BusAddress, PlatformError> {
+        self.address_of(self.first)
+    }
+
+    /// The last descriptor of the chain; `None` if the chain is empty.
+    pub(crate) fn tail(&self) -> Result<Option<BusAddress>, PlatformError> {
+        match self.used.checked_sub(1) {
+            Some(last) => self.address_of((self.first + last) % self.count).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// Looks how far the engine is, from the oldest descriptor that was not seen complete.
+    pub(crate) fn progress(&mut self) -> Progress {
+        let (mut seen, mut bytes) = self.seen;
+        let mut packet_ended = false;
+        while seen < self.used {
+            let index = (self.first + seen) % self.count;
+            let status = DescriptorStatus(self.words.read(index * WORDS + STATUS));
+            if status.failed() {
+                return Progress::Failed { index: seen, status };
+            }
+            if !status.complete() {
+                return Progress::Running;
+            }
+            seen += 1;
+            bytes += u64::from(status.transferred());
+            packet_ended = status.packet_ended();
+            if packet_ended && seen < self.used {
+                return Progress::Short { bytes };
+            }
+            // The last one is looked at again on every call: it says whether the packet ended.
+            if seen < self.used {
+                self.seen = (seen, bytes);
+            }
+        }
+        Progress::Complete { bytes, packet_ended }
+    }
+
+    /// Leaves the memory to an engine that could not be stopped.
+    pub(crate) fn leave_to_device(&mut self) {
+        self.words.leave_to_device();
+    }
+
+    #[cfg(test)]
+    fn complete(&self, place: usize, status: u32) {
+        self.words.write((self.first + place) % self.count * WORDS + STATUS, status);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::platform::fake::FakePlatform;
+    use crate::platform::{Access, CpuBuffer};
+
+    const COMPLETE: u32 = 1 << 31;
+    const RXEOF: u32 = 1 << 26;
+
+    fn ring(chain: usize) -> (Ring, BusAddress) {
+        let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
+        let ring = Ring::new(&platform, chain, 40).expect("allocated");
+        let buffer = CpuBuffer::allocate(&platform, 16, 40).expect("allocated");
+        let buffer = buffer.into_device(Access::Read).expect("handed over");
+        (ring, buffer.range(0, 256).expect("inside"))
+    }
+
+    fn descriptor(address: BusAddress) -> Descriptor {
+        Descriptor { address, bytes: 64, starts_packet: true, ends_packet: false }
+    }
+
+    #[test]
+    fn the_last_descriptor_links_to_the_first() {
+        let (ring, _) = ring(3);
+        let links: Vec<_> = (0..4).map(|index| ring.words.read(index * 16)).collect();
+        assert_eq!(links, [0x40, 0x80, 0xC0, 0x00]);
+        assert!((0..4).all(|index| ring.words.read(index * 16 + 1) == 8));
+    }
+
+    #[test]
+    fn each_chain_begins_after_the_tail_of_the_last_and_wraps() {
+        let (mut ring, address) = ring(3);
+        let mut tails = Vec::new();
+        for _ in 0..4 {
+            ring.begin();
+            for place in 0..3 {
+                ring.push(&descriptor(address));
+                ring.complete(place, COMPLETE | 64);
+            }
+            tails.push(ring.tail().expect("inside").expect("not empty").low());
+            assert_eq!(ring.progress(), Progress::Complete { bytes: 192, packet_ended: false });
+        }
+        // Four descriptors, three a chain: the spare moves one back each time.
+        assert_eq!(tails, [0x80, 0x40, 0x00, 0xC0]);
+    }
+
+    #[test]
+    fn a_used_descriptor_is_written_with_its_status_cleared() {
+        let (mut ring, address) = ring(1);
+        ring.push(&descriptor(address));
+        ring.complete(0, COMPLETE | 64);
+        assert_eq!(ring.progress(), Progress::Complete { bytes: 64, packet_ended: false });
+        ring.begin();
+        ring.push(&descriptor(address));
+        ring.complete(0, COMPLETE | 64);
+        ring.begin();
+        ring.push(&descriptor(address));
+        assert_eq!(ring.progress(), Progress::Running);
+        assert_eq!(ring.words.read(6), 0x0800_0040);
+    }
+
+    #[test]
+    fn an_empty_chain_has_no_tail_and_is_complete() {
+        let (mut ring, _) = ring(3);
+        ring.begin();
+        assert_eq!(ring.tail().expect("no error"), None);
+        assert_eq!(ring.progress(), Progress::Complete { bytes: 0, packet_ended: false });
+    }
+
+    #[test]
+    fn a_packet_that_ends_early_is_short() {
+        let (mut ring, address) = ring(3);
+        ring.push(&descriptor(address));
+        ring.push(&descriptor(address));
+        assert_eq!(ring.progress(), Progress::Running);
+        ring.complete(0, COMPLETE | RXEOF | 48);
+        assert_eq!(ring.progress(), Progress::Short { bytes: 48 });
+    }
+
+    #[test]
+    fn a_packet_that_ends_with_the_chain_is_whole_however_often_one_looks() {
+        let (mut ring, address) = ring(3);
+        ring.push(&descriptor(address));
+        ring.push(&descriptor(address));
+        ring.complete(0, COMPLETE | 64);
+        assert_eq!(ring.progress(), Progress::Running);
+        ring.complete(1, COMPLETE | RXEOF | 32);
+        let whole = Progress::Complete { bytes: 96, packet_ended: true };
+        assert_eq!([ring.progress(), ring.progress()], [whole, whole]);
+    }
+
+    #[test]
+    fn a_failed_descriptor_is_named() {
+        let (mut ring, address) = ring(3);
+        ring.push(&descriptor(address));
+        ring.push(&descriptor(address));
+        ring.complete(0, COMPLETE | 64);
+        ring.complete(1, 1 << 30);
+        let status = DescriptorStatus(1 << 30);
+        assert_eq!(ring.progress(), Progress::Failed { index: 1, status });
+    }
+}

@@ -1,0 +1,5 @@
+//! This folder lays records out over the channels of a board, and reads results back from them.
+
+pub(crate) mod pack;
+pub(crate) mod stripe;
+pub(crate) mod unpack;

@@ -1,0 +1,169 @@
+//! This file holds the public error: what failed, and what the caller can do next.
+
+use thiserror::Error;
+
+use crate::accelerator::{ControlError, IdentityError};
+use crate::axi_dma::DmaError;
+use crate::platform::PlatformError;
+use crate::scene::InputError;
+use crate::step::Fault;
+
+/// Why a call failed. The cause is the [`source`](std::error::Error::source).
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The input was refused. Nothing was sent to the board.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// No board could be opened.
+    #[error("cannot open a board")]
+    Open(#[from] OpenError),
+    /// A step failed; the caller's bodies are as they were.
+    #[error("{}", match aftermath {
+        Aftermath::Ready => "the step failed and changed nothing; the board was reset and is ready for the next",
+        Aftermath::Untouched => "the step's results were refused and changed nothing; the board is ready for the next",
+        Aftermath::MustReopen => "the step failed and changed nothing; the board could not be reset: open it again",
+    })]
+    Step {
+        /// What went wrong.
+        #[source]
+        fault: Box<Fault>,
+        /// How the board stands now.
+        aftermath: Aftermath,
+    },
+    /// An earlier fault could not be cleared.
+    #[error("the board was given up after an earlier fault: open it again")]
+    MustReopen,
+}
+
+/// How the board stands after a failed step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Aftermath {
+    /// It was reset and works again: the same call may be made again.
+    Ready,
+    /// It works; the same call would fail in the same way.
+    Untouched,
+    /// It could not be reset.
+    MustReopen,
+}
+
+impl Error {
+    /// Whether the input was refused; nothing was sent to the board.
+    #[must_use]
+    pub fn is_input(&self) -> bool {
+        matches!(self, Self::Input(_))
+    }
+
+    /// Whether the same call may be made again as it is: the board works again.
+    #[must_use]
+    pub fn may_retry(&self) -> bool {
+        matches!(self, Self::Step { aftermath: Aftermath::Ready, .. })
+    }
+
+    /// Whether the board must be opened again first.
+    #[must_use]
+    pub fn must_reopen(&self) -> bool {
+        matches!(self, Self::MustReopen | Self::Step { aftermath: Aftermath::MustReopen, .. })
+    }
+}
+
+/// Why no board could be opened.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// There is no such UIO node.
+    #[error("no UIO node named {wanted:?} (found: {}): is the overlay loaded?", if found.is_empty() { "none" } else { found })]
+    NoNode {
+        /// The name that was looked for.
+        wanted: String,
+        /// The names that there are.
+        found: String,
+    },
+    /// There is no node, and no emulated board to fall back to.
+    #[error(
+        "no UIO node named {wanted:?}, and this build has no emulated board: load the overlay, or \
+         build with the feature `emulation`"
+    )]
+    NoEmulation {
+        /// The name that was looked for.
+        wanted: String,
+    },
+    /// A node lacks a register region.
+    #[error("UIO node {node:?} has no map named {map:?}: is this the accelerator's overlay?")]
+    NoMap {
+        /// Name of the node.
+        node: String,
+        /// Name of the missing map.
+        map: &'static str,
+    },
+    /// The node is there; its DMA memory is what this version lacks.
+    #[error(
+        "UIO node {node:?} ({device}) carries profile {profile}, interface {major}.{minor}: this \
+         version identifies real hardware but has no DMA memory for it; choose the emulated board"
+    )]
+    NoMemory {
+        /// Name of the node.
+        node: String,
+        /// The kernel's name for it.
+        device: String,
+        /// Name of the bitstream's profile.
+        profile: &'static str,
+        /// Major interface version.
+        major: u32,
+        /// Minor interface version.
+        minor: u32,
+    },
+    /// A length width that no DMA core can have.
+    #[error("the length width must be {low} to {high} bits, found {found}")]
+    LengthWidth {
+        /// What was asked for.
+        found: u32,
+        /// The narrowest.
+        low: u32,
+        /// The widest.
+        high: u32,
+    },
+    /// Registers, memory, files.
+    #[error(transparent)]
+    Platform(#[from] PlatformError),
+    /// The bitstream is not one for this driver.
+    #[error(transparent)]
+    Identity(#[from] IdentityError),
+    /// A DMA core did not follow.
+    #[error(transparent)]
+    Core(#[from] DmaError),
+    /// The control block did not follow.
+    #[error(transparent)]
+    Control(#[from] ControlError),
+    /// The emulated board could not be built.
+    #[cfg(feature = "emulation")]
+    #[error("cannot build the emulated board")]
+    Emulation(#[from] bitstream_model::ConfigError),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(aftermath: Aftermath) -> Error {
+        Error::Step { fault: Box::new(Fault::NotFinite { body: 3 }), aftermath }
+    }
+
+    #[test]
+    fn each_error_says_what_to_do_next() {
+        let answers = |error: &Error| (error.is_input(), error.may_retry(), error.must_reopen());
+        assert_eq!(answers(&Error::Input(InputError::NoBodies)), (true, false, false));
+        assert_eq!(answers(&step(Aftermath::Ready)), (false, true, false));
+        assert_eq!(answers(&step(Aftermath::Untouched)), (false, false, false));
+        assert_eq!(answers(&step(Aftermath::MustReopen)), (false, false, true));
+        assert_eq!(answers(&Error::MustReopen), (false, false, true));
+    }
+
+    #[test]
+    fn the_cause_is_the_source_and_not_in_the_text() {
+        let error = step(Aftermath::Ready);
+        let source = std::error::Error::source(&error).expect("a fault").to_string();
+        assert!(source.contains("body 3") && !error.to_string().contains("body 3"));
+    }
+}

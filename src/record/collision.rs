@@ -1,0 +1,108 @@
+//! This file makes the record of a collision.
+
+use super::vec3_and_word;
+use crate::interface::record::{Beat, CONTACT_POINTS, collision};
+use crate::scene::Collision;
+
+/// The collision record: normal and count, positions and indices of both bodies, contact points.
+///
+/// Contact points from `count` on are zeros, whatever the caller left there: they may hold anything
+/// (NaN too), and what is sent must not depend on it.
+///
+/// Shape: 7 beats. Units: metres, world frame; distance negative = penetrating.
+///
+/// Source: interface specification, record table.
+#[inline]
+pub(crate) fn encode(
+    from: &Collision,
+    position_a: [f32; 3],
+    position_b: [f32; 3],
+) -> [Beat; collision::BEATS] {
+    let mut beats = [Beat::default(); collision::BEATS];
+    beats[collision::NORMAL] = vec3_and_word(from.normal, from.count);
+    beats[collision::BODY_A] = vec3_and_word(position_a, from.body_a);
+    beats[collision::BODY_B] = vec3_and_word(position_b, from.body_b);
+    for (ordinal, (contact, beat)) in
+        (0_u32..).zip(from.contacts.iter().zip(&mut beats[collision::CONTACTS..]))
+    {
+        // A mask, not a branch: counts follow no pattern that could be predicted.
+        let used = if ordinal < from.count { u32::MAX } else { 0 };
+        let filled = vec3_and_word(contact.point, contact.distance.to_bits());
+        *beat = Beat(filled.0.map(|word| word & used));
+    }
+    beats
+}
+
+const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::BEATS);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Contact;
+
+    #[test]
+    fn a_collision_record_is_these_bytes() {
+        let collision = Collision {
+            body_a: 0x0102_0304,
+            body_b: 0x0506_0708,
+            normal: [0.0, -1.0, 0.0],
+            count: 3,
+            contacts: [
+                Contact { point: [1.0, 2.0, 3.0], distance: -0.5 },
+                Contact { point: [4.0, 5.0, 6.0], distance: 0.25 },
+                Contact { point: [-7.0, 8.0, -0.0], distance: -1.0 },
+                Contact { point: [f32::NAN, 9.0, f32::INFINITY], distance: 9.0 },
+            ],
+        };
+        let bytes: [u8; 112] = [
+            0x00, 0x00, 0x00, 0x00, // n.x 0.0
+            0x00, 0x00, 0x80, 0xBF, // n.y -1.0
+            0x00, 0x00, 0x00, 0x00, // n.z 0.0
+            0x03, 0x00, 0x00, 0x00, // count
+            0x00, 0x00, 0x20, 0x41, // pA.x 10.0
+            0x00, 0x00, 0x30, 0x41, // pA.y 11.0
+            0x00, 0x00, 0x40, 0x41, // pA.z 12.0
+            0x04, 0x03, 0x02, 0x01, // bodyA
+            0x00, 0x00, 0x50, 0x41, // pB.x 13.0
+            0x00, 0x00, 0x60, 0x41, // pB.y 14.0
+            0x00, 0x00, 0x70, 0x41, // pB.z 15.0
+            0x08, 0x07, 0x06, 0x05, // bodyB
+            0x00, 0x00, 0x80, 0x3F, // c0.x 1.0
+            0x00, 0x00, 0x00, 0x40, // c0.y 2.0
+            0x00, 0x00, 0x40, 0x40, // c0.z 3.0
+            0x00, 0x00, 0x00, 0xBF, // distance0 -0.5
+            0x00, 0x00, 0x80, 0x40, // c1.x 4.0
+            0x00, 0x00, 0xA0, 0x40, // c1.y 5.0
+            0x00, 0x00, 0xC0, 0x40, // c1.z 6.0
+            0x00, 0x00, 0x80, 0x3E, // distance1 0.25
+            0x00, 0x00, 0xE0, 0xC0, // c2.x -7.0
+            0x00, 0x00, 0x00, 0x41, // c2.y 8.0
+            0x00, 0x00, 0x00, 0x80, // c2.z -0.0
+            0x00, 0x00, 0x80, 0xBF, // distance2 -1.0
+            0x00, 0x00, 0x00, 0x00, // unused
+            0x00, 0x00, 0x00, 0x00, // unused
+            0x00, 0x00, 0x00, 0x00, // unused
+            0x00, 0x00, 0x00, 0x00, // unused
+        ];
+        let beats = encode(&collision, [10.0, 11.0, 12.0], [13.0, 14.0, 15.0]);
+        assert_eq!(bytemuck::bytes_of(&beats), bytes);
+    }
+
+    #[test]
+    fn contact_points_from_count_on_are_sent_as_zeros() {
+        let contact = Contact { point: [f32::NAN; 3], distance: f32::NAN };
+        for count in 0..=4_u32 {
+            let collision = Collision {
+                body_a: 0,
+                body_b: 1,
+                normal: [1.0, 0.0, 0.0],
+                count,
+                contacts: [contact; 4],
+            };
+            let beats = encode(&collision, [0.0; 3], [0.0; 3]);
+            for (ordinal, beat) in (0..).zip(&beats[3..]) {
+                assert_eq!(*beat == Beat([0; 4]), ordinal >= count, "count {count}: {ordinal}");
+            }
+        }
+    }
+}

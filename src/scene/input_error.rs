@@ -1,0 +1,293 @@
+//! This file lists everything that a step refuses before anything is sent.
+
+use crate::interface::record::CONTACT_POINTS;
+
+/// Why input was refused. Nothing was sent, and nothing of the caller's was changed.
+///
+/// Indices are positions in the arrays that the caller gave.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// There are no bodies.
+    #[error("a step needs at least one body, found none: give all bodies, static ones included")]
+    NoBodies,
+
+    /// More bodies than the bitstream has room for, whatever the memory.
+    #[error(
+        "found {found} bodies, the bitstream takes at most {limit}: give fewer, or load a \
+         bitstream with a larger body capacity"
+    )]
+    TooManyBodies {
+        /// Bodies given.
+        found: usize,
+        /// Bodies that the bitstream takes.
+        limit: u32,
+    },
+
+    /// More collisions than 32 bits count.
+    #[error("found {found} collisions, a step takes at most {limit}: give fewer", limit = u32::MAX)]
+    TooManyCollisions {
+        /// Collisions given.
+        found: usize,
+    },
+
+    /// Bodies and collisions together exceed the on-chip memory.
+    #[error(
+        "{bodies} bodies and {collisions} collisions need {needed} bytes of on-chip memory, there \
+         are {available}: with so many bodies at most {fitting} collisions fit"
+    )]
+    MemoryExceeded {
+        /// Bodies given.
+        bodies: usize,
+        /// Collisions given.
+        collisions: usize,
+        /// What they need, bytes.
+        needed: u64,
+        /// What there is, bytes.
+        available: u32,
+        /// Collisions that fit beside the bodies; 0 if the bodies alone are too many.
+        fitting: u32,
+    },
+
+    /// A number of a body is NaN or infinite.
+    #[error("body {body}: {field}[{component}] is {found}, expected a finite number: correct it")]
+    BodyNotFinite {
+        /// The body.
+        body: usize,
+        /// Position, orientation, linear or angular velocity.
+        field: &'static str,
+        /// Component of the field, 0 for x.
+        component: usize,
+        /// Its value.
+        found: f32,
+    },
+
+    /// A quaternion that stands for no rotation.
+    #[error(
+        "body {body}: the orientation has length {length:e}, which cannot be normalised (at least \
+         {limit:e} and finite): give a unit quaternion x, y, z, w",
+        limit = InputError::SHORTEST_ORIENTATION
+    )]
+    Orientation {
+        /// The body.
+        body: usize,
+        /// Length of the quaternion; infinite if its square is beyond f32.
+        length: f32,
+    },
+
+    /// A static body moves.
+    #[error(
+        "body {body} is static (its shape has inverse mass 0) but its {field}[{component}] is \
+         {found}: set its velocity to 0, or give it a shape with a mass"
+    )]
+    StaticBodyMoves {
+        /// The body.
+        body: usize,
+        /// Linear or angular velocity.
+        field: &'static str,
+        /// Component of the field, 0 for x.
+        component: usize,
+        /// Its value, m/s or rad/s.
+        found: f32,
+    },
+
+    /// A body refers to a shape that was not set.
+    #[error(
+        "body {body}: its shape is {found}, but the table has {shapes} shapes, counted from 0: \
+         correct the index, or set the shapes first"
+    )]
+    ShapeIndex {
+        /// The body.
+        body: usize,
+        /// Its shape index.
+        found: u32,
+        /// Shapes in the table.
+        shapes: usize,
+    },
+
+    /// A collision refers to a body that does not exist.
+    #[error(
+        "collision {collision}: body {side} is {found}, but there are {bodies} bodies, counted \
+         from 0: correct the index"
+    )]
+    BodyIndex {
+        /// The collision.
+        collision: usize,
+        /// Which of the two bodies, `A` or `B`.
+        side: char,
+        /// Its index.
+        found: u32,
+        /// Bodies given.
+        bodies: usize,
+    },
+
+    /// A collision of a body with itself.
+    #[error("collision {collision}: bodies A and B are both {body}: remove the collision")]
+    SelfCollision {
+        /// The collision.
+        collision: usize,
+        /// The body.
+        body: u32,
+    },
+
+    /// A collision between bodies that cannot move.
+    #[error(
+        "collision {collision}: bodies {body_a} and {body_b} are both static, nothing can move: \
+         remove the collision"
+    )]
+    BothStatic {
+        /// The collision.
+        collision: usize,
+        /// Body A.
+        body_a: u32,
+        /// Body B.
+        body_b: u32,
+    },
+
+    /// A number of contact points outside 1 to [`CONTACT_POINTS`].
+    #[error(
+        "collision {collision}: its count is {found}, expected 1 to {CONTACT_POINTS} contact \
+         points: remove the collision if there are none, reduce them if there are more"
+    )]
+    ContactCount {
+        /// The collision.
+        collision: usize,
+        /// Its count.
+        found: u32,
+    },
+
+    /// A component of a normal is NaN or infinite.
+    #[error(
+        "collision {collision}: normal[{component}] is {found}, expected a finite number: correct \
+         it"
+    )]
+    NormalNotFinite {
+        /// The collision.
+        collision: usize,
+        /// Component, 0 for x.
+        component: usize,
+        /// Its value.
+        found: f32,
+    },
+
+    /// A normal is not of unit length.
+    #[error(
+        "collision {collision}: the normal has length {length}, expected 1 within {tolerance}: \
+         normalise it",
+        tolerance = InputError::NORMAL_TOLERANCE
+    )]
+    NormalLength {
+        /// The collision.
+        collision: usize,
+        /// Length of the normal.
+        length: f32,
+    },
+
+    /// A number of a contact point in use is NaN or infinite.
+    #[error(
+        "collision {collision}, contact point {contact}: {field}[{component}] is {found}, expected \
+         a finite number: correct it, or lower the count if the point is not in use"
+    )]
+    ContactNotFinite {
+        /// The collision.
+        collision: usize,
+        /// The contact point.
+        contact: usize,
+        /// Point or distance.
+        field: &'static str,
+        /// Component of the field, 0 for x; 0 for the distance.
+        component: usize,
+        /// Its value.
+        found: f32,
+    },
+
+    /// A parameter is outside its range.
+    #[error("the {parameter} is {found}, expected {expected}: correct the step parameters")]
+    Parameter {
+        /// The parameter; a gravity component with its axis.
+        parameter: &'static str,
+        /// Its value.
+        found: f32,
+        /// Its range.
+        expected: &'static str,
+    },
+
+    /// More passes than a step takes.
+    #[error(
+        "{found} {solver} iterations, a step takes at most {limit}: give fewer, or take several \
+         steps",
+        limit = InputError::MAX_ITERATIONS
+    )]
+    TooManyIterations {
+        /// Contact or friction.
+        solver: &'static str,
+        /// Iterations asked for.
+        found: u32,
+    },
+
+    /// The shape table is empty.
+    #[error("found no shapes, expected at least one: set the shapes that the bodies refer to")]
+    NoShapes,
+
+    /// More shapes than the table has entries.
+    #[error(
+        "found {found} shapes, the bitstream's table takes at most {limit}: give bodies of equal \
+         mass and inertia one shape"
+    )]
+    TooManyShapes {
+        /// Shapes given.
+        found: usize,
+        /// Entries of the table.
+        limit: u32,
+    },
+
+    /// An inverse mass or inertia is no mass or inertia.
+    #[error(
+        "shape {shape}: its {field}[{component}] is {found:e}, expected 0 or a finite number of at \
+         least {limit:e}: correct it",
+        limit = f32::MIN_POSITIVE
+    )]
+    ShapeValue {
+        /// The shape.
+        shape: usize,
+        /// Inverse mass or inverse inertia.
+        field: &'static str,
+        /// Component of the field, 0 for x; 0 for the mass.
+        component: usize,
+        /// Its value, 1/kg or 1/(kg m²).
+        found: f32,
+    },
+
+    /// A shape whose inertia differs between axes.
+    #[error(
+        "shape {shape}: its inverse inertia is {found:?}, but this accelerator takes only shapes \
+         with three equal components (cube, sphere): give such a shape"
+    )]
+    Anisotropic {
+        /// The shape.
+        shape: usize,
+        /// Its inverse inertia, 1/(kg m²).
+        found: [f32; 3],
+    },
+
+    /// A static shape that could rotate.
+    #[error(
+        "shape {shape} is static (inverse mass 0) but its inverse inertia is {found}: set that to \
+         0 too, or give the shape a mass"
+    )]
+    StaticShapeRotates {
+        /// The shape.
+        shape: usize,
+        /// Its inverse inertia, 1/(kg m²).
+        found: f32,
+    },
+}
+
+impl InputError {
+    /// Length below which a quaternion stands for no rotation.
+    pub const SHORTEST_ORIENTATION: f32 = 1e-6;
+    /// How far from 1 a normal's length may be.
+    pub const NORMAL_TOLERANCE: f32 = 1e-3;
+    /// Passes of each solver that a step takes.
+    pub const MAX_ITERATIONS: u32 = bitstream_model::interface::control::ITERATIONS_MAX;
+}

@@ -1,0 +1,255 @@
+//! This folder refuses bad input before anything is sent.
+//!
+//! One pass over the bodies, one over the collisions. What passes here, a board of the same
+//! capacities accepts.
+
+mod body;
+mod collision;
+mod parameters;
+mod shape;
+
+pub(crate) use shape::validate_shapes;
+
+use self::body::{check_body, shape_of};
+use self::collision::check_collision;
+use self::parameters::check_parameters;
+use super::{Bodies, Collisions, InputError, Shape, StepParameters};
+
+/// What a bitstream has room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Limits {
+    /// Largest number of bodies, whatever the memory.
+    pub(crate) body_capacity: u32,
+    /// Entries of the shape table.
+    pub(crate) shape_capacity: u32,
+    /// On-chip memory that bodies and collisions share, bytes.
+    pub(crate) memory_bytes: u32,
+    /// What a body takes of it, bytes.
+    pub(crate) bytes_per_body: u32,
+    /// What a collision takes of it, bytes.
+    pub(crate) bytes_per_collision: u32,
+}
+
+/// Everything a step refuses before anything is sent.
+///
+/// `shapes` is the table as [`validate_shapes`] has accepted it; a shape of inverse mass 0 is
+/// static. Of several mistakes of one kind the one with the lowest index is reported.
+pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+    bodies: &B,
+    collisions: &C,
+    shapes: &[Shape],
+    parameters: &StepParameters,
+    limits: &Limits,
+) -> Result<(), InputError> {
+    let body_count = bodies.len();
+    check_parameters(parameters)?;
+    check_room(body_count, collisions.len(), limits)?;
+    validate_shapes(shapes, limits.shape_capacity)?;
+    for index in 0..body_count {
+        check_body(index, &bodies.body(index), shapes)?;
+    }
+    let is_static =
+        |index: usize| shapes.get(shape_of(&bodies.body(index))).is_some_and(Shape::is_static);
+    for index in 0..collisions.len() {
+        let collision = collisions.collision(index);
+        let (body_a, body_b) = check_collision(index, &collision, body_count)?;
+        if is_static(body_a) && is_static(body_b) {
+            return Err(InputError::BothStatic {
+                collision: index,
+                body_a: collision.body_a,
+                body_b: collision.body_b,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn check_room(bodies: usize, collisions: usize, limits: &Limits) -> Result<(), InputError> {
+    if bodies == 0 {
+        return Err(InputError::NoBodies);
+    }
+    if exceeds(bodies, limits.body_capacity) {
+        return Err(InputError::TooManyBodies { found: bodies, limit: limits.body_capacity });
+    }
+    if exceeds(collisions, u32::MAX) {
+        return Err(InputError::TooManyCollisions { found: collisions });
+    }
+    // Neither product leaves 64 bits: both factors are below 2^32 by now.
+    let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
+    let for_bodies = bytes(bodies, limits.bytes_per_body);
+    let needed = for_bodies.saturating_add(bytes(collisions, limits.bytes_per_collision));
+    let available = limits.memory_bytes;
+    if needed > u64::from(available) {
+        let free = u64::from(available).saturating_sub(for_bodies);
+        let fitting = free.checked_div(u64::from(limits.bytes_per_collision)).unwrap_or(0);
+        let fitting = u32::try_from(fitting).unwrap_or(u32::MAX);
+        return Err(InputError::MemoryExceeded { bodies, collisions, needed, available, fitting });
+    }
+    Ok(())
+}
+
+/// Whether a number of things is above a limit of the hardware.
+fn exceeds(found: usize, limit: u32) -> bool {
+    !u32::try_from(found).is_ok_and(|found| found <= limit)
+}
+
+/// Without a branch per number: these loops see every number of a step.
+fn all_finite(values: &[f32]) -> bool {
+    values.iter().fold(true, |finite, value| finite & value.is_finite())
+}
+
+/// The first value that is wrong, which the caller has found to exist, and where it stands.
+#[cold]
+fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
+    let found = values.iter().copied().enumerate().find(|(_, value)| wrong(*value));
+    found.expect("a number was found to be wrong")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Body, Collision, Contact, Pose, Velocity};
+
+    const FLOAT: Limits = Limits {
+        body_capacity: 131_072,
+        shape_capacity: 64,
+        memory_bytes: 4 << 20,
+        bytes_per_body: 24,
+        bytes_per_collision: 16,
+    };
+    const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+
+    fn body(shape: u32) -> Body {
+        Body {
+            pose: Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] },
+            velocity: Velocity::default(),
+            shape,
+        }
+    }
+
+    fn collision(body_a: u32, body_b: u32) -> Collision {
+        Collision {
+            body_a,
+            body_b,
+            normal: [0.0, -1.0, 0.0],
+            count: 1,
+            contacts: [Contact::default(); 4],
+        }
+    }
+
+    fn validated(bodies: &[Body], collisions: &[Collision]) -> Result<(), InputError> {
+        validate(bodies, collisions, &SHAPES, &StepParameters::default(), &FLOAT)
+    }
+
+    #[test]
+    fn static_against_moving_is_accepted_either_way_round() {
+        let bodies = [body(0), body(1), body(1)];
+        let collisions = [collision(0, 1), collision(2, 0), collision(2, 1)];
+        assert_eq!(validated(&bodies, &collisions), Ok(()));
+        assert_eq!(validated(&bodies, &[]), Ok(()));
+    }
+
+    #[test]
+    fn two_static_bodies_are_refused() {
+        assert_eq!(
+            validated(&[body(0), body(1), body(0)], &[collision(0, 1), collision(2, 0)]),
+            Err(InputError::BothStatic { collision: 1, body_a: 2, body_b: 0 })
+        );
+    }
+
+    #[test]
+    fn each_check_is_reached_and_names_its_index() {
+        let bodies = [body(0), body(1), body(2)];
+        assert_eq!(
+            validated(&bodies, &[]),
+            Err(InputError::ShapeIndex { body: 2, found: 2, shapes: 2 })
+        );
+        assert_eq!(
+            validated(&bodies[..2], &[collision(0, 1), collision(1, 1)]),
+            Err(InputError::SelfCollision { collision: 1, body: 1 })
+        );
+        let parameters = StepParameters { contact_iterations: 256, ..StepParameters::default() };
+        assert_eq!(
+            validate(&bodies[..2], &[][..], &SHAPES, &parameters, &FLOAT),
+            Err(InputError::TooManyIterations { solver: "contact", found: 256 })
+        );
+        assert_eq!(
+            validate(&bodies[..2], &[][..], &[], &StepParameters::default(), &FLOAT),
+            Err(InputError::NoShapes)
+        );
+    }
+
+    #[test]
+    fn a_step_without_bodies_is_refused() {
+        assert_eq!(validated(&[], &[]), Err(InputError::NoBodies));
+    }
+
+    #[test]
+    fn more_bodies_than_the_capacity_are_refused() {
+        assert_eq!(check_room(131_072, 0, &FLOAT), Ok(()));
+        assert_eq!(
+            check_room(131_073, 0, &FLOAT),
+            Err(InputError::TooManyBodies { found: 131_073, limit: 131_072 })
+        );
+    }
+
+    #[test]
+    fn memory_of_four_mebibytes_carries_203_822_collisions_of_the_big_pile() {
+        // (4,194,304 - 38,881 * 24) / 16 = 203,822.5
+        assert_eq!(check_room(38_881, 203_822, &FLOAT), Ok(()));
+        let refused = check_room(38_881, 203_823, &FLOAT).expect_err("one too many");
+        assert_eq!(
+            refused,
+            InputError::MemoryExceeded {
+                bodies: 38_881,
+                collisions: 203_823,
+                needed: 4_194_312,
+                available: 4_194_304,
+                fitting: 203_822,
+            }
+        );
+        let text = refused.to_string();
+        for number in ["38881", "203823", "4194312", "4194304", "203822"] {
+            assert!(text.contains(number), "{text}");
+        }
+    }
+
+    #[test]
+    fn bodies_that_fill_the_memory_alone_leave_room_for_no_collision() {
+        let small = Limits { memory_bytes: 47, ..FLOAT };
+        assert!(matches!(
+            check_room(2, 0, &small),
+            Err(InputError::MemoryExceeded { needed: 48, available: 47, fitting: 0, .. })
+        ));
+        let free = Limits { bytes_per_collision: 0, ..small };
+        assert!(matches!(
+            check_room(2, 9, &free),
+            Err(InputError::MemoryExceeded { needed: 48, fitting: 0, .. })
+        ));
+    }
+
+    #[test]
+    #[cfg(target_pointer_width = "64")]
+    fn more_collisions_than_32_bits_count_are_refused() {
+        let free = Limits { bytes_per_collision: 0, ..FLOAT };
+        let most = usize::try_from(u32::MAX).expect("32 bits fit");
+        assert_eq!(check_room(1, most, &free), Ok(()));
+        assert_eq!(
+            check_room(1, most + 1, &free),
+            Err(InputError::TooManyCollisions { found: most + 1 })
+        );
+    }
+
+    #[test]
+    fn messages_name_index_value_and_limit() {
+        let text = |error: InputError| error.to_string();
+        let length = text(InputError::NormalLength { collision: 12, length: 1.25 });
+        assert!(length.contains("12") && length.contains("1.25") && length.contains("0.001"));
+        let count = text(InputError::ContactCount { collision: 12, found: 7 });
+        assert!(count.contains("12") && count.contains('7') && count.contains("1 to 4"));
+        let passes = text(InputError::TooManyIterations { solver: "friction", found: 300 });
+        assert!(passes.contains("300") && passes.contains("friction") && passes.contains("255"));
+        let orientation = text(InputError::Orientation { body: 3, length: 0.0 });
+        assert!(orientation.contains("body 3") && orientation.contains("1e-6"));
+    }
+}

@@ -1,0 +1,258 @@
+//! This file holds an open board: its lanes and its control block, from opening to closing.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bitstream_model::interface::address_map::DMA_COUNT_MAX;
+use bitstream_model::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+
+use super::fault::{Fault, RegisterDump};
+use super::lane::Lane;
+use super::plan::{Plan, bytes};
+use crate::accelerator::{Capabilities, Control, identify};
+use crate::axi_dma::{
+    Channel, Direction, DmaError, Dmacr, Dmasr, detect_length_width, largest_piece, reset_core,
+};
+use crate::error::OpenError;
+use crate::platform::{Access, AccessCounts, Platform, RegisterMap, Window, release_to_device};
+use crate::scene::StepParameters;
+
+/// Status registers of all channels: S2MM first, then MM2S.
+pub(super) type Statuses = [Dmasr; 2 * DMA_COUNT_MAX];
+
+/// An open board.
+#[derive(Debug)]
+pub(super) struct Device {
+    pub(super) mm2s: Vec<Lane>,
+    pub(super) s2mm: Vec<Lane>,
+    pub(super) control: Control,
+    pub(super) capabilities: Capabilities,
+    pub(super) counts: Arc<AccessCounts>,
+    pub(super) platform: Arc<dyn Platform>,
+    /// Interrupts that did not come although the work was done, in a row.
+    pub(super) missed_interrupts: u32,
+    /// Whether a reset failed: nothing may be touched any more.
+    pub(super) dead: bool,
+    largest: u32,
+}
+
+impl Device {
+    /// Identifies the bitstream, resets everything and checks the DMA cores.
+    pub(super) fn open(
+        platform: Arc<dyn Platform>,
+        length_width: Option<u32>,
+    ) -> Result<Self, OpenError> {
+        let counts = Arc::<AccessCounts>::default();
+        let window =
+            Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;
+        let mut capabilities = identify(&window)?;
+        if let Some(found) = length_width {
+            if !(LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&found) {
+                let (low, high) = (LENGTH_WIDTH_MIN, LENGTH_WIDTH_MAX);
+                return Err(OpenError::LengthWidth { found, low, high });
+            }
+            capabilities.length_width = found;
+        }
+        let mut control = Control::new(window);
+        let (mut mm2s, mut s2mm) = (Vec::new(), Vec::new());
+        let cores = capabilities.mm2s_channels;
+        for core in 0..cores {
+            let registers = platform.dma_window(core)?;
+            let window =
+                Arc::new(Window::new(registers, RegisterMap::Dma(core), Arc::clone(&counts))?);
+            let width = capabilities.address_width;
+            let mut sender = Channel::new(Arc::clone(&window), core, Direction::Mm2s, width);
+            let mut receiver = Channel::new(window, core, Direction::S2mm, width);
+            reset_core(&*platform, &mut sender, &mut receiver)?;
+            for channel in [&mut sender, &mut receiver] {
+                check_channel(channel, capabilities.length_width)?;
+            }
+            mm2s.push(Lane::new(sender, Access::Read, Dmacr::RUNNING));
+            // The last beat of the results goes to the last channel: its completion is the step's.
+            let completion = core + 1 == cores;
+            let running = if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
+            s2mm.push(Lane::new(receiver, Access::Write, running));
+        }
+        control.reset(&*platform)?;
+        drain_interrupt(&*platform)?;
+        Ok(Self {
+            mm2s,
+            s2mm,
+            control,
+            capabilities,
+            counts,
+            platform,
+            missed_interrupts: 0,
+            dead: false,
+            largest: largest_piece(capabilities.length_width),
+        })
+    }
+
+    /// Makes buffers and rings large enough for a step.
+    pub(super) fn reserve(&mut self, plan: &Plan) -> Result<(), Fault> {
+        let width = self.capabilities.address_width;
+        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
+            let beats = plan.segments(channel).poses.end;
+            lane.reserve_beats(&self.platform, beats, width)?;
+        }
+        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
+            lane.reserve_beats(&self.platform, plan.results(channel), width)?;
+        }
+        for core in 0..self.mm2s.len() {
+            let sent = plan.descriptors(core, self.largest);
+            let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
+            let received = usize::try_from(received).unwrap_or(usize::MAX);
+            for (lane, descriptors) in
+                [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
+            {
+                if !lane.ring_takes(descriptors) {
+                    lane.stop(&*self.platform)?;
+                    lane.replace_ring(&self.platform, descriptors, width)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Hands the buffers over, queues all descriptors, and starts; the number of doorbells.
+    pub(super) fn start(&mut self, plan: &Plan, parameters: &StepParameters) -> Result<u64, Fault> {
+        let largest = self.largest;
+        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
+            lane.hand_over()?;
+            lane.begin();
+            lane.queue(0, bytes(plan.results(channel)), largest)?;
+            lane.ensure_running(&*self.platform)?;
+        }
+        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
+            lane.hand_over()?;
+            lane.begin();
+            let segments = plan.segments(channel);
+            let mut queue = |beats: &std::ops::Range<usize>| {
+                lane.queue(bytes(beats.start), bytes(beats.len()), largest)
+            };
+            queue(&segments.velocities)?;
+            if !segments.collisions.is_empty() {
+                for _ in 0..plan.passes {
+                    queue(&segments.collisions)?;
+                }
+            }
+            queue(&segments.poses)?;
+            lane.ensure_running(&*self.platform)?;
+        }
+        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        self.control.set_arguments(count(plan.bodies), count(plan.collisions), parameters);
+        // Buffers and descriptors must be visible before the first doorbell.
+        release_to_device();
+        // Receivers first: otherwise the accelerator's output stalls, and with it the input.
+        let mut doorbells = 1;
+        for lane in &mut self.s2mm {
+            doorbells += u64::from(lane.ring_doorbell()?);
+        }
+        self.control.start();
+        for lane in &mut self.mm2s {
+            doorbells += u64::from(lane.ring_doorbell()?);
+        }
+        Ok(doorbells)
+    }
+
+    /// Takes all buffers back after a step whose chains are complete.
+    pub(super) fn take_back(&mut self) -> Result<(), Fault> {
+        for lane in self.lanes_mut() {
+            lane.take_back()?;
+        }
+        Ok(())
+    }
+
+    /// Descriptors in the chains of the step.
+    pub(super) fn descriptors(&mut self) -> u64 {
+        self.lanes_mut().map(|lane| lane.ring_mut().used() as u64).sum()
+    }
+
+    /// All lanes, in the order of [`Statuses`].
+    pub(super) fn lanes_mut(&mut self) -> impl Iterator<Item = &mut Lane> {
+        self.s2mm.iter_mut().chain(&mut self.mm2s)
+    }
+
+    /// All lanes, in the order of [`Statuses`].
+    pub(super) fn lanes(&self) -> impl Iterator<Item = &Lane> {
+        self.s2mm.iter().chain(&self.mm2s)
+    }
+
+    /// Reads every status register once.
+    pub(super) fn statuses(&self) -> Statuses {
+        let mut statuses = [Dmasr(0); 2 * DMA_COUNT_MAX];
+        for (status, lane) in statuses.iter_mut().zip(self.lanes()) {
+            *status = lane.channel.status();
+        }
+        statuses
+    }
+
+    /// The statuses for people.
+    pub(super) fn dump(&self, statuses: &Statuses) -> RegisterDump {
+        let line = |(status, lane): (&Dmasr, &Lane)| format!("{} {status}", lane.channel.name());
+        RegisterDump(statuses.iter().zip(self.lanes()).map(line).collect())
+    }
+
+    /// Resets all DMA cores and the accelerator.
+    pub(super) fn reset(&mut self) -> Result<(), Fault> {
+        // Every core is tried, even if one does not come back: the others stop moving data.
+        let mut result = Ok(());
+        for (sender, receiver) in self.mm2s.iter_mut().zip(&mut self.s2mm) {
+            let reset = reset_core(&*self.platform, &mut sender.channel, &mut receiver.channel);
+            result = result.and(reset);
+        }
+        result?;
+        self.control.reset(&*self.platform)?;
+        drain_interrupt(&*self.platform)?;
+        Ok(())
+    }
+}
+
+/// Checks a channel that was just reset.
+fn check_channel(channel: &mut Channel, expected: u32) -> Result<(), DmaError> {
+    let status = channel.status();
+    let name = channel.name().to_string();
+    if status.gone() {
+        return Err(DmaError::Gone { channel: name });
+    }
+    if !status.scatter_gather() {
+        return Err(DmaError::NoScatterGather { channel: name, found: status.to_string() });
+    }
+    let found = detect_length_width(channel)?;
+    if found != expected {
+        return Err(DmaError::LengthWidth { channel: name, expected, found });
+    }
+    Ok(())
+}
+
+/// Takes an event from before, and lets the next one through.
+fn drain_interrupt(platform: &dyn Platform) -> Result<(), crate::platform::PlatformError> {
+    platform.wait_interrupt(Duration::ZERO)?;
+    platform.unmask_interrupt()
+}
+
+impl Drop for Device {
+    /// Stops the engines before their memory goes; what cannot be stopped keeps its memory.
+    fn drop(&mut self) {
+        if self.dead {
+            return;
+        }
+        let Self { mm2s, s2mm, platform, .. } = self;
+        for (sender, receiver) in mm2s.iter_mut().zip(s2mm) {
+            if !sender.running() && !receiver.running() {
+                continue;
+            }
+            let stopped = sender.stop(&**platform).and_then(|()| receiver.stop(&**platform));
+            let stopped = stopped
+                .or_else(|_| reset_core(&**platform, &mut sender.channel, &mut receiver.channel));
+            for lane in [sender, receiver] {
+                if let Err(error) = &stopped {
+                    log::error!("a channel could not be stopped: {error}");
+                    lane.leave_to_device();
+                } else if let Err(error) = lane.take_back() {
+                    log::error!("cannot take a buffer back: {error}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! This file joins what one DMA channel needs for a step: its buffer, its ring, its registers.
+
+use std::sync::Arc;
+
+use crate::axi_dma::{Channel, Descriptor, DmaError, Dmacr, Ring, pieces};
+use crate::platform::{Access, CpuBuffer, DeviceBuffer, Platform, PlatformError};
+
+use bitstream_model::interface::record::Beat;
+
+/// Who holds the buffer.
+#[derive(Debug, Default)]
+enum Held {
+    /// There is none, or it was lost to a fault.
+    #[default]
+    Nobody,
+    Cpu(CpuBuffer),
+    Device(DeviceBuffer),
+}
+
+/// One channel with its memory.
+#[derive(Debug)]
+pub(super) struct Lane {
+    pub(super) channel: Channel,
+    control: Dmacr,
+    access: Access,
+    ring: Option<Ring>,
+    held: Held,
+    running: bool,
+}
+
+impl Lane {
+    /// A lane of a channel that was reset; `control` is what it will run with.
+    pub(super) fn new(channel: Channel, access: Access, control: Dmacr) -> Self {
+        Self { channel, control, access, ring: None, held: Held::Nobody, running: false }
+    }
+
+    /// Makes the buffer hold `beats`. Grows with slack, never shrinks.
+    pub(super) fn reserve_beats(
+        &mut self,
+        platform: &Arc<dyn Platform>,
+        beats: usize,
+        address_width: u32,
+    ) -> Result<(), PlatformError> {
+        if let Held::Cpu(buffer) = &self.held
+            && buffer.beats().len() >= beats.max(1)
+        {
+            return Ok(());
+        }
+        // The old buffer goes first: memory for DMA is scarce.
+        self.held = Held::Nobody;
+        let slack = (beats + beats / 4).max(1).next_multiple_of(4);
+        self.held = Held::Cpu(CpuBuffer::allocate(platform, slack, address_width)?);
+        Ok(())
+    }
+
+    /// Whether the ring takes a chain of so many descriptors.
+    pub(super) fn ring_takes(&self, descriptors: usize) -> bool {
+        self.ring.as_ref().is_some_and(|ring| ring.capacity() >= descriptors)
+    }
+
+    /// Replaces the ring of a channel that is stopped.
+    pub(super) fn replace_ring(
+        &mut self,
+        platform: &Arc<dyn Platform>,
+        descriptors: usize,
+        address_width: u32,
+    ) -> Result<(), PlatformError> {
+        self.ring = None;
+        let slack = descriptors.saturating_add(descriptors / 4);
+        self.ring = Some(Ring::new(platform, slack, address_width)?);
+        Ok(())
+    }
+
+    /// Stops the channel if it runs.
+    pub(super) fn stop(&mut self, platform: &dyn Platform) -> Result<(), DmaError> {
+        if self.running {
+            self.channel.stop(platform)?;
+            self.running = false;
+        }
+        Ok(())
+    }
+
+    /// Whether the engine runs.
+    pub(super) fn running(&self) -> bool {
+        self.running
+    }
+
+    /// The beats that the CPU holds; none while the device does.
+    pub(super) fn beats(&self) -> &[Beat] {
+        match &self.held {
+            Held::Cpu(buffer) => buffer.beats(),
+            Held::Nobody | Held::Device(_) => &[],
+        }
+    }
+
+    /// The beats that the CPU holds, to write; none while the device does.
+    pub(super) fn beats_mut(&mut self) -> &mut [Beat] {
+        match &mut self.held {
+            Held::Cpu(buffer) => buffer.beats_mut(),
+            Held::Nobody | Held::Device(_) => &mut [],
+        }
+    }
+
+    /// Gives the buffer to the device.
+    pub(super) fn hand_over(&mut self) -> Result<(), PlatformError> {
+        if let Held::Cpu(buffer) = std::mem::take(&mut self.held) {
+            self.held = Held::Device(buffer.into_device(self.access)?);
+        }
+        Ok(())
+    }
+
+    /// Takes the buffer back, if the device has it. Only when the chain is complete, or after a
+    /// reset.
+    pub(super) fn take_back(&mut self) -> Result<(), PlatformError> {
+        match std::mem::take(&mut self.held) {
+            Held::Device(buffer) => self.held = Held::Cpu(buffer.into_cpu()?),
+            held => self.held = held,
+        }
+        Ok(())
+    }
+
+    /// Starts the chain of a step.
+    pub(super) fn begin(&mut self) {
+        self.ring_mut().begin();
+    }
+
+    /// Appends one packet, or a place for one, to the chain. A packet of no bytes is none.
+    pub(super) fn queue(
+        &mut self,
+        offset: u64,
+        bytes: u64,
+        largest: u32,
+    ) -> Result<(), PlatformError> {
+        let Self { ring: Some(ring), held: Held::Device(buffer), access, .. } = self else {
+            unreachable!("a chain begins after reserving and handing over");
+        };
+        // S2MM: the device marks where the packet starts and ends.
+        let marks = *access == Access::Read;
+        for (piece, length) in pieces(bytes, largest) {
+            ring.push(&Descriptor {
+                address: buffer.range(offset + piece, u64::from(length))?,
+                bytes: length,
+                starts_packet: marks && piece == 0,
+                ends_packet: marks && piece + u64::from(length) == bytes,
+            });
+        }
+        Ok(())
+    }
+
+    /// Starts the channel at this step's chain, if it does not run yet.
+    pub(super) fn ensure_running(&mut self, platform: &dyn Platform) -> Result<(), DmaError> {
+        if !self.running && self.ring_mut().used() > 0 {
+            let first = self.ring_mut().start()?;
+            self.channel.start(platform, first, self.control)?;
+            self.running = true;
+        }
+        Ok(())
+    }
+
+    /// Lets the engine run to the end of the chain; whether there was anything to run.
+    pub(super) fn ring_doorbell(&mut self) -> Result<bool, PlatformError> {
+        let tail = self.ring_mut().tail()?;
+        if let Some(tail) = tail {
+            self.channel.ring_doorbell(tail);
+        }
+        Ok(tail.is_some())
+    }
+
+    /// The ring.
+    pub(super) fn ring_mut(&mut self) -> &mut Ring {
+        self.ring.as_mut().expect("every step reserves the rings first")
+    }
+
+    /// Takes note that the core was reset, and takes the buffer back.
+    pub(super) fn was_reset(&mut self) -> Result<(), PlatformError> {
+        self.running = false;
+        self.channel.was_reset();
+        if let Some(ring) = &mut self.ring {
+            ring.rewind();
+        }
+        self.take_back()
+    }
+
+    /// Gives up: an engine that could not be stopped may still reach ring and buffer.
+    pub(super) fn leave_to_device(&mut self) {
+        if let Some(ring) = &mut self.ring {
+            ring.leave_to_device();
+        }
+    }
+}

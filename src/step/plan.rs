@@ -1,0 +1,152 @@
+//! This file lays out one step: where the segments lie in each channel's buffer, how many
+//! descriptors they take, and how long the step may last.
+//!
+//! ```text
+//! MM2S buffer of a channel: | velocities | collisions | poses |    each from a multiple of 64 bytes
+//! ```
+
+use std::ops::Range;
+use std::time::Duration;
+
+use bitstream_model::interface::record::BEAT_BYTES;
+
+use super::report::time_of;
+use crate::accelerator::Capabilities;
+use crate::axi_dma::pieces;
+use crate::beat::stripe::{Segment, beats_on_channel};
+use crate::scene::StepParameters;
+
+/// Beats to which segments are aligned: 64 bytes.
+const ALIGNMENT: usize = 64 / BEAT_BYTES;
+
+/// What a step streams.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Plan {
+    pub(super) bodies: usize,
+    pub(super) collisions: usize,
+    pub(super) passes: u64,
+    pub(super) channels: usize,
+}
+
+/// Where the segments lie in the buffer of one MM2S channel, beats.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Segments {
+    pub(super) velocities: Range<usize>,
+    pub(super) collisions: Range<usize>,
+    pub(super) poses: Range<usize>,
+}
+
+/// Bytes of a number of beats.
+pub(super) const fn bytes(beats: usize) -> u64 {
+    (beats as u64) * BEAT_BYTES as u64
+}
+
+impl Plan {
+    /// The segments of one MM2S channel.
+    pub(super) fn segments(&self, channel: usize) -> Segments {
+        let place = |segment, records, start: usize| {
+            let start = start.next_multiple_of(ALIGNMENT);
+            start..start + beats_on_channel(segment, records, channel, self.channels)
+        };
+        let velocities = place(Segment::Velocities, self.bodies, 0);
+        let collisions = place(Segment::Collisions, self.collisions, velocities.end);
+        let poses = place(Segment::Poses, self.bodies, collisions.end);
+        Segments { velocities, collisions, poses }
+    }
+
+    /// Beats of results on one S2MM channel.
+    pub(super) fn results(&self, channel: usize) -> usize {
+        beats_on_channel(Segment::Results, self.bodies, channel, self.channels)
+    }
+
+    /// Descriptors of one MM2S channel, whose descriptors carry at most `largest` bytes.
+    pub(super) fn descriptors(&self, channel: usize, largest: u32) -> usize {
+        let count = |range: Range<usize>| pieces(bytes(range.len()), largest).count();
+        let Segments { velocities, collisions, poses } = self.segments(channel);
+        let passes = usize::try_from(self.passes).unwrap_or(usize::MAX);
+        (count(velocities) + count(poses)).saturating_add(count(collisions).saturating_mul(passes))
+    }
+
+    /// Bytes streamed to the accelerator, all channels.
+    pub(super) fn bytes_to_device(&self) -> u64 {
+        (0..self.channels)
+            .map(|channel| {
+                let Segments { velocities, collisions, poses } = self.segments(channel);
+                bytes(velocities.len() + poses.len())
+                    .saturating_add(bytes(collisions.len()).saturating_mul(self.passes))
+            })
+            .fold(0, u64::saturating_add)
+    }
+
+    /// Bytes streamed from the accelerator, all channels.
+    pub(super) fn bytes_from_device(&self) -> u64 {
+        (0..self.channels).map(|channel| bytes(self.results(channel))).sum()
+    }
+
+    /// How long the step may last: four times what it takes if every collision waits for the one
+    /// before it, and 10 ms.
+    pub(super) fn deadline(
+        &self,
+        parameters: &StepParameters,
+        capabilities: &Capabilities,
+    ) -> Duration {
+        parameters.deadline.unwrap_or_else(|| {
+            let window = capabilities.contact.window.max(capabilities.friction.window);
+            let cycles = 4u64
+                .saturating_mul(self.passes)
+                .saturating_mul(self.collisions as u64)
+                .saturating_mul(u64::from(capabilities.initiation_interval) + u64::from(window));
+            time_of(cycles, capabilities.clock_khz).saturating_add(Duration::from_millis(10))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accelerator::{fake, identify};
+    use crate::platform::RegisterMap;
+    use crate::platform::fake::FakeRegisters;
+
+    const FOUR: Plan = Plan { bodies: 38_881, collisions: 127_746, passes: 8, channels: 4 };
+
+    #[test]
+    fn a_wide_length_register_takes_ten_descriptors_a_channel() {
+        // Velocities, eight passes, poses (interface specification, packets).
+        assert!((0..4).all(|channel| FOUR.descriptors(channel, 67_108_800) == 10));
+    }
+
+    #[test]
+    fn segments_begin_on_64_bytes_and_hold_every_beat() {
+        let all: Vec<_> = (0..4).map(|channel| FOUR.segments(channel)).collect();
+        assert!(all.iter().all(|s| s.collisions.start % 4 == 0 && s.poses.start % 4 == 0));
+        let beats = |of: fn(&Segments) -> &Range<usize>| -> usize {
+            all.iter().map(|segments| of(segments).len()).sum()
+        };
+        assert_eq!(beats(|s| &s.velocities), 2 * 38_881);
+        assert_eq!(beats(|s| &s.collisions), 7 * 127_746);
+        assert_eq!(beats(|s| &s.poses), 2 * 38_881);
+        assert_eq!(FOUR.bytes_to_device(), 16 * (4 * 38_881 + 8 * 7 * 127_746));
+        assert_eq!(FOUR.bytes_from_device(), 16 * 4 * 38_881);
+    }
+
+    #[test]
+    fn a_channel_without_beats_has_no_descriptors() {
+        let one = Plan { bodies: 1, collisions: 0, passes: 8, channels: 4 };
+        let counts: Vec<_> = (0..4).map(|channel| one.descriptors(channel, 192)).collect();
+        assert_eq!(counts, [2, 2, 0, 0]);
+    }
+
+    #[test]
+    fn the_deadline_follows_from_the_work_unless_it_is_given() {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
+        let mut parameters = StepParameters::default();
+        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.727066 s.
+        let limit = FOUR.deadline(&parameters, &capabilities);
+        assert_eq!(limit.as_micros(), 4_727_066 + 10_000);
+        parameters.deadline = Some(Duration::from_millis(3));
+        assert_eq!(FOUR.deadline(&parameters, &capabilities), Duration::from_millis(3));
+    }
+}

@@ -1,0 +1,58 @@
+//! This file leads from any fault to "the next step works" or "open again".
+
+use super::device::Device;
+use super::fault::Fault;
+use super::plan::Plan;
+use crate::error::{Aftermath, Error};
+use crate::scene::Shape;
+
+impl Device {
+    /// Brings the board back after `fault`; the error to return.
+    pub(super) fn fail(&mut self, fault: Fault, shapes: &[Shape]) -> Error {
+        log::error!("step failed: {fault}");
+        let aftermath = match fault {
+            // The board did its part: everything is complete and back.
+            Fault::NotFinite { .. } => Aftermath::Untouched,
+            _ => match self.recover(shapes) {
+                Ok(()) => Aftermath::Ready,
+                Err(error) => {
+                    log::error!("the board could not be reset: {error}");
+                    self.dead = true;
+                    // The memory stays with the engines: they may still reach it.
+                    for lane in self.lanes_mut() {
+                        lane.leave_to_device();
+                    }
+                    Aftermath::MustReopen
+                }
+            },
+        };
+        Error::Step { fault: Box::new(fault), aftermath }
+    }
+
+    /// Makes buffers and rings large enough for a step. A channel that does not stop for its new
+    /// ring is reset, with everything else.
+    pub(super) fn reserve_or_reset(&mut self, plan: &Plan, shapes: &[Shape]) -> Result<(), Fault> {
+        match self.reserve(plan) {
+            Err(Fault::Core(error)) => {
+                log::warn!("a channel did not stop, resetting the board: {error}");
+                self.recover(shapes)?;
+                self.reserve(plan)
+            }
+            result => result,
+        }
+    }
+
+    /// Resets everything and restores what a step relies on.
+    fn recover(&mut self, shapes: &[Shape]) -> Result<(), Fault> {
+        self.reset()?;
+        for lane in self.lanes_mut() {
+            // A buffer that does not come back is replaced by the next step.
+            if let Err(error) = lane.was_reset() {
+                log::error!("a buffer was lost: {error}");
+            }
+        }
+        self.control.load_shapes(shapes);
+        log::info!("the board was reset after a fault");
+        Ok(())
+    }
+}

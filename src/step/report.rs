@@ -1,0 +1,157 @@
+//! This file says what a step reports: cycles by kind, bytes, register accesses, host times.
+
+use std::time::Duration;
+
+/// Clock cycles of a step on the accelerator, by what they were spent on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct StepCycles {
+    /// From start to done.
+    pub total: u64,
+    /// What is left of [`total`](Self::total) without stalls and waits: the cycles by the formula
+    /// of the interface specification.
+    pub work: u64,
+    /// Cycles in which an issue waited for a velocity to be written back.
+    pub stalls: u64,
+    /// Cycles in which the accelerator waited for a stream.
+    pub waits: u64,
+}
+
+/// Host time of a step, by phase, on the host's clock.
+///
+/// With the emulated board, `wait` is the time that the emulation takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct HostTimes {
+    /// Checking the input.
+    pub validate: Duration,
+    /// Making buffers large enough and writing the records into them.
+    pub pack: Duration,
+    /// Handing over, descriptors, arguments, doorbells.
+    pub start: Duration,
+    /// Waiting for the accelerator, and reading its counters.
+    pub wait: Duration,
+    /// Reading and checking the results.
+    pub unpack: Duration,
+    /// Storing the results with the caller.
+    pub commit: Duration,
+}
+
+/// What took the largest part of a step's cycles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Limit {
+    /// The pipeline's initiation interval and depth.
+    Pipeline,
+    /// Waiting for velocities to be written back.
+    Hazards,
+    /// Waiting for memory.
+    Streams,
+}
+
+/// What one step did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct StepReport {
+    /// Number of bodies.
+    pub bodies: u64,
+    /// Number of collisions.
+    pub collisions: u64,
+    /// Passes over the collisions: contact and friction iterations.
+    pub passes: u32,
+    /// Clock cycles, as the accelerator counted them.
+    pub cycles: StepCycles,
+    /// The clock that counts them, kHz.
+    pub clock_khz: u32,
+    /// Bytes streamed to the accelerator.
+    pub bytes_to_device: u64,
+    /// Bytes streamed back.
+    pub bytes_from_device: u64,
+    /// Collisions that met a hazard, over all passes.
+    pub hazards: u64,
+    /// Sum of the accumulated normal impulses after the last contact pass, N s; `None` if the
+    /// bitstream does not count it.
+    pub impulse_sum: Option<f64>,
+    /// 32-bit register reads.
+    pub register_reads: u64,
+    /// 32-bit register writes.
+    pub register_writes: u64,
+    /// Writes that started something: tails of descriptor rings, and the accelerator's start.
+    pub doorbells: u64,
+    /// Interrupts that woke the driver.
+    pub interrupts: u64,
+    /// Scatter-gather descriptors.
+    pub descriptors: u64,
+    /// Where the host's time went.
+    pub host: HostTimes,
+}
+
+impl StepReport {
+    /// Time from start to done on the accelerator: cycles divided by the clock.
+    ///
+    /// Zero if the bitstream gives no clock.
+    #[must_use]
+    pub fn modelled_time(&self) -> Duration {
+        time_of(self.cycles.total, self.clock_khz)
+    }
+
+    /// What took the largest part of the cycles; of equal parts the first in the order pipeline,
+    /// hazards, streams.
+    #[must_use]
+    pub fn limit(&self) -> Limit {
+        let StepCycles { work, stalls, waits, .. } = self.cycles;
+        if work >= stalls && work >= waits {
+            Limit::Pipeline
+        } else if stalls >= waits {
+            Limit::Hazards
+        } else {
+            Limit::Streams
+        }
+    }
+}
+
+/// `cycles` of a clock of `clock_khz`, rounded down to nanoseconds; zero for a clock of 0.
+pub(crate) fn time_of(cycles: u64, clock_khz: u32) -> Duration {
+    let nanoseconds =
+        (u128::from(cycles) * 1_000_000).checked_div(u128::from(clock_khz)).unwrap_or(0);
+    Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(work: u64, stalls: u64, waits: u64) -> StepReport {
+        StepReport {
+            bodies: 0,
+            collisions: 0,
+            passes: 0,
+            cycles: StepCycles { total: work + stalls + waits, work, stalls, waits },
+            clock_khz: 275_000,
+            bytes_to_device: 0,
+            bytes_from_device: 0,
+            hazards: 0,
+            impulse_sum: None,
+            register_reads: 0,
+            register_writes: 0,
+            doorbells: 0,
+            interrupts: 0,
+            descriptors: 0,
+            host: HostTimes::default(),
+        }
+    }
+
+    #[test]
+    fn the_largest_part_is_the_limit() {
+        assert_eq!(report(5, 5, 5).limit(), Limit::Pipeline);
+        assert_eq!(report(4, 5, 5).limit(), Limit::Hazards);
+        assert_eq!(report(4, 5, 6).limit(), Limit::Streams);
+    }
+
+    #[test]
+    fn thesis_cycles_take_the_thesis_time() {
+        // Thesis T6.4: 2,062,697 cycles at 275 MHz are 7.49 ms (7.5007 ms before rounding down).
+        let time = time_of(2_062_697, 275_000);
+        assert_eq!(time.as_micros(), 7500);
+        assert_eq!(time_of(1, 0), Duration::ZERO);
+        assert_eq!(time_of(u64::MAX, 1), Duration::from_nanos(u64::MAX));
+    }
+}

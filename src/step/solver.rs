@@ -1,0 +1,316 @@
+//! This file is the accelerator as a caller sees it, and one step from end to end.
+//!
+//! Validate, reserve, pack, hand over, start, wait, take back, unpack, check, commit: nothing of
+//! the caller's changes before the last.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use bitstream_model::interface::address_map::DMA_COUNT_MAX;
+use bitstream_model::interface::record::Beat;
+
+use super::board::{self, BoardDescription, Found, OpenOptions, System};
+use super::device::Device;
+use super::fault::Fault;
+use super::plan::Plan;
+use super::report::{HostTimes, StepCycles, StepReport};
+use crate::accelerator::{Capabilities, Counters};
+use crate::beat::pack::{pack_collisions, pack_poses, pack_velocities};
+use crate::beat::unpack::{sum_of_words, unpack_result};
+use crate::error::Error;
+use crate::platform::{Deadline, UIO_CLASS};
+use crate::scene::validate::{Limits, validate, validate_shapes};
+use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
+
+/// An open accelerator.
+///
+/// Dropping it stops the DMA channels and frees their memory.
+#[derive(Debug)]
+pub struct Accelerator {
+    board: BoardDescription,
+    device: Device,
+    limits: Limits,
+    shapes: Vec<Shape>,
+    /// Results of a step until all are checked. Kept, so that a step allocates nothing.
+    spare: Vec<(Pose, Velocity)>,
+}
+
+/// What a step sent, for comparison with what the accelerator received.
+#[derive(Debug, Clone, Copy)]
+struct Sent {
+    velocities: u32,
+    collisions: u32,
+    poses: u32,
+}
+
+impl Accelerator {
+    /// Opens a board, identifies its bitstream and resets it.
+    ///
+    /// # Errors
+    /// [`Error::Open`]: no such board, not a bitstream that this driver knows, or DMA cores that
+    /// do not behave as they should.
+    pub fn open(options: OpenOptions) -> Result<Self, Error> {
+        let OpenOptions { board: choice, length_width } = options;
+        let system = System { class: Path::new(UIO_CLASS), dev: Path::new("/dev") };
+        let found = board::find(&choice, system)?;
+        Self::on(found, length_width)
+    }
+
+    /// Opens the accelerator of a board that was found.
+    pub(super) fn on(found: Found, length_width: Option<u32>) -> Result<Self, Error> {
+        let device = Device::open(found.platform, length_width)?;
+        let Capabilities { profile_id, version, clock_khz, .. } = device.capabilities;
+        log::info!(
+            "opened {}: profile {profile_id}, interface {}.{}, {clock_khz} kHz",
+            found.description,
+            version.0,
+            version.1
+        );
+        let limits = Limits {
+            body_capacity: device.capabilities.body_capacity,
+            shape_capacity: device.capabilities.shape_capacity,
+            memory_bytes: device.capabilities.memory_bytes,
+            bytes_per_body: device.capabilities.bytes_per_body,
+            bytes_per_collision: device.capabilities.bytes_per_collision,
+        };
+        let board = found.description;
+        Ok(Self { board, device, limits, shapes: Vec::new(), spare: Vec::new() })
+    }
+
+    /// Which board was opened, and why.
+    #[must_use]
+    pub fn board(&self) -> &BoardDescription {
+        &self.board
+    }
+
+    /// What the bitstream says of itself.
+    #[must_use]
+    pub fn capabilities(&self) -> &Capabilities {
+        &self.device.capabilities
+    }
+
+    /// Loads the shapes that bodies refer to by index, in place of all earlier ones.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
+    /// stay. [`Error::MustReopen`] after a fault that could not be cleared.
+    pub fn set_shapes(&mut self, shapes: &[Shape]) -> Result<(), Error> {
+        if self.device.dead {
+            return Err(Error::MustReopen);
+        }
+        validate_shapes(shapes, self.limits.shape_capacity)?;
+        self.device.control.load_shapes(shapes);
+        self.shapes.clear();
+        self.shapes.extend_from_slice(shapes);
+        Ok(())
+    }
+
+    /// Solves the contacts of one time step and integrates it.
+    ///
+    /// Collisions are taken in the order of their index. Static bodies are left as they are. The
+    /// bodies change only if the step succeeds, and then all at once.
+    ///
+    /// Units: metres, kilograms, seconds, radians, world frame.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: the input was refused and nothing was sent. [`Error::Step`]: a fault of
+    /// the board; [`Error::may_retry`] and [`Error::must_reopen`] say what to do.
+    /// [`Error::MustReopen`] after a fault that could not be cleared.
+    pub fn step<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &mut B,
+        collisions: &C,
+        parameters: &StepParameters,
+    ) -> Result<StepReport, Error> {
+        if self.device.dead {
+            return Err(Error::MustReopen);
+        }
+        let mut watch = Stopwatch(Instant::now());
+        let mut host = HostTimes::default();
+        validate(bodies, collisions, &self.shapes, parameters, &self.limits)?;
+        host.validate = watch.lap();
+        let plan = Plan {
+            bodies: bodies.len(),
+            collisions: collisions.len(),
+            passes: u64::from(parameters.contact_iterations)
+                + u64::from(parameters.friction_iterations),
+            channels: self.device.mm2s.len(),
+        };
+        let counts = &self.device.counts;
+        let before = (counts.reads(), counts.writes());
+        let ended = self.run(&plan, bodies, collisions, parameters, &mut host, &mut watch);
+        let mut report = ended.map_err(|fault| self.device.fail(fault, &self.shapes))?;
+        for (index, (pose, velocity)) in self.spare.drain(..).enumerate() {
+            bodies.commit(index, pose, velocity);
+        }
+        host.commit = watch.lap();
+        report.host = host;
+        report.register_reads = self.device.counts.reads() - before.0;
+        report.register_writes = self.device.counts.writes() - before.1;
+        log::debug!(
+            "step: {} bodies, {} collisions, {} passes, {} cycles ({} stalled, {} waiting), {} hazards",
+            report.bodies,
+            report.collisions,
+            report.passes,
+            report.cycles.total,
+            report.cycles.stalls,
+            report.cycles.waits,
+            report.hazards
+        );
+        Ok(report)
+    }
+
+    /// Everything between validation and commitment; the results are in `spare` afterwards.
+    fn run<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        plan: &Plan,
+        bodies: &B,
+        collisions: &C,
+        parameters: &StepParameters,
+        host: &mut HostTimes,
+        watch: &mut Stopwatch,
+    ) -> Result<StepReport, Fault> {
+        self.device.reserve_or_reset(plan, &self.shapes)?;
+        let sent = self.pack(plan, bodies, collisions);
+        host.pack = watch.lap();
+        let limit = plan.deadline(parameters, &self.device.capabilities);
+        let deadline = Deadline::after(&*self.device.platform, limit);
+        let doorbells = self.device.start(plan, parameters)?;
+        host.start = watch.lap();
+        let interrupts = self.device.wait(plan, &deadline)?;
+        let counters = self.device.collect(&deadline)?;
+        self.device.take_back()?;
+        host.wait = watch.lap();
+        self.check_sums(plan, sent, &counters)?;
+        self.unpack(plan, bodies)?;
+        host.unpack = watch.lap();
+
+        let (stalls, waits) = (u64::from(counters.stalls), u64::from(counters.waits));
+        let work = counters.cycles.saturating_sub(stalls).saturating_sub(waits);
+        Ok(StepReport {
+            bodies: plan.bodies as u64,
+            collisions: plan.collisions as u64,
+            passes: u32::try_from(plan.passes).unwrap_or(u32::MAX),
+            cycles: StepCycles { total: counters.cycles, work, stalls, waits },
+            clock_khz: self.device.capabilities.clock_khz,
+            bytes_to_device: plan.bytes_to_device(),
+            bytes_from_device: plan.bytes_from_device(),
+            hazards: u64::from(counters.hazards),
+            impulse_sum: counters.impulse_sum,
+            register_reads: 0,
+            register_writes: 0,
+            doorbells,
+            interrupts,
+            descriptors: self.device.descriptors(),
+            host: HostTimes::default(),
+        })
+    }
+
+    /// Writes the records of a step into the buffers.
+    fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        plan: &Plan,
+        bodies: &B,
+        collisions: &C,
+    ) -> Sent {
+        let mut channels: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
+        let lanes = &mut self.device.mm2s;
+        // One borrow of each buffer, cut into its three segments.
+        let mut later: [(&mut [Beat], &mut [Beat]); DMA_COUNT_MAX] = Default::default();
+        for (place, lane) in lanes.iter_mut().enumerate() {
+            let segments = plan.segments(place);
+            let beats = &mut lane.beats_mut()[..segments.poses.end];
+            let (beats, poses) = beats.split_at_mut(segments.poses.start);
+            let (beats, collisions) = beats.split_at_mut(segments.collisions.start);
+            channels[place] = &mut beats[segments.velocities];
+            later[place] = (&mut collisions[..segments.collisions.len()], poses);
+        }
+        let velocities = pack_velocities(bodies, &mut channels[..plan.channels]);
+        let mut poses_of: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
+        for (place, (collisions, poses)) in later.into_iter().enumerate() {
+            channels[place] = collisions;
+            poses_of[place] = poses;
+        }
+        let collisions = pack_collisions(bodies, collisions, &mut channels[..plan.channels]);
+        let poses = pack_poses(bodies, &mut poses_of[..plan.channels]);
+        Sent { velocities, collisions, poses }
+    }
+
+    /// The result beats of each channel.
+    fn results<'a>(&'a self, plan: &Plan, channels: &mut [&'a [Beat]; DMA_COUNT_MAX]) {
+        for (place, lane) in self.device.s2mm.iter().enumerate() {
+            channels[place] = &lane.beats()[..plan.results(place)];
+        }
+    }
+
+    /// Compares the accelerator's sums of words with ours, if it has any.
+    fn check_sums(&self, plan: &Plan, sent: Sent, counters: &Counters) -> Result<(), Fault> {
+        let Some((received, answered)) = counters.sums else { return Ok(()) };
+        #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
+        let passes = plan.passes as u32;
+        let expected = sent
+            .velocities
+            .wrapping_add(sent.collisions.wrapping_mul(passes))
+            .wrapping_add(sent.poses);
+        if received != expected {
+            let direction = "to the accelerator";
+            return Err(Fault::Checksum { direction, expected, found: received });
+        }
+        let mut channels = Default::default();
+        self.results(plan, &mut channels);
+        let found = channels.iter().fold(0u32, |sum, beats| sum.wrapping_add(sum_of_words(beats)));
+        if found != answered {
+            let direction = "from the accelerator";
+            return Err(Fault::Checksum { direction, expected: answered, found });
+        }
+        Ok(())
+    }
+
+    /// Reads the results into the spare.
+    fn unpack<B: Bodies + ?Sized>(&mut self, plan: &Plan, bodies: &B) -> Result<(), Fault> {
+        let mut spare = std::mem::take(&mut self.spare);
+        spare.clear();
+        spare.reserve(plan.bodies);
+        let mut channels = Default::default();
+        self.results(plan, &mut channels);
+        let channels = &channels[..plan.channels];
+        let mut broken = None;
+        for index in 0..plan.bodies {
+            let own = bodies.body(index);
+            let shape = usize::try_from(own.shape).ok().and_then(|shape| self.shapes.get(shape));
+            if shape.is_none_or(|shape| shape.inverse_mass == 0.0) {
+                // A static body does not move, whatever comes back for it.
+                spare.push((own.pose, own.velocity));
+                continue;
+            }
+            let (pose, velocity) = unpack_result(index, channels);
+            if !finite(&pose, &velocity) {
+                broken = Some(index);
+                break;
+            }
+            spare.push((pose, velocity));
+        }
+        self.spare = spare;
+        match broken {
+            Some(body) => Err(Fault::NotFinite { body }),
+            None => Ok(()),
+        }
+    }
+}
+
+fn finite(pose: &Pose, velocity: &Velocity) -> bool {
+    let all = |numbers: &[f32]| numbers.iter().all(|number| number.is_finite());
+    all(&pose.position) && all(&pose.orientation) && all(&velocity.linear) && all(&velocity.angular)
+}
+
+/// Host time by laps.
+#[derive(Debug)]
+struct Stopwatch(Instant);
+
+impl Stopwatch {
+    /// Time since the last lap.
+    fn lap(&mut self) -> Duration {
+        let now = Instant::now();
+        now - std::mem::replace(&mut self.0, now)
+    }
+}

@@ -1,0 +1,85 @@
+//! A step allocates nothing once a step of the same size has run.
+//!
+//! The emulated board is asked for nothing on the heap either: what is counted is everything that
+//! happens during the call.
+#![cfg(feature = "emulation")]
+#![allow(unsafe_code, reason = "an allocator that counts is an unsafe trait")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use zynq_pgs::{
+    Accelerator, Body, Collision, Contact, OpenOptions, Pose, Shape, StepParameters, Velocity,
+};
+
+thread_local! {
+    static COUNTED: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting the calls of each thread.
+struct Counting;
+
+fn count() {
+    // A thread that is ending has no counter any more.
+    let _ = COUNTED.try_with(|counted| counted.set(counted.get() + 1));
+}
+
+// SAFETY: every call goes to the system's allocator with the arguments as they came; counting
+// itself does not allocate.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises about `layout` are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
+        unsafe { System.realloc(pointer, layout, bytes) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn steps_two_to_ten_allocate_nothing() {
+    let mut accelerator = Accelerator::open(OpenOptions::default()).expect("the emulated board");
+    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("they fit");
+    let body = |y, shape| Body {
+        pose: Pose { position: [0.0, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity: Velocity::default(),
+        shape,
+    };
+    let mut bodies = vec![body(-1.0, 0)];
+    let mut collisions = Vec::new();
+    for cube in 1..200 {
+        bodies.push(body(0.99, 1));
+        let contact = Contact { point: [0.5, -0.01, 0.25], distance: -0.01 };
+        collisions.push(Collision {
+            body_a: 0,
+            body_b: cube,
+            normal: [0.0, -1.0, 0.0],
+            count: 1,
+            contacts: [contact; 4],
+        });
+    }
+    let mut counted = Vec::with_capacity(10);
+    for step in 0..10 {
+        // The number of collisions changes, as it does in a scene that moves.
+        let of_step = &collisions[step % 3..];
+        let before = COUNTED.get();
+        accelerator
+            .step(&mut bodies, of_step, &StepParameters::default())
+            .expect("nothing disturbs it");
+        counted.push(COUNTED.get() - before);
+    }
+    assert!(counted[0] > 0, "the first step makes buffers: does the allocator count?");
+    assert_eq!(counted[1..], [0; 9], "{counted:?}");
+}

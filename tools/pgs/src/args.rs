@@ -1,0 +1,170 @@
+//! This file is the command line: which verb, and what holds for all of them.
+
+use std::ffi::OsString;
+
+use clap::parser::ValueSource;
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+
+use crate::verbs::list::ListArgs;
+use crate::verbs::model::ModelArgs;
+use crate::verbs::run::RunArgs;
+use crate::verbs::solve::SolveArgs;
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs                                  step the thesis' scene of 38,880 cubes
+  pgs --grid 10x10x10 --steps 60       a smaller one; the same as `pgs run --grid ...`
+  pgs solve vectors/one_cube --compare
+  pgs model --collisions 127000 --bodies 38880
+  pgs list --json
+
+RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
+
+Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or unreadable input; 3 no usable board, or
+no rights; 4 hardware fault or deadline; 130 interrupted.";
+
+/// Steps rigid bodies on the zynq-pgs accelerator, real or emulated.
+///
+/// Without a verb, `run` is meant: its options are accepted here too.
+#[derive(Debug, Parser)]
+#[command(name = "pgs", version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Option<Verb>,
+    #[command(flatten)]
+    common: CommonArgs,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+/// What to do.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum Verb {
+    Run(RunArgs),
+    Solve(SolveArgs),
+    Model(ModelArgs),
+    List(ListArgs),
+}
+
+/// What holds for every verb.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct CommonArgs {
+    /// Print one JSON document instead of text.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// Board to use; auto takes the UIO node "pgs" if there is one, else the emulated board.
+    #[arg(long, global = true, env = "PGS_BOARD", value_name = "BOARD", default_value = "auto")]
+    pub(crate) board: BoardName,
+}
+
+/// A board, as it is named on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BoardName {
+    Auto,
+    Uio,
+    Emulated,
+}
+
+/// What to do, and how.
+#[derive(Debug, Clone)]
+pub(crate) struct Command {
+    pub(crate) verb: Verb,
+    pub(crate) common: CommonArgs,
+}
+
+/// Reads the command line; the error is also how help is asked for.
+pub(crate) fn parse(
+    arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+) -> Result<Command, clap::Error> {
+    let mut command = Cli::command();
+    let matches = command.try_get_matches_from_mut(arguments)?;
+    if let Some(verb) = matches.subcommand_name() {
+        // `run`'s options stand here as well, and would silently mean nothing before another verb.
+        let stray = matches.ids().find(|id| {
+            let common = matches!(id.as_str(), "json" | "board");
+            let is_argument = command.get_arguments().any(|argument| argument.get_id() == *id);
+            let given = || matches.value_source(id.as_str()) == Some(ValueSource::CommandLine);
+            !common && is_argument && given()
+        });
+        if let Some(id) = stray {
+            let message = format!(
+                "--{id} belongs behind the verb: pgs {verb} --{id} ...",
+                id = id.as_str().replace('_', "-")
+            );
+            return Err(command.error(clap::error::ErrorKind::ArgumentConflict, message));
+        }
+    }
+    let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+    Ok(Command { verb: cli.verb.unwrap_or(Verb::Run(cli.run)), common: cli.common })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::error::ErrorKind;
+
+    fn parsed(line: &str) -> Result<Command, ErrorKind> {
+        parse(line.split_whitespace()).map_err(|error| error.kind())
+    }
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn run_is_the_default_verb_with_its_options() {
+        for line in [
+            "pgs --steps 5",
+            "pgs run --steps 5",
+            "pgs --json --steps 5",
+            "pgs --json run --steps 5",
+        ] {
+            let command = parsed(line).expect(line);
+            assert!(matches!(command.verb, Verb::Run(RunArgs { steps: 5, .. })), "{line}");
+        }
+        assert!(matches!(parsed("pgs").expect("no verb").verb, Verb::Run(_)));
+    }
+
+    #[test]
+    fn common_options_stand_on_either_side_of_the_verb() {
+        for line in ["pgs --json --board emulated list", "pgs list --json --board emulated"] {
+            let common = parsed(line).expect(line).common;
+            assert!(common.json, "{line}");
+            assert_eq!(common.board, BoardName::Emulated, "{line}");
+        }
+    }
+
+    #[test]
+    fn options_of_run_before_another_verb_are_refused() {
+        assert_eq!(parsed("pgs --steps 5 list").expect_err("stray"), ErrorKind::ArgumentConflict);
+        assert_eq!(
+            parsed("pgs --hazards unchecked solve x").expect_err("stray"),
+            ErrorKind::ArgumentConflict
+        );
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_refused() {
+        for line in [
+            "pgs --steps 0",
+            "pgs --steps -1",
+            "pgs --grid 3x3",
+            "pgs --grid 0x1x1",
+            "pgs --drop nan",
+            "pgs --drop -1",
+            "pgs --window 0",
+            "pgs --window 99999999999",
+            "pgs --bandwidth 0",
+            "pgs --bandwidth inf",
+            "pgs --bandwidth -3",
+            "pgs --report-every 0",
+            "pgs model --collisions -1 --bodies 1",
+            "pgs model --collisions 1",
+            "pgs solve",
+            "pgs frobnicate",
+        ] {
+            parsed(line).expect_err(line);
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! This file opens the board that the command line asks for, and says what it is.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use bitstream_model::interface::address_map::UIO_NODE;
+use bitstream_model::interface::profile::Profile;
+use bitstream_model::{BoardConfig, EmulatedBoard, Hazards, Subnormals};
+use serde_json::{Value, json};
+use zynq_pgs::{Accelerator, BoardChoice, BoardKind, Fault, OpenOptions, UIO_CLASS, uio_nodes};
+
+use crate::args::BoardName;
+use crate::failure::{Cause, Failure};
+use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
+
+/// An open board.
+#[derive(Debug)]
+pub(crate) struct Opened {
+    pub(crate) accelerator: Accelerator,
+    /// The emulated board, as its builder sees it; none for a real one.
+    pub(crate) observer: Option<EmulatedBoard>,
+    /// Why this board and no other.
+    pub(crate) reason: String,
+}
+
+/// Which kind of board a name on the command line means here, and why.
+pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
+    match name {
+        BoardName::Uio => (BoardKind::Uio, "as asked for".to_owned()),
+        BoardName::Emulated => (BoardKind::Emulated, "as asked for".to_owned()),
+        BoardName::Auto => match uio_nodes(Path::new(UIO_CLASS)) {
+            Ok(nodes) if nodes.iter().any(|node| node.name == UIO_NODE) => {
+                (BoardKind::Uio, format!("there is a UIO node named {UIO_NODE:?}"))
+            }
+            Ok(_) => (BoardKind::Emulated, format!("there is no UIO node named {UIO_NODE:?}")),
+            // An unreadable node may be the board: the attempt to open it says what is wrong.
+            Err(error) => (BoardKind::Uio, format!("UIO nodes cannot be listed: {error}")),
+        },
+    }
+}
+
+/// Opens a board.
+pub(crate) fn open(name: BoardName, build: &BuildArgs) -> Result<Opened, Failure> {
+    let (kind, reason) = choose(name);
+    if kind == BoardKind::Emulated {
+        if name == BoardName::Auto {
+            log::warn!("{reason}: using the emulated board");
+        }
+        let emulated = EmulatedBoard::new(build.config()).map_err(Failure::input)?;
+        let board = BoardChoice::Emulated(emulated.cpu_port());
+        let accelerator = accelerator(board)?;
+        return Ok(Opened { accelerator, observer: Some(emulated), reason });
+    }
+    if let Some(option) = build.given() {
+        let error = format!("{option} says how to build an emulated board, this one is real");
+        return Err(
+            Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
+        );
+    }
+    let board = BoardChoice::Uio { node: UIO_NODE.to_owned() };
+    Ok(Opened { accelerator: accelerator(board)?, observer: None, reason })
+}
+
+fn accelerator(board: BoardChoice) -> Result<Accelerator, Failure> {
+    let options = OpenOptions { board, ..OpenOptions::default() };
+    Accelerator::open(options).map_err(|error| {
+        Failure::new(Cause::NoBoard, error).next(
+            "see what there is with `pgs list`, or use the emulated board with --board emulated",
+        )
+    })
+}
+
+impl Opened {
+    /// The failure that an error of the driver is.
+    pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {
+        if error.is_input() {
+            return Failure::input(error);
+        }
+        let diverged = matches!(&error, zynq_pgs::Error::Step { fault, .. }
+            if matches!(**fault, Fault::NotFinite { .. }));
+        if diverged && self.observer.is_some() {
+            // The emulated board does not miscalculate: the numbers given were too large.
+            return Failure::input(error).next("give smaller velocities, or a shorter time step");
+        }
+        let next = if error.may_retry() {
+            "run the command again"
+        } else {
+            "run the command again; load the bitstream anew if that does not help"
+        };
+        let violations = self.observer.as_ref().map(EmulatedBoard::violations).unwrap_or_default();
+        let seen: String = violations.iter().map(|violation| format!("\n{violation}")).collect();
+        let next = match seen.is_empty() {
+            true => next.to_owned(),
+            false => format!("{next}; the emulated board saw this misuse:{seen}"),
+        };
+        Failure::new(Cause::Hardware, error).next(next)
+    }
+
+    fn kind(&self) -> &'static str {
+        if self.observer.is_some() { "emulated" } else { "uio" }
+    }
+
+    fn profile(&self) -> &'static str {
+        Profile::by_id(self.accelerator.capabilities().profile_id)
+            .map_or("unknown", |profile| profile.name)
+    }
+
+    /// Two lines: which board and why, which bitstream.
+    pub(crate) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
+        let can = self.accelerator.capabilities();
+        writeln!(out, "board      {} ({})", self.kind(), self.reason)?;
+        writeln!(
+            out,
+            "bitstream  profile {}, {} kHz, {} + {} channels, one issue every {} cycles, {}, \
+             subnormals {}",
+            self.profile(),
+            can.clock_khz,
+            can.mm2s_channels,
+            can.s2mm_channels,
+            can.initiation_interval,
+            hazards_text(can.interlocked),
+            subnormals_text(can.flush_subnormals),
+        )?;
+        if let Some(config) = self.config() {
+            writeln!(
+                out,
+                "emulation  memory bandwidth {}, hazard window {}",
+                bandwidth_text(config.bandwidth),
+                match config.window_slots {
+                    Some(slots) => format!("{slots} slots"),
+                    None => format!(
+                        "{} cycles (contact), {} cycles (friction)",
+                        can.contact.window, can.friction.window
+                    ),
+                },
+            )?;
+        }
+        Ok(())
+    }
+
+    /// The same for programs.
+    pub(crate) fn to_json(&self) -> Value {
+        let can = self.accelerator.capabilities();
+        json!({
+            "kind": self.kind(),
+            "reason": self.reason,
+            "profile": self.profile(),
+            "interface_version": [can.version.0, can.version.1],
+            "clock_khz": can.clock_khz,
+            "interlocked": can.interlocked,
+            "flush_subnormals": can.flush_subnormals,
+            "mm2s_channels": can.mm2s_channels,
+            "s2mm_channels": can.s2mm_channels,
+            "initiation_interval": can.initiation_interval,
+            "contact_window_cycles": can.contact.window,
+            "friction_window_cycles": can.friction.window,
+            "body_capacity": can.body_capacity,
+            "shape_capacity": can.shape_capacity,
+            "memory_bytes": can.memory_bytes,
+            "bytes_per_body": can.bytes_per_body,
+            "bytes_per_collision": can.bytes_per_collision,
+            "length_width": can.length_width,
+            "address_width": can.address_width,
+            "emulation": self.config().map(|config| json!({
+                "hazards": hazards_text(config.hazards == Hazards::Interlocked),
+                "window_slots": config.window_slots,
+                "subnormals": subnormals_text(config.subnormals == Subnormals::Flush),
+                "bandwidth_bytes_per_second": bandwidth_number(config.bandwidth),
+            })),
+        })
+    }
+
+    fn config(&self) -> Option<BoardConfig> {
+        self.observer.as_ref().map(EmulatedBoard::config)
+    }
+}
+
+fn hazards_text(interlocked: bool) -> &'static str {
+    if interlocked { "interlocked" } else { "unchecked" }
+}
+
+fn subnormals_text(flush: bool) -> &'static str {
+    if flush { "flush" } else { "keep" }
+}

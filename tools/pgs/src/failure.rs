@@ -1,0 +1,144 @@
+//! This file says how a command ends: exit codes, and errors as a chain with the next step.
+//!
+//! | code | meaning |
+//! |---|---|
+//! | 0 | done; also when the reader of a pipe has gone |
+//! | 1 | ran, and the answer is no |
+//! | 2 | wrong usage or unreadable input |
+//! | 3 | no usable board, or no rights |
+//! | 4 | hardware fault or deadline |
+//! | 130 | interrupted; the channels were stopped |
+
+use std::error::Error;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// A command that ran.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    Done,
+    /// A comparison found differences.
+    Differs,
+    /// Ctrl-C ended it between two steps.
+    Interrupted,
+}
+
+impl Verdict {
+    pub(crate) fn code(self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Done => 0,
+            Self::Differs => 1,
+            Self::Interrupted => 130,
+        })
+    }
+}
+
+/// Whose fault it is that a command did not run to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cause {
+    /// The command line, or a file named on it.
+    Input,
+    /// There is no board to be used.
+    NoBoard,
+    /// The board failed.
+    Hardware,
+    /// Results could not be written.
+    Output,
+}
+
+/// Why a command did not run to its end.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    cause: Cause,
+    error: Box<dyn Error + Send + Sync>,
+    /// Where the innermost message does not say what to do.
+    next: Option<String>,
+}
+
+impl Failure {
+    pub(crate) fn new(cause: Cause, error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self { cause, error: error.into(), next: None }
+    }
+
+    /// Wrong usage or unreadable input.
+    pub(crate) fn input(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::new(Cause::Input, error)
+    }
+
+    /// Says what to do next.
+    pub(crate) fn next(mut self, next: impl Into<String>) -> Self {
+        self.next = Some(next.into());
+        self
+    }
+
+    fn is_closed_pipe(&self) -> bool {
+        let io = self.error.downcast_ref::<io::Error>();
+        self.cause == Cause::Output && io.is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)
+    }
+
+    /// The messages from the outermost to the innermost, one a line, and the next step.
+    pub(crate) fn chain(&self) -> String {
+        let mut text = format!("error: {}", self.error);
+        let mut source = self.error.source();
+        while let Some(error) = source {
+            text.push_str(&format!("\n  because: {error}"));
+            source = error.source();
+        }
+        if let Some(next) = &self.next {
+            text.push_str(&format!("\n  next: {next}"));
+        }
+        text
+    }
+
+    /// Says on `stderr` what went wrong.
+    pub(crate) fn report(&self, stderr: &mut impl Write) -> ExitCode {
+        if self.is_closed_pipe() {
+            return ExitCode::SUCCESS;
+        }
+        // If nobody can be told, the code still says it.
+        let _ = writeln!(stderr, "{}", self.chain());
+        ExitCode::from(match self.cause {
+            Cause::Input | Cause::Output => 2,
+            Cause::NoBoard => 3,
+            Cause::Hardware => 4,
+        })
+    }
+}
+
+/// Verbs write to stdout only; files have errors of their own.
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::new(Cause::Output, error)
+    }
+}
+
+/// 0 for help and version, 2 for wrong usage.
+pub(crate) fn usage_code(message: &clap::Error) -> ExitCode {
+    ExitCode::from(if message.use_stderr() { 2 } else { 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::npy::{NpyError, Problem};
+
+    #[test]
+    fn a_chain_names_every_cause_once() {
+        let missing = io::Error::new(io::ErrorKind::NotFound, "no such file");
+        let error = NpyError { path: "x/params.npy".into(), problem: Problem::Read(missing) };
+        let text = Failure::input(error).next("look").chain();
+        assert_eq!(
+            text,
+            "error: x/params.npy\n  because: cannot be read\n  because: no such file\n  next: look"
+        );
+    }
+
+    #[test]
+    fn a_closed_pipe_is_quiet_and_a_full_disk_is_not() {
+        let mut stderr = Vec::new();
+        Failure::from(io::Error::from(io::ErrorKind::BrokenPipe)).report(&mut stderr);
+        assert!(stderr.is_empty());
+        Failure::from(io::Error::from(io::ErrorKind::StorageFull)).report(&mut stderr);
+        assert!(!stderr.is_empty());
+    }
+}

@@ -1,0 +1,240 @@
+//! This file reads one step from a folder of arrays, and writes its results beside them.
+//!
+//! One array a file: `params` (8) and `iterations` (2); per body `body_pos` (N, 3), `body_quat`
+//! (N, 4), `body_linvel`, `body_angvel` (N, 3), `body_inv_mass` (N), `body_inv_inertia` (N, 3);
+//! per collision `contact_bodies` (M, 2), `contact_npoints` (M), `contact_normal` (M, 3),
+//! `contact_points` (M, 4, 4). Everything is f32, or u32 for `iterations`, `contact_bodies` and
+//! `contact_npoints`.
+//!
+//! Only the files' form is checked here; the driver judges their values.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
+
+use crate::npy::{self, Dimensions, Element, NpyError};
+
+pub(crate) const PARAMS: &str = "params.npy";
+pub(crate) const ITERATIONS: &str = "iterations.npy";
+pub(crate) const BODY_POSITION: &str = "body_pos.npy";
+pub(crate) const BODY_ORIENTATION: &str = "body_quat.npy";
+pub(crate) const BODY_LINEAR: &str = "body_linvel.npy";
+pub(crate) const BODY_ANGULAR: &str = "body_angvel.npy";
+pub(crate) const BODY_INVERSE_MASS: &str = "body_inv_mass.npy";
+pub(crate) const BODY_INVERSE_INERTIA: &str = "body_inv_inertia.npy";
+pub(crate) const COLLISION_BODIES: &str = "contact_bodies.npy";
+pub(crate) const COLLISION_COUNT: &str = "contact_npoints.npy";
+pub(crate) const COLLISION_NORMAL: &str = "contact_normal.npy";
+pub(crate) const COLLISION_POINTS: &str = "contact_points.npy";
+
+/// More shapes than the board's table holds.
+#[derive(Debug, Error)]
+#[error(
+    "{}: body {body} brings another mass or inertia, {found} different ones in all, and the board \
+     takes at most {limit}",
+    path.display()
+)]
+pub(crate) struct TooManyShapes {
+    path: PathBuf,
+    body: usize,
+    found: usize,
+    limit: usize,
+}
+
+/// What a folder holds.
+#[derive(Debug)]
+pub(crate) struct Folder {
+    pub(crate) path: PathBuf,
+    pub(crate) bodies: Vec<Body>,
+    /// The distinct rows of mass and inertia, in the order of their first body.
+    pub(crate) shapes: Vec<Shape>,
+    /// The first body of each shape.
+    pub(crate) shape_bodies: Vec<usize>,
+    pub(crate) collisions: Vec<Collision>,
+    pub(crate) parameters: StepParameters,
+}
+
+/// A property of a body that a step changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum State {
+    Position,
+    Orientation,
+    Linear,
+    Angular,
+}
+
+impl State {
+    pub(crate) const ALL: [Self; 4] =
+        [Self::Position, Self::Orientation, Self::Linear, Self::Angular];
+
+    /// The array of a folder that holds it after the step.
+    pub(crate) const fn file(self) -> &'static str {
+        match self {
+            Self::Position => "out_pos.npy",
+            Self::Orientation => "out_quat.npy",
+            Self::Linear => "out_linvel.npy",
+            Self::Angular => "out_angvel.npy",
+        }
+    }
+
+    /// Numbers a body.
+    pub(crate) const fn width(self) -> usize {
+        match self {
+            Self::Orientation => 4,
+            Self::Position | Self::Linear | Self::Angular => 3,
+        }
+    }
+
+    /// The numbers of all bodies.
+    pub(crate) fn of(self, bodies: &[Body]) -> Box<dyn Iterator<Item = f32> + '_> {
+        match self {
+            Self::Position => Box::new(bodies.iter().flat_map(|body| body.pose.position)),
+            Self::Orientation => Box::new(bodies.iter().flat_map(|body| body.pose.orientation)),
+            Self::Linear => Box::new(bodies.iter().flat_map(|body| body.velocity.linear)),
+            Self::Angular => Box::new(bodies.iter().flat_map(|body| body.velocity.angular)),
+        }
+    }
+}
+
+/// Linear and angular velocity of each body in turn, as `out_vel_*` hold them.
+pub(crate) fn velocities(bodies: &[Body]) -> impl Iterator<Item = f32> {
+    bodies.iter().flat_map(|body| body.velocity.linear.into_iter().chain(body.velocity.angular))
+}
+
+fn rows<T: Element, const N: usize>(
+    path: &Path,
+    name: &str,
+    first: Option<usize>,
+) -> Result<Vec<[T; N]>, NpyError> {
+    let (_, elements) = npy::read(&path.join(name), &Dimensions(vec![first, Some(N)]))?;
+    Ok(as_rows(&elements))
+}
+
+fn as_rows<T: Element, const N: usize>(elements: &[T]) -> Vec<[T; N]> {
+    let (rows, rest) = elements.as_chunks();
+    debug_assert!(rest.is_empty(), "the shape was checked");
+    rows.to_vec()
+}
+
+impl Folder {
+    /// Reads every array of the step.
+    pub(crate) fn load(path: &Path) -> Result<Self, NpyError> {
+        let one = |name: &str, n| npy::read::<f32>(&path.join(name), &Dimensions(vec![n]));
+        let (_, params) = one(PARAMS, Some(8))?;
+        let (_, iterations) = npy::read::<u32>(&path.join(ITERATIONS), &Dimensions(vec![Some(2)]))?;
+
+        let positions: Vec<[f32; 3]> = rows(path, BODY_POSITION, None)?;
+        let n = Some(positions.len());
+        let orientations: Vec<[f32; 4]> = rows(path, BODY_ORIENTATION, n)?;
+        let linear: Vec<[f32; 3]> = rows(path, BODY_LINEAR, n)?;
+        let angular: Vec<[f32; 3]> = rows(path, BODY_ANGULAR, n)?;
+        let (_, inverse_masses) = one(BODY_INVERSE_MASS, n)?;
+        let inverse_inertias: Vec<[f32; 3]> = rows(path, BODY_INVERSE_INERTIA, n)?;
+        let (shapes, shape_bodies, shape_of) = distinct(&inverse_masses, &inverse_inertias);
+        let bodies = (0..positions.len())
+            .map(|k| Body {
+                pose: Pose { position: positions[k], orientation: orientations[k] },
+                velocity: Velocity { linear: linear[k], angular: angular[k] },
+                shape: shape_of[k],
+            })
+            .collect();
+
+        let pairs: Vec<[u32; 2]> = rows(path, COLLISION_BODIES, None)?;
+        let m = Some(pairs.len());
+        let (_, counts) = npy::read::<u32>(&path.join(COLLISION_COUNT), &Dimensions(vec![m]))?;
+        let normals: Vec<[f32; 3]> = rows(path, COLLISION_NORMAL, m)?;
+        let shape = Dimensions(vec![m, Some(CONTACT_POINTS), Some(4)]);
+        let (_, points) = npy::read::<f32>(&path.join(COLLISION_POINTS), &shape)?;
+        let points: Vec<[f32; 4]> = as_rows(&points);
+        let contacts = points.as_chunks::<CONTACT_POINTS>().0;
+        let collisions = (0..pairs.len())
+            .map(|k| Collision {
+                body_a: pairs[k][0],
+                body_b: pairs[k][1],
+                normal: normals[k],
+                count: counts[k],
+                contacts: contacts[k]
+                    .map(|[x, y, z, distance]| Contact { point: [x, y, z], distance }),
+            })
+            .collect();
+
+        let mut parameters = StepParameters::default();
+        parameters.time_step = params[0];
+        parameters.position_drift = params[1];
+        parameters.position_coefficient = params[2];
+        parameters.friction = params[3];
+        parameters.angular_damping = params[4];
+        parameters.gravity = [params[5], params[6], params[7]];
+        parameters.contact_iterations = iterations[0];
+        parameters.friction_iterations = iterations[1];
+        let path = path.to_path_buf();
+        Ok(Self { path, bodies, shapes, shape_bodies, collisions, parameters })
+    }
+
+    /// Refuses more shapes than a table of `limit` entries holds, naming the body that is too much.
+    pub(crate) fn check_shapes(&self, limit: u32) -> Result<(), TooManyShapes> {
+        let limit = usize::try_from(limit).unwrap_or(usize::MAX);
+        match self.shape_bodies.get(limit) {
+            None => Ok(()),
+            Some(body) => Err(TooManyShapes {
+                path: self.path.join(BODY_INVERSE_MASS),
+                body: *body,
+                found: self.shapes.len(),
+                limit,
+            }),
+        }
+    }
+}
+
+/// The distinct rows, the first body of each, and each body's row.
+///
+/// Rows are equal if their bits are. The map is only asked, never walked: it decides no order.
+fn distinct(
+    inverse_masses: &[f32],
+    inverse_inertias: &[[f32; 3]],
+) -> (Vec<Shape>, Vec<usize>, Vec<u32>) {
+    let mut known: HashMap<[u32; 4], u32> = HashMap::new();
+    let mut shapes = Vec::new();
+    let mut first_bodies = Vec::new();
+    let mut shape_of = Vec::with_capacity(inverse_masses.len());
+    for (body, (mass, inertia)) in inverse_masses.iter().zip(inverse_inertias).enumerate() {
+        let [x, y, z] = inertia.map(f32::to_bits);
+        let index = known.entry([mass.to_bits(), x, y, z]).or_insert_with(|| {
+            shapes.push(Shape { inverse_mass: *mass, inverse_inertia: *inertia });
+            first_bodies.push(body);
+            // A table has far fewer entries; the excess is refused before the index is used.
+            u32::try_from(shapes.len() - 1).unwrap_or(u32::MAX)
+        });
+        shape_of.push(*index);
+    }
+    (shapes, first_bodies, shape_of)
+}
+
+/// Writes the state of all bodies as the four arrays of [`State`].
+pub(crate) fn write_results(path: &Path, bodies: &[Body]) -> Result<(), NpyError> {
+    std::fs::create_dir_all(path).map_err(|error| NpyError {
+        path: path.to_path_buf(),
+        problem: npy::Problem::Write(error),
+    })?;
+    for state in State::ALL {
+        npy::write(&path.join(state.file()), &[bodies.len(), state.width()], state.of(bodies))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_are_the_distinct_rows_in_order() {
+        let masses = [0.0, 1.0, 2.0, 1.0, 1.0];
+        let inertias = [[0.0; 3], [1.5; 3], [1.5; 3], [1.5; 3], [1.5, 1.5, 2.0]];
+        let (shapes, first_bodies, shape_of) = distinct(&masses, &inertias);
+        assert_eq!(shape_of, [0, 1, 2, 1, 3]);
+        assert_eq!(first_bodies, [0, 1, 2, 4]);
+        assert_eq!(shapes[3].inverse_inertia.map(f32::to_bits), [1.5, 1.5, 2.0].map(f32::to_bits));
+    }
+}

@@ -1,0 +1,135 @@
+//! This file holds the options of the emulated board, and how they are written on the command line.
+
+use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
+use clap::{Args, ValueEnum};
+
+/// How the emulated board is built; a real board is as its bitstream is.
+#[derive(Debug, Clone, Copy, Default, Args)]
+#[command(next_help_heading = "Emulated board")]
+pub(crate) struct BuildArgs {
+    /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
+    #[arg(long)]
+    hazards: Option<HazardsName>,
+    /// Hazard window in issue slots [default: that of the profile]
+    #[arg(long, value_name = "SLOTS", value_parser = clap::value_parser!(u32).range(1..))]
+    window: Option<u32>,
+    /// Keep subnormal numbers or flush them to zero [default: keep]
+    #[arg(long)]
+    subnormals: Option<SubnormalsName>,
+    /// Memory bandwidth in GB/s, or "unlimited" [default: 12.8]
+    #[arg(long, value_name = "GBPS", value_parser = bandwidth)]
+    bandwidth: Option<Bandwidth>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum HazardsName {
+    Interlocked,
+    Unchecked,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SubnormalsName {
+    Keep,
+    Flush,
+}
+
+impl BuildArgs {
+    /// The first option that was given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        [
+            ("--hazards", self.hazards.is_some()),
+            ("--window", self.window.is_some()),
+            ("--subnormals", self.subnormals.is_some()),
+            ("--bandwidth", self.bandwidth.is_some()),
+        ]
+        .into_iter()
+        .find_map(|(name, given)| given.then_some(name))
+    }
+
+    /// The board that they describe.
+    pub(crate) fn config(&self) -> BoardConfig {
+        let default = BoardConfig::default();
+        BoardConfig {
+            hazards: match self.hazards {
+                None => default.hazards,
+                Some(HazardsName::Interlocked) => Hazards::Interlocked,
+                Some(HazardsName::Unchecked) => Hazards::Unchecked,
+            },
+            window_slots: self.window,
+            subnormals: match self.subnormals {
+                None => default.subnormals,
+                Some(SubnormalsName::Keep) => Subnormals::Keep,
+                Some(SubnormalsName::Flush) => Subnormals::Flush,
+            },
+            bandwidth: self.bandwidth.unwrap_or(default.bandwidth),
+            ..default
+        }
+    }
+}
+
+const BYTES_PER_GB: f64 = 1e9;
+/// Faster than any memory; beyond it a typing error is likelier.
+const BANDWIDTH_MAX: f64 = 1000.0;
+/// Slower than any memory.
+const BANDWIDTH_MIN: f64 = 0.001;
+
+/// A bandwidth, as it is written on the command line.
+pub(crate) fn bandwidth(text: &str) -> Result<Bandwidth, String> {
+    if text == "unlimited" {
+        return Ok(Bandwidth::Unlimited);
+    }
+    let wrong = || {
+        format!(
+            "expected a number of GB/s from {BANDWIDTH_MIN} to {BANDWIDTH_MAX}, or \"unlimited\""
+        )
+    };
+    let number: f64 = text.parse().map_err(|_| wrong())?;
+    if !(BANDWIDTH_MIN..=BANDWIDTH_MAX).contains(&number) {
+        return Err(wrong());
+    }
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a whole number between 1e6 and 1e12 after the check"
+    )]
+    let rate = (number * BYTES_PER_GB).round() as u64;
+    Ok(Bandwidth::BytesPerSecond(rate))
+}
+
+/// A bandwidth for people.
+pub(crate) fn bandwidth_text(bandwidth: Bandwidth) -> String {
+    match bandwidth {
+        Bandwidth::Unlimited => "unlimited".to_owned(),
+        Bandwidth::BytesPerSecond(rate) => format!("{} GB/s", rate as f64 / BYTES_PER_GB),
+    }
+}
+
+/// A bandwidth for programs: bytes a second, or null.
+pub(crate) fn bandwidth_number(bandwidth: Bandwidth) -> Option<u64> {
+    match bandwidth {
+        Bandwidth::Unlimited => None,
+        Bandwidth::BytesPerSecond(rate) => Some(rate),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bandwidths_are_read_as_they_are_shown() {
+        assert_eq!(bandwidth("12.8"), Ok(Bandwidth::ZCU102_SUSTAINED));
+        assert_eq!(bandwidth("17.07"), Ok(Bandwidth::ZCU102_PEAK));
+        assert_eq!(bandwidth("unlimited"), Ok(Bandwidth::Unlimited));
+        assert_eq!(bandwidth_text(Bandwidth::ZCU102_SUSTAINED), "12.8 GB/s");
+        for wrong in ["", "0", "-1", "nan", "inf", "1e9", "12.8GB", "Unlimited"] {
+            bandwidth(wrong).expect_err(wrong);
+        }
+    }
+
+    #[test]
+    fn no_option_is_the_default_board() {
+        assert_eq!(BuildArgs::default().config(), BoardConfig::default());
+        assert_eq!(BuildArgs::default().given(), None);
+    }
+}

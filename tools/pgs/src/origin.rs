@@ -1,0 +1,78 @@
+//! This file says which array of a folder the driver complains about.
+
+use std::path::Path;
+
+use thiserror::Error;
+use zynq_pgs::InputError;
+
+use crate::folder::{
+    BODY_ANGULAR, BODY_INVERSE_INERTIA, BODY_INVERSE_MASS, BODY_LINEAR, BODY_ORIENTATION,
+    BODY_POSITION, COLLISION_BODIES, COLLISION_COUNT, COLLISION_NORMAL, COLLISION_POINTS, Folder,
+    ITERATIONS, PARAMS,
+};
+
+/// Input that the driver refused, with the file that it stands in.
+#[derive(Debug, Error)]
+#[error("{place}")]
+pub(crate) struct Located {
+    place: String,
+    #[source]
+    source: zynq_pgs::Error,
+}
+
+/// Names the array, and for a shape the first body that has it.
+pub(crate) fn locate(source: zynq_pgs::Error, folder: &Folder) -> Located {
+    let place = match &source {
+        zynq_pgs::Error::Input(input) => place(input, &folder.path, &folder.shape_bodies),
+        _ => folder.path.display().to_string(),
+    };
+    Located { place, source }
+}
+
+fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
+    let file = folder.join(file_of(error)).display().to_string();
+    let shape = match error {
+        InputError::ShapeValue { shape, .. }
+        | InputError::Anisotropic { shape, .. }
+        | InputError::StaticShapeRotates { shape, .. } => Some(*shape),
+        _ => None,
+    };
+    match shape.and_then(|shape| shape_bodies.get(shape)) {
+        Some(body) => format!("{file}: the shape of body {body}"),
+        None => file,
+    }
+}
+
+/// The array that holds the refused value.
+fn file_of(error: &InputError) -> &'static str {
+    match error {
+        InputError::BodyNotFinite { field, .. } | InputError::StaticBodyMoves { field, .. } => {
+            match *field {
+                "orientation" => BODY_ORIENTATION,
+                "linear velocity" => BODY_LINEAR,
+                "angular velocity" => BODY_ANGULAR,
+                _ => BODY_POSITION,
+            }
+        }
+        InputError::Orientation { .. } => BODY_ORIENTATION,
+        InputError::ShapeIndex { .. }
+        | InputError::NoShapes
+        | InputError::TooManyShapes { .. }
+        | InputError::ShapeValue { field: "inverse mass", .. } => BODY_INVERSE_MASS,
+        InputError::ShapeValue { .. }
+        | InputError::Anisotropic { .. }
+        | InputError::StaticShapeRotates { .. } => BODY_INVERSE_INERTIA,
+        InputError::TooManyCollisions { .. }
+        | InputError::MemoryExceeded { .. }
+        | InputError::BodyIndex { .. }
+        | InputError::SelfCollision { .. }
+        | InputError::BothStatic { .. } => COLLISION_BODIES,
+        InputError::ContactCount { .. } => COLLISION_COUNT,
+        InputError::NormalNotFinite { .. } | InputError::NormalLength { .. } => COLLISION_NORMAL,
+        InputError::ContactNotFinite { .. } => COLLISION_POINTS,
+        InputError::Parameter { .. } => PARAMS,
+        InputError::TooManyIterations { .. } => ITERATIONS,
+        // No bodies, too many bodies, and what later versions of the driver add.
+        _ => BODY_POSITION,
+    }
+}

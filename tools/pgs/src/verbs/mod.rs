@@ -1,0 +1,63 @@
+//! The verbs, one file each.
+
+pub(crate) mod list;
+pub(crate) mod model;
+pub(crate) mod run;
+pub(crate) mod solve;
+mod table;
+
+use std::io::Write;
+
+use serde_json::{Value, json};
+use zynq_pgs::StepReport;
+
+use crate::args::{Command, Verb};
+use crate::failure::{Failure, Verdict};
+
+/// Number of the JSON documents' layout; it grows when a key changes its meaning or goes.
+pub(crate) const SCHEMA: u32 = 1;
+
+/// Runs the command and writes its results to `out`.
+pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Failure> {
+    match &command.verb {
+        Verb::Run(args) => run::run(args, &command.common, out),
+        Verb::Solve(args) => solve::run(args, &command.common, out),
+        Verb::Model(args) => model::run(args, &command.common, out),
+        Verb::List(args) => list::run(args, &command.common, out),
+    }
+}
+
+/// A step's report for programs.
+fn report_json(report: &StepReport) -> Value {
+    let StepReport { cycles, host, .. } = report;
+    json!({
+        "bodies": report.bodies,
+        "collisions": report.collisions,
+        "passes": report.passes,
+        "impulse_sum_n_s": report.impulse_sum,
+        "cycles": {
+            "total": cycles.total,
+            "formula": cycles.work,
+            "stalls": cycles.stalls,
+            "waits": cycles.waits,
+        },
+        "modelled_ms": run::milliseconds(report.modelled_time()),
+        "limit": run::limit_text(report.limit()),
+        "hazards": report.hazards,
+        "bytes_to_device": report.bytes_to_device,
+        "bytes_from_device": report.bytes_from_device,
+        "register_reads": report.register_reads,
+        "register_writes": report.register_writes,
+        "doorbells": report.doorbells,
+        "interrupts": report.interrupts,
+        "descriptors": report.descriptors,
+        "host_ms": {
+            "validate": run::milliseconds(host.validate),
+            "pack": run::milliseconds(host.pack),
+            "start": run::milliseconds(host.start),
+            "wait": run::milliseconds(host.wait),
+            "unpack": run::milliseconds(host.unpack),
+            "commit": run::milliseconds(host.commit),
+        },
+    })
+}

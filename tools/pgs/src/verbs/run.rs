@@ -1,0 +1,266 @@
+//! The verb `run`: steps a scene and shows what every step cost.
+
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use scene::{Grid, Inertia, Scene, SceneOptions, ground_pairs, kinetic_energy};
+use serde_json::{Value, json};
+use zynq_pgs::{Limit, StepParameters, StepReport};
+
+use super::SCHEMA;
+use super::table::{Column, grouped, heading, line};
+use crate::args::CommonArgs;
+use crate::board::{self, Opened};
+use crate::digest;
+use crate::failure::{Failure, Verdict};
+use crate::interrupt::Interrupt;
+use crate::options::BuildArgs;
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs run                                        the thesis' scene
+  pgs run --grid 10x10x10 --steps 60 --report-every 10
+  pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
+  pgs run --bandwidth unlimited --json > run.json";
+
+/// Rows of the table, if not said otherwise.
+const ROWS: u32 = 15;
+
+/// Step a pile of cubes dropped on the ground.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct RunArgs {
+    /// Steps of 1/60 s.
+    #[arg(long, value_name = "N", default_value_t = 150, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) steps: u32,
+    /// Cubes along each axis; y is up.
+    #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
+    grid: Grid,
+    /// Height of the lowest cubes above the ground at the start, m.
+    #[arg(long, value_name = "H", default_value_t = SceneOptions::default().drop, value_parser = drop_height)]
+    drop: f32,
+    /// Inverse inertia of the cubes: what Bullet computes (0.3676), or a textbook's (1.5).
+    #[arg(long, value_enum, default_value_t = InertiaName::Bullet)]
+    inertia: InertiaName,
+    /// Show every N-th step [default: a fifteenth of the steps]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    report_every: Option<u32>,
+    #[command(flatten)]
+    build: BuildArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum InertiaName {
+    Bullet,
+    Textbook,
+}
+
+impl From<InertiaName> for Inertia {
+    fn from(name: InertiaName) -> Self {
+        match name {
+            InertiaName::Bullet => Self::Bullet,
+            InertiaName::Textbook => Self::Textbook,
+        }
+    }
+}
+
+fn drop_height(text: &str) -> Result<f32, String> {
+    let most = scene::DROP_MAX;
+    match text.parse::<f32>() {
+        Ok(height) if (0.0..=most).contains(&height) => Ok(height),
+        _ => Err(format!("expected a height from 0 to {most} m")),
+    }
+}
+
+/// What one step did.
+struct Row {
+    step: u32,
+    ground_pairs: usize,
+    kinetic_energy: f64,
+    detect: Duration,
+    report: StepReport,
+}
+
+const COLUMNS: [Column; 16] = [
+    Column { name: "step", unit: "", width: 5 },
+    Column { name: "pairs", unit: "", width: 8 },
+    Column { name: "ground", unit: "pairs", width: 6 },
+    Column { name: "impulses", unit: "N s", width: 10 },
+    Column { name: "energy", unit: "kJ", width: 9 },
+    Column { name: "formula", unit: "cycles", width: 10 },
+    Column { name: "stalls", unit: "cycles", width: 12 },
+    Column { name: "waits", unit: "cycles", width: 9 },
+    Column { name: "modelled", unit: "ms", width: 9 },
+    Column { name: "moved", unit: "MB", width: 7 },
+    Column { name: "limit", unit: "", width: 8 },
+    Column { name: "hazards", unit: "", width: 9 },
+    Column { name: "detect", unit: "host ms", width: 7 },
+    Column { name: "pack", unit: "host ms", width: 7 },
+    Column { name: "device", unit: "host ms", width: 7 },
+    Column { name: "unpack", unit: "host ms", width: 7 },
+];
+
+impl Row {
+    fn bytes(&self) -> u64 {
+        self.report.bytes_to_device + self.report.bytes_from_device
+    }
+
+    fn cells(&self) -> [String; 16] {
+        let StepReport { cycles, host, .. } = &self.report;
+        let impulses = self.report.impulse_sum;
+        [
+            self.step.to_string(),
+            grouped(self.report.collisions),
+            grouped(self.ground_pairs as u64),
+            impulses.map_or_else(|| "-".to_owned(), |sum| format!("{sum:.1}")),
+            format!("{:.3}", self.kinetic_energy / 1e3),
+            grouped(cycles.work),
+            grouped(cycles.stalls),
+            grouped(cycles.waits),
+            format!("{:.3}", milliseconds(self.report.modelled_time())),
+            format!("{:.1}", self.bytes() as f64 / 1e6),
+            limit_text(self.report.limit()).to_owned(),
+            grouped(self.report.hazards),
+            format!("{:.1}", milliseconds(self.detect)),
+            format!("{:.1}", milliseconds(host.validate + host.pack)),
+            format!("{:.1}", milliseconds(host.start + host.wait)),
+            format!("{:.1}", milliseconds(host.unpack + host.commit)),
+        ]
+    }
+
+    fn to_json(&self) -> Value {
+        let mut value = super::report_json(&self.report);
+        value["step"] = self.step.into();
+        value["ground_pairs"] = self.ground_pairs.into();
+        value["kinetic_energy_j"] = self.kinetic_energy.into();
+        value["host_ms"]["detect"] = milliseconds(self.detect).into();
+        value
+    }
+}
+
+pub(super) fn milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}
+
+pub(super) fn limit_text(limit: Limit) -> &'static str {
+    match limit {
+        Limit::Pipeline => "pipeline",
+        Limit::Hazards => "hazards",
+        Limit::Streams => "memory",
+        _ => "other",
+    }
+}
+
+/// Steps the scene.
+pub(crate) fn run(
+    args: &RunArgs,
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    let options = SceneOptions { grid: args.grid, drop: args.drop, inertia: args.inertia.into() };
+    let mut opened = board::open(common.board, &args.build)?;
+    check_size(args.grid, &opened)?;
+    let mut scene = Scene::new(&options).map_err(Failure::input)?;
+    if !common.json {
+        opened.print(out)?;
+        writeln!(
+            out,
+            "scene      {} cubes ({}) on a static ground, dropped from {} m, {} steps",
+            grouped(args.grid.cubes().into()),
+            args.grid,
+            args.drop,
+            args.steps
+        )?;
+        writeln!(out)?;
+        heading(out, &COLUMNS)?;
+        out.flush()?;
+    }
+    opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
+
+    let interrupt = Interrupt::install();
+    let every = args.report_every.unwrap_or(args.steps.div_ceil(ROWS));
+    let progress = progress_bar(args.steps);
+    let mut documents = Vec::new();
+    let mut done = 0;
+    while done < args.steps && !interrupt.is_set() {
+        done += 1;
+        let row = step(done, &mut opened, &mut scene)?;
+        progress.inc(1);
+        if common.json {
+            documents.push(row.to_json());
+        } else if done == 1 || done % every == 0 || done == args.steps {
+            progress.suspend(|| line(out, &COLUMNS, row.cells()))?;
+            out.flush()?;
+        }
+    }
+    progress.finish_and_clear();
+
+    let digest = format!("{:016x}", digest::of_bodies(scene.bodies()));
+    let complete = done == args.steps;
+    if common.json {
+        let document = json!({
+            "schema": SCHEMA,
+            "verb": "run",
+            "config": {
+                "grid": args.grid.to_string(),
+                "drop_m": args.drop,
+                "inertia": match args.inertia {
+                    InertiaName::Bullet => "bullet",
+                    InertiaName::Textbook => "textbook",
+                },
+                "steps": args.steps,
+            },
+            "board": opened.to_json(),
+            "complete": complete,
+            "steps": documents,
+            "digest": { "algorithm": digest::ALGORITHM, "value": digest },
+        });
+        writeln!(out, "{document:#}")?;
+    } else {
+        writeln!(out)?;
+        if !complete {
+            writeln!(out, "interrupted after {done} of {} steps", args.steps)?;
+        }
+        writeln!(out, "digest     {} {digest}", digest::ALGORITHM)?;
+    }
+    Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
+}
+
+/// Refuses a grid that does not fit before memory is taken for it.
+fn check_size(grid: Grid, opened: &Opened) -> Result<(), Failure> {
+    let capacity = opened.accelerator.capabilities().body_capacity;
+    if grid.cubes() < capacity {
+        return Ok(());
+    }
+    let error = format!(
+        "a grid of {grid} is {} bodies with the ground, the board takes at most {capacity}",
+        u64::from(grid.cubes()) + 1
+    );
+    Err(Failure::input(error).next("give a smaller --grid"))
+}
+
+/// Detects collisions and takes one step.
+fn step(number: u32, opened: &mut Opened, scene: &mut Scene) -> Result<Row, Failure> {
+    let begin = Instant::now();
+    let ground_pairs = ground_pairs(scene.detect());
+    let detect = begin.elapsed();
+    let (bodies, collisions) = scene.parts_mut();
+    let report = opened
+        .accelerator
+        .step(bodies, collisions, &StepParameters::default())
+        .map_err(|error| opened.failure(error))?;
+    let kinetic_energy = kinetic_energy(scene.bodies(), scene.shapes());
+    Ok(Row { step: number, ground_pairs, kinetic_energy, detect, report })
+}
+
+/// On stderr, and only if that is a terminal.
+fn progress_bar(steps: u32) -> ProgressBar {
+    let bar = ProgressBar::new(steps.into());
+    let style = "{bar:30} {pos}/{len} steps, {per_sec}, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(style) {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,323 @@
+//! The verb `solve`: one step from a folder of arrays, and its comparison with expected arrays.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use scene::kinetic_energy;
+use serde_json::{Value, json};
+use zynq_pgs::{Body, StepParameters, StepReport};
+
+use super::SCHEMA;
+use super::run::{limit_text, milliseconds};
+use super::table::grouped;
+use crate::args::CommonArgs;
+use crate::board;
+use crate::compare::{self, Difference};
+use crate::digest;
+use crate::failure::{Failure, Verdict};
+use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
+use crate::npy::{self, Dimensions};
+use crate::options::BuildArgs;
+use crate::origin;
+
+const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
+const VELOCITIES_FRICTION: &str = "out_vel_friction.npy";
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs solve vectors/one_cube --compare
+  pgs solve vectors/pile10_step90 --out result --digest
+  pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
+
+The folder holds one .npy array a property: params (8) and iterations (2); body_pos, body_linvel,
+body_angvel, body_inv_inertia (N, 3), body_quat (N, 4), body_inv_mass (N); contact_bodies (M, 2),
+contact_npoints (M), contact_normal (M, 3), contact_points (M, 4, 4). Types are <f4, and <u4 for
+iterations, contact_bodies and contact_npoints.";
+
+/// Take one step from a folder of arrays.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct SolveArgs {
+    /// Folder of .npy arrays.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Write the results as arrays to this folder: `out_pos`, `out_quat`, `out_linvel`, `out_angvel`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Compare bit by bit with the folder's own results; exit code 1 on a difference. With
+    /// --no-integrate, with the velocities after that many iterations.
+    #[arg(long)]
+    compare: bool,
+    /// Print the digest of the final state alone.
+    #[arg(long, conflicts_with = "json")]
+    digest: bool,
+    /// Contact iterations [default: those of the folder]
+    #[arg(long, value_name = "K")]
+    contact_iterations: Option<u32>,
+    /// Friction iterations [default: those of the folder]
+    #[arg(long, value_name = "K")]
+    friction_iterations: Option<u32>,
+    /// Stop after the solver: poses stay, velocities are undamped and without gravity.
+    #[arg(long)]
+    no_integrate: bool,
+    #[command(flatten)]
+    build: BuildArgs,
+}
+
+impl SolveArgs {
+    /// The folder's parameters, with what the command line says otherwise.
+    fn parameters(&self, folder: &StepParameters) -> StepParameters {
+        let mut parameters = *folder;
+        parameters.integrate = !self.no_integrate;
+        if let Some(iterations) = self.contact_iterations {
+            parameters.contact_iterations = iterations;
+        }
+        if let Some(iterations) = self.friction_iterations {
+            parameters.friction_iterations = iterations;
+        }
+        parameters
+    }
+}
+
+/// An array that the result must equal.
+struct Expected {
+    name: String,
+    values: Vec<f32>,
+    kind: Kind,
+}
+
+enum Kind {
+    /// One property.
+    State(State),
+    /// Linear and angular velocities in turn.
+    Velocities,
+}
+
+/// Takes the step.
+pub(crate) fn run(
+    args: &SolveArgs,
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    let mut folder = Folder::load(&args.folder).map_err(|error| {
+        Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
+    })?;
+    let parameters = args.parameters(&folder.parameters);
+    let expected = match args.compare {
+        true => expected(&folder, &parameters)?,
+        false => Vec::new(),
+    };
+    let mut opened = board::open(common.board, &args.build)?;
+    folder
+        .check_shapes(opened.accelerator.capabilities().shape_capacity)
+        .map_err(Failure::input)?;
+    let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
+    let mut bodies = std::mem::take(&mut folder.bodies);
+    let report = opened
+        .accelerator
+        .set_shapes(&folder.shapes)
+        .and_then(|()| opened.accelerator.step(&mut bodies, &folder.collisions, &parameters))
+        .map_err(|error| match error.is_input() {
+            true => Failure::input(origin::locate(error, &folder)),
+            false => opened.failure(error),
+        })?;
+    if let Some(path) = &args.out {
+        folder::write_results(path, &bodies).map_err(Failure::input)?;
+    }
+
+    let solved = Solved {
+        parameters,
+        report,
+        energy: [energy_before, kinetic_energy(&bodies, &folder.shapes)],
+        digest: format!("{:016x}", digest::of_bodies(&bodies)),
+        differences: compared(&bodies, &expected),
+    };
+    let equal = solved.differences.iter().all(|difference| difference.differing == 0);
+    if common.json {
+        let mut document = solved.to_json();
+        document["folder"] = args.folder.display().to_string().into();
+        document["board"] = opened.to_json();
+        document["equal"] = args.compare.then_some(equal).into();
+        writeln!(out, "{document:#}")?;
+    } else if args.digest {
+        writeln!(out, "{} {}", digest::ALGORITHM, solved.digest)?;
+    } else {
+        opened.print(out)?;
+        solved.print(out)?;
+    }
+    if args.digest && !equal {
+        for difference in solved.differences.iter().filter(|d| d.differing > 0) {
+            log::error!("{}: {} values differ", difference.array, difference.differing);
+        }
+    }
+    Ok(if equal { Verdict::Done } else { Verdict::Differs })
+}
+
+/// The arrays that the step must reproduce.
+fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected>, Failure> {
+    let own = &folder.parameters;
+    let contact = parameters.contact_iterations;
+    let friction = parameters.friction_iterations;
+    let all_contact = contact == own.contact_iterations;
+    let n = folder.bodies.len();
+    if parameters.integrate && all_contact && friction == own.friction_iterations {
+        return State::ALL
+            .into_iter()
+            .map(|property| state(folder, property.file(), property))
+            .collect();
+    }
+    let (name, passes, pass) = if !parameters.integrate
+        && friction == 0
+        && (1..=own.contact_iterations).contains(&contact)
+    {
+        (VELOCITIES_CONTACT, own.contact_iterations, contact)
+    } else if !parameters.integrate
+        && all_contact
+        && (1..=own.friction_iterations).contains(&friction)
+    {
+        (VELOCITIES_FRICTION, own.friction_iterations, friction)
+    } else {
+        let error = format!(
+            "nothing to compare with: there are no expected results after {contact} contact and \
+             {friction} friction iterations {} integration",
+            if parameters.integrate { "and the" } else { "without" },
+        );
+        return Err(Failure::input(error).next(format!(
+            "compare the whole step ({} and {}, integrated), or with --no-integrate 1 to {} \
+             contact and no friction iterations, or {} contact and 1 to {} friction iterations",
+            own.contact_iterations,
+            own.friction_iterations,
+            own.contact_iterations,
+            own.contact_iterations,
+            own.friction_iterations,
+        )));
+    };
+    let path = folder.path.join(name);
+    let size = |n: u32| usize::try_from(n).unwrap_or(usize::MAX);
+    let shape = Dimensions(vec![Some(size(passes)), Some(n), Some(6)]);
+    let (_, mut values) = npy::read::<f32>(&path, &shape).map_err(Failure::input)?;
+    values.drain(..(size(pass) - 1) * n * 6);
+    values.truncate(n * 6);
+    compare::check(&path, &values).map_err(Failure::input)?;
+    let velocities =
+        Expected { name: format!("{name}[{}]", pass - 1), values, kind: Kind::Velocities };
+    Ok(vec![
+        velocities,
+        state(folder, BODY_POSITION, State::Position)?,
+        state(folder, BODY_ORIENTATION, State::Orientation)?,
+    ])
+}
+
+/// The array in `file`, which that property must equal after the step.
+fn state(folder: &Folder, file: &str, property: State) -> Result<Expected, Failure> {
+    let path = &folder.path.join(file);
+    let shape = Dimensions(vec![Some(folder.bodies.len()), Some(property.width())]);
+    let (_, values) = npy::read::<f32>(path, &shape).map_err(Failure::input)?;
+    compare::check(path, &values).map_err(Failure::input)?;
+    Ok(Expected { name: file.to_owned(), values, kind: Kind::State(property) })
+}
+
+fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
+    expected
+        .iter()
+        .map(|Expected { name, values, kind }| match kind {
+            Kind::State(property) => compare::compare(name, property.of(bodies), values),
+            Kind::Velocities => compare::compare(name, folder::velocities(bodies), values),
+        })
+        .collect()
+}
+
+/// What there is to tell.
+struct Solved {
+    parameters: StepParameters,
+    report: StepReport,
+    /// Before and after the step, J.
+    energy: [f64; 2],
+    digest: String,
+    differences: Vec<Difference>,
+}
+
+impl Solved {
+    /// Share of the collisions that met a hazard, over all passes.
+    fn hazard_share(&self) -> f64 {
+        let issued = self.report.collisions * u64::from(self.report.passes);
+        if issued == 0 { 0.0 } else { self.report.hazards as f64 / issued as f64 }
+    }
+
+    fn print(&self, out: &mut dyn Write) -> std::io::Result<()> {
+        let report = &self.report;
+        writeln!(
+            out,
+            "step       {} bodies, {} collisions, {} contact and {} friction iterations, {}",
+            grouped(report.bodies),
+            grouped(report.collisions),
+            self.parameters.contact_iterations,
+            self.parameters.friction_iterations,
+            if self.parameters.integrate { "integrated" } else { "not integrated" },
+        )?;
+        writeln!(
+            out,
+            "cycles     {} = {} by formula + {} stalls + {} waits; {:.3} ms modelled, limit: {}",
+            grouped(report.cycles.total),
+            grouped(report.cycles.work),
+            grouped(report.cycles.stalls),
+            grouped(report.cycles.waits),
+            milliseconds(report.modelled_time()),
+            limit_text(report.limit()),
+        )?;
+        writeln!(
+            out,
+            "hazards    {} ({:.1} % of the collisions of a pass)",
+            grouped(report.hazards),
+            self.hazard_share() * 100.0,
+        )?;
+        if let Some(sum) = report.impulse_sum {
+            writeln!(out, "impulses   {sum:.3} N s")?;
+        }
+        let [before, after] = self.energy;
+        writeln!(out, "energy     {before:.3} J before, {after:.3} J after (kinetic)")?;
+        writeln!(out, "digest     {} {}", digest::ALGORITHM, self.digest)?;
+        for difference in &self.differences {
+            let Difference { array, values, differing, largest, first } = difference;
+            write!(out, "compare    {array}: {differing} of {values} values differ in bits")?;
+            match first {
+                None => writeln!(out)?,
+                Some(first) => writeln!(out, ", by {largest:e} at most, first at {first}")?,
+            }
+        }
+        Ok(())
+    }
+
+    fn to_json(&self) -> Value {
+        let differences: Vec<Value> = self
+            .differences
+            .iter()
+            .map(|difference| {
+                json!({
+                    "array": difference.array,
+                    "values": difference.values,
+                    "differing": difference.differing,
+                    // Infinite differences are null: JSON has no other word.
+                    "largest": difference.largest,
+                    "first": difference.first,
+                })
+            })
+            .collect();
+        json!({
+            "schema": SCHEMA,
+            "verb": "solve",
+            "config": {
+                "contact_iterations": self.parameters.contact_iterations,
+                "friction_iterations": self.parameters.friction_iterations,
+                "integrate": self.parameters.integrate,
+            },
+            "step": super::report_json(&self.report),
+            "hazard_share": self.hazard_share(),
+            "kinetic_energy_before_j": self.energy[0],
+            "kinetic_energy_j": self.energy[1],
+            "digest": { "algorithm": digest::ALGORITHM, "value": self.digest },
+            "comparison": differences,
+        })
+    }
+}

@@ -1,0 +1,331 @@
+//! The command line keeps its promises: help, exit codes, JSON, closed pipes, Ctrl-C.
+
+#![allow(clippy::print_stdout, reason = "a test says aloud what it skips")]
+
+mod common;
+
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+
+use common::{Ran, golden, patch, pgs, run};
+use serde_json::Value;
+
+fn json(ran: &Ran) -> Value {
+    serde_json::from_str(&ran.stdout).expect("one JSON document and nothing else")
+}
+
+fn assert_keys(value: &Value, keys: &[&str]) {
+    for key in keys {
+        assert!(value.get(key).is_some(), "no key {key} in {value:#}");
+    }
+}
+
+#[test]
+fn every_help_has_an_example() {
+    for verb in [&[][..], &["run"], &["solve"], &["model"], &["list"]] {
+        let ran = run(verb.iter().copied().chain(["--help"]));
+        assert_eq!(ran.code, Some(0), "{verb:?}");
+        let example = format!("  pgs{}", verb.iter().map(|v| format!(" {v}")).collect::<String>());
+        assert!(ran.stdout.contains("Examples:"), "{verb:?}: {}", ran.stdout);
+        assert!(ran.stdout.contains(&example), "{verb:?}: {}", ran.stdout);
+        assert!(ran.stderr.is_empty());
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
+    let folder = golden("two_cubes");
+    let folder = folder.to_str().expect("a path in UTF-8");
+    for arguments in [
+        &["frobnicate"][..],
+        &["--steps", "0"],
+        &["--grid", "0x1x1"],
+        &["--window", "40000"],
+        &["--grid", "180x1000x180"],
+        &["--steps", "5", "list"],
+        &["--board", "abacus", "list"],
+        &["solve"],
+        &["solve", "/nonexistent"],
+        &["model", "--collisions", "1"],
+        &["solve", folder, "--compare", "--contact-iterations", "3"],
+        &[
+            "solve",
+            folder,
+            "--compare",
+            "--no-integrate",
+            "--contact-iterations",
+            "5",
+            "--friction-iterations",
+            "0",
+        ],
+        &[
+            "solve",
+            folder,
+            "--compare",
+            "--no-integrate",
+            "--contact-iterations",
+            "3",
+            "--friction-iterations",
+            "1",
+        ],
+        &[
+            "solve",
+            folder,
+            "--compare",
+            "--no-integrate",
+            "--contact-iterations",
+            "0",
+            "--friction-iterations",
+            "0",
+        ],
+        &["solve", folder, "--contact-iterations", "256"],
+    ] {
+        let ran = run(arguments);
+        assert_eq!(ran.code, Some(2), "{arguments:?}: {}", ran.stderr);
+        assert!(ran.stderr.starts_with("error: "), "{arguments:?}: {}", ran.stderr);
+        assert!(!ran.stderr.contains("panicked"), "{arguments:?}: {}", ran.stderr);
+        assert!(ran.stdout.is_empty(), "{arguments:?}: {}", ran.stdout);
+    }
+}
+
+#[test]
+fn options_of_the_emulated_board_are_refused_for_a_real_one() {
+    for (option, value) in [
+        ("--hazards", "unchecked"),
+        ("--window", "64"),
+        ("--subnormals", "flush"),
+        ("--bandwidth", "unlimited"),
+    ] {
+        let ran = run(["--board", "uio", "run", option, value]);
+        assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+        assert!(ran.stderr.contains(option), "{}", ran.stderr);
+        assert!(ran.stderr.contains("--board emulated"), "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_missing_board_ends_with_3_and_the_next_step() {
+    if std::path::Path::new("/sys/class/uio").exists() {
+        println!("skipped: this machine has UIO nodes");
+        return;
+    }
+    let ran = run(["--board", "uio"]);
+    assert_eq!(ran.code, Some(3), "{}", ran.stderr);
+    assert!(ran.stderr.contains("because: no UIO node named \"pgs\""), "{}", ran.stderr);
+    assert!(ran.stderr.contains("next: "), "{}", ran.stderr);
+}
+
+#[test]
+fn falling_back_to_the_emulated_board_is_said() {
+    if std::path::Path::new("/sys/class/uio").exists() {
+        println!("skipped: this machine has UIO nodes");
+        return;
+    }
+    let arguments = ["--board", "auto", "--grid", "1x1x1", "--steps", "1"];
+    let output = pgs().env_remove("RUST_LOG").args(arguments).output().expect("it starts");
+    let ran = Ran::from(output);
+    assert_eq!(ran.code, Some(0));
+    assert!(ran.stdout.starts_with("board      emulated (there is no UIO node"), "{}", ran.stdout);
+    assert!(ran.stderr.contains("WARN"), "{}", ran.stderr);
+}
+
+#[test]
+fn run_reports_every_step_as_json() {
+    let ran = run(["--json", "--grid", "2x2x2", "--steps", "3", "--drop", "0"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let document = json(&ran);
+    assert_keys(&document, &["schema", "verb", "config", "board", "complete", "steps", "digest"]);
+    assert_eq!(document["schema"], 1);
+    assert_eq!(document["digest"]["algorithm"], "fnv1a-64");
+    let steps = document["steps"].as_array().expect("an array of steps");
+    assert_eq!(steps.len(), 3);
+    for (k, step) in steps.iter().enumerate() {
+        assert_eq!(step["step"], k + 1);
+        assert_keys(
+            step,
+            &[
+                "collisions",
+                "ground_pairs",
+                "impulse_sum_n_s",
+                "kinetic_energy_j",
+                "cycles",
+                "modelled_ms",
+                "limit",
+                "hazards",
+                "register_reads",
+                "register_writes",
+                "doorbells",
+                "interrupts",
+                "host_ms",
+            ],
+        );
+    }
+    assert_eq!(steps[0]["ground_pairs"], 4);
+}
+
+#[test]
+fn two_runs_have_one_digest_and_another_scene_has_another() {
+    let digest = |arguments: &[&str]| {
+        let ran = run(arguments);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        ran.stdout.lines().last().expect("a last line").to_owned()
+    };
+    let scene = ["run", "--grid", "3x3x3", "--steps", "5", "--drop", "0"];
+    let first = digest(&scene);
+    assert!(first.starts_with("digest     fnv1a-64 "), "{first}");
+    assert_eq!(first, digest(&scene[1..]), "without the verb");
+    assert_ne!(first, digest(&[&scene[..], &["--inertia", "textbook"]].concat()));
+}
+
+#[test]
+fn the_pile_has_impulses_after_landing_and_none_before() {
+    let ran = run(["--json", "--grid", "3x2x3", "--steps", "70"]);
+    let document = json(&ran);
+    let impulses = |step: usize| {
+        document["steps"][step - 1]["impulse_sum_n_s"].as_f64().expect("the board counts them")
+    };
+    assert_eq!(impulses(60).to_bits(), 0.0_f64.to_bits(), "in free fall");
+    assert!(impulses(70) > 1.0, "landed: {}", impulses(70));
+}
+
+#[test]
+fn solve_compares_with_every_stage_of_the_golden_step() {
+    let folder = golden("pile5_step60");
+    let folder = folder.to_str().expect("a path in UTF-8");
+    let mut cases = vec![vec![]];
+    for k in ["1", "2", "3", "4"] {
+        cases.push(vec!["--no-integrate", "--contact-iterations", k, "--friction-iterations", "0"]);
+        cases.push(vec!["--no-integrate", "--friction-iterations", k]);
+    }
+    for case in cases {
+        for subnormals in ["keep", "flush"] {
+            let arguments = ["solve", folder, "--compare", "--json", "--subnormals", subnormals];
+            let ran = run(arguments.iter().chain(&case));
+            assert_eq!(ran.code, Some(0), "{case:?}: {} {}", ran.stdout, ran.stderr);
+            let document = json(&ran);
+            assert_keys(
+                &document,
+                &["schema", "folder", "board", "step", "digest", "hazard_share"],
+            );
+            assert_eq!(document["equal"], true);
+            let comparison = document["comparison"].as_array().expect("an array");
+            assert!(comparison.len() >= 3 && comparison.iter().all(|c| c["values"] != 0));
+        }
+    }
+}
+
+#[test]
+fn a_difference_ends_with_1_and_is_measured() {
+    let folder = common::copy("two_cubes");
+    patch(&folder, "out_pos.npy", 4, 0.0_f32.to_le_bytes());
+    let path = folder.path().to_str().expect("a path in UTF-8");
+    let ran = run(["solve", path, "--compare"]);
+    assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    assert!(
+        ran.stdout.contains("out_pos.npy: 1 of 9 values differ in bits, by "),
+        "{}",
+        ran.stdout
+    );
+    assert!(ran.stdout.contains("first at 4"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("out_quat.npy: 0 of 12 values differ in bits"), "{}", ran.stdout);
+    assert!(ran.stderr.is_empty(), "the answer is a result: {}", ran.stderr);
+    let ran = run(["solve", path, "--compare", "--json"]);
+    assert_eq!((ran.code, &json(&ran)["equal"]), (Some(1), &Value::Bool(false)));
+}
+
+#[test]
+fn written_results_are_the_golden_files() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let folder = golden("pile5_step60");
+    let into = out.path().join("a/b");
+    let ran = pgs().arg("solve").arg(&folder).arg("--out").arg(&into).output();
+    assert_eq!(Ran::from(ran.expect("it starts")).code, Some(0));
+    for name in ["out_pos.npy", "out_quat.npy", "out_linvel.npy", "out_angvel.npy"] {
+        let bytes = |path: &std::path::Path| std::fs::read(path.join(name)).expect(name);
+        assert!(bytes(&into) == bytes(&folder), "{name}");
+    }
+}
+
+#[test]
+fn model_reproduces_the_thesis_step() {
+    let ran = run(["model", "--collisions", "127000", "--bodies", "38880", "--json"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let document = json(&ran);
+    assert_keys(&document, &["schema", "thesis_words", "streamed_words", "thesis", "memory"]);
+    // Thesis Table 6.4: 2,062,697 cycles; §4.4.2: 2.83 MiB.
+    let cycles = document["thesis_words"]["cycles"]["total"].as_f64().expect("a number");
+    assert!((cycles / 2_062_697.0 - 1.0).abs() < 0.006, "{cycles}");
+    assert_eq!(document["streamed_words"]["cycles"]["total"], 2_093_000);
+    assert_eq!(document["memory"]["block_ram"], 2_965_120);
+    assert_eq!(document["thesis_words"]["times"].as_array().map(Vec::len), Some(3));
+    let text = run(["model", "--collisions", "127000", "--bodies", "38880"]).stdout;
+    assert!(text.contains("2.83 MiB of 4.0 MiB"), "{text}");
+}
+
+#[test]
+fn model_takes_the_largest_numbers() {
+    let most = u32::MAX.to_string();
+    let ran = run(["model", "--collisions", &most, "--bodies", &most]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stdout.contains("does not fit"), "{}", ran.stdout);
+}
+
+#[test]
+fn list_names_the_board_that_would_be_opened() {
+    let ran = run(["list", "--json"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let document = json(&ran);
+    assert_keys(&document, &["schema", "board", "uio_nodes", "uio_error", "emulated"]);
+    assert_eq!(document["board"]["kind"], "emulated");
+    assert!(run(["list"]).stdout.contains("would open  emulated (as asked for)"));
+}
+
+#[test]
+fn trace_shows_register_accesses_on_stderr_only() {
+    let arguments = ["solve", "--digest"];
+    let mut command = pgs();
+    command.env("RUST_LOG", "trace").args(arguments).arg(golden("one_cube"));
+    let ran = Ran::from(command.output().expect("it starts"));
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stderr.contains("DMASR"), "{}", ran.stderr);
+    assert_eq!(ran.stdout.lines().count(), 1, "{}", ran.stdout);
+    assert!(ran.stdout.starts_with("fnv1a-64 "), "{}", ran.stdout);
+}
+
+#[test]
+fn a_closed_pipe_ends_quietly_with_0() {
+    let mut child = pgs()
+        .args(["--grid", "2x2x2", "--steps", "100000", "--report-every", "1"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let mut stdout = BufReader::new(child.stdout.take().expect("a pipe"));
+    let mut line = String::new();
+    stdout.read_line(&mut line).expect("a first line");
+    drop(stdout);
+    let ran = Ran::from(child.wait_with_output().expect("it ends"));
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn ctrl_c_ends_after_the_step_with_130_and_a_digest() {
+    let mut child = pgs()
+        .args(["--grid", "2x2x2", "--steps", "1000000", "--report-every", "1000000"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let mut lines = BufReader::new(child.stdout.take().expect("a pipe")).lines();
+    // The row of the first step comes after Ctrl-C was taken over.
+    let row =
+        lines.find(|line| line.as_ref().is_ok_and(|line| line.trim_start().starts_with("1 ")));
+    assert!(row.is_some(), "a row of the first step");
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(kill.expect("kill runs").success());
+    let rest: Vec<String> = lines.map(|line| line.expect("text")).collect();
+    let ran = Ran::from(child.wait_with_output().expect("it ends"));
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(130), ""));
+    assert!(rest.iter().any(|line| line.starts_with("interrupted after ")), "{rest:?}");
+    assert!(rest.iter().any(|line| line.starts_with("digest ")), "{rest:?}");
+}

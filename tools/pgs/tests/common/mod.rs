@@ -1,0 +1,78 @@
+//! What the tests of the command line share: running it, and folders of arrays to break.
+
+#![allow(dead_code, reason = "not every test uses every helper")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+/// Where the data of the golden arrays begins: `.npy` pads its header to 128 bytes here.
+pub(crate) const DATA: usize = 128;
+
+/// The command, on the emulated board and with errors only in its log.
+pub(crate) fn pgs() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pgs"));
+    command.env("PGS_BOARD", "emulated").env("RUST_LOG", "error");
+    command
+}
+
+/// What a command did: its code, stdout and stderr.
+pub(crate) struct Ran {
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+}
+
+impl From<Output> for Ran {
+    fn from(output: Output) -> Self {
+        Self {
+            code: output.status.code(),
+            stdout: String::from_utf8(output.stdout).expect("stdout is text"),
+            stderr: String::from_utf8(output.stderr).expect("stderr is text"),
+        }
+    }
+}
+
+/// Runs `pgs` with these arguments.
+pub(crate) fn run<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Ran {
+    pgs().args(arguments).output().expect("the command starts").into()
+}
+
+/// A folder of golden arrays.
+pub(crate) fn golden(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden").join(name)
+}
+
+/// A copy of a golden folder, to be changed.
+pub(crate) fn copy(name: &str) -> TempDir {
+    let copy = tempfile::tempdir().expect("a temporary folder");
+    for entry in fs::read_dir(golden(name)).expect("the golden folder") {
+        let from = entry.expect("an entry").path();
+        fs::copy(&from, copy.path().join(from.file_name().expect("a name"))).expect("a copy");
+    }
+    copy
+}
+
+/// Overwrites a 32-bit value of an array.
+pub(crate) fn patch(folder: &TempDir, file: &str, index: usize, bytes: [u8; 4]) {
+    let path = folder.path().join(file);
+    let mut content = fs::read(&path).expect("the array");
+    let at = DATA + 4 * index;
+    content[at..at + 4].copy_from_slice(&bytes);
+    fs::write(path, content).expect("the array");
+}
+
+/// Writes an array with `data` repeated to that shape.
+pub(crate) fn write(folder: &TempDir, file: &str, descr: &str, shape: &[usize], data: &[[u8; 4]]) {
+    let dimensions: String = shape.iter().map(|n| format!("{n}, ")).collect();
+    let mut header =
+        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({dimensions}), }}");
+    header = format!("{header:<117}\n");
+    let mut content = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    content.extend(header.as_bytes());
+    let values: usize = shape.iter().product();
+    content.extend(data.iter().cycle().take(values).flatten());
+    fs::write(folder.path().join(file), content).expect("the array");
+}

@@ -1,0 +1,235 @@
+//! This file builds the scene and holds its bodies and collisions.
+
+use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
+
+use crate::detect::Detector;
+use crate::{CUBE_HALF_EXTENT, GROUND_HALF_EXTENT, Grid, SceneError};
+
+/// Largest drop, m.
+pub const DROP_MAX: f32 = 1000.0;
+
+/// Distance between the centres of neighbours in a layer, m.
+const SPACING: f32 = 2.2;
+
+/// Indices into the shape table.
+const STATIC_SHAPE: u32 = 0;
+const CUBE_SHAPE: u32 = 1;
+
+/// Which inverse inertia the cubes have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Inertia {
+    /// What Bullet computes on registering the cube: 0.36761099 1/(kg m²), from the box enlarged
+    /// by its margin, with the full size where half of it is meant.
+    #[default]
+    Bullet,
+    /// What a cube of 1 kg and 2 m has: 1.5 1/(kg m²).
+    Textbook,
+}
+
+impl Inertia {
+    /// The inverse inertia about every axis, 1/(kg m²).
+    #[must_use]
+    pub const fn inverse(self) -> f32 {
+        match self {
+            Self::Bullet => f32::from_bits(0x3EBC_3782),
+            Self::Textbook => 1.5,
+        }
+    }
+}
+
+/// What a scene is made of. The default is the thesis' scene, dropped from 5 m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneOptions {
+    /// Cubes along each axis.
+    pub grid: Grid,
+    /// Height of the lowest layer's underside above the ground at the start, m.
+    pub drop: f32,
+    /// Inverse inertia of the cubes.
+    pub inertia: Inertia,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self { grid: Grid::default(), drop: 5.0, inertia: Inertia::default() }
+    }
+}
+
+/// Cubes of 1 kg above a plane.
+///
+/// Body 0 is the ground: a static box whose top is the plane y = 0. The cubes follow, those along z
+/// next to each other, then those along y, then those along x.
+#[derive(Debug)]
+pub struct Scene {
+    shapes: [Shape; 2],
+    bodies: Vec<Body>,
+    collisions: Vec<Collision>,
+    detector: Detector,
+}
+
+impl Scene {
+    /// Builds the scene, at rest.
+    ///
+    /// # Errors
+    /// [`SceneError::Drop`] if the drop is negative, not a number or above [`DROP_MAX`].
+    pub fn new(options: &SceneOptions) -> Result<Self, SceneError> {
+        let drop = options.drop;
+        if !(0.0..=DROP_MAX).contains(&drop) {
+            return Err(SceneError::Drop { found: drop, most: DROP_MAX });
+        }
+        let mut bodies = vec![at_rest([0.0, -GROUND_HALF_EXTENT, 0.0], STATIC_SHAPE)];
+        for i in 0..options.grid.x() {
+            for j in 0..options.grid.y() {
+                let shift = f32::from((j + 1) & 1);
+                for k in 0..options.grid.z() {
+                    let position = [
+                        shift + SPACING * f32::from(i),
+                        (CUBE_HALF_EXTENT + 2.0 * f32::from(j)) + drop,
+                        shift + SPACING * f32::from(k),
+                    ];
+                    bodies.push(at_rest(position, CUBE_SHAPE));
+                }
+            }
+        }
+        Ok(Self {
+            shapes: [Shape::STATIC, Shape::isotropic(1.0, options.inertia.inverse())],
+            bodies,
+            collisions: Vec::new(),
+            detector: Detector::default(),
+        })
+    }
+
+    /// The shape table: 0 is static, 1 is a cube.
+    #[must_use]
+    pub fn shapes(&self) -> &[Shape] {
+        &self.shapes
+    }
+
+    /// The bodies.
+    #[must_use]
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// The bodies, to be moved.
+    #[must_use]
+    pub fn bodies_mut(&mut self) -> &mut [Body] {
+        &mut self.bodies
+    }
+
+    /// The collisions that [`detect`](Self::detect) found last; none before.
+    #[must_use]
+    pub fn collisions(&self) -> &[Collision] {
+        &self.collisions
+    }
+
+    /// What a step takes: the bodies, and the collisions that [`detect`](Self::detect) found last.
+    #[must_use]
+    pub fn parts_mut(&mut self) -> (&mut [Body], &[Collision]) {
+        (&mut self.bodies, &self.collisions)
+    }
+
+    /// Finds the collisions of the current poses, sorted by body A, then body B.
+    ///
+    /// Pairs up to [`MARGIN`](crate::MARGIN) apart are collisions too. The ground is always body A,
+    /// of two cubes the one with the lower index is. A body whose pose is not finite collides with
+    /// nothing; a step refuses it.
+    pub fn detect(&mut self) -> &[Collision] {
+        self.detector.detect(&self.bodies, &mut self.collisions);
+        &self.collisions
+    }
+}
+
+/// A body that stands still, its axes along the world's.
+fn at_rest(position: [f32; 3], shape: u32) -> Body {
+    Body {
+        pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity: Velocity::default(),
+        shape,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(grid: &str, drop: f32) -> Scene {
+        let grid = grid.parse().expect("a grid");
+        Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).expect("a scene")
+    }
+
+    #[test]
+    fn cubes_follow_the_ground_with_z_fastest_then_y_then_x() {
+        let scene = scene("2x2x2", 5.0);
+        let positions: Vec<[f32; 3]> = scene.bodies().iter().map(|b| b.pose.position).collect();
+        assert_eq!(
+            positions,
+            [
+                [0.0, -400.0, 0.0],
+                [1.0, 6.0, 1.0],
+                [1.0, 6.0, 3.2],
+                [0.0, 8.0, 0.0],
+                [0.0, 8.0, 2.2],
+                [3.2, 6.0, 1.0],
+                [3.2, 6.0, 3.2],
+                [2.2, 8.0, 0.0],
+                [2.2, 8.0, 2.2],
+            ]
+        );
+        assert_eq!(scene.bodies()[0].shape, STATIC_SHAPE);
+        assert!(scene.bodies()[1..].iter().all(|body| body.shape == CUBE_SHAPE));
+        assert_eq!(scene.shapes()[0], Shape::STATIC);
+        assert_eq!(scene.shapes()[1].inverse_inertia.map(f32::to_bits), [0x3EBC_3782; 3]);
+    }
+
+    #[test]
+    fn a_drop_that_no_scene_starts_from_is_refused() {
+        for drop in [-1.0, 1000.5, f32::INFINITY, f32::NAN] {
+            let options = SceneOptions { drop, ..SceneOptions::default() };
+            assert!(matches!(Scene::new(&options), Err(SceneError::Drop { .. })), "{drop}");
+        }
+    }
+
+    /// A cube of one layer lies on four of the next, except at the borders: along a side of n cubes
+    /// there are n neighbours with the same number and n - 1 with the next one.
+    fn pairs_of_the_lattice(x: usize, y: usize, z: usize) -> usize {
+        (y - 1) * (2 * x - 1) * (2 * z - 1)
+    }
+
+    #[test]
+    fn the_lattice_touches_layer_on_layer() {
+        for (grid, expected) in
+            [("1x1x1", 0), ("5x4x3", pairs_of_the_lattice(5, 4, 3)), ("12x10x12", 9 * 23 * 23)]
+        {
+            assert_eq!(scene(grid, 5.0).detect().len(), expected, "{grid}");
+        }
+        // Without a drop the lowest layer lies on the ground.
+        assert_eq!(scene("5x4x3", 0.0).detect().len(), 15 + pairs_of_the_lattice(5, 4, 3));
+    }
+
+    #[test]
+    fn the_scene_of_the_thesis_starts_with_146189_pairs() {
+        let mut scene = Scene::new(&SceneOptions::default()).expect("a scene");
+        let collisions = scene.detect();
+        assert_eq!(collisions.len(), 146_189);
+        assert_eq!(pairs_of_the_lattice(36, 30, 36), 146_189);
+        assert!(collisions.iter().all(|c| c.count == 4));
+    }
+
+    #[test]
+    fn a_dropped_pile_meets_the_ground_in_step_62() {
+        // Free fall as the accelerator integrates it: position first, then gravity.
+        let mut scene = scene("3x3x3", 5.0);
+        let time_step = 1.0_f32 / 60.0;
+        let mut first = None;
+        for step in 1..=62 {
+            if first.is_none() && crate::ground_pairs(scene.detect()) > 0 {
+                first = Some(step);
+            }
+            for body in &mut scene.bodies_mut()[1..] {
+                body.pose.position[1] += body.velocity.linear[1] * time_step;
+                body.velocity.linear[1] += -9.8 * time_step;
+            }
+        }
+        assert_eq!(first, Some(62));
+    }
+}

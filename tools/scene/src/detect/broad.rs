@@ -1,0 +1,192 @@
+//! This file finds the pairs of cubes that may touch.
+//!
+//! Space is cut into cells as wide as two cubes are apart at most when they touch, so that partners
+//! of a cube have their centres in its own cell or one of the 26 around it. The cells are not stored:
+//! the cubes are sorted by their cell (x, then y, then z), and each cube looks forward only, at the
+//! rest of its own row of cells along z and at four neighbouring rows. In each of the five the
+//! partners are a range of the sorted cubes that moves forward as the cube does.
+
+use zynq_pgs::Body;
+
+use super::MARGIN;
+use crate::{CUBE_HALF_EXTENT, rotation};
+
+/// Width of a cell, m: above the diagonal of a cube (3.4641 m) and the margin.
+const CELL: f32 = 3.5;
+
+/// What rounding may take away from a gap between two boxes, m; the narrow phase decides.
+const SLACK: f32 = 1e-3;
+
+/// Cells on either side of the origin. Beyond it cubes share the outermost cell, which costs time but
+/// loses no pair. 20 bits, less the neighbours' 1.
+const CELLS: f32 = 1_048_574.0;
+
+/// Bits of a cell's number along one axis.
+const BITS: u32 = 21;
+
+/// A cube in its cell.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    /// Numbers of the cell along x, y and z, 21 bits each.
+    cell: u64,
+    /// Index of the body.
+    index: u32,
+    /// Centre of mass, m.
+    centre: [f32; 3],
+    /// Half extents of the box along the world's axes around the cube, m.
+    reach: [f32; 3],
+}
+
+/// The broad phase, with its buffers.
+#[derive(Debug, Default)]
+pub(super) struct Broad {
+    entries: Vec<Entry>,
+    keys: Vec<u64>,
+}
+
+impl Broad {
+    /// Writes the pairs of cubes whose boxes are not farther apart than the margin, lower index
+    /// first, sorted. `bodies[0]` is the ground and takes no part.
+    pub(super) fn pairs(&mut self, bodies: &[Body], pairs: &mut Vec<(u32, u32)>) {
+        self.entries.clear();
+        self.entries.extend((0..).zip(bodies).skip(1).filter_map(|(i, b)| entry(i, b)));
+        self.entries.sort_unstable_by_key(|entry| (entry.cell, entry.index));
+
+        self.keys.clear();
+        let entries = &self.entries;
+        // Rows after the own one, as steps in x and y.
+        for (dx, dy) in [(0, 0), (0, 1), (1, -1), (1, 0), (1, 1)] {
+            let row = (dx << (2 * BITS)) + (dy << BITS);
+            let (mut start, mut end) = (0, 0);
+            for (position, own) in entries.iter().enumerate() {
+                // No field overflows: see `CELLS`.
+                let cell = own.cell.wrapping_add_signed(row);
+                while start < entries.len() && entries[start].cell < cell - 1 {
+                    start += 1;
+                }
+                while end < entries.len() && entries[end].cell <= cell + 1 {
+                    end += 1;
+                }
+                // In the own row each pair is seen from its first cube only.
+                let from = if row == 0 { position + 1 } else { start };
+                for other in &entries[from..end] {
+                    if near(own, other) {
+                        let (a, b) = if own.index < other.index {
+                            (own.index, other.index)
+                        } else {
+                            (other.index, own.index)
+                        };
+                        self.keys.push(u64::from(a) << 32 | u64::from(b));
+                    }
+                }
+            }
+        }
+        self.keys.sort_unstable();
+        pairs.clear();
+        pairs.extend(self.keys.iter().map(|&key| {
+            #[allow(clippy::cast_possible_truncation, reason = "the lower half is wanted")]
+            let b = key as u32;
+            #[allow(clippy::cast_possible_truncation, reason = "32 bits are left")]
+            let a = (key >> 32) as u32;
+            (a, b)
+        }));
+    }
+}
+
+/// Where a cube is; `None` if its pose is not finite.
+fn entry(index: u32, body: &Body) -> Option<Entry> {
+    let centre = body.pose.position;
+    let reach = rotation::matrix(body.pose.orientation)
+        .map(|[x, y, z]| ((x.abs() + y.abs()) + z.abs()) * CUBE_HALF_EXTENT);
+    if !centre.iter().chain(&reach).all(|value| value.is_finite()) {
+        return None;
+    }
+    let [x, y, z] = centre.map(cell_number);
+    Some(Entry { cell: x << (2 * BITS) | y << BITS | z, index, centre, reach })
+}
+
+/// Number of the cell in which a coordinate lies; it grows with the coordinate.
+fn cell_number(coordinate: f32) -> u64 {
+    // Never NaN, and the sign of a zero does not matter here.
+    let cell = (coordinate / CELL).floor().clamp(-CELLS, CELLS);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a whole number from 2 to 2^21 - 2"
+    )]
+    let number = (cell + 1_048_576.0) as u64;
+    number
+}
+
+/// Whether the boxes around two cubes are not farther apart than the margin.
+fn near(a: &Entry, b: &Entry) -> bool {
+    (0..3).all(|axis| {
+        (a.centre[axis] - b.centre[axis]).abs()
+            <= (a.reach[axis] + b.reach[axis]) + (MARGIN + SLACK)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use zynq_pgs::{Pose, Velocity};
+
+    use super::*;
+
+    fn body(position: [f32; 3], q: [f32; 4]) -> Body {
+        let length = (((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]).sqrt();
+        let orientation = q.map(|value| value / length);
+        Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
+    }
+
+    fn every_pair(bodies: &[Body]) -> Vec<(u32, u32)> {
+        let entries: Vec<Entry> =
+            (0..).zip(bodies).skip(1).filter_map(|(i, b)| entry(i, b)).collect();
+        let mut pairs = Vec::new();
+        for (n, a) in entries.iter().enumerate() {
+            for b in &entries[n + 1..] {
+                if near(a, b) {
+                    pairs.push((a.index, b.index));
+                }
+            }
+        }
+        pairs
+    }
+
+    proptest! {
+        #[test]
+        fn the_pairs_are_those_of_a_comparison_of_all_with_all(
+            cubes in prop::collection::vec(
+                (prop::array::uniform3(-9.0_f32..9.0), prop::array::uniform4(0.1_f32..1.0)), 0..60
+            ),
+            far in prop::collection::vec(prop::array::uniform3(-1e8_f32..1e8), 0..4),
+        ) {
+            let mut bodies = vec![body([0.0; 3], [0.0, 0.0, 0.0, 1.0])];
+            bodies.extend(cubes.into_iter().map(|(position, q)| body(position, q)));
+            bodies.extend(far.into_iter().map(|position| body(position, [0.0, 0.0, 0.0, 1.0])));
+            let mut pairs = Vec::new();
+            Broad::default().pairs(&bodies, &mut pairs);
+            prop_assert_eq!(pairs, every_pair(&bodies));
+        }
+    }
+
+    #[test]
+    fn cubes_beyond_the_last_cell_are_still_compared() {
+        let level = [0.0, 0.0, 0.0, 1.0];
+        let bodies = [[0.0; 3], [9e6, 0.0, 0.0], [9e6, 2.0, 0.0], [-9e30, 0.0, 9e30]]
+            .map(|position| body(position, level));
+        let mut pairs = Vec::new();
+        Broad::default().pairs(&bodies, &mut pairs);
+        assert_eq!(pairs, [(1, 2)]);
+    }
+
+    #[test]
+    fn a_cube_without_a_place_has_no_pairs() {
+        let level = [0.0, 0.0, 0.0, 1.0];
+        let mut bodies = [[0.0; 3], [1.0; 3], [1.5; 3]].map(|position| body(position, level));
+        bodies[2].pose.orientation[0] = f32::NAN;
+        let mut pairs = vec![(9, 9)];
+        Broad::default().pairs(&bodies, &mut pairs);
+        assert!(pairs.is_empty());
+    }
+}

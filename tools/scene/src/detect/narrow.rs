@@ -1,0 +1,218 @@
+//! This file finds where two cubes touch.
+//!
+//! parry3d computes the contact manifold in the frame of its first shape, which is our body A. Its
+//! normal points from A to B, ours from B to A; its distances mean the same.
+
+use parry3d::math::{Pose, Rotation, Vector};
+use parry3d::query::ContactManifold;
+use parry3d::query::details::contact_manifold_cuboid_cuboid;
+use parry3d::shape::Cuboid;
+use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
+
+use super::MARGIN;
+use super::reduce::{Candidate, reduce};
+use crate::CUBE_HALF_EXTENT;
+
+/// How far from 1 the length of a normal may be: rounding is far below, a broken pose above.
+const NORMAL_TOLERANCE: f32 = 5e-4;
+
+/// The narrow phase, with its buffers.
+#[derive(Debug)]
+pub(super) struct Narrow {
+    cube: Cuboid,
+    manifold: ContactManifold<(), ()>,
+    candidates: Vec<Candidate>,
+    on_b: Vec<Vector>,
+}
+
+impl Default for Narrow {
+    fn default() -> Self {
+        Self {
+            cube: Cuboid::new(Vector::splat(CUBE_HALF_EXTENT)),
+            manifold: ContactManifold::new(),
+            candidates: Vec::new(),
+            on_b: Vec::new(),
+        }
+    }
+}
+
+impl Narrow {
+    /// The collision of the cubes `a` and `b` of `bodies`, if there is one.
+    pub(super) fn collide(&mut self, bodies: &[Body], (a, b): (u32, u32)) -> Option<Collision> {
+        let pose_a = pose(bodies.get(usize::try_from(a).ok()?)?);
+        let pose_b = pose(bodies.get(usize::try_from(b).ok()?)?);
+
+        // Without points of an earlier pair parry starts afresh, so that a result depends on the
+        // two poses alone.
+        self.manifold.clear();
+        let b_in_a = pose_a.inv_mul(&pose_b);
+        contact_manifold_cuboid_cuboid(&b_in_a, &self.cube, &self.cube, MARGIN, &mut self.manifold);
+
+        self.candidates.clear();
+        self.on_b.clear();
+        for point in &self.manifold.points {
+            // Written so that a NaN is no contact.
+            if point.dist <= MARGIN && point.dist.is_finite() && point.local_p2.is_finite() {
+                self.candidates
+                    .push(Candidate { point: point.local_p1.to_array(), distance: point.dist });
+                self.on_b.push(point.local_p2);
+            }
+        }
+        if self.candidates.is_empty() {
+            return None;
+        }
+        let normal = -(pose_a.rotation * self.manifold.local_n1);
+        let error = (normal.length() - 1.0).abs();
+        if error > NORMAL_TOLERANCE || error.is_nan() {
+            return None;
+        }
+
+        let (chosen, count) = reduce(&self.candidates, self.manifold.local_n1.to_array());
+        let mut contacts = [Contact::default(); CONTACT_POINTS];
+        for (contact, &index) in contacts.iter_mut().zip(&chosen[..count]) {
+            *contact = Contact {
+                point: (pose_b * self.on_b[index]).to_array(),
+                distance: self.candidates[index].distance,
+            };
+        }
+        // At most four.
+        let count = u32::try_from(count).ok()?;
+        Some(Collision { body_a: a, body_b: b, normal: normal.to_array(), count, contacts })
+    }
+}
+
+fn pose(body: &Body) -> Pose {
+    Pose::from_parts(
+        Vector::from_array(body.pose.position),
+        Rotation::from_array(body.pose.orientation),
+    )
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "of boxes along the axes the normal is exact")]
+mod tests {
+    use zynq_pgs::{Pose, Velocity};
+
+    use super::*;
+
+    const LEVEL: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
+    fn cube(position: [f32; 3], orientation: [f32; 4]) -> Body {
+        Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
+    }
+
+    fn collide(a: Body, b: Body) -> Option<Collision> {
+        Narrow::default().collide(&[a, b], (0, 1))
+    }
+
+    #[test]
+    fn the_normal_points_b_in_a_and_the_points_lie_on_b() {
+        // B on A, 5 mm deep.
+        let a = cube([10.0, 3.0, 0.0], LEVEL);
+        let b = cube([11.0, 4.995, 0.8], LEVEL);
+        let found = collide(a, b).expect("contact");
+        assert_eq!((found.body_a, found.body_b, found.count), (0, 1, 4));
+        assert_eq!(found.normal, [0.0, -1.0, 0.0]);
+        for contact in found.contacts {
+            assert!((contact.distance + 0.005).abs() < 1e-5, "{contact:?}");
+            // The underside of B; the point on A's surface is c + d n, its top at y = 4.
+            assert!((contact.point[1] - 3.995).abs() < 1e-5, "{contact:?}");
+            assert!((contact.point[1] - contact.distance - 4.0).abs() < 1e-5, "{contact:?}");
+            // Where the faces overlap.
+            assert!((9.999..11.001).contains(&contact.point[0]), "{contact:?}");
+            assert!((-0.201..1.001).contains(&contact.point[2]), "{contact:?}");
+        }
+        // The other way round the normal turns and the points lie on the other cube.
+        let found = collide(b, a).expect("contact");
+        assert_eq!(found.normal, [0.0, 1.0, 0.0]);
+        assert!(found.contacts.iter().all(|c| (c.point[1] - 4.0).abs() < 1e-5), "{found:?}");
+    }
+
+    #[test]
+    fn a_cube_turned_by_45_degrees_touches_another_in_four_points_of_its_octagon() {
+        let turn = [0.0, 0.382_683_43, 0.0, 0.923_879_5];
+        let a = cube([0.0, 1.0, 0.0], LEVEL);
+        let b = cube([0.0, 2.99, 0.0], turn);
+        let found = collide(a, b).expect("contact");
+        assert_eq!(found.count, 4);
+        // parry gives the eight corners of the octagon in which the faces overlap, at the radius
+        // 1 / cos 22.5 degrees. The four are opposites in pairs, the pairs at right angles.
+        let radius = 1.082_392_2_f32;
+        let planar = found.contacts.map(|contact| [contact.point[0], contact.point[2]]);
+        for [x, z] in planar {
+            assert!(((x * x + z * z).sqrt() - radius).abs() < 1e-4, "{found:?}");
+        }
+        let sum = planar.iter().fold([0.0, 0.0], |s: [f32; 2], p| [s[0] + p[0], s[1] + p[1]]);
+        assert!(sum[0].abs() < 1e-4 && sum[1].abs() < 1e-4, "{found:?}");
+        let corner = |i: usize, j: usize| planar[i][0] * planar[j][0] + planar[i][1] * planar[j][1];
+        assert!((corner(0, 1) + radius * radius).abs() < 1e-3, "{found:?}");
+        assert!(corner(0, 2).abs() < 1e-3 && corner(0, 3).abs() < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn a_cube_exactly_on_another_touches_it_in_its_four_corners() {
+        let found =
+            collide(cube([0.0, 1.0, 0.0], LEVEL), cube([0.0, 3.0, 0.0], LEVEL)).expect("contact");
+        assert_eq!(found.count, 4);
+        for (x, z) in [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)] {
+            let here = |c: &Contact| (c.point[0] - x).abs() < 1e-5 && (c.point[2] - z).abs() < 1e-5;
+            assert!(found.contacts.iter().any(here), "({x}, {z}): {found:?}");
+        }
+    }
+
+    #[test]
+    fn the_margin_is_kept_at_two_centimetres() {
+        let a = cube([0.0, 1.0, 0.0], LEVEL);
+        let found = collide(a, cube([0.5, 3.0199, 0.5], LEVEL)).expect("within the margin");
+        assert!(found.contacts.iter().all(|c| c.distance > 0.0 && c.distance <= MARGIN));
+        assert!(collide(a, cube([0.5, 3.0201, 0.5], LEVEL)).is_none());
+    }
+
+    #[test]
+    fn stacked_cubes_have_the_contact_that_bullet_finds() {
+        // Bullet's vectors, scene `two_cubes`, collision 1.
+        let a = cube(
+            [0.250_276_68, 0.994_702_9, -0.499_972_02],
+            [-6.372_234e-5, -0.000_124_026_96, -0.000_107_972_42, 1.0],
+        );
+        let b = cube(
+            [0.645_283_4, 2.989_992_4, -0.695_435_1],
+            [-0.000_229_805_8, 0.001_554_238_3, -0.000_130_734_36, 0.999_998_75],
+        );
+        // Bullet gives one corner of the overlap twice and leaves one out.
+        let bullet: [[f32; 4]; 4] = [
+            [1.248_292_3, 1.991_913, -1.497_404_5, -0.004_895_148],
+            [1.250_292_7, 1.990_293_9, 0.303_148_15, -0.004_295_349],
+            [-0.351_863_92, 1.990_714, 0.308_128_3, -0.004_221_797],
+            [1.250_739_8, 1.989_464_3, -1.499_850_7, -0.004_895_091],
+        ];
+        let found = collide(a, b).expect("contact");
+        assert_eq!(found.count, 4);
+        for (ours, theirs) in found.normal.iter().zip([-0.000_260_754, -1.0, 0.000_460_017_4]) {
+            assert!((ours - theirs).abs() < 1e-3, "{found:?}");
+        }
+        for [x, y, z, distance] in bullet {
+            let near = |c: &Contact| {
+                (c.point[0] - x).abs() < 5e-3
+                    && (c.point[1] - y).abs() < 5e-3
+                    && (c.point[2] - z).abs() < 5e-3
+                    && (c.distance - distance).abs() < 1e-3
+            };
+            assert!(found.contacts.iter().any(near), "({x}, {y}, {z}) is none of {found:?}");
+        }
+    }
+
+    #[test]
+    fn crossed_edges_touch_in_one_point() {
+        // A on an edge along z, B above it on an edge along x: both turned by 45 degrees.
+        let (sin, cos) = (0.382_683_43, 0.923_879_5);
+        let a = cube([0.0; 3], [0.0, 0.0, sin, cos]);
+        let b = cube([0.0, 2.82, 0.0], [sin, 0.0, 0.0, cos]);
+        let found = collide(a, b).expect("contact");
+        assert!((found.normal[1] + 1.0).abs() < 1e-4, "{found:?}");
+        assert_eq!(found.count, 1);
+        let contact = found.contacts[0];
+        assert!((contact.distance + 0.008_427).abs() < 1e-3, "{found:?}");
+        assert!(contact.point[0].abs() < 1e-3 && contact.point[2].abs() < 1e-3, "{found:?}");
+    }
+}

@@ -1,0 +1,35 @@
+//! This file holds what can be wrong with a request for a scene.
+
+/// Why a scene could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The text is not a grid.
+    #[error(
+        "expected a grid as three numbers of cubes joined by \"x\", such as 36x30x36, found {found:?}"
+    )]
+    GridSyntax {
+        /// The text.
+        found: String,
+    },
+    /// A side of the grid is empty or too long.
+    #[error("expected 1 to {most} cubes along {axis}, found {found}: {reason}")]
+    GridSide {
+        /// x, y or z.
+        axis: char,
+        /// Cubes asked for.
+        found: u64,
+        /// Most cubes along that axis.
+        most: u16,
+        /// Why there are no more.
+        reason: &'static str,
+    },
+    /// The height above the ground is not one that a scene can start from.
+    #[error("expected a drop of 0 to {most} m, found {found} m")]
+    Drop {
+        /// Height asked for, m.
+        found: f32,
+        /// Largest height, m.
+        most: f32,
+    },
+}
