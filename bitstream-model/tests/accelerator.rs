@@ -450,6 +450,14 @@ fn done_is_cleared_by_reading_and_interrupts_by_toggling() {
     assert_eq!(host.control(control::ISR), 0b010);
     host.set_control(control::ISR, 0b010);
     assert_eq!(host.control(control::ISR), 0);
+    // The bits toggle: a constant written blindly sets what was clear.
+    host.set_control(control::ISR, 0b100);
+    assert_eq!(host.control(control::ISR), 0b100);
+    host.set_control(control::ISR, 0b100);
+    host.set_control(control::IER, 0b001);
+    host.set_control(control::ISR, 0b111);
+    assert_eq!(host.control(control::ISR), 0b001, "only what is enabled can be set");
+    host.set_control(control::ISR, 0b001);
     host.port.unmask_interrupt();
     assert_eq!(host.port.wait_interrupt(microseconds(5)), None);
 }

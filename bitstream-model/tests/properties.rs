@@ -8,7 +8,9 @@ use bitstream_model::interface::axi_dma::{ADDRESS, ADDRESS_MSB, CHANNEL_REGISTER
 use bitstream_model::interface::control::{self, ap_ctrl};
 use bitstream_model::interface::descriptor::WORDS;
 use bitstream_model::interface::profile::FLOAT;
-use bitstream_model::{Bandwidth, BoardConfig, Direction, EmulatedBoard, Hazards, Subnormals};
+use bitstream_model::{
+    Bandwidth, BoardConfig, Delays, Direction, EmulatedBoard, Hazards, Subnormals,
+};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -389,4 +391,19 @@ fn random_programs_reach_engines_interrupts_and_results() {
         }
     }
     assert!(reached.iter().all(|programs| *programs > 40), "{reached:?} of 100");
+}
+
+#[test]
+fn delays_that_would_overflow_the_clock_are_refused_with_their_range() {
+    let delays = BoardConfig::default().delays;
+    for (name, delays) in [
+        ("halt", Delays { halt: u64::MAX, ..delays }),
+        ("reset", Delays { reset: u64::MAX, ..delays }),
+        ("descriptor fetch", Delays { descriptor_fetch: u64::MAX, ..delays }),
+    ] {
+        let error = EmulatedBoard::new(BoardConfig { delays, ..BoardConfig::default() })
+            .expect_err("the clock has 64 bits");
+        assert!(error.to_string().starts_with(name), "{error}");
+        assert!(error.to_string().contains("0 to 4294967296"), "{error}");
+    }
 }

@@ -566,6 +566,28 @@ fn a_stop_in_the_middle_halts_and_a_start_begins_at_curdesc() {
 }
 
 #[test]
+fn a_tail_moved_while_the_engine_is_busy_moves_the_pause_point_only() {
+    let (host, ring) = one_channel(0);
+    // More than the FIFO takes.
+    ring.fill(0, host.readable(&numbered(600)), WHOLE | (600 * 16));
+    ring.fill(1, host.readable(&numbered(4)), WHOLE | 64);
+    ring.doorbell(&host, 0);
+    host.pause(20);
+    ring.doorbell(&host, 1);
+    host.pause(20);
+    assert_eq!((ring.status(0), ring.status(1)), (0, 0));
+    assert_eq!(host.board.counts().beats_read, 512, "nothing was moved twice");
+    // Empties the FIFO.
+    host.reset_accelerator();
+    host.pause(20);
+    assert_eq!(ring.status(0), status::CMPLTED.mask() | 9_600);
+    assert_eq!(ring.status(1), status::CMPLTED.mask() | 64);
+    assert!(dmasr::IDLE.is_set(host.status(0, Direction::Mm2s)));
+    assert_eq!(host.board.counts().beats_read, 604);
+    host.assert_no_violation();
+}
+
+#[test]
 fn keyhole_reads_one_address_for_every_beat() {
     let mut machine = Machine::new(BoardConfig::default());
     for ring in &machine.mm2s {
