@@ -136,6 +136,10 @@ impl Board {
     pub(crate) fn read32(&mut self, address: u64) -> u32 {
         self.counts.register_reads += 1;
         self.advance(self.now + self.access_cycles(), false);
+        if self.dead() {
+            self.record(address, false, u32::MAX);
+            return u32::MAX;
+        }
         let found = match bus::decode(address, self.cores.len()) {
             Target::Dma { core, offset } => {
                 self.cores[core].read(offset).ok_or(ViolationKind::ReservedRegister { address })

@@ -160,6 +160,13 @@ impl BoardConfig {
         let slots_max = u64::from(u16::MAX) / u64::from(self.profile.initiation_interval);
         range("hazard window in slots", self.window_slots.unwrap_or(1).into(), 1, slots_max)?;
         range("FIFO depth in beats", self.delays.fifo_beats as u64, 16, 1 << 20)?;
+        for (what, cycles) in [
+            ("halt delay in cycles", self.delays.halt),
+            ("reset delay in cycles", self.delays.reset),
+            ("descriptor fetch in cycles", self.delays.descriptor_fetch),
+        ] {
+            range(what, cycles, 0, 1 << 32)?;
+        }
         range("register access time in ns", self.delays.register_access_ns, 1, 1_000_000)?;
         if let Bandwidth::BytesPerSecond(bytes) = self.bandwidth {
             range("memory bandwidth in bytes per second", bytes, 1_000_000, 1_000_000_000_000)?;

@@ -154,11 +154,14 @@ impl CpuPort {
     }
 }
 
+/// The clock does not run further than this, a thousand years, so that sums of clocks do not overflow.
+const CLOCK_END: u64 = u64::MAX / 2;
+
 /// The clock at which a time from now has passed.
 fn deadline(board: &Board, duration: Duration) -> u64 {
     let cycles = duration
         .as_nanos()
         .saturating_mul(board.config.profile.clock_khz.into())
         .div_ceil(1_000_000);
-    board.now.saturating_add(u64::try_from(cycles).unwrap_or(u64::MAX))
+    board.now.saturating_add(u64::try_from(cycles).unwrap_or(u64::MAX)).min(CLOCK_END)
 }

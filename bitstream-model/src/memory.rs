@@ -101,12 +101,13 @@ pub(crate) struct Memory {
 impl Memory {
     /// Memory for DMAs with addresses of that many bits.
     pub(crate) fn new(address_width: u32) -> Self {
-        // The kernel and the rest of the system keep the lower gigabyte of each part.
+        // The kernel and the rest of the system keep one gigabyte of each part, and not the same:
+        // a high address cut to 32 bits must not meet a buffer.
         const SYSTEM: u64 = 1 << 30;
         Self {
             regions: BTreeMap::new(),
             low: DDR_LOW.start + SYSTEM..DDR_LOW.end,
-            high: DDR_HIGH.start + SYSTEM..DDR_HIGH.end,
+            high: DDR_HIGH.start..DDR_HIGH.end - SYSTEM,
             address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
             next_is_high: false,
         }

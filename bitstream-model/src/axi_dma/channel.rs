@@ -7,6 +7,7 @@ use crate::interface::axi_dma::{
     TAILDESC_MSB, dmacr, dmasr,
 };
 use crate::interface::descriptor;
+use crate::interface::record::BEAT_BYTES;
 use crate::violation::{Log, ViolationKind};
 
 /// Clocks of one tick of the delay timer.
@@ -273,6 +274,13 @@ impl Channel {
             return false;
         }
         self.length = value & mask;
+        let beat = BEAT_BYTES as u64;
+        let whole_beats =
+            self.direction == Direction::Mm2s || u64::from(self.length).is_multiple_of(beat);
+        if !self.address.is_multiple_of(beat) || !whole_beats {
+            let (address, length) = (self.address, self.length);
+            log.violation(ViolationKind::Misaligned { core, direction, address, length });
+        }
         self.idle = false;
         self.time = now;
         self.work = Work::Direct { moved: 0 };

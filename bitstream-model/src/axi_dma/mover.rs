@@ -115,7 +115,9 @@ impl Channel {
 
     /// S2MM in scatter-gather mode: the chain has ended in the middle of a packet and more comes.
     fn overrun(&self, stream: &Stream) -> bool {
-        self.direction == Direction::S2mm && self.idle && self.in_packet && stream.len() > 0
+        // A channel that has failed already is on its way to Halted.
+        let runs = dmacr::RS.is_set(self.control);
+        runs && self.direction == Direction::S2mm && self.idle && self.in_packet && stream.len() > 0
     }
 
     /// Beats that can be moved now.
@@ -303,7 +305,11 @@ impl Channel {
             word = status::RXSOF.put(word, u32::from(bd.rxsof));
             word = status::RXEOF.put(word, u32::from(ended));
         }
-        if with.memory.write_word(bd.address + 4 * STATUS as u64, word).is_err() {
+        let address = bd.address + 4 * STATUS as u64;
+        if let Err(denied) = with.memory.write_word(address, word) {
+            let (core, direction) = (build.core, self.direction);
+            let kind = ViolationKind::OutsideGrant { core, direction, address, bytes: 4, denied };
+            with.log.violation(kind);
             self.fail(build, dmasr::SG_DEC_ERR.mask());
             return;
         }

@@ -1,0 +1,277 @@
+//! A step's input and output as plain numbers, and how they lie on four 128-bit streams.
+
+use bitstream_model::interface::control;
+use bitstream_model::interface::record::Beat;
+use bitstream_model::timing::StepShape;
+
+use super::{CORES, Host};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Body {
+    pub(crate) shape: u32,
+    pub(crate) position: [f32; 3],
+    pub(crate) orientation: [f32; 4],
+    pub(crate) linear: [f32; 3],
+    pub(crate) angular: [f32; 3],
+}
+
+/// Unturned, at rest, at the origin.
+pub(crate) const AT_REST: Body = Body {
+    shape: MOVING,
+    position: [0.0; 3],
+    orientation: [0.0, 0.0, 0.0, 1.0],
+    linear: [0.0; 3],
+    angular: [0.0; 3],
+};
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Collision {
+    pub(crate) bodies: [u32; 2],
+    pub(crate) count: u32,
+    pub(crate) normal: [f32; 3],
+    pub(crate) positions: [[f32; 3]; 2],
+    /// x, y, z, distance.
+    pub(crate) contacts: [[f32; 4]; 4],
+}
+
+/// The static entry of [`Step::shapes`].
+pub(crate) const STATIC: u32 = 0;
+/// The entry of a point mass of 1 kg.
+pub(crate) const MOVING: u32 = 1;
+
+#[derive(Debug, Clone)]
+pub(crate) struct Step {
+    /// Inverse mass, inverse inertia.
+    pub(crate) shapes: Vec<[f32; 2]>,
+    pub(crate) bodies: Vec<Body>,
+    pub(crate) collisions: Vec<Collision>,
+    /// Contact and friction passes.
+    pub(crate) iterations: [u32; 2],
+    pub(crate) integrate: bool,
+    pub(crate) time_step: f32,
+    pub(crate) drift: f32,
+    pub(crate) coefficient: f32,
+    pub(crate) friction: f32,
+    pub(crate) damping: f32,
+    pub(crate) gravity: [f32; 3],
+}
+
+impl Step {
+    /// Half a second with gravity 8 m/s², so that small numbers stay exact; no bias.
+    pub(crate) fn new(bodies: Vec<Body>, collisions: Vec<Collision>) -> Self {
+        Self {
+            shapes: vec![[0.0, 0.0], [1.0, 0.0]],
+            bodies,
+            collisions,
+            iterations: [4, 4],
+            integrate: true,
+            time_step: 0.5,
+            drift: 0.0,
+            coefficient: 0.0,
+            friction: 0.5,
+            damping: 1.0,
+            gravity: [0.0, -8.0, 0.0],
+        }
+    }
+
+    /// Bodies that fall, each with a state of its own.
+    pub(crate) fn falling(count: u16) -> Self {
+        let body = |k: u16| {
+            let k = f32::from(k);
+            Body { position: [k, 2.0 * k, -1.0], linear: [1.0, -k, 0.5], ..AT_REST }
+        };
+        Self::new((0..count).map(body).collect(), Vec::new())
+    }
+
+    /// What [`falling`](Self::falling) becomes: moved by v / 2, then 4 m/s faster downward.
+    pub(crate) fn fallen(count: u16) -> Vec<Body> {
+        let body = |k: u16| {
+            let k = f32::from(k);
+            Body {
+                shape: 0,
+                position: [k + 0.5, 2.0 * k - 0.5 * k, -0.75],
+                linear: [1.0, -k - 4.0, 0.5],
+                ..AT_REST
+            }
+        };
+        (0..count).map(body).collect()
+    }
+
+    /// A static ground and `bodies` point masses on it, body k in collision k - 1 and so on round.
+    pub(crate) fn on_ground(bodies: u16, collisions: usize) -> Self {
+        let ground = Body { shape: STATIC, position: [0.0, -1.0, 0.0], ..AT_REST };
+        let mass = |k: u16| Body {
+            position: [f32::from(k), 1.0, 0.0],
+            linear: [0.0, -1.0, 0.0],
+            ..AT_REST
+        };
+        let all = std::iter::once(ground).chain((1..=bodies).map(mass)).collect();
+        let collisions = (1..=bodies)
+            .cycle()
+            .take(collisions)
+            .map(|k| ground_contact(k, [0.0, -1.0, 0.0]))
+            .collect();
+        Self::new(all, collisions)
+    }
+
+    pub(crate) fn shape(&self) -> StepShape {
+        StepShape {
+            bodies: self.bodies.len() as u64,
+            collisions: self.collisions.len() as u64,
+            contact_iterations: self.iterations[0].into(),
+            friction_iterations: self.iterations[1].into(),
+        }
+    }
+
+    /// Writes the arguments and the shape table.
+    pub(crate) fn write_arguments(&self, host: &Host) {
+        let number = |length: usize| u32::try_from(length).expect("the tests' steps are small");
+        host.set_control(control::BODIES, number(self.bodies.len()));
+        host.set_control(control::COLLISIONS, number(self.collisions.len()));
+        host.set_control(control::CONTACT_ITERATIONS, self.iterations[0]);
+        host.set_control(control::FRICTION_ITERATIONS, self.iterations[1]);
+        host.set_control(control::FLAGS, u32::from(self.integrate));
+        let [x, y, z] = self.gravity;
+        for (register, value) in [
+            (control::TIME_STEP, self.time_step),
+            (control::POSITION_DRIFT, self.drift),
+            (control::POSITION_COEFFICIENT, self.coefficient),
+            (control::FRICTION, self.friction),
+            (control::ANGULAR_DAMPING, self.damping),
+            (control::GRAVITY_X, x),
+            (control::GRAVITY_Y, y),
+            (control::GRAVITY_Z, z),
+        ] {
+            host.set_control(register, value.to_bits());
+        }
+        for (entry, [mass, inertia]) in self.shapes.iter().enumerate() {
+            let at = control::SHAPE_TABLE + number(entry) * control::SHAPE_STRIDE;
+            let register = |offset| control::BODIES.moved(offset);
+            host.set_control(register(at + control::SHAPE_INVERSE_MASS), mass.to_bits());
+            host.set_control(register(at + control::SHAPE_INVERSE_INERTIA), inertia.to_bits());
+        }
+    }
+
+    /// What goes out on each stream.
+    pub(crate) fn lanes(&self) -> [Lane; CORES] {
+        let mut lanes: [Lane; CORES] = Default::default();
+        let velocities = self
+            .bodies
+            .iter()
+            .flat_map(|body| [row(body.linear, body.shape), row(body.angular, 0)]);
+        for (running, beat) in velocities.enumerate() {
+            lanes[running % CORES].segments[0].push(beat);
+        }
+        for collision in &self.collisions {
+            for (beat, value) in collision.beats().into_iter().enumerate() {
+                lanes[beat % CORES].segments[1].push(value);
+            }
+        }
+        let poses = self
+            .bodies
+            .iter()
+            .flat_map(|body| [row(body.position, 0), Beat(body.orientation.map(f32::to_bits))]);
+        for (running, beat) in poses.enumerate() {
+            lanes[running % CORES].segments[2].push(beat);
+        }
+        let passes = self.iterations[0] + self.iterations[1];
+        for lane in &mut lanes {
+            lane.packets = vec![0];
+            lane.packets.extend((0..passes).map(|_| 1));
+            lane.packets.push(2);
+            lane.packets.retain(|segment| !lane.segments[*segment].is_empty());
+        }
+        lanes
+    }
+
+    /// Sum of all words that the accelerator receives.
+    pub(crate) fn sum_of_input(&self) -> u32 {
+        self.lanes().iter().fold(0, |sum, lane| {
+            lane.packets.iter().fold(sum, |sum, segment| sum_words(sum, &lane.segments[*segment]))
+        })
+    }
+}
+
+/// What goes out on one stream: the segments, and which of them in which order, a packet each.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Lane {
+    pub(crate) segments: [Vec<Beat>; 3],
+    pub(crate) packets: Vec<usize>,
+}
+
+/// A contact of static body 0 with body `k`, at the middle of both, pushing along -`normal`.
+pub(crate) fn ground_contact(k: u16, normal: [f32; 3]) -> Collision {
+    Collision {
+        bodies: [0, k.into()],
+        count: 1,
+        normal,
+        positions: [[f32::from(k), -1.0, 0.0], [f32::from(k), 1.0, 0.0]],
+        contacts: [[f32::from(k), 0.0, 0.0, 0.0]; 4],
+    }
+}
+
+impl Collision {
+    pub(crate) fn beats(&self) -> [Beat; 7] {
+        let [c0, c1, c2, c3] = self.contacts.map(|contact| Beat(contact.map(f32::to_bits)));
+        let [a, b] = self.bodies;
+        [
+            row(self.normal, self.count),
+            row(self.positions[0], a),
+            row(self.positions[1], b),
+            c0,
+            c1,
+            c2,
+            c3,
+        ]
+    }
+}
+
+fn row([x, y, z]: [f32; 3], word: u32) -> Beat {
+    Beat([x.to_bits(), y.to_bits(), z.to_bits(), word])
+}
+
+pub(crate) fn sum_words(sum: u32, beats: &[Beat]) -> u32 {
+    beats.iter().flat_map(|beat| beat.0).fold(sum, u32::wrapping_add)
+}
+
+/// Result beats on each stream.
+pub(crate) fn result_beats(bodies: usize) -> [usize; CORES] {
+    // Four beats a body on four streams.
+    [bodies; CORES]
+}
+
+/// The bodies out of the result beats of all streams; shapes are not part of a result and read 0.
+pub(crate) fn unpack(streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
+    let beat = |running: usize| streams[running % CORES][running / CORES].0;
+    let vec3 = |beat: [u32; 4]| {
+        let [x, y, z, word] = beat;
+        assert_eq!(word, 0, "the fourth word of a result is 0");
+        [x, y, z].map(f32::from_bits)
+    };
+    (0..bodies)
+        .map(|body| Body {
+            shape: 0,
+            position: vec3(beat(4 * body)),
+            orientation: beat(4 * body + 1).map(f32::from_bits),
+            linear: vec3(beat(4 * body + 2)),
+            angular: vec3(beat(4 * body + 3)),
+        })
+        .collect()
+}
+
+/// A body as bits, for comparisons that see the sign of zero.
+pub(crate) fn bits(body: &Body) -> [[u32; 4]; 4] {
+    let wide = |[x, y, z]: [f32; 3]| [x.to_bits(), y.to_bits(), z.to_bits(), 0];
+    [wide(body.position), body.orientation.map(f32::to_bits), wide(body.linear), wide(body.angular)]
+}
+
+/// A register somewhere else.
+trait Moved {
+    fn moved(self, offset: u32) -> Self;
+}
+
+impl Moved for bitstream_model::interface::register::Register {
+    fn moved(self, offset: u32) -> Self {
+        Self { offset, ..self }
+    }
+}

@@ -1,0 +1,237 @@
+//! A step by scatter-gather: one ring per channel, started once.
+
+use std::time::Duration;
+
+use bitstream_model::interface::axi_dma::{DMASR, dmacr, dmasr};
+use bitstream_model::interface::control::{self, ap_ctrl, irq};
+use bitstream_model::interface::descriptor::status;
+use bitstream_model::interface::record::{BEAT_BYTES, Beat};
+use bitstream_model::{BoardConfig, Direction};
+
+use super::ring::{EOF, Ring, SOF};
+use super::scene::{Body, Lane, Step, result_beats, unpack};
+use super::{BOTH, CORES, Host, microseconds};
+
+/// Longer than any step of the tests takes.
+pub(crate) const LONG: Duration = microseconds(20_000);
+/// Descriptors of a ring, where nothing else matters.
+const SLOTS: usize = 64;
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Failure {
+    Deadline,
+    Dma {
+        core: usize,
+        direction: Direction,
+        errors: u32,
+    },
+    /// Code, stream, detail.
+    Accelerator(u32, u32, u32),
+}
+
+/// What a step gave.
+#[derive(Debug, Clone)]
+pub(crate) struct Outcome {
+    pub(crate) bodies: Vec<Body>,
+    pub(crate) cycles: u64,
+    pub(crate) stalls: u64,
+    pub(crate) waits: u64,
+    pub(crate) hazards: u32,
+    pub(crate) sum_received: u32,
+    pub(crate) sum_sent: u32,
+    pub(crate) impulse_sum: u64,
+    /// Sum of all result words, as the host adds them.
+    pub(crate) sum_of_results: u32,
+}
+
+/// Buffers that the device has.
+#[derive(Debug, Default)]
+pub(crate) struct Flight {
+    inputs: Vec<u64>,
+    outputs: Vec<u64>,
+    /// The last result descriptor of each channel.
+    last: Vec<usize>,
+}
+
+#[derive(Debug)]
+pub(crate) struct Machine {
+    pub(crate) host: Host,
+    pub(crate) mm2s: Vec<Ring>,
+    pub(crate) s2mm: Vec<Ring>,
+}
+
+impl Machine {
+    pub(crate) fn new(config: BoardConfig) -> Self {
+        Self::with_slots(config, SLOTS)
+    }
+
+    pub(crate) fn with_slots(config: BoardConfig, slots: usize) -> Self {
+        let host = Host::new(config);
+        let rings = |direction| -> Vec<Ring> {
+            (0..CORES).map(|core| Ring::new(&host, core, direction, slots)).collect()
+        };
+        let (mm2s, s2mm) = (rings(Direction::Mm2s), rings(Direction::S2mm));
+        let mut machine = Self { host, mm2s, s2mm };
+        machine.recover();
+        machine
+    }
+
+    /// Resets everything and starts the rings from their first slot.
+    pub(crate) fn recover(&mut self) {
+        self.host.reset_all();
+        for ring in self.mm2s.iter_mut().chain(&mut self.s2mm) {
+            ring.restart();
+            let done = ring.direction == Direction::S2mm && ring.core == 0;
+            let enables = dmacr::IOC_IRQ_EN.put(dmacr::ERR_IRQ_EN.mask(), u32::from(done));
+            ring.run(&self.host, enables);
+        }
+        self.host.set_control(control::GIE, 1);
+        self.host.set_control(control::IER, irq::ERROR.mask());
+    }
+
+    /// The longest piece of a packet, bytes.
+    fn piece(&self) -> usize {
+        let longest = (1_usize << self.host.board.config().length_width) - 1;
+        longest - longest % BEAT_BYTES
+    }
+
+    /// Queues result buffers of those beats.
+    pub(crate) fn arm(&mut self, flight: &mut Flight, beats: [usize; CORES]) {
+        let piece = self.piece();
+        for (ring, beats) in self.s2mm.iter_mut().zip(beats) {
+            let address = self.host.writable(beats);
+            flight.outputs.push(address);
+            let mut slot = 0;
+            for (offset, bytes) in pieces(beats * BEAT_BYTES, piece) {
+                let control = u32::try_from(bytes).expect("at most 26 bits");
+                slot = ring.push(address + offset as u64, control);
+            }
+            ring.doorbell(&self.host, slot);
+            flight.last.push(slot);
+        }
+    }
+
+    pub(crate) fn start(&self) {
+        self.host.set_control(control::AP_CTRL, ap_ctrl::START.mask());
+    }
+
+    /// Queues the packets of every stream.
+    pub(crate) fn send(&mut self, flight: &mut Flight, lanes: &[Lane; CORES]) {
+        let piece = self.piece();
+        for (ring, lane) in self.mm2s.iter_mut().zip(lanes) {
+            let host = &self.host;
+            let addresses: Vec<_> = lane
+                .segments
+                .iter()
+                .map(|beats| (!beats.is_empty()).then(|| host.readable(beats)))
+                .collect();
+            flight.inputs.extend(addresses.iter().flatten());
+            let mut tail = None;
+            for segment in &lane.packets {
+                let address = addresses[*segment].expect("a packet has beats");
+                let total = lane.segments[*segment].len() * BEAT_BYTES;
+                for (offset, bytes) in pieces(total, piece) {
+                    let mut control = u32::try_from(bytes).expect("at most 26 bits");
+                    if offset == 0 {
+                        control |= SOF;
+                    }
+                    if offset + bytes == total {
+                        control |= EOF;
+                    }
+                    tail = Some(ring.push(address + offset as u64, control));
+                }
+            }
+            if let Some(slot) = tail {
+                ring.doorbell(&self.host, slot);
+            }
+        }
+    }
+
+    /// Waits until every result packet is there, with a deadline in virtual time.
+    pub(crate) fn wait(&self, flight: &Flight, timeout: Duration) -> Result<(), Failure> {
+        let host = &self.host;
+        let deadline = host.port.now() + timeout;
+        loop {
+            let left = deadline.saturating_sub(host.port.now());
+            if left.is_zero() {
+                return Err(Failure::Deadline);
+            }
+            // Bounded, so that nothing depends on the interrupt alone.
+            let _ = host.port.wait_interrupt(left.min(microseconds(50)));
+            for core in 0..CORES {
+                for direction in BOTH {
+                    let value = host.status(core, direction);
+                    if value & dmasr::ERRORS != 0 {
+                        let errors = value & dmasr::ERRORS;
+                        return Err(Failure::Dma { core, direction, errors });
+                    }
+                    if value & dmasr::IRQS != 0 {
+                        host.write(core, direction, DMASR, value & dmasr::IRQS);
+                    }
+                }
+            }
+            host.port.unmask_interrupt();
+            let (code, channel, detail) = host.error();
+            if code != 0 {
+                return Err(Failure::Accelerator(code, channel, detail));
+            }
+            let done = |(ring, slot): (&Ring, &usize)| status::CMPLTED.is_set(ring.status(*slot));
+            if self.s2mm.iter().zip(&flight.last).all(done) {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Takes all buffers back and reads the counters.
+    pub(crate) fn collect(&self, flight: &Flight, bodies: usize) -> Outcome {
+        let host = &self.host;
+        for address in &flight.inputs {
+            host.take(*address);
+            host.port.release(*address).expect("it was allocated");
+        }
+        let streams: Vec<Box<[Beat]>> =
+            flight.outputs.iter().map(|address| host.take(*address)).collect();
+        for address in &flight.outputs {
+            host.port.release(*address).expect("it was allocated");
+        }
+        let pair = |low, high| u64::from(host.control(low)) | (u64::from(host.control(high)) << 32);
+        assert!(ap_ctrl::DONE.is_set(host.control(control::AP_CTRL)), "the step is done");
+        Outcome {
+            bodies: unpack(&streams, bodies),
+            cycles: pair(control::CYCLES_LO, control::CYCLES_HI),
+            stalls: host.control(control::STALL_CYCLES).into(),
+            waits: host.control(control::WAIT_CYCLES).into(),
+            hazards: host.control(control::HAZARDS),
+            sum_received: host.control(control::SUM_RECEIVED),
+            sum_sent: host.control(control::SUM_SENT),
+            impulse_sum: pair(control::IMPULSE_SUM_LO, control::IMPULSE_SUM_HI),
+            sum_of_results: streams
+                .iter()
+                .fold(0, |sum, beats| super::scene::sum_words(sum, beats)),
+        }
+    }
+
+    /// A step with those beats on the streams instead of its own.
+    pub(crate) fn step_with(
+        &mut self,
+        step: &Step,
+        lanes: &[Lane; CORES],
+    ) -> Result<Outcome, Failure> {
+        step.write_arguments(&self.host);
+        let mut flight = Flight::default();
+        self.arm(&mut flight, result_beats(step.bodies.len()));
+        self.start();
+        self.send(&mut flight, lanes);
+        self.wait(&flight, LONG)?;
+        Ok(self.collect(&flight, step.bodies.len()))
+    }
+
+    pub(crate) fn step(&mut self, step: &Step) -> Result<Outcome, Failure> {
+        self.step_with(step, &step.lanes())
+    }
+}
+
+/// Offset and length of each piece of a packet.
+fn pieces(bytes: usize, piece: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..bytes).step_by(piece).map(move |offset| (offset, piece.min(bytes - offset)))
+}
