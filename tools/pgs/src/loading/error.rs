@@ -79,13 +79,14 @@ impl LoadError {
     /// What to do.
     pub(crate) fn next(&self) -> String {
         match self {
-            Self::Unreadable { .. } | Self::Kind { .. } => {
+            Self::Unreadable { .. } => "give the path of a file that can be read".to_owned(),
+            Self::Kind { .. } => {
                 "see device-tree/README.md for how the files are made".to_owned()
             }
             Self::Name { .. } => "rename the file, or give one from another folder".to_owned(),
             Self::NoManager { .. } => {
                 "on the board: boot a kernel with CONFIG_FPGA_MGR_ZYNQMP_FPGA and a tree with its \
-                 node; elsewhere use --board emulated"
+                 node; elsewhere there is nothing to load, and the other verbs take --board emulated"
                     .to_owned()
             }
             Self::NoFirmwareFile { .. } => {
