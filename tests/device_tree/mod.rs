@@ -30,7 +30,7 @@ pub(crate) fn tools_found() -> bool {
     if !found {
         static SAID: Once = Once::new();
         SAID.call_once(|| {
-            say("skipped: device trees (dtc, fdtoverlay or fdtget is not installed)")
+            say("skipped: device trees (dtc, fdtoverlay or fdtget is not installed)");
         });
     }
     found
