@@ -6,6 +6,7 @@ use clap::parser::ValueSource;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::verbs::list::ListArgs;
+use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
 use crate::verbs::run::RunArgs;
 use crate::verbs::solve::SolveArgs;
@@ -17,6 +18,7 @@ Examples:
   pgs solve vectors/one_cube --compare
   pgs model --collisions 127000 --bodies 38880
   pgs list --json
+  pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 
@@ -44,6 +46,7 @@ pub(crate) enum Verb {
     Solve(SolveArgs),
     Model(ModelArgs),
     List(ListArgs),
+    Load(LoadArgs),
 }
 
 /// What holds for every verb.
