@@ -106,7 +106,7 @@ fn options_of_the_emulated_board_are_refused_for_a_real_one() {
 #[test]
 fn a_missing_board_ends_with_3_and_the_next_step() {
     if std::path::Path::new("/sys/class/uio").exists() {
-        println!("skipped: this machine has UIO nodes");
+        common::skipped("this machine has UIO nodes");
         return;
     }
     let ran = run(["--board", "uio"]);
@@ -118,7 +118,7 @@ fn a_missing_board_ends_with_3_and_the_next_step() {
 #[test]
 fn falling_back_to_the_emulated_board_is_said() {
     if std::path::Path::new("/sys/class/uio").exists() {
-        println!("skipped: this machine has UIO nodes");
+        common::skipped("this machine has UIO nodes");
         return;
     }
     let arguments = ["--board", "auto", "--grid", "1x1x1", "--steps", "1"];
