@@ -28,7 +28,7 @@ fn options(board: &EmulatedBoard) -> OpenOptions {
 }
 
 /// A row of cubes that fall on the ground, each with its own speed, each in contact.
-fn scene(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
+pub(super) fn scene(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
     let body = |position, shape, velocity| Body {
         pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
         velocity,
@@ -52,7 +52,7 @@ fn scene(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
     (bodies, collisions)
 }
 
-fn bits(bodies: &[Body]) -> Vec<u32> {
+pub(super) fn bits(bodies: &[Body]) -> Vec<u32> {
     let numbers = |body: &Body| {
         let Pose { position, orientation } = body.pose;
         let Velocity { linear, angular } = body.velocity;
@@ -68,7 +68,7 @@ fn step(accelerator: &mut Accelerator, cubes: u32) -> (Result<StepReport, Error>
     (result, bodies)
 }
 
-fn undisturbed(cubes: u32) -> Vec<u32> {
+pub(super) fn undisturbed(cubes: u32) -> Vec<u32> {
     let (result, bodies) = step(&mut open(BoardConfig::default()).1, cubes);
     result.expect("nothing disturbs it");
     bits(&bodies)
