@@ -224,7 +224,9 @@ fn memory_that_is_too_small_is_an_error_and_a_smaller_step_still_works() {
     };
     let (result, after) = step(500);
     let error = result.expect_err("no room");
-    let cause = std::error::Error::source(&error).expect("a fault");
+    assert!(!error.may_retry() && !error.must_reopen(), "the same step finds no room again");
+    let fault = std::error::Error::source(&error).expect("a fault");
+    let cause = fault.source().expect("what there is no room for");
     assert!(cause.to_string().contains("no room for a DMA buffer"), "{cause}");
     assert_eq!(after, bits(&scene(500).0));
     let (result, after) = step(3);
