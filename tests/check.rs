@@ -126,7 +126,7 @@ fn another_interface_version_is_named() {
 #[test]
 fn a_length_register_of_14_bits_is_found_and_the_rest_goes_on_with_it() {
     let quirks = Quirks { length_register: Some(14), ..Quirks::default() };
-    let texts = ["14 bits on all 8 channels", "26 bits, what the bitstream says", "width of 14"];
+    let texts = ["14 bits on all 8 channels", "26 bits, as the bitstream says", "width of 14"];
     fails(quirks, "length register", false, texts);
 }
 
@@ -134,11 +134,11 @@ fn a_length_register_of_14_bits_is_found_and_the_rest_goes_on_with_it() {
 fn a_reset_that_never_ends_is_named_by_its_part() {
     for core in 0..4 {
         let quirks = Quirks { held_reset: Some(Resettable::Dma(core)), ..Quirks::default() };
-        let name = format!("dma{core} MM2S was expected to be out of reset");
+        let name = format!("dma{core} MM2S in reset (0x00010006");
         fails(quirks, "reset", true, [&name, "10ms", "reset input"]);
     }
     let quirks = Quirks { held_reset: Some(Resettable::Accelerator), ..Quirks::default() };
-    fails(quirks, "reset", true, ["the accelerator was expected", "10ms", "reset input"]);
+    fails(quirks, "reset", true, ["the accelerator in reset", "10ms", "reset input"]);
 }
 
 #[test]
@@ -184,6 +184,31 @@ fn a_core_without_scatter_gather_is_named() {
 }
 
 #[test]
+fn a_step_that_fails_ends_the_test_with_its_fault() {
+    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board");
+    // A reset does not take this fault away: the first echo meets it.
+    board.inject(bitstream_model::Fault::AcceleratorError {
+        code: bitstream_model::interface::control::ErrorCode::TlastMissing,
+    });
+    let port = BoardChoice::Emulated(board.cpu_port());
+    let report = check(OpenOptions { board: port, ..OpenOptions::default() }).expect("reachable");
+    assert!(!report.passed());
+    let outcome = |name| &report.lines.iter().find(|line| line.name == name).expect("it").outcome;
+    assert!(
+        matches!(outcome("echo"), Outcome::Failed { found, .. } if found.contains("code 4")),
+        "{:?}",
+        outcome("echo")
+    );
+    for name in ["sums", "coherency", "interrupt"] {
+        assert!(
+            matches!(outcome(name), Outcome::Skipped { reason } if reason.contains("\"echo\"")),
+            "{:?}",
+            outcome(name)
+        );
+    }
+}
+
+#[test]
 fn a_length_width_that_was_given_is_what_the_cores_are_held_against() {
     let quirks = Quirks { length_register: Some(14), ..Quirks::default() };
     let board = EmulatedBoard::new(BoardConfig { quirks, ..BoardConfig::default() })
@@ -194,7 +219,7 @@ fn a_length_width_that_was_given_is_what_the_cores_are_held_against() {
     };
     let report = check(options(14)).expect("reachable");
     assert!(report.passed(), "{report:#?}");
-    assert!(detail(&report, "length register").contains("given"));
+    assert!(detail(&report, "length register").contains("as given"));
     // What the failing line advises is what opening needs.
     assert!(Accelerator::open(options(14)).is_ok());
     assert!(Accelerator::open(options(26)).is_err());

@@ -7,7 +7,7 @@ use bitstream_model::interface::control::{IDENTIFICATION_VALUE, VERSION, VERSION
 use bitstream_model::interface::profile::Profile;
 
 use super::report::{Line, Lines, Outcome};
-use crate::accelerator::{Capabilities, Control, IdentityError, identify};
+use crate::accelerator::{Capabilities, Control, ControlError, IdentityError, identify};
 use crate::axi_dma::{DmaError, STATE_CHANGE};
 use crate::error::OpenError;
 use crate::platform::{AccessCounts, RegisterMap, Window};
@@ -47,9 +47,17 @@ pub(super) fn bring_up(
     let mut failed: Vec<String> = cores
         .iter_mut()
         .filter_map(|core| core.reset(&*platform).err())
-        .map(|error| chain(&error))
+        .map(|error| match &error {
+            DmaError::State { channel, found, .. } => format!("{channel} in reset ({found})"),
+            error => chain(error),
+        })
         .collect();
-    failed.extend(control.reset(&*platform).err().map(|error| chain(&error)));
+    failed.extend(control.reset(&*platform).err().map(|error| match &error {
+        ControlError::Reset { found, .. } => {
+            format!("the accelerator in reset (RESET {found:#x})")
+        }
+        error => chain(error),
+    }));
     if !failed.is_empty() {
         let outcome = Outcome::failed(
             failed.join("; "),
@@ -186,7 +194,7 @@ fn length(
     lines: &mut Lines,
 ) -> Option<u32> {
     let expected = given.unwrap_or(capabilities.length_width);
-    let source = if given.is_some() { "given" } else { "what the bitstream says" };
+    let source = if given.is_some() { "as given" } else { "as the bitstream says" };
     let mut widths = Vec::new();
     for core in cores.iter_mut() {
         match core.length_widths() {
@@ -236,4 +244,45 @@ pub(super) fn chain(error: &dyn std::error::Error) -> String {
         source = error.source();
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accelerator::fake;
+    use crate::platform::fake::FakeRegisters;
+
+    #[test]
+    fn capabilities_that_contradict_each_other_are_named() {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        let good = identify(&registers.window(RegisterMap::Control)).expect("well formed");
+        assert_eq!(contradiction(&good), None);
+        // 4 MiB hold 174,762 bodies of 24 bytes and 262,144 collisions of 16.
+        let cases = [
+            (Capabilities { body_capacity: 174_763, ..good }, "174763 bodies of 24 bytes"),
+            (Capabilities { collision_capacity: 262_145, ..good }, "262145 collisions"),
+            (Capabilities { body_capacity: 0, ..good }, "room for no bodies"),
+        ];
+        for (capabilities, text) in cases {
+            let (found, _) = contradiction(&capabilities).expect(text);
+            assert!(found.contains(text), "{found}");
+        }
+        assert_eq!(contradiction(&Capabilities { body_capacity: 174_762, ..good }), None);
+    }
+
+    #[test]
+    fn a_capability_register_that_makes_no_sense_fails_the_third_line_alone() {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        registers.with(|state| state.values.insert(0x110, 0x0503));
+        let mut lines = Lines::default();
+        assert!(identity(&registers.window(RegisterMap::Control), &mut lines).is_none());
+        let lines = lines.finish();
+        assert_eq!(lines[1].outcome, Outcome::ok("1.0"));
+        assert!(
+            matches!(&lines[2].outcome, Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503")
+        );
+        assert!(matches!(&lines[3].outcome, Outcome::Skipped { .. }));
+    }
 }

@@ -217,9 +217,9 @@ mod tests {
     fn dirt_is_stale_on_whichever_side_it_lay() {
         let found = difference(true, |r| r[2][4] = dirt(Direction::S2mm, 2, 4)).expect("differs");
         assert_eq!((found.origin, found.channel, found.offset), (Origin::StaleResult, 2, 64));
-        // The position of body 1 is beat 2 of the poses, which begin at beat 8 on channel 2.
-        let found = difference(false, |r| r[0][1] = dirt(Direction::Mm2s, 2, 8)).expect("differs");
-        assert_eq!((found.origin, found.channel, found.offset), (Origin::StaleRead, 2, 128));
+        // The position of body 1 is beat 2 of the poses: channel 2, where they begin at beat 4.
+        let found = difference(false, |r| r[0][1] = dirt(Direction::Mm2s, 2, 4)).expect("differs");
+        assert_eq!((found.origin, found.channel, found.offset), (Origin::StaleRead, 2, 64));
     }
 
     #[test]

@@ -209,9 +209,37 @@ fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
             ),
             "an interrupt at the end of every step",
             "look whether the interrupt output of the PL is connected and enabled, and whether its \
-             number in the device tree is right: SPI numbers count from 0 there, from 32 in the \
-             interrupt controller",
+             number in the device tree is right: it is the interrupt controller's less 32",
         ));
     }
     Ok(Outcome::ok(format!("ended each of {INTERRUPT_STEPS} steps, quiet in between")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run of one beat whose words add up to 10.
+    fn run(sent: u32, sums: Option<(u32, u32)>) -> Echoed {
+        let results = vec![vec![Beat([1, 2, 3, 4])], Vec::new()];
+        Echoed { results, sent, sums, interrupts: 1, descriptors: 1 }
+    }
+
+    #[test]
+    fn sums_say_on_which_side_of_the_accelerator_words_were_damaged() {
+        let good = || run(7, Some((7, 10)));
+        assert!(matches!(sums(&[good(), good()]), Outcome::Ok { .. }));
+        for (bad, value, side) in [
+            (run(7, Some((8, 10))), "0x00000008 arrived", "before the accelerator"),
+            (run(7, Some((7, 11))), "0x0000000a came back", "behind the accelerator"),
+        ] {
+            let outcome = sums(&[good(), bad]);
+            assert!(
+                matches!(&outcome, Outcome::Failed { found, next, .. }
+                    if found.contains(value) && next.contains(side)),
+                "{outcome:?}"
+            );
+        }
+        assert!(matches!(sums(&[run(7, None)]), Outcome::Skipped { .. }));
+    }
 }

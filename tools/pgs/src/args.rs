@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use clap::parser::ValueSource;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
+use crate::verbs::check::CheckArgs;
 use crate::verbs::list::ListArgs;
 use crate::verbs::model::ModelArgs;
 use crate::verbs::run::RunArgs;
@@ -17,10 +18,11 @@ Examples:
   pgs solve vectors/one_cube --compare
   pgs model --collisions 127000 --bodies 38880
   pgs list --json
+  pgs check
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 
-Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or unreadable input; 3 no usable board, or
+Exit codes: 0 done; 1 a comparison or a check failed; 2 wrong usage or unreadable input; 3 no usable board, or
 no rights; 4 hardware fault or deadline; 130 interrupted.";
 
 /// Steps rigid bodies on the zynq-pgs accelerator, real or emulated.
@@ -44,6 +46,7 @@ pub(crate) enum Verb {
     Solve(SolveArgs),
     Model(ModelArgs),
     List(ListArgs),
+    Check(CheckArgs),
 }
 
 /// What holds for every verb.

@@ -23,6 +23,11 @@ pub(crate) struct Opened {
     pub(crate) reason: String,
 }
 
+/// A kind of board, as it is written in results.
+pub(crate) fn kind_text(observer: Option<&EmulatedBoard>) -> &'static str {
+    if observer.is_some() { "emulated" } else { "uio" }
+}
+
 /// Which kind of board a name on the command line means here, and why.
 pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
     match name {
@@ -39,35 +44,51 @@ pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
     }
 }
 
-/// Opens a board.
-pub(crate) fn open(name: BoardName, build: &BuildArgs) -> Result<Opened, Failure> {
+/// A board that was chosen and not opened yet.
+#[derive(Debug)]
+pub(crate) struct Chosen {
+    pub(crate) options: OpenOptions,
+    /// The emulated board, as its builder sees it; none for a real one.
+    pub(crate) observer: Option<EmulatedBoard>,
+    /// Why this board and no other.
+    pub(crate) reason: String,
+}
+
+/// Chooses a board. `given` is an option of the command line that only an emulated one has.
+pub(crate) fn find(
+    name: BoardName,
+    config: BoardConfig,
+    given: Option<&'static str>,
+) -> Result<Chosen, Failure> {
     let (kind, reason) = choose(name);
-    if kind == BoardKind::Emulated {
+    let (board, observer) = if kind == BoardKind::Emulated {
         if name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
         }
-        let emulated = EmulatedBoard::new(build.config()).map_err(Failure::input)?;
-        let board = BoardChoice::Emulated(emulated.cpu_port());
-        let accelerator = accelerator(board)?;
-        return Ok(Opened { accelerator, observer: Some(emulated), reason });
-    }
-    if let Some(option) = build.given() {
+        let emulated = EmulatedBoard::new(config).map_err(Failure::input)?;
+        (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
+    } else if let Some(option) = given {
         let error = format!("{option} says how to build an emulated board, this one is real");
         return Err(
             Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
         );
-    }
-    let board = BoardChoice::Uio { node: UIO_NODE.to_owned() };
-    Ok(Opened { accelerator: accelerator(board)?, observer: None, reason })
+    } else {
+        (BoardChoice::Uio { node: UIO_NODE.to_owned() }, None)
+    };
+    Ok(Chosen { options: OpenOptions { board, ..OpenOptions::default() }, observer, reason })
 }
 
-fn accelerator(board: BoardChoice) -> Result<Accelerator, Failure> {
-    let options = OpenOptions { board, ..OpenOptions::default() };
-    Accelerator::open(options).map_err(|error| {
-        Failure::new(Cause::NoBoard, error).next(
-            "see what there is with `pgs list`, or use the emulated board with --board emulated",
-        )
-    })
+/// Opens a board.
+pub(crate) fn open(name: BoardName, build: &BuildArgs) -> Result<Opened, Failure> {
+    let Chosen { options, observer, reason } = find(name, build.config(), build.given())?;
+    let accelerator = Accelerator::open(options).map_err(unusable)?;
+    Ok(Opened { accelerator, observer, reason })
+}
+
+/// There is no board, or none that can be opened.
+pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
+    Failure::new(Cause::NoBoard, error)
+        .next("see what there is with `pgs list`, or use the emulated board with --board emulated")
 }
 
 impl Opened {
@@ -97,7 +118,7 @@ impl Opened {
     }
 
     fn kind(&self) -> &'static str {
-        if self.observer.is_some() { "emulated" } else { "uio" }
+        kind_text(self.observer.as_ref())
     }
 
     fn profile(&self) -> &'static str {

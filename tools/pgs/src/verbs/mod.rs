@@ -1,5 +1,6 @@
 //! The verbs, one file each.
 
+pub(crate) mod check;
 pub(crate) mod list;
 pub(crate) mod model;
 pub(crate) mod run;
@@ -24,6 +25,7 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
         Verb::Solve(args) => solve::run(args, &command.common, out),
         Verb::Model(args) => model::run(args, &command.common, out),
         Verb::List(args) => list::run(args, &command.common, out),
+        Verb::Check(args) => check::run(args, &command.common, out),
     }
 }
 
