@@ -111,6 +111,7 @@
 mod accelerator;
 mod axi_dma;
 mod beat;
+mod check;
 mod error;
 pub mod platform;
 mod record;
@@ -120,6 +121,7 @@ mod step;
 pub use accelerator::{Capabilities, ControlError, IdentityError};
 pub use axi_dma::DmaError;
 pub use bitstream_model::interface;
+pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use error::{Aftermath, Error, OpenError};
 pub use platform::{
     Caching, DevMemWindows, MemoryChoice, PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes,

@@ -12,6 +12,7 @@ use crate::fault::Fault;
 use crate::interface::record::BEAT_BYTES;
 use crate::interrupt::InterruptLine;
 use crate::memory::Memory;
+use crate::quirks::InterruptWiring;
 use crate::stream::Stream;
 use crate::violation::{Log, RegisterAccess, ViolationKind};
 
@@ -76,7 +77,7 @@ impl Board {
         Self {
             config,
             now: 0,
-            memory: Memory::new(config.address_width),
+            memory: Memory::new(config.address_width, config.quirks.coherency),
             interrupt: InterruptLine::default(),
             log: Log::new(),
             cores: (0..cores).map(|core| Core::new(core, &config)).collect(),
@@ -186,9 +187,13 @@ impl Board {
     }
 
     fn update_interrupt(&mut self) {
-        let level = !self.dead()
-            && (self.accelerator.interrupt() || self.cores.iter().any(Core::interrupt));
-        self.interrupt.set(level);
+        let source = || self.accelerator.interrupt() || self.cores.iter().any(Core::interrupt);
+        let level = match self.config.quirks.interrupt {
+            InterruptWiring::Connected => source(),
+            InterruptWiring::Disconnected => false,
+            InterruptWiring::StuckHigh => true,
+        };
+        self.interrupt.set(level && !self.dead());
     }
 
     /// Lets time pass until `until`, or until the interrupt wants attention if `watch` says so.

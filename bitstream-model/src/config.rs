@@ -3,6 +3,7 @@
 
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use crate::interface::profile::{Depth, FLOAT, Profile};
+use crate::quirks::Quirks;
 
 /// What the pipeline does when a collision needs a velocity that is still being computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,11 +94,13 @@ pub struct BoardConfig {
     pub strict: bool,
     /// Delays and depths.
     pub delays: Delays,
+    /// What is built wrongly.
+    pub quirks: Quirks,
 }
 
 impl Default for BoardConfig {
     /// The `float` profile, interlocked, sustained bandwidth of the ZCU102, 26-bit lengths, 40-bit
-    /// addresses, strict.
+    /// addresses, strict, nothing built wrongly.
     fn default() -> Self {
         Self {
             profile: &FLOAT,
@@ -110,6 +113,7 @@ impl Default for BoardConfig {
             scatter_gather: true,
             strict: true,
             delays: Delays::default(),
+            quirks: Quirks::default(),
         }
     }
 }
@@ -170,6 +174,9 @@ impl BoardConfig {
             range(what, cycles, 0, 1 << 32)?;
         }
         range("register access time in ns", self.delays.register_access_ns, 1, 1_000_000)?;
+        for (what, found, low, high) in self.quirks.ranges() {
+            range(what, found, low, high)?;
+        }
         if let Bandwidth::BytesPerSecond(bytes) = self.bandwidth {
             range("memory bandwidth in bytes per second", bytes, 1_000_000, 1_000_000_000_000)?;
         }

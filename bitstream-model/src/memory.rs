@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::cast::index;
 use crate::interface::address_map::{DDR_HIGH, DDR_LOW};
 use crate::interface::record::{BEAT_BYTES, Beat};
+use crate::quirks::Coherency;
 
 /// What the device may do with a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,6 +84,8 @@ enum Content {
 struct Region {
     bytes: u64,
     content: Content,
+    /// What the CPU's caches hold of it, where they do not agree with memory.
+    cached: Option<Box<[Beat]>>,
 }
 
 /// Ranges are kept apart by this much, so that running off an end meets nothing.
@@ -100,11 +103,12 @@ pub(crate) struct Memory {
     released: Vec<Range<u64>>,
     address_limit: u64,
     next_is_high: bool,
+    coherency: Coherency,
 }
 
 impl Memory {
     /// Memory for DMAs with addresses of that many bits.
-    pub(crate) fn new(address_width: u32) -> Self {
+    pub(crate) fn new(address_width: u32, coherency: Coherency) -> Self {
         // The kernel and the rest of the system keep one gigabyte of each part, and not the same:
         // a high address cut to 32 bits must not meet a buffer.
         const SYSTEM: u64 = 1 << 30;
@@ -115,6 +119,7 @@ impl Memory {
             released: Vec::new(),
             address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
             next_is_high: false,
+            coherency,
         }
     }
 
@@ -134,7 +139,7 @@ impl Memory {
         };
         let address = part.start;
         part.start += take;
-        self.regions.insert(address, Region { bytes, content });
+        self.regions.insert(address, Region { bytes, content, cached: None });
         Ok(address)
     }
 
@@ -170,6 +175,7 @@ impl Memory {
         beats: Box<[Beat]>,
         access: DeviceAccess,
     ) -> Result<(), MemoryError> {
+        let coherency = self.coherency;
         let region = self.region_at(address)?;
         if !matches!(region.content, Content::Cpu) {
             return Err(MemoryError::State { address, state: "the CPU does not own it" });
@@ -177,14 +183,36 @@ impl Memory {
         if (beats.len() * BEAT_BYTES) as u64 != region.bytes {
             return Err(MemoryError::State { address, state: "its length is another" });
         }
-        region.content = Content::Device(beats, access);
+        let visible = match (coherency, access) {
+            (Coherency::StaleReads { from_byte }, DeviceAccess::Read) => {
+                let before = region.cached.replace(beats.clone());
+                stale_from(from_byte, beats, before.as_deref())
+            }
+            (Coherency::StaleWrites { .. }, DeviceAccess::Write) if region.cached.is_some() => {
+                region.cached = Some(beats.clone());
+                beats
+            }
+            _ => beats,
+        };
+        region.content = Content::Device(visible, access);
         Ok(())
     }
 
     pub(crate) fn take_back(&mut self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
+        let coherency = self.coherency;
         let region = self.region_at(address)?;
         match std::mem::replace(&mut region.content, Content::Cpu) {
-            Content::Device(beats, _) => Ok(beats),
+            Content::Device(beats, access) => Ok(match (coherency, access) {
+                (Coherency::StaleReads { .. }, DeviceAccess::Read) => {
+                    region.cached.clone().unwrap_or(beats)
+                }
+                (Coherency::StaleWrites { from_byte }, DeviceAccess::Write) => {
+                    let seen = stale_from(from_byte, beats, region.cached.as_deref());
+                    region.cached = Some(seen.clone());
+                    seen
+                }
+                _ => beats,
+            }),
             other => {
                 region.content = other;
                 Err(MemoryError::State { address, state: "the device does not own it" })
@@ -259,13 +287,22 @@ impl Memory {
     }
 }
 
+/// `beats` with what `stale` holds from that byte on.
+fn stale_from(from_byte: usize, mut beats: Box<[Beat]>, stale: Option<&[Beat]>) -> Box<[Beat]> {
+    let Some(stale) = stale else { return beats };
+    for (beat, stale) in beats.iter_mut().zip(stale).skip(from_byte.div_ceil(BEAT_BYTES)) {
+        *beat = *stale;
+    }
+    beats
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_buffer_of_the_cpu_is_out_of_the_devices_reach() {
-        let mut memory = Memory::new(40);
+        let mut memory = Memory::new(40, Coherency::Coherent);
         let (address, beats) = memory.allocate(4).expect("fits");
         assert_eq!(memory.beats(address, 1).err(), Some(Denied::CpuOwned));
         memory.hand_over(address, beats, DeviceAccess::Read).expect("the CPU owns it");
@@ -277,7 +314,7 @@ mod tests {
 
     #[test]
     fn one_beat_past_the_end_is_denied() {
-        let mut memory = Memory::new(40);
+        let mut memory = Memory::new(40, Coherency::Coherent);
         let (address, beats) = memory.allocate(4).expect("fits");
         memory.hand_over(address, beats, DeviceAccess::Read).expect("the CPU owns it");
         assert_eq!(memory.beats(address + 48, 2).err(), Some(Denied::PastEnd));
@@ -287,7 +324,7 @@ mod tests {
 
     #[test]
     fn a_released_buffer_is_gone_and_its_address_is_not_reused() {
-        let mut memory = Memory::new(40);
+        let mut memory = Memory::new(40, Coherency::Coherent);
         let (address, beats) = memory.allocate(4).expect("fits");
         memory.hand_over(address, beats, DeviceAccess::Write).expect("the CPU owns it");
         memory.release(address).expect("it is there");
@@ -299,7 +336,7 @@ mod tests {
 
     #[test]
     fn released_memory_is_reused_when_nothing_else_is_left() {
-        let mut memory = Memory::new(32);
+        let mut memory = Memory::new(32, Coherency::Coherent);
         for _ in 0..100 {
             let address = memory.place(64 << 20, Content::Cpu).expect("released ones are reused");
             memory.release(address).expect("it is there");
@@ -308,10 +345,10 @@ mod tests {
 
     #[test]
     fn buffers_stand_on_both_sides_of_4_gib_unless_addresses_have_32_bits() {
-        let mut memory = Memory::new(40);
+        let mut memory = Memory::new(40, Coherency::Coherent);
         let addresses: Vec<_> = (0..4).map(|_| memory.allocate(1).expect("fits").0).collect();
         assert!(addresses.iter().any(|a| *a < 1 << 32) && addresses.iter().any(|a| *a >= 1 << 32));
-        let mut memory = Memory::new(32);
+        let mut memory = Memory::new(32, Coherency::Coherent);
         assert!((0..4).all(|_| memory.allocate(1).expect("fits").0 < 1 << 32));
         let too_much = (1_usize << 30) / BEAT_BYTES;
         assert!(matches!(memory.allocate(too_much), Err(MemoryError::Exhausted { .. })));
@@ -319,7 +356,7 @@ mod tests {
 
     #[test]
     fn descriptors_are_shared_and_are_no_data() {
-        let mut memory = Memory::new(40);
+        let mut memory = Memory::new(40, Coherency::Coherent);
         let (address, words) = memory.allocate_shared(16).expect("fits");
         words[3].store(7, Ordering::Relaxed);
         let third = memory.words(address + 12, 1).expect("granted");
@@ -327,5 +364,42 @@ mod tests {
         assert_eq!(memory.beats(address, 1).err(), Some(Denied::Kind));
         memory.write_word(address + 4, 9).expect("granted");
         assert_eq!(words[1].load(Ordering::Relaxed), 9);
+    }
+
+    /// Hands beats of that value over, lets the device read them or write others, and returns what
+    /// the device has read and what the CPU finds afterwards.
+    fn round(memory: &mut Memory, address: u64, value: u32, access: DeviceAccess) -> [Vec<u32>; 2] {
+        let first = |beats: &[Beat]| beats.iter().map(|beat| beat.0[0]).collect::<Vec<_>>();
+        let beats = vec![Beat([value; 4]); 8].into();
+        memory.hand_over(address, beats, access).expect("the CPU owns it");
+        let read = match access {
+            DeviceAccess::Read => first(memory.beats(address, 8).expect("granted")),
+            DeviceAccess::Write => {
+                memory.beats_mut(address, 8).expect("granted").fill(Beat([value + 100; 4]));
+                Vec::new()
+            }
+        };
+        [read, first(&memory.take_back(address).expect("handed over"))]
+    }
+
+    #[test]
+    fn stale_reads_are_those_of_the_hand_over_before_and_the_cpu_does_not_notice() {
+        let mut memory = Memory::new(40, Coherency::StaleReads { from_byte: 64 });
+        let (address, _) = memory.allocate(8).expect("fits");
+        let mut rounds = (1..=3).map(|v| round(&mut memory, address, v, DeviceAccess::Read));
+        assert_eq!(rounds.next(), Some([vec![1; 8], vec![1; 8]]));
+        assert_eq!(rounds.next(), Some([vec![2, 2, 2, 2, 1, 1, 1, 1], vec![2; 8]]));
+        assert_eq!(rounds.next(), Some([vec![3, 3, 3, 3, 2, 2, 2, 2], vec![3; 8]]));
+    }
+
+    #[test]
+    fn stale_writes_leave_the_cpu_with_what_it_handed_over() {
+        let mut memory = Memory::new(40, Coherency::StaleWrites { from_byte: 64 });
+        let (address, _) = memory.allocate(8).expect("fits");
+        let mut rounds =
+            (1..=3).map(|v| round(&mut memory, address, v, DeviceAccess::Write)[1].clone());
+        assert_eq!(rounds.next(), Some(vec![101; 8]));
+        assert_eq!(rounds.next(), Some(vec![102, 102, 102, 102, 2, 2, 2, 2]));
+        assert_eq!(rounds.next(), Some(vec![103, 103, 103, 103, 3, 3, 3, 3]));
     }
 }

@@ -75,9 +75,9 @@ impl fmt::Display for BoardDescription {
 
 /// A board that was found.
 #[derive(Debug)]
-pub(super) struct Found {
-    pub(super) platform: Arc<dyn Platform>,
-    pub(super) description: BoardDescription,
+pub(crate) struct Found {
+    pub(crate) platform: Arc<dyn Platform>,
+    pub(crate) description: BoardDescription,
 }
 
 /// Finds the board of choice.

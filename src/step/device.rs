@@ -1,18 +1,15 @@
 //! This file holds an open board: its lanes and its control block, from opening to closing.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
-use bitstream_model::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 
+use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
 use super::fault::{Fault, RegisterDump};
 use super::lane::Lane;
 use super::plan::{Plan, bytes};
 use crate::accelerator::{Capabilities, Control, identify};
-use crate::axi_dma::{
-    Channel, Direction, DmaError, Dmacr, Dmasr, detect_length_width, largest_piece, reset_core,
-};
+use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
 use crate::error::OpenError;
 use crate::platform::{Access, AccessCounts, Platform, RegisterMap, Window, release_to_device};
 use crate::scene::StepParameters;
@@ -22,7 +19,7 @@ pub(super) type Statuses = [Dmasr; 2 * DMA_COUNT_MAX];
 
 /// An open board.
 #[derive(Debug)]
-pub(super) struct Device {
+pub(crate) struct Device {
     pub(super) mm2s: Vec<Lane>,
     pub(super) s2mm: Vec<Lane>,
     pub(super) control: Control,
@@ -33,7 +30,8 @@ pub(super) struct Device {
     pub(super) missed_interrupts: u32,
     /// Whether a reset failed: nothing may be touched any more.
     pub(super) dead: bool,
-    largest: u32,
+    /// The longest piece that a descriptor carries, bytes.
+    pub(super) largest: u32,
 }
 
 impl Device {
@@ -46,36 +44,38 @@ impl Device {
         let window =
             Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;
         let mut capabilities = identify(&window)?;
-        if let Some(found) = length_width {
-            if !(LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&found) {
-                let (low, high) = (LENGTH_WIDTH_MIN, LENGTH_WIDTH_MAX);
-                return Err(OpenError::LengthWidth { found, low, high });
-            }
-            capabilities.length_width = found;
-        }
+        check_given_width(length_width)?;
+        capabilities.length_width = length_width.unwrap_or(capabilities.length_width);
         let mut control = Control::new(window);
-        let (mut mm2s, mut s2mm) = (Vec::new(), Vec::new());
-        let cores = capabilities.mm2s_channels;
-        for core in 0..cores {
-            let registers = platform.dma_window(core)?;
-            let window =
-                Arc::new(Window::new(registers, RegisterMap::Dma(core), Arc::clone(&counts))?);
-            let width = capabilities.address_width;
-            let mut sender = Channel::new(Arc::clone(&window), core, Direction::Mm2s, width);
-            let mut receiver = Channel::new(window, core, Direction::S2mm, width);
-            reset_core(&*platform, &mut sender, &mut receiver)?;
-            for channel in [&mut sender, &mut receiver] {
-                check_channel(channel, capabilities.length_width)?;
-            }
-            mm2s.push(Lane::new(sender, Access::Read, Dmacr::RUNNING));
-            // The last beat of the results goes to the last channel: its completion is the step's.
-            let completion = core + 1 == cores;
-            let running = if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
-            s2mm.push(Lane::new(receiver, Access::Write, running));
+        let mut cores = connect(&*platform, &capabilities, &counts)?;
+        for core in &mut cores {
+            core.reset(&*platform)?;
+            core.check_mode()?;
+            core.check_length_width(capabilities.length_width)?;
         }
         control.reset(&*platform)?;
         drain_interrupt(&*platform)?;
-        Ok(Self {
+        Ok(Self::assemble(platform, control, capabilities, counts, cores))
+    }
+
+    /// A board of parts that were reset and checked.
+    pub(crate) fn assemble(
+        platform: Arc<dyn Platform>,
+        control: Control,
+        capabilities: Capabilities,
+        counts: Arc<AccessCounts>,
+        cores: Vec<Core>,
+    ) -> Self {
+        let (mut mm2s, mut s2mm) = (Vec::new(), Vec::new());
+        let last = cores.len().saturating_sub(1);
+        for (place, Core { sender, receiver }) in cores.into_iter().enumerate() {
+            mm2s.push(Lane::new(sender, Access::Read, Dmacr::RUNNING));
+            // The last beat of the results goes to the last channel: its completion is the step's.
+            let completion = place == last;
+            let running = if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
+            s2mm.push(Lane::new(receiver, Access::Write, running));
+        }
+        Self {
             mm2s,
             s2mm,
             control,
@@ -85,7 +85,7 @@ impl Device {
             missed_interrupts: 0,
             dead: false,
             largest: largest_piece(capabilities.length_width),
-        })
+        }
     }
 
     /// Makes buffers and rings large enough for a step.
@@ -207,29 +207,6 @@ impl Device {
         drain_interrupt(&*self.platform)?;
         Ok(())
     }
-}
-
-/// Checks a channel that was just reset.
-fn check_channel(channel: &mut Channel, expected: u32) -> Result<(), DmaError> {
-    let status = channel.status();
-    let name = channel.name().to_string();
-    if status.gone() {
-        return Err(DmaError::Gone { channel: name });
-    }
-    if !status.scatter_gather() {
-        return Err(DmaError::NoScatterGather { channel: name, found: status.to_string() });
-    }
-    let found = detect_length_width(channel)?;
-    if found != expected {
-        return Err(DmaError::LengthWidth { channel: name, expected, found });
-    }
-    Ok(())
-}
-
-/// Takes an event from before, and lets the next one through.
-fn drain_interrupt(platform: &dyn Platform) -> Result<(), crate::platform::PlatformError> {
-    platform.wait_interrupt(Duration::ZERO)?;
-    platform.unmask_interrupt()
 }
 
 impl Drop for Device {

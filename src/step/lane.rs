@@ -53,6 +53,13 @@ impl Lane {
         Ok(())
     }
 
+    /// Frees the buffer, if the CPU holds it: the next one is another.
+    pub(super) fn drop_buffer(&mut self) {
+        if matches!(self.held, Held::Cpu(_)) {
+            self.held = Held::Nobody;
+        }
+    }
+
     /// Whether the ring takes a chain of so many descriptors.
     pub(super) fn ring_takes(&self, descriptors: usize) -> bool {
         self.ring.as_ref().is_some_and(|ring| ring.capacity() >= descriptors)

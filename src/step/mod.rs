@@ -1,8 +1,10 @@
 //! One step, from the caller's bodies to the caller's bodies.
 
 mod board;
+mod bring_up;
 mod completion;
 mod device;
+mod echo;
 mod fault;
 mod lane;
 #[cfg(all(test, feature = "emulation"))]
@@ -18,3 +20,10 @@ pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
 pub use fault::{Fault, RegisterDump};
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
 pub use solver::Accelerator;
+pub(crate) use {
+    board::Found,
+    bring_up::{Core, check_given_width, connect, drain_interrupt},
+    device::Device,
+    echo::{ECHO_LIMIT, Echo, Echoed, source_of},
+    solver::find,
+};

@@ -16,10 +16,15 @@ use super::report::{HostTimes, StepCycles, StepReport};
 use crate::accelerator::{Capabilities, Counters};
 use crate::beat::pack::{pack_collisions, pack_poses, pack_velocities};
 use crate::beat::unpack::{sum_of_words, unpack_result};
-use crate::error::Error;
+use crate::error::{Error, OpenError};
 use crate::platform::{Deadline, System};
 use crate::scene::validate::{Limits, validate, validate_shapes};
 use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
+
+/// Finds the board that the options ask for.
+pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
+    board::find(&options.board, &options.memory, &System::default())
+}
 
 /// An open accelerator.
 ///
@@ -27,19 +32,19 @@ use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
 #[derive(Debug)]
 pub struct Accelerator {
     board: BoardDescription,
-    device: Device,
+    pub(super) device: Device,
     limits: Limits,
-    shapes: Vec<Shape>,
+    pub(super) shapes: Vec<Shape>,
     /// Results of a step until all are checked. Kept, so that a step allocates nothing.
     spare: Vec<(Pose, Velocity)>,
 }
 
 /// What a step sent, for comparison with what the accelerator received.
 #[derive(Debug, Clone, Copy)]
-struct Sent {
-    velocities: u32,
-    collisions: u32,
-    poses: u32,
+pub(super) struct Sent {
+    pub(super) velocities: u32,
+    pub(super) collisions: u32,
+    pub(super) poses: u32,
 }
 
 impl Accelerator {
@@ -49,18 +54,20 @@ impl Accelerator {
     /// [`Error::Open`]: no such board, not a bitstream that this driver knows, or DMA cores that
     /// do not behave as they should.
     pub fn open(options: OpenOptions) -> Result<Self, Error> {
-        let OpenOptions { board: choice, memory, length_width } = options;
-        let found = board::find(&choice, &memory, &System::default())?;
-        Self::on(found, length_width)
+        Self::on(find(&options)?, options.length_width)
     }
 
     /// Opens the accelerator of a board that was found.
     pub(super) fn on(found: Found, length_width: Option<u32>) -> Result<Self, Error> {
         let device = Device::open(found.platform, length_width)?;
+        Ok(Self::assemble(found.description, device))
+    }
+
+    /// The accelerator of a board that was brought up.
+    pub(crate) fn assemble(board: BoardDescription, device: Device) -> Self {
         let Capabilities { profile_id, version, clock_khz, .. } = device.capabilities;
         log::info!(
-            "opened {}: profile {profile_id}, interface {}.{}, {clock_khz} kHz",
-            found.description,
+            "opened {board}: profile {profile_id}, interface {}.{}, {clock_khz} kHz",
             version.0,
             version.1
         );
@@ -72,8 +79,7 @@ impl Accelerator {
             bytes_per_body: device.capabilities.bytes_per_body,
             bytes_per_collision: device.capabilities.bytes_per_collision,
         };
-        let board = found.description;
-        Ok(Self { board, device, limits, shapes: Vec::new(), spare: Vec::new() })
+        Self { board, device, limits, shapes: Vec::new(), spare: Vec::new() }
     }
 
     /// Which board was opened, and why.
@@ -206,7 +212,7 @@ impl Accelerator {
     }
 
     /// Writes the records of a step into the buffers.
-    fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+    pub(super) fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         plan: &Plan,
         bodies: &B,
@@ -236,7 +242,7 @@ impl Accelerator {
     }
 
     /// The result beats of each channel.
-    fn results<'a>(&'a self, plan: &Plan, channels: &mut [&'a [Beat]; DMA_COUNT_MAX]) {
+    pub(super) fn results<'a>(&'a self, plan: &Plan, channels: &mut [&'a [Beat]; DMA_COUNT_MAX]) {
         for (place, lane) in self.device.s2mm.iter().enumerate() {
             channels[place] = &lane.beats()[..plan.results(place)];
         }

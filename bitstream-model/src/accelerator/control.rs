@@ -219,8 +219,8 @@ impl Registers {
             _ if offset == IER.offset => self.ier,
             _ if offset == ISR.offset => self.isr,
             _ if ARGUMENTS.contains(&offset) => self.argument(offset),
-            _ if offset == IDENTIFICATION.offset => IDENTIFICATION.reset,
-            _ if offset == VERSION.offset => VERSION.reset,
+            _ if offset == IDENTIFICATION.offset => config.quirks.identification,
+            _ if offset == VERSION.offset => config.quirks.version,
             _ if offset == PROFILE.offset => profile.id,
             _ if offset == FEATURES.offset => {
                 features::CHECKSUMS.mask()

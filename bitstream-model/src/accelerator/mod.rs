@@ -25,6 +25,7 @@ use crate::interface::control::{
 };
 use crate::interface::profile::Depth;
 use crate::interface::record::{Beat, CONTACT_POINTS, collision, pose, result, velocity};
+use crate::quirks::Resettable;
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
 
@@ -90,13 +91,14 @@ pub(crate) struct Accelerator {
 impl Accelerator {
     pub(crate) fn new(config: &BoardConfig) -> Self {
         let profile = config.profile;
+        let held = config.quirks.held_reset == Some(Resettable::Accelerator);
         Self {
             config: *config,
             registers: Registers::new(config),
             arguments: Arguments::default(),
             phase: Phase::Idle,
             start_due: false,
-            reset_until: None,
+            reset_until: held.then_some(u64::MAX),
             fault: None,
             clock: 0,
             debt: 0,

@@ -13,6 +13,7 @@ use std::fmt;
 use crate::config::{BoardConfig, Delays};
 use crate::interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 use crate::memory::Memory;
+use crate::quirks::Resettable;
 use crate::stream::Stream;
 use crate::violation::Log;
 
@@ -74,16 +75,17 @@ impl Core {
     pub(crate) fn new(core: usize, config: &BoardConfig) -> Self {
         let build = Build {
             core,
-            length_width: config.length_width,
+            length_width: config.quirks.length_register.unwrap_or(config.length_width),
             address_width: config.address_width,
             scatter_gather: config.scatter_gather,
             delays: config.delays,
         };
+        let held = config.quirks.held_reset == Some(Resettable::Dma(core));
         Self {
             build,
             mm2s: Channel::new(Direction::Mm2s),
             s2mm: Channel::new(Direction::S2mm),
-            reset_until: None,
+            reset_until: held.then_some(u64::MAX),
         }
     }
 

@@ -7,6 +7,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use zynq_pgs::MemoryChoice;
 
 use crate::memory::memory;
+use crate::verbs::check::CheckArgs;
 use crate::verbs::list::ListArgs;
 use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
@@ -21,10 +22,11 @@ Examples:
   pgs model --collisions 127000 --bodies 38880
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
+  pgs check
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 
-Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or unreadable input; 3 no usable board, or
+Exit codes: 0 done; 1 a comparison or a check failed; 2 wrong usage or unreadable input; 3 no usable board, or
 no rights; 4 hardware fault or deadline; 130 interrupted.";
 
 /// Steps rigid bodies on the zynq-pgs accelerator, real or emulated.
@@ -49,6 +51,7 @@ pub(crate) enum Verb {
     Model(ModelArgs),
     List(ListArgs),
     Load(LoadArgs),
+    Check(CheckArgs),
 }
 
 /// What holds for every verb.

@@ -26,6 +26,15 @@ pub(crate) struct Opened {
     pub(crate) reason: String,
 }
 
+/// A kind of board, as it is written on the command line and in results.
+pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
+    match kind {
+        BoardKind::Emulated => "emulated",
+        BoardKind::DevMem => "devmem",
+        _ => "uio",
+    }
+}
+
 /// Which kind of board a name on the command line means here, and why.
 pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
     match name {
@@ -48,20 +57,26 @@ pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
     }
 }
 
-/// A kind of board, as it is written on the command line and in results.
-pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
-    match kind {
-        BoardKind::Emulated => "emulated",
-        BoardKind::DevMem => "devmem",
-        _ => "uio",
-    }
+/// A board that was chosen and not opened yet.
+#[derive(Debug)]
+pub(crate) struct Chosen {
+    pub(crate) kind: BoardKind,
+    pub(crate) options: OpenOptions,
+    /// The emulated board, as its builder sees it; none for a real one.
+    pub(crate) observer: Option<EmulatedBoard>,
+    /// Why this board and no other.
+    pub(crate) reason: String,
 }
 
-/// Opens a board.
-pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Failure> {
+/// Chooses a board. `given` is an option of the command line that only an emulated one has.
+pub(crate) fn find(
+    common: &CommonArgs,
+    config: BoardConfig,
+    given: Option<&'static str>,
+) -> Result<Chosen, Failure> {
     let CommonArgs { board: name, memory, .. } = common;
     let (kind, reason) = choose(*name);
-    if kind == BoardKind::Emulated {
+    let (board, observer) = if kind == BoardKind::Emulated {
         if *name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
         }
@@ -69,31 +84,33 @@ pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Fai
             let error = "--memory is for real boards, this one is emulated and has its own";
             return Err(Failure::input(error).next("leave out --memory, or add --board uio"));
         }
-        let emulated = EmulatedBoard::new(build.config()).map_err(Failure::input)?;
-        let board = BoardChoice::Emulated(emulated.cpu_port());
-        let accelerator = accelerator(board, memory)?;
-        return Ok(Opened { accelerator, observer: Some(emulated), reason });
-    }
-    if let Some(option) = build.given() {
+        let emulated = EmulatedBoard::new(config).map_err(Failure::input)?;
+        (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
+    } else if let Some(option) = given {
         let error = format!("{option} says how to build an emulated board, this one is real");
         return Err(
             Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
         );
-    }
-    let board = match kind {
-        BoardKind::DevMem => BoardChoice::DevMem(DevMemWindows::default()),
-        _ => BoardChoice::Uio { node: UIO_NODE.to_owned() },
+    } else if kind == BoardKind::DevMem {
+        (BoardChoice::DevMem(DevMemWindows::default()), None)
+    } else {
+        (BoardChoice::Uio { node: UIO_NODE.to_owned() }, None)
     };
-    Ok(Opened { accelerator: accelerator(board, memory)?, observer: None, reason })
+    let options = OpenOptions { board, memory: memory.clone(), ..OpenOptions::default() };
+    Ok(Chosen { kind, options, observer, reason })
 }
 
-fn accelerator(board: BoardChoice, memory: &MemoryChoice) -> Result<Accelerator, Failure> {
-    let options = OpenOptions { board, memory: memory.clone(), ..OpenOptions::default() };
-    Accelerator::open(options).map_err(|error| {
-        Failure::new(Cause::NoBoard, error).next(
-            "see what there is with `pgs list`, or use the emulated board with --board emulated",
-        )
-    })
+/// Opens a board.
+pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Failure> {
+    let Chosen { options, observer, reason, .. } = find(common, build.config(), build.given())?;
+    let accelerator = Accelerator::open(options).map_err(unusable)?;
+    Ok(Opened { accelerator, observer, reason })
+}
+
+/// There is no board, or none that can be opened.
+pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
+    Failure::new(Cause::NoBoard, error)
+        .next("see what there is with `pgs list`, or use the emulated board with --board emulated")
 }
 
 impl Opened {

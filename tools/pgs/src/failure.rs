@@ -17,7 +17,7 @@ use std::process::ExitCode;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
     Done,
-    /// A comparison found differences.
+    /// A comparison found differences, or a check failed.
     Differs,
     /// Ctrl-C ended it between two steps.
     Interrupted,

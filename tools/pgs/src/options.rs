@@ -19,6 +19,12 @@ pub(crate) struct BuildArgs {
     /// Memory bandwidth in GB/s, or "unlimited" [default: 12.8]
     #[arg(long, value_name = "GBPS", value_parser = bandwidth)]
     bandwidth: Option<Bandwidth>,
+    /// Width of the DMA length registers in bits, 8 to 26 [default: 26]
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(8..=26))]
+    length_width: Option<u32>,
+    /// Width of DMA addresses in bits, 32 to 64 [default: 40]
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(32..=64))]
+    address_width: Option<u32>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -41,6 +47,8 @@ impl BuildArgs {
             ("--window", self.window.is_some()),
             ("--subnormals", self.subnormals.is_some()),
             ("--bandwidth", self.bandwidth.is_some()),
+            ("--length-width", self.length_width.is_some()),
+            ("--address-width", self.address_width.is_some()),
         ]
         .into_iter()
         .find_map(|(name, given)| given.then_some(name))
@@ -62,6 +70,8 @@ impl BuildArgs {
                 Some(SubnormalsName::Flush) => Subnormals::Flush,
             },
             bandwidth: self.bandwidth.unwrap_or(default.bandwidth),
+            length_width: self.length_width.unwrap_or(default.length_width),
+            address_width: self.address_width.unwrap_or(default.address_width),
             ..default
         }
     }

@@ -22,7 +22,7 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 
 #[test]
 fn every_help_has_an_example() {
-    for verb in [&[][..], &["run"], &["solve"], &["model"], &["list"], &["load"]] {
+    for verb in [&[][..], &["run"], &["solve"], &["model"], &["list"], &["load"], &["check"]] {
         let ran = run(verb.iter().copied().chain(["--help"]));
         assert_eq!(ran.code, Some(0), "{verb:?}");
         let example = format!("  pgs{}", verb.iter().map(|v| format!(" {v}")).collect::<String>());
@@ -95,6 +95,8 @@ fn options_of_the_emulated_board_are_refused_for_a_real_one() {
         ("--window", "64"),
         ("--subnormals", "flush"),
         ("--bandwidth", "unlimited"),
+        ("--length-width", "14"),
+        ("--address-width", "32"),
     ] {
         let ran = run(["--board", "uio", "run", option, value]);
         assert_eq!(ran.code, Some(2), "{}", ran.stderr);

@@ -1,5 +1,6 @@
 //! The verbs, one file each.
 
+pub(crate) mod check;
 pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
@@ -26,6 +27,7 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
         Verb::Model(args) => model::run(args, &command.common, out),
         Verb::List(args) => list::run(args, &command.common, out),
         Verb::Load(args) => load::run(args, &command.common, out),
+        Verb::Check(args) => check::run(args, &command.common, out),
     }
 }
 

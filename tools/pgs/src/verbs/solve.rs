@@ -29,6 +29,7 @@ const EXAMPLES: &str = "\
 Examples:
   pgs solve vectors/one_cube --compare
   pgs solve vectors/pile10_step90 --out result --digest
+  pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
   pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
 
 The folder holds one .npy array a property: params (8) and iterations (2); body_pos, body_linvel,
@@ -271,6 +272,13 @@ impl Solved {
             grouped(report.cycles.waits),
             milliseconds(report.modelled_time()),
             limit_text(report.limit()),
+        )?;
+        writeln!(
+            out,
+            "transfers  {} bytes to the board and {} back, in {} descriptors",
+            grouped(report.bytes_to_device),
+            grouped(report.bytes_from_device),
+            grouped(report.descriptors),
         )?;
         writeln!(
             out,

@@ -1,0 +1,288 @@
+//! This file tests what must hold before anything can be streamed, and leaves an open accelerator.
+
+use std::sync::Arc;
+
+use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MAX;
+use bitstream_model::interface::control::{IDENTIFICATION_VALUE, VERSION, VERSION_MAJOR, version};
+use bitstream_model::interface::profile::Profile;
+
+use super::report::{Line, Lines, Outcome};
+use crate::accelerator::{Capabilities, Control, ControlError, IdentityError, identify};
+use crate::axi_dma::{DmaError, STATE_CHANGE};
+use crate::error::OpenError;
+use crate::platform::{AccessCounts, RegisterMap, Window};
+use crate::step::{Accelerator, Core, Device, Found, check_given_width, connect, drain_interrupt};
+
+const SAME_DRIVER: &str = "use the driver that belongs to the bitstream";
+const CLOCK: &str = "load the bitstream, and look whether the clock of the PL runs";
+
+/// Goes through the stages of opening, one line each; `None` if the rest makes no sense.
+///
+/// The error is a board that cannot be reached at all.
+pub(super) fn bring_up(
+    found: Found,
+    length_width: Option<u32>,
+    lines: &mut Lines,
+) -> Result<Option<Accelerator>, OpenError> {
+    let Found { platform, description } = found;
+    check_given_width(length_width)?;
+    let counts = Arc::<AccessCounts>::default();
+    let window =
+        Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;
+    let Some(mut capabilities) = identity(&window, lines) else { return Ok(None) };
+
+    let mut cores = match connect(&*platform, &capabilities, &counts) {
+        Ok(cores) => cores,
+        Err(error) => {
+            let expected = format!("a region for each of {} cores", capabilities.mm2s_channels);
+            let next = "load the overlay that belongs to the bitstream";
+            lines.stop(Line::Regions, Outcome::failed(chain(&error), expected, next));
+            return Ok(None);
+        }
+    };
+    lines.ok(Line::Regions, format!("the control block and {} DMA cores", cores.len()));
+
+    let mut control = Control::new(window);
+    // Each is tried: several failures together point to their common reset.
+    let mut failed: Vec<String> = cores
+        .iter_mut()
+        .filter_map(|core| core.reset(&*platform).err())
+        .map(|error| match &error {
+            DmaError::State { channel, found, .. } => format!("{channel} in reset ({found})"),
+            error => chain(error),
+        })
+        .collect();
+    failed.extend(control.reset(&*platform).err().map(|error| match &error {
+        ControlError::Reset { found, .. } => {
+            format!("the accelerator in reset (RESET {found:#x})")
+        }
+        error => chain(error),
+    }));
+    if !failed.is_empty() {
+        let outcome = Outcome::failed(
+            failed.join("; "),
+            format!("every part out of reset within {STATE_CHANGE:?}"),
+            "look whether the part's reset input is released, its clock runs, and its memory port \
+             answers: an outstanding transfer holds a reset up",
+        );
+        lines.stop(Line::Reset, outcome);
+        return Ok(None);
+    }
+    lines.ok(
+        Line::Reset,
+        format!("{} DMA cores and the accelerator, within {STATE_CHANGE:?}", cores.len()),
+    );
+
+    if let Some(error) = cores.iter().find_map(|core| core.check_mode().err()) {
+        let next = match error {
+            DmaError::Gone { .. } => CLOCK,
+            _ => "build the bitstream's AXI DMA cores with their scatter-gather engine",
+        };
+        lines.stop(Line::Mode, Outcome::failed(chain(&error), "scatter-gather", next));
+        return Ok(None);
+    }
+    lines.ok(Line::Mode, format!("scatter-gather on {} channels", 2 * cores.len()));
+
+    let Some(width) = length(&mut cores, &capabilities, length_width, lines) else {
+        return Ok(None);
+    };
+    capabilities.length_width = width;
+    drain_interrupt(&*platform)?;
+    let device = Device::assemble(platform, control, capabilities, counts, cores);
+    Ok(Some(Accelerator::assemble(description, device)))
+}
+
+/// Identification, interface version and capabilities.
+fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
+    let identified = identify(window);
+    let refused = identified.as_ref().err().map(refused);
+    let stop = refused.as_ref().map(|(line, _)| *line);
+    if stop != Some(Line::Identification) {
+        lines.ok(Line::Identification, format!("{IDENTIFICATION_VALUE:#010x} (\"PGS1\")"));
+        if stop != Some(Line::Version) {
+            let word = window.read32(VERSION.offset);
+            let (major, minor) = (version::MAJOR.of(word), version::MINOR.of(word));
+            lines.ok(Line::Version, format!("{major}.{minor}"));
+        }
+    }
+    if let Some((line, outcome)) = refused {
+        lines.stop(line, outcome);
+        return None;
+    }
+    let capabilities = identified.ok()?;
+    if let Some((found, expected)) = contradiction(&capabilities) {
+        let next = "correct the capability registers of the bitstream";
+        lines.stop(Line::Capabilities, Outcome::failed(found, expected, next));
+        return None;
+    }
+    let profile = Profile::by_id(capabilities.profile_id).map_or("unknown", |found| found.name);
+    lines.ok(
+        Line::Capabilities,
+        format!(
+            "profile {profile}, {} + {} streams of 128 bits, {} kHz, up to {} bodies and {} shapes",
+            capabilities.mm2s_channels,
+            capabilities.s2mm_channels,
+            capabilities.clock_khz,
+            capabilities.body_capacity,
+            capabilities.shape_capacity,
+        ),
+    );
+    Some(capabilities)
+}
+
+/// The line that a refused bitstream fails at.
+fn refused(error: &IdentityError) -> (Line, Outcome) {
+    let (line, found, expected, next) = match error {
+        IdentityError::Gone => (
+            Line::Identification,
+            "all ones: nothing answers".to_owned(),
+            format!("{IDENTIFICATION_VALUE:#010x}"),
+            CLOCK,
+        ),
+        IdentityError::Identification { found } => (
+            Line::Identification,
+            format!("{found:#010x}"),
+            format!("{IDENTIFICATION_VALUE:#010x} (\"PGS1\")"),
+            "load the accelerator's bitstream, or correct the control block's address in the device \
+             tree",
+        ),
+        IdentityError::Version { major, minor } => {
+            (Line::Version, format!("{major}.{minor}"), format!("{VERSION_MAJOR}.x"), SAME_DRIVER)
+        }
+        IdentityError::Profile { found } => (
+            Line::Capabilities,
+            format!("profile {found}"),
+            "a profile that this driver knows".to_owned(),
+            SAME_DRIVER,
+        ),
+        IdentityError::Capability { register, found, expected } => (
+            Line::Capabilities,
+            format!("{register} {found:#010x}"),
+            (*expected).to_owned(),
+            SAME_DRIVER,
+        ),
+    };
+    (line, Outcome::failed(found, expected, next))
+}
+
+/// Capabilities that contradict each other: what was found, what was expected.
+fn contradiction(capabilities: &Capabilities) -> Option<(String, String)> {
+    let memory = u64::from(capabilities.memory_bytes);
+    let records = [
+        ("bodies", capabilities.body_capacity, capabilities.bytes_per_body),
+        ("collisions", capabilities.collision_capacity, capabilities.bytes_per_collision),
+    ];
+    records.into_iter().find_map(|(what, capacity, bytes)| {
+        let needed = u64::from(capacity) * u64::from(bytes);
+        if capacity == 0 {
+            return Some((format!("room for no {what}"), format!("room for {what}")));
+        }
+        (needed > memory).then(|| {
+            (
+                format!("{capacity} {what} of {bytes} bytes, which take {needed} bytes"),
+                format!("no more than the {memory} bytes of on-chip memory"),
+            )
+        })
+    })
+}
+
+/// The width of the length registers; the lines that follow go on with the one found.
+fn length(
+    cores: &mut [Core],
+    capabilities: &Capabilities,
+    given: Option<u32>,
+    lines: &mut Lines,
+) -> Option<u32> {
+    let expected = given.unwrap_or(capabilities.length_width);
+    let source = if given.is_some() { "as given" } else { "as the bitstream says" };
+    let mut widths = Vec::new();
+    for core in cores.iter_mut() {
+        match core.length_widths() {
+            Ok(of_core) => widths.extend(of_core),
+            Err(error) => {
+                let next = "look whether the region is that of an AXI DMA";
+                let outcome = Outcome::failed(chain(&error), format!("{expected} bits"), next);
+                lines.stop(Line::Length, outcome);
+                return None;
+            }
+        }
+    }
+    let narrowest = widths.iter().map(|(_, width)| *width).min()?;
+    let wrong: Vec<_> = widths.iter().filter(|(_, width)| *width != expected).collect();
+    let channels = widths.len();
+    if wrong.is_empty() {
+        let narrow = match expected {
+            LENGTH_WIDTH_MAX => "",
+            _ => "; a width of 26 would take fewer descriptors",
+        };
+        let detail = format!("{expected} bits on {channels} channels, {source}{narrow}");
+        lines.ok(Line::Length, detail);
+        return Some(narrowest);
+    }
+    let found = if wrong.len() == channels && wrong.iter().all(|(_, width)| *width == narrowest) {
+        format!("{narrowest} bits on all {channels} channels")
+    } else {
+        let of_channels: Vec<_> =
+            wrong.iter().map(|(name, width)| format!("{name} {width} bits")).collect();
+        of_channels.join(", ")
+    };
+    let next = format!(
+        "build the AXI DMA cores with a length register of {LENGTH_WIDTH_MAX} bits (they have 14 \
+         unless told otherwise) and say so in the bitstream's DMA register; until then, open the \
+         board with a length width of {narrowest}"
+    );
+    lines.set(Line::Length, Outcome::failed(found, format!("{expected} bits, {source}"), next));
+    Some(narrowest)
+}
+
+/// An error with its causes.
+pub(super) fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(error) = source {
+        text = format!("{text}: {error}");
+        source = error.source();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accelerator::fake;
+    use crate::platform::fake::FakeRegisters;
+
+    #[test]
+    fn capabilities_that_contradict_each_other_are_named() {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        let good = identify(&registers.window(RegisterMap::Control)).expect("well formed");
+        assert_eq!(contradiction(&good), None);
+        // 4 MiB hold 174,762 bodies of 24 bytes and 262,144 collisions of 16.
+        let cases = [
+            (Capabilities { body_capacity: 174_763, ..good }, "174763 bodies of 24 bytes"),
+            (Capabilities { collision_capacity: 262_145, ..good }, "262145 collisions"),
+            (Capabilities { body_capacity: 0, ..good }, "room for no bodies"),
+        ];
+        for (capabilities, text) in cases {
+            let (found, _) = contradiction(&capabilities).expect(text);
+            assert!(found.contains(text), "{found}");
+        }
+        assert_eq!(contradiction(&Capabilities { body_capacity: 174_762, ..good }), None);
+    }
+
+    #[test]
+    fn a_capability_register_that_makes_no_sense_fails_the_third_line_alone() {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        registers.with(|state| state.values.insert(0x110, 0x0503));
+        let mut lines = Lines::default();
+        assert!(identity(&registers.window(RegisterMap::Control), &mut lines).is_none());
+        let lines = lines.finish();
+        assert_eq!(lines[1].outcome, Outcome::ok("1.0"));
+        assert!(
+            matches!(&lines[2].outcome, Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503")
+        );
+        assert!(matches!(&lines[3].outcome, Outcome::Skipped { .. }));
+    }
+}

@@ -1,0 +1,54 @@
+//! The start-up self-test: whether a board is built and described as the driver needs it.
+//!
+//! ```text
+//! bring-up: identification, interface version, capabilities, register regions, reset,
+//!           dma mode, length register                            stops at the first failure
+//! streams:  echo, sums, coherency, interrupt                     each by itself
+//! ```
+//!
+//! An echo is a step without collisions and without integration: every bitstream returns poses and
+//! velocities bit for bit. `pattern.rs` makes what is sent, `judge.rs` looks at what came back.
+
+mod bring_up;
+mod judge;
+mod pattern;
+mod report;
+mod streams;
+
+pub use report::{CheckLine, CheckReport, Outcome};
+
+use crate::error::Error;
+use crate::step::{OpenOptions, find};
+use report::Lines;
+
+/// Tests a board from its identification to its interrupt. Every wait is bounded: it takes well
+/// under a second on a good board, a few on a bad one.
+///
+/// The board is reset. Nothing else may use it meanwhile, and it must be opened anew afterwards.
+///
+/// ```
+/// use zynq_pgs::{OpenOptions, Outcome, check};
+///
+/// # fn main() -> Result<(), zynq_pgs::Error> {
+/// let report = check(OpenOptions::default())?;
+/// for line in &report.lines {
+///     if let Outcome::Failed { found, expected, next } = &line.outcome {
+///         eprintln!("{}: expected {expected}, found {found}: {next}", line.name);
+///     }
+/// }
+/// assert!(report.passed());
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// [`Error::Open`] if there is no board to be tested, or it cannot be reached.
+pub fn check(options: OpenOptions) -> Result<CheckReport, Error> {
+    let found = find(&options)?;
+    let board = found.description.clone();
+    let mut lines = Lines::default();
+    if let Some(accelerator) = bring_up::bring_up(found, options.length_width, &mut lines)? {
+        streams::streams(accelerator, &mut lines);
+    }
+    Ok(CheckReport { board, lines: lines.finish() })
+}

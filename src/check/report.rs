@@ -1,0 +1,179 @@
+//! This file says what a self-test reports: one line for each thing tested, in a fixed order.
+
+use crate::step::BoardDescription;
+
+/// What was tested, and how it went.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct CheckReport {
+    /// Which board.
+    pub board: BoardDescription,
+    /// All lines, always the same ones in the same order.
+    pub lines: Vec<CheckLine>,
+}
+
+impl CheckReport {
+    /// Whether no line failed.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        !self.lines.iter().any(|line| matches!(line.outcome, Outcome::Failed { .. }))
+    }
+}
+
+/// One thing that was tested.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct CheckLine {
+    /// What.
+    pub name: &'static str,
+    /// How it went.
+    pub outcome: Outcome,
+}
+
+/// How a test went.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Outcome {
+    /// As it should.
+    Ok {
+        /// What was seen.
+        detail: String,
+    },
+    /// Not as it should.
+    Failed {
+        /// What was seen.
+        found: String,
+        /// What should have been.
+        expected: String,
+        /// What to do.
+        next: String,
+    },
+    /// It was not tested.
+    Skipped {
+        /// Why not.
+        reason: String,
+    },
+}
+
+impl Outcome {
+    pub(super) fn ok(detail: impl Into<String>) -> Self {
+        Self::Ok { detail: detail.into() }
+    }
+
+    pub(super) fn failed(
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        next: impl Into<String>,
+    ) -> Self {
+        Self::Failed { found: found.into(), expected: expected.into(), next: next.into() }
+    }
+
+    pub(super) fn skipped(reason: impl Into<String>) -> Self {
+        Self::Skipped { reason: reason.into() }
+    }
+}
+
+/// What is tested, in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Line {
+    Identification,
+    Version,
+    Capabilities,
+    Regions,
+    Reset,
+    Mode,
+    Length,
+    Echo,
+    Sums,
+    Coherency,
+    Interrupt,
+}
+
+impl Line {
+    const ALL: [Self; 11] = [
+        Self::Identification,
+        Self::Version,
+        Self::Capabilities,
+        Self::Regions,
+        Self::Reset,
+        Self::Mode,
+        Self::Length,
+        Self::Echo,
+        Self::Sums,
+        Self::Coherency,
+        Self::Interrupt,
+    ];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Identification => "identification",
+            Self::Version => "interface version",
+            Self::Capabilities => "capabilities",
+            Self::Regions => "register regions",
+            Self::Reset => "reset",
+            Self::Mode => "dma mode",
+            Self::Length => "length register",
+            Self::Echo => "echo",
+            Self::Sums => "sums",
+            Self::Coherency => "coherency",
+            Self::Interrupt => "interrupt",
+        }
+    }
+}
+
+/// The lines so far.
+#[derive(Debug, Default)]
+pub(super) struct Lines {
+    outcomes: [Option<Outcome>; Line::ALL.len()],
+    /// The line after whose failure there is nothing left to test.
+    stopped_at: Option<Line>,
+}
+
+impl Lines {
+    /// Notes how a line went.
+    pub(super) fn set(&mut self, line: Line, outcome: Outcome) {
+        self.outcomes[line as usize] = Some(outcome);
+    }
+
+    pub(super) fn ok(&mut self, line: Line, detail: impl Into<String>) {
+        self.set(line, Outcome::ok(detail));
+    }
+
+    /// Notes a failure after which the rest makes no sense.
+    pub(super) fn stop(&mut self, line: Line, outcome: Outcome) {
+        self.set(line, outcome);
+        self.stopped_at = Some(line);
+    }
+
+    /// All lines; those without an outcome were skipped.
+    pub(super) fn finish(self) -> Vec<CheckLine> {
+        let reason = match self.stopped_at {
+            Some(line) => format!("needs the line \"{}\"", line.name()),
+            None => "not reached".to_owned(),
+        };
+        let lines = Line::ALL.into_iter().zip(self.outcomes);
+        lines
+            .map(|(line, outcome)| CheckLine {
+                name: line.name(),
+                outcome: outcome.unwrap_or_else(|| Outcome::skipped(reason.clone())),
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_outcome_was_skipped_for_what_failed() {
+        let mut lines = Lines::default();
+        lines.ok(Line::Identification, "fine");
+        lines.stop(Line::Reset, Outcome::failed("a", "b", "c"));
+        let lines = lines.finish();
+        let names: Vec<_> = lines.iter().map(|line| line.name).collect();
+        assert_eq!(names, Line::ALL.map(Line::name));
+        assert!(Line::ALL.iter().enumerate().all(|(index, line)| *line as usize == index));
+        assert_eq!(lines[10].outcome, Outcome::skipped("needs the line \"reset\""));
+    }
+}

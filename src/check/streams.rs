@@ -1,0 +1,245 @@
+//! This file tests what only streaming shows: that data arrives, is the newest, and is announced.
+
+use std::time::Duration;
+
+use bitstream_model::interface::record::Beat;
+
+use super::bring_up::chain;
+use super::judge::{Difference, Origin, Run, judge};
+use super::pattern;
+use super::report::{Line, Lines, Outcome};
+use crate::beat::unpack::sum_of_words;
+use crate::error::Error;
+use crate::step::{Accelerator, ECHO_LIMIT, Echo, Echoed};
+
+/// Bodies of the echoes: the least, odd numbers that leave channels of different lengths, and one
+/// that fills a length register of 14 bits more than once.
+const SIZES: [u32; 4] = [1, 7, 101, 4099];
+/// Up to this size the packets are cut into short pieces.
+const SHORT_PIECES_UP_TO: u32 = 101;
+/// Bodies of a round of the coherency test: more than the lines of a first-level cache.
+const COHERENCY_BODIES: u32 = 1501;
+const COHERENCY_ROUNDS: u32 = 3;
+const INTERRUPT_STEPS: u64 = 3;
+/// How long to listen for an interrupt that nothing asked for.
+const QUIET: Duration = Duration::from_millis(2);
+
+/// Runs the lines that stream.
+pub(super) fn streams(mut accelerator: Accelerator, lines: &mut Lines) {
+    if let Err(error) = accelerator.set_shapes(&pattern::SHAPES) {
+        let next = "load the bitstream anew";
+        lines.stop(Line::Echo, Outcome::failed(chain(&error), "shapes that can be loaded", next));
+        return;
+    }
+    let runs = match echoes(&mut accelerator, lines) {
+        Ok(runs) => runs,
+        Err(outcome) => {
+            lines.stop(Line::Echo, outcome);
+            return;
+        }
+    };
+    lines.set(Line::Sums, sums(&runs));
+    let outcome = coherency(&mut accelerator).unwrap_or_else(|outcome| outcome);
+    lines.set(Line::Coherency, outcome);
+    let outcome = interrupt(&mut accelerator).unwrap_or_else(|outcome| outcome);
+    lines.set(Line::Interrupt, outcome);
+}
+
+/// Sizes that the bitstream has room for.
+fn fitting(accelerator: &Accelerator, bodies: u32) -> u32 {
+    let capabilities = accelerator.capabilities();
+    let room = capabilities.memory_bytes / capabilities.bytes_per_body.max(1);
+    bodies.min(capabilities.body_capacity).min(room).max(1)
+}
+
+/// A step that did not end as it should.
+fn step_failed(error: &Error) -> Outcome {
+    Outcome::failed(
+        chain(error),
+        format!("a step without collisions to end within {ECHO_LIMIT:?}"),
+        "look whether the named channel's stream is connected to the accelerator and its memory \
+         port is enabled, and whether the addresses of the buffers are mapped for it in the block \
+         design",
+    )
+}
+
+/// Sends patterns of several sizes through fresh buffers. The error is a step that failed.
+fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<Echoed>, Outcome> {
+    let channels = accelerator.capabilities().mm2s_channels;
+    let mut sizes = SIZES.map(|size| fitting(accelerator, size)).to_vec();
+    sizes.dedup();
+    let mut runs = Vec::new();
+    let mut failure = None;
+    for (seed, size) in (1..).zip(&sizes) {
+        let bodies = pattern::bodies(seed, *size);
+        let echo = Echo {
+            bodies: &bodies,
+            short_pieces: *size <= SHORT_PIECES_UP_TO,
+            fresh_buffers: true,
+            dirt: None,
+        };
+        let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
+        let expected = pattern::results(&bodies, channels);
+        let run = Run { bodies: bodies.len(), expected: &expected, before: None };
+        if let Some(difference) = judge(&run, &echoed) {
+            let expected = format!("a pattern of {size} bodies back bit for bit");
+            let next = advice(&difference);
+            failure.get_or_insert(Outcome::failed(difference.to_string(), expected, next));
+        }
+        runs.push(echoed);
+    }
+    let descriptors: u64 = runs.iter().map(|run| run.descriptors).sum();
+    let detail = || {
+        let sizes: Vec<_> = sizes.iter().map(u32::to_string).collect();
+        format!(
+            "patterns of {} bodies came back bit for bit through {channels} + {channels} channels, \
+             {descriptors} descriptors",
+            sizes.join(", ")
+        )
+    };
+    lines.set(Line::Echo, failure.unwrap_or_else(|| Outcome::ok(detail())));
+    Ok(runs)
+}
+
+/// What to do about wrong data.
+fn advice(difference: &Difference) -> &'static str {
+    match difference.origin {
+        Origin::StaleRead | Origin::StaleResult => {
+            "do not map the buffers as coherent: let the driver synchronise them, or make the path \
+             coherent (a coherent port, its cache attributes and snooping, and dma-coherent in the \
+             device tree, all of them)"
+        }
+        Origin::Elsewhere(_) => {
+            "look whether streams are exchanged between the cores and the accelerator"
+        }
+        Origin::Unknown => {
+            "look whether the widths of the memory ports, which boot software sets, are those of \
+             the bitstream, and whether the streams meet timing"
+        }
+    }
+}
+
+/// Compares the accelerator's sums with ours.
+fn sums(runs: &[Echoed]) -> Outcome {
+    for run in runs {
+        let Some((received, answered)) = run.sums else {
+            return Outcome::skipped("this bitstream does not sum its words");
+        };
+        let found = run
+            .results
+            .iter()
+            .fold(0u32, |sum, beats: &Vec<Beat>| sum.wrapping_add(sum_of_words(beats)));
+        let sides = [
+            ("arrived at the accelerator", received, run.sent, "before"),
+            ("came back", found, answered, "behind"),
+        ];
+        for (what, found, expected, side) in sides {
+            if found != expected {
+                return Outcome::failed(
+                    format!("words that add up to {found:#010x} {what}"),
+                    format!("{expected:#010x}"),
+                    format!("look for the damage {side} the accelerator: memory, port or stream"),
+                );
+            }
+        }
+    }
+    Outcome::ok(format!("both directions agree in {} steps", runs.len()))
+}
+
+/// Sends pattern after pattern through the same buffers, dirtied in between.
+fn coherency(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
+    let channels = accelerator.capabilities().mm2s_channels;
+    let size = fitting(accelerator, COHERENCY_BODIES);
+    let mut before: Option<Vec<Vec<Beat>>> = None;
+    for round in 0..COHERENCY_ROUNDS {
+        let bodies = pattern::bodies(0x100 + round, size);
+        let echo = Echo {
+            bodies: &bodies,
+            short_pieces: false,
+            fresh_buffers: round == 0,
+            dirt: Some(pattern::dirt),
+        };
+        let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
+        let expected = pattern::results(&bodies, channels);
+        let run = Run { bodies: bodies.len(), expected: &expected, before: before.as_deref() };
+        if let Some(difference) = judge(&run, &echoed) {
+            return Ok(Outcome::failed(
+                difference.to_string(),
+                format!("the pattern of round {} of {COHERENCY_ROUNDS}", round + 1),
+                advice(&difference),
+            ));
+        }
+        before = Some(expected);
+    }
+    Ok(Outcome::ok(format!(
+        "{COHERENCY_ROUNDS} rounds of {size} bodies through dirtied buffers, nothing stale"
+    )))
+}
+
+/// Looks whether every step's end raises the interrupt, and nothing else does.
+fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
+    let unusable = |error: crate::platform::PlatformError| {
+        let next = "look whether the device tree gives the node an interrupt";
+        Outcome::failed(chain(&error), "an interrupt that can be waited for", next)
+    };
+    // One event may still stand from before; a second one has no source.
+    let mut events = 0;
+    while events < 2 && accelerator.interrupt_within(QUIET).map_err(unusable)? {
+        events += 1;
+    }
+    if events == 2 {
+        return Err(Outcome::failed(
+            "interrupts that come again although nothing asks for one",
+            "none while every source is quiet",
+            "look whether the line's type in the device tree is level, active high (4), and what \
+             else drives it",
+        ));
+    }
+    let bodies = pattern::bodies(0x200, fitting(accelerator, COHERENCY_BODIES));
+    let mut woken = 0;
+    for _ in 0..INTERRUPT_STEPS {
+        let echo = Echo { bodies: &bodies, short_pieces: false, fresh_buffers: false, dirt: None };
+        let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
+        woken += u64::from(echoed.interrupts > 0);
+    }
+    if woken < INTERRUPT_STEPS {
+        return Err(Outcome::failed(
+            format!(
+                "{woken} of {INTERRUPT_STEPS} steps ended with an interrupt, the others were found by looking"
+            ),
+            "an interrupt at the end of every step",
+            "look whether the interrupt output of the PL is connected and enabled, and whether its \
+             number in the device tree is right: it is the interrupt controller's less 32",
+        ));
+    }
+    Ok(Outcome::ok(format!("ended each of {INTERRUPT_STEPS} steps, quiet in between")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run of one beat whose words add up to 10.
+    fn run(sent: u32, sums: Option<(u32, u32)>) -> Echoed {
+        let results = vec![vec![Beat([1, 2, 3, 4])], Vec::new()];
+        Echoed { results, sent, sums, interrupts: 1, descriptors: 1 }
+    }
+
+    #[test]
+    fn sums_say_on_which_side_of_the_accelerator_words_were_damaged() {
+        let good = || run(7, Some((7, 10)));
+        assert!(matches!(sums(&[good(), good()]), Outcome::Ok { .. }));
+        for (bad, value, side) in [
+            (run(7, Some((8, 10))), "0x00000008 arrived", "before the accelerator"),
+            (run(7, Some((7, 11))), "0x0000000a came back", "behind the accelerator"),
+        ] {
+            let outcome = sums(&[good(), bad]);
+            assert!(
+                matches!(&outcome, Outcome::Failed { found, next, .. }
+                    if found.contains(value) && next.contains(side)),
+                "{outcome:?}"
+            );
+        }
+        assert!(matches!(sums(&[run(7, None)]), Outcome::Skipped { .. }));
+    }
+}

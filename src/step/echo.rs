@@ -1,0 +1,157 @@
+//! This file runs a step that changes nothing: no collisions, no integration, so that every
+//! bitstream returns poses and velocities bit for bit. The self-test looks at what came back.
+
+use std::time::Duration;
+
+use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MIN;
+use bitstream_model::interface::record::Beat;
+
+use super::fault::Fault;
+use super::plan::{Plan, bytes};
+use super::solver::Accelerator;
+use crate::axi_dma::{Direction, largest_piece};
+use crate::beat::stripe::{Place, Segment};
+use crate::error::Error;
+use crate::platform::{Deadline, PlatformError};
+use crate::scene::{Body, Collision, StepParameters};
+
+/// How long an echo may take. A quarter of it passes before the driver looks without an interrupt.
+pub(crate) const ECHO_LIMIT: Duration = Duration::from_millis(200);
+
+/// What a buffer is filled with before it is used: direction, channel, beat.
+pub(crate) type Dirt = fn(Direction, usize, usize) -> Beat;
+
+/// What to send, and how.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Echo<'a> {
+    /// The bodies. They need not be valid: nothing is computed with them.
+    pub(crate) bodies: &'a [Body],
+    /// Whether to cut every packet into the shortest pieces, for many descriptors.
+    pub(crate) short_pieces: bool,
+    /// Whether buffers of an earlier run are given up first.
+    pub(crate) fresh_buffers: bool,
+    /// What to write over all buffers first.
+    pub(crate) dirt: Option<Dirt>,
+}
+
+/// What came back.
+#[derive(Debug)]
+pub(crate) struct Echoed {
+    /// The result beats of each channel.
+    pub(crate) results: Vec<Vec<Beat>>,
+    /// Sum of the words sent.
+    pub(crate) sent: u32,
+    /// The accelerator's sums of words received and sent, if it has any.
+    pub(crate) sums: Option<(u32, u32)>,
+    /// Interrupts that woke the driver.
+    pub(crate) interrupts: u64,
+    /// Descriptors used.
+    pub(crate) descriptors: u64,
+}
+
+impl Accelerator {
+    /// Runs an echo. After an error the board was reset, if it could be.
+    pub(crate) fn echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Error> {
+        if self.device.dead {
+            return Err(Error::MustReopen);
+        }
+        let largest = self.device.largest;
+        if echo.short_pieces {
+            self.device.largest = largest_piece(LENGTH_WIDTH_MIN);
+        }
+        let echoed = self.run_echo(echo);
+        self.device.largest = largest;
+        echoed.map_err(|fault| self.device.fail(fault, &self.shapes))
+    }
+
+    fn run_echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Fault> {
+        let plan = plan(echo.bodies.len(), self.device.mm2s.len());
+        if echo.fresh_buffers {
+            self.device.lanes_mut().for_each(super::lane::Lane::drop_buffer);
+        }
+        self.device.reserve_or_reset(&plan, &self.shapes)?;
+        if let Some(dirt) = echo.dirt {
+            let sides = [
+                (Direction::Mm2s, &mut self.device.mm2s),
+                (Direction::S2mm, &mut self.device.s2mm),
+            ];
+            for (direction, lanes) in sides {
+                for (channel, lane) in lanes.iter_mut().enumerate() {
+                    for (slot, beat) in lane.beats_mut().iter_mut().enumerate() {
+                        *beat = dirt(direction, channel, slot);
+                    }
+                }
+            }
+        }
+        let none: &[Collision] = &[];
+        let sent = self.pack(&plan, echo.bodies, none);
+        let parameters = StepParameters {
+            contact_iterations: 0,
+            friction_iterations: 0,
+            integrate: false,
+            deadline: Some(ECHO_LIMIT),
+            ..StepParameters::default()
+        };
+        let deadline = Deadline::after(&*self.device.platform, ECHO_LIMIT);
+        self.device.start(&plan, &parameters)?;
+        let interrupts = self.device.wait(&plan, &deadline)?;
+        let counters = self.device.collect(&deadline)?;
+        self.device.take_back()?;
+        let mut channels = Default::default();
+        self.results(&plan, &mut channels);
+        Ok(Echoed {
+            results: channels[..plan.channels].iter().map(|beats| beats.to_vec()).collect(),
+            sent: sent.velocities.wrapping_add(sent.poses),
+            sums: counters.sums,
+            interrupts,
+            descriptors: self.device.descriptors(),
+        })
+    }
+
+    /// Whether an interrupt comes within `timeout`, which is then let through again.
+    pub(crate) fn interrupt_within(&mut self, timeout: Duration) -> Result<bool, PlatformError> {
+        let came = self.device.platform.wait_interrupt(timeout)?.is_some();
+        if came {
+            self.device.platform.unmask_interrupt()?;
+        }
+        Ok(came)
+    }
+}
+
+fn plan(bodies: usize, channels: usize) -> Plan {
+    Plan { bodies, collisions: 0, passes: 0, channels }
+}
+
+/// The MM2S channel on which a beat of the results was sent, and its offset in that channel's
+/// buffer, bytes.
+pub(crate) fn source_of(bodies: usize, channels: usize, result: Place) -> (usize, u64) {
+    let index = result.slot * channels + result.channel;
+    let per_record = Segment::Results.beats_per_record();
+    let (record, beat) = (index / per_record, index % per_record);
+    // A result is the pose and then the velocity.
+    let poses = Segment::Poses.beats_per_record();
+    let (place, start) = if beat < poses {
+        let place = Segment::Poses.place(record, beat, channels);
+        (place, plan(bodies, channels).segments(place.channel).poses.start)
+    } else {
+        (Segment::Velocities.place(record, beat - poses, channels), 0)
+    };
+    (place.channel, bytes(start + place.slot))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_result_is_traced_to_the_beat_that_was_sent() {
+        let at = |channel, slot| source_of(7, 4, Place { channel, slot });
+        // Body 0: pose on channels 0 and 1, velocity on 0 and 1. Seven bodies are four beats of
+        // velocities on channel 0, so that the poses begin at beat 4.
+        assert_eq!([at(0, 0), at(1, 0), at(2, 0), at(3, 0)], [(0, 64), (1, 64), (0, 0), (1, 0)]);
+        // Body 1: its pose is beats 2 and 3.
+        assert_eq!([at(0, 1), at(3, 1)], [(2, 64), (3, 0)]);
+        // Body 6: beats 12 and 13.
+        assert_eq!([at(1, 6), at(2, 6)], [(1, 64 + 48), (0, 48)]);
+    }
+}

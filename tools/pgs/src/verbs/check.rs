@@ -1,0 +1,148 @@
+//! The verb `check`: the start-up self-test of a board, line by line.
+
+use std::io::Write;
+
+use bitstream_model::{BoardConfig, Coherency, InterruptWiring, Quirks, Resettable};
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
+
+use super::SCHEMA;
+use crate::args::CommonArgs;
+use crate::board::{self, Chosen};
+use crate::failure::{Failure, Verdict};
+use crate::options::BuildArgs;
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs check
+  pgs check --json
+  pgs check --board emulated --quirk stale     see what a failure looks like
+
+Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
+3 if there is no board.";
+
+/// Test a board: identity, reset, DMA, data both ways, coherency, interrupt; what to do if it fails.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct CheckArgs {
+    /// Build the emulated board wrongly, to see what the test says
+    #[arg(long, value_enum, value_name = "QUIRK", help_heading = "Emulated board")]
+    quirk: Option<QuirkName>,
+    #[command(flatten)]
+    build: BuildArgs,
+}
+
+/// A way to build the emulated board wrongly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum QuirkName {
+    /// Another design's identification
+    Identity,
+    /// Interface version 2.0
+    Version,
+    /// Length registers of 14 bits where the bitstream says another width
+    Length14,
+    /// The interrupt line is not connected
+    NoInterrupt,
+    /// The interrupt line is always high
+    StuckInterrupt,
+    /// The device reads stale data
+    Stale,
+    /// The CPU finds stale results
+    StaleResults,
+    /// The second DMA core stays in reset
+    HeldReset,
+}
+
+impl QuirkName {
+    /// From here on buffers are stale: an offset to be found in the report.
+    const STALE_FROM: usize = 0x400;
+
+    fn quirks(self) -> Quirks {
+        let from_byte = Self::STALE_FROM;
+        let mut quirks = Quirks::default();
+        match self {
+            Self::Identity => quirks.identification = 0xFFFF_0000,
+            Self::Version => quirks.version = 0x0002_0000,
+            Self::Length14 => quirks.length_register = Some(14),
+            Self::NoInterrupt => quirks.interrupt = InterruptWiring::Disconnected,
+            Self::StuckInterrupt => quirks.interrupt = InterruptWiring::StuckHigh,
+            Self::Stale => quirks.coherency = Coherency::StaleReads { from_byte },
+            Self::StaleResults => quirks.coherency = Coherency::StaleWrites { from_byte },
+            Self::HeldReset => quirks.held_reset = Some(Resettable::Dma(1)),
+        }
+        quirks
+    }
+}
+
+impl CheckArgs {
+    fn config(&self) -> BoardConfig {
+        let quirks = self.quirk.map(QuirkName::quirks).unwrap_or_default();
+        BoardConfig { quirks, ..self.build.config() }
+    }
+
+    /// The first option that only an emulated board has.
+    fn given(&self) -> Option<&'static str> {
+        self.quirk.map(|_| "--quirk").or(self.build.given())
+    }
+}
+
+/// Tests the board.
+pub(crate) fn run(
+    args: &CheckArgs,
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    let Chosen { kind, options, reason, .. } = board::find(common, args.config(), args.given())?;
+    let report = check(options).map_err(board::unusable)?;
+    let kind = board::kind_text(kind);
+    if common.json {
+        let document = json!({
+            "schema": SCHEMA,
+            "verb": "check",
+            "board": { "kind": kind, "reason": reason },
+            "passed": report.passed(),
+            "lines": report.lines.iter().map(line_json).collect::<Vec<_>>(),
+        });
+        writeln!(out, "{document:#}")?;
+    } else {
+        writeln!(out, "board {kind} ({reason})")?;
+        print(&report, out)?;
+    }
+    Ok(if report.passed() { Verdict::Done } else { Verdict::Differs })
+}
+
+fn line_json(line: &CheckLine) -> Value {
+    let mut value = match &line.outcome {
+        Outcome::Ok { detail } => json!({ "outcome": "ok", "detail": detail }),
+        Outcome::Failed { found, expected, next } => {
+            json!({ "outcome": "failed", "found": found, "expected": expected, "next": next })
+        }
+        Outcome::Skipped { reason } => json!({ "outcome": "skipped", "reason": reason }),
+        _ => json!({ "outcome": "unknown" }),
+    };
+    value["name"] = line.name.into();
+    value
+}
+
+fn print(report: &CheckReport, out: &mut dyn Write) -> std::io::Result<()> {
+    let (mut failed, mut skipped) = (0, 0);
+    for CheckLine { name, outcome, .. } in &report.lines {
+        match outcome {
+            Outcome::Ok { detail } => writeln!(out, "ok    {name:<18} {detail}")?,
+            Outcome::Failed { found, expected, next } => {
+                failed += 1;
+                writeln!(out, "FAIL  {name:<18} found {found}")?;
+                writeln!(out, "      {:<18} expected {expected}", "")?;
+                writeln!(out, "      {:<18} next: {next}", "")?;
+            }
+            Outcome::Skipped { reason } => {
+                skipped += 1;
+                writeln!(out, "skip  {name:<18} {reason}")?;
+            }
+            _ => writeln!(out, "?     {name:<18}")?,
+        }
+    }
+    let passed = report.lines.len() - failed - skipped;
+    writeln!(out, "{passed} ok, {failed} failed, {skipped} skipped")
+}
