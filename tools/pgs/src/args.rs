@@ -7,6 +7,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::verbs::check::CheckArgs;
 use crate::verbs::list::ListArgs;
+use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
 use crate::verbs::run::RunArgs;
 use crate::verbs::solve::SolveArgs;
@@ -18,6 +19,7 @@ Examples:
   pgs solve vectors/one_cube --compare
   pgs model --collisions 127000 --bodies 38880
   pgs list --json
+  pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
@@ -46,6 +48,7 @@ pub(crate) enum Verb {
     Solve(SolveArgs),
     Model(ModelArgs),
     List(ListArgs),
+    Load(LoadArgs),
     Check(CheckArgs),
 }
 

@@ -148,7 +148,7 @@ pub(super) fn limit_text(limit: Limit) -> &'static str {
     match limit {
         Limit::Pipeline => "pipeline",
         Limit::Hazards => "hazards",
-        Limit::Streams => "memory",
+        Limit::Streams => "streams",
         _ => "other",
     }
 }
