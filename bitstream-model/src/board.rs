@@ -294,6 +294,9 @@ impl Board {
             (Direction::S2mm, self.outputs.get_mut(number))
         };
         let Some(stream) = stream else { return (0, false) };
+        if self.config.quirks.unconnected == Some((number, direction)) {
+            return (0, false);
+        }
         let mut with =
             Surroundings { memory: &mut self.memory, log: &mut self.log, moved: &mut self.moved };
         self.cores[number].run(direction, start, end, limit, stream, &mut with)

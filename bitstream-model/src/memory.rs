@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::cast::index;
 use crate::interface::address_map::{DDR_HIGH, DDR_LOW};
 use crate::interface::record::{BEAT_BYTES, Beat};
-use crate::quirks::Coherency;
+use crate::quirks::{Coherency, stale_from};
 
 /// What the device may do with a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -285,15 +285,6 @@ impl Memory {
         self.words(address, 1)?[0].store(value, Ordering::Release);
         Ok(())
     }
-}
-
-/// `beats` with what `stale` holds from that byte on.
-fn stale_from(from_byte: usize, mut beats: Box<[Beat]>, stale: Option<&[Beat]>) -> Box<[Beat]> {
-    let Some(stale) = stale else { return beats };
-    for (beat, stale) in beats.iter_mut().zip(stale).skip(from_byte.div_ceil(BEAT_BYTES)) {
-        *beat = *stale;
-    }
-    beats
 }
 
 #[cfg(test)]

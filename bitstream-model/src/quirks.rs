@@ -3,8 +3,10 @@
 //!
 //! Unlike a [`Fault`](crate::Fault), which happens once, they last as long as the board.
 
+use crate::axi_dma::Direction;
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use crate::interface::control::{IDENTIFICATION, VERSION};
+use crate::interface::record::{BEAT_BYTES, Beat};
 
 /// Where the interrupt line leads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -66,6 +68,8 @@ pub struct Quirks {
     pub coherency: Coherency,
     /// A part that stays in reset from power-up on.
     pub held_reset: Option<Resettable>,
+    /// A stream between a DMA core and the accelerator that carries nothing.
+    pub unconnected: Option<(usize, Direction)>,
 }
 
 impl Default for Quirks {
@@ -77,6 +81,7 @@ impl Default for Quirks {
             interrupt: InterruptWiring::default(),
             coherency: Coherency::default(),
             held_reset: None,
+            unconnected: None,
         }
     }
 }
@@ -89,4 +94,17 @@ impl Quirks {
             .into_iter()
             .map(move |width| ("true length register width", width.into(), low, high))
     }
+}
+
+/// `beats` with what `stale` holds from that byte on.
+pub(crate) fn stale_from(
+    from_byte: usize,
+    mut beats: Box<[Beat]>,
+    stale: Option<&[Beat]>,
+) -> Box<[Beat]> {
+    let Some(stale) = stale else { return beats };
+    for (beat, stale) in beats.iter_mut().zip(stale).skip(from_byte.div_ceil(BEAT_BYTES)) {
+        *beat = *stale;
+    }
+    beats
 }

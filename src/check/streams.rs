@@ -10,7 +10,7 @@ use super::pattern;
 use super::report::{Line, Lines, Outcome};
 use crate::beat::unpack::sum_of_words;
 use crate::error::Error;
-use crate::step::{Accelerator, ECHO_LIMIT, Echo, Echoed};
+use crate::step::{Accelerator, ECHO_LIMIT, Echo, Echoed, Fault, RegisterDump};
 
 /// Bodies of the echoes: the least, odd numbers that leave channels of different lengths, and one
 /// that fills a length register of 14 bits more than once.
@@ -54,13 +54,39 @@ fn fitting(accelerator: &Accelerator, bodies: u32) -> u32 {
 
 /// A step that did not end as it should.
 fn step_failed(error: &Error) -> Outcome {
-    Outcome::failed(
-        chain(error),
-        format!("a step without collisions to end within {ECHO_LIMIT:?}"),
-        "look whether the named channel's stream is connected to the accelerator and its memory \
-         port is enabled, and whether the addresses of the buffers are mapped for it in the block \
-         design",
-    )
+    let (found, next) = match error {
+        Error::Step { fault, .. } => match &**fault {
+            Fault::Deadline { registers, .. } => (
+                format!("no end after {ECHO_LIMIT:?}: {}", still_moving(registers)),
+                "look whether the stream of the named channel is connected to the accelerator and \
+                 its memory port is enabled",
+            ),
+            fault => (
+                chain(fault),
+                "look whether the addresses of the buffers are mapped for the channel in the block \
+                 design, and whether streams are exchanged",
+            ),
+        },
+        error => (chain(error), "load the bitstream anew"),
+    };
+    let expected = format!("a step without collisions to end within {ECHO_LIMIT:?}");
+    Outcome::failed(found, expected, next)
+}
+
+/// The channels that hold a step up: senders that have data left, or else receivers that wait.
+fn still_moving(registers: &RegisterDump) -> String {
+    let busy = |side: &str| -> Vec<_> {
+        let lines = registers.0.iter().map(String::as_str);
+        // A channel that is halted had nothing to do in this step.
+        let moving = |line: &str| !line.contains(" Idle") && !line.contains(" Halted");
+        lines.filter(|line| line.contains(side) && moving(line)).collect()
+    };
+    let (senders, receivers) = (busy(" MM2S "), busy(" S2MM "));
+    match (senders.is_empty(), receivers.is_empty()) {
+        (false, _) => format!("{} has data left to send", senders.join(", ")),
+        (true, false) => format!("{} waits for results", receivers.join(", ")),
+        (true, true) => "every channel is idle, the accelerator is not done".to_owned(),
+    }
 }
 
 /// Sends patterns of several sizes through fresh buffers. The error is a step that failed.

@@ -43,6 +43,7 @@ fn every_quirk_ends_with_1_and_fails_its_own_line_alone() {
         ("stuck-interrupt", "interrupt", "nothing asks for one"),
         ("stale", "coherency", "MM2S read at byte 0x400 of its buffer"),
         ("stale-results", "coherency", "at byte 0x400 of the buffer of dma0 S2MM"),
+        ("unconnected-stream", "echo", "no end after 200ms: dma2 MM2S"),
         ("held-reset", "reset", "found dma1 MM2S in reset"),
     ] {
         let ran = check(&["--quirk", quirk]);

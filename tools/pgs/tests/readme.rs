@@ -32,7 +32,7 @@ fn the_readmes_commands_print_what_it_shows() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let readme = std::fs::read_to_string(root.join("README.md")).expect("the README");
     let transcripts = transcripts(&readme);
-    assert_eq!(transcripts.len(), 2, "solve and model");
+    assert_eq!(transcripts.len(), 3, "solve, model and check");
     for (arguments, shown) in transcripts {
         let ran = pgs()
             .current_dir(&root)

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use bitstream_model::{BoardConfig, Coherency, InterruptWiring, Quirks, Resettable};
+use bitstream_model::{BoardConfig, Coherency, Direction, InterruptWiring, Quirks, Resettable};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
@@ -52,6 +52,8 @@ enum QuirkName {
     StaleResults,
     /// The second DMA core stays in reset
     HeldReset,
+    /// The stream from the third DMA core carries nothing
+    UnconnectedStream,
 }
 
 impl QuirkName {
@@ -70,6 +72,7 @@ impl QuirkName {
             Self::Stale => quirks.coherency = Coherency::StaleReads { from_byte },
             Self::StaleResults => quirks.coherency = Coherency::StaleWrites { from_byte },
             Self::HeldReset => quirks.held_reset = Some(Resettable::Dma(1)),
+            Self::UnconnectedStream => quirks.unconnected = Some((2, Direction::Mm2s)),
         }
         quirks
     }
