@@ -130,3 +130,9 @@ pub use step::{
     Accelerator, BoardChoice, BoardDescription, BoardKind, Fault, HostTimes, Limit, OpenOptions,
     RegisterDump, StepCycles, StepReport,
 };
+
+/// The README's library example is a test.
+#[cfg(all(doctest, feature = "emulation"))]
+#[doc = include_str!("../README.md")]
+#[derive(Debug)]
+pub struct Readme;
