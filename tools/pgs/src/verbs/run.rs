@@ -160,7 +160,7 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     let options = SceneOptions { grid: args.grid, drop: args.drop, inertia: args.inertia.into() };
-    let mut opened = board::open(common.board, &args.build)?;
+    let mut opened = board::open(common, &args.build)?;
     check_size(args.grid, &opened)?;
     let mut scene = Scene::new(&options).map_err(Failure::input)?;
     if !common.json {
