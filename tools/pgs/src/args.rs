@@ -8,6 +8,7 @@ use zynq_pgs::MemoryChoice;
 
 use crate::memory::memory;
 use crate::verbs::list::ListArgs;
+use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
 use crate::verbs::run::RunArgs;
 use crate::verbs::solve::SolveArgs;
@@ -19,6 +20,7 @@ Examples:
   pgs solve vectors/one_cube --compare
   pgs model --collisions 127000 --bodies 38880
   pgs list --json
+  pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 
@@ -46,6 +48,7 @@ pub(crate) enum Verb {
     Solve(SolveArgs),
     Model(ModelArgs),
     List(ListArgs),
+    Load(LoadArgs),
 }
 
 /// What holds for every verb.

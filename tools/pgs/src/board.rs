@@ -106,7 +106,10 @@ impl Opened {
             if matches!(**fault, Fault::NotFinite { .. }));
         if diverged && self.observer.is_some() {
             // The emulated board does not miscalculate: the numbers given were too large.
-            return Failure::input(error).next("give smaller velocities, or a shorter time step");
+            return Failure::input(error).next(
+                "start from smaller velocities (run: a lower --drop, or --hazards interlocked), or \
+                 take a shorter time step (solve: params.npy)",
+            );
         }
         let next = if error.may_retry() {
             "run the command again"

@@ -12,6 +12,7 @@ mod digest;
 mod failure;
 mod folder;
 mod interrupt;
+mod loading;
 mod memory;
 mod npy;
 mod options;

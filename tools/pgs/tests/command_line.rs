@@ -22,7 +22,7 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 
 #[test]
 fn every_help_has_an_example() {
-    for verb in [&[][..], &["run"], &["solve"], &["model"], &["list"]] {
+    for verb in [&[][..], &["run"], &["solve"], &["model"], &["list"], &["load"]] {
         let ran = run(verb.iter().copied().chain(["--help"]));
         assert_eq!(ran.code, Some(0), "{verb:?}");
         let example = format!("  pgs{}", verb.iter().map(|v| format!(" {v}")).collect::<String>());
@@ -113,7 +113,7 @@ fn memory_is_refused_for_an_emulated_board() {
 #[test]
 fn a_missing_board_ends_with_3_and_the_next_step() {
     if std::path::Path::new("/sys/class/uio").exists() {
-        println!("skipped: this machine has UIO nodes");
+        common::skipped("this machine has UIO nodes");
         return;
     }
     let ran = run(["--board", "uio"]);
@@ -125,7 +125,7 @@ fn a_missing_board_ends_with_3_and_the_next_step() {
 #[test]
 fn falling_back_to_the_emulated_board_is_said() {
     if std::path::Path::new("/sys/class/uio").exists() {
-        println!("skipped: this machine has UIO nodes");
+        common::skipped("this machine has UIO nodes");
         return;
     }
     let arguments = ["--board", "auto", "--grid", "1x1x1", "--steps", "1"];
