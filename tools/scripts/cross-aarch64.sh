@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# Builds the command line tool for the board: a static aarch64 binary that needs no library there.
+#
+# usage: cross-aarch64.sh [--test]
+#   --test   also run the tests for aarch64, under user-mode QEMU as a Cortex-A53
+#
+# Made for Debian 12 on x86-64. The cargo is the one in PATH; the compiler is Debian's rustc-web,
+# the only one there with an aarch64 standard library. Missing packages are installed (as root).
+# Exit code: 0 done, 1 the build or a test failed, 2 wrong usage, 77 skipped: not on this machine.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+run_tests=no
+case ${1:-} in
+'') ;;
+--test) run_tests=yes ;;
+*) sed -n '2,9s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; exit 2 ;;
+esac
+
+. "$repository/tools/scripts/aarch64-env.sh"
+cd "$repository"
+time_of() { local begin=$SECONDS; "$@"; echo "($((SECONDS - begin)) s for: $*)"; }
+
+# With the guest programs of tools/guest, so that one build has both.
+time_of timeout 1200 cargo build --release --locked --target "$aarch64" -p pgs -p zdma
+binary=$CARGO_TARGET_DIR/$aarch64/release/pgs
+file -b "$binary"
+file -b "$binary" | grep -q 'ARM aarch64.*statically linked' ||
+	fail "expected a static aarch64 binary in $binary"
+echo "$binary: $(stat -c %s "$binary") bytes"
+
+if [ $run_tests = yes ]; then
+	# What computes, and what drives; not what only reads command lines.
+	test_all() {
+		timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" "$@"
+	}
+	time_of test_all -p zynq-pgs -p bitstream-model -p zynq-pgs-scene --lib --tests
+	time_of test_all -p pgs --bins --test golden
+fi
