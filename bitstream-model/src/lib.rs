@@ -27,6 +27,8 @@ mod interrupt;
 #[cfg(feature = "emulation")]
 mod memory;
 #[cfg(feature = "emulation")]
+mod outside;
+#[cfg(feature = "emulation")]
 mod stream;
 #[cfg(feature = "emulation")]
 pub mod timing;
@@ -41,5 +43,6 @@ pub use {
     fault::Fault,
     handle::{CpuPort, EmulatedBoard},
     memory::{Denied, DeviceAccess, MemoryError},
+    outside::DeviceMemory,
     violation::{RegisterAccess, Violation, ViolationKind},
 };
