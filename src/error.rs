@@ -72,14 +72,6 @@ impl Error {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OpenError {
-    /// There is no such UIO node.
-    #[error("no UIO node named {wanted:?} (found: {}): is the overlay loaded?", if found.is_empty() { "none" } else { found })]
-    NoNode {
-        /// The name that was looked for.
-        wanted: String,
-        /// The names that there are.
-        found: String,
-    },
     /// There is no node, and no emulated board to fall back to.
     #[error(
         "no UIO node named {wanted:?}, and this build has no emulated board: load the overlay, or \
@@ -88,14 +80,6 @@ pub enum OpenError {
     NoEmulation {
         /// The name that was looked for.
         wanted: String,
-    },
-    /// A node lacks a register region.
-    #[error("UIO node {node:?} has no map named {map:?}: is this the accelerator's overlay?")]
-    NoMap {
-        /// Name of the node.
-        node: String,
-        /// Name of the missing map.
-        map: &'static str,
     },
     /// The node is there; its DMA memory is what this version lacks.
     #[error(

@@ -112,7 +112,7 @@ mod accelerator;
 mod axi_dma;
 mod beat;
 mod error;
-mod platform;
+pub mod platform;
 mod record;
 pub mod scene;
 mod step;

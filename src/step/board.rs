@@ -1,7 +1,6 @@
 //! This file opens a board: the one place that knows every kind.
 
 use std::fmt;
-use std::path::Path;
 use std::sync::Arc;
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_MAP, UIO_NODE};
@@ -9,7 +8,9 @@ use bitstream_model::interface::profile::Profile;
 
 use crate::accelerator::identify;
 use crate::error::OpenError;
-use crate::platform::{AccessCounts, Platform, RegisterMap, UioNode, Window, uio_nodes};
+use crate::platform::{
+    AccessCounts, Platform, RegisterMap, System, UioDevice, UioNode, Window, node_named, uio_nodes,
+};
 
 /// How to open the accelerator. The default takes whatever board is there.
 #[derive(Debug, Clone, Default)]
@@ -66,13 +67,6 @@ impl fmt::Display for BoardDescription {
     }
 }
 
-/// Where the kernel shows UIO nodes: descriptions and device files.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct System<'a> {
-    pub(super) class: &'a Path,
-    pub(super) dev: &'a Path,
-}
-
 /// A board that was found.
 #[derive(Debug)]
 pub(super) struct Found {
@@ -81,24 +75,18 @@ pub(super) struct Found {
 }
 
 /// Finds the board of choice.
-pub(super) fn find(choice: &BoardChoice, system: System<'_>) -> Result<Found, OpenError> {
+pub(super) fn find(choice: &BoardChoice, system: &System) -> Result<Found, OpenError> {
     match choice {
         BoardChoice::Automatic => {
-            let nodes = uio_nodes(system.class)?;
+            let nodes = uio_nodes(&system.uio)?;
             match nodes.iter().find(|node| node.name == UIO_NODE) {
                 Some(node) => Err(identify_node(node, system)),
                 None => fall_back(),
             }
         }
         BoardChoice::Uio { node: wanted } => {
-            let nodes = uio_nodes(system.class)?;
-            match nodes.iter().find(|node| node.name == *wanted) {
-                Some(node) => Err(identify_node(node, system)),
-                None => {
-                    let names: Vec<_> = nodes.iter().map(|node| node.name.as_str()).collect();
-                    Err(OpenError::NoNode { wanted: wanted.clone(), found: names.join(", ") })
-                }
-            }
+            let nodes = uio_nodes(&system.uio)?;
+            Err(identify_node(&node_named(&nodes, wanted)?, system))
         }
         #[cfg(feature = "emulation")]
         BoardChoice::Emulated(port) => Ok(emulated(port.clone(), "asked for")),
@@ -107,13 +95,11 @@ pub(super) fn find(choice: &BoardChoice, system: System<'_>) -> Result<Found, Op
 
 /// Identifies the bitstream behind a node, to say why the board cannot be opened: there is no DMA
 /// memory for real hardware.
-fn identify_node(node: &UioNode, system: System<'_>) -> OpenError {
+fn identify_node(node: &UioNode, system: &System) -> OpenError {
     let identified = || -> Result<_, OpenError> {
-        let registers = node
-            .open_map(system.dev, UIO_CONTROL_MAP)?
-            .ok_or_else(|| OpenError::NoMap { node: node.name.clone(), map: UIO_CONTROL_MAP })?;
+        let registers = UioDevice::of_node(system, node.clone())?.window(UIO_CONTROL_MAP)?;
         let counts = Arc::<AccessCounts>::default();
-        Ok(identify(&Window::new(registers, RegisterMap::Control, counts)?)?)
+        Ok(identify(&Window::new(registers.into(), RegisterMap::Control, counts)?)?)
     };
     match identified() {
         Ok(capabilities) => OpenError::NoMemory {
@@ -166,15 +152,16 @@ mod tests {
     }
 
     /// A system with the nodes `fabric` and `pgs`, whose control block says what `describe` makes it.
-    fn system_with(describe: impl Fn(&FakeRegisters)) -> (tempfile::TempDir, tempfile::TempDir) {
-        let (class, dev) =
-            (tempfile::tempdir().expect("a directory"), tempfile::tempdir().expect("a directory"));
-        uio_fake::add_node(class.path(), 0, "fabric");
-        uio_fake::add_node(class.path(), 1, "pgs");
+    fn system_with(describe: impl Fn(&FakeRegisters)) -> (tempfile::TempDir, System) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        uio_fake::add_node(&system, 0, "fabric", &[]);
+        uio_fake::add_node(&system, 1, "pgs", &uio_fake::regions());
         let registers = FakeRegisters::default();
         describe(&registers);
         // Pages of up to 64 KiB; the control block is map 4.
-        let mut device = vec![0u8; 5 << 16];
+        let path = system.dev.join("uio1");
+        let mut device = fs::read(&path).expect("read");
         for page in [1 << 12, 1 << 14, 1 << 16] {
             registers.with(|state| {
                 for (at, value) in &state.values {
@@ -183,27 +170,27 @@ mod tests {
                 }
             });
         }
-        fs::write(dev.path().join("uio1"), device).expect("written");
-        (class, dev)
+        fs::write(path, device).expect("written");
+        (root, system)
     }
 
-    fn error_of(choice: &BoardChoice, class: &Path, dev: &Path) -> OpenError {
-        find(choice, System { class, dev }).expect_err("no board")
+    fn error_of(choice: &BoardChoice, system: &System) -> OpenError {
+        find(choice, system).expect_err("no board")
     }
 
     #[test]
     fn a_node_that_is_not_there_is_named_beside_those_that_are() {
-        let (class, dev) = system_with(bitstream::describe);
-        let error = error_of(&uio("pgs2"), class.path(), dev.path());
+        let (_root, system) = system_with(bitstream::describe);
+        let error = error_of(&uio("pgs2"), &system);
         let text = error.to_string();
         assert!(text.contains("\"pgs2\" (found: fabric, pgs)"), "{text}");
     }
 
     #[test]
     fn a_real_board_is_identified_and_never_replaced_by_an_emulated_one() {
-        let (class, dev) = system_with(bitstream::describe);
+        let (_root, system) = system_with(bitstream::describe);
         for choice in [BoardChoice::Automatic, uio("pgs")] {
-            let error = error_of(&choice, class.path(), dev.path());
+            let error = error_of(&choice, &system);
             assert!(
                 matches!(&error, OpenError::NoMemory { device, profile: "float", .. } if device == "uio1"),
                 "{error}"
@@ -213,15 +200,15 @@ mod tests {
 
     #[test]
     fn another_bitstream_behind_the_node_is_refused_as_such() {
-        let (class, dev) = system_with(|_| ());
-        let error = error_of(&uio("pgs"), class.path(), dev.path());
+        let (_root, system) = system_with(|_| ());
+        let error = error_of(&uio("pgs"), &system);
         assert!(matches!(error, OpenError::Identity(_)), "{error}");
     }
 
     #[test]
     fn without_a_node_the_emulated_board_says_why_it_was_taken() {
-        let class = Path::new("/nonexistent/uio");
-        let found = find(&BoardChoice::Automatic, System { class, dev: class });
+        let system = System::under(std::path::Path::new("/nonexistent"));
+        let found = find(&BoardChoice::Automatic, &system);
         if cfg!(feature = "emulation") {
             let description = found.expect("the emulated board").description;
             assert_eq!(description.kind, BoardKind::Emulated);

@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# Builds the command line tool for the board: a static aarch64 binary that needs no library there.
+#
+# usage: cross-aarch64.sh [--test]
+#   --test   also run the tests for aarch64, under user-mode QEMU as a Cortex-A53
+#
+# Made for Debian 12 on x86-64. The cargo is the one in PATH; the compiler is Debian's rustc-web,
+# the only one there with an aarch64 standard library. Missing packages are installed (as root).
+# Exit code: 0 done, 1 the build or a test failed, 2 wrong usage, 77 skipped: not on this machine.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+run_tests=no
+case ${1:-} in
+'') ;;
+--test) run_tests=yes ;;
+*) sed -n '2,9s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; exit 2 ;;
+esac
+
+. "$repository/tools/scripts/aarch64-env.sh"
+cd "$repository"
+time_of() { local begin=$SECONDS; "$@"; echo "  ($((SECONDS - begin)) s: $1 ${2:-} ${3:-})"; }
+
+time_of timeout 1200 cargo build --release --locked --target "$aarch64" -p pgs
+binary=$CARGO_TARGET_DIR/$aarch64/release/pgs
+file -b "$binary"
+file -b "$binary" | grep -q 'ARM aarch64.*statically linked' ||
+	fail "expected a static aarch64 binary in $binary"
+echo "$binary: $(stat -c %s "$binary") bytes"
+
+if [ $run_tests = yes ]; then
+	# Compiled first and without the limit that ends a test which hangs.
+	tests=(--release --locked --target "$aarch64" --workspace --lib --bins --tests)
+	time_of timeout 1200 cargo test "${tests[@]}" --no-run
+	time_of timeout "${TEST_LIMIT:-900}" cargo test "${tests[@]}"
+fi

@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Boots a kernel on QEMU's ZCU102 and says what its checks found.
+#
+# usage: boot.sh KERNEL INITRD LOG           KERNEL: a directory made by debian.sh or small.sh
+# environment: QEMU (qemu-system-aarch64), BOOT_LIMIT (seconds, 300)
+# Exit code: 0 when every check passed and the guest said so itself.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/../lib.sh"
+need_packages qemu-system-arm device-tree-compiler
+
+kernel=$1 initrd=$2 log=$3
+tree=$(mktemp)
+trap 'rm -f "$tree"' EXIT
+dtc -q -I dts -O dtb -o "$tree" "$repository/tools/guest/zcu102.dts"
+begin=$(date +%s%N)
+code=0
+# The module takes its option where it is loaded; a kernel that has it built in takes it here.
+QEMU_AUDIO_DRV=none timeout "${BOOT_LIMIT:-300}" "${QEMU:-qemu-system-aarch64}" \
+	-M xlnx-zcu102 -smp 2 -m 1G -display none -monitor none -serial stdio -no-reboot \
+	-kernel "$kernel/Image" -dtb "$tree" -initrd "$initrd" \
+	-append 'console=ttyPS0,115200n8 panic=-1 quiet uio_pdrv_genirq.of_id=generic-uio' \
+	< /dev/null 2> "$log.qemu" | tr -d '\r' > "$log" || code=$?
+grep -a -E '^(guest:|ok |FAIL |  )' "$log" || true
+printf 'QEMU ended with %s after %s ms, log %s\n' "$code" $((($(date +%s%N) - begin) / 1000000)) "$log"
+
+[ $code = 0 ] || { tail -n 20 "$log" "$log.qemu" >&2; fail "the guest did not power itself off in time"; }
+total=$(sed -n 's/^guest: \([0-9]* ok, [0-9]* failed\)$/\1/p' "$log")
+[ -n "$total" ] || { tail -n 20 "$log" >&2; fail "the guest did not reach the end of its checks"; }
+ok=${total%% ok*}
+[ "$ok" -gt 0 ] && [ "$total" = "$ok ok, 0 failed" ] || fail "in the guest: $total"
