@@ -21,3 +21,4 @@ pub mod mailbox;
 pub mod one_cube;
 pub mod qtest;
 pub mod server;
+pub mod trap;
