@@ -21,7 +21,8 @@ esac
 cd "$repository"
 time_of() { local begin=$SECONDS; "$@"; echo "  ($((SECONDS - begin)) s: $1 ${2:-} ${3:-})"; }
 
-time_of timeout 1200 cargo build --release --locked --target "$aarch64" -p pgs
+# With the guest programs of tools/guest, so that one build has both.
+time_of timeout 1200 cargo build --release --locked --target "$aarch64" -p pgs -p zdma
 binary=$CARGO_TARGET_DIR/$aarch64/release/pgs
 file -b "$binary"
 file -b "$binary" | grep -q 'ARM aarch64.*statically linked' ||

@@ -26,7 +26,9 @@ work=$target_root/kernel-test
 content=$work/content
 rm -rf "$content"
 mkdir -p "$content/bin" "$content/expected"
-install -m 755 "$target_root/aarch64/aarch64-unknown-linux-gnu/release/pgs" "$content/bin/"
+for program in pgs zdma; do
+	install -m 755 "$target_root/aarch64/aarch64-unknown-linux-gnu/release/$program" "$content/bin/"
+done
 cp -r tests/golden "$content/golden"
 echo "$digest" > "$content/expected/digest"
 echo "$kernel" > "$content/expected/kernel"

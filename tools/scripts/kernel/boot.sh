@@ -16,7 +16,7 @@ begin=$(date +%s%N)
 code=0
 # The module takes its option where it is loaded; a kernel that has it built in takes it here.
 QEMU_AUDIO_DRV=none timeout "${BOOT_LIMIT:-300}" "${QEMU:-qemu-system-aarch64}" \
-	-M xlnx-zcu102 -smp 2 -m 1G -display none -monitor none -serial stdio -no-reboot \
+	-M xlnx-zcu102 -smp 2 -m 2G -display none -monitor none -serial stdio -no-reboot \
 	-kernel "$kernel/Image" -dtb "$tree" -initrd "$initrd" \
 	-append 'console=ttyPS0,115200n8 panic=-1 quiet uio_pdrv_genirq.of_id=generic-uio' \
 	< /dev/null 2> "$log.qemu" | tr -d '\r' > "$log" || code=$?

@@ -1,0 +1,95 @@
+//! This file checks what needs no transfer: names, addresses, bounds, memory.
+
+use zynq_pgs::PlatformError;
+use zynq_pgs::interface::address_map::{MEMORY_BASE, MEMORY_BYTES, UIO_MEMORY_NODE};
+use zynq_pgs::interface::record::{BEAT_BYTES, Beat};
+use zynq_pgs::platform::{ReservedMemory, UioDevice};
+
+use crate::Outcome;
+use crate::transfer::pattern;
+
+/// The UIO node of the engine's channel.
+pub(crate) const ZDMA_NODE: &str = "zdma";
+/// Where the device tree says that the channel lies.
+const CHANNEL: (u64, u64) = (0xFD50_0000, 0x1000);
+
+/// Nodes and maps are found where the device tree puts them; what is not there is said to be not.
+pub(crate) fn nodes_by_name() -> Outcome {
+    let device = UioDevice::open(ZDMA_NODE)?;
+    let registers = device.window("channel")?;
+    let found = (registers.address(), registers.bytes());
+    if found != CHANNEL {
+        return Err(format!("expected {CHANNEL:#x?}, found {found:#x?}").into());
+    }
+    let memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
+    let found = (memory.address(), memory.bytes());
+    if found != (MEMORY_BASE, MEMORY_BYTES) {
+        return Err(format!("memory is {found:#x?}").into());
+    }
+    match UioDevice::open("nonesuch") {
+        Err(error @ PlatformError::NoNode { .. }) => {
+            if !error.to_string().contains(ZDMA_NODE) {
+                return Err(format!("does not list the nodes: {error}").into());
+            }
+        }
+        other => return Err(format!("expected no node, found {other:?}").into()),
+    }
+    match device.window("nonesuch") {
+        Err(PlatformError::NoMap { .. }) => {}
+        other => return Err(format!("expected no map, found {other:?}").into()),
+    }
+    match ReservedMemory::open(UIO_MEMORY_NODE).and_then(|_| UioDevice::open(UIO_MEMORY_NODE)) {
+        Ok(silent) => match silent.unmask() {
+            Err(PlatformError::NoInterrupt { .. }) => {}
+            other => return Err(format!("expected no interrupt, found {other:?}").into()),
+        },
+        Err(error) => return Err(error.into()),
+    }
+    Ok(format!("{} at {:#x}, memory at {:#x}", device.node().device, CHANNEL.0, MEMORY_BASE))
+}
+
+/// Nothing outside of a region can be reached, nothing between its words or beats.
+pub(crate) fn confined() -> Outcome {
+    let device = UioDevice::open(ZDMA_NODE)?;
+    let registers = device.window("channel")?;
+    let mut refused = 0;
+    for at in [0x1000, 0x1004, 0xFFE, 1, 2, u32::MAX, u32::MAX - 3] {
+        for result in [registers.read32(at).map(|_| ()), registers.write32(at, 0)] {
+            match result {
+                Err(PlatformError::OutOfRegion { .. }) => refused += 1,
+                other => return Err(format!("register {at:#x}: {other:?}").into()),
+            }
+        }
+    }
+    let memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
+    let mut two = [Beat::default(); 2];
+    let end = memory.bytes();
+    for at in [end, end - 16, end - 8, 8, 1, u64::MAX, u64::MAX - 15] {
+        for result in [memory.write(at, &two), memory.read(at, &mut two)] {
+            match result {
+                Err(PlatformError::OutOfRegion { .. }) => refused += 1,
+                other => return Err(format!("memory {at:#x}: {other:?}").into()),
+            }
+        }
+    }
+    registers.read32(0xFFC)?;
+    memory.read(end - 32, &mut two)?;
+    Ok(format!("{refused} accesses refused, the last word and beats allowed"))
+}
+
+/// What is written to the memory is read from it, from its first beat to its last.
+pub(crate) fn memory() -> Outcome {
+    let memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
+    let beats = 4097;
+    let written = pattern(beats, 7);
+    let last = memory.bytes() - (beats * BEAT_BYTES) as u64;
+    for at in [0, 16, last / 32 * 16, last] {
+        memory.write(at, &written)?;
+        let mut read = vec![Beat::default(); beats];
+        memory.read(at, &mut read)?;
+        if read != written {
+            return Err(format!("differs at {at:#x}").into());
+        }
+    }
+    Ok(format!("4 times {beats} beats, up to {:#x}", memory.address() + memory.bytes()))
+}

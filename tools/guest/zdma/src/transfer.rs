@@ -1,0 +1,229 @@
+//! This file checks transfers: data, bounds of what was written, interrupts and the lack of them.
+
+use std::error::Error;
+use std::time::{Duration, Instant};
+
+use zynq_pgs::interface::address_map::UIO_MEMORY_NODE;
+use zynq_pgs::interface::record::{BEAT_BYTES, Beat};
+
+use crate::Outcome;
+use crate::checks::ZDMA_NODE;
+use crate::engine::Engine;
+
+/// Longest wait for an interrupt that has to come.
+const LIMIT: Duration = Duration::from_secs(5);
+/// How long an interrupt is waited for that must not come.
+const QUIET: Duration = Duration::from_millis(100);
+/// Beats of the largest transfer: 1 MiB.
+const LARGEST: usize = (1 << 20) / BEAT_BYTES;
+/// What stands before and after the destination, and has to stay.
+const GUARD: Beat = Beat([0xFEED_BEEF, 0x0BAD_CAFE, 0x5555_AAAA, 0x1234_5678]);
+
+/// Beats of which no two are alike, other ones for every seed.
+pub(crate) fn pattern(beats: usize, seed: u32) -> Vec<Beat> {
+    let mut state = seed.wrapping_mul(2_654_435_761) | 1;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        state
+    };
+    (0..beats).map(|_| Beat([next(), next(), next(), next()])).collect()
+}
+
+/// A transfer that was prepared: source filled, destination spoiled, guards around it.
+struct Transfer {
+    data: Vec<Beat>,
+    from: u64,
+    to: u64,
+}
+
+impl Transfer {
+    /// Source in the lower half of the memory, destination in the upper, moved by the seed.
+    fn prepare(engine: &Engine, beats: usize, seed: u32) -> Result<Self, Box<dyn Error>> {
+        let half = engine.memory.bytes() / 2;
+        let beat = BEAT_BYTES as u64;
+        let room = half / beat - beats as u64 - 2;
+        let place = |seed: u32| u64::from(seed.wrapping_mul(40_503)) % room * beat;
+        let (from, to) = (place(seed), half + beat + place(seed ^ 0x5A5A));
+        let data = pattern(beats, seed);
+        engine.memory.write(from, &data)?;
+        let spoiled: Vec<Beat> = data.iter().map(|beat| Beat(beat.0.map(|word| !word))).collect();
+        engine.memory.write(to, &spoiled)?;
+        engine.memory.write(to - beat, &[GUARD])?;
+        engine.memory.write(to + beats as u64 * beat, &[GUARD])?;
+        Ok(Self { data, from, to })
+    }
+
+    fn start(&self, engine: &Engine) -> Result<(), Box<dyn Error>> {
+        Ok(engine.start(self.from, self.to, self.data.len())?)
+    }
+
+    /// The destination holds the data, the source still does, and the guards stand.
+    fn compare(&self, engine: &Engine) -> Result<(), Box<dyn Error>> {
+        let mut read = vec![Beat::default(); self.data.len()];
+        for (what, at) in [("source", self.from), ("destination", self.to)] {
+            engine.memory.read(at, &mut read)?;
+            if let Some(wrong) = read.iter().zip(&self.data).position(|(read, data)| read != data) {
+                let text = format!("{what}: beat {wrong} of {} differs", self.data.len());
+                return Err(text.into());
+            }
+        }
+        for at in [self.to - BEAT_BYTES as u64, self.to + (self.data.len() * BEAT_BYTES) as u64] {
+            let mut guard = [Beat::default()];
+            engine.memory.read(at, &mut guard)?;
+            if guard != [GUARD] {
+                return Err(format!("wrote beside the destination, at {at:#x}").into());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One transfer that is ended by its interrupt: its count, and how long it took.
+fn by_interrupt(
+    engine: &Engine,
+    beats: usize,
+    seed: u32,
+) -> Result<(u32, Duration), Box<dyn Error>> {
+    let transfer = Transfer::prepare(engine, beats, seed)?;
+    let begin = Instant::now();
+    transfer.start(engine)?;
+    let count = engine.device.wait_interrupt(LIMIT)?.ok_or("no interrupt came")?;
+    let took = begin.elapsed();
+    if !engine.is_done()? {
+        return Err("an interrupt, but the transfer is not done".into());
+    }
+    engine.acknowledge()?;
+    engine.device.unmask()?;
+    transfer.compare(engine)?;
+    Ok((count, took))
+}
+
+fn open() -> Result<Engine, crate::engine::EngineError> {
+    Engine::open(ZDMA_NODE, UIO_MEMORY_NODE)
+}
+
+/// Every power of two from 16 bytes to 1 MiB, and its neighbours.
+pub(crate) fn sizes() -> Outcome {
+    let engine = open()?;
+    engine.enable_interrupt()?;
+    let (mut done, mut seed, mut slowest) = (0, 1, Duration::ZERO);
+    for power in 0..=LARGEST.ilog2() {
+        for beats in [(1usize << power) - 1, 1 << power, (1 << power) + 1] {
+            if (1..=LARGEST).contains(&beats) {
+                let error = |error| format!("{} bytes: {error}", beats * BEAT_BYTES);
+                slowest = slowest.max(by_interrupt(&engine, beats, seed).map_err(error)?.1);
+                done += 1;
+                seed += 1;
+            }
+        }
+    }
+    engine.disable_interrupt()?;
+    Ok(format!("{done} transfers of 16 B to 1 MiB, the slowest {slowest:?}"))
+}
+
+/// Many transfers, short and long ones in turn; every one is compared, none may fail.
+pub(crate) fn thousand() -> Outcome {
+    const TRANSFERS: u32 = 1000;
+    let engine = open()?;
+    engine.enable_interrupt()?;
+    let (mut bytes, mut errors, mut lost) = (0, Vec::new(), 0);
+    let mut last: Option<u32> = None;
+    for seed in 1..=TRANSFERS {
+        // Every octave alike, up to 1 MiB.
+        let octave = (seed * 7) % (LARGEST.ilog2() + 1);
+        let beats = (1usize << octave) - (seed as usize % 97) % (1usize << octave).div_ceil(2);
+        bytes += beats * BEAT_BYTES;
+        match by_interrupt(&engine, beats, seed) {
+            Ok((count, _)) => {
+                if last.is_some_and(|last| count != last.wrapping_add(1)) {
+                    lost += 1;
+                }
+                last = Some(count);
+            }
+            Err(error) => {
+                errors.push(format!("{seed} ({} bytes): {error}", beats * BEAT_BYTES));
+                engine.acknowledge()?;
+                engine.device.unmask()?;
+            }
+        }
+    }
+    engine.disable_interrupt()?;
+    if !errors.is_empty() || lost > 0 {
+        let first = errors.first().map_or("", String::as_str);
+        return Err(format!("{} errors, {lost} jumps of the count; {first}", errors.len()).into());
+    }
+    Ok(format!("0 errors, {bytes} bytes, one interrupt each"))
+}
+
+/// No interrupt comes, the wait ends in time, polling finds the transfer done; afterwards
+/// interrupts work again.
+fn survive(engine: &Engine, seed: u32) -> Result<(), Box<dyn Error>> {
+    let transfer = Transfer::prepare(engine, 256, seed)?;
+    transfer.start(engine)?;
+    let begin = Instant::now();
+    if let Some(count) = engine.device.wait_interrupt(QUIET)? {
+        return Err(format!("an interrupt came, number {count}").into());
+    }
+    let waited = begin.elapsed();
+    if waited < QUIET || waited > LIMIT {
+        return Err(format!("waited {waited:?}, asked for {QUIET:?}").into());
+    }
+    engine.poll_done(LIMIT)?;
+    transfer.compare(engine)?;
+    engine.acknowledge()?;
+    Ok(())
+}
+
+/// The engine keeps its interrupt to itself.
+pub(crate) fn suppressed_in_engine() -> Outcome {
+    let engine = open()?;
+    for seed in 1..=5 {
+        survive(&engine, seed)?;
+    }
+    engine.enable_interrupt()?;
+    by_interrupt(&engine, 256, 6)?;
+    engine.disable_interrupt()?;
+    Ok("5 transfers found done by polling, then one by interrupt".to_owned())
+}
+
+/// The engine raises it, and the kernel keeps it back.
+pub(crate) fn masked_in_kernel() -> Outcome {
+    let engine = open()?;
+    engine.enable_interrupt()?;
+    for seed in 1..=5 {
+        engine.device.mask()?;
+        survive(&engine, seed)?;
+    }
+    engine.device.unmask()?;
+    if engine.device.wait_interrupt(QUIET)?.is_some() {
+        // A controller may have latched the edge; it must be no more than one.
+        engine.device.unmask()?;
+        if engine.device.wait_interrupt(QUIET)?.is_some() {
+            return Err("interrupts without a cause".into());
+        }
+    }
+    by_interrupt(&engine, 256, 6)?;
+    engine.disable_interrupt()?;
+    Ok("5 transfers found done by polling, then one by interrupt".to_owned())
+}
+
+/// The line is a level: let through before it is acknowledged in the engine, it comes again.
+pub(crate) fn not_acknowledged() -> Outcome {
+    let engine = open()?;
+    engine.enable_interrupt()?;
+    let transfer = Transfer::prepare(&engine, 64, 3)?;
+    transfer.start(&engine)?;
+    let first = engine.device.wait_interrupt(LIMIT)?.ok_or("no interrupt came")?;
+    engine.device.unmask()?;
+    let second = engine.device.wait_interrupt(LIMIT)?.ok_or("it did not come again")?;
+    engine.acknowledge()?;
+    engine.device.unmask()?;
+    if let Some(third) = engine.device.wait_interrupt(QUIET)? {
+        return Err(format!("acknowledged, and came again: {first}, {second}, {third}").into());
+    }
+    engine.disable_interrupt()?;
+    transfer.compare(&engine)?;
+    Ok(format!("came again as number {second} after {first}, and no more once acknowledged"))
+}
