@@ -81,23 +81,9 @@ pub enum OpenError {
         /// The name that was looked for.
         wanted: String,
     },
-    /// The node is there; its DMA memory is what this version lacks.
-    #[error(
-        "UIO node {node:?} ({device}) carries profile {profile}, interface {major}.{minor}: this \
-         version identifies real hardware but has no DMA memory for it; choose the emulated board"
-    )]
-    NoMemory {
-        /// Name of the node.
-        node: String,
-        /// The kernel's name for it.
-        device: String,
-        /// Name of the bitstream's profile.
-        profile: &'static str,
-        /// Major interface version.
-        major: u32,
-        /// Minor interface version.
-        minor: u32,
-    },
+    /// Memory was chosen for an emulated board.
+    #[error("an emulated board has memory of its own: leave out the choice of memory")]
+    EmulatedMemory,
     /// A length width that no DMA core can have.
     #[error("the length width must be {low} to {high} bits, found {found}")]
     LengthWidth {

@@ -121,7 +121,9 @@ pub use accelerator::{Capabilities, ControlError, IdentityError};
 pub use axi_dma::DmaError;
 pub use bitstream_model::interface;
 pub use error::{Aftermath, Error, OpenError};
-pub use platform::{PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes};
+pub use platform::{
+    Caching, DevMemWindows, MemoryChoice, PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes,
+};
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
     InputError, Pose, Shape, StepParameters, Velocity,

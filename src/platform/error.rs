@@ -172,4 +172,121 @@ pub enum PlatformError {
         /// Where it begins.
         address: u64,
     },
+    /// There is no room left for DMA buffers.
+    #[error(
+        "no room for a DMA buffer of {wanted} bytes: {largest} are free in one piece, of {total} \
+         in all; reserve more memory, see device-tree/README.md"
+    )]
+    Exhausted {
+        /// Bytes asked for.
+        wanted: u64,
+        /// The largest piece that is free, bytes.
+        largest: u64,
+        /// All there is, bytes.
+        total: u64,
+    },
+    /// Memory is not where it was thought to be.
+    #[error("the DMA buffer at {address:#x} is not {state}")]
+    NotGivenOut {
+        /// Its bus address.
+        address: u64,
+        /// Where it should be.
+        state: &'static str,
+    },
+    /// There is no such u-dma-buf.
+    #[error(
+        "no u-dma-buf named {wanted:?} (found: {}): is the module loaded, with a buffer of that \
+         name? see device-tree/README.md",
+        if found.is_empty() { "none" } else { found }
+    )]
+    NoUDmaBuf {
+        /// The name that was looked for.
+        wanted: String,
+        /// The names that there are.
+        found: String,
+    },
+    /// A u-dma-buf cannot be mapped as it should be.
+    #[error(
+        "u-dma-buf {name:?} has sync_mode {found}, which cannot give {wanted}: write 2 to {} as \
+         root, or set `sync-mode = <2>` in its device-tree node",
+        path.display()
+    )]
+    SyncMode {
+        /// Name of the buffer.
+        name: String,
+        /// Its mode.
+        found: u64,
+        /// What was wanted.
+        wanted: &'static str,
+        /// Where to change it.
+        path: PathBuf,
+    },
+    /// A memory region is of no use.
+    #[error("memory {region} of {bytes} bytes at {address:#x} cannot be used: {reason}")]
+    UnusableMemory {
+        /// Name of the region.
+        region: String,
+        /// Its address.
+        address: u64,
+        /// Its length, bytes.
+        bytes: u64,
+        /// Why, and what to do.
+        reason: &'static str,
+    },
+    /// There is no memory for DMA.
+    #[error(
+        "no memory for DMA: neither a u-dma-buf named {u_dma_buf:?} nor a UIO node named {node:?}; \
+         add one (see device-tree/README.md), or name another with --memory"
+    )]
+    NoMemory {
+        /// The u-dma-buf that was looked for.
+        u_dma_buf: &'static str,
+        /// The UIO node that was looked for.
+        node: &'static str,
+    },
+    /// Another program uses the board.
+    #[error("{} is locked: another program uses the board; end it first", path.display())]
+    Busy {
+        /// The locked file.
+        path: PathBuf,
+    },
+    /// `/dev/mem` was not given.
+    #[error(
+        "the kernel does not let {} be {act} at {address:#x}: it needs root, and a kernel with \
+         STRICT_DEVMEM gives only what it does not use; prefer a UIO node",
+        path.display()
+    )]
+    DevMemRefused {
+        /// What was tried.
+        act: &'static str,
+        /// Where.
+        address: u64,
+        /// The file.
+        path: PathBuf,
+        /// What the kernel says.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A range lies outside what was configured for `/dev/mem`.
+    #[error(
+        "{bytes} bytes at {address:#x} lie in none of the windows configured for /dev/mem; \
+         refusing to map them"
+    )]
+    OutOfWindows {
+        /// First byte asked for.
+        address: u64,
+        /// Number of bytes asked for.
+        bytes: u64,
+    },
+    /// A window for `/dev/mem` overlaps memory of the kernel's.
+    #[error(
+        "the window at {address:#x} overlaps the kernel's memory {ram}: reserve it with `no-map` \
+         in the device tree first"
+    )]
+    KernelMemory {
+        /// First byte of the window.
+        address: u64,
+        /// What it overlaps.
+        ram: String,
+    },
 }

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
-use bitstream_model::interface::record::BEAT_BYTES;
+use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use memmap2::{MmapOptions, MmapRaw};
 
 use super::copy::Doublewords;
@@ -13,8 +13,8 @@ use super::{PlatformError, RegisterWindow};
 
 /// A region of a device file, mapped readable and writable and shared with the device.
 ///
-/// The region begins on a multiple of 16 of the address space. No reference to it exists but those
-/// that [`Mapping::beats_mut`] gives.
+/// The region begins on a multiple of 16 of the address space. The only references to it are those
+/// of [`MappedBeats`](super::memory::MappedBeats).
 #[derive(Debug)]
 pub(crate) struct Mapping {
     map: MmapRaw,
@@ -72,6 +72,22 @@ impl Mapping {
         self.pointer(at, 8).cast()
     }
 
+    /// Insists that `beats` beats from byte `at` lie inside the region, on multiples of 16.
+    pub(super) fn check_beats(&self, at: usize, beats: usize) {
+        let end = beats.checked_mul(BEAT_BYTES).and_then(|bytes| bytes.checked_add(at));
+        assert!(
+            at.is_multiple_of(BEAT_BYTES) && end.is_some_and(|end| end <= self.bytes),
+            "callers check what they are asked for"
+        );
+    }
+
+    /// Where the beat at byte `at` lies, a multiple of 16 inside the region or its end.
+    #[allow(clippy::cast_ptr_alignment, reason = "a page, plus start and at: multiples of 16")]
+    pub(super) fn beat(&self, at: usize) -> *mut Beat {
+        self.check_beats(at, 0);
+        self.map.as_mut_ptr().wrapping_add(self.start + at).cast()
+    }
+
     /// One 32-bit load; `at` is a multiple of 4 inside the region.
     pub(crate) fn load_word(&self, at: usize) -> u32 {
         let word = self.word(at);
@@ -122,8 +138,6 @@ impl RegisterWindow for Mapping {
 #[cfg(test)]
 mod tests {
     use std::io::{Read as _, Seek as _, Write as _};
-
-    use bitstream_model::interface::record::Beat;
 
     use super::*;
     use crate::platform::copy::{load_beats, store_beats};

@@ -33,36 +33,41 @@
 
 mod buffer;
 mod copy;
+mod dev_mem;
 #[cfg(feature = "emulation")]
 mod emulated;
 mod error;
 mod fence;
 mod fpga;
+mod hardware;
 mod mapped;
+mod memory;
+mod pool;
 mod reserved;
 mod sysfs;
 mod system;
+mod u_dma_buf;
 mod uio;
 mod uio_device;
 mod wait;
 mod window;
 
 use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::AtomicU32;
 use std::time::Duration;
 
-use bitstream_model::interface::record::Beat;
-
 pub(crate) use buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
+pub use dev_mem::DevMemWindows;
 #[cfg(feature = "emulation")]
 pub(crate) use emulated::EmulatedPlatform;
 pub use error::PlatformError;
 pub(crate) use fence::{acquire_from_device, release_to_device};
 pub use fpga::require_bitstream;
+pub use hardware::MemoryChoice;
+pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
+pub(crate) use memory::{DmaMemory, SharedMemory};
 pub use reserved::ReservedMemory;
 pub use system::{System, UIO_CLASS};
-pub(crate) use uio::node_named;
+pub use u_dma_buf::Caching;
 pub use uio::{UioMap, UioNode, uio_nodes};
 pub use uio_device::{UioDevice, UioWindow};
 pub(crate) use wait::{Deadline, poll_until};
@@ -89,18 +94,19 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
     fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError>;
 
     /// Contiguous memory, aligned to 64 bytes on the bus, owned by the CPU.
-    fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), PlatformError>;
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError>;
     /// Coherent words that both sides may touch at any time.
-    fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), PlatformError>;
-    /// Gives memory to the device.
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError>;
+    /// Gives memory to the device, which will touch its first `used` beats.
     fn hand_over(
         &self,
         address: u64,
-        beats: Box<[Beat]>,
+        memory: DmaMemory,
+        used: usize,
         access: Access,
     ) -> Result<(), PlatformError>;
     /// Takes memory back that the device has finished with.
-    fn take_back(&self, address: u64) -> Result<Box<[Beat]>, PlatformError>;
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError>;
     /// Frees memory that the CPU owns, or shared words that no engine runs on.
     fn release(&self, address: u64) -> Result<(), PlatformError>;
 

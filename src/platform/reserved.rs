@@ -9,7 +9,11 @@ use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
 use super::copy::{load_beats, store_beats};
 use super::mapped::Mapping;
-use super::{PlatformError, System, UioDevice, acquire_from_device, release_to_device};
+use super::pool::Region;
+use super::{
+    Access, DmaMemory, PlatformError, SharedMemory, System, UioDevice, acquire_from_device,
+    release_to_device,
+};
 
 /// A contiguous piece of physical memory for DMA, mapped as Device memory.
 #[derive(Debug, Clone)]
@@ -96,6 +100,69 @@ impl ReservedMemory {
                 region_bytes: self.bytes(),
             }),
         }
+    }
+}
+
+/// The CPU works on the heap; what changes hands is copied. Shared words take aligned 32-bit
+/// accesses, which Device memory does too.
+impl Region for ReservedMemory {
+    fn address(&self) -> u64 {
+        self.address
+    }
+
+    fn bytes(&self) -> u64 {
+        ReservedMemory::bytes(self)
+    }
+
+    fn memory(&self, _: usize, beats: usize) -> Result<DmaMemory, PlatformError> {
+        Ok(DmaMemory::Heap(vec![Beat::default(); beats].into()))
+    }
+
+    fn shared(&self, at: usize, words: usize) -> Result<SharedMemory, PlatformError> {
+        Ok(SharedMemory::Mapped { mapping: Arc::clone(&self.mapping), at, words })
+    }
+
+    fn to_device(
+        &self,
+        at: usize,
+        memory: &DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        match access {
+            Access::Read => self.write(at as u64, &memory.beats()[..used]),
+            Access::Write => Ok(()),
+        }
+    }
+
+    fn to_cpu(
+        &self,
+        at: usize,
+        memory: &mut DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        match access {
+            Access::Read => Ok(()),
+            Access::Write => self.read(at as u64, &mut memory.beats_mut()[..used]),
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod fake {
+    //! Reserved memory that is a file.
+
+    use super::*;
+    use crate::platform::uio_fake::add_node;
+
+    /// Memory of `bytes` bytes at `address`; it lasts as long as the folder.
+    pub(crate) fn reserved(address: u64, bytes: u64) -> (tempfile::TempDir, ReservedMemory) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        add_node(&system, 0, "pgs-memory", &[("memory", address, bytes)]);
+        let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        (root, memory)
     }
 }
 

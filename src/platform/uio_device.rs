@@ -6,7 +6,7 @@
 //!
 //! Source: Linux `Documentation/driver-api/uio-howto.rst`, `drivers/uio/uio_pdrv_genirq.c`.
 
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::os::fd::AsFd as _;
 use std::path::{Path, PathBuf};
@@ -60,6 +60,18 @@ impl UioDevice {
         // Without O_NONBLOCK a wake-up that somebody else took would block for ever.
         let file = open_device(&path, nix::libc::O_NONBLOCK)?;
         Ok(Self { node, path, file })
+    }
+
+    /// Keeps other programs that ask for it from using the device; until this is dropped.
+    ///
+    /// # Errors
+    /// [`PlatformError::Busy`] if another one does.
+    pub fn lock(&self) -> Result<(), PlatformError> {
+        match self.file.try_lock() {
+            Ok(()) => Ok(()),
+            Err(TryLockError::WouldBlock) => Err(PlatformError::Busy { path: self.path.clone() }),
+            Err(TryLockError::Error(source)) => Err(self.error("lock", source)),
+        }
     }
 
     /// What the kernel says of it.

@@ -5,6 +5,8 @@ mod completion;
 mod device;
 mod fault;
 mod lane;
+#[cfg(all(test, feature = "emulation"))]
+mod memory_tests;
 mod plan;
 mod recovery;
 mod report;

@@ -49,8 +49,8 @@ impl Accelerator {
     /// [`Error::Open`]: no such board, not a bitstream that this driver knows, or DMA cores that
     /// do not behave as they should.
     pub fn open(options: OpenOptions) -> Result<Self, Error> {
-        let OpenOptions { board: choice, length_width } = options;
-        let found = board::find(&choice, &System::default())?;
+        let OpenOptions { board: choice, memory, length_width } = options;
+        let found = board::find(&choice, &memory, &System::default())?;
         Self::on(found, length_width)
     }
 
