@@ -18,7 +18,7 @@ use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use crate::npy::{self, Dimensions};
-use crate::options::BuildArgs;
+use crate::options::{BuildArgs, DeadlineArgs};
 use crate::origin;
 
 const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
@@ -62,6 +62,8 @@ pub(crate) struct SolveArgs {
     #[arg(long)]
     no_integrate: bool,
     #[command(flatten)]
+    deadline: DeadlineArgs,
+    #[command(flatten)]
     build: BuildArgs,
 }
 
@@ -76,7 +78,7 @@ impl SolveArgs {
         if let Some(iterations) = self.friction_iterations {
             parameters.friction_iterations = iterations;
         }
-        parameters
+        self.deadline.apply(parameters)
     }
 }
 
