@@ -117,7 +117,7 @@ fn with_guest<T>(base: u64, run: impl FnOnce(&mut Guest) -> T) -> (T, Served, Em
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
     file.as_file().set_len(GUEST_BYTES).expect("resized");
     let memory = GuestFile::open(file.path()).expect("opened");
-    let granted = vec![BUFFERS..GUEST_BYTES];
+    let granted = std::iter::once(BUFFERS..GUEST_BYTES).collect();
     let board = EmulatedBoard::on_memory(BoardConfig::default(), Box::new(memory.clone()), granted)
         .expect("the default board can be built");
     let wire = Wire::default();
