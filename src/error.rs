@@ -21,7 +21,7 @@ pub enum Error {
     /// A step failed; the caller's bodies are as they were.
     #[error("{}", match aftermath {
         Aftermath::Ready => "the step failed and changed nothing; the board was reset and is ready for the next",
-        Aftermath::Untouched => "the step's results were refused and changed nothing; the board is ready for the next",
+        Aftermath::Untouched => "the step was refused and changed nothing; the board is ready for the next",
         Aftermath::MustReopen => "the step failed and changed nothing; the board could not be reset: open it again",
     })]
     Step {

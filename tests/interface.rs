@@ -145,7 +145,7 @@ fn control_registers_stand_at_their_published_offsets() {
             ("ERROR_DETAIL", 0x184),
             ("CYCLES_LO", 0x188),
             ("CYCLES_HI", 0x18C),
-            ("STALL_CYCLES", 0x190),
+            ("WORK_CYCLES", 0x190),
             ("WAIT_CYCLES", 0x194),
             ("HAZARDS", 0x198),
             ("SUM_RECEIVED", 0x19C),

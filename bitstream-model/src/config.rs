@@ -2,7 +2,7 @@
 //! and a device tree fix on a real one.
 
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
-use crate::interface::profile::{FLOAT, Profile};
+use crate::interface::profile::{Depth, FLOAT, Profile};
 
 /// What the pipeline does when a collision needs a velocity that is still being computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -133,12 +133,14 @@ pub enum ConfigError {
 }
 
 impl BoardConfig {
-    /// Hazard window of one kind of pass, cycles.
-    pub(crate) fn window_cycles(&self, profile_window: u32) -> u64 {
-        match self.window_slots {
-            Some(slots) => u64::from(slots) * u64::from(self.profile.initiation_interval),
-            None => u64::from(profile_window),
-        }
+    /// Depth of one kind of pass as this board has it: a pass ends no sooner than its last
+    /// write-back.
+    pub(crate) fn depth(&self, profile: Depth) -> Depth {
+        let window = match self.window_slots {
+            Some(slots) => slots.saturating_mul(self.profile.initiation_interval),
+            None => profile.window,
+        };
+        Depth { fill: profile.fill.max(window), window }
     }
 
     pub(crate) fn check(&self) -> Result<(), ConfigError> {

@@ -3,7 +3,8 @@
 use crate::axi_dma::Direction;
 use crate::interface::control::ErrorCode;
 
-/// A fault that happens once, at the next occasion after it is injected.
+/// A fault that happens once, at the next occasion after it is injected. A reset of the DMA core
+/// concerned, or of the accelerator, forgets one that is still due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Fault {

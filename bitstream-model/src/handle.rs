@@ -11,7 +11,7 @@ use crate::fault::Fault;
 use crate::interface::record::Beat;
 use crate::memory::{DeviceAccess, Memory, MemoryError};
 use crate::outside::DeviceMemory;
-use crate::violation::Violation;
+use crate::violation::{RegisterAccess, Violation};
 
 fn lock(board: &Mutex<Board>) -> MutexGuard<'_, Board> {
     // A panic elsewhere leaves numbers, never a broken structure.
@@ -64,6 +64,12 @@ impl EmulatedBoard {
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         lock(&self.0).log.violations().to_vec()
+    }
+
+    /// The last register accesses of the driver, oldest first; 32 are kept.
+    #[must_use]
+    pub fn register_accesses(&self) -> Vec<RegisterAccess> {
+        lock(&self.0).log.recent()
     }
 
     /// What has happened so far.

@@ -98,8 +98,12 @@ const GUARD: u64 = 4096;
 #[derive(Debug)]
 pub(crate) struct Memory {
     regions: BTreeMap<u64, Region>,
+    /// What was never allocated, on both sides of 4 GiB.
     low: Range<u64>,
     high: Range<u64>,
+    /// Released ranges, guard included. They are reused only when nothing else is left, so that a
+    /// use after release meets no other buffer.
+    released: Vec<Range<u64>>,
     address_limit: u64,
     next_is_high: bool,
     /// Memory that is not kept here, instead of all ranges.
@@ -116,6 +120,7 @@ impl Memory {
             regions: BTreeMap::new(),
             low: DDR_LOW.start + SYSTEM..DDR_LOW.end,
             high: DDR_HIGH.start..DDR_HIGH.end - SYSTEM,
+            released: Vec::new(),
             address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
             next_is_high: false,
             outside: None,
@@ -128,6 +133,7 @@ impl Memory {
             regions: BTreeMap::new(),
             low: 0..0,
             high: 0..0,
+            released: Vec::new(),
             address_limit: 0,
             next_is_high: false,
             outside: Some(Outside::new(memory, granted)),
@@ -142,9 +148,12 @@ impl Memory {
         let use_high = if self.next_is_high { fits(&self.high) } else { !fits(&self.low) };
         self.next_is_high = !self.next_is_high;
         let part = if use_high { &mut self.high } else { &mut self.low };
-        if !fits(part) {
-            return Err(MemoryError::Exhausted { bytes, limit });
-        }
+        let part = if fits(part) {
+            part
+        } else {
+            let released = self.released.iter_mut().find(|part| fits(part));
+            released.ok_or(MemoryError::Exhausted { bytes, limit })?
+        };
         let address = part.start;
         part.start += take;
         self.regions.insert(address, Region { bytes, content });
@@ -206,7 +215,10 @@ impl Memory {
     }
 
     pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
-        self.regions.remove(&address).map(|_| ()).ok_or(MemoryError::Unknown { address })
+        let region = self.regions.remove(&address).ok_or(MemoryError::Unknown { address })?;
+        self.released.retain(|range| !range.is_empty());
+        self.released.push(address..address + region.bytes.next_multiple_of(GUARD) + GUARD);
+        Ok(())
     }
 
     /// The range that holds `address`, and the offset in it.
@@ -343,6 +355,15 @@ mod tests {
         assert_eq!(memory.beats_mut(address, 1).err(), Some(Denied::Unmapped));
         for _ in 0..8 {
             assert_ne!(memory.allocate(4).expect("fits").0, address);
+        }
+    }
+
+    #[test]
+    fn released_memory_is_reused_when_nothing_else_is_left() {
+        let mut memory = Memory::new(32);
+        for _ in 0..100 {
+            let address = memory.place(64 << 20, Content::Cpu).expect("released ones are reused");
+            memory.release(address).expect("it is there");
         }
     }
 

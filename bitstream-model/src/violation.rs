@@ -45,6 +45,14 @@ pub enum ViolationKind {
         /// Which channel.
         direction: Direction,
     },
+    /// TAILDESC on a core without scatter-gather, or LENGTH on one with it, while running.
+    #[error("dma{core} {direction}: a doorbell of the mode that this core was not built for")]
+    WrongMode {
+        /// Which DMA.
+        core: usize,
+        /// Which channel.
+        direction: Direction,
+    },
     /// A direct transfer while one is running.
     #[error("dma{core} {direction}: LENGTH written while busy")]
     LengthWhileBusy {
@@ -231,9 +239,14 @@ impl Log {
         log::debug!("board: violation: {kind}");
         self.count += 1;
         if self.violations.len() < VIOLATIONS_KEPT {
-            let accesses = self.recent.iter().copied().collect();
+            let accesses = self.recent();
             self.violations.push(Violation { kind, cycle: self.now, accesses });
         }
+    }
+
+    /// The last register accesses, oldest first.
+    pub(crate) fn recent(&self) -> Vec<RegisterAccess> {
+        self.recent.iter().copied().collect()
     }
 
     pub(crate) fn violations(&self) -> &[Violation] {

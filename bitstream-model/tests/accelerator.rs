@@ -532,6 +532,40 @@ fn a_chain_on_one_body_stalls_for_the_window_less_the_interval_each() {
 }
 
 #[test]
+fn a_pass_ends_no_sooner_than_its_last_write_back() {
+    // 2,000 slots are 4,000 cycles, more than either fill.
+    let config = BoardConfig {
+        window_slots: Some(2_000),
+        hazards: Hazards::Unchecked,
+        ..BoardConfig::default()
+    };
+    let scene = Step { iterations: [1, 1], ..Step::on_ground(1, 3) };
+    let mut machine = Machine::new(config);
+    let outcome = machine.step(&scene).expect("the step completes");
+    let longer = (4_000 - 364) + (4_000 - 306);
+    assert_eq!(outcome.cycles, formula(&scene) + longer + outcome.waits, "{outcome:?}");
+    assert_eq!(outcome.stalls, 0);
+    for register in [control::CONTACT_DEPTH, control::FRICTION_DEPTH] {
+        let depth = machine.host.control(register);
+        assert_eq!(
+            (control::depth::FILL.of(depth), control::depth::WINDOW.of(depth)),
+            (4_000, 4_000)
+        );
+    }
+}
+
+#[test]
+fn stalls_of_more_than_32_bits_leave_the_formula_right() {
+    let config = BoardConfig { window_slots: Some(32_767), ..BoardConfig::default() };
+    let scene = Step { iterations: [1, 0], ..Step::on_ground(1, 66_000) };
+    let outcome = Machine::new(config).step(&scene).expect("the step completes");
+    assert_eq!(outcome.stalls, 65_999 * (65_534 - 2));
+    assert!(outcome.stalls > u64::from(u32::MAX));
+    let longer = 65_534 - 364;
+    assert_eq!(outcome.cycles - outcome.stalls - outcome.waits, formula(&scene) + longer);
+}
+
+#[test]
 fn a_window_of_one_slot_never_stalls() {
     for hazards in [Hazards::Interlocked, Hazards::Unchecked] {
         let config = BoardConfig { window_slots: Some(1), hazards, ..BoardConfig::default() };

@@ -156,6 +156,18 @@ fn idle_and_ioc_come_with_each_transfer_whatever_the_threshold() {
 }
 
 #[test]
+fn a_length_after_rs_was_cleared_starts_nothing_although_the_channel_has_not_halted() {
+    let host = Host::lenient(without_scatter_gather());
+    run_all(&host);
+    let direction = Direction::Mm2s;
+    host.write(0, direction, DMACR, DMACR.reset);
+    transfer(&host, 0, direction, host.readable(&numbered(8)), 128);
+    assert_eq!(host.violations(), [ViolationKind::DoorbellWhileHalted { core: 0, direction }]);
+    host.pause(10);
+    assert_eq!(host.board.counts().beats_read, 0);
+}
+
+#[test]
 fn a_length_while_busy_is_ignored_and_told() {
     let host = Host::lenient(without_scatter_gather());
     run_all(&host);

@@ -4,7 +4,7 @@ use std::fmt;
 
 use bitstream_model::interface::control::{
     CYCLES_HI, CYCLES_LO, ERROR, ERROR_DETAIL, ErrorCode, HAZARDS, IMPULSE_SUM_FRACTION_BITS,
-    IMPULSE_SUM_HI, IMPULSE_SUM_LO, STALL_CYCLES, SUM_RECEIVED, SUM_SENT, WAIT_CYCLES, error,
+    IMPULSE_SUM_HI, IMPULSE_SUM_LO, SUM_RECEIVED, SUM_SENT, WAIT_CYCLES, WORK_CYCLES, error,
 };
 
 use super::{Capabilities, Control};
@@ -34,8 +34,8 @@ impl fmt::Display for StickyError {
 pub(crate) struct Counters {
     /// From start to done.
     pub(crate) cycles: u64,
-    /// Of it, waiting for velocities.
-    pub(crate) stalls: u32,
+    /// Of it, neither waiting for velocities nor for streams.
+    pub(crate) work: u32,
     /// Of it, waiting for streams.
     pub(crate) waits: u32,
     /// Collisions that met a hazard.
@@ -60,14 +60,14 @@ impl Control {
         let hazards = self.read(&HAZARDS);
         let low = self.read(&CYCLES_LO);
         let cycles = wide(self.read(&CYCLES_HI), low);
-        let stalls = self.read(&STALL_CYCLES);
+        let work = self.read(&WORK_CYCLES);
         let waits = self.read(&WAIT_CYCLES);
         let sums = capabilities.checksums.then(|| (self.read(&SUM_RECEIVED), self.read(&SUM_SENT)));
         let impulse_sum = capabilities.impulse_sum.then(|| {
             let low = self.read(&IMPULSE_SUM_LO);
             impulse(wide(self.read(&IMPULSE_SUM_HI), low))
         });
-        Counters { cycles, stalls, waits, hazards, sums, impulse_sum }
+        Counters { cycles, work, waits, hazards, sums, impulse_sum }
     }
 }
 

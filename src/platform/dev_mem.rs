@@ -177,7 +177,7 @@ mod tests {
         assert_eq!(windows.dma(3), Some(0xA003_0000..0xA004_0000));
         assert_eq!(windows.dma(4), None);
         assert_eq!(windows.control(), Some(0xA004_0000..0xA004_1000));
-        assert_eq!(windows.memory, 0x6000_0000..0x6400_0000);
+        assert_eq!(windows.memory, 0x5000_0000..0x5400_0000);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 #![allow(unsafe_code, reason = "a slice of mapped memory is made from a raw pointer")]
 
 use std::sync::Arc;
+#[cfg(any(test, feature = "emulation"))]
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use bitstream_model::interface::record::Beat;
@@ -77,6 +78,7 @@ impl MappedBeats {
 #[derive(Debug)]
 pub(crate) enum SharedMemory {
     /// Of the emulated board.
+    #[cfg(any(test, feature = "emulation"))]
     Heap(Arc<[AtomicU32]>),
     /// Mapped uncached or write-combining: the words from byte `at` of a mapping.
     Mapped {
@@ -93,6 +95,7 @@ impl SharedMemory {
     /// How many words there are.
     pub(crate) fn len(&self) -> usize {
         match self {
+            #[cfg(any(test, feature = "emulation"))]
             Self::Heap(words) => words.len(),
             Self::Mapped { words, .. } => *words,
         }
@@ -101,6 +104,7 @@ impl SharedMemory {
     /// One load.
     pub(crate) fn load(&self, index: usize) -> u32 {
         match self {
+            #[cfg(any(test, feature = "emulation"))]
             Self::Heap(words) => words[index].load(Ordering::Relaxed),
             Self::Mapped { mapping, at, words } => {
                 assert!(index < *words, "a ring knows its length");
@@ -112,6 +116,7 @@ impl SharedMemory {
     /// One store.
     pub(crate) fn store(&self, index: usize, value: u32) {
         match self {
+            #[cfg(any(test, feature = "emulation"))]
             Self::Heap(words) => words[index].store(value, Ordering::Relaxed),
             Self::Mapped { mapping, at, words } => {
                 assert!(index < *words, "a ring knows its length");

@@ -67,7 +67,7 @@ pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
 pub(crate) use memory::{DmaMemory, SharedMemory};
 pub use reserved::ReservedMemory;
 pub use system::{System, UIO_CLASS};
-pub use u_dma_buf::Caching;
+pub use u_dma_buf::{Caching, u_dma_buf_names};
 pub use uio::{UioMap, UioNode, uio_nodes};
 pub use uio_device::{UioDevice, UioWindow};
 pub(crate) use wait::{Deadline, poll_until};

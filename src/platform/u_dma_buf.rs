@@ -132,7 +132,7 @@ impl UDmaBuf {
     ) -> Result<Self, PlatformError> {
         let buffer = system.u_dma_buf.join(name);
         if !Self::exists(system, name) {
-            let found = names(&system.u_dma_buf).join(", ");
+            let found = u_dma_buf_names(system).join(", ");
             return Err(PlatformError::NoUDmaBuf { wanted: name.to_owned(), found });
         }
         let address = read_number(&buffer.join("phys_addr"))?;
@@ -199,9 +199,10 @@ fn set_mode(
     fs::write(&path, format!("{MODE_WRITE_COMBINING}\n")).map_err(refused)
 }
 
-/// The names of all buffers.
-fn names(class: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(class)
+/// The names of the u-dma-buf buffers that there are.
+#[must_use]
+pub fn u_dma_buf_names(system: &System) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(&system.u_dma_buf)
         .into_iter()
         .flatten()
         .flatten()

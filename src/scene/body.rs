@@ -51,6 +51,12 @@ pub trait Bodies {
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Whether everything that is kept separately is there for every index; a step refuses it
+    /// otherwise.
+    fn lengths_agree(&self) -> bool {
+        true
+    }
 }
 
 impl Bodies for [Body] {
@@ -83,9 +89,7 @@ impl Bodies for Vec<Body> {
     }
 }
 
-/// Bodies kept in separate arrays of one length.
-///
-/// The number of bodies is that of the shortest array.
+/// Bodies kept in separate arrays of one length; a step refuses arrays of unequal lengths.
 #[derive(Debug)]
 pub struct BodyArrays<'a> {
     /// Centres of mass, m.
@@ -100,14 +104,25 @@ pub struct BodyArrays<'a> {
     pub shapes: &'a [u32],
 }
 
+impl BodyArrays<'_> {
+    fn lengths(&self) -> [usize; 5] {
+        [
+            self.positions.len(),
+            self.orientations.len(),
+            self.linear_velocities.len(),
+            self.angular_velocities.len(),
+            self.shapes.len(),
+        ]
+    }
+}
+
 impl Bodies for BodyArrays<'_> {
     fn len(&self) -> usize {
-        self.positions
-            .len()
-            .min(self.orientations.len())
-            .min(self.linear_velocities.len())
-            .min(self.angular_velocities.len())
-            .min(self.shapes.len())
+        self.positions.len()
+    }
+
+    fn lengths_agree(&self) -> bool {
+        self.lengths().iter().all(|length| *length == self.len())
     }
 
     fn body(&self, index: usize) -> Body {

@@ -42,6 +42,12 @@ pub trait Collisions {
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Whether everything that is kept separately is there for every index; a step refuses it
+    /// otherwise.
+    fn lengths_agree(&self) -> bool {
+        true
+    }
 }
 
 impl Collisions for [Collision] {
@@ -64,9 +70,7 @@ impl Collisions for Vec<Collision> {
     }
 }
 
-/// Collisions kept in separate arrays of one length.
-///
-/// The number of collisions is that of the shortest array.
+/// Collisions kept in separate arrays of one length; a step refuses arrays of unequal lengths.
 #[derive(Debug, Clone, Copy)]
 pub struct CollisionArrays<'a> {
     /// Indices of bodies A and B.
@@ -81,7 +85,13 @@ pub struct CollisionArrays<'a> {
 
 impl Collisions for CollisionArrays<'_> {
     fn len(&self) -> usize {
-        self.bodies.len().min(self.normals.len()).min(self.counts.len()).min(self.contacts.len())
+        self.bodies.len()
+    }
+
+    fn lengths_agree(&self) -> bool {
+        [self.normals.len(), self.counts.len(), self.contacts.len()]
+            .iter()
+            .all(|length| *length == self.len())
     }
 
     fn collision(&self, index: usize) -> Collision {

@@ -24,11 +24,23 @@ pub enum InputError {
         limit: u32,
     },
 
-    /// More collisions than 32 bits count.
-    #[error("found {found} collisions, a step takes at most {limit}: give fewer", limit = u32::MAX)]
+    /// More collisions than the bitstream has room for, whatever the memory.
+    #[error(
+        "found {found} collisions, the bitstream takes at most {limit}: give fewer, or load a \
+         bitstream with a larger collision capacity"
+    )]
     TooManyCollisions {
         /// Collisions given.
         found: usize,
+        /// Collisions that the bitstream takes.
+        limit: u32,
+    },
+
+    /// Separate arrays of different lengths.
+    #[error("the arrays of the {what} have different lengths: give every array for all {what}")]
+    UnequalLengths {
+        /// "bodies" or "collisions".
+        what: &'static str,
     },
 
     /// Bodies and collisions together exceed the on-chip memory.

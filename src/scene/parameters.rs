@@ -26,7 +26,8 @@ pub struct StepParameters {
     /// velocities that the solver left (undamped, without gravity).
     pub integrate: bool,
     /// How long a step may take on the accelerator; `None` follows from the work: four times what
-    /// it takes if every collision waits for the one before it, and 10 ms.
+    /// it takes if every collision waits for the one before it, what its bytes take at 100 MB/s,
+    /// and 10 ms.
     pub deadline: Option<Duration>,
 }
 

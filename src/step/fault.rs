@@ -101,6 +101,9 @@ pub enum Fault {
     /// The control block did not follow.
     #[error(transparent)]
     Control(#[from] ControlError),
+    /// There is no DMA memory for a step of this size.
+    #[error("no DMA memory for this step: give a smaller one, or reserve more")]
+    NoMemory(#[source] PlatformError),
     /// Memory or the interrupt failed.
     #[error(transparent)]
     Platform(#[from] PlatformError),

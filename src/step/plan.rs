@@ -16,6 +16,8 @@ use crate::axi_dma::pieces;
 use crate::beat::stripe::{Segment, beats_on_channel};
 use crate::scene::StepParameters;
 
+/// A memory slower than 100 MB/s is taken for one that does not answer.
+const SLOWEST_BYTES_PER_MICROSECOND: u64 = 100;
 /// Beats to which segments are aligned: 64 bytes.
 const ALIGNMENT: usize = 64 / BEAT_BYTES;
 
@@ -84,7 +86,7 @@ impl Plan {
     }
 
     /// How long the step may last: four times what it takes if every collision waits for the one
-    /// before it, and 10 ms.
+    /// before it, what its bytes take over the slowest memory, and 10 ms.
     pub(super) fn deadline(
         &self,
         parameters: &StepParameters,
@@ -96,7 +98,11 @@ impl Plan {
                 .saturating_mul(self.passes)
                 .saturating_mul(self.collisions as u64)
                 .saturating_mul(u64::from(capabilities.initiation_interval) + u64::from(window));
-            time_of(cycles, capabilities.clock_khz).saturating_add(Duration::from_millis(10))
+            let bytes = self.bytes_to_device().saturating_add(self.bytes_from_device());
+            let moving = Duration::from_micros(bytes / SLOWEST_BYTES_PER_MICROSECOND);
+            time_of(cycles, capabilities.clock_khz)
+                .saturating_add(moving)
+                .saturating_add(Duration::from_millis(10))
         })
     }
 }
@@ -143,9 +149,10 @@ mod tests {
         fake::describe(&registers);
         let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
         let mut parameters = StepParameters::default();
-        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.727066 s.
+        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.727066 s; 119,437,184 bytes in and out
+        // are 1.194371 s at 100 MB/s.
         let limit = FOUR.deadline(&parameters, &capabilities);
-        assert_eq!(limit.as_micros(), 4_727_066 + 10_000);
+        assert_eq!(limit.as_micros(), 4_727_066 + 1_194_371 + 10_000);
         parameters.deadline = Some(Duration::from_millis(3));
         assert_eq!(FOUR.deadline(&parameters, &capabilities), Duration::from_millis(3));
     }

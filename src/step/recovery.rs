@@ -9,10 +9,10 @@ use crate::scene::Shape;
 impl Device {
     /// Brings the board back after `fault`; the error to return.
     pub(super) fn fail(&mut self, fault: Fault, shapes: &[Shape]) -> Error {
-        log::error!("step failed: {fault}");
+        log::debug!("step failed: {fault}");
         let aftermath = match fault {
-            // The board did its part: everything is complete and back.
-            Fault::NotFinite { .. } => Aftermath::Untouched,
+            // The board did its part: everything is complete and back. Or it was not asked yet.
+            Fault::NotFinite { .. } | Fault::NoMemory(_) => Aftermath::Untouched,
             _ => match self.recover(shapes) {
                 Ok(()) => Aftermath::Ready,
                 Err(error) => {
@@ -32,14 +32,16 @@ impl Device {
     /// Makes buffers and rings large enough for a step. A channel that does not stop for its new
     /// ring is reset, with everything else.
     pub(super) fn reserve_or_reset(&mut self, plan: &Plan, shapes: &[Shape]) -> Result<(), Fault> {
-        match self.reserve(plan) {
-            Err(Fault::Core(error)) => {
-                log::warn!("a channel did not stop, resetting the board: {error}");
-                self.recover(shapes)?;
-                self.reserve(plan)
-            }
-            result => result,
+        let mut reserved = self.reserve(plan);
+        if let Err(Fault::Core(error)) = &reserved {
+            log::warn!("a channel did not stop, resetting the board: {error}");
+            self.recover(shapes)?;
+            reserved = self.reserve(plan);
         }
+        reserved.map_err(|fault| match fault {
+            Fault::Platform(error) => Fault::NoMemory(error),
+            other => other,
+        })
     }
 
     /// Resets everything and restores what a step relies on.

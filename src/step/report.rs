@@ -7,8 +7,7 @@ use std::time::Duration;
 pub struct StepCycles {
     /// From start to done.
     pub total: u64,
-    /// What is left of [`total`](Self::total) without stalls and waits: the cycles by the formula
-    /// of the interface specification.
+    /// By the formula of the interface specification: neither stalled nor waiting.
     pub work: u64,
     /// Cycles in which an issue waited for a velocity to be written back.
     pub stalls: u64,
@@ -151,8 +150,8 @@ mod tests {
     }
 
     #[test]
-    fn thesis_cycles_take_the_thesis_time() {
-        // Thesis T6.4: 2,062,697 cycles at 275 MHz are 7.49 ms (7.5007 ms before rounding down).
+    fn time_is_cycles_over_the_clock() {
+        // 2,062,697 cycles at 275 MHz are 7.5007 ms; the thesis prints 7.49 ms beside them (T6.4).
         let time = time_of(2_062_697, 275_000);
         assert_eq!(time.as_micros(), 7500);
         assert_eq!(time_of(1, 0), Duration::ZERO);

@@ -66,6 +66,7 @@ impl Accelerator {
         );
         let limits = Limits {
             body_capacity: device.capabilities.body_capacity,
+            collision_capacity: device.capabilities.collision_capacity,
             shape_capacity: device.capabilities.shape_capacity,
             memory_bytes: device.capabilities.memory_bytes,
             bytes_per_body: device.capabilities.bytes_per_body,
@@ -183,8 +184,8 @@ impl Accelerator {
         self.unpack(plan, bodies)?;
         host.unpack = watch.lap();
 
-        let (stalls, waits) = (u64::from(counters.stalls), u64::from(counters.waits));
-        let work = counters.cycles.saturating_sub(stalls).saturating_sub(waits);
+        let (work, waits) = (u64::from(counters.work), u64::from(counters.waits));
+        let stalls = counters.cycles.saturating_sub(work).saturating_sub(waits);
         Ok(StepReport {
             bodies: plan.bodies as u64,
             collisions: plan.collisions as u64,

@@ -52,13 +52,14 @@ need_packages() {
 		skip "these packages cannot be installed: ${missing% }"
 }
 
-# Makes the package lists include arm64 ones, once.
+# Brings the package lists up to date, with those of arm64; an ordinary user has to take them as
+# they are.
 need_lists() {
 	if ! dpkg --print-foreign-architectures | grep -qx arm64; then
 		[ "$(id -u)" = 0 ] || skip "needs the packages of arm64; as root: dpkg --add-architecture arm64 && apt-get update"
 		dpkg --add-architecture arm64
 	fi
-	if [ -z "${lists_are_new:-}" ]; then
+	if [ -z "${lists_are_new:-}" ] && [ "$(id -u)" = 0 ]; then
 		apt update || skip "the package lists cannot be fetched"
 		lists_are_new=yes
 	fi

@@ -9,7 +9,7 @@ use crate::interface::control::{
     GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO, ISR, ISSUE,
     MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE,
     RESET, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE,
-    SHAPE_TABLE, STALL_CYCLES, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, ap_ctrl,
+    SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WORK_CYCLES, ap_ctrl,
     channels, depth, dma, error, features, flags, irq, issue, memory_per_record,
 };
 use crate::interface::profile::Depth;
@@ -200,8 +200,8 @@ impl Registers {
                 .fold(0, |value, (k, bits)| value | ((bits / 8).ilog2() << (4 * register(k))))
         };
         let pipeline = |kind: Depth| {
-            let window = register(config.window_cycles(kind.window));
-            depth::WINDOW.put(depth::FILL.put(0, kind.fill), window)
+            let built = config.depth(kind);
+            depth::WINDOW.put(depth::FILL.put(0, built.fill), built.window)
         };
         let counters = &self.counters;
         let memory = profile.memory;
@@ -258,7 +258,10 @@ impl Registers {
             _ if offset == ERROR_DETAIL.offset => self.error_detail,
             _ if offset == CYCLES_LO.offset => low(counters.cycles),
             _ if offset == CYCLES_HI.offset => high(counters.cycles),
-            _ if offset == STALL_CYCLES.offset => register(counters.stalls),
+            _ if offset == WORK_CYCLES.offset => {
+                // A step that ended in an error may have counted a stall before it was over.
+                register(counters.cycles.saturating_sub(counters.stalls + counters.waits))
+            }
             _ if offset == WAIT_CYCLES.offset => register(counters.waits),
             _ if offset == HAZARDS.offset => register(counters.hazards),
             _ if offset == SUM_RECEIVED.offset => counters.sum_received,

@@ -23,6 +23,7 @@ use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, IMPULSE_SUM_FRACTION_BITS,
     ITERATIONS_MAX,
 };
+use crate::interface::profile::Depth;
 use crate::interface::record::{Beat, CONTACT_POINTS, collision, pose, result, velocity};
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
@@ -34,13 +35,6 @@ use number::{Flush, Keep, Number};
 use pipeline::{Entry, Pipeline};
 use segment::{PacketError, Segment, Striping};
 use solver::{Impulses, Mass, Velocity};
-
-/// What kind of pass runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Contact,
-    Friction,
-}
 
 /// Where a step stands.
 #[derive(Debug, Clone, Copy)]
@@ -164,6 +158,7 @@ impl Accelerator {
                 self.phase = Phase::Idle;
                 self.start_due = false;
                 self.debt = 0;
+                self.fault = None;
                 Some(false)
             }
         }
@@ -363,8 +358,11 @@ impl Accelerator {
         }
     }
 
-    fn kind(&self, pass: u32) -> Kind {
-        if pass < self.arguments.contact_iterations { Kind::Contact } else { Kind::Friction }
+    /// Depth of the pipeline that a pass goes through.
+    fn depth(&self, pass: u32) -> Depth {
+        let profile = self.config.profile;
+        let contact = pass < self.arguments.contact_iterations;
+        self.config.depth(if contact { profile.contact } else { profile.friction })
     }
 
     fn start_pass(&mut self, number: u32) {
@@ -374,12 +372,7 @@ impl Accelerator {
             self.start_integration();
             return;
         }
-        let profile = self.config.profile;
-        let window = match self.kind(number) {
-            Kind::Contact => profile.contact.window,
-            Kind::Friction => profile.friction.window,
-        };
-        self.pipeline.start_pass(self.config.window_cycles(window));
+        self.pipeline.start_pass(self.depth(number).window.into());
         self.phase = Phase::Pass { number, segment };
     }
 
@@ -427,10 +420,7 @@ impl Accelerator {
             if self.config.hazards == Hazards::Unchecked {
                 self.pipeline.finish_pass(&mut self.velocities);
             }
-            self.debt += u64::from(match self.kind(number) {
-                Kind::Contact => profile.contact.fill,
-                Kind::Friction => profile.friction.fill,
-            });
+            self.debt += u64::from(self.depth(number).fill);
             self.start_pass(number + 1);
         }
         Ok(true)

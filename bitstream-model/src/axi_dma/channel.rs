@@ -240,7 +240,7 @@ impl Channel {
             return false;
         }
         if !build.scatter_gather {
-            log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
+            log.violation(ViolationKind::WrongMode { core, direction });
             return false;
         }
         if matches!(self.work, Work::None) {
@@ -262,7 +262,16 @@ impl Channel {
             }
             return false;
         }
-        if build.scatter_gather || !matches!(self.work, Work::None) {
+        if build.scatter_gather {
+            log.violation(ViolationKind::WrongMode { core, direction });
+            return false;
+        }
+        if !dmacr::RS.is_set(self.control) {
+            // Stopped, by software or by an error, and not halted yet.
+            log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
+            return false;
+        }
+        if !matches!(self.work, Work::None) {
             log.violation(ViolationKind::LengthWhileBusy { core, direction });
             return false;
         }

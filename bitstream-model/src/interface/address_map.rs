@@ -45,7 +45,7 @@ pub const U_DMA_BUF: &str = "pgs";
 
 /// Where the reserved memory begins unless it is said otherwise: in low DDR, so that cores with
 /// 32-bit addresses reach it.
-pub const MEMORY_BASE: u64 = 0x6000_0000;
+pub const MEMORY_BASE: u64 = 0x5000_0000;
 /// How much of it there is, bytes: 38,880 bodies with 127,000 collisions take 19 MB and some slack.
 pub const MEMORY_BYTES: u64 = 64 << 20;
 

@@ -17,7 +17,7 @@ use super::register::{Access, Field, Register};
 pub mod ap_ctrl {
     use super::{Access, Field};
 
-    /// Starts a step; reads 1 until the accelerator has taken its arguments.
+    /// Starts a step; reads 1 while it runs.
     pub const START: Field = Field::bit("ap_start", 0, Access::SelfClearing);
     /// A step has ended, well or with an error; reading clears it.
     pub const DONE: Field = Field::bit("ap_done", 1, Access::ClearOnRead);
@@ -25,8 +25,8 @@ pub mod ap_ctrl {
     pub const IDLE: Field = Field::bit("ap_idle", 2, Access::ReadOnly);
     /// The accelerator can take a new start; reading clears it.
     pub const READY: Field = Field::bit("ap_ready", 3, Access::ClearOnRead);
-    /// Restart by itself; this accelerator has no use for it and ignores it.
-    pub const AUTO_RESTART: Field = Field::bit("auto_restart", 7, Access::ReadWrite);
+    /// Restart by itself, which this accelerator cannot; reads 0.
+    pub const AUTO_RESTART: Field = Field::bit("auto_restart", 7, Access::ReadOnly);
 }
 
 /// Fields of IER and ISR.
@@ -281,8 +281,10 @@ pub const ERROR_DETAIL: Register = read_only("ERROR_DETAIL", 0x184, &[]);
 pub const CYCLES_LO: Register = read_only("CYCLES_LO", 0x188, &[]);
 /// Clock cycles of the last step, bits 63:32.
 pub const CYCLES_HI: Register = read_only("CYCLES_HI", 0x18C, &[]);
-/// Cycles of it in which an issue waited for a velocity to be written back; stops at its maximum.
-pub const STALL_CYCLES: Register = read_only("STALL_CYCLES", 0x190, &[]);
+/// Cycles of it by the formula: neither waiting for a velocity to be written back nor for a stream.
+/// What is left of [`CYCLES_LO`] without these and [`WAIT_CYCLES`] are interlock stalls, which may
+/// take more than 32 bits.
+pub const WORK_CYCLES: Register = read_only("WORK_CYCLES", 0x190, &[]);
 /// Cycles of it in which the accelerator waited for a stream; stops at its maximum.
 pub const WAIT_CYCLES: Register = read_only("WAIT_CYCLES", 0x194, &[]);
 /// Collisions that met a hazard, over all passes: waited (interlocked) or read a stale velocity.
@@ -355,7 +357,7 @@ pub const REGISTERS: &[Register] = &[
     ERROR_DETAIL,
     CYCLES_LO,
     CYCLES_HI,
-    STALL_CYCLES,
+    WORK_CYCLES,
     WAIT_CYCLES,
     HAZARDS,
     SUM_RECEIVED,

@@ -196,11 +196,14 @@ impl Machine {
         }
         let pair = |low, high| u64::from(host.control(low)) | (u64::from(host.control(high)) << 32);
         assert!(ap_ctrl::DONE.is_set(host.control(control::AP_CTRL)), "the step is done");
+        let cycles = pair(control::CYCLES_LO, control::CYCLES_HI);
+        let work = u64::from(host.control(control::WORK_CYCLES));
+        let waits = u64::from(host.control(control::WAIT_CYCLES));
         Outcome {
             bodies: unpack(&streams, bodies),
-            cycles: pair(control::CYCLES_LO, control::CYCLES_HI),
-            stalls: host.control(control::STALL_CYCLES).into(),
-            waits: host.control(control::WAIT_CYCLES).into(),
+            cycles,
+            stalls: cycles - work - waits,
+            waits,
             hazards: host.control(control::HAZARDS),
             sum_received: host.control(control::SUM_RECEIVED),
             sum_sent: host.control(control::SUM_SENT),
@@ -222,7 +225,9 @@ impl Machine {
         self.arm(&mut flight, result_beats(step.bodies.len()));
         self.start();
         self.send(&mut flight, lanes);
-        self.wait(&flight, LONG)?;
+        // The widest window is 65,534 cycles, 0.24 ms.
+        let stalls = u32::try_from(step.collisions.len()).expect("some thousands");
+        self.wait(&flight, LONG + microseconds(300) * stalls)?;
         Ok(self.collect(&flight, step.bodies.len()))
     }
 

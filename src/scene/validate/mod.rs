@@ -20,6 +20,8 @@ use super::{Bodies, Collisions, InputError, Shape, StepParameters};
 pub(crate) struct Limits {
     /// Largest number of bodies, whatever the memory.
     pub(crate) body_capacity: u32,
+    /// Largest number of collisions, whatever the memory.
+    pub(crate) collision_capacity: u32,
     /// Entries of the shape table.
     pub(crate) shape_capacity: u32,
     /// On-chip memory that bodies and collisions share, bytes.
@@ -41,6 +43,13 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     parameters: &StepParameters,
     limits: &Limits,
 ) -> Result<(), InputError> {
+    for (what, agree) in
+        [("bodies", bodies.lengths_agree()), ("collisions", collisions.lengths_agree())]
+    {
+        if !agree {
+            return Err(InputError::UnequalLengths { what });
+        }
+    }
     let body_count = bodies.len();
     check_parameters(parameters)?;
     check_room(body_count, collisions.len(), limits)?;
@@ -71,8 +80,9 @@ fn check_room(bodies: usize, collisions: usize, limits: &Limits) -> Result<(), I
     if exceeds(bodies, limits.body_capacity) {
         return Err(InputError::TooManyBodies { found: bodies, limit: limits.body_capacity });
     }
-    if exceeds(collisions, u32::MAX) {
-        return Err(InputError::TooManyCollisions { found: collisions });
+    if exceeds(collisions, limits.collision_capacity) {
+        let limit = limits.collision_capacity;
+        return Err(InputError::TooManyCollisions { found: collisions, limit });
     }
     // Neither product leaves 64 bits: both factors are below 2^32 by now.
     let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
@@ -108,10 +118,11 @@ fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Body, Collision, Contact, Pose, Velocity};
+    use crate::scene::{Body, BodyArrays, Collision, CollisionArrays, Contact, Pose, Velocity};
 
     const FLOAT: Limits = Limits {
         body_capacity: 131_072,
+        collision_capacity: 262_144,
         shape_capacity: 64,
         memory_bytes: 4 << 20,
         bytes_per_body: 24,
@@ -229,15 +240,41 @@ mod tests {
     }
 
     #[test]
-    #[cfg(target_pointer_width = "64")]
-    fn more_collisions_than_32_bits_count_are_refused() {
-        let free = Limits { bytes_per_collision: 0, ..FLOAT };
-        let most = usize::try_from(u32::MAX).expect("32 bits fit");
-        assert_eq!(check_room(1, most, &free), Ok(()));
-        assert_eq!(
-            check_room(1, most + 1, &free),
-            Err(InputError::TooManyCollisions { found: most + 1 })
-        );
+    fn more_collisions_than_the_capacity_are_refused_whatever_the_memory() {
+        let free = Limits { bytes_per_collision: 0, collision_capacity: 9, ..FLOAT };
+        assert_eq!(check_room(1, 9, &free), Ok(()));
+        let refused = InputError::TooManyCollisions { found: 10, limit: 9 };
+        assert_eq!(check_room(1, 10, &free), Err(refused));
+    }
+
+    #[test]
+    fn separate_arrays_of_unequal_lengths_are_refused() {
+        let parameters = StepParameters::default();
+        let mut positions = [[0.0; 3]; 2];
+        let mut linear_velocities = [[0.0; 3]; 2];
+        let mut angular_velocities = [[0.0; 3]; 2];
+        let mut orientations = [[0.0, 0.0, 0.0, 1.0]; 2];
+        let mut check = |shapes: &[u32], counts: &[u32]| {
+            let bodies = BodyArrays {
+                positions: &mut positions,
+                orientations: &mut orientations,
+                linear_velocities: &mut linear_velocities,
+                angular_velocities: &mut angular_velocities,
+                shapes,
+            };
+            let collisions = CollisionArrays {
+                bodies: &[[0, 1]],
+                normals: &[[0.0, 1.0, 0.0]],
+                counts,
+                contacts: &[[[0.0; 4]; 4]],
+            };
+            validate(&bodies, &collisions, &SHAPES, &parameters, &FLOAT)
+        };
+        assert_eq!(check(&[0, 1], &[1]), Ok(()));
+        let unequal = |what| Err(InputError::UnequalLengths { what });
+        assert_eq!(check(&[0], &[1]), unequal("bodies"));
+        assert_eq!(check(&[0, 1, 1], &[1]), unequal("bodies"));
+        assert_eq!(check(&[0, 1], &[]), unequal("collisions"));
     }
 
     #[test]

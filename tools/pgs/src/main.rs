@@ -12,6 +12,8 @@ mod digest;
 mod failure;
 mod folder;
 mod interrupt;
+mod loading;
+mod memory;
 mod npy;
 mod options;
 mod origin;

@@ -94,7 +94,7 @@ const BYTES_PER_GB: f64 = 1e9;
 /// Faster than any memory; beyond it a typing error is likelier.
 const BANDWIDTH_MAX: f64 = 1000.0;
 /// Slower than any memory.
-const BANDWIDTH_MIN: f64 = 0.001;
+const BANDWIDTH_MIN: f64 = 0.1;
 
 /// A bandwidth, as it is written on the command line.
 pub(crate) fn bandwidth(text: &str) -> Result<Bandwidth, String> {

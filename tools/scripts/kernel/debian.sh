@@ -5,20 +5,19 @@
 # usage: debian.sh DIRECTORY    makes DIRECTORY/Image and DIRECTORY/modules/{*.ko,order}
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../lib.sh"
-need_packages make gcc-aarch64-linux-gnu xz-utils bc
-need_lists
-
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
+if [ -f "$out/version" ]; then
+	echo "Debian's kernel $(cat "$out/version") is there"
+	exit 0
+fi
+need_packages make gcc-aarch64-linux-gnu xz-utils bc
+need_lists
 image=$(apt-cache depends linux-image-arm64:arm64 | sed -n 's/.*Depends: \(linux-image-[^:]*\).*/\1/p' | head -n 1)
 [ -n "$image" ] || skip "Debian's package linux-image-arm64:arm64 is not in the package lists"
 version=${image#linux-image-}      # 6.1.0-56-arm64
 abi=${version%-arm64}              # 6.1.0-56
 series=$(cut -d. -f1,2 <<<"$version") # 6.1
-if [ "$(cat "$out/version" 2>/dev/null)" = "$version" ]; then
-	echo "Debian's kernel $version is there"
-	exit 0
-fi
 
 scratch=$out/scratch
 rm -rf "$out"

@@ -93,3 +93,26 @@ pub(crate) fn memory() -> Outcome {
     }
     Ok(format!("4 times {beats} beats, up to {:#x}", memory.address() + memory.bytes()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The guest is built from other files than this program: they have to agree.
+    #[test]
+    fn the_guests_device_tree_has_the_memory_of_the_interface() {
+        let tree = include_str!("../../zcu102.dts");
+        let region = |(address, bytes): (u64, u64)| {
+            format!(
+                "reg = <{:#x} {:#010x} 0x0 {bytes:#010x}>;",
+                address >> 32,
+                address & 0xFFFF_FFFF
+            )
+        };
+        let memory = region((MEMORY_BASE, MEMORY_BYTES));
+        assert_eq!(tree.matches(&memory).count(), 2, "{memory}: reserved, and a UIO node");
+        assert_eq!(tree.matches(&format!("uio-name = \"{UIO_MEMORY_NODE}\";")).count(), 1);
+        assert_eq!(tree.matches(&format!("uio-name = \"{ZDMA_NODE}\";")).count(), 1);
+        assert!(tree.contains("reg = <0x0 0xfd500000 0x0 0x1000>;"));
+    }
+}

@@ -1,6 +1,7 @@
 //! The verbs, one file each.
 
 pub(crate) mod list;
+pub(crate) mod load;
 pub(crate) mod model;
 pub(crate) mod run;
 pub(crate) mod solve;
@@ -24,6 +25,7 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
         Verb::Solve(args) => solve::run(args, &command.common, out),
         Verb::Model(args) => model::run(args, &command.common, out),
         Verb::List(args) => list::run(args, &command.common, out),
+        Verb::Load(args) => load::run(args, &command.common, out),
     }
 }
 

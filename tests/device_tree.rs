@@ -1,0 +1,284 @@
+//! The device trees say what the interface says: regions, sizes, names, interrupt; buffers lie
+//! where every DMA core reaches them; the udev rule names every node and gives nobody else rights.
+
+#[path = "device_tree/mod.rs"]
+mod device_tree;
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use device_tree::{Tree, sources, tools_found};
+use zynq_pgs::interface::address_map;
+
+/// GIC, in device tree bindings: shared peripheral interrupt, and level, active high.
+const SPI: u32 = 0;
+const LEVEL_HIGH: u32 = 4;
+
+/// Every region of the interface: its map's name, address, length.
+fn interface() -> Vec<(&'static str, u64, u64)> {
+    let dma = address_map::UIO_DMA_MAPS
+        .iter()
+        .enumerate()
+        .map(|(k, name)| (*name, address_map::dma_base(k), u64::from(address_map::DMA_BYTES)));
+    let bytes = u64::from(address_map::CONTROL_BYTES);
+    dma.chain([(address_map::UIO_CONTROL_MAP, address_map::CONTROL_BASE, bytes)]).collect()
+}
+
+/// Compares one property, and says which differs.
+fn equal<T: PartialEq + std::fmt::Debug>(
+    node: &str,
+    what: &str,
+    found: T,
+    expected: T,
+) -> Result<(), String> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(format!("{node}: {what} is {found:?}, the interface says {expected:?}"))
+}
+
+/// Holds a node against the interface: its UIO name, its regions, and whether it has the interrupt.
+fn check_node(
+    tree: &Tree,
+    node: &str,
+    uio_name: &str,
+    regions: &[(&str, u64, u64)],
+    interrupt: bool,
+) -> Result<(), String> {
+    let strings = |property| tree.strings(node, property).unwrap_or_default();
+    equal(node, "compatible", strings("compatible"), vec!["generic-uio".to_owned()])?;
+    equal(node, "linux,uio-name", strings("linux,uio-name"), vec![uio_name.to_owned()])?;
+    // Kernels without linux,uio-name take the node's name without its address.
+    let own = node.rsplit('/').next().unwrap_or_default();
+    let expected = format!("{uio_name}@{:x}", regions[0].1);
+    equal(node, "the node's name", own, expected.as_str())?;
+    let found = tree.regions(node).unwrap_or_default();
+    let expected: Vec<_> = regions.iter().map(|(_, address, bytes)| (*address, *bytes)).collect();
+    equal(node, "reg", found, expected)?;
+    let expected: Vec<_> = regions.iter().map(|(name, _, _)| (*name).to_owned()).collect();
+    equal(node, "reg-names", strings("reg-names"), expected)?;
+    let expected = interrupt.then_some(vec![SPI, address_map::INTERRUPT_SPI, LEVEL_HIGH]);
+    equal(node, "interrupts", tree.cells(node, "interrupts"), expected)?;
+    let gic = tree.strings("/__symbols__", "gic").unwrap_or_default().concat();
+    let expected = interrupt.then(|| tree.cells(&gic, "phandle")).flatten();
+    equal(node, "interrupt-parent", tree.cells(node, "interrupt-parent"), expected)
+}
+
+fn check_single(tree: &Tree, parent: &str) -> Result<(), String> {
+    let node = format!("{parent}/{}@{:x}", address_map::UIO_NODE, address_map::DMA_BASE);
+    check_node(tree, &node, address_map::UIO_NODE, &interface(), true)
+}
+
+fn check_separate(tree: &Tree) -> Result<(), String> {
+    for region in interface() {
+        let name = format!("{}-{}", address_map::UIO_NODE, region.0);
+        let node = format!("/{name}@{:x}", region.1);
+        let interrupt = region.0 == address_map::UIO_CONTROL_MAP;
+        check_node(tree, &node, &name, &[region], interrupt)?;
+    }
+    Ok(())
+}
+
+fn as_shipped(text: String) -> String {
+    text
+}
+
+#[test]
+fn the_single_node_has_the_regions_and_the_interrupt_of_the_interface() {
+    if !tools_found() {
+        return;
+    }
+    check_single(&Tree::with_overlay("zynq-pgs.dtso", as_shipped), "").expect("as the interface");
+}
+
+#[test]
+fn inside_the_fpga_region_stands_the_same_node_and_the_bitstream() {
+    if !tools_found() {
+        return;
+    }
+    let tree = Tree::with_overlay("zynq-pgs-region.dtso", as_shipped);
+    check_single(&tree, "/fpga-full").expect("as the interface");
+    let firmware = tree.strings("/fpga-full", "firmware-name");
+    assert_eq!(firmware, Some(vec!["zynq-pgs.bit.bin".to_owned()]));
+}
+
+#[test]
+fn the_separate_nodes_have_the_regions_and_control_has_the_interrupt() {
+    if !tools_found() {
+        return;
+    }
+    check_separate(&Tree::with_overlay("zynq-pgs-nodes.dtso", as_shipped))
+        .expect("as the interface");
+}
+
+#[test]
+fn every_difference_from_the_interface_is_noticed() {
+    if !tools_found() {
+        return;
+    }
+    for (original, mutant, noticed) in [
+        ("0x0 0xa0020000 0x0", "0x0 0xa0050000 0x0", "reg "),
+        ("0x0 0xa0040000 0x0 0x1000>", "0x0 0xa0040000 0x0 0x2000>", "reg "),
+        ("0x0 0xa0030000 0x0", "0x4 0xa0030000 0x0", "reg "),
+        ("\"dma1\", \"dma2\"", "\"dma2\", \"dma1\"", "reg-names"),
+        // The GIC's own number, 32 more, is the classic mistake; so is an edge.
+        ("<0 89 4>", "<0 121 4>", "interrupts"),
+        ("<0 89 4>", "<0 89 1>", "interrupts"),
+        ("linux,uio-name = \"pgs\"", "linux,uio-name = \"solver\"", "linux,uio-name"),
+        ("\"generic-uio\"", "\"xlnx,axi-dma-1.00.a\"", "compatible"),
+    ] {
+        let mutate = |text: String| text.replace(original, mutant);
+        let shipped = fs::read_to_string(sources().join("zynq-pgs.dtsi")).expect("the node");
+        assert_ne!(mutate(shipped.clone()), shipped, "{original} is not in the source");
+        let error = check_single(&Tree::with_overlay("zynq-pgs.dtso", mutate), "")
+            .expect_err("a difference");
+        assert!(error.contains(noticed), "{original} -> {mutant}: {error}");
+    }
+    for (original, mutant) in [
+        ("0x0 0xa0010000 0x0 0x10000", "0x0 0xa0010000 0x0 0x8000"),
+        ("<0 89 4>", "<0 90 4>"),
+        ("\"pgs-dma3\"", "\"pgs-dma4\""),
+    ] {
+        let mutate = |text: String| text.replace(original, mutant);
+        check_separate(&Tree::with_overlay("zynq-pgs-nodes.dtso", mutate))
+            .expect_err("a difference");
+    }
+}
+
+/// Whether a node is to be used: without a status it is.
+fn enabled(tree: &Tree, node: &str) -> bool {
+    tree.strings(node, "status").is_none_or(|status| status == ["okay"])
+}
+
+/// The node of that label.
+fn labelled(tree: &Tree, label: &str) -> String {
+    tree.strings("/__symbols__", label).expect("a label").concat()
+}
+
+/// The one region of a node, which every DMA core reaches and which lies in memory.
+fn low_region(tree: &Tree, node: &str) -> (u64, u64) {
+    let regions = tree.regions(node).expect("a region");
+    let [(start, bytes)] = regions[..] else { panic!("{node}: {regions:x?}") };
+    assert!(start + bytes <= address_map::DDR_LOW.end, "{node}: {start:#x}, {bytes:#x} bytes");
+    assert_eq!((start | bytes) % (2 << 20), 0, "{node}: whole pages of 2 MiB");
+    (start, bytes)
+}
+
+#[test]
+fn the_carve_out_is_what_its_uio_node_exposes() {
+    if !tools_found() {
+        return;
+    }
+    let tree = Tree::with_included("zynq-pgs-memory.dtsi", "");
+    let (memory, node) = (labelled(&tree, "pgs_carve_out"), labelled(&tree, "pgs_memory"));
+    assert!(memory.starts_with("/reserved-memory/"), "{memory}");
+    assert!(tree.properties(&memory).contains(&"no-map".to_owned()));
+    let region = low_region(&tree, &memory);
+    check_node(&tree, &node, "pgs-memory", &[("memory", region.0, region.1)], false)
+        .expect("the carve-out");
+    assert!(enabled(&tree, &memory) && enabled(&tree, &node));
+    for label in ["pgs_pool", "pgs_buffer"] {
+        assert!(!enabled(&tree, &labelled(&tree, label)), "{label}: only one way is on");
+    }
+}
+
+#[test]
+fn the_pool_takes_over_with_the_lines_that_the_file_shows() {
+    if !tools_found() {
+        return;
+    }
+    let source = fs::read_to_string(sources().join("zynq-pgs-memory.dtsi")).expect("the source");
+    let lines: Vec<_> =
+        source.lines().filter_map(|line| line.strip_prefix(" *\t")).map(str::trim).collect();
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    let tree = Tree::with_included("zynq-pgs-memory.dtsi", &lines.join("\n"));
+    let (pool, buffer) = (labelled(&tree, "pgs_pool"), labelled(&tree, "pgs_buffer"));
+    assert!(enabled(&tree, &pool) && enabled(&tree, &buffer));
+    for label in ["pgs_carve_out", "pgs_memory"] {
+        assert!(!enabled(&tree, &labelled(&tree, label)), "{label}: only one way is on");
+    }
+    let region = low_region(&tree, &pool);
+    assert!(tree.properties(&pool).contains(&"reusable".to_owned()));
+    assert_eq!(tree.strings(&pool, "compatible"), Some(vec!["shared-dma-pool".to_owned()]));
+    let carve_out = low_region(&tree, &labelled(&tree, "pgs_carve_out"));
+    let apart = region.0 >= carve_out.0 + carve_out.1 || carve_out.0 >= region.0 + region.1;
+    assert!(apart, "{region:x?} and {carve_out:x?} overlap");
+
+    assert_eq!(tree.cells(&buffer, "memory-region"), tree.cells(&pool, "phandle"));
+    assert_eq!(tree.strings(&buffer, "device-name"), Some(vec![address_map::UIO_NODE.to_owned()]));
+    assert_eq!(tree.strings(&buffer, "compatible"), Some(vec!["ikwzm,u-dma-buf".to_owned()]));
+    assert_eq!(tree.cells(&buffer, "size").map(|size| u64::from(size[0])), Some(region.1));
+}
+
+/// The names that a udev pattern of alternatives and ranges of one digit matches.
+fn names(pattern: &str) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for alternative in pattern.split('|') {
+        match alternative.split_once('[') {
+            None => drop(names.insert(alternative.to_owned())),
+            Some((before, rest)) => {
+                let (range, after) = rest.split_once(']').expect("a closed range");
+                let (first, last) = range.split_once('-').expect("a range");
+                let digit = |text: &str| text.parse::<u32>().expect("a digit");
+                for k in digit(first)..=digit(last) {
+                    names.insert(format!("{before}{k}{after}"));
+                }
+            }
+        }
+    }
+    names
+}
+
+/// What a rule compares or assigns for a key.
+fn rule_value<'a>(rule: &'a str, key: &str) -> Option<&'a str> {
+    let term = rule.split(", ").find(|term| term.starts_with(key))?;
+    Some(term[key.len()..].trim_matches('"'))
+}
+
+#[test]
+fn the_udev_rule_names_every_node_and_gives_rights_to_the_group_only() {
+    let text = fs::read_to_string(sources().join("99-zynq-pgs.rules")).expect("the rules");
+    let rules: Vec<_> =
+        text.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).collect();
+    let of = |subsystem| {
+        let ours = move |rule: &&&str| rule_value(rule, "SUBSYSTEM==") == Some(subsystem);
+        rules.iter().filter(ours).copied().collect::<Vec<_>>()
+    };
+    let [uio] = of("uio")[..] else { panic!("one rule for UIO nodes: {text}") };
+    let node = address_map::UIO_NODE;
+    let maps = interface().into_iter().map(|(map, _, _)| format!("{node}-{map}"));
+    let expected: BTreeSet<_> = maps.chain([node.to_owned(), format!("{node}-memory")]).collect();
+    assert_eq!(names(rule_value(uio, "ATTR{name}==").expect("by name")), expected);
+    let buffers = of("u-dma-buf");
+    assert_eq!(buffers.len() + 1, rules.len(), "{text}");
+    for rule in buffers {
+        assert_eq!(rule_value(rule, "KERNEL=="), Some(node), "{rule}");
+    }
+    for rule in rules {
+        let mode = rule_value(rule, "MODE=");
+        assert!(mode == Some("0660") || rule.contains("RUN+="), "{rule}");
+        assert_eq!(rule_value(rule, "GROUP=").is_some(), mode.is_some(), "{rule}");
+    }
+    for attribute in ["sync_for_cpu", "sync_for_device"] {
+        for command in ["/bin/chgrp pgs ", "/bin/chmod 0660 "] {
+            let given = text.lines().any(|l| l.contains(command) && l.contains(attribute));
+            assert!(given, "{command}{attribute}");
+        }
+    }
+}
+
+#[test]
+fn the_readme_says_of_every_file_what_it_is_for() {
+    let readme = fs::read_to_string(sources().join("README.md")).expect("the README");
+    for entry in fs::read_dir(sources()).expect("the folder") {
+        let name = entry.expect("an entry").file_name().into_string().expect("UTF-8");
+        assert!(name == "README.md" || readme.contains(&format!("`{name}`")), "{name}");
+    }
+    if !tools_found() {
+        return;
+    }
+    // No node beside those that the README and the rule know.
+    let tree = Tree::with_overlay("zynq-pgs-nodes.dtso", as_shipped);
+    let ours = tree.children("/").into_iter().filter(|name| name.starts_with("pgs")).count();
+    assert_eq!(ours, interface().len());
+}

@@ -1,0 +1,63 @@
+//! This file is what loading does to the system; a test puts a kernel of its own in its place.
+
+use std::fmt::Debug;
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// The files of a Linux system.
+pub(crate) trait System: Debug {
+    /// Where a path, without its leading slash, really is.
+    fn path(&self, path: &str) -> PathBuf;
+
+    /// Writes an attribute of the kernel's, in one piece; it has to be there.
+    fn write(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
+        let mut file = OpenOptions::new().write(true).truncate(true).open(path)?;
+        // The kernel acts on each write: a second one would be another value.
+        let written = file.write(bytes)?;
+        if written != bytes.len() {
+            return Err(io::Error::new(
+                io::ErrorKind::WriteZero,
+                format!("{written} of {} bytes were taken", bytes.len()),
+            ));
+        }
+        file.flush()
+    }
+
+    /// Makes a directory, which may stand for an object of the kernel's.
+    fn make_directory(&self, path: &Path) -> io::Result<()> {
+        fs::create_dir(path)
+    }
+
+    /// Removes such a directory; the kernel's attributes in it do not count.
+    fn remove_directory(&self, path: &Path) -> io::Result<()> {
+        fs::remove_dir(path)
+    }
+
+    /// Copies a file to where none is.
+    fn copy(&self, from: &Path, to: &Path) -> io::Result<()> {
+        let mut source = fs::File::open(from)?;
+        let mut target = OpenOptions::new().write(true).create_new(true).open(to)?;
+        io::copy(&mut source, &mut target).and_then(|_| target.sync_all()).inspect_err(|_| {
+            // Half a file is worse than none; the error that counts is the first.
+            let _ = fs::remove_file(to);
+        })
+    }
+}
+
+/// This system, or the files of one below a directory.
+#[derive(Debug, Clone)]
+pub(crate) struct Linux {
+    pub(crate) root: PathBuf,
+}
+
+impl System for Linux {
+    fn path(&self, path: &str) -> PathBuf {
+        self.root.join(path)
+    }
+}
+
+/// An attribute's text.
+pub(super) fn read(path: &Path) -> io::Result<String> {
+    fs::read_to_string(path).map(|text| text.trim().to_owned())
+}
