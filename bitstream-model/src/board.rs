@@ -66,7 +66,7 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    pub(crate) fn new(config: BoardConfig) -> Self {
+    pub(crate) fn new(config: BoardConfig, memory: Memory) -> Self {
         let profile = config.profile;
         let streams = |widths: &[u32]| {
             widths.iter().map(|_| Stream::new(config.delays.fifo_beats)).collect::<Vec<_>>()
@@ -77,7 +77,7 @@ impl Board {
         Self {
             config,
             now: 0,
-            memory: Memory::new(config.address_width, config.quirks.coherency),
+            memory,
             interrupt: InterruptLine::default(),
             log: Log::new(),
             cores: (0..cores).map(|core| Core::new(core, &config)).collect(),

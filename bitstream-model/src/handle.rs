@@ -1,5 +1,6 @@
 //! This file gives a board its two handles: what a driver may touch, and what its builder may see.
 
+use std::ops::Range;
 use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -8,7 +9,8 @@ use crate::board::{Board, Counts};
 use crate::config::{BoardConfig, ConfigError};
 use crate::fault::Fault;
 use crate::interface::record::Beat;
-use crate::memory::{DeviceAccess, MemoryError};
+use crate::memory::{DeviceAccess, Memory, MemoryError};
+use crate::outside::DeviceMemory;
 use crate::violation::{RegisterAccess, Violation};
 
 fn lock(board: &Mutex<Board>) -> MutexGuard<'_, Board> {
@@ -27,7 +29,23 @@ impl EmulatedBoard {
     /// [`ConfigError`] if a number is outside its range.
     pub fn new(config: BoardConfig) -> Result<Self, ConfigError> {
         config.check()?;
-        Ok(Self(Arc::new(Mutex::new(Board::new(config)))))
+        let memory = Memory::new(config.address_width, config.quirks.coherency);
+        Ok(Self(Arc::new(Mutex::new(Board::new(config, memory)))))
+    }
+
+    /// Builds a board on memory that somebody else keeps, of which the device may touch the
+    /// granted ranges. Such a board allocates no memory itself.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if a number is outside its range.
+    pub fn on_memory(
+        config: BoardConfig,
+        memory: Box<dyn DeviceMemory>,
+        granted: Vec<Range<u64>>,
+    ) -> Result<Self, ConfigError> {
+        config.check()?;
+        let memory = Memory::outside(memory, granted);
+        Ok(Self(Arc::new(Mutex::new(Board::new(config, memory)))))
     }
 
     /// What a driver of this board may touch.
@@ -58,6 +76,12 @@ impl EmulatedBoard {
     #[must_use]
     pub fn counts(&self) -> Counts {
         lock(&self.0).counts()
+    }
+
+    /// The level of the interrupt line.
+    #[must_use]
+    pub fn interrupt_level(&self) -> bool {
+        lock(&self.0).interrupt.level()
     }
 
     /// Makes the board fail once. A fault of a DMA that does not exist never happens.

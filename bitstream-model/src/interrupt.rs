@@ -18,6 +18,11 @@ impl InterruptLine {
         self.level = level;
     }
 
+    /// The level that the sources give.
+    pub(crate) fn level(&self) -> bool {
+        self.level
+    }
+
     /// Whether an event would be delivered.
     pub(crate) fn pending(&self) -> bool {
         self.level && !self.masked

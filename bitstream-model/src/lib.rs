@@ -27,6 +27,8 @@ mod interrupt;
 #[cfg(feature = "emulation")]
 mod memory;
 #[cfg(feature = "emulation")]
+mod outside;
+#[cfg(feature = "emulation")]
 mod quirks;
 #[cfg(feature = "emulation")]
 mod stream;
@@ -43,6 +45,7 @@ pub use {
     fault::Fault,
     handle::{CpuPort, EmulatedBoard},
     memory::{Denied, DeviceAccess, MemoryError},
+    outside::DeviceMemory,
     quirks::{Coherency, InterruptWiring, Quirks, Resettable},
     violation::{RegisterAccess, Violation, ViolationKind},
 };

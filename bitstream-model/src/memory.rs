@@ -4,6 +4,8 @@
 //! the CPU owns is not here at all: handing a buffer over *moves* it into the board, so that an
 //! access of the device to a buffer of the CPU is a decode error by construction. Ranges of words
 //! (descriptors) are shared for good.
+//!
+//! A board can be built on memory outside instead (`outside.rs`); then it allocates none.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -13,6 +15,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::cast::index;
 use crate::interface::address_map::{DDR_HIGH, DDR_LOW};
 use crate::interface::record::{BEAT_BYTES, Beat};
+use crate::outside::{DeviceMemory, Outside};
 use crate::quirks::{Coherency, stale_from};
 
 /// What the device may do with a buffer.
@@ -71,6 +74,9 @@ pub enum Denied {
     /// Descriptors where data is expected, or data where descriptors are.
     #[error("descriptor memory and data buffers are not interchangeable")]
     Kind,
+    /// Memory outside the board that cannot be reached; the log says why.
+    #[error("the memory there does not answer")]
+    NoAnswer,
 }
 
 #[derive(Debug)]
@@ -104,6 +110,8 @@ pub(crate) struct Memory {
     address_limit: u64,
     next_is_high: bool,
     coherency: Coherency,
+    /// Memory that is not kept here, instead of all ranges.
+    outside: Option<Outside>,
 }
 
 impl Memory {
@@ -120,6 +128,21 @@ impl Memory {
             address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
             next_is_high: false,
             coherency,
+            outside: None,
+        }
+    }
+
+    /// Memory outside the board, of which the device may touch what is granted.
+    pub(crate) fn outside(memory: Box<dyn DeviceMemory>, granted: Vec<Range<u64>>) -> Self {
+        Self {
+            regions: BTreeMap::new(),
+            low: 0..0,
+            high: 0..0,
+            released: Vec::new(),
+            address_limit: 0,
+            next_is_high: false,
+            coherency: Coherency::Coherent,
+            outside: Some(Outside::new(memory, granted)),
         }
     }
 
@@ -241,7 +264,10 @@ impl Memory {
     }
 
     /// Beats that the device reads. The address is a multiple of a beat.
-    pub(crate) fn beats(&self, address: u64, count: usize) -> Result<&[Beat], Denied> {
+    pub(crate) fn beats(&mut self, address: u64, count: usize) -> Result<&[Beat], Denied> {
+        if let Some(ref mut outside) = self.outside {
+            return outside.read(address, count);
+        }
         let (region, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
         match &region.content {
             Content::Cpu => Err(Denied::CpuOwned),
@@ -254,8 +280,7 @@ impl Memory {
         }
     }
 
-    /// Beats that the device writes. The address is a multiple of a beat.
-    pub(crate) fn beats_mut(&mut self, address: u64, count: usize) -> Result<&mut [Beat], Denied> {
+    fn beats_mut(&mut self, address: u64, count: usize) -> Result<&mut [Beat], Denied> {
         let (_, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
         let (_, region) = self.regions.range_mut(..=address).next_back().ok_or(Denied::Unmapped)?;
         match &mut region.content {
@@ -269,8 +294,29 @@ impl Memory {
         }
     }
 
-    /// Words of a descriptor that the device fetches or updates. The address is a multiple of 4.
-    pub(crate) fn words(&self, address: u64, count: usize) -> Result<&[AtomicU32], Denied> {
+    /// Whether the device may write those beats.
+    pub(crate) fn check_write(&mut self, address: u64, count: usize) -> Result<(), Denied> {
+        match &self.outside {
+            Some(outside) => outside.check(address, (count * BEAT_BYTES) as u64),
+            None => self.beats_mut(address, count).map(|_| ()),
+        }
+    }
+
+    /// Beats that the device writes: `fill` gives them, if the device may. The address is a multiple
+    /// of a beat.
+    pub(crate) fn write(
+        &mut self,
+        address: u64,
+        count: usize,
+        fill: impl FnOnce(&mut [Beat]),
+    ) -> Result<(), Denied> {
+        match &mut self.outside {
+            Some(outside) => outside.write(address, count, fill),
+            None => self.beats_mut(address, count).map(fill),
+        }
+    }
+
+    fn words(&self, address: u64, count: usize) -> Result<&[AtomicU32], Denied> {
         let (region, offset) = self.find(address, (count * 4) as u64)?;
         match &region.content {
             Content::Words(words) => {
@@ -281,7 +327,23 @@ impl Memory {
         }
     }
 
-    pub(crate) fn write_word(&self, address: u64, value: u32) -> Result<(), Denied> {
+    /// Words of a descriptor that the device fetches. The address is a multiple of 4.
+    pub(crate) fn read_words(&mut self, address: u64, to: &mut [u32]) -> Result<(), Denied> {
+        if let Some(outside) = &mut self.outside {
+            return outside.read_words(address, to);
+        }
+        let words = self.words(address, to.len())?;
+        for (to, from) in to.iter_mut().zip(words) {
+            *to = from.load(Ordering::Acquire);
+        }
+        Ok(())
+    }
+
+    /// The word of a descriptor that the device updates. The address is a multiple of 4.
+    pub(crate) fn write_word(&mut self, address: u64, value: u32) -> Result<(), Denied> {
+        if let Some(outside) = &mut self.outside {
+            return outside.write_word(address, value);
+        }
         self.words(address, 1)?[0].store(value, Ordering::Release);
         Ok(())
     }
@@ -350,8 +412,10 @@ mod tests {
         let mut memory = Memory::new(40, Coherency::Coherent);
         let (address, words) = memory.allocate_shared(16).expect("fits");
         words[3].store(7, Ordering::Relaxed);
-        let third = memory.words(address + 12, 1).expect("granted");
-        assert_eq!(third[0].load(Ordering::Relaxed), 7);
+        let mut read = [0; 2];
+        memory.read_words(address + 8, &mut read).expect("granted");
+        assert_eq!(read, [0, 7]);
+        assert_eq!(memory.read_words(address + 60, &mut read).err(), Some(Denied::PastEnd));
         assert_eq!(memory.beats(address, 1).err(), Some(Denied::Kind));
         memory.write_word(address + 4, 9).expect("granted");
         assert_eq!(words[1].load(Ordering::Relaxed), 9);

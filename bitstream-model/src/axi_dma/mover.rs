@@ -14,7 +14,6 @@ use crate::interface::record::BEAT_BYTES;
 use crate::memory::Denied;
 use crate::stream::Stream;
 use crate::violation::ViolationKind;
-use std::sync::atomic::Ordering;
 
 #[expect(clippy::cast_possible_truncation, reason = "it is 16")]
 const BEAT: u32 = BEAT_BYTES as u32;
@@ -163,16 +162,17 @@ impl Channel {
                 Ok(_) => Some(None),
                 Err(denied) => Some(Some(denied)),
             },
-            Direction::S2mm => match with.memory.beats_mut(at, n) {
-                Ok(beats) if !injected => {
-                    let ends = stream.next_last() == Some(n - 1);
-                    stream.pop_into(beats);
-                    with.moved.beats_written += n as u64;
-                    return Some(ends);
+            Direction::S2mm if injected => Some(with.memory.check_write(at, n).err()),
+            Direction::S2mm => {
+                let ends = stream.next_last() == Some(n - 1);
+                match with.memory.write(at, n, |beats| stream.pop_into(beats)) {
+                    Ok(()) => {
+                        with.moved.beats_written += n as u64;
+                        return Some(ends);
+                    }
+                    Err(denied) => Some(Some(denied)),
                 }
-                Ok(_) => Some(None),
-                Err(denied) => Some(Some(denied)),
-            },
+            }
         };
         if let Some(denied) = denied {
             self.denied(build, at, n, denied, with);
@@ -229,23 +229,17 @@ impl Channel {
         }
         let address = address & !(BYTES as u64 - 1);
         let mut words = [0_u32; FETCHED_WORDS];
-        match with.memory.words(address, FETCHED_WORDS) {
-            Ok(memory) => {
-                for (word, from) in words.iter_mut().zip(memory) {
-                    *word = from.load(Ordering::Acquire);
-                }
-            }
-            Err(denied) => {
-                with.log.violation(ViolationKind::OutsideGrant {
-                    core,
-                    direction,
-                    address,
-                    bytes: (FETCHED_WORDS * 4) as u64,
-                    denied,
-                });
-                self.fail(build, dmasr::SG_DEC_ERR.mask());
-                return;
-            }
+        if let Err(denied) = with.memory.read_words(address, &mut words) {
+            let bytes = (FETCHED_WORDS * 4) as u64;
+            with.log.violation(ViolationKind::OutsideGrant {
+                core,
+                direction,
+                address,
+                bytes,
+                denied,
+            });
+            self.fail(build, dmasr::SG_DEC_ERR.mask());
+            return;
         }
         let wide = build.address_width > 32;
         let join = |low: usize, high: usize| {

@@ -1,7 +1,11 @@
-//! This file holds the options of the emulated board, and how they are written on the command line.
+//! This file holds the options of the emulated board and of a step, and how they are written on the
+//! command line.
+
+use std::time::Duration;
 
 use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
 use clap::{Args, ValueEnum};
+use zynq_pgs::StepParameters;
 
 /// How the emulated board is built; a real board is as its bitstream is.
 #[derive(Debug, Clone, Copy, Default, Args)]
@@ -74,6 +78,25 @@ impl BuildArgs {
             address_width: self.address_width.unwrap_or(default.address_width),
             ..default
         }
+    }
+}
+
+/// How long a step may take on the board.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(crate) struct DeadlineArgs {
+    /// How long a step may take on the board, ms [default: 10, and four times what its collisions
+    /// take one after the other]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    deadline: Option<u32>,
+}
+
+impl DeadlineArgs {
+    /// The same parameters with this deadline.
+    pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
+        if let Some(milliseconds) = self.deadline {
+            parameters.deadline = Some(Duration::from_millis(milliseconds.into()));
+        }
+        parameters
     }
 }
 

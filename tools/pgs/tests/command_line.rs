@@ -187,6 +187,18 @@ fn two_runs_have_one_digest_and_another_scene_has_another() {
 }
 
 #[test]
+fn a_step_takes_as_long_as_the_deadline_says_and_no_longer() {
+    let slow = ["run", "--grid", "2x2x2", "--steps", "1", "--bandwidth", "0.001"];
+    let with = |deadline: &[&str]| run(slow.iter().chain(deadline));
+    let late = with(&["--deadline", "1"]);
+    assert_eq!(late.code, Some(4), "{}", late.stderr);
+    assert!(late.stderr.contains("did not come within 1ms"), "{}", late.stderr);
+    let patient = with(&["--deadline", "60000"]);
+    assert_eq!(patient.code, Some(0), "{}", patient.stderr);
+    assert_eq!(with(&["--deadline", "0"]).code, Some(2));
+}
+
+#[test]
 fn the_pile_has_impulses_after_landing_and_none_before() {
     let ran = run(["--json", "--grid", "3x2x3", "--steps", "70"]);
     let document = json(&ran);

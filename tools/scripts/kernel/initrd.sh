@@ -3,6 +3,7 @@
 # whose content goes to its root as it is.
 #
 # usage: initrd.sh KERNEL CONTENT OUTPUT     KERNEL: a directory made by debian.sh or small.sh
+# environment: CHECKS (what the guest runs, a folder; tools/guest/checks)
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../lib.sh"
 need_packages cpio
@@ -23,7 +24,7 @@ mkdir -p "$root"/{bin,sbin,usr/bin,usr/sbin,etc,proc,sys,dev,tmp,modules,checks}
 cp "$cache/bin/busybox" "$root/bin/"
 cp "$kernel"/modules/* "$root/modules/"
 install -m 755 "$repository/tools/guest/init" "$root/init"
-install -m 755 "$repository"/tools/guest/checks/* "$root/checks/"
+install -m 755 "${CHECKS:-$repository/tools/guest/checks}"/* "$root/checks/"
 printf '%s\n' 'root:x:0:0:root:/:/bin/sh' 'user:x:1000:1000:user:/:/bin/sh' > "$root/etc/passwd"
 printf '%s\n' 'root:x:0:' 'user:x:1000:' > "$root/etc/group"
 cp -r "$content/." "$root/"

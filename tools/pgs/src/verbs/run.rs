@@ -16,7 +16,7 @@ use crate::board::{self, Opened};
 use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
-use crate::options::BuildArgs;
+use crate::options::{BuildArgs, DeadlineArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -47,6 +47,8 @@ pub(crate) struct RunArgs {
     /// Show every N-th step [default: a fifteenth of the steps]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     report_every: Option<u32>,
+    #[command(flatten)]
+    deadline: DeadlineArgs,
     #[command(flatten)]
     build: BuildArgs,
 }
@@ -168,11 +170,12 @@ pub(crate) fn run(
     let interrupt = Interrupt::install();
     let every = args.report_every.unwrap_or(args.steps.div_ceil(ROWS));
     let progress = progress_bar(args.steps);
+    let parameters = args.deadline.apply(StepParameters::default());
     let mut documents = Vec::new();
     let mut done = 0;
     while done < args.steps && !interrupt.is_set() {
         done += 1;
-        let row = step(done, &mut opened, &mut scene)?;
+        let row = step(done, &parameters, &mut opened, &mut scene)?;
         if done == 1 && !common.json {
             // Only now: a scene that is refused prints nothing but the refusal.
             progress.suspend(|| print_heading(args, &opened, out))?;
@@ -248,14 +251,19 @@ fn check_size(grid: Grid, opened: &Opened) -> Result<(), Failure> {
 }
 
 /// Detects collisions and takes one step.
-fn step(number: u32, opened: &mut Opened, scene: &mut Scene) -> Result<Row, Failure> {
+fn step(
+    number: u32,
+    parameters: &StepParameters,
+    opened: &mut Opened,
+    scene: &mut Scene,
+) -> Result<Row, Failure> {
     let begin = Instant::now();
     let ground_pairs = ground_pairs(scene.detect());
     let detect = begin.elapsed();
     let (bodies, collisions) = scene.parts_mut();
     let report = opened
         .accelerator
-        .step(bodies, collisions, &StepParameters::default())
+        .step(bodies, collisions, parameters)
         .map_err(|error| opened.failure(error))?;
     let kinetic_energy = kinetic_energy(scene.bodies(), scene.shapes());
     Ok(Row { step: number, ground_pairs, kinetic_energy, detect, report })

@@ -19,7 +19,7 @@ use crate::failure::{Failure, Verdict};
 use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use crate::interrupt::Interrupt;
 use crate::npy::{self, Dimensions};
-use crate::options::BuildArgs;
+use crate::options::{BuildArgs, DeadlineArgs};
 use crate::origin;
 
 const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
@@ -64,6 +64,8 @@ pub(crate) struct SolveArgs {
     #[arg(long)]
     no_integrate: bool,
     #[command(flatten)]
+    deadline: DeadlineArgs,
+    #[command(flatten)]
     build: BuildArgs,
 }
 
@@ -78,7 +80,7 @@ impl SolveArgs {
         if let Some(iterations) = self.friction_iterations {
             parameters.friction_iterations = iterations;
         }
-        parameters
+        self.deadline.apply(parameters)
     }
 }
 

@@ -1,0 +1,121 @@
+//! Plays the programmable logic of a guest in QEMU: an emulated board on the guest's memory.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command line tool")]
+
+use std::error::Error;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use bitstream_model::interface::address_map::INTERRUPT_SPI;
+use bitstream_model::{BoardConfig, EmulatedBoard};
+use clap::Parser;
+use guest_board::guest_file::GuestFile;
+use guest_board::qtest::QtestLine;
+use guest_board::server::{ServeError, Server};
+
+/// Plays the programmable logic of a guest in QEMU until the guest ends.
+///
+/// QEMU is started with `-object memory-backend-file,id=ddr,size=SIZE,mem-path=FILE,share=on
+/// -machine memory-backend=ddr -accel tcg -qtest unix:SOCKET,server=on,wait=off`.
+///
+/// Exit codes: 0 served and the driver did nothing wrong; 1 it did, or the guest could not be
+/// served; 2 wrong usage.
+#[derive(Debug, Parser)]
+struct Args {
+    /// The file behind the guest's memory; its byte 0 is physical address 0.
+    #[arg(long, value_name = "FILE")]
+    memory: PathBuf,
+    /// QEMU's qtest socket.
+    #[arg(long, value_name = "SOCKET")]
+    qtest: PathBuf,
+    /// Physical address of the mailbox page.
+    #[arg(long, value_name = "ADDRESS", value_parser = number)]
+    mailbox: u64,
+    /// Memory that the device may touch; may be given more than once.
+    #[arg(long, value_name = "ADDRESS+BYTES", value_parser = range, required = true)]
+    grant: Vec<Range<u64>>,
+    /// The interrupt, as the device tree counts (SPI).
+    #[arg(long, value_name = "NUMBER", default_value_t = INTERRUPT_SPI)]
+    spi: u32,
+    /// How long the guest may run, seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 600)]
+    limit: u64,
+}
+
+fn number(text: &str) -> Result<u64, String> {
+    let parsed = match text.strip_prefix("0x") {
+        Some(digits) => u64::from_str_radix(digits, 16),
+        None => text.parse(),
+    };
+    parsed.map_err(|_| format!("expected a number like 0x30000000, found {text:?}"))
+}
+
+fn range(text: &str) -> Result<Range<u64>, String> {
+    let wrong = || format!("expected a range like 0x30000000+0x1000000, found {text:?}");
+    let (start, bytes) = text.split_once('+').ok_or_else(wrong)?;
+    let (start, bytes) = (number(start)?, number(bytes)?);
+    Ok(start..start.checked_add(bytes).ok_or_else(wrong)?)
+}
+
+fn main() -> ExitCode {
+    env_logger::init();
+    match run(&Args::parse()) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error}");
+            let mut cause = error.source();
+            while let Some(error) = cause {
+                eprintln!("  because {error}");
+                cause = error.source();
+            }
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
+    let limit = Duration::from_secs(args.limit);
+    // QEMU makes its socket last: the memory is there then.
+    let line = QtestLine::connect(&args.qtest, args.spi, limit)
+        .map_err(|error| format!("{}: {error}", args.qtest.display()))?;
+    let memory = GuestFile::open(&args.memory)
+        .map_err(|error| format!("{}: {error}", args.memory.display()))?;
+    let page = memory.page(args.mailbox)?;
+    let board =
+        EmulatedBoard::on_memory(BoardConfig::default(), Box::new(memory), args.grant.clone())?;
+    let ended = Server::new(board.clone(), page, line)?.serve(limit);
+
+    let counts = board.counts();
+    println!(
+        "board: {} register reads, {} writes, {} doorbells, {} descriptors, {} beats read, \
+         {} written, {} interrupts, {} violations",
+        counts.register_reads,
+        counts.register_writes,
+        counts.doorbells,
+        counts.descriptors,
+        counts.beats_read,
+        counts.beats_written,
+        counts.interrupts,
+        counts.violations
+    );
+    for violation in board.violations() {
+        println!("board: {violation}");
+    }
+    ended.map_err(Box::<ServeError>::new)?;
+    Ok(if counts.violations == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_addresses_and_lengths() {
+        assert_eq!(range("0x30000000+0x1000"), Ok(0x3000_0000..0x3000_1000));
+        assert_eq!(range("16+16"), Ok(16..32));
+        for wrong in ["", "0x10", "0x10+", "a+1", "0xffffffffffffffff+2"] {
+            assert!(range(wrong).is_err(), "{wrong}");
+        }
+    }
+}

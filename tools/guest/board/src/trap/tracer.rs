@@ -1,0 +1,333 @@
+//! This file is the tracer: it stops a program at system calls and at accesses to registers.
+//!
+//! Source: ptrace(2); Linux `arch/arm64/kernel/ptrace.c` (arguments of a system call can be changed
+//! where it enters).
+
+use std::collections::HashMap;
+use std::ffi::OsString;
+use std::fs;
+use std::os::unix::process::CommandExt as _;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::Duration;
+
+use nix::errno::Errno;
+use nix::libc::{self, user_regs_struct};
+use nix::sys::ptrace::{self, Options};
+use nix::sys::signal::Signal;
+use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
+use nix::unistd::{Pid, SysconfVar, sysconf};
+use zynq_pgs::platform::{System, UioDevice, UioWindow};
+use zynq_pgs::{PlatformError, uio_nodes};
+
+use super::{Node, Regions};
+use crate::instruction::{self, Registers};
+use crate::mailbox::{self, Access, Client, MailboxError};
+
+/// How long the host may take for an answer.
+const LIMIT: Duration = Duration::from_secs(30);
+/// The register that carries the number of a system call.
+const SYSCALL: usize = 8;
+
+/// What was passed on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Counts {
+    /// Reads of registers.
+    pub reads: u64,
+    /// Writes of registers.
+    pub writes: u64,
+    /// Register regions that were mapped.
+    pub regions: u64,
+}
+
+/// Why a program cannot be traced on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TraceError {
+    /// The mailbox's UIO node, or the board's.
+    #[error(transparent)]
+    Platform(#[from] PlatformError),
+    /// The host.
+    #[error(transparent)]
+    Mailbox(#[from] MailboxError<PlatformError>),
+    /// The kernel.
+    #[error("cannot {act}")]
+    Kernel {
+        /// What was tried.
+        act: &'static str,
+        /// Why not.
+        #[source]
+        source: Errno,
+    },
+    /// The program cannot be started.
+    #[error("cannot start {program:?}")]
+    Start {
+        /// Which.
+        program: OsString,
+        /// Why not.
+        #[source]
+        source: std::io::Error,
+    },
+    /// There is nothing to trap.
+    #[error("expected a UIO node of the accelerator, found none: is this the guest's device tree?")]
+    NoNode,
+    /// A register was touched otherwise than by a load or store of 32 bits.
+    #[error(
+        "expected a 32-bit load or store, found instruction {instruction:#010x} at {pc:#x}, which \
+         touches the registers at {address:#x}: nothing else may reach an AXI-Lite slave"
+    )]
+    NotARegisterAccess {
+        /// The instruction.
+        instruction: u32,
+        /// Where it stands.
+        pc: u64,
+        /// What it touched, as the kernel gives it in the signal's place.
+        address: u64,
+    },
+    /// The program maps registers in a way that is not passed on.
+    #[error("{what} of the register mapping at {address:#x} is not passed on by this tracer")]
+    NotPassedOn {
+        /// What was tried.
+        what: &'static str,
+        /// Where.
+        address: u64,
+    },
+}
+
+fn kernel(act: &'static str) -> impl FnOnce(Errno) -> TraceError {
+    move |source| TraceError::Kernel { act, source }
+}
+
+/// Asks to be traced, and becomes the program. Returns only if that fails.
+#[must_use]
+pub fn become_traced(program: &[OsString]) -> TraceError {
+    if let Err(errno) = ptrace::traceme() {
+        return kernel("ask to be traced")(errno);
+    }
+    let Some((name, arguments)) = program.split_first() else { return TraceError::NoNode };
+    let source = Command::new(name).args(arguments).exec();
+    TraceError::Start { program: name.clone(), source }
+}
+
+/// Runs a program, and passes its register accesses on; its exit code, and what was passed on.
+///
+/// The time that the program takes is not bounded, as in a shell.
+///
+/// # Errors
+/// [`TraceError`]; the program is killed then.
+pub fn run(program: &[OsString]) -> Result<(u8, Counts), TraceError> {
+    let system = System::default();
+    let nodes = Node::of_the_board(&uio_nodes(&system.uio)?, &system.dev);
+    if nodes.is_empty() {
+        return Err(TraceError::NoNode);
+    }
+    let page = UioDevice::open(mailbox::NODE)?.window(mailbox::MAP)?;
+    let host = Client::open(page, LIMIT)?;
+    let page_bytes = sysconf(SysconfVar::PAGE_SIZE)
+        .ok()
+        .flatten()
+        .and_then(|bytes| u64::try_from(bytes).ok())
+        .ok_or(TraceError::Kernel { act: "learn the page size", source: Errno::EINVAL })?;
+
+    let this = "/proc/self/exe";
+    let start = |source| TraceError::Start { program: this.into(), source };
+    let child = Command::new(this).arg("--traced").args(program).spawn().map_err(start)?;
+    let child = i32::try_from(child.id())
+        .map(Pid::from_raw)
+        .map_err(|_| TraceError::Kernel { act: "name the process", source: Errno::ERANGE })?;
+    // The program's first stop is the end of its exec; a failed one ends it before.
+    match waitpid(child, None).map_err(kernel("wait for the program"))? {
+        WaitStatus::Stopped(..) => {}
+        WaitStatus::Exited(_, code) => return Ok((exit_code(code), Counts::default())),
+        _ => return Ok((u8::MAX, Counts::default())),
+    }
+    let options =
+        Options::PTRACE_O_TRACESYSGOOD | Options::PTRACE_O_TRACECLONE | Options::PTRACE_O_EXITKILL;
+    ptrace::setoptions(child, options).map_err(kernel("set options of the trace"))?;
+    ptrace::syscall(child, None).map_err(kernel("let the program run"))?;
+    let threads = HashMap::from([(child, None)]);
+    let (regions, counts) = (Regions::default(), Counts::default());
+    Tracer { child, nodes, page_bytes, host, regions, threads, counts }.run()
+}
+
+fn exit_code(code: i32) -> u8 {
+    u8::try_from(code).unwrap_or(u8::MAX)
+}
+
+/// A system call that a thread is in.
+#[derive(Debug, Clone, Copy)]
+enum Call {
+    /// One that does not matter here.
+    Other,
+    /// A mapping of registers.
+    Map { bytes: u64, physical: u64, rights: u64 },
+    /// The end of a mapping.
+    Unmap { start: u64, bytes: u64 },
+}
+
+struct Tracer {
+    child: Pid,
+    nodes: Vec<Node>,
+    page_bytes: u64,
+    host: Client<UioWindow>,
+    regions: Regions,
+    /// What call each thread is in.
+    threads: HashMap<Pid, Option<Call>>,
+    counts: Counts,
+}
+
+impl Tracer {
+    fn run(mut self) -> Result<(u8, Counts), TraceError> {
+        loop {
+            let any = Pid::from_raw(-1);
+            let status = waitpid(any, Some(WaitPidFlag::__WALL));
+            let (thread, signal) = match status.map_err(kernel("wait for the program"))? {
+                WaitStatus::Exited(pid, code) if pid == self.child => {
+                    return Ok((exit_code(code), self.counts));
+                }
+                WaitStatus::Signaled(pid, signal, _) if pid == self.child => {
+                    return Ok((exit_code(128 + signal as i32), self.counts));
+                }
+                WaitStatus::PtraceSyscall(pid) => {
+                    self.system_call(pid)?;
+                    (pid, None)
+                }
+                WaitStatus::Stopped(pid, Signal::SIGSEGV) => {
+                    (pid, (!self.register_access(pid)?).then_some(Signal::SIGSEGV))
+                }
+                WaitStatus::Stopped(pid, signal) => {
+                    // A new thread begins with a stop of the trace's own.
+                    let new = self.threads.insert(pid, None).is_none();
+                    (pid, (!new || signal != Signal::SIGSTOP).then_some(signal))
+                }
+                WaitStatus::PtraceEvent(pid, ..) => (pid, None),
+                WaitStatus::Exited(pid, _) | WaitStatus::Signaled(pid, ..) => {
+                    self.threads.remove(&pid);
+                    continue;
+                }
+                _ => continue,
+            };
+            match ptrace::syscall(thread, signal) {
+                // It was killed meanwhile: the next wait says so.
+                Ok(()) | Err(Errno::ESRCH) => {}
+                Err(errno) => return Err(kernel("let the program run")(errno)),
+            }
+        }
+    }
+
+    /// A thread enters or leaves a system call.
+    fn system_call(&mut self, thread: Pid) -> Result<(), TraceError> {
+        let mut registers = ptrace::getregs(thread).map_err(kernel("read registers"))?;
+        match self.threads.insert(thread, None).flatten() {
+            None => {
+                let call = self.entered(thread, &mut registers)?;
+                self.threads.insert(thread, Some(call));
+                Ok(())
+            }
+            Some(call) => self.left(thread, call, &mut registers),
+        }
+    }
+
+    fn entered(&self, thread: Pid, registers: &mut user_regs_struct) -> Result<Call, TraceError> {
+        let [first, second, third, _, file, offset, ..] = registers.regs;
+        let touches = || self.regions.touch(first, second);
+        let number = i64::try_from(registers.regs[SYSCALL]).unwrap_or(-1);
+        match number {
+            libc::SYS_mmap => {
+                let Some((physical, _)) = self.registers_behind(thread, file, offset) else {
+                    return Ok(Call::Other);
+                };
+                let call = Call::Map { bytes: second, physical, rights: third };
+                // Rights: none.
+                registers.regs[2] = 0;
+                ptrace::setregs(thread, *registers).map_err(kernel("write registers"))?;
+                Ok(call)
+            }
+            libc::SYS_munmap => Ok(Call::Unmap { start: first, bytes: second }),
+            libc::SYS_mprotect if touches() => {
+                Err(TraceError::NotPassedOn { what: "a change of rights", address: first })
+            }
+            libc::SYS_mremap if touches() => {
+                Err(TraceError::NotPassedOn { what: "a move", address: first })
+            }
+            _ => Ok(Call::Other),
+        }
+    }
+
+    fn left(
+        &mut self,
+        thread: Pid,
+        call: Call,
+        registers: &mut user_regs_struct,
+    ) -> Result<(), TraceError> {
+        let result = registers.regs[0];
+        // Errors are -4095 to -1.
+        let failed = result > u64::MAX - 4095;
+        match call {
+            Call::Map { bytes, physical, rights } => {
+                // The program finds its arguments as they were.
+                registers.regs[2] = rights;
+                ptrace::setregs(thread, *registers).map_err(kernel("write registers"))?;
+                if !failed {
+                    self.counts.regions += 1;
+                    let bytes = bytes.next_multiple_of(self.page_bytes);
+                    self.regions.add(result, bytes, physical);
+                }
+            }
+            Call::Unmap { start, bytes } if !failed => {
+                self.regions.remove(start, bytes.next_multiple_of(self.page_bytes));
+            }
+            Call::Unmap { .. } | Call::Other => {}
+        }
+        Ok(())
+    }
+
+    /// Physical address and length of the registers that a file shows at an offset, if it does.
+    fn registers_behind(&self, thread: Pid, file: u64, offset: u64) -> Option<(u64, u64)> {
+        let file = i32::try_from(file).ok().filter(|file| *file >= 0)?;
+        let path: PathBuf = fs::read_link(format!("/proc/{thread}/fd/{file}")).ok()?;
+        self.nodes.iter().find(|node| node.path == path)?.map_at(offset, self.page_bytes)
+    }
+
+    /// A thread touched what it may not: makes the access if it is one to a register.
+    fn register_access(&mut self, thread: Pid) -> Result<bool, TraceError> {
+        let mut registers = ptrace::getregs(thread).map_err(kernel("read registers"))?;
+        let pc = registers.pc;
+        let Ok(place) = usize::try_from(pc).map(std::ptr::without_provenance_mut) else {
+            return Ok(false);
+        };
+        let Ok(words) = ptrace::read(thread, place) else { return Ok(false) };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low half")]
+        let instruction = words as u32;
+        let mut general = Registers { x: registers.regs, sp: registers.sp };
+        let Some(access) = instruction::decode(instruction, &general) else {
+            return self.foreign(instruction, &registers);
+        };
+        let Some(address) = self.regions.physical(access.address) else { return Ok(false) };
+        let request = if access.store {
+            self.counts.writes += 1;
+            Access::Write { address, value: general.stored(&access) }
+        } else {
+            self.counts.reads += 1;
+            Access::Read { address }
+        };
+        let loaded = self.host.ask(request)?;
+        general.complete(&access, loaded);
+        (registers.regs, registers.sp) = (general.x, general.sp);
+        registers.pc = pc.wrapping_add(4);
+        ptrace::setregs(thread, registers).map_err(kernel("write registers"))?;
+        Ok(true)
+    }
+
+    /// An instruction that is not passed on: an error if a base register points to registers.
+    fn foreign(&self, instruction: u32, at: &user_regs_struct) -> Result<bool, TraceError> {
+        let base = usize::try_from((instruction >> 5) & 31).unwrap_or_default();
+        let address = at.regs.get(base).copied().unwrap_or(at.sp);
+        // Offsets of pairs and bytes stay within a page of the base.
+        match self.regions.touch(address.saturating_sub(4096), 8192) {
+            true => Err(TraceError::NotARegisterAccess { instruction, pc: at.pc, address }),
+            false => Ok(false),
+        }
+    }
+}
