@@ -72,14 +72,6 @@ impl Error {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OpenError {
-    /// There is no such UIO node.
-    #[error("no UIO node named {wanted:?} (found: {}): is the overlay loaded?", if found.is_empty() { "none" } else { found })]
-    NoNode {
-        /// The name that was looked for.
-        wanted: String,
-        /// The names that there are.
-        found: String,
-    },
     /// There is no node, and no emulated board to fall back to.
     #[error(
         "no UIO node named {wanted:?}, and this build has no emulated board: load the overlay, or \
@@ -89,31 +81,9 @@ pub enum OpenError {
         /// The name that was looked for.
         wanted: String,
     },
-    /// A node lacks a register region.
-    #[error("UIO node {node:?} has no map named {map:?}: is this the accelerator's overlay?")]
-    NoMap {
-        /// Name of the node.
-        node: String,
-        /// Name of the missing map.
-        map: &'static str,
-    },
-    /// The node is there; its DMA memory is what this version lacks.
-    #[error(
-        "UIO node {node:?} ({device}) carries profile {profile}, interface {major}.{minor}: this \
-         version identifies real hardware but has no DMA memory for it; choose the emulated board"
-    )]
-    NoMemory {
-        /// Name of the node.
-        node: String,
-        /// The kernel's name for it.
-        device: String,
-        /// Name of the bitstream's profile.
-        profile: &'static str,
-        /// Major interface version.
-        major: u32,
-        /// Minor interface version.
-        minor: u32,
-    },
+    /// Memory was chosen for an emulated board.
+    #[error("an emulated board has memory of its own: leave out the choice of memory")]
+    EmulatedMemory,
     /// A length width that no DMA core can have.
     #[error("the length width must be {low} to {high} bits, found {found}")]
     LengthWidth {

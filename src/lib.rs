@@ -113,7 +113,7 @@ mod axi_dma;
 mod beat;
 mod check;
 mod error;
-mod platform;
+pub mod platform;
 mod record;
 pub mod scene;
 mod step;
@@ -123,7 +123,9 @@ pub use axi_dma::DmaError;
 pub use bitstream_model::interface;
 pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use error::{Aftermath, Error, OpenError};
-pub use platform::{PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes};
+pub use platform::{
+    Caching, DevMemWindows, MemoryChoice, PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes,
+};
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
     InputError, Pose, Shape, StepParameters, Velocity,

@@ -205,6 +205,7 @@ fn a_length_width_that_was_given_is_what_the_cores_are_held_against() {
     let options = |width| OpenOptions {
         board: BoardChoice::Emulated(board.cpu_port()),
         length_width: Some(width),
+        ..OpenOptions::default()
     };
     let report = check(options(14)).expect("reachable");
     assert!(report.passed(), "{report:#?}");

@@ -179,7 +179,7 @@ mod tests {
         let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
         let ring = Ring::new(&platform, chain, 40).expect("allocated");
         let buffer = CpuBuffer::allocate(&platform, 16, 40).expect("allocated");
-        let buffer = buffer.into_device(Access::Read).expect("handed over");
+        let buffer = buffer.into_device(16, Access::Read).expect("handed over");
         (ring, buffer.range(0, 256).expect("inside"))
     }
 

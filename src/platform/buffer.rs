@@ -10,11 +10,13 @@
 //! it.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
-use super::{Access, Platform, PlatformError, acquire_from_device, release_to_device};
+use super::{
+    Access, DmaMemory, Platform, PlatformError, SharedMemory, acquire_from_device,
+    release_to_device,
+};
 
 /// An address that a DMA core may be given: it lies inside memory of this driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,7 +97,8 @@ impl Drop for Allocation {
 /// A buffer that the CPU owns.
 #[derive(Debug)]
 pub(crate) struct CpuBuffer {
-    beats: Box<[Beat]>,
+    // Dropped before the allocation, which makes the memory free for others.
+    memory: DmaMemory,
     allocation: Allocation,
 }
 
@@ -107,28 +110,31 @@ impl CpuBuffer {
         address_width: u32,
     ) -> Result<Self, PlatformError> {
         let (address, memory) = platform.allocate(beats)?;
-        let bytes = (memory.len() as u64) * BEAT_BYTES as u64;
+        let bytes = (memory.beats().len() as u64) * BEAT_BYTES as u64;
         let allocation = Allocation::new(platform, address, bytes, address_width)?;
-        Ok(Self { beats: memory, allocation })
+        Ok(Self { memory, allocation })
     }
 
     /// The beats.
     pub(crate) fn beats(&self) -> &[Beat] {
-        &self.beats
+        self.memory.beats()
     }
 
     /// The beats, to write.
     pub(crate) fn beats_mut(&mut self) -> &mut [Beat] {
-        &mut self.beats
+        self.memory.beats_mut()
     }
 
-    /// Gives the buffer to the device.
-    pub(crate) fn into_device(self, access: Access) -> Result<DeviceBuffer, PlatformError> {
-        let Self { beats, mut allocation } = self;
-        release_to_device();
+    /// Gives the buffer to the device, which will touch its first `used` beats.
+    pub(crate) fn into_device(
+        self,
+        used: usize,
+        access: Access,
+    ) -> Result<DeviceBuffer, PlatformError> {
+        let Self { memory, mut allocation } = self;
         allocation.owner = Owner::Device;
-        let platform = Arc::clone(&allocation.platform);
-        platform.hand_over(allocation.address, beats, access)?;
+        allocation.platform.hand_over(allocation.address, memory, used, access)?;
+        release_to_device();
         Ok(DeviceBuffer { allocation })
     }
 }
@@ -149,17 +155,17 @@ impl DeviceBuffer {
     /// was reset.
     pub(crate) fn into_cpu(self) -> Result<CpuBuffer, PlatformError> {
         let Self { mut allocation } = self;
-        let beats = allocation.platform.take_back(allocation.address)?;
-        allocation.owner = Owner::Cpu;
         acquire_from_device();
-        Ok(CpuBuffer { beats, allocation })
+        let memory = allocation.platform.take_back(allocation.address)?;
+        allocation.owner = Owner::Cpu;
+        Ok(CpuBuffer { memory, allocation })
     }
 }
 
 /// Coherent 32-bit words that CPU and device may both touch: descriptors.
 #[derive(Debug)]
 pub(crate) struct SharedWords {
-    words: Arc<[AtomicU32]>,
+    words: SharedMemory,
     allocation: Allocation,
 }
 
@@ -182,12 +188,12 @@ impl SharedWords {
 
     /// One load.
     pub(crate) fn read(&self, index: usize) -> u32 {
-        self.words[index].load(Ordering::Relaxed)
+        self.words.load(index)
     }
 
     /// One store.
     pub(crate) fn write(&self, index: usize, value: u32) {
-        self.words[index].store(value, Ordering::Relaxed);
+        self.words.store(index, value);
     }
 
     /// Where `count` words from `index` lie for the device.
@@ -216,7 +222,7 @@ mod tests {
         let (fake, platform) = platform();
         let mut buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
         buffer.beats_mut()[3] = Beat([1, 2, 3, 4]);
-        let device = buffer.into_device(Access::Read).expect("handed over");
+        let device = buffer.into_device(4, Access::Read).expect("handed over");
         assert_eq!(fake.device.lock().expect("unpoisoned").len(), 1);
         let back = device.into_cpu().expect("handed over before");
         assert_eq!(back.beats()[3], Beat([1, 2, 3, 4]));
@@ -228,7 +234,7 @@ mod tests {
     fn a_buffer_dropped_with_the_device_is_not_freed() {
         let (fake, platform) = platform();
         let buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
-        drop(buffer.into_device(Access::Write).expect("handed over"));
+        drop(buffer.into_device(4, Access::Write).expect("handed over"));
         assert!(fake.released.lock().expect("unpoisoned").is_empty());
     }
 
@@ -236,7 +242,7 @@ mod tests {
     fn an_address_outside_the_buffer_cannot_be_made() {
         let (_, platform) = platform();
         let buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
-        let device = buffer.into_device(Access::Read).expect("handed over");
+        let device = buffer.into_device(4, Access::Read).expect("handed over");
         let address = device.range(16, 48).expect("inside");
         assert_eq!((address.low(), address.high()), (16, 8));
         assert!(matches!(device.range(16, 49), Err(PlatformError::OutOfBuffer { .. })));

@@ -1,14 +1,12 @@
 //! This file is the platform over the emulated board.
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicU32;
 use std::time::Duration;
 
 use bitstream_model::interface::address_map;
-use bitstream_model::interface::record::{BEAT_BYTES, Beat};
+use bitstream_model::interface::record::BEAT_BYTES;
 use bitstream_model::{CpuPort, DeviceAccess};
 
-use super::{Access, Platform, PlatformError, RegisterWindow};
+use super::{Access, DmaMemory, Platform, PlatformError, RegisterWindow, SharedMemory};
 
 /// The emulated board, as its processor sees it.
 #[derive(Debug)]
@@ -66,22 +64,30 @@ impl Platform for EmulatedPlatform {
         Ok(self.window(address_map::CONTROL_BASE, address_map::CONTROL_BYTES))
     }
 
-    fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), PlatformError> {
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let bytes = beats.saturating_mul(BEAT_BYTES) as u64;
-        self.port.allocate(beats).map_err(refused("allocate", "bytes", bytes))
+        let allocated = self.port.allocate(beats);
+        let (address, beats) = allocated.map_err(refused("allocate", "bytes", bytes))?;
+        Ok((address, DmaMemory::Heap(beats)))
     }
 
-    fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), PlatformError> {
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
         let bytes = words.saturating_mul(4) as u64;
-        self.port.allocate_shared(words).map_err(refused("allocate", "bytes", bytes))
+        let allocated = self.port.allocate_shared(words);
+        let (address, words) = allocated.map_err(refused("allocate", "bytes", bytes))?;
+        Ok((address, SharedMemory::Heap(words)))
     }
 
     fn hand_over(
         &self,
         address: u64,
-        beats: Box<[Beat]>,
+        memory: DmaMemory,
+        _: usize,
         access: Access,
     ) -> Result<(), PlatformError> {
+        let DmaMemory::Heap(beats) = memory else {
+            unreachable!("a buffer goes back to the platform that it came from");
+        };
         let access = match access {
             Access::Read => DeviceAccess::Read,
             Access::Write => DeviceAccess::Write,
@@ -93,8 +99,9 @@ impl Platform for EmulatedPlatform {
         ))
     }
 
-    fn take_back(&self, address: u64) -> Result<Box<[Beat]>, PlatformError> {
-        self.port.take_back(address).map_err(refused("take back", "address", address))
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+        let taken = self.port.take_back(address);
+        Ok(DmaMemory::Heap(taken.map_err(refused("take back", "address", address))?))
     }
 
     fn release(&self, address: u64) -> Result<(), PlatformError> {

@@ -1,83 +1,137 @@
-//! This file reaches the registers behind a memory map of a UIO node.
-#![allow(unsafe_code, reason = "a mapped register is reached through a raw pointer only")]
+//! This file maps device files and reaches what is mapped: registers, and memory for DMA.
+#![allow(unsafe_code, reason = "what is mapped is reached through raw pointers only")]
 
-use std::fs::OpenOptions;
+use std::fs::File;
+use std::io;
 use std::path::Path;
 
+use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use memmap2::{MmapOptions, MmapRaw};
 
+use super::copy::Doublewords;
 use super::{PlatformError, RegisterWindow};
 
-/// A register region, mapped.
+/// A region of a device file, mapped readable and writable and shared with the device.
+///
+/// The region begins on a multiple of 16 of the address space. The only references to it are those
+/// of [`MappedBeats`](super::memory::MappedBeats).
 #[derive(Debug)]
-pub(crate) struct MappedWindow {
+pub(crate) struct Mapping {
     map: MmapRaw,
-    /// Where the region begins in the mapping, a multiple of 4.
+    /// Where the region begins in the mapping, a multiple of 16.
     start: usize,
     bytes: usize,
 }
 
-impl MappedWindow {
-    /// Maps `bytes` at `file_offset` of a device file; the region begins `start` bytes into them.
-    pub(crate) fn open(
+impl Mapping {
+    /// Maps `start + bytes` bytes at `file_offset` of a device file, a multiple of the page size;
+    /// the region is what follows the first `start` of them.
+    pub(crate) fn new(
+        file: &File,
         path: &Path,
         file_offset: u64,
         start: usize,
         bytes: usize,
     ) -> Result<Self, PlatformError> {
-        let error = |act, source| PlatformError::File { act, path: path.to_owned(), source };
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .open(path)
-            .map_err(|source| error("open", source))?;
+        let error = |source| PlatformError::File { act: "map", path: path.to_owned(), source };
         let invalid = || {
-            let text =
-                format!("a region of {bytes} bytes at {start} is not one of 32-bit registers");
-            error("map", std::io::Error::new(std::io::ErrorKind::InvalidData, text))
+            let text = format!("a region of {bytes} bytes at {start} cannot be mapped");
+            error(io::Error::new(io::ErrorKind::InvalidData, text))
         };
         let length = start.checked_add(bytes).ok_or_else(invalid)?;
-        if !start.is_multiple_of(4) || bytes < 4 {
+        if !start.is_multiple_of(BEAT_BYTES) || bytes < 4 {
             return Err(invalid());
         }
-        let map = MmapOptions::new()
-            .offset(file_offset)
-            .len(length)
-            .map_raw(&file)
-            .map_err(|source| error("map", source))?;
+        let map =
+            MmapOptions::new().offset(file_offset).len(length).map_raw(file).map_err(error)?;
         Ok(Self { map, start, bytes })
     }
 
-    fn register(&self, at: u32) -> *mut u32 {
-        let at = at as usize;
-        assert!(at.is_multiple_of(4) && at + 4 <= self.bytes, "checked by Window");
+    /// Length of the region.
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// A pointer to `bytes` at `at`, of which `at` is a multiple.
+    fn pointer(&self, at: usize, bytes: usize) -> *mut u8 {
+        assert!(
+            at.is_multiple_of(bytes) && at.checked_add(bytes).is_some_and(|end| end <= self.bytes),
+            "callers check what they are asked for"
+        );
         // Wrapping arithmetic needs no proof here; the proof stands at the accesses.
-        let byte = self.map.as_mut_ptr().wrapping_add(self.start + at);
-        #[allow(
-            clippy::cast_ptr_alignment,
-            reason = "a mapping begins on a page, start and at are multiples of 4"
-        )]
-        byte.cast::<u32>()
+        self.map.as_mut_ptr().wrapping_add(self.start + at)
+    }
+
+    #[allow(clippy::cast_ptr_alignment, reason = "a page, plus start and at: multiples of 4")]
+    fn word(&self, at: usize) -> *mut u32 {
+        self.pointer(at, 4).cast()
+    }
+
+    #[allow(clippy::cast_ptr_alignment, reason = "a page, plus start and at: multiples of 8")]
+    fn doubleword(&self, at: usize) -> *mut u64 {
+        self.pointer(at, 8).cast()
+    }
+
+    /// Insists that `beats` beats from byte `at` lie inside the region, on multiples of 16.
+    pub(super) fn check_beats(&self, at: usize, beats: usize) {
+        let end = beats.checked_mul(BEAT_BYTES).and_then(|bytes| bytes.checked_add(at));
+        assert!(
+            at.is_multiple_of(BEAT_BYTES) && end.is_some_and(|end| end <= self.bytes),
+            "callers check what they are asked for"
+        );
+    }
+
+    /// Where the beat at byte `at` lies, a multiple of 16 inside the region or its end.
+    #[allow(clippy::cast_ptr_alignment, reason = "a page, plus start and at: multiples of 16")]
+    pub(super) fn beat(&self, at: usize) -> *mut Beat {
+        self.check_beats(at, 0);
+        self.map.as_mut_ptr().wrapping_add(self.start + at).cast()
+    }
+
+    /// One 32-bit load; `at` is a multiple of 4 inside the region.
+    pub(crate) fn load_word(&self, at: usize) -> u32 {
+        let word = self.word(at);
+        // SAFETY: `pointer` asserted that the four bytes lie inside the region, and `new` mapped
+        // `start + bytes` bytes readable; `map` is alive as long as `self`. The address is a
+        // multiple of 4: a page, plus multiples of 4.
+        unsafe { word.read_volatile() }
+    }
+
+    /// One 32-bit store; `at` is a multiple of 4 inside the region.
+    pub(crate) fn store_word(&self, at: usize, value: u32) {
+        let word = self.word(at);
+        // SAFETY: as in `load_word`; `new` mapped the region writable.
+        unsafe { word.write_volatile(value) }
     }
 }
 
-impl RegisterWindow for MappedWindow {
+impl Doublewords for Mapping {
+    fn load(&self, at: usize) -> u64 {
+        let doubleword = self.doubleword(at);
+        // SAFETY: `pointer` asserted that the eight bytes lie inside the region, and `new` mapped
+        // `start + bytes` bytes readable; `map` is alive as long as `self`. The address is a
+        // multiple of 8: a page, plus `start`, a multiple of 16, plus `at`, a multiple of 8.
+        unsafe { doubleword.read_volatile() }
+    }
+
+    fn store(&self, at: usize, value: u64) {
+        let doubleword = self.doubleword(at);
+        // SAFETY: as in `load`; `new` mapped the region writable.
+        unsafe { doubleword.write_volatile(value) }
+    }
+}
+
+impl RegisterWindow for Mapping {
     fn bytes(&self) -> u64 {
         self.bytes as u64
     }
 
     fn read32(&self, at: u32) -> u32 {
-        let register = self.register(at);
-        // SAFETY: `register` asserted that the four bytes lie inside the region, and `open` mapped
-        // `start + bytes` bytes readable; `map` is alive as long as `self`. The address is a
-        // multiple of 4 (page + multiples of 4). No reference to the mapping exists anywhere.
-        unsafe { register.read_volatile() }
+        self.load_word(at as usize)
     }
 
     fn write32(&self, at: u32, value: u32) {
-        let register = self.register(at);
-        // SAFETY: as in `read32`; `open` mapped the region writable.
-        unsafe { register.write_volatile(value) }
+        self.store_word(at as usize, value);
     }
 }
 
@@ -86,35 +140,71 @@ mod tests {
     use std::io::{Read as _, Seek as _, Write as _};
 
     use super::*;
+    use crate::platform::copy::{load_beats, store_beats};
+
+    fn page() -> Vec<u8> {
+        (0..4096u32).map(|k| u8::try_from(k % 251).expect("below 251")).collect()
+    }
+
+    fn file_of(bytes: &[u8]) -> tempfile::NamedTempFile {
+        let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
+        file.write_all(bytes).expect("written");
+        file
+    }
+
+    fn content(file: &mut tempfile::NamedTempFile) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        file.rewind().expect("rewound");
+        file.read_to_end(&mut bytes).expect("read");
+        bytes
+    }
 
     #[test]
     fn registers_are_the_little_endian_words_of_the_mapping() {
-        let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
-        let page: Vec<u8> =
-            (0..4096u32).map(|k| u8::try_from(k % 251).expect("below 251")).collect();
-        file.write_all(&page).expect("written");
-        let window = MappedWindow::open(file.path(), 0, 0x100, 0x40).expect("mapped");
-        assert_eq!(window.bytes(), 0x40);
+        let page = page();
+        let mut file = file_of(&page);
+        let window = Mapping::new(file.as_file(), file.path(), 0, 0x100, 0x40).expect("mapped");
+        assert_eq!(RegisterWindow::bytes(&window), 0x40);
         let word = |at: usize| u32::from_le_bytes(page[at..at + 4].try_into().expect("four bytes"));
         assert_eq!(window.read32(0), word(0x100));
         assert_eq!(window.read32(0x3C), word(0x13C));
         window.write32(8, 0x0403_0201);
-        let mut after = Vec::new();
-        file.rewind().expect("rewound");
-        file.read_to_end(&mut after).expect("read");
+        let after = content(&mut file);
         assert_eq!(after[0x108..0x10C], [1, 2, 3, 4]);
         assert_eq!((&after[..0x108], &after[0x10C..]), (&page[..0x108], &page[0x10C..]));
     }
 
     #[test]
-    fn what_cannot_be_registers_is_an_error_that_names_the_file() {
-        let missing = MappedWindow::open(Path::new("/nonexistent/uio0"), 0, 0, 16)
-            .expect_err("there is no such file");
-        assert!(missing.to_string().contains("/nonexistent/uio0"), "{missing}");
-        let file = tempfile::NamedTempFile::new().expect("a temporary file");
-        file.as_file().set_len(4096).expect("resized");
-        assert!(MappedWindow::open(file.path(), 0, 2, 16).is_err());
-        assert!(MappedWindow::open(file.path(), 0, 0, 0).is_err());
-        assert!(MappedWindow::open(file.path(), 0, usize::MAX, 4).is_err());
+    fn beats_lie_in_the_mapping_as_in_the_interface() {
+        let page = page();
+        let mut file = file_of(&page);
+        let memory = Mapping::new(file.as_file(), file.path(), 0, 0x10, 0x100).expect("mapped");
+        let beats = [Beat([1, 2, 3, 4]), Beat([5, 6, 7, 8])];
+        store_beats(&memory, 0x20, &beats);
+        let mut back = [Beat::default(); 2];
+        load_beats(&memory, 0x20, &mut back);
+        assert_eq!(back, beats);
+        let after = content(&mut file);
+        let words: Vec<u8> = (1..=8_u32).flat_map(u32::to_le_bytes).collect();
+        assert_eq!(after[0x30..0x50], words[..]);
+        assert_eq!((&after[..0x30], &after[0x50..]), (&page[..0x30], &page[0x50..]));
+    }
+
+    #[test]
+    fn what_cannot_be_a_region_is_an_error_that_names_the_file() {
+        let file = file_of(&page());
+        for (start, bytes) in [(2, 16), (8, 16), (0, 0), (usize::MAX - 15, 4096)] {
+            let error = Mapping::new(file.as_file(), file.path(), 0, start, bytes)
+                .expect_err("not a region")
+                .to_string();
+            assert!(error.contains(&file.path().display().to_string()), "{error}");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "callers check")]
+    fn the_word_after_the_region_is_a_broken_invariant() {
+        let file = file_of(&page());
+        Mapping::new(file.as_file(), file.path(), 0, 0, 0x40).expect("mapped").load_word(0x40);
     }
 }

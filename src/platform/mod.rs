@@ -1,28 +1,75 @@
 //! Registers, memory, interrupts and time, as a board gives them; the only folder with `unsafe`.
+//!
+//! What is public here works with any UIO node that has registers, an interrupt, and memory for
+//! DMA. The accelerator's driver is built on it:
+//!
+//! ```no_run
+//! use std::time::Duration;
+//! use zynq_pgs::interface::record::Beat;
+//! use zynq_pgs::platform::{ReservedMemory, UioDevice};
+//!
+//! # fn main() -> Result<(), zynq_pgs::PlatformError> {
+//! let memory = ReservedMemory::open("my-memory")?;
+//! memory.write(0, &[Beat([1, 2, 3, 4])])?;
+//!
+//! let device = UioDevice::open("my-engine")?;
+//! let registers = device.window("control")?;
+//! device.unmask()?;
+//! // The engine's own registers: where to read, and go. Addresses have two halves.
+//! registers.write32(0x10, memory.address() as u32)?;
+//! registers.write32(0x14, (memory.address() >> 32) as u32)?;
+//! registers.write32(0x00, 1)?;
+//! if device.wait_interrupt(Duration::from_millis(100))?.is_none() {
+//!     // Interrupts get lost: the status register is the truth.
+//! }
+//! let status = registers.read32(0x04)?;
+//! registers.write32(0x04, status)?;
+//!
+//! let mut answer = [Beat::default()];
+//! memory.read(16, &mut answer)?;
+//! # Ok(())
+//! # }
+//! ```
 
 mod buffer;
+mod copy;
+mod dev_mem;
 #[cfg(feature = "emulation")]
 mod emulated;
+mod error;
 mod fence;
+mod fpga;
+mod hardware;
 mod mapped;
+mod memory;
+mod pool;
+mod reserved;
+mod sysfs;
+mod system;
+mod u_dma_buf;
 mod uio;
+mod uio_device;
 mod wait;
 mod window;
 
 use std::fmt;
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::AtomicU32;
 use std::time::Duration;
 
-use bitstream_model::interface::record::Beat;
-use thiserror::Error;
-
 pub(crate) use buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
+pub use dev_mem::DevMemWindows;
 #[cfg(feature = "emulation")]
 pub(crate) use emulated::EmulatedPlatform;
+pub use error::PlatformError;
 pub(crate) use fence::{acquire_from_device, release_to_device};
-pub use uio::{UIO_CLASS, UioMap, UioNode, uio_nodes};
+pub use fpga::require_bitstream;
+pub use hardware::MemoryChoice;
+pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
+pub(crate) use memory::{DmaMemory, SharedMemory};
+pub use reserved::ReservedMemory;
+pub use system::{System, UIO_CLASS};
+pub use u_dma_buf::{Caching, u_dma_buf_names};
+pub use uio::{UioMap, UioNode, uio_nodes};
+pub use uio_device::{UioDevice, UioWindow};
 pub(crate) use wait::{Deadline, poll_until};
 pub(crate) use window::{AccessCounts, RegisterMap, RegisterWindow, Window, fields};
 #[cfg(test)]
@@ -47,18 +94,19 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
     fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError>;
 
     /// Contiguous memory, aligned to 64 bytes on the bus, owned by the CPU.
-    fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), PlatformError>;
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError>;
     /// Coherent words that both sides may touch at any time.
-    fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), PlatformError>;
-    /// Gives memory to the device.
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError>;
+    /// Gives memory to the device, which will touch its first `used` beats.
     fn hand_over(
         &self,
         address: u64,
-        beats: Box<[Beat]>,
+        memory: DmaMemory,
+        used: usize,
         access: Access,
     ) -> Result<(), PlatformError>;
     /// Takes memory back that the device has finished with.
-    fn take_back(&self, address: u64) -> Result<Box<[Beat]>, PlatformError>;
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError>;
     /// Frees memory that the CPU owns, or shared words that no engine runs on.
     fn release(&self, address: u64) -> Result<(), PlatformError>;
 
@@ -70,77 +118,4 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError>;
     /// Lets the interrupt through again.
     fn unmask_interrupt(&self) -> Result<(), PlatformError>;
-}
-
-/// Why the platform could not do what it was asked for.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum PlatformError {
-    /// Memory was refused.
-    #[error("cannot {act} DMA memory ({what} {value:#x})")]
-    Memory {
-        /// What was tried.
-        act: &'static str,
-        /// What is known of the memory: its length in bytes, or its address.
-        what: &'static str,
-        /// The length or the address.
-        value: u64,
-        /// Why.
-        #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
-    /// Memory lies where the DMA cores cannot reach it.
-    #[error(
-        "a buffer of {bytes} bytes at {address:#x} is out of reach of DMA cores with \
-         {address_width}-bit addresses: reserve memory below 2^{address_width}"
-    )]
-    OutOfReach {
-        /// Bus address of the buffer.
-        address: u64,
-        /// Its length, bytes.
-        bytes: u64,
-        /// What the cores can address, bits.
-        address_width: u32,
-    },
-    /// A range does not lie inside its buffer.
-    #[error("{bytes} bytes at offset {offset} do not lie in a buffer of {buffer_bytes} bytes")]
-    OutOfBuffer {
-        /// First byte asked for.
-        offset: u64,
-        /// Number of bytes asked for.
-        bytes: u64,
-        /// Length of the buffer, bytes.
-        buffer_bytes: u64,
-    },
-    /// A register region is too short.
-    #[error(
-        "register region {region} has {found} bytes, at least {expected} are needed: is this the device tree of the bitstream?"
-    )]
-    ShortRegion {
-        /// Name of the region.
-        region: String,
-        /// Bytes needed.
-        expected: u32,
-        /// Bytes found.
-        found: u64,
-    },
-    /// A file of the kernel's could not be used.
-    #[error("cannot {act} {}", path.display())]
-    File {
-        /// What was tried.
-        act: &'static str,
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        #[source]
-        source: std::io::Error,
-    },
-    /// A file of the kernel's says something else than a number.
-    #[error("expected a number in {}, found {found:?}", path.display())]
-    NotANumber {
-        /// Which file.
-        path: PathBuf,
-        /// What it says.
-        found: String,
-    },
 }

@@ -1,21 +1,16 @@
-//! This file finds UIO nodes and their register maps, and maps them.
+//! This file finds UIO nodes by name and says what they have.
 //!
 //! The kernel numbers the nodes as it meets them; what stays is the name (`linux,uio-name` of the
 //! device tree). A node says where its regions lie in `maps/map*/{name,addr,size,offset}`.
 //!
 //! Source: Linux `Documentation/driver-api/uio-howto.rst`.
 
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::mapped::MappedWindow;
-use super::{PlatformError, RegisterWindow};
+use super::PlatformError;
+use super::sysfs::{numbered, read, read_if_present, read_number};
 
-/// Where Linux lists the UIO nodes.
-pub const UIO_CLASS: &str = "/sys/class/uio";
-
-/// One register region of a UIO node.
+/// One region of a UIO node.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct UioMap {
@@ -23,9 +18,9 @@ pub struct UioMap {
     pub index: u32,
     /// Name, as the device tree's `reg-names` give it; empty if there is none.
     pub name: String,
-    /// Physical address.
+    /// Physical address of the first page.
     pub address: u64,
-    /// Length, bytes.
+    /// Length of the pages, bytes.
     pub bytes: u64,
     /// Where the region begins in its first page, bytes.
     pub offset: u64,
@@ -39,47 +34,37 @@ pub struct UioNode {
     pub device: String,
     /// The device tree's name for it.
     pub name: String,
-    /// Its register regions, by number.
+    /// Its regions, by number.
     pub maps: Vec<UioMap>,
 }
 
 impl UioNode {
-    /// Maps the region of that name; `dev` is where the device files lie.
-    pub(crate) fn open_map(
-        &self,
-        dev: &Path,
-        name: &str,
-    ) -> Result<Option<Box<dyn RegisterWindow>>, PlatformError> {
-        let Some(map) = self.maps.iter().find(|map| map.name == name) else {
-            return Ok(None);
-        };
-        let page = page_bytes(dev)?;
-        let short = |_| PlatformError::ShortRegion {
-            region: name.to_owned(),
-            expected: u32::MAX,
-            found: map.bytes,
-        };
-        let window = MappedWindow::open(
-            &dev.join(&self.device),
-            u64::from(map.index) * page,
-            usize::try_from(map.offset).map_err(short)?,
-            usize::try_from(map.bytes).map_err(short)?,
-        )?;
-        Ok(Some(Box::new(window)))
+    /// The region of that name.
+    ///
+    /// # Errors
+    /// [`PlatformError::NoMap`], which lists those that there are.
+    pub fn map(&self, name: &str) -> Result<&UioMap, PlatformError> {
+        self.maps.iter().find(|map| map.name == name).ok_or_else(|| {
+            let names: Vec<_> = self.maps.iter().map(|map| map.name.as_str()).collect();
+            PlatformError::NoMap {
+                node: self.name.clone(),
+                map: name.to_owned(),
+                found: names.join(", "),
+            }
+        })
+    }
+
+    /// The region of that name, or the only one that there is, whatever its name.
+    pub(crate) fn map_or_only(&self, name: &str) -> Result<&UioMap, PlatformError> {
+        match self.maps.as_slice() {
+            [only] => Ok(only),
+            _ => self.map(name),
+        }
     }
 }
 
-fn page_bytes(dev: &Path) -> Result<u64, PlatformError> {
-    let bytes = nix::unistd::sysconf(nix::unistd::SysconfVar::PAGE_SIZE);
-    let source = match bytes {
-        Ok(Some(bytes)) if bytes > 0 => return Ok(bytes.unsigned_abs()),
-        Ok(_) => io::Error::new(io::ErrorKind::Unsupported, "the system gives no page size"),
-        Err(errno) => errno.into(),
-    };
-    Err(PlatformError::File { act: "find the page size for", path: dev.to_owned(), source })
-}
-
-/// The UIO nodes under `class` (normally [`UIO_CLASS`]), by number. A system without UIO has none.
+/// The UIO nodes under `class` (normally [`UIO_CLASS`](super::UIO_CLASS)), by number. A system
+/// without UIO has none.
 ///
 /// # Errors
 /// A node whose description cannot be read or is not a number where one belongs; the path is in
@@ -89,12 +74,10 @@ pub fn uio_nodes(class: &Path) -> Result<Vec<UioNode>, PlatformError> {
     for (number, path) in numbered(class, "uio")? {
         let mut maps = Vec::new();
         for (index, map) in numbered(&path.join("maps"), "map")? {
-            // The name is younger than the other files and may be absent.
-            let name = map.join("name");
-            let name = if name.exists() { read(&name)? } else { String::new() };
             maps.push(UioMap {
                 index,
-                name,
+                // The name is younger than the other files and may be absent.
+                name: read_if_present(&map.join("name"))?.unwrap_or_default(),
                 address: read_number(&map.join("addr"))?,
                 bytes: read_number(&map.join("size"))?,
                 offset: read_number(&map.join("offset"))?,
@@ -109,59 +92,29 @@ pub fn uio_nodes(class: &Path) -> Result<Vec<UioNode>, PlatformError> {
     Ok(nodes)
 }
 
-/// The entries `<prefix><number>` of a directory, by number; none if there is no such directory.
-fn numbered(directory: &Path, prefix: &str) -> Result<Vec<(u32, PathBuf)>, PlatformError> {
-    let error = |source| PlatformError::File { act: "list", path: directory.to_owned(), source };
-    let entries = match fs::read_dir(directory) {
-        Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries.map_err(error)?,
-    };
-    let mut found = Vec::new();
-    for entry in entries {
-        let entry = entry.map_err(error)?;
-        let name = entry.file_name();
-        let number = name.to_str().and_then(|name| name.strip_prefix(prefix)?.parse().ok());
-        if let Some(number) = number {
-            found.push((number, entry.path()));
-        }
-    }
-    found.sort_unstable();
-    Ok(found)
-}
-
-fn read(path: &Path) -> Result<String, PlatformError> {
-    let text = fs::read_to_string(path).map_err(|source| PlatformError::File {
-        act: "read",
-        path: path.to_owned(),
-        source,
-    })?;
-    Ok(text.trim().to_owned())
-}
-
-fn read_number(path: &Path) -> Result<u64, PlatformError> {
-    let text = read(path)?;
-    let number = match text.strip_prefix("0x") {
-        Some(digits) => u64::from_str_radix(digits, 16),
-        None => text.parse(),
-    };
-    number.map_err(|_| PlatformError::NotANumber { path: path.to_owned(), found: text })
+/// The node of that name among `nodes`.
+pub(crate) fn node_named(nodes: &[UioNode], name: &str) -> Result<UioNode, PlatformError> {
+    nodes.iter().find(|node| node.name == name).cloned().ok_or_else(|| {
+        let names: Vec<_> = nodes.iter().map(|node| node.name.as_str()).collect();
+        PlatformError::NoNode { wanted: name.to_owned(), found: names.join(", ") }
+    })
 }
 
 #[cfg(test)]
 pub(crate) mod fake {
     //! A system with UIO nodes, made of files.
 
-    use super::*;
+    use std::fs;
+    use std::path::PathBuf;
+
+    use crate::platform::System;
     use bitstream_model::interface::address_map;
 
-    /// Adds the node `uio<number>` with the accelerator's regions.
-    pub(crate) fn add_node(class: &Path, number: u32, name: &str) {
-        let node = class.join(format!("uio{number}"));
-        let write = |path: PathBuf, text: &str| {
-            fs::create_dir_all(path.parent().expect("below the class")).expect("made");
-            fs::write(path, format!("{text}\n")).expect("written");
-        };
-        write(node.join("name"), name);
+    /// A map: its name, physical address and length.
+    pub(crate) type Map<'a> = (&'a str, u64, u64);
+
+    /// The accelerator's regions.
+    pub(crate) fn regions() -> Vec<Map<'static>> {
         let dma = address_map::UIO_DMA_MAPS.iter().enumerate().map(|(core, name)| {
             (*name, address_map::dma_base(core), u64::from(address_map::DMA_BYTES))
         });
@@ -170,19 +123,40 @@ pub(crate) mod fake {
             address_map::CONTROL_BASE,
             u64::from(address_map::CONTROL_BYTES),
         );
-        for (index, (name, address, bytes)) in dma.chain([control]).enumerate() {
+        dma.chain([control]).collect()
+    }
+
+    pub(crate) fn write(path: PathBuf, text: &str) {
+        fs::create_dir_all(path.parent().expect("below the root")).expect("made");
+        fs::write(path, format!("{text}\n")).expect("written");
+    }
+
+    /// Adds the node `uio<number>` with these regions; its device file is of zeros, and long enough
+    /// for pages of up to 64 KiB.
+    pub(crate) fn add_node(system: &System, number: u32, name: &str, maps: &[Map<'_>]) {
+        let node = system.uio.join(format!("uio{number}"));
+        write(node.join("name"), name);
+        for (index, (name, address, bytes)) in maps.iter().enumerate() {
             let map = node.join(format!("maps/map{index}"));
             write(map.join("name"), name);
             write(map.join("addr"), &format!("{address:#x}"));
             write(map.join("size"), &format!("{bytes:#x}"));
             write(map.join("offset"), "0x0");
         }
+        let device = system.dev.join(format!("uio{number}"));
+        write(device.clone(), "");
+        let last = maps.last().map_or(0, |(_, _, bytes)| *bytes);
+        let length = ((maps.len() as u64) << 16) + last;
+        fs::File::create(device).and_then(|file| file.set_len(length)).expect("resized");
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
+    use crate::platform::System;
 
     #[test]
     fn a_system_without_uio_has_no_nodes() {
@@ -191,43 +165,57 @@ mod tests {
 
     #[test]
     fn nodes_are_listed_by_number_with_their_regions() {
-        let class = tempfile::tempdir().expect("a directory");
-        fake::add_node(class.path(), 10, "pgs");
-        fake::add_node(class.path(), 2, "axi-pmon");
-        fs::write(class.path().join("uevent"), "").expect("written");
-        let nodes = uio_nodes(class.path()).expect("readable");
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        fake::add_node(&system, 10, "pgs", &fake::regions());
+        fake::add_node(&system, 2, "axi-pmon", &[]);
+        fs::write(system.uio.join("uevent"), "").expect("written");
+        let nodes = uio_nodes(&system.uio).expect("readable");
         let names: Vec<_> =
             nodes.iter().map(|node| (node.device.as_str(), node.name.as_str())).collect();
         assert_eq!(names, [("uio2", "axi-pmon"), ("uio10", "pgs")]);
         assert_eq!(nodes[1].maps.len(), 5);
-        let control = &nodes[1].maps[4];
+        let control = nodes[1].map("control").expect("named");
         assert_eq!(
-            (control.name.as_str(), control.address, control.bytes, control.offset),
-            ("control", 0xA004_0000, 0x1000, 0)
+            (control.index, control.address, control.bytes, control.offset),
+            (4, 0xA004_0000, 0x1000, 0)
         );
+        let missing = node_named(&nodes, "other").expect_err("there is none").to_string();
+        assert!(missing.contains("\"other\" (found: axi-pmon, pgs)"), "{missing}");
+    }
+
+    #[test]
+    fn a_region_is_found_by_name_whatever_its_number() {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        let mut regions = fake::regions();
+        regions.swap(0, 4);
+        regions.remove(2);
+        fake::add_node(&system, 0, "pgs", &regions);
+        let node = uio_nodes(&system.uio).expect("readable").remove(0);
+        assert_eq!(node.map("control").expect("named").index, 0);
+        assert_eq!(node.map("dma0").expect("named").index, 3);
+        let missing = node.map("dma2").expect_err("left out").to_string();
+        assert!(missing.contains("found: control, dma1, dma3, dma0"), "{missing}");
+        node.map_or_only("memory").expect_err("one of several needs its name");
+    }
+
+    #[test]
+    fn the_only_region_of_a_node_needs_no_name() {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        fake::add_node(&system, 0, "pgs-dma0", &[("dma@a0000000", 0xA000_0000, 0x1_0000)]);
+        let node = uio_nodes(&system.uio).expect("readable").remove(0);
+        assert_eq!(node.map_or_only("dma0").expect("the only one").address, 0xA000_0000);
     }
 
     #[test]
     fn a_size_that_is_no_number_is_an_error_with_its_path() {
-        let class = tempfile::tempdir().expect("a directory");
-        fake::add_node(class.path(), 0, "pgs");
-        fs::write(class.path().join("uio0/maps/map3/size"), "large\n").expect("written");
-        let error = uio_nodes(class.path()).expect_err("not a number").to_string();
-        assert!(error.contains("uio0/maps/map3/size") && error.contains("large"), "{error}");
-    }
-
-    #[test]
-    fn a_map_is_found_at_its_number_of_pages_in_the_device_file() {
         let root = tempfile::tempdir().expect("a directory");
-        fake::add_node(root.path(), 0, "pgs");
-        let page = usize::try_from(page_bytes(root.path()).expect("a page size")).expect("fits");
-        let node = uio_nodes(root.path()).expect("readable").remove(0);
-        let mut device = vec![0; 5 * page];
-        device[4 * page..4 * page + 4].copy_from_slice(&[0x31, 0x53, 0x47, 0x50]);
-        let dev = tempfile::tempdir().expect("a directory");
-        fs::write(dev.path().join("uio0"), device).expect("written");
-        let control = node.open_map(dev.path(), "control").expect("mapped").expect("named");
-        assert_eq!(control.read32(0), 0x5047_5331);
-        assert!(node.open_map(dev.path(), "other").expect("no error").is_none());
+        let system = System::under(root.path());
+        fake::add_node(&system, 0, "pgs", &fake::regions());
+        fs::write(system.uio.join("uio0/maps/map3/size"), "large\n").expect("written");
+        let error = uio_nodes(&system.uio).expect_err("not a number").to_string();
+        assert!(error.contains("uio0/maps/map3/size") && error.contains("large"), "{error}");
     }
 }

@@ -168,7 +168,7 @@ pub(crate) mod fake {
     use std::time::Duration;
 
     use super::*;
-    use crate::platform::{Access, Beat, Platform};
+    use crate::platform::{Access, DmaMemory, Platform, SharedMemory};
     use std::sync::atomic::AtomicU32;
 
     /// Registers that keep what is written, with a script for reads: a queue of values per offset.
@@ -223,7 +223,7 @@ pub(crate) mod fake {
     #[derive(Debug, Default)]
     pub(crate) struct FakePlatform {
         pub(crate) time: Mutex<Duration>,
-        pub(crate) device: Mutex<BTreeMap<u64, Box<[Beat]>>>,
+        pub(crate) device: Mutex<BTreeMap<u64, DmaMemory>>,
         pub(crate) next: AtomicU64,
         pub(crate) released: Mutex<Vec<u64>>,
     }
@@ -244,20 +244,28 @@ pub(crate) mod fake {
             Ok(Box::new(FakeRegisters::default()))
         }
 
-        fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), PlatformError> {
-            Ok((self.address(beats * 16), vec![Beat::default(); beats].into()))
+        fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+            let memory = DmaMemory::Heap(vec![Default::default(); beats].into());
+            Ok((self.address(beats * 16), memory))
         }
 
-        fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), PlatformError> {
-            Ok((self.address(words * 4), (0..words).map(|_| AtomicU32::new(0)).collect()))
+        fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+            let memory = (0..words).map(|_| AtomicU32::new(0)).collect();
+            Ok((self.address(words * 4), SharedMemory::Heap(memory)))
         }
 
-        fn hand_over(&self, at: u64, beats: Box<[Beat]>, _: Access) -> Result<(), PlatformError> {
-            self.device.lock().expect("no test panics with the lock").insert(at, beats);
+        fn hand_over(
+            &self,
+            at: u64,
+            memory: DmaMemory,
+            _: usize,
+            _: Access,
+        ) -> Result<(), PlatformError> {
+            self.device.lock().expect("no test panics with the lock").insert(at, memory);
             Ok(())
         }
 
-        fn take_back(&self, address: u64) -> Result<Box<[Beat]>, PlatformError> {
+        fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
             let mut device = self.device.lock().expect("no test panics with the lock");
             Ok(device.remove(&address).expect("handed over before"))
         }

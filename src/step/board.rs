@@ -1,21 +1,23 @@
 //! This file opens a board: the one place that knows every kind.
 
 use std::fmt;
-use std::path::Path;
 use std::sync::Arc;
 
-use bitstream_model::interface::address_map::{UIO_CONTROL_MAP, UIO_NODE};
-use bitstream_model::interface::profile::Profile;
+use bitstream_model::interface::address_map::UIO_NODE;
 
-use crate::accelerator::identify;
 use crate::error::OpenError;
-use crate::platform::{AccessCounts, Platform, RegisterMap, UioNode, Window, uio_nodes};
+use crate::platform::{
+    DevMemWindows, HardwarePlatform, MemoryChoice, Platform, RegisterChoice, System, has_nodes,
+    uio_nodes,
+};
 
 /// How to open the accelerator. The default takes whatever board is there.
 #[derive(Debug, Clone, Default)]
 pub struct OpenOptions {
     /// Which board.
     pub board: BoardChoice,
+    /// Where a real board's memory for DMA comes from.
+    pub memory: MemoryChoice,
     /// Width of the DMA cores' length registers, bits; `None` believes the bitstream. Either is
     /// checked against the cores themselves.
     pub length_width: Option<u32>,
@@ -25,14 +27,17 @@ pub struct OpenOptions {
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub enum BoardChoice {
-    /// The UIO node `pgs` if there is one, else an emulated board, which is said at warn level.
+    /// The UIO node `pgs`, or the nodes `pgs-control` and `pgs-dma0` to `pgs-dma3`, if there are
+    /// any; else an emulated board, which is said at warn level.
     #[default]
     Automatic,
-    /// The UIO node of that name (`linux,uio-name`).
+    /// The UIO node of that name (`linux,uio-name`). `pgs` also means the separate nodes.
     Uio {
         /// The name, as in `/sys/class/uio/uio*/name`.
         node: String,
     },
+    /// Registers through `/dev/mem`, inside these windows only. There is no interrupt this way.
+    DevMem(DevMemWindows),
     /// An emulated board.
     #[cfg(feature = "emulation")]
     Emulated(bitstream_model::CpuPort),
@@ -44,8 +49,10 @@ pub enum BoardChoice {
 pub enum BoardKind {
     /// A software-emulated board.
     Emulated,
-    /// A board behind a UIO node.
+    /// A board behind UIO nodes.
     Uio,
+    /// A board behind `/dev/mem`.
+    DevMem,
 }
 
 /// Which board was opened, and why.
@@ -54,7 +61,7 @@ pub enum BoardKind {
 pub struct BoardDescription {
     /// What kind.
     pub kind: BoardKind,
-    /// Its name: the UIO node, or "emulated".
+    /// Its name: the UIO node, "/dev/mem", or "emulated".
     pub name: String,
     /// Why this board and no other.
     pub reason: String,
@@ -66,13 +73,6 @@ impl fmt::Display for BoardDescription {
     }
 }
 
-/// Where the kernel shows UIO nodes: descriptions and device files.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct System<'a> {
-    pub(super) class: &'a Path,
-    pub(super) dev: &'a Path,
-}
-
 /// A board that was found.
 #[derive(Debug)]
 pub(crate) struct Found {
@@ -81,50 +81,49 @@ pub(crate) struct Found {
 }
 
 /// Finds the board of choice.
-pub(super) fn find(choice: &BoardChoice, system: System<'_>) -> Result<Found, OpenError> {
+pub(super) fn find(
+    choice: &BoardChoice,
+    memory: &MemoryChoice,
+    system: &System,
+) -> Result<Found, OpenError> {
+    let real = |registers, kind, name: &str, reason: &str| -> Result<Found, OpenError> {
+        Ok(Found {
+            platform: Arc::new(HardwarePlatform::open(system, registers, memory)?),
+            description: BoardDescription {
+                kind,
+                name: name.to_owned(),
+                reason: reason.to_owned(),
+            },
+        })
+    };
+    let uio = |node: &str, reason| {
+        real(RegisterChoice::Uio(node.to_owned()), BoardKind::Uio, node, reason)
+    };
     match choice {
-        BoardChoice::Automatic => {
-            let nodes = uio_nodes(system.class)?;
-            match nodes.iter().find(|node| node.name == UIO_NODE) {
-                Some(node) => Err(identify_node(node, system)),
-                None => fall_back(),
-            }
+        BoardChoice::Automatic if has_nodes(&uio_nodes(&system.uio)?, UIO_NODE) => {
+            uio(UIO_NODE, "its UIO node is there")
         }
-        BoardChoice::Uio { node: wanted } => {
-            let nodes = uio_nodes(system.class)?;
-            match nodes.iter().find(|node| node.name == *wanted) {
-                Some(node) => Err(identify_node(node, system)),
-                None => {
-                    let names: Vec<_> = nodes.iter().map(|node| node.name.as_str()).collect();
-                    Err(OpenError::NoNode { wanted: wanted.clone(), found: names.join(", ") })
-                }
-            }
+        BoardChoice::Automatic => {
+            let found = fall_back()?;
+            own_memory(memory).map(|()| found)
+        }
+        BoardChoice::Uio { node } => uio(node, "asked for"),
+        BoardChoice::DevMem(windows) => {
+            let registers = RegisterChoice::DevMem(windows.clone());
+            real(registers, BoardKind::DevMem, "/dev/mem", "asked for")
         }
         #[cfg(feature = "emulation")]
-        BoardChoice::Emulated(port) => Ok(emulated(port.clone(), "asked for")),
+        BoardChoice::Emulated(port) => {
+            own_memory(memory).map(|()| emulated(port.clone(), "asked for"))
+        }
     }
 }
 
-/// Identifies the bitstream behind a node, to say why the board cannot be opened: there is no DMA
-/// memory for real hardware.
-fn identify_node(node: &UioNode, system: System<'_>) -> OpenError {
-    let identified = || -> Result<_, OpenError> {
-        let registers = node
-            .open_map(system.dev, UIO_CONTROL_MAP)?
-            .ok_or_else(|| OpenError::NoMap { node: node.name.clone(), map: UIO_CONTROL_MAP })?;
-        let counts = Arc::<AccessCounts>::default();
-        Ok(identify(&Window::new(registers, RegisterMap::Control, counts)?)?)
-    };
-    match identified() {
-        Ok(capabilities) => OpenError::NoMemory {
-            node: node.name.clone(),
-            device: node.device.clone(),
-            profile: Profile::by_id(capabilities.profile_id)
-                .map_or("unknown", |profile| profile.name),
-            major: capabilities.version.0,
-            minor: capabilities.version.1,
-        },
-        Err(error) => error,
+/// Refuses a choice of memory for a board that has its own.
+fn own_memory(memory: &MemoryChoice) -> Result<(), OpenError> {
+    match memory {
+        MemoryChoice::Automatic => Ok(()),
+        _ => Err(OpenError::EmulatedMemory),
     }
 }
 
@@ -158,23 +157,26 @@ mod tests {
 
     use super::*;
     use crate::accelerator::fake as bitstream;
+    use crate::axi_dma::DmaError;
     use crate::platform::fake::FakeRegisters;
-    use crate::platform::uio_fake;
+    use crate::platform::{Caching, PlatformError, uio_fake};
+    use crate::{Accelerator, Error};
 
     fn uio(node: &str) -> BoardChoice {
         BoardChoice::Uio { node: node.to_owned() }
     }
 
     /// A system with the nodes `fabric` and `pgs`, whose control block says what `describe` makes it.
-    fn system_with(describe: impl Fn(&FakeRegisters)) -> (tempfile::TempDir, tempfile::TempDir) {
-        let (class, dev) =
-            (tempfile::tempdir().expect("a directory"), tempfile::tempdir().expect("a directory"));
-        uio_fake::add_node(class.path(), 0, "fabric");
-        uio_fake::add_node(class.path(), 1, "pgs");
+    fn system_with(describe: impl Fn(&FakeRegisters)) -> (tempfile::TempDir, System) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        uio_fake::add_node(&system, 0, "fabric", &[]);
+        uio_fake::add_node(&system, 1, "pgs", &uio_fake::regions());
         let registers = FakeRegisters::default();
         describe(&registers);
         // Pages of up to 64 KiB; the control block is map 4.
-        let mut device = vec![0u8; 5 << 16];
+        let path = system.dev.join("uio1");
+        let mut device = fs::read(&path).expect("read");
         for page in [1 << 12, 1 << 14, 1 << 16] {
             registers.with(|state| {
                 for (at, value) in &state.values {
@@ -183,29 +185,56 @@ mod tests {
                 }
             });
         }
-        fs::write(dev.path().join("uio1"), device).expect("written");
-        (class, dev)
+        fs::write(path, device).expect("written");
+        (root, system)
     }
 
-    fn error_of(choice: &BoardChoice, class: &Path, dev: &Path) -> OpenError {
-        find(choice, System { class, dev }).expect_err("no board")
+    fn open(choice: &BoardChoice, system: &System) -> Result<Accelerator, Error> {
+        let found = find(choice, &MemoryChoice::Automatic, system).map_err(Error::Open)?;
+        Accelerator::on(found, None)
+    }
+
+    fn error_of(choice: &BoardChoice, system: &System) -> OpenError {
+        match open(choice, system).expect_err("no board") {
+            Error::Open(error) => error,
+            other => panic!("{other}"),
+        }
+    }
+
+    fn add_memory(system: &System) {
+        uio_fake::add_node(system, 7, "pgs-memory", &[("memory", 0x6000_0000, 0x1_0000)]);
     }
 
     #[test]
     fn a_node_that_is_not_there_is_named_beside_those_that_are() {
-        let (class, dev) = system_with(bitstream::describe);
-        let error = error_of(&uio("pgs2"), class.path(), dev.path());
-        let text = error.to_string();
+        let (_root, system) = system_with(bitstream::describe);
+        let text = error_of(&uio("pgs2"), &system).to_string();
         assert!(text.contains("\"pgs2\" (found: fabric, pgs)"), "{text}");
+        let text = error_of(&uio("fabric"), &system).to_string();
+        assert!(text.contains("\"fabric\" has no map named \"control\""), "{text}");
+    }
+
+    #[test]
+    fn a_board_without_memory_says_what_it_looked_for() {
+        let (_root, system) = system_with(bitstream::describe);
+        for choice in [BoardChoice::Automatic, uio("pgs")] {
+            let error = error_of(&choice, &system);
+            assert!(
+                matches!(error, OpenError::Platform(PlatformError::NoMemory { .. })),
+                "{error}"
+            );
+        }
     }
 
     #[test]
     fn a_real_board_is_identified_and_never_replaced_by_an_emulated_one() {
-        let (class, dev) = system_with(bitstream::describe);
+        let (_root, system) = system_with(bitstream::describe);
+        add_memory(&system);
         for choice in [BoardChoice::Automatic, uio("pgs")] {
-            let error = error_of(&choice, class.path(), dev.path());
+            // The file of registers identifies itself; its cores do not come out of reset.
+            let error = error_of(&choice, &system);
             assert!(
-                matches!(&error, OpenError::NoMemory { device, profile: "float", .. } if device == "uio1"),
+                matches!(&error, OpenError::Core(DmaError::State { channel, .. }) if channel == "dma0 MM2S"),
                 "{error}"
             );
         }
@@ -213,15 +242,92 @@ mod tests {
 
     #[test]
     fn another_bitstream_behind_the_node_is_refused_as_such() {
-        let (class, dev) = system_with(|_| ());
-        let error = error_of(&uio("pgs"), class.path(), dev.path());
+        let (_root, system) = system_with(|_| ());
+        add_memory(&system);
+        let error = error_of(&uio("pgs"), &system);
         assert!(matches!(error, OpenError::Identity(_)), "{error}");
     }
 
     #[test]
+    fn nothing_is_touched_before_a_bitstream_is_loaded() {
+        let (_root, system) = system_with(bitstream::describe);
+        add_memory(&system);
+        uio_fake::write(system.fpga_manager.join("state"), "unknown");
+        let before = fs::read(system.dev.join("uio1")).expect("read");
+        let error = error_of(&uio("pgs"), &system);
+        assert!(matches!(error, OpenError::Platform(PlatformError::NoBitstream { .. })), "{error}");
+        assert!(fs::read(system.dev.join("uio1")).expect("read") == before);
+    }
+
+    #[test]
+    fn a_board_in_use_is_busy_until_it_is_closed() {
+        let (_root, system) = system_with(bitstream::describe);
+        add_memory(&system);
+        let memory = MemoryChoice::Automatic;
+        let first = find(&uio("pgs"), &memory, &system).expect("opened");
+        let error = error_of(&uio("pgs"), &system);
+        assert!(matches!(error, OpenError::Platform(PlatformError::Busy { .. })), "{error}");
+        drop(first);
+        find(&uio("pgs"), &memory, &system).expect("opened");
+    }
+
+    #[test]
+    fn separate_nodes_are_a_board_and_an_absent_core_is_named() {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        add_memory(&system);
+        let regions = uio_fake::regions();
+        uio_fake::add_node(&system, 0, "pgs-control", &regions[4..]);
+        uio_fake::add_node(&system, 2, "pgs-dma1", &regions[1..2]);
+        let found = find(&BoardChoice::Automatic, &MemoryChoice::Automatic, &system);
+        let Found { platform, description } = found.expect("a board");
+        assert_eq!(description.to_string(), "pgs (its UIO node is there)");
+        assert_eq!(platform.control_window().expect("mapped").bytes(), 0x1000);
+        platform.dma_window(1).expect("mapped").write32(4, 0x55);
+        assert_eq!(fs::read(system.dev.join("uio2")).expect("read")[4], 0x55);
+        for core in [0, 2, 3, 4] {
+            let error = platform.dma_window(core).expect_err("absent").to_string();
+            assert!(error.contains("found: pgs-dma1, pgs-control"), "{error}");
+        }
+    }
+
+    #[test]
+    fn dev_mem_is_opened_on_request_only_and_refused_without_the_file() {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        let error = error_of(&BoardChoice::DevMem(DevMemWindows::default()), &system);
+        assert!(matches!(error, OpenError::Platform(PlatformError::NoDevice { .. })), "{error}");
+    }
+
+    #[test]
+    fn memory_is_taken_from_where_it_is_asked_for() {
+        let (_root, system) = system_with(bitstream::describe);
+        add_memory(&system);
+        let open = |memory| find(&uio("pgs"), &memory, &system).map(|_| ());
+        open(MemoryChoice::Uio { node: "pgs-memory".to_owned() }).expect("it is there");
+        let other = open(MemoryChoice::Uio { node: "other".to_owned() }).expect_err("no such node");
+        assert!(other.to_string().contains("\"other\""), "{other}");
+        let name = "pgs".to_owned();
+        let other = open(MemoryChoice::UDmaBuf { name, caching: Caching::Cached });
+        let other = other.expect_err("no such buffer");
+        assert!(matches!(other, OpenError::Platform(PlatformError::NoUDmaBuf { .. })), "{other}");
+        let other = open(MemoryChoice::DevMem { window: 0..4096 }).expect_err("no such file");
+        assert!(matches!(other, OpenError::Platform(PlatformError::NoDevice { .. })), "{other}");
+    }
+
+    #[cfg(feature = "emulation")]
+    #[test]
+    fn an_emulated_board_takes_no_other_memory() {
+        let memory = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
+        let nothing = System::under(std::path::Path::new("/nonexistent"));
+        let refused = find(&BoardChoice::Automatic, &memory, &nothing).expect_err("no board");
+        assert!(matches!(refused, OpenError::EmulatedMemory), "{refused}");
+    }
+
+    #[test]
     fn without_a_node_the_emulated_board_says_why_it_was_taken() {
-        let class = Path::new("/nonexistent/uio");
-        let found = find(&BoardChoice::Automatic, System { class, dev: class });
+        let system = System::under(std::path::Path::new("/nonexistent"));
+        let found = find(&BoardChoice::Automatic, &MemoryChoice::Automatic, &system);
         if cfg!(feature = "emulation") {
             let description = found.expect("the emulated board").description;
             assert_eq!(description.kind, BoardKind::Emulated);

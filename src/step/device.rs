@@ -118,15 +118,16 @@ impl Device {
     pub(super) fn start(&mut self, plan: &Plan, parameters: &StepParameters) -> Result<u64, Fault> {
         let largest = self.largest;
         for (channel, lane) in self.s2mm.iter_mut().enumerate() {
-            lane.hand_over()?;
+            let results = plan.results(channel);
+            lane.hand_over(results)?;
             lane.begin();
-            lane.queue(0, bytes(plan.results(channel)), largest)?;
+            lane.queue(0, bytes(results), largest)?;
             lane.ensure_running(&*self.platform)?;
         }
         for (channel, lane) in self.mm2s.iter_mut().enumerate() {
-            lane.hand_over()?;
-            lane.begin();
             let segments = plan.segments(channel);
+            lane.hand_over(segments.poses.end)?;
+            lane.begin();
             let mut queue = |beats: &std::ops::Range<usize>| {
                 lane.queue(bytes(beats.start), bytes(beats.len()), largest)
             };

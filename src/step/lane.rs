@@ -108,10 +108,10 @@ impl Lane {
         }
     }
 
-    /// Gives the buffer to the device.
-    pub(super) fn hand_over(&mut self) -> Result<(), PlatformError> {
+    /// Gives the buffer to the device, which will touch its first `used` beats.
+    pub(super) fn hand_over(&mut self, used: usize) -> Result<(), PlatformError> {
         if let Held::Cpu(buffer) = std::mem::take(&mut self.held) {
-            self.held = Held::Device(buffer.into_device(self.access)?);
+            self.held = Held::Device(buffer.into_device(used, self.access)?);
         }
         Ok(())
     }

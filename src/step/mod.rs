@@ -7,6 +7,8 @@ mod device;
 mod echo;
 mod fault;
 mod lane;
+#[cfg(all(test, feature = "emulation"))]
+mod memory_tests;
 mod plan;
 mod recovery;
 mod report;

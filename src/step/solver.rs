@@ -3,13 +3,12 @@
 //! Validate, reserve, pack, hand over, start, wait, take back, unpack, check, commit: nothing of
 //! the caller's changes before the last.
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::record::Beat;
 
-use super::board::{self, BoardDescription, Found, OpenOptions, System};
+use super::board::{self, BoardDescription, Found, OpenOptions};
 use super::device::Device;
 use super::fault::Fault;
 use super::plan::Plan;
@@ -18,14 +17,13 @@ use crate::accelerator::{Capabilities, Counters};
 use crate::beat::pack::{pack_collisions, pack_poses, pack_velocities};
 use crate::beat::unpack::{sum_of_words, unpack_result};
 use crate::error::{Error, OpenError};
-use crate::platform::{Deadline, UIO_CLASS};
+use crate::platform::{Deadline, System};
 use crate::scene::validate::{Limits, validate, validate_shapes};
 use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
 
 /// Finds the board that the options ask for.
 pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
-    let system = System { class: Path::new(UIO_CLASS), dev: Path::new("/dev") };
-    board::find(&options.board, system)
+    board::find(&options.board, &options.memory, &System::default())
 }
 
 /// An open accelerator.

@@ -5,11 +5,12 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bitstream_model::interface::control::ErrorCode;
-use bitstream_model::interface::record::Beat;
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected};
 
 use super::board::{BoardDescription, BoardKind, Found};
-use crate::platform::{Access, EmulatedPlatform, Platform, PlatformError, RegisterWindow};
+use crate::platform::{
+    Access, DmaMemory, EmulatedPlatform, Platform, PlatformError, RegisterWindow, SharedMemory,
+};
 use crate::{
     Accelerator, Aftermath, BoardChoice, Body, Collision, Contact, Error, Fault, OpenError,
     OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
@@ -27,7 +28,7 @@ fn options(board: &EmulatedBoard) -> OpenOptions {
 }
 
 /// A row of cubes that fall on the ground, each with its own speed, each in contact.
-fn scene(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
+pub(super) fn scene(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
     let body = |position, shape, velocity| Body {
         pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
         velocity,
@@ -51,7 +52,7 @@ fn scene(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
     (bodies, collisions)
 }
 
-fn bits(bodies: &[Body]) -> Vec<u32> {
+pub(super) fn bits(bodies: &[Body]) -> Vec<u32> {
     let numbers = |body: &Body| {
         let Pose { position, orientation } = body.pose;
         let Velocity { linear, angular } = body.velocity;
@@ -67,7 +68,7 @@ fn step(accelerator: &mut Accelerator, cubes: u32) -> (Result<StepReport, Error>
     (result, bodies)
 }
 
-fn undisturbed(cubes: u32) -> Vec<u32> {
+pub(super) fn undisturbed(cubes: u32) -> Vec<u32> {
     let (result, bodies) = step(&mut open(BoardConfig::default()).1, cubes);
     result.expect("nothing disturbs it");
     bits(&bodies)
@@ -312,30 +313,31 @@ impl Platform for BadlyWired {
         Ok(Box::new(Noted { inner, region: 4, writes }))
     }
 
-    fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), PlatformError> {
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         self.inner.allocate(beats)
     }
 
-    fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), PlatformError> {
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
         self.inner.allocate_shared(words)
     }
 
     fn hand_over(
         &self,
         address: u64,
-        mut beats: Box<[Beat]>,
+        mut memory: DmaMemory,
+        used: usize,
         access: Access,
     ) -> Result<(), PlatformError> {
         if access == Access::Read {
-            beats[0].0[0] ^= self.flip_going.swap(0, Ordering::Relaxed);
+            memory.beats_mut()[0].0[0] ^= self.flip_going.swap(0, Ordering::Relaxed);
         }
-        self.inner.hand_over(address, beats, access)
+        self.inner.hand_over(address, memory, used, access)
     }
 
-    fn take_back(&self, address: u64) -> Result<Box<[Beat]>, PlatformError> {
-        let mut beats = self.inner.take_back(address)?;
-        beats[0].0[0] ^= self.flip_coming.swap(0, Ordering::Relaxed);
-        Ok(beats)
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+        let mut memory = self.inner.take_back(address)?;
+        memory.beats_mut()[0].0[0] ^= self.flip_coming.swap(0, Ordering::Relaxed);
+        Ok(memory)
     }
 
     fn release(&self, address: u64) -> Result<(), PlatformError> {

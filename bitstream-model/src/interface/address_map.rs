@@ -27,10 +27,27 @@ pub const INTERRUPT_SPI: u32 = 89;
 
 /// Name of the UIO node that carries all regions.
 pub const UIO_NODE: &str = "pgs";
+/// Names of the UIO nodes of the AXI DMAs, where each region has a node of its own.
+pub const UIO_DMA_NODES: [&str; DMA_COUNT_MAX] = ["pgs-dma0", "pgs-dma1", "pgs-dma2", "pgs-dma3"];
+/// Name of the UIO node of the control block, where each region has a node of its own. It carries
+/// the interrupt.
+pub const UIO_CONTROL_NODE: &str = "pgs-control";
+/// Name of the UIO node of the memory that is reserved for DMA.
+pub const UIO_MEMORY_NODE: &str = "pgs-memory";
 /// Names of the UIO maps of the AXI DMAs.
 pub const UIO_DMA_MAPS: [&str; DMA_COUNT_MAX] = ["dma0", "dma1", "dma2", "dma3"];
 /// Name of the UIO map of the control block.
 pub const UIO_CONTROL_MAP: &str = "control";
+/// Name of the UIO map of the reserved memory.
+pub const UIO_MEMORY_MAP: &str = "memory";
+/// Name of the u-dma-buf, where DMA memory comes from that kernel module.
+pub const U_DMA_BUF: &str = "pgs";
+
+/// Where the reserved memory begins unless it is said otherwise: in low DDR, so that cores with
+/// 32-bit addresses reach it.
+pub const MEMORY_BASE: u64 = 0x5000_0000;
+/// How much of it there is, bytes: 38,880 bodies with 127,000 collisions take 19 MB and some slack.
+pub const MEMORY_BYTES: u64 = 64 << 20;
 
 /// Where low DDR begins and ends: 2 GiB on the ZCU102.
 pub const DDR_LOW: core::ops::Range<u64> = 0..0x8000_0000;

@@ -4,7 +4,9 @@ use std::ffi::OsString;
 
 use clap::parser::ValueSource;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use zynq_pgs::MemoryChoice;
 
+use crate::memory::memory;
 use crate::verbs::check::CheckArgs;
 use crate::verbs::list::ListArgs;
 use crate::verbs::load::LoadArgs;
@@ -61,6 +63,17 @@ pub(crate) struct CommonArgs {
     /// Board to use; auto takes the UIO node "pgs" if there is one, else the emulated board.
     #[arg(long, global = true, env = "PGS_BOARD", value_name = "BOARD", default_value = "auto")]
     pub(crate) board: BoardName,
+    /// DMA memory of a real board: auto (the u-dma-buf "pgs", else the UIO node "pgs-memory"),
+    /// u-dma-buf[:NAME[:write-combining]], uio[:NODE] or devmem[:ADDRESS+BYTES].
+    #[arg(
+        long,
+        global = true,
+        env = "PGS_MEMORY",
+        value_name = "MEMORY",
+        default_value = "auto",
+        value_parser = memory
+    )]
+    pub(crate) memory: MemoryChoice,
 }
 
 /// A board, as it is named on the command line.
@@ -68,6 +81,8 @@ pub(crate) struct CommonArgs {
 pub(crate) enum BoardName {
     Auto,
     Uio,
+    /// Registers through /dev/mem, at the addresses of the interface; needs root.
+    Devmem,
     Emulated,
 }
 
@@ -87,7 +102,7 @@ pub(crate) fn parse(
     if let Some(verb) = matches.subcommand_name() {
         // `run`'s options stand here as well, and would silently mean nothing before another verb.
         let stray = matches.ids().find(|id| {
-            let common = matches!(id.as_str(), "json" | "board");
+            let common = matches!(id.as_str(), "json" | "board" | "memory");
             let is_argument = command.get_arguments().any(|argument| argument.get_id() == *id);
             let given = || matches.value_source(id.as_str()) == Some(ValueSource::CommandLine);
             !common && is_argument && given()
@@ -134,9 +149,13 @@ mod tests {
 
     #[test]
     fn common_options_stand_on_either_side_of_the_verb() {
-        for line in ["pgs --json --board emulated list", "pgs list --json --board emulated"] {
+        for line in [
+            "pgs --json --board emulated --memory uio:m list",
+            "pgs list --json --board emulated --memory uio:m",
+        ] {
             let common = parsed(line).expect(line).common;
             assert!(common.json, "{line}");
+            assert_eq!(common.memory, MemoryChoice::Uio { node: "m".to_owned() }, "{line}");
             assert_eq!(common.board, BoardName::Emulated, "{line}");
         }
     }
@@ -165,6 +184,7 @@ mod tests {
             "pgs --bandwidth inf",
             "pgs --bandwidth -3",
             "pgs --report-every 0",
+            "pgs --memory udmabuf",
             "pgs model --collisions -1 --bodies 1",
             "pgs model --collisions 1",
             "pgs solve",

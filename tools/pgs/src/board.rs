@@ -3,13 +3,16 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use bitstream_model::interface::address_map::UIO_NODE;
+use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
-use zynq_pgs::{Accelerator, BoardChoice, BoardKind, Fault, OpenOptions, UIO_CLASS, uio_nodes};
+use zynq_pgs::{
+    Accelerator, BoardChoice, BoardKind, DevMemWindows, Fault, MemoryChoice, OpenOptions,
+    UIO_CLASS, uio_nodes,
+};
 
-use crate::args::BoardName;
+use crate::args::{BoardName, CommonArgs};
 use crate::failure::{Cause, Failure};
 use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
 
@@ -23,21 +26,22 @@ pub(crate) struct Opened {
     pub(crate) reason: String,
 }
 
-/// A kind of board, as it is written in results.
-pub(crate) fn kind_text(observer: Option<&EmulatedBoard>) -> &'static str {
-    if observer.is_some() { "emulated" } else { "uio" }
-}
-
 /// Which kind of board a name on the command line means here, and why.
 pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
     match name {
         BoardName::Uio => (BoardKind::Uio, "as asked for".to_owned()),
+        BoardName::Devmem => (BoardKind::DevMem, "as asked for".to_owned()),
         BoardName::Emulated => (BoardKind::Emulated, "as asked for".to_owned()),
         BoardName::Auto => match uio_nodes(Path::new(UIO_CLASS)) {
-            Ok(nodes) if nodes.iter().any(|node| node.name == UIO_NODE) => {
-                (BoardKind::Uio, format!("there is a UIO node named {UIO_NODE:?}"))
+            Ok(nodes) => {
+                let names = [UIO_NODE, UIO_CONTROL_NODE];
+                match names.iter().find(|name| nodes.iter().any(|node| node.name == **name)) {
+                    Some(name) => (BoardKind::Uio, format!("there is a UIO node named {name:?}")),
+                    None => {
+                        (BoardKind::Emulated, format!("there is no UIO node named {UIO_NODE:?}"))
+                    }
+                }
             }
-            Ok(_) => (BoardKind::Emulated, format!("there is no UIO node named {UIO_NODE:?}")),
             // An unreadable node may be the board: the attempt to open it says what is wrong.
             Err(error) => (BoardKind::Uio, format!("UIO nodes cannot be listed: {error}")),
         },
@@ -54,33 +58,51 @@ pub(crate) struct Chosen {
     pub(crate) reason: String,
 }
 
+/// A kind of board, as it is written on the command line and in results.
+pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
+    match kind {
+        BoardKind::Emulated => "emulated",
+        BoardKind::DevMem => "devmem",
+        _ => "uio",
+    }
+}
+
 /// Chooses a board. `given` is an option of the command line that only an emulated one has.
 pub(crate) fn find(
-    name: BoardName,
+    common: &CommonArgs,
     config: BoardConfig,
     given: Option<&'static str>,
 ) -> Result<Chosen, Failure> {
-    let (kind, reason) = choose(name);
-    let (board, observer) = if kind == BoardKind::Emulated {
-        if name == BoardName::Auto {
+    let CommonArgs { board: name, memory, .. } = common;
+    let (kind, reason) = choose(*name);
+    let mut observer = None;
+    let board = if kind == BoardKind::Emulated {
+        if *name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
         }
+        if *memory != MemoryChoice::Automatic {
+            let error = "--memory is for real boards, this one is emulated and has its own";
+            return Err(Failure::input(error).next("leave out --memory, or add --board uio"));
+        }
         let emulated = EmulatedBoard::new(config).map_err(Failure::input)?;
-        (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
+        BoardChoice::Emulated(observer.insert(emulated).cpu_port())
     } else if let Some(option) = given {
         let error = format!("{option} says how to build an emulated board, this one is real");
         return Err(
             Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
         );
+    } else if kind == BoardKind::DevMem {
+        BoardChoice::DevMem(DevMemWindows::default())
     } else {
-        (BoardChoice::Uio { node: UIO_NODE.to_owned() }, None)
+        BoardChoice::Uio { node: UIO_NODE.to_owned() }
     };
-    Ok(Chosen { options: OpenOptions { board, ..OpenOptions::default() }, observer, reason })
+    let options = OpenOptions { board, memory: memory.clone(), ..OpenOptions::default() };
+    Ok(Chosen { options, observer, reason })
 }
 
 /// Opens a board.
-pub(crate) fn open(name: BoardName, build: &BuildArgs) -> Result<Opened, Failure> {
-    let Chosen { options, observer, reason } = find(name, build.config(), build.given())?;
+pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Failure> {
+    let Chosen { options, observer, reason } = find(common, build.config(), build.given())?;
     let accelerator = Accelerator::open(options).map_err(unusable)?;
     Ok(Opened { accelerator, observer, reason })
 }
@@ -101,7 +123,10 @@ impl Opened {
             if matches!(**fault, Fault::NotFinite { .. }));
         if diverged && self.observer.is_some() {
             // The emulated board does not miscalculate: the numbers given were too large.
-            return Failure::input(error).next("give smaller velocities, or a shorter time step");
+            return Failure::input(error).next(
+                "start from smaller velocities (run: a lower --drop, or --hazards interlocked), or \
+                 take a shorter time step (solve: params.npy)",
+            );
         }
         let next = if error.may_retry() {
             "run the command again"
@@ -118,7 +143,7 @@ impl Opened {
     }
 
     fn kind(&self) -> &'static str {
-        kind_text(self.observer.as_ref())
+        kind_text(self.accelerator.board().kind)
     }
 
     fn profile(&self) -> &'static str {

@@ -13,6 +13,7 @@ mod failure;
 mod folder;
 mod interrupt;
 mod loading;
+mod memory;
 mod npy;
 mod options;
 mod origin;

@@ -106,9 +106,16 @@ fn options_of_the_emulated_board_are_refused_for_a_real_one() {
 }
 
 #[test]
+fn memory_is_refused_for_an_emulated_board() {
+    let ran = run(["--board", "emulated", "--memory", "uio"]);
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+    assert!(ran.stderr.contains("--memory is for real boards"), "{}", ran.stderr);
+}
+
+#[test]
 fn a_missing_board_ends_with_3_and_the_next_step() {
     if std::path::Path::new("/sys/class/uio").exists() {
-        println!("skipped: this machine has UIO nodes");
+        common::skipped("this machine has UIO nodes");
         return;
     }
     let ran = run(["--board", "uio"]);
@@ -120,7 +127,7 @@ fn a_missing_board_ends_with_3_and_the_next_step() {
 #[test]
 fn falling_back_to_the_emulated_board_is_said() {
     if std::path::Path::new("/sys/class/uio").exists() {
-        println!("skipped: this machine has UIO nodes");
+        common::skipped("this machine has UIO nodes");
         return;
     }
     let arguments = ["--board", "auto", "--grid", "1x1x1", "--steps", "1"];
@@ -278,6 +285,7 @@ fn list_names_the_board_that_would_be_opened() {
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     let document = json(&ran);
     assert_keys(&document, &["schema", "board", "uio_nodes", "uio_error", "emulated"]);
+    assert_keys(&document, &["u_dma_bufs", "logic_error"]);
     assert_eq!(document["board"]["kind"], "emulated");
     assert!(run(["list"]).stdout.contains("would open  emulated (as asked for)"));
 }

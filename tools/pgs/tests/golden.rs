@@ -5,29 +5,22 @@
 //! below that directory is compared too; among them `full_step186`, the thesis' scene.
 mod common;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Once;
+use std::sync::LazyLock;
 
-use common::run;
+use common::{run, skipped};
 use serde_json::Value;
 
-/// Says once what is skipped, past the harness, which keeps what passing tests print.
-fn skipped(what: &str) {
-    static SAID: Once = Once::new();
-    SAID.call_once(|| {
-        // If nobody can be told, the test is no worse for it.
-        let _ = writeln!(std::io::stderr(), "skipped: {what}");
-    });
-}
-
-/// The folder of all vectors, if there is one.
+/// The folder of all vectors, if there is one; says once if there is none.
 fn all_vectors() -> Option<PathBuf> {
-    let root = std::env::var_os("PGS_VECTORS").map(PathBuf::from);
-    if root.is_none() {
-        skipped("the full golden vectors, full_step186 among them (PGS_VECTORS is not set)");
-    }
-    root
+    static ROOT: LazyLock<Option<PathBuf>> = LazyLock::new(|| {
+        let root = std::env::var_os("PGS_VECTORS").map(PathBuf::from);
+        if root.is_none() {
+            skipped("the full golden vectors, full_step186 among them (PGS_VECTORS is not set)");
+        }
+        root
+    });
+    ROOT.clone()
 }
 
 /// Folders of arrays below `root`, in the order of their names.

@@ -4,10 +4,13 @@ use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::Path;
 
-use bitstream_model::interface::address_map::{UIO_CONTROL_MAP, UIO_NODE};
+use bitstream_model::interface::address_map::{
+    UIO_CONTROL_MAP, UIO_CONTROL_NODE, UIO_DMA_NODES, UIO_MEMORY_NODE, UIO_NODE,
+};
 use clap::Args;
 use serde_json::{Value, json};
-use zynq_pgs::{BoardKind, UIO_CLASS, UioNode, uio_nodes};
+use zynq_pgs::platform::{System, require_bitstream, u_dma_buf_names};
+use zynq_pgs::{UIO_CLASS, UioNode, uio_nodes};
 
 use super::SCHEMA;
 use crate::args::CommonArgs;
@@ -19,17 +22,18 @@ Examples:
   pgs list
   pgs list --json";
 
-/// List the boards: UIO nodes, what is inaccessible and why, and the emulated board.
+/// List the boards: UIO nodes, DMA buffers, what is inaccessible and why, and the emulated board.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ListArgs {}
 
 /// Why a node cannot be used; `None` if it can, as far as that shows without mapping it.
 fn obstacle(node: &UioNode) -> Option<String> {
-    if node.name != UIO_NODE {
+    let parts = [UIO_CONTROL_NODE, UIO_MEMORY_NODE].into_iter().chain(UIO_DMA_NODES);
+    if !parts.chain([UIO_NODE]).any(|name| node.name == name) {
         return Some("another device".to_owned());
     }
-    if !node.maps.iter().any(|map| map.name == UIO_CONTROL_MAP) {
+    if node.name == UIO_NODE && !node.maps.iter().any(|map| map.name == UIO_CONTROL_MAP) {
         return Some(format!(
             "no map named {UIO_CONTROL_MAP:?}: is this the accelerator's overlay?"
         ));
@@ -46,10 +50,10 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     let (kind, reason) = board::choose(common.board);
-    let chosen = match kind {
-        BoardKind::Uio => "uio",
-        _ => "emulated",
-    };
+    let chosen = board::kind_text(kind);
+    let system = System::default();
+    let buffers = u_dma_buf_names(&system);
+    let logic_error = require_bitstream(&system).err().map(|error| Failure::input(error).chain());
     let (nodes, error) = match uio_nodes(Path::new(UIO_CLASS)) {
         Ok(nodes) => (nodes, None),
         Err(error) => (Vec::new(), Some(Failure::input(error).chain())),
@@ -77,6 +81,8 @@ pub(crate) fn run(
             "board": { "kind": chosen, "reason": reason },
             "uio_nodes": nodes,
             "uio_error": error,
+            "u_dma_bufs": buffers,
+            "logic_error": logic_error,
             "emulated": { "available": true },
         });
         writeln!(out, "{document:#}")?;
@@ -99,6 +105,12 @@ pub(crate) fn run(
                 map.index, map.name, map.address, map.bytes
             )?;
         }
+    }
+    for name in &buffers {
+        writeln!(out, "u-dma-buf   {name:?}")?;
+    }
+    if let Some(error) = logic_error {
+        writeln!(out, "logic       {error}")?;
     }
     writeln!(out, "emulated    always available")?;
     Ok(Verdict::Done)

@@ -1,6 +1,6 @@
 //! The verb `run`: steps a scene and shows what every step cost.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -160,23 +160,9 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     let options = SceneOptions { grid: args.grid, drop: args.drop, inertia: args.inertia.into() };
-    let mut opened = board::open(common.board, &args.build)?;
+    let mut opened = board::open(common, &args.build)?;
     check_size(args.grid, &opened)?;
     let mut scene = Scene::new(&options).map_err(Failure::input)?;
-    if !common.json {
-        opened.print(out)?;
-        writeln!(
-            out,
-            "scene      {} cubes ({}) on a static ground, dropped from {} m, {} steps",
-            grouped(args.grid.cubes().into()),
-            args.grid,
-            args.drop,
-            args.steps
-        )?;
-        writeln!(out)?;
-        heading(out, &COLUMNS)?;
-        out.flush()?;
-    }
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
 
     let interrupt = Interrupt::install();
@@ -187,6 +173,10 @@ pub(crate) fn run(
     while done < args.steps && !interrupt.is_set() {
         done += 1;
         let row = step(done, &mut opened, &mut scene)?;
+        if done == 1 && !common.json {
+            // Only now: a scene that is refused prints nothing but the refusal.
+            progress.suspend(|| print_heading(args, &opened, out))?;
+        }
         progress.inc(1);
         if common.json {
             documents.push(row.to_json());
@@ -226,6 +216,22 @@ pub(crate) fn run(
         writeln!(out, "digest     {} {digest}", digest::ALGORITHM)?;
     }
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
+}
+
+/// Which board, which scene, and the names of the columns.
+fn print_heading(args: &RunArgs, opened: &Opened, out: &mut dyn Write) -> io::Result<()> {
+    opened.print(out)?;
+    writeln!(
+        out,
+        "scene      {} cubes ({}) on a static ground, dropped from {} m, {} steps",
+        grouped(args.grid.cubes().into()),
+        args.grid,
+        args.drop,
+        args.steps
+    )?;
+    writeln!(out)?;
+    heading(out, &COLUMNS)?;
+    out.flush()
 }
 
 /// Refuses a grid that does not fit before memory is taken for it.

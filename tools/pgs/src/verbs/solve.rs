@@ -17,6 +17,7 @@ use crate::compare::{self, Difference};
 use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
+use crate::interrupt::Interrupt;
 use crate::npy::{self, Dimensions};
 use crate::options::BuildArgs;
 use crate::origin;
@@ -109,10 +110,12 @@ pub(crate) fn run(
         true => expected(&folder, &parameters)?,
         false => Vec::new(),
     };
-    let mut opened = board::open(common.board, &args.build)?;
+    let mut opened = board::open(common, &args.build)?;
     folder
         .check_shapes(opened.accelerator.capabilities().shape_capacity)
         .map_err(Failure::input)?;
+    // The step is let finish, so that no channel is left running.
+    let interrupt = Interrupt::install();
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
     let mut bodies = std::mem::take(&mut folder.bodies);
     let report = opened
@@ -123,6 +126,9 @@ pub(crate) fn run(
             true => Failure::input(origin::locate(error, &folder)),
             false => opened.failure(error),
         })?;
+    if interrupt.is_set() {
+        return Ok(Verdict::Interrupted);
+    }
     if let Some(path) = &args.out {
         folder::write_results(path, &bodies).map_err(Failure::input)?;
     }

@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "not every test uses every helper")]
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -16,6 +17,12 @@ pub(crate) fn pgs() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_pgs"));
     command.env("PGS_BOARD", "emulated").env("RUST_LOG", "error");
     command
+}
+
+/// Says what a test skips, past the harness, which keeps what passing tests print.
+pub(crate) fn skipped(what: &str) {
+    // If nobody can be told, the test is no worse for it.
+    let _ = writeln!(std::io::stderr(), "skipped: {what}");
 }
 
 /// What a command did: its code, stdout and stderr.

@@ -1,0 +1,247 @@
+//! This file maps physical memory through `/dev/mem`: only on request, and only inside windows that
+//! were configured.
+//!
+//! There is no interrupt this way. What the kernel does not map (registers, memory reserved with
+//! `no-map`) is Device memory.
+//!
+//! Source: Linux `Documentation/arch/arm64/memory.rst`, `drivers/char/mem.c`.
+
+use std::fs::File;
+use std::io;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use bitstream_model::interface::address_map::{
+    CONTROL_BASE, CONTROL_BYTES, DMA_BYTES, DMA_COUNT_MAX, MEMORY_BASE, MEMORY_BYTES, dma_base,
+};
+
+use super::mapped::Mapping;
+use super::sysfs::read_if_present;
+use super::uio_device::page_bytes;
+use super::{PlatformError, ReservedMemory, System};
+
+/// What may be reached through `/dev/mem`. The default is the address map of the interface.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DevMemWindows {
+    /// Physical address of each AXI DMA, whose registers take 64 KiB.
+    pub dma: [u64; DMA_COUNT_MAX],
+    /// Physical address of the control block, which takes 4 KiB.
+    pub control: u64,
+    /// Memory that is reserved for DMA and that the kernel does not map.
+    pub memory: Range<u64>,
+}
+
+impl Default for DevMemWindows {
+    fn default() -> Self {
+        Self {
+            dma: std::array::from_fn(dma_base),
+            control: CONTROL_BASE,
+            memory: MEMORY_BASE..MEMORY_BASE + MEMORY_BYTES,
+        }
+    }
+}
+
+impl DevMemWindows {
+    /// The registers of AXI DMA `core`.
+    pub(super) fn dma(&self, core: usize) -> Option<Range<u64>> {
+        self.dma.get(core).and_then(|start| range(*start, u64::from(DMA_BYTES)))
+    }
+
+    /// The registers of the accelerator.
+    pub(super) fn control(&self) -> Option<Range<u64>> {
+        range(self.control, u64::from(CONTROL_BYTES))
+    }
+
+    fn contain(&self, wanted: &Range<u64>) -> bool {
+        let registers = (0..DMA_COUNT_MAX).map(|core| self.dma(core)).chain([self.control()]);
+        registers
+            .flatten()
+            .chain([self.memory.clone()])
+            .any(|window| window.start <= wanted.start && wanted.end <= window.end)
+    }
+}
+
+fn range(start: u64, bytes: u64) -> Option<Range<u64>> {
+    Some(start..start.checked_add(bytes)?)
+}
+
+/// `/dev/mem`, open.
+#[derive(Debug)]
+pub(super) struct DevMem {
+    file: File,
+    path: PathBuf,
+    windows: DevMemWindows,
+    /// What the kernel uses as its own, as far as it says.
+    kernel: Vec<(Range<u64>, String)>,
+}
+
+impl DevMem {
+    /// Opens it.
+    pub(super) fn open(system: &System, windows: DevMemWindows) -> Result<Self, PlatformError> {
+        let path = system.dev.join("mem");
+        let file = super::system::open_device(&path, nix::libc::O_SYNC);
+        let file = file.map_err(|error| match error {
+            PlatformError::Permission { path, source } => PlatformError::DevMemRefused {
+                act: "opened",
+                address: windows.control,
+                path,
+                source,
+            },
+            error => error,
+        })?;
+        let kernel = kernel_memory(&read_if_present(&system.iomem)?.unwrap_or_default());
+        Ok(Self { file, path, windows, kernel })
+    }
+
+    /// What was configured.
+    pub(super) fn windows(&self) -> &DevMemWindows {
+        &self.windows
+    }
+
+    /// Maps a range.
+    pub(super) fn map(&self, wanted: &Range<u64>) -> Result<Mapping, PlatformError> {
+        let (address, bytes) = (wanted.start, wanted.end.saturating_sub(wanted.start));
+        if bytes == 0 || !self.windows.contain(wanted) {
+            return Err(PlatformError::OutOfWindows { address, bytes });
+        }
+        let overlaps = |ram: &Range<u64>| ram.start < wanted.end && wanted.start < ram.end;
+        if let Some((_, ram)) = self.kernel.iter().find(|(ram, _)| overlaps(ram)) {
+            return Err(PlatformError::KernelMemory { address, ram: ram.clone() });
+        }
+        let start = address % page_bytes(&self.path)?;
+        let region = || format!("{address:#x} of /dev/mem");
+        let large = |_| PlatformError::TooLarge { region: region(), bytes };
+        let mapped = Mapping::new(
+            &self.file,
+            &self.path,
+            address - start,
+            usize::try_from(start).map_err(large)?,
+            usize::try_from(bytes).map_err(large)?,
+        );
+        mapped.map_err(|error| match error {
+            PlatformError::File { path, source, .. }
+                if source.kind() == io::ErrorKind::PermissionDenied =>
+            {
+                PlatformError::DevMemRefused { act: "mapped", address, path, source }
+            }
+            error => error,
+        })
+    }
+
+    /// Maps memory for DMA.
+    pub(super) fn memory(&self, wanted: &Range<u64>) -> Result<ReservedMemory, PlatformError> {
+        ReservedMemory::new(self.map(wanted)?, wanted.start, "of /dev/mem".to_owned())
+    }
+}
+
+/// The lines of `/proc/iomem` that are memory of the kernel's. Without rights it shows zeros.
+fn kernel_memory(iomem: &str) -> Vec<(Range<u64>, String)> {
+    let parse = |line: &str| {
+        let (addresses, name) = line.trim().split_once(" : ")?;
+        let (first, last) = addresses.split_once('-')?;
+        let first = u64::from_str_radix(first, 16).ok()?;
+        let last = u64::from_str_radix(last, 16).ok()?;
+        (name == "System RAM" && last > first)
+            .then(|| (first..last.saturating_add(1), line.trim().to_owned()))
+    };
+    iomem.lines().filter_map(parse).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::platform::uio_fake::write;
+    use crate::platform::{RegisterWindow, release_to_device};
+    use bitstream_model::interface::record::Beat;
+
+    /// A `/dev/mem` of 1 MiB with registers at its start and memory at 0x40040.
+    fn memory() -> (tempfile::TempDir, System, DevMemWindows) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        let path = system.dev.join("mem");
+        write(path.clone(), "");
+        File::create(path).and_then(|file| file.set_len(1 << 20)).expect("resized");
+        let windows = DevMemWindows {
+            dma: [0, 0x1_0000, 0x2_0000, 0x3_0000],
+            control: 0x8_0040,
+            memory: 0x4_0040..0x6_0000,
+        };
+        (root, system, windows)
+    }
+
+    #[test]
+    fn the_default_windows_are_those_of_the_interface() {
+        let windows = DevMemWindows::default();
+        assert_eq!(windows.dma(3), Some(0xA003_0000..0xA004_0000));
+        assert_eq!(windows.dma(4), None);
+        assert_eq!(windows.control(), Some(0xA004_0000..0xA004_1000));
+        assert_eq!(windows.memory, 0x5000_0000..0x5400_0000);
+    }
+
+    #[test]
+    fn a_window_is_mapped_where_it_lies_and_need_not_begin_on_a_page() {
+        let (_root, system, windows) = memory();
+        let control = windows.control().expect("no overflow");
+        let memory_window = windows.memory.clone();
+        let mem = DevMem::open(&system, windows).expect("opened");
+        mem.map(&control).expect("mapped").write32(8, 0x0403_0201);
+        let memory = mem.memory(&memory_window).expect("mapped");
+        assert_eq!((memory.address(), memory.bytes()), (0x4_0040, 0x1_FFC0));
+        memory.write(16, &[Beat([5, 6, 7, 8])]).expect("inside");
+        release_to_device();
+        let file = fs::read(system.dev.join("mem")).expect("read");
+        assert_eq!(file[0x8_0048..0x8_004C], [1, 2, 3, 4]);
+        assert_eq!(file[0x4_0050..0x4_0054], [5, 0, 0, 0]);
+    }
+
+    #[test]
+    fn nothing_outside_the_windows_is_mapped() {
+        let (_root, system, windows) = memory();
+        let mem = DevMem::open(&system, windows).expect("opened");
+        for (wanted, _) in [
+            (0xF_0000..0xF_1000, "nowhere"),
+            (0x3_FFF0..0x4_0010, "over an end"),
+            (0x5_0000..0x6_0001, "past an end"),
+            (0x4_0000..0x4_0080, "before a start"),
+            (0x5_0000..0x5_0000, "empty"),
+        ] {
+            let error = mem.map(&wanted).expect_err("outside");
+            assert!(matches!(error, PlatformError::OutOfWindows { .. }), "{error}");
+        }
+    }
+
+    #[test]
+    fn memory_of_the_kernel_is_refused() {
+        let (_root, system, windows) = memory();
+        let iomem = "00000000-0000ffff : reserved\n\
+                     00040000-0004ffff : System RAM\n  00041000-00041fff : Kernel code\n\
+                     00080000-00080fff : a0040000.control\n";
+        write(system.iomem.clone(), iomem);
+        let memory = windows.memory.clone();
+        let control = windows.control().expect("no overflow");
+        let mem = DevMem::open(&system, windows).expect("opened");
+        let error = mem.memory(&memory).expect_err("overlaps");
+        assert!(
+            matches!(&error, PlatformError::KernelMemory { ram, .. } if ram.contains("0004ffff")),
+            "{error}"
+        );
+        mem.map(&control).expect("not the kernel's");
+        mem.map(&(0x5_0000..0x6_0000)).expect("just behind it");
+    }
+
+    #[test]
+    fn an_iomem_without_rights_says_nothing() {
+        assert_eq!(kernel_memory("00000000-00000000 : System RAM\n"), []);
+        assert_eq!(kernel_memory("rubbish\n-- : System RAM\n"), []);
+    }
+
+    #[test]
+    fn a_system_without_the_file_says_so() {
+        let (_root, system, windows) = memory();
+        fs::remove_file(system.dev.join("mem")).expect("removed");
+        let error = DevMem::open(&system, windows).expect_err("no file");
+        assert!(matches!(error, PlatformError::NoDevice { .. }), "{error}");
+    }
+}

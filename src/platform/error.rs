@@ -1,0 +1,292 @@
+//! This file holds why the platform could not do what it was asked for, and what to do about it.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why the platform could not do what it was asked for.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PlatformError {
+    /// Memory was refused.
+    #[error("cannot {act} DMA memory ({what} {value:#x})")]
+    Memory {
+        /// What was tried.
+        act: &'static str,
+        /// What is known of the memory: its length in bytes, or its address.
+        what: &'static str,
+        /// The length or the address.
+        value: u64,
+        /// Why.
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Memory lies where the DMA cores cannot reach it.
+    #[error(
+        "a buffer of {bytes} bytes at {address:#x} is out of reach of DMA cores with \
+         {address_width}-bit addresses: reserve memory below 2^{address_width}"
+    )]
+    OutOfReach {
+        /// Bus address of the buffer.
+        address: u64,
+        /// Its length, bytes.
+        bytes: u64,
+        /// What the cores can address, bits.
+        address_width: u32,
+    },
+    /// A range does not lie inside its buffer.
+    #[error("{bytes} bytes at offset {offset} do not lie in a buffer of {buffer_bytes} bytes")]
+    OutOfBuffer {
+        /// First byte asked for.
+        offset: u64,
+        /// Number of bytes asked for.
+        bytes: u64,
+        /// Length of the buffer, bytes.
+        buffer_bytes: u64,
+    },
+    /// A register region is too short.
+    #[error(
+        "register region {region} has {found} bytes, at least {expected} are needed: is this the device tree of the bitstream?"
+    )]
+    ShortRegion {
+        /// Name of the region.
+        region: String,
+        /// Bytes needed.
+        expected: u32,
+        /// Bytes found.
+        found: u64,
+    },
+    /// A file of the kernel's could not be used.
+    #[error("cannot {act} {}", path.display())]
+    File {
+        /// What was tried.
+        act: &'static str,
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A file of the kernel's says something else than a number.
+    #[error("expected a number in {}, found {found:?}", path.display())]
+    NotANumber {
+        /// Which file.
+        path: PathBuf,
+        /// What it says.
+        found: String,
+    },
+    /// There is no such UIO node.
+    #[error(
+        "no UIO node named {wanted:?} (found: {}): is the overlay loaded? see device-tree/README.md",
+        if found.is_empty() { "none" } else { found }
+    )]
+    NoNode {
+        /// The name that was looked for.
+        wanted: String,
+        /// The names that there are.
+        found: String,
+    },
+    /// A node lacks a region.
+    #[error(
+        "UIO node {node:?} has no map named {map:?} (found: {}): is this the accelerator's \
+         overlay? `reg-names` gives the names",
+        if found.is_empty() { "none" } else { found }
+    )]
+    NoMap {
+        /// Name of the node.
+        node: String,
+        /// Name of the missing map.
+        map: String,
+        /// The names that there are.
+        found: String,
+    },
+    /// A device file may not be opened.
+    #[error(
+        "no right to open {}: install the udev rule of device-tree/ and join its group, or run \
+         as root",
+        path.display()
+    )]
+    Permission {
+        /// Which file.
+        path: PathBuf,
+        /// What the kernel says.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A device is listed, and has no device file.
+    #[error("the kernel lists a device that has no file {}: does udev run?", path.display())]
+    NoDevice {
+        /// Which file.
+        path: PathBuf,
+    },
+    /// The programmable logic is not programmed.
+    #[error(
+        "no bitstream is loaded: expected \"operating\" in {}, found {found:?}; refusing to touch \
+         the programmable logic: load one first, for example with `pgs load`",
+        path.display()
+    )]
+    NoBitstream {
+        /// Where the kernel says so.
+        path: PathBuf,
+        /// What it says.
+        found: String,
+    },
+    /// A UIO node has no interrupt.
+    #[error(
+        "UIO node {node:?} ({device}) carries no interrupt: add `interrupts` to its device-tree \
+         node, or do without"
+    )]
+    NoInterrupt {
+        /// Name of the node.
+        node: String,
+        /// The kernel's name for it.
+        device: String,
+    },
+    /// An access does not lie in its region.
+    #[error(
+        "{bytes} bytes at {at:#x} do not lie aligned in region {region} of {region_bytes} bytes"
+    )]
+    OutOfRegion {
+        /// Name of the region.
+        region: String,
+        /// First byte asked for.
+        at: u64,
+        /// Number of bytes asked for.
+        bytes: u64,
+        /// Length of the region, bytes.
+        region_bytes: u64,
+    },
+    /// A region is larger than the address space.
+    #[error("region {region} of {bytes} bytes does not fit the address space: correct its `reg`")]
+    TooLarge {
+        /// Name of the region.
+        region: String,
+        /// Its length, bytes.
+        bytes: u64,
+    },
+    /// Reserved memory does not begin on a beat.
+    #[error("memory {region} at {address:#x} must begin on a multiple of 16: correct its `reg`")]
+    Misaligned {
+        /// Name of the region.
+        region: String,
+        /// Where it begins.
+        address: u64,
+    },
+    /// There is no room left for DMA buffers.
+    #[error(
+        "no room for a DMA buffer of {wanted} bytes: {largest} are free in one piece, of {total} \
+         in all; reserve more memory, see device-tree/README.md"
+    )]
+    Exhausted {
+        /// Bytes asked for.
+        wanted: u64,
+        /// The largest piece that is free, bytes.
+        largest: u64,
+        /// All there is, bytes.
+        total: u64,
+    },
+    /// Memory is not where it was thought to be.
+    #[error("the DMA buffer at {address:#x} is not {state}")]
+    NotGivenOut {
+        /// Its bus address.
+        address: u64,
+        /// Where it should be.
+        state: &'static str,
+    },
+    /// There is no such u-dma-buf.
+    #[error(
+        "no u-dma-buf named {wanted:?} (found: {}): is the module loaded, with a buffer of that \
+         name? see device-tree/README.md",
+        if found.is_empty() { "none" } else { found }
+    )]
+    NoUDmaBuf {
+        /// The name that was looked for.
+        wanted: String,
+        /// The names that there are.
+        found: String,
+    },
+    /// A u-dma-buf cannot be mapped as it should be.
+    #[error(
+        "u-dma-buf {name:?} has sync_mode {found}, which cannot give {wanted}: write 2 to {} as \
+         root, or set `sync-mode = <2>` in its device-tree node",
+        path.display()
+    )]
+    SyncMode {
+        /// Name of the buffer.
+        name: String,
+        /// Its mode.
+        found: u64,
+        /// What was wanted.
+        wanted: &'static str,
+        /// Where to change it.
+        path: PathBuf,
+    },
+    /// A memory region is of no use.
+    #[error("memory {region} of {bytes} bytes at {address:#x} cannot be used: {reason}")]
+    UnusableMemory {
+        /// Name of the region.
+        region: String,
+        /// Its address.
+        address: u64,
+        /// Its length, bytes.
+        bytes: u64,
+        /// Why, and what to do.
+        reason: &'static str,
+    },
+    /// There is no memory for DMA.
+    #[error(
+        "no memory for DMA: neither a u-dma-buf named {u_dma_buf:?} nor a UIO node named {node:?}; \
+         add one (see device-tree/README.md), or name another with --memory"
+    )]
+    NoMemory {
+        /// The u-dma-buf that was looked for.
+        u_dma_buf: &'static str,
+        /// The UIO node that was looked for.
+        node: &'static str,
+    },
+    /// Another program uses the board.
+    #[error("{} is locked: another program uses the board; end it first", path.display())]
+    Busy {
+        /// The locked file.
+        path: PathBuf,
+    },
+    /// `/dev/mem` was not given.
+    #[error(
+        "the kernel does not let {} be {act} at {address:#x}: it needs root, and a kernel with \
+         STRICT_DEVMEM gives only what it does not use; prefer a UIO node",
+        path.display()
+    )]
+    DevMemRefused {
+        /// What was tried.
+        act: &'static str,
+        /// Where.
+        address: u64,
+        /// The file.
+        path: PathBuf,
+        /// What the kernel says.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A range lies outside what was configured for `/dev/mem`.
+    #[error(
+        "{bytes} bytes at {address:#x} lie in none of the windows configured for /dev/mem; \
+         refusing to map them"
+    )]
+    OutOfWindows {
+        /// First byte asked for.
+        address: u64,
+        /// Number of bytes asked for.
+        bytes: u64,
+    },
+    /// A window for `/dev/mem` overlaps memory of the kernel's.
+    #[error(
+        "the window at {address:#x} overlaps the kernel's memory {ram}: reserve it with `no-map` \
+         in the device tree first"
+    )]
+    KernelMemory {
+        /// First byte of the window.
+        address: u64,
+        /// What it overlaps.
+        ram: String,
+    },
+}

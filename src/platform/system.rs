@@ -1,0 +1,82 @@
+//! This file says where Linux shows devices, in one place, so that a test can show others.
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+
+use super::PlatformError;
+
+/// Where Linux lists the UIO nodes.
+pub const UIO_CLASS: &str = "/sys/class/uio";
+
+/// Where a Linux system shows its devices. The default is the system that the program runs on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct System {
+    /// Descriptions of the UIO nodes.
+    pub uio: PathBuf,
+    /// Descriptions of the u-dma-buf buffers.
+    pub u_dma_buf: PathBuf,
+    /// State of the programmable logic.
+    pub fpga_manager: PathBuf,
+    /// Device files.
+    pub dev: PathBuf,
+    /// What lies where in physical memory.
+    pub iomem: PathBuf,
+}
+
+impl System {
+    /// The system whose files lie below `root`.
+    #[must_use]
+    pub fn under(root: &Path) -> Self {
+        Self {
+            uio: root.join(UIO_CLASS.trim_start_matches('/')),
+            u_dma_buf: root.join("sys/class/u-dma-buf"),
+            fpga_manager: root.join("sys/class/fpga_manager/fpga0"),
+            dev: root.join("dev"),
+            iomem: root.join("proc/iomem"),
+        }
+    }
+}
+
+impl Default for System {
+    fn default() -> Self {
+        Self::under(Path::new("/"))
+    }
+}
+
+/// Opens a device file to read and write; `flags` as for `open`.
+pub(super) fn open_device(path: &Path, flags: i32) -> Result<File, PlatformError> {
+    let path = || path.to_owned();
+    OpenOptions::new().read(true).write(true).custom_flags(flags).open(path()).map_err(|source| {
+        match source.kind() {
+            io::ErrorKind::PermissionDenied => PlatformError::Permission { path: path(), source },
+            io::ErrorKind::NotFound => PlatformError::NoDevice { path: path() },
+            _ => PlatformError::File { act: "open", path: path(), source },
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_the_running_system() {
+        let System { uio, u_dma_buf, fpga_manager, dev, iomem } = System::default();
+        assert_eq!(uio, Path::new(UIO_CLASS));
+        assert_eq!(u_dma_buf, Path::new("/sys/class/u-dma-buf"));
+        assert_eq!(fpga_manager, Path::new("/sys/class/fpga_manager/fpga0"));
+        assert_eq!((dev.as_path(), iomem.as_path()), (Path::new("/dev"), Path::new("/proc/iomem")));
+    }
+
+    #[test]
+    fn a_missing_device_file_is_told_from_another_failure() {
+        let root = tempfile::tempdir().expect("a directory");
+        let missing = open_device(&root.path().join("uio0"), 0).expect_err("there is none");
+        assert!(matches!(missing, PlatformError::NoDevice { .. }), "{missing}");
+        let directory = open_device(root.path(), 0).expect_err("a directory is no device");
+        assert!(matches!(directory, PlatformError::File { .. }), "{directory}");
+    }
+}

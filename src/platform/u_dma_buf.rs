@@ -1,0 +1,400 @@
+//! This file takes memory for DMA from the kernel module u-dma-buf.
+//!
+//! The device file is mapped twice. Buffers: cached, with maintenance by range when they change
+//! hands, or write-combining. Shared words: with `O_SYNC`, which the module maps uncached.
+//!
+//! Maintenance is one write of a number to `sync_for_device` or `sync_for_cpu`:
+//!
+//! ```text
+//! 63            32 31           4 3       2   1   0
+//! | first byte    | bytes / 16   | direction | 0 | 1 |     1 to the device, 2 from it
+//! ```
+//!
+//! It carries its range always: the attributes `sync_offset` and `sync_size` are shared by all who
+//! use the buffer.
+//!
+//! Source: README and source of u-dma-buf 5.
+#![allow(unsafe_code, reason = "beats in mapped memory promise that no others overlap")]
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write as _};
+use std::os::unix::fs::FileExt as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use bitstream_model::interface::record::BEAT_BYTES;
+
+use super::mapped::Mapping;
+use super::memory::MappedBeats;
+use super::pool::Region;
+use super::sysfs::{read_if_present, read_number};
+use super::system::open_device;
+use super::{Access, DmaMemory, PlatformError, SharedMemory, System};
+
+/// How the CPU sees the buffers of a u-dma-buf.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Caching {
+    /// Through its caches, with maintenance when a buffer changes hands: best for reading results.
+    #[default]
+    Cached,
+    /// Past its caches, stores combined: no maintenance, slow to read.
+    WriteCombining,
+}
+
+/// Bits 1:0 of `sync_mode`: cached even with `O_SYNC`.
+const MODE_CACHED: u64 = 0;
+/// Uncached with `O_SYNC`: Device memory on arm64.
+const MODE_UNCACHED: u64 = 1;
+/// Write-combining with `O_SYNC`.
+const MODE_WRITE_COMBINING: u64 = 2;
+/// Bit of `sync_mode`: the mode holds without `O_SYNC` too.
+const MODE_ALWAYS: u64 = 4;
+/// The number carries 32 bits of length, in multiples of 16.
+const BYTES_MAX: u64 = 0xFFFF_FFF0;
+/// Maintenance is of whole cache lines; the pool's pieces are too.
+const LINE: usize = 64;
+
+/// A buffer of the module's.
+#[derive(Debug)]
+pub(super) struct UDmaBuf {
+    address: u64,
+    bytes: u64,
+    /// Where buffers are.
+    data: Arc<Mapping>,
+    /// Where shared words are.
+    words: Arc<Mapping>,
+    /// None where the CPU's accesses need no maintenance.
+    sync: Option<Sync>,
+}
+
+/// The two files that ask for maintenance.
+#[derive(Debug)]
+struct Sync {
+    for_device: (PathBuf, File),
+    for_cpu: (PathBuf, File),
+}
+
+impl Sync {
+    fn open(buffer: &Path) -> Result<Self, PlatformError> {
+        let open = |name| {
+            let path = buffer.join(name);
+            match OpenOptions::new().write(true).open(&path) {
+                Ok(file) => Ok((path, file)),
+                Err(source) if source.kind() == io::ErrorKind::PermissionDenied => {
+                    Err(PlatformError::Permission { path, source })
+                }
+                Err(source) => Err(PlatformError::File { act: "open", path, source }),
+            }
+        };
+        Ok(Self { for_device: open("sync_for_device")?, for_cpu: open("sync_for_cpu")? })
+    }
+}
+
+/// The number that asks for maintenance of a range.
+fn command(at: usize, bytes: usize, access: Access) -> u64 {
+    let bytes = bytes.next_multiple_of(LINE) as u64;
+    let direction: u64 = match access {
+        Access::Read => 1,
+        Access::Write => 2,
+    };
+    (at as u64) << 32 | bytes | direction << 2 | 1
+}
+
+fn synchronize(
+    (path, file): &(PathBuf, File),
+    at: usize,
+    bytes: usize,
+    access: Access,
+) -> Result<(), PlatformError> {
+    // Eighteen characters, on the stack: a step allocates nothing.
+    let mut text = [0; 18];
+    write!(&mut text[..], "{:#018x}", command(at, bytes, access))
+        .and_then(|()| file.write_all_at(&text, 0))
+        .map_err(|source| PlatformError::File {
+            act: "ask for cache maintenance by",
+            path: path.clone(),
+            source,
+        })
+}
+
+impl UDmaBuf {
+    /// Whether there is a buffer of that name.
+    pub(super) fn exists(system: &System, name: &str) -> bool {
+        system.u_dma_buf.join(name).exists()
+    }
+
+    /// Maps the buffer of that name.
+    pub(super) fn open(
+        system: &System,
+        name: &str,
+        caching: Caching,
+    ) -> Result<Self, PlatformError> {
+        let buffer = system.u_dma_buf.join(name);
+        if !Self::exists(system, name) {
+            let found = u_dma_buf_names(system).join(", ");
+            return Err(PlatformError::NoUDmaBuf { wanted: name.to_owned(), found });
+        }
+        let address = read_number(&buffer.join("phys_addr"))?;
+        let bytes = read_number(&buffer.join("size"))?;
+        let unusable = |reason| PlatformError::UnusableMemory {
+            region: name.to_owned(),
+            address,
+            bytes,
+            reason,
+        };
+        if bytes > BYTES_MAX {
+            return Err(unusable("maintenance by range takes less than 4 GiB: make it smaller"));
+        }
+        if !address.is_multiple_of(LINE as u64) {
+            return Err(unusable("it does not begin on a cache line: set `dma-mask`, or its size"));
+        }
+        let length = usize::try_from(bytes).map_err(|_| unusable("make it smaller"))?;
+        let coherent =
+            read_if_present(&buffer.join("dma_coherent"))?.is_some_and(|text| text == "1");
+        set_mode(name, &buffer, caching, coherent)?;
+
+        let path = system.dev.join(name);
+        let map = |flags| {
+            let file = open_device(&path, flags)?;
+            Mapping::new(&file, &path, 0, 0, length).map(Arc::new)
+        };
+        let words = map(nix::libc::O_SYNC)?;
+        let (data, sync) = match caching {
+            Caching::WriteCombining => (Arc::clone(&words), None),
+            Caching::Cached if coherent => (map(0)?, None),
+            Caching::Cached => (map(0)?, Some(Sync::open(&buffer)?)),
+        };
+        Ok(Self { address, bytes, data, words, sync })
+    }
+}
+
+/// Sees to a mode in which the two ways to open give the two mappings that are wanted.
+fn set_mode(
+    name: &str,
+    buffer: &Path,
+    caching: Caching,
+    coherent: bool,
+) -> Result<(), PlatformError> {
+    let path = buffer.join("sync_mode");
+    let found = read_number(&path)?;
+    let (suits, wanted) = match caching {
+        // O_SYNC must not be cached; no O_SYNC must be.
+        Caching::Cached => (
+            (found & MODE_ALWAYS == 0 && (found != MODE_CACHED || coherent))
+                || (coherent && found == MODE_ALWAYS | MODE_CACHED),
+            "cached buffers beside uncached descriptors",
+        ),
+        Caching::WriteCombining => (
+            !matches!(found & !MODE_ALWAYS, MODE_CACHED | MODE_UNCACHED),
+            "write-combining buffers",
+        ),
+    };
+    if suits {
+        return Ok(());
+    }
+    let refused =
+        |_| PlatformError::SyncMode { name: name.to_owned(), found, wanted, path: path.clone() };
+    log::info!("u-dma-buf {name:?}: changing sync_mode from {found} to {MODE_WRITE_COMBINING}");
+    fs::write(&path, format!("{MODE_WRITE_COMBINING}\n")).map_err(refused)
+}
+
+/// The names of the u-dma-buf buffers that there are.
+#[must_use]
+pub fn u_dma_buf_names(system: &System) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(&system.u_dma_buf)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort_unstable();
+    names
+}
+
+impl Region for UDmaBuf {
+    fn address(&self) -> u64 {
+        self.address
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    fn memory(&self, at: usize, beats: usize) -> Result<DmaMemory, PlatformError> {
+        let mapping = Arc::clone(&self.data);
+        // SAFETY: `set_mode` saw to a mapping that is normal memory. The pool gives each piece out
+        // once until it is released, after its memory was dropped, and pieces do not overlap; the
+        // shared words are pieces too. The device writes a piece only between `to_device` and
+        // `to_cpu`, when the pool holds the value and nobody has a slice of it.
+        let memory = unsafe { MappedBeats::new(mapping, at, beats) };
+        Ok(DmaMemory::Mapped(memory))
+    }
+
+    fn shared(&self, at: usize, words: usize) -> Result<SharedMemory, PlatformError> {
+        if let Some(sync) = &self.sync {
+            // No dirty line of an earlier use may be written back over the words.
+            synchronize(&sync.for_device, at, 4 * words, Access::Read)?;
+            synchronize(&sync.for_cpu, at, 4 * words, Access::Write)?;
+        }
+        Ok(SharedMemory::Mapped { mapping: Arc::clone(&self.words), at, words })
+    }
+
+    fn to_device(
+        &self,
+        at: usize,
+        _: &DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        match &self.sync {
+            Some(sync) if used > 0 => synchronize(&sync.for_device, at, used * BEAT_BYTES, access),
+            _ => Ok(()),
+        }
+    }
+
+    fn to_cpu(
+        &self,
+        at: usize,
+        _: &mut DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        match &self.sync {
+            Some(sync) if used > 0 => synchronize(&sync.for_cpu, at, used * BEAT_BYTES, access),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bitstream_model::interface::record::Beat;
+
+    use super::*;
+    use crate::platform::pool::Pool;
+    use crate::platform::uio_fake::write;
+
+    /// A system with the buffer `pgs` of 64 KiB, in that mode.
+    fn system(mode: &str, coherent: &str) -> (tempfile::TempDir, System) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        let file = |name: &str, text: &str| write(system.u_dma_buf.join("pgs").join(name), text);
+        file("phys_addr", "0x0000000070000000");
+        file("size", "65536");
+        file("sync_mode", mode);
+        file("dma_coherent", coherent);
+        file("sync_for_device", "");
+        file("sync_for_cpu", "");
+        write(system.dev.join("pgs"), "");
+        File::create(system.dev.join("pgs")).and_then(|file| file.set_len(65536)).expect("resized");
+        (root, system)
+    }
+
+    fn text_of(system: &System, name: &str) -> String {
+        fs::read_to_string(system.u_dma_buf.join("pgs").join(name)).expect("read").trim().to_owned()
+    }
+
+    #[test]
+    fn the_command_is_the_one_of_the_modules_readme() {
+        // offset << 32 | size (multiple of 16) | direction << 2 | 1
+        assert_eq!(command(0, 0x10000, Access::Read), 0x0000_0000_0001_0005);
+        assert_eq!(command(0x2000, 64, Access::Write), 0x0000_2000_0000_0049);
+        assert_eq!(command(0x40, 65, Access::Read) & 0xFFFF_FFF0, 128, "whole lines");
+    }
+
+    #[test]
+    fn a_cached_buffer_is_maintained_by_range_when_it_changes_hands() {
+        let (_root, system) = system("1", "0");
+        let buffer = UDmaBuf::open(&system, "pgs", Caching::Cached).expect("mapped");
+        let pool = Pool::new(Box::new(buffer));
+        pool.allocate(256).expect("so that the next does not lie at the start");
+        let (address, mut memory) = pool.allocate(100).expect("there is room");
+        assert_eq!(address, 0x7000_1000);
+        memory.beats_mut()[0] = Beat([1, 2, 3, 4]);
+        pool.hand_over(address, memory, 9, Access::Read).expect("with the CPU");
+        // Nine beats are 144 bytes: three lines.
+        assert_eq!(text_of(&system, "sync_for_device"), "0x00001000000000c5");
+        let device = fs::read(system.dev.join("pgs")).expect("read");
+        assert_eq!(device[0x1000..0x1010], [1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0]);
+
+        let memory = pool.take_back(address).expect("with the device");
+        pool.hand_over(address, memory, 100, Access::Write).expect("with the CPU");
+        assert_eq!(text_of(&system, "sync_for_device"), "0x0000100000000649");
+        let memory = pool.take_back(address).expect("with the device");
+        assert_eq!(text_of(&system, "sync_for_cpu"), "0x0000100000000649");
+        assert_eq!(memory.beats().len(), 100);
+    }
+
+    #[test]
+    fn shared_words_begin_without_a_line_of_theirs_in_a_cache() {
+        let (_root, system) = system("2", "0");
+        let buffer = UDmaBuf::open(&system, "pgs", Caching::Cached).expect("mapped");
+        let (_, words) = Pool::new(Box::new(buffer)).allocate_shared(32).expect("there is room");
+        assert_eq!(text_of(&system, "sync_for_device"), "0x0000000000000085");
+        assert_eq!(text_of(&system, "sync_for_cpu"), "0x0000000000000089");
+        words.store(31, 0x0403_0201);
+        assert_eq!(fs::read(system.dev.join("pgs")).expect("read")[124..128], [1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn write_combining_and_coherent_buffers_need_no_maintenance() {
+        for (mode, coherent, caching) in [
+            ("2", "0", Caching::WriteCombining),
+            ("3", "0", Caching::WriteCombining),
+            ("6", "0", Caching::WriteCombining),
+            ("0", "1", Caching::Cached),
+            ("4", "1", Caching::Cached),
+        ] {
+            let (_root, system) = system(mode, coherent);
+            let buffer = UDmaBuf::open(&system, "pgs", caching).expect("mapped");
+            let pool = Pool::new(Box::new(buffer));
+            let (address, memory) = pool.allocate(4).expect("there is room");
+            pool.hand_over(address, memory, 4, Access::Write).expect("with the CPU");
+            pool.take_back(address).expect("with the device");
+            pool.allocate_shared(4).expect("there is room");
+            assert_eq!(text_of(&system, "sync_for_device"), "", "{mode}");
+            assert_eq!(text_of(&system, "sync_mode"), mode);
+        }
+    }
+
+    #[test]
+    fn a_mode_that_does_not_suit_is_changed() {
+        for (mode, caching) in [
+            ("0", Caching::Cached),
+            ("4", Caching::Cached),
+            ("5", Caching::Cached),
+            ("6", Caching::Cached),
+            ("0", Caching::WriteCombining),
+            ("1", Caching::WriteCombining),
+            ("5", Caching::WriteCombining),
+        ] {
+            let (_root, system) = system(mode, "0");
+            UDmaBuf::open(&system, "pgs", caching).expect("changed");
+            assert_eq!(text_of(&system, "sync_mode"), "2", "{mode}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_used_says_why() {
+        let (_root, system) = system("1", "0");
+        let open = |name: &str| UDmaBuf::open(&system, name, Caching::Cached).map(drop);
+        let error = open("pgs0").expect_err("no such buffer").to_string();
+        assert!(error.contains("\"pgs0\" (found: pgs)"), "{error}");
+        let attribute = |name: &str, text: &str| {
+            write(system.u_dma_buf.join("pgs").join(name), text);
+            open("pgs").expect_err(text).to_string()
+        };
+        let error = attribute("size", "4294967296");
+        assert!(error.contains("less than 4 GiB"), "{error}");
+        let error = attribute("size", "many");
+        assert!(error.contains("\"many\""), "{error}");
+        attribute("size", "0");
+        let error = attribute("phys_addr", "0x70000020");
+        assert!(error.contains("expected") || error.contains("cannot be"), "{error}");
+        fs::remove_file(system.u_dma_buf.join("pgs/sync_for_cpu")).expect("removed");
+        write(system.u_dma_buf.join("pgs/phys_addr"), "0x70000000");
+        let error = attribute("size", "65536");
+        assert!(error.contains("sync_for_cpu"), "{error}");
+    }
+}
