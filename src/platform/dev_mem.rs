@@ -80,15 +80,7 @@ impl DevMem {
     pub(super) fn open(system: &System, windows: DevMemWindows) -> Result<Self, PlatformError> {
         let path = system.dev.join("mem");
         let file = super::system::open_device(&path, nix::libc::O_SYNC);
-        let file = file.map_err(|error| match error {
-            PlatformError::Permission { path, source } => PlatformError::DevMemRefused {
-                act: "opened",
-                address: windows.control,
-                path,
-                source,
-            },
-            error => error,
-        })?;
+        let file = file.map_err(|error| refused("opened", windows.control, error))?;
         let kernel = kernel_memory(&read_if_present(&system.iomem)?.unwrap_or_default());
         Ok(Self { file, path, windows, kernel })
     }
@@ -118,19 +110,27 @@ impl DevMem {
             usize::try_from(start).map_err(large)?,
             usize::try_from(bytes).map_err(large)?,
         );
-        mapped.map_err(|error| match error {
-            PlatformError::File { path, source, .. }
-                if source.kind() == io::ErrorKind::PermissionDenied =>
-            {
-                PlatformError::DevMemRefused { act: "mapped", address, path, source }
-            }
-            error => error,
-        })
+        mapped.map_err(|error| refused("mapped", address, error))
     }
 
     /// Maps memory for DMA.
     pub(super) fn memory(&self, wanted: &Range<u64>) -> Result<ReservedMemory, PlatformError> {
         ReservedMemory::new(self.map(wanted)?, wanted.start, "of /dev/mem".to_owned())
+    }
+}
+
+/// Tells missing rights and the kernel's restrictions from other failures.
+fn refused(act: &'static str, address: u64, error: PlatformError) -> PlatformError {
+    match error {
+        PlatformError::Permission { path, source } => {
+            PlatformError::DevMemRefused { act, address, path, source }
+        }
+        PlatformError::File { path, source, .. }
+            if source.kind() == io::ErrorKind::PermissionDenied =>
+        {
+            PlatformError::DevMemRefused { act, address, path, source }
+        }
+        error => error,
     }
 }
 
@@ -243,5 +243,17 @@ mod tests {
         fs::remove_file(system.dev.join("mem")).expect("removed");
         let error = DevMem::open(&system, windows).expect_err("no file");
         assert!(matches!(error, PlatformError::NoDevice { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_kernel_that_refuses_is_told_from_other_failures() {
+        let error = |errno: nix::errno::Errno| {
+            let path = PathBuf::from("/dev/mem");
+            PlatformError::File { act: "map", path, source: errno.into() }
+        };
+        let text = refused("mapped", 0xA000_0000, error(nix::errno::Errno::EPERM)).to_string();
+        assert!(text.contains("STRICT_DEVMEM") && text.contains("mapped at 0xa0000000"), "{text}");
+        let other = refused("mapped", 0, error(nix::errno::Errno::EINVAL));
+        assert!(matches!(other, PlatformError::File { .. }), "{other}");
     }
 }

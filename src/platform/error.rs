@@ -113,8 +113,8 @@ pub enum PlatformError {
         #[source]
         source: std::io::Error,
     },
-    /// A device is listed, and has no device file.
-    #[error("the kernel lists a device that has no file {}: does udev run?", path.display())]
+    /// There is no device file.
+    #[error("there is no device file {}: does udev run, and has the kernel such a device?", path.display())]
     NoDevice {
         /// Which file.
         path: PathBuf,

@@ -48,14 +48,18 @@ impl Default for System {
 
 /// Opens a device file to read and write; `flags` as for `open`.
 pub(super) fn open_device(path: &Path, flags: i32) -> Result<File, PlatformError> {
-    let path = || path.to_owned();
-    OpenOptions::new().read(true).write(true).custom_flags(flags).open(path()).map_err(|source| {
-        match source.kind() {
-            io::ErrorKind::PermissionDenied => PlatformError::Permission { path: path(), source },
-            io::ErrorKind::NotFound => PlatformError::NoDevice { path: path() },
-            _ => PlatformError::File { act: "open", path: path(), source },
-        }
-    })
+    let file = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path);
+    file.map_err(|source| obstacle(path, source))
+}
+
+/// Why a device file could not be opened.
+pub(super) fn obstacle(path: &Path, source: io::Error) -> PlatformError {
+    let path = path.to_owned();
+    match source.kind() {
+        io::ErrorKind::PermissionDenied => PlatformError::Permission { path, source },
+        io::ErrorKind::NotFound => PlatformError::NoDevice { path },
+        _ => PlatformError::File { act: "open", path, source },
+    }
 }
 
 #[cfg(test)]
@@ -72,10 +76,16 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_device_file_is_told_from_another_failure() {
+    fn a_missing_device_file_and_missing_rights_are_told_from_another_failure() {
         let root = tempfile::tempdir().expect("a directory");
         let missing = open_device(&root.path().join("uio0"), 0).expect_err("there is none");
         assert!(matches!(missing, PlatformError::NoDevice { .. }), "{missing}");
+        // The superuser may open anything: what the kernel says to others is made here.
+        for errno in [nix::errno::Errno::EACCES, nix::errno::Errno::EPERM] {
+            let error = obstacle(Path::new("/dev/uio0"), errno.into());
+            assert!(matches!(error, PlatformError::Permission { .. }), "{error}");
+            assert!(error.to_string().contains("udev rule"), "{error}");
+        }
         let directory = open_device(root.path(), 0).expect_err("a directory is no device");
         assert!(matches!(directory, PlatformError::File { .. }), "{directory}");
     }

@@ -63,9 +63,11 @@ pub(crate) struct CommonArgs {
     /// Board to use; auto takes the UIO node "pgs" if there is one, else the emulated board.
     #[arg(long, global = true, env = "PGS_BOARD", value_name = "BOARD", default_value = "auto")]
     pub(crate) board: BoardName,
-    /// DMA memory of a real board: auto (the u-dma-buf "pgs", else the UIO node "pgs-memory"),
-    /// u-dma-buf[:NAME[:write-combining]], uio[:NODE] or devmem[:ADDRESS+BYTES].
+    /// DMA memory of a real board.
     #[arg(
+        help = "DMA memory of a real board: auto (the u-dma-buf \"pgs\", else the UIO node \
+                \"pgs-memory\"), u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
+                devmem[:ADDRESS+BYTES]",
         long,
         global = true,
         env = "PGS_MEMORY",

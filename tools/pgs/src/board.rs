@@ -26,6 +26,15 @@ pub(crate) struct Opened {
     pub(crate) reason: String,
 }
 
+/// A kind of board, as it is written on the command line and in results.
+pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
+    match kind {
+        BoardKind::Emulated => "emulated",
+        BoardKind::DevMem => "devmem",
+        _ => "uio",
+    }
+}
+
 /// Which kind of board a name on the command line means here, and why.
 pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
     match name {
@@ -51,20 +60,12 @@ pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
 /// A board that was chosen and not opened yet.
 #[derive(Debug)]
 pub(crate) struct Chosen {
+    pub(crate) kind: BoardKind,
     pub(crate) options: OpenOptions,
     /// The emulated board, as its builder sees it; none for a real one.
     pub(crate) observer: Option<EmulatedBoard>,
     /// Why this board and no other.
     pub(crate) reason: String,
-}
-
-/// A kind of board, as it is written on the command line and in results.
-pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
-    match kind {
-        BoardKind::Emulated => "emulated",
-        BoardKind::DevMem => "devmem",
-        _ => "uio",
-    }
 }
 
 /// Chooses a board. `given` is an option of the command line that only an emulated one has.
@@ -75,8 +76,7 @@ pub(crate) fn find(
 ) -> Result<Chosen, Failure> {
     let CommonArgs { board: name, memory, .. } = common;
     let (kind, reason) = choose(*name);
-    let mut observer = None;
-    let board = if kind == BoardKind::Emulated {
+    let (board, observer) = if kind == BoardKind::Emulated {
         if *name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
         }
@@ -85,24 +85,24 @@ pub(crate) fn find(
             return Err(Failure::input(error).next("leave out --memory, or add --board uio"));
         }
         let emulated = EmulatedBoard::new(config).map_err(Failure::input)?;
-        BoardChoice::Emulated(observer.insert(emulated).cpu_port())
+        (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
     } else if let Some(option) = given {
         let error = format!("{option} says how to build an emulated board, this one is real");
         return Err(
             Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
         );
     } else if kind == BoardKind::DevMem {
-        BoardChoice::DevMem(DevMemWindows::default())
+        (BoardChoice::DevMem(DevMemWindows::default()), None)
     } else {
-        BoardChoice::Uio { node: UIO_NODE.to_owned() }
+        (BoardChoice::Uio { node: UIO_NODE.to_owned() }, None)
     };
     let options = OpenOptions { board, memory: memory.clone(), ..OpenOptions::default() };
-    Ok(Chosen { options, observer, reason })
+    Ok(Chosen { kind, options, observer, reason })
 }
 
 /// Opens a board.
 pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Failure> {
-    let Chosen { options, observer, reason } = find(common, build.config(), build.given())?;
+    let Chosen { options, observer, reason, .. } = find(common, build.config(), build.given())?;
     let accelerator = Accelerator::open(options).map_err(unusable)?;
     Ok(Opened { accelerator, observer, reason })
 }

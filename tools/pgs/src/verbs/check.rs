@@ -96,9 +96,9 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let Chosen { options, reason, .. } = board::find(common, args.config(), args.given())?;
+    let Chosen { kind, options, reason, .. } = board::find(common, args.config(), args.given())?;
     let report = check(options).map_err(board::unusable)?;
-    let kind = board::kind_text(report.board.kind);
+    let kind = board::kind_text(kind);
     if common.json {
         let document = json!({
             "schema": SCHEMA,
