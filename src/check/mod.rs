@@ -18,7 +18,7 @@ mod streams;
 pub use report::{CheckLine, CheckReport, Outcome};
 
 use crate::error::Error;
-use crate::step::{OpenOptions, find};
+use crate::step::{Found, OpenOptions, find};
 use report::Lines;
 
 /// Tests a board from its identification to its interrupt. Every wait is bounded: it takes well
@@ -44,10 +44,14 @@ use report::Lines;
 /// # Errors
 /// [`Error::Open`] if there is no board to be tested, or it cannot be reached.
 pub fn check(options: OpenOptions) -> Result<CheckReport, Error> {
-    let found = find(&options)?;
+    check_found(find(&options)?, options.length_width)
+}
+
+/// Tests a board that was found.
+pub(crate) fn check_found(found: Found, length_width: Option<u32>) -> Result<CheckReport, Error> {
     let board = found.description.clone();
     let mut lines = Lines::default();
-    if let Some(accelerator) = bring_up::bring_up(found, options.length_width, &mut lines)? {
+    if let Some(accelerator) = bring_up::bring_up(found, length_width, &mut lines)? {
         streams::streams(accelerator, &mut lines);
     }
     Ok(CheckReport { board, lines: lines.finish() })

@@ -15,11 +15,12 @@ use bitstream_model::{BoardConfig, EmulatedBoard};
 
 use super::board::{BoardDescription, BoardKind, Found};
 use super::tests::{bits, scene, undisturbed};
+use crate::check::check_found;
 use crate::platform::{
     Access, Caching, DmaMemory, EmulatedPlatform, HardwarePlatform, MemoryChoice, Platform,
     PlatformError, RegisterChoice, RegisterWindow, SharedMemory, System, uio_fake,
 };
-use crate::{Accelerator, Aftermath, Error, Fault, Shape, StepParameters};
+use crate::{Accelerator, Aftermath, Error, Fault, Outcome, Shape, StepParameters};
 
 const BASE: u64 = 0x6000_0000;
 const BYTES: u64 = 1 << 20;
@@ -171,7 +172,6 @@ impl Platform for Composed {
 
 #[test]
 fn steps_through_the_memory_of_a_real_board_give_the_same_bits() {
-    let u_dma_buf = |caching| MemoryChoice::UDmaBuf { name: "pgs".to_owned(), caching };
     for choice in [
         MemoryChoice::Uio { node: "pgs-memory".to_owned() },
         u_dma_buf(Caching::Cached),
@@ -179,13 +179,7 @@ fn steps_through_the_memory_of_a_real_board_give_the_same_bits() {
     ] {
         let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
         let platform = Arc::new(Composed::new(&board, &choice));
-        let description = BoardDescription {
-            kind: BoardKind::Uio,
-            name: "composed".to_owned(),
-            reason: "a test".to_owned(),
-        };
-        let found = Found { platform: Arc::clone(&platform) as _, description };
-        let mut accelerator = Accelerator::on(found, None).expect("a board that opens");
+        let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
         let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
         accelerator.set_shapes(&shapes).expect("shapes that fit");
         // Buffers grow, are used in part, and are replaced.
@@ -204,6 +198,47 @@ fn steps_through_the_memory_of_a_real_board_give_the_same_bits() {
     }
 }
 
+fn u_dma_buf(caching: Caching) -> MemoryChoice {
+    MemoryChoice::UDmaBuf { name: "pgs".to_owned(), caching }
+}
+
+fn found(platform: &Arc<Composed>) -> Found {
+    let description = BoardDescription {
+        kind: BoardKind::Uio,
+        name: "composed".to_owned(),
+        reason: "a test".to_owned(),
+    };
+    Found { platform: Arc::clone(platform) as _, description }
+}
+
+#[test]
+fn the_self_test_passes_through_the_memory_of_a_real_board_and_says_when_it_is_too_small() {
+    for choice in [
+        MemoryChoice::Uio { node: "pgs-memory".to_owned() },
+        u_dma_buf(Caching::Cached),
+        u_dma_buf(Caching::WriteCombining),
+    ] {
+        let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+        let platform = Arc::new(Composed::new(&board, &choice));
+        let report = check_found(found(&platform), None).expect("reachable");
+        assert!(
+            report.lines.iter().all(|line| matches!(line.outcome, Outcome::Ok { .. })),
+            "{choice:?}: {report:#?}"
+        );
+        assert_eq!(board.violations(), []);
+        let whole = usize::try_from(BYTES / 16).expect("fits");
+        platform.memory.allocate(whole).expect("all of it came back");
+        // Now there is none left.
+        let report = check_found(found(&platform), None).expect("reachable");
+        let echo = report.lines.iter().find(|line| line.name == "echo").expect("it");
+        assert!(
+            matches!(&echo.outcome, Outcome::Failed { found, next, .. }
+                if found.contains("no room for a DMA buffer") && next.contains("memory for DMA")),
+            "{echo:?}"
+        );
+    }
+}
+
 #[test]
 fn memory_that_is_too_small_is_an_error_and_a_smaller_step_still_works() {
     let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
@@ -211,10 +246,7 @@ fn memory_that_is_too_small_is_an_error_and_a_smaller_step_still_works() {
     let platform = Arc::new(Composed::new(&board, &choice));
     // What is left takes three cubes.
     platform.memory.allocate(usize::try_from((BYTES - 8192) / 16).expect("fits")).expect("room");
-    let description =
-        BoardDescription { kind: BoardKind::Uio, name: String::new(), reason: String::new() };
-    let mut accelerator =
-        Accelerator::on(Found { platform, description }, None).expect("a board that opens");
+    let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
     let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
     accelerator.set_shapes(&shapes).expect("shapes that fit");
     let mut step = |cubes| {
