@@ -188,7 +188,7 @@ fn two_runs_have_one_digest_and_another_scene_has_another() {
 
 #[test]
 fn a_step_takes_as_long_as_the_deadline_says_and_no_longer() {
-    let slow = ["run", "--grid", "2x2x2", "--steps", "1", "--bandwidth", "0.001"];
+    let slow = ["run", "--grid", "6x6x6", "--steps", "1", "--bandwidth", "0.1"];
     let with = |deadline: &[&str]| run(slow.iter().chain(deadline));
     let late = with(&["--deadline", "1"]);
     assert_eq!(late.code, Some(4), "{}", late.stderr);
