@@ -24,7 +24,7 @@ if [ -n "${BOARD:-}" ]; then
 	shared=(-object "memory-backend-file,id=ddr,size=2G,mem-path=$ram,share=on" -accel tcg
 		-qtest "unix:$scratch/qtest,server=on,wait=off" -qtest-log /dev/null)
 	"$BOARD" --memory "$ram" --qtest "$scratch/qtest" --mailbox 0x31000000 \
-		--grant 0x60000000+0x4000000 --limit "$limit" > "$log.board" 2>&1 &
+		--limit "$limit" > "$log.board" 2>&1 &
 	board=$!
 fi
 begin=$(date +%s%N)

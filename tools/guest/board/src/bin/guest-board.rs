@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use bitstream_model::interface::address_map::INTERRUPT_SPI;
+use bitstream_model::interface::address_map::{INTERRUPT_SPI, MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use clap::Parser;
 use guest_board::guest_file::GuestFile;
@@ -32,8 +32,9 @@ struct Args {
     /// Physical address of the mailbox page.
     #[arg(long, value_name = "ADDRESS", value_parser = number)]
     mailbox: u64,
-    /// Memory that the device may touch; may be given more than once.
-    #[arg(long, value_name = "ADDRESS+BYTES", value_parser = range, required = true)]
+    /// Memory that the device may touch; may be given more than once [default: the memory that the
+    /// interface reserves]
+    #[arg(long, value_name = "ADDRESS+BYTES", value_parser = range)]
     grant: Vec<Range<u64>>,
     /// The interrupt, as the device tree counts (SPI).
     #[arg(long, value_name = "NUMBER", default_value_t = INTERRUPT_SPI)]
@@ -82,8 +83,11 @@ fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let memory = GuestFile::open(&args.memory)
         .map_err(|error| format!("{}: {error}", args.memory.display()))?;
     let page = memory.page(args.mailbox)?;
-    let board =
-        EmulatedBoard::on_memory(BoardConfig::default(), Box::new(memory), args.grant.clone())?;
+    let mut granted = args.grant.clone();
+    if granted.is_empty() {
+        granted.push(MEMORY_BASE..MEMORY_BASE + MEMORY_BYTES);
+    }
+    let board = EmulatedBoard::on_memory(BoardConfig::default(), Box::new(memory), granted)?;
     let ended = Server::new(board.clone(), page, line)?.serve(limit);
 
     let counts = board.counts();
