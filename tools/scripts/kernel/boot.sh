@@ -40,9 +40,10 @@ printf 'QEMU ended with %s after %s ms, log %s\n' "$code" $((($(date +%s%N) - be
 
 if [ -n "${BOARD:-}" ]; then
 	served=0
+	[ $code = 0 ] || kill $board 2>/dev/null || true
 	wait $board || served=$?
 	cat "$log.board"
-	[ $served = 0 ] || fail "the board ended with $served"
+	[ $code != 0 ] || [ $served = 0 ] || fail "the board ended with $served"
 fi
 [ $code = 0 ] || { tail -n 20 "$log" "$log.qemu" >&2; fail "the guest did not power itself off in time"; }
 total=$(sed -n 's/^guest: \([0-9]* ok, [0-9]* failed\)$/\1/p' "$log")

@@ -14,6 +14,9 @@ use guest_board::guest_file::GuestFile;
 use guest_board::qtest::QtestLine;
 use guest_board::server::{ServeError, Server};
 
+/// How long QEMU may take to make its socket.
+const START_LIMIT: Duration = Duration::from_secs(30);
+
 /// Plays the programmable logic of a guest in QEMU until the guest ends.
 ///
 /// QEMU is started with `-object memory-backend-file,id=ddr,size=SIZE,mem-path=FILE,share=on
@@ -77,8 +80,8 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let limit = Duration::from_secs(args.limit);
-    // QEMU makes its socket last: the memory is there then.
-    let line = QtestLine::connect(&args.qtest, args.spi, limit)
+    // QEMU answers once its machine is made: the memory is there then.
+    let line = QtestLine::connect(&args.qtest, args.spi, limit.min(START_LIMIT))
         .map_err(|error| format!("{}: {error}", args.qtest.display()))?;
     let memory = GuestFile::open(&args.memory)
         .map_err(|error| format!("{}: {error}", args.memory.display()))?;
