@@ -4,7 +4,7 @@
 //! `write ADDRESS SIZE DATA`) is answered by `OK` and perhaps a value. `IRQ raise N` and
 //! `IRQ lower N` come in between, whenever they happen.
 //!
-//! Source: QEMU, system/qtest.c (protocol), hw/microblaze/petalogix_ml605_mmu.c (the machine).
+//! Source: QEMU, system/qtest.c (protocol), `hw/microblaze/petalogix_ml605_mmu.c` (the machine).
 
 use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader, ErrorKind, Write as _};

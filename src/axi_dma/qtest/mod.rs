@@ -27,7 +27,7 @@ use platform::QtestPlatform;
 const ADDRESS_WIDTH: u32 = 32;
 /// How long an interrupt may take.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Addresses, and a type that is free for experiments (IEEE 802, EtherType 0x88B5).
+/// Addresses, and a type that is free for experiments (IEEE 802, `EtherType` 0x88B5).
 const HEADER: [u8; 14] = *b"\x52\x54\x00\x12\x34\x56\x02\x00\x00\x00\x00\x01\x88\xb5";
 
 /// A DMA core of QEMU's that was reset by the driver.
@@ -193,7 +193,7 @@ fn packets_leave_byte_for_byte_chain_after_chain_and_round_the_ring() {
     let mut ring = core.ring(7);
     for chain in 0..8 {
         ring.begin();
-        // Two packets a chain, of two to four and of one to three descriptors: 42 in all, where the
+        // Two packets a chain, of two to four and of one to three descriptors: 43 in all, where the
         // ring has 8.
         let frames = [frame(100 + 20 * chain, chain), frame(60 + 15 * chain, 100 + chain)];
         let buffers = frames.each_ref().map(|frame| core.outgoing(frame));
