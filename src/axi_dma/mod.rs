@@ -2,6 +2,8 @@
 
 mod channel;
 mod descriptor;
+#[cfg(test)]
+mod qtest;
 mod registers;
 mod reset;
 mod ring;
