@@ -126,6 +126,15 @@ fn another_interface_version_is_named() {
 }
 
 #[test]
+fn a_length_register_that_no_core_can_have_ends_the_test() {
+    for width in [1, 6, 7] {
+        let quirks = Quirks { length_register: Some(width), ..Quirks::default() };
+        let found = format!("{width} bits on all 8 channels");
+        fails(quirks, "length register", true, [&found, "26 bits", "8 to 26 bits"]);
+    }
+}
+
+#[test]
 fn a_length_register_of_14_bits_is_found_and_the_rest_goes_on_with_it() {
     let quirks = Quirks { length_register: Some(14), ..Quirks::default() };
     let texts = ["14 bits on all 8 channels", "26 bits, as the bitstream says", "width of 14"];

@@ -4,7 +4,7 @@
 //! Unlike a [`Fault`](crate::Fault), which happens once, they last as long as the board.
 
 use crate::axi_dma::Direction;
-use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+use crate::interface::axi_dma::LENGTH_WIDTH_MAX;
 use crate::interface::control::{IDENTIFICATION, VERSION};
 use crate::interface::record::{BEAT_BYTES, Beat};
 
@@ -89,7 +89,8 @@ impl Default for Quirks {
 impl Quirks {
     /// What has a range: name, value, smallest and largest value.
     pub(crate) fn ranges(&self) -> impl Iterator<Item = (&'static str, u64, u64, u64)> {
-        let (low, high) = (LENGTH_WIDTH_MIN.into(), LENGTH_WIDTH_MAX.into());
+        // Below what an AXI DMA can have too: what answers there may be none.
+        let (low, high) = (1, LENGTH_WIDTH_MAX.into());
         self.length_register
             .into_iter()
             .map(move |width| ("true length register width", width.into(), low, high))

@@ -40,8 +40,8 @@ fn the_length_registers_are_narrower_than_the_dma_register_says() {
 }
 
 #[test]
-fn a_length_register_that_no_core_can_have_is_refused() {
-    for width in [7, 27] {
+fn a_length_register_of_no_bits_or_more_than_26_is_refused() {
+    for width in [0, 27] {
         let quirks = Quirks { length_register: Some(width), ..Quirks::default() };
         let error =
             bitstream_model::EmulatedBoard::new(BoardConfig { quirks, ..BoardConfig::default() })

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MAX;
+use bitstream_model::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use bitstream_model::interface::control::{IDENTIFICATION_VALUE, VERSION, VERSION_MAJOR, version};
 use bitstream_model::interface::profile::Profile;
 
@@ -226,6 +226,16 @@ fn length(
             wrong.iter().map(|(name, width)| format!("{name} {width} bits")).collect();
         of_channels.join(", ")
     };
+    if !(LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&narrowest) {
+        // Nothing can be transferred with it: the rest of the lines would say nothing.
+        let next = format!(
+            "an AXI DMA has {LENGTH_WIDTH_MIN} to {LENGTH_WIDTH_MAX} bits: look whether the region \
+             is that of one"
+        );
+        let expected = format!("{expected} bits, {source}");
+        lines.stop(Line::Length, Outcome::failed(found, expected, next));
+        return None;
+    }
     let next = format!(
         "build the AXI DMA cores with a length register of {LENGTH_WIDTH_MAX} bits (they have 14 \
          unless told otherwise) and say so in the bitstream's DMA register; until then, open the \
