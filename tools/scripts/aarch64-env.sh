@@ -17,5 +17,5 @@ export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C target-feature=+crt-static -C strip=symbols"
 # QEMU's own choice of CPU has half precision instructions, which the board's has not. There is no
 # -L: with the loader of one C library and the threads of another, a program hangs.
-export PGS_TEST_RUNNER="timeout 300 qemu-aarch64-static -cpu cortex-a53"
+export PGS_TEST_RUNNER="timeout 900 qemu-aarch64-static -cpu cortex-a53"
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER=$PGS_TEST_RUNNER

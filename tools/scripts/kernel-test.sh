@@ -2,7 +2,7 @@
 # Runs the tool and the driver's own platform code under a real arm64 kernel, on QEMU's ZCU102.
 #
 # usage: kernel-test.sh [debian|small]        which kernel, see tools/guest/README.md
-# environment: QEMU (qemu-system-aarch64), BOOT_LIMIT (seconds, 300)
+# environment: QEMU (qemu-system-aarch64), BOOT_LIMIT (seconds, 900)
 #
 # Made for Debian 12 on x86-64; missing packages are installed (as root), kernels only unpacked.
 # Exit code: 0 done, 1 a check failed, 2 wrong usage, 77 skipped: not on this machine.

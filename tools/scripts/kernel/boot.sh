@@ -2,7 +2,7 @@
 # Boots a kernel on QEMU's ZCU102 and says what its checks found.
 #
 # usage: boot.sh KERNEL INITRD LOG           KERNEL: a directory made by debian.sh or small.sh
-# environment: QEMU (qemu-system-aarch64), BOOT_LIMIT (seconds, 300),
+# environment: QEMU (qemu-system-aarch64), BOOT_LIMIT (seconds, 900),
 #   TREE (device tree source, tools/guest/zcu102.dts),
 #   BOARD (a program that plays the programmable logic: tools/guest/board; none)
 # Exit code: 0 when every check passed and the guest said so itself.
@@ -11,7 +11,7 @@ set -euo pipefail
 need_packages qemu-system-arm device-tree-compiler
 
 kernel=$1 initrd=$2 log=$3
-limit=${BOOT_LIMIT:-300}
+limit=${BOOT_LIMIT:-900}
 scratch=$(mktemp -d) # the path of a socket must be short
 ram=$log.ram
 trap 'rm -rf "$scratch" "$ram"' EXIT
