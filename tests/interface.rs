@@ -141,6 +141,7 @@ fn control_registers_stand_at_their_published_offsets() {
             ("MEMORY_BYTES", 0x138),
             ("MEMORY_PER_RECORD", 0x13C),
             ("DMA", 0x140),
+            ("NUMBERS", 0x144),
             ("ERROR", 0x180),
             ("ERROR_DETAIL", 0x184),
             ("CYCLES_LO", 0x188),
@@ -156,8 +157,8 @@ fn control_registers_stand_at_their_published_offsets() {
         ]
     );
     assert_eq!(control::IDENTIFICATION_VALUE.to_be_bytes(), *b"PGS1");
-    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 0));
-    assert_eq!(control::VERSION.reset, 0x0001_0000);
+    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 1));
+    assert_eq!(control::VERSION.reset, 0x0001_0001);
     assert_eq!(control::IMPULSE_SUM_FRACTION_BITS, 20);
     assert_eq!(control::ITERATIONS_MAX, 255);
 }
@@ -179,6 +180,19 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::features::INTERLOCKED.mask(), 1 << 1);
     assert_eq!(control::features::FLUSH_SUBNORMALS.mask(), 1 << 2);
     assert_eq!(control::features::IMPULSE_SUM.mask(), 1 << 3);
+    assert_eq!(control::features::WORLD_INERTIA.mask(), 1 << 4);
+    let formats = [
+        control::numbers::COLLISIONS,
+        control::numbers::BODIES,
+        control::numbers::ROWS,
+        control::numbers::UPDATES,
+        control::numbers::VELOCITIES,
+        control::numbers::IMPULSES,
+    ];
+    assert_eq!(
+        formats.map(|field| field.mask()),
+        [0xF, 0xF0, 0xF00, 0xF000, 0x000F_0000, 0x00F0_0000]
+    );
     assert_eq!(
         (control::channels::MM2S.mask(), control::channels::S2MM.mask()),
         (0x0000_00FF, 0x0000_FF00)
@@ -232,15 +246,19 @@ fn error_codes_keep_their_numbers() {
 fn records_have_the_layout_of_the_record_table() {
     assert_eq!((record::BEAT_BYTES, record::LANES, record::WORD_LANE), (16, 4, 3));
     assert_eq!(record::CONTACT_POINTS, 4);
-    assert_eq!(record::velocity::BEATS, 2);
+    assert_eq!((record::velocity::ROWS, record::velocity::WORLD_ROWS), (2, 4));
+    assert_eq!((record::velocity::DIAGONAL, record::velocity::OFF_DIAGONAL), (2, 3));
+    assert_eq!(record::relative::ROWS, 6);
+    assert_eq!((record::relative::NORMAL, record::relative::OFFSET), (0, 1));
+    assert_eq!(record::relative::CONTACTS, 2);
     assert_eq!((record::velocity::LINEAR, record::velocity::ANGULAR), (0, 1));
-    assert_eq!(record::collision::BEATS, 7);
+    assert_eq!(record::collision::ROWS, 7);
     assert_eq!(record::collision::NORMAL, 0);
     assert_eq!((record::collision::BODY_A, record::collision::BODY_B), (1, 2));
     assert_eq!(record::collision::CONTACTS, 3);
-    assert_eq!(record::pose::BEATS, 2);
+    assert_eq!(record::pose::ROWS, 2);
     assert_eq!((record::pose::POSITION, record::pose::ORIENTATION), (0, 1));
-    assert_eq!(record::result::BEATS, 4);
+    assert_eq!(record::result::ROWS, 4);
     assert_eq!((record::result::POSITION, record::result::ORIENTATION), (0, 1));
     assert_eq!((record::result::LINEAR, record::result::ANGULAR), (2, 3));
 }
@@ -256,12 +274,50 @@ fn float_is_the_profile_of_the_thesis() {
     assert_eq!((float.contact.fill, float.contact.window), (364, 316));
     assert_eq!((float.friction.fill, float.friction.window), (306, 182));
     assert_eq!(float.clock_khz, 275_000);
-    assert_eq!((float.memory.bytes_per_body, float.memory.bytes_per_collision), (24, 16));
+    assert_eq!(
+        (float.default_variant().bytes_per_body(), float.default_variant().bytes_per_collision()),
+        (24, 16)
+    );
     assert_eq!(float.memory.bytes, 4 << 20);
-    let words = float.words;
+    let words = float.default_variant().words();
     assert_eq!((words.velocity, words.collision, words.pose, words.result), (8, 28, 8, 16));
     let packed = profile::THESIS_WORDS;
     assert_eq!((packed.velocity, packed.collision, packed.pose, packed.result), (6, 27, 7, 6));
+}
+
+#[test]
+fn the_other_profiles_are_those_of_the_specification() {
+    let by_name = |name| profile::Profile::by_name(name).expect("the profile exists");
+    let [naive, half, mixed] = ["naive", "half", "mixed"].map(by_name);
+    assert_eq!([naive.id, half.id, mixed.id], [2, 3, 4]);
+    assert_eq!(naive.mm2s_widths, [32]);
+    assert_eq!(half.mm2s_widths, [128, 128, 64]);
+    assert_eq!(mixed.mm2s_widths, [128; 3]);
+    for profile in [naive, half, mixed] {
+        assert_eq!(profile.mm2s_widths, profile.s2mm_widths);
+        assert_eq!((profile.contact.fill, profile.contact.window), (364, 316));
+        assert_eq!((profile.friction.fill, profile.friction.window), (306, 182));
+    }
+    assert_eq!([naive, half, mixed].map(|p| p.clock_khz), [275_000, 250_000, 250_000]);
+    let issue = |p: &profile::Profile| (p.initiation_interval, p.collisions_per_issue);
+    assert_eq!([naive, half, mixed].map(issue), [(28, 1), (3, 2), (1, 1)]);
+    let per_record = |p: &'static profile::Profile| {
+        let variant = p.default_variant();
+        (variant.bytes_per_body(), variant.bytes_per_collision())
+    };
+    assert_eq!([naive, half, mixed].map(per_record), [(24, 16), (24, 8), (24, 16)]);
+    let words = |p: &'static profile::Profile| {
+        let words = p.default_variant().words();
+        [words.velocity, words.collision, words.pose, words.result]
+    };
+    assert_eq!([naive, half, mixed].map(words), [[8, 28, 8, 16], [4, 14, 4, 8], [8, 12, 8, 16]]);
+    assert_eq!(half.stripes.collisions.streams, [0, 0, 0, 1, 1, 1, 2]);
+    assert_eq!(half.stripes.bodies.streams, [0, 0, 1, 1, 2]);
+    assert!(half.stripes.collisions.padded && half.stripes.bodies.padded);
+    let mut world = profile::FLOAT.default_variant();
+    world.inertia = profile::Inertia::World;
+    assert_eq!((world.words().velocity, world.bytes_per_body()), (16, 48));
+    assert_eq!(half.default_variant().body_capacity(), 65_536);
 }
 
 #[test]

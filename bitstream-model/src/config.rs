@@ -2,7 +2,8 @@
 //! and a device tree fix on a real one.
 
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
-use crate::interface::profile::{Depth, FLOAT, Profile};
+use crate::interface::number::Numbers;
+use crate::interface::profile::{Depth, FLOAT, Inertia, Profile, Variant};
 use crate::quirks::Quirks;
 
 /// What the pipeline does when a collision needs a velocity that is still being computed.
@@ -74,8 +75,12 @@ impl Default for Delays {
 /// How to build an emulated board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoardConfig {
-    /// The bitstream.
+    /// The design.
     pub profile: &'static Profile,
+    /// Its formats, instead of the profile's own; of the same widths on the streams.
+    pub numbers: Option<Numbers>,
+    /// How it knows the inertia of its bodies.
+    pub inertia: Inertia,
     /// Behaviour on read-after-write hazards.
     pub hazards: Hazards,
     /// Hazard window of both solvers in issue slots, instead of the profile's cycles.
@@ -104,6 +109,8 @@ impl Default for BoardConfig {
     fn default() -> Self {
         Self {
             profile: &FLOAT,
+            numbers: None,
+            inertia: Inertia::Isotropic,
             hazards: Hazards::Interlocked,
             window_slots: None,
             subnormals: Subnormals::Keep,
@@ -122,6 +129,18 @@ impl Default for BoardConfig {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigError {
+    /// Formats that do not fit the streams of the profile.
+    #[error(
+        "{stream} records of {found} bits a number, expected {expected} as the profile has them"
+    )]
+    StreamFormat {
+        /// Which records.
+        stream: &'static str,
+        /// Bits of the format asked for.
+        found: u32,
+        /// Bits of the profile's format.
+        expected: u32,
+    },
     /// A number outside its range.
     #[error("{what} is {found}, expected {low} to {high}")]
     OutOfRange {
@@ -137,6 +156,16 @@ pub enum ConfigError {
 }
 
 impl BoardConfig {
+    /// The profile with what was chosen.
+    #[must_use]
+    pub fn variant(&self) -> Variant {
+        Variant {
+            profile: self.profile,
+            numbers: self.numbers.unwrap_or(self.profile.numbers),
+            inertia: self.inertia,
+        }
+    }
+
     /// Depth of one kind of pass as this board has it: a pass ends no sooner than its last
     /// write-back.
     pub(crate) fn depth(&self, profile: Depth) -> Depth {
@@ -161,6 +190,15 @@ impl BoardConfig {
             LENGTH_WIDTH_MIN.into(),
             LENGTH_WIDTH_MAX.into(),
         )?;
+        let (asked, own) = (self.variant().numbers, self.profile.numbers);
+        for (stream, asked, own) in
+            [("collision", asked.collisions, own.collisions), ("body", asked.bodies, own.bodies)]
+        {
+            let (found, expected) = (asked.bits(), own.bits());
+            if found != expected {
+                return Err(ConfigError::StreamFormat { stream, found, expected });
+            }
+        }
         range("address width", self.address_width.into(), 32, 64)?;
         // The capability register carries the window in cycles in 16 bits.
         let slots_max = u64::from(u16::MAX) / u64::from(self.profile.initiation_interval);

@@ -463,7 +463,7 @@ fn done_is_cleared_by_reading_and_interrupts_by_toggling() {
 }
 
 fn formula(scene: &Step) -> u64 {
-    StepCycles::new(&FLOAT, &FLOAT.words, &scene.shape()).total
+    StepCycles::new(&FLOAT, &FLOAT.default_variant().words(), &scene.shape()).total
 }
 
 fn assert_accounted(outcome: &Outcome, scene: &Step) {
@@ -508,7 +508,9 @@ fn under_a_bandwidth_limit_a_large_step_takes_the_time_by_formula() {
         let mut machine = Machine::new(BoardConfig { bandwidth, ..BoardConfig::default() });
         let outcome = machine.step(&scene).expect("the step completes");
         assert_accounted(&outcome, &scene);
-        let expected = StepTime::new(&FLOAT, &FLOAT.words, &scene.shape(), bandwidth).seconds;
+        let expected =
+            StepTime::new(&FLOAT, &FLOAT.default_variant().words(), &scene.shape(), bandwidth)
+                .seconds;
         let cycles = u32::try_from(outcome.cycles).expect("a few million");
         let found = f64::from(cycles) / 275e6;
         assert!((found / expected - 1.0).abs() < 0.01, "{found} s, by formula {expected} s");

@@ -8,7 +8,7 @@ use bitstream_model::interface::control::{
     MM2S_WIDTHS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_STRIDE, SHAPE_TABLE, VERSION,
     VERSION_MAJOR, channels, depth, dma, features, issue, memory_per_record, version,
 };
-use bitstream_model::interface::profile::{Depth, NumberFormat, Profile};
+use bitstream_model::interface::profile::{Depth, Profile};
 use bitstream_model::interface::register::Register;
 use thiserror::Error;
 
@@ -127,9 +127,6 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     }
     let profile_id = read(&PROFILE);
     let profile = Profile::by_id(profile_id).ok_or(IdentityError::Profile { found: profile_id })?;
-    if profile.numbers != NumberFormat::F32 {
-        return Err(IdentityError::Profile { found: profile_id });
-    }
 
     let streams = checked(window, &CHANNELS, "1 to 4 streams each way", |word| {
         let fits = |count: u32| (1..=DMA_COUNT_MAX).contains(&(count as usize));

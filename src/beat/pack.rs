@@ -52,7 +52,7 @@ pub(crate) fn pack_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         let pairs = pairs.zip(third.as_chunks_mut::<2>().0);
         for (index, (((first, second), third), fourth)) in pairs.zip(fourth.iter_mut()).enumerate()
         {
-            let beats: [Beat; collision::BEATS] = record(index);
+            let beats: [Beat; collision::ROWS] = record(index);
             beats.iter().for_each(|beat| add(&mut lanes, *beat));
             let [beat_0, beat_1, beat_2, beat_3, beat_4, beat_5, beat_6] = beats;
             *first = [beat_0, beat_4];

@@ -45,10 +45,10 @@ impl Segment {
     /// Beats of one record.
     pub(crate) const fn beats_per_record(self) -> usize {
         match self {
-            Self::Velocities => velocity::BEATS,
-            Self::Collisions => collision::BEATS,
-            Self::Poses => pose::BEATS,
-            Self::Results => result::BEATS,
+            Self::Velocities => velocity::ROWS,
+            Self::Collisions => collision::ROWS,
+            Self::Poses => pose::ROWS,
+            Self::Results => result::ROWS,
         }
     }
 
@@ -57,7 +57,7 @@ impl Segment {
     /// This is the definition. What packs and unpacks without its divisions is tested against it.
     pub(crate) const fn place(self, record: usize, beat: usize, channels: usize) -> Place {
         let (index, first_slot) = match self {
-            Self::Collisions => (beat, record * share(collision::BEATS, beat % channels, channels)),
+            Self::Collisions => (beat, record * share(collision::ROWS, beat % channels, channels)),
             Self::Velocities | Self::Poses | Self::Results => {
                 (record * self.beats_per_record() + beat, 0)
             }
@@ -76,7 +76,7 @@ pub(crate) const fn beats_on_channel(
     channels: usize,
 ) -> usize {
     match segment {
-        Segment::Collisions => records * share(collision::BEATS, channel, channels),
+        Segment::Collisions => records * share(collision::ROWS, channel, channels),
         Segment::Velocities | Segment::Poses | Segment::Results => {
             share(records * segment.beats_per_record(), channel, channels)
         }

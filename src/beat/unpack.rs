@@ -8,7 +8,7 @@ use crate::scene::{Pose, Velocity};
 /// The new state of body `body` from the result segments, one a channel.
 #[inline]
 pub(crate) fn unpack_result(body: usize, channels: &[&[Beat]]) -> (Pose, Velocity) {
-    let beats: [Beat; result::BEATS] = if let [first, second, third, fourth] = channels {
+    let beats: [Beat; result::ROWS] = if let [first, second, third, fourth] = channels {
         // As many channels as a record has beats: the running index needs no division.
         [first[body], second[body], third[body], fourth[body]]
     } else {

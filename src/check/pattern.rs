@@ -47,7 +47,7 @@ pub(super) fn results(bodies: &[Body], channels: usize) -> Vec<Vec<Beat>> {
         (0..channels).map(|channel| vec![Beat::default(); beats(channel)]).collect();
     for (record, body) in bodies.iter().enumerate() {
         let three = |v: [f32; 3]| Beat([v[0].to_bits(), v[1].to_bits(), v[2].to_bits(), 0]);
-        let mut of = [Beat::default(); result::BEATS];
+        let mut of = [Beat::default(); result::ROWS];
         of[result::POSITION] = three(body.pose.position);
         of[result::ORIENTATION] = Beat(body.pose.orientation.map(f32::to_bits));
         of[result::LINEAR] = three(body.velocity.linear);

@@ -17,8 +17,8 @@ pub(crate) fn encode(
     from: &Collision,
     position_a: [f32; 3],
     position_b: [f32; 3],
-) -> [Beat; collision::BEATS] {
-    let mut beats = [Beat::default(); collision::BEATS];
+) -> [Beat; collision::ROWS] {
+    let mut beats = [Beat::default(); collision::ROWS];
     beats[collision::NORMAL] = vec3_and_word(from.normal, from.count);
     beats[collision::BODY_A] = vec3_and_word(position_a, from.body_a);
     beats[collision::BODY_B] = vec3_and_word(position_b, from.body_b);
@@ -33,7 +33,7 @@ pub(crate) fn encode(
     beats
 }
 
-const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::BEATS);
+const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::ROWS);
 
 #[cfg(test)]
 mod tests {

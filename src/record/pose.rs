@@ -10,8 +10,8 @@ use crate::scene::Body;
 ///
 /// Source: interface specification, record table.
 #[inline]
-pub(crate) fn encode(body: &Body) -> [Beat; pose::BEATS] {
-    let mut beats = [Beat::default(); pose::BEATS];
+pub(crate) fn encode(body: &Body) -> [Beat; pose::ROWS] {
+    let mut beats = [Beat::default(); pose::ROWS];
     beats[pose::POSITION] = vec3_and_word(body.pose.position, 0);
     beats[pose::ORIENTATION] = vec4(body.pose.orientation);
     beats

@@ -10,7 +10,7 @@ use crate::scene::{Pose, Velocity};
 ///
 /// Source: interface specification, record table.
 #[inline]
-pub(crate) fn decode(beats: &[Beat; result::BEATS]) -> (Pose, Velocity) {
+pub(crate) fn decode(beats: &[Beat; result::ROWS]) -> (Pose, Velocity) {
     let pose = Pose {
         position: to_vec3(beats[result::POSITION]),
         orientation: to_vec4(beats[result::ORIENTATION]),

@@ -10,8 +10,8 @@ use crate::scene::Body;
 ///
 /// Source: interface specification, record table.
 #[inline]
-pub(crate) fn encode(body: &Body) -> [Beat; velocity::BEATS] {
-    let mut beats = [Beat::default(); velocity::BEATS];
+pub(crate) fn encode(body: &Body) -> [Beat; velocity::ROWS] {
+    let mut beats = [Beat::default(); velocity::ROWS];
     beats[velocity::LINEAR] = vec3_and_word(body.velocity.linear, body.shape);
     beats[velocity::ANGULAR] = vec3_and_word(body.velocity.angular, 0);
     beats

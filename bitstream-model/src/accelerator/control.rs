@@ -7,15 +7,27 @@ use crate::interface::control::{
     COLLISIONS, CONTACT_DEPTH, CONTACT_ITERATIONS, CYCLES_HI, CYCLES_LO, DMA, ERROR, ERROR_DETAIL,
     ErrorCode, FEATURES, FLAGS, FRICTION, FRICTION_DEPTH, FRICTION_ITERATIONS, GIE, GRAVITY_X,
     GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO, ISR, ISSUE,
-    MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE,
-    RESET, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE,
-    SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WORK_CYCLES, ap_ctrl,
-    channels, depth, dma, error, features, flags, irq, issue, memory_per_record,
+    MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS, POSITION_COEFFICIENT, POSITION_DRIFT,
+    PROFILE, RESET, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS,
+    SHAPE_STRIDE, SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES,
+    WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq, issue,
+    memory_per_record, numbers,
 };
-use crate::interface::profile::Depth;
+use crate::interface::number::Numbers;
+use crate::interface::profile::{Depth, Inertia};
 
 use super::integrate::Integration;
 use super::solver::{Mass, SolverParameters};
+
+/// The NUMBERS register.
+fn formats(of: &Numbers) -> u32 {
+    let word = numbers::COLLISIONS.put(0, of.collisions as u32);
+    let word = numbers::BODIES.put(word, of.bodies as u32);
+    let word = numbers::ROWS.put(word, of.rows as u32);
+    let word = numbers::UPDATES.put(word, of.updates as u32);
+    let word = numbers::VELOCITIES.put(word, of.velocities as u32);
+    numbers::IMPULSES.put(word, of.impulses as u32)
+}
 
 /// What the accelerator has counted in a step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -205,6 +217,7 @@ impl Registers {
         };
         let counters = &self.counters;
         let memory = profile.memory;
+        let variant = config.variant();
         if let Some((index, at)) = self.shape_at(offset) {
             let shape = self.shapes[index];
             return Some(match at {
@@ -229,6 +242,7 @@ impl Registers {
                         .put(0, u32::from(config.hazards == Hazards::Interlocked))
                     | features::FLUSH_SUBNORMALS
                         .put(0, u32::from(config.subnormals == Subnormals::Flush))
+                    | features::WORLD_INERTIA.put(0, u32::from(config.inertia == Inertia::World))
             }
             _ if offset == CHANNELS.offset => {
                 let mm2s = register(profile.mm2s_widths.len());
@@ -244,16 +258,19 @@ impl Registers {
             _ if offset == CONTACT_DEPTH.offset => pipeline(profile.contact),
             _ if offset == FRICTION_DEPTH.offset => pipeline(profile.friction),
             _ if offset == CLOCK_KHZ.offset => profile.clock_khz,
-            _ if offset == BODY_CAPACITY.offset => profile.body_capacity,
-            _ if offset == COLLISION_CAPACITY.offset => memory.bytes / memory.bytes_per_collision,
+            _ if offset == BODY_CAPACITY.offset => variant.body_capacity(),
+            _ if offset == COLLISION_CAPACITY.offset => {
+                memory.bytes / variant.bytes_per_collision()
+            }
             _ if offset == SHAPE_CAPACITY.offset => profile.shape_capacity,
             _ if offset == MEMORY_BYTES.offset => memory.bytes,
             _ if offset == MEMORY_PER_RECORD.offset => memory_per_record::COLLISION.put(
-                memory_per_record::BODY.put(0, memory.bytes_per_body),
-                memory.bytes_per_collision,
+                memory_per_record::BODY.put(0, variant.bytes_per_body()),
+                variant.bytes_per_collision(),
             ),
             _ if offset == DMA.offset => dma::ADDRESS_WIDTH
                 .put(dma::LENGTH_WIDTH.put(0, config.length_width), config.address_width),
+            _ if offset == NUMBERS.offset => formats(&variant.numbers),
             _ if offset == ERROR.offset => self.error,
             _ if offset == ERROR_DETAIL.offset => self.error_detail,
             _ if offset == CYCLES_LO.offset => low(counters.cycles),

@@ -34,7 +34,7 @@ pub(super) struct Collision {
 
 impl Collision {
     #[inline]
-    pub(super) fn from_beats(beats: &[Beat; collision::BEATS]) -> Self {
+    pub(super) fn from_beats(beats: &[Beat; collision::ROWS]) -> Self {
         let mut contacts = [[0.0; 4]; CONTACT_POINTS];
         for (contact, beat) in contacts.iter_mut().zip(&beats[collision::CONTACTS..]) {
             *contact = vec4(*beat);
@@ -52,21 +52,21 @@ impl Collision {
 }
 
 /// A velocity record: the velocity and the shape index.
-pub(super) fn velocity_from_beats(beats: &[Beat; velocity::BEATS]) -> (Velocity, u32) {
+pub(super) fn velocity_from_beats(beats: &[Beat; velocity::ROWS]) -> (Velocity, u32) {
     let linear = beats[velocity::LINEAR];
     let angular = vec3(beats[velocity::ANGULAR]);
     (Velocity { linear: vec3(linear), angular }, word(linear))
 }
 
 /// A pose record.
-pub(super) fn pose_from_beats(beats: &[Beat; pose::BEATS]) -> Pose {
+pub(super) fn pose_from_beats(beats: &[Beat; pose::ROWS]) -> Pose {
     Pose { position: vec3(beats[pose::POSITION]), orientation: vec4(beats[pose::ORIENTATION]) }
 }
 
 /// The result record of a body.
-pub(super) fn result_to_beats(pose: &Pose, velocity: &Velocity) -> [Beat; result::BEATS] {
+pub(super) fn result_to_beats(pose: &Pose, velocity: &Velocity) -> [Beat; result::ROWS] {
     let row = |[x, y, z]: [f32; 3]| Beat([x.to_bits(), y.to_bits(), z.to_bits(), 0]);
-    let mut beats = [Beat::default(); result::BEATS];
+    let mut beats = [Beat::default(); result::ROWS];
     beats[result::POSITION] = row(pose.position);
     beats[result::ORIENTATION] = Beat(pose.orientation.map(f32::to_bits));
     beats[result::LINEAR] = row(velocity.linear);

@@ -264,11 +264,11 @@ impl Accelerator {
         self.clock = 0;
         self.debt = 0;
         let profile = self.config.profile;
-        let memory = profile.memory;
-        let needed = u64::from(arguments.bodies) * u64::from(memory.bytes_per_body)
-            + u64::from(arguments.collisions) * u64::from(memory.bytes_per_collision);
+        let variant = self.config.variant();
+        let needed = u64::from(arguments.bodies) * u64::from(variant.bytes_per_body())
+            + u64::from(arguments.collisions) * u64::from(variant.bytes_per_collision());
         let out_of_range = [
-            (BODIES.offset, arguments.bodies == 0 || arguments.bodies > profile.body_capacity),
+            (BODIES.offset, arguments.bodies == 0 || arguments.bodies > variant.body_capacity()),
             (CONTACT_ITERATIONS.offset, arguments.contact_iterations > ITERATIONS_MAX),
             (FRICTION_ITERATIONS.offset, arguments.friction_iterations > ITERATIONS_MAX),
         ];
@@ -276,7 +276,7 @@ impl Accelerator {
             self.fail(ErrorCode::Argument, 0, offset);
             return;
         }
-        if needed > u64::from(memory.bytes) {
+        if needed > u64::from(profile.memory.bytes) {
             self.fail(ErrorCode::Capacity, 0, register(needed));
             return;
         }
@@ -288,6 +288,6 @@ impl Accelerator {
         self.impulses.clear();
         self.impulses.resize(arguments.collisions as usize, [0.0; CONTACT_POINTS]);
         self.pipeline.start_step(bodies);
-        self.phase = Phase::Load(self.segment(Striping::Running, velocity::BEATS, bodies));
+        self.phase = Phase::Load(self.segment(Striping::Running, velocity::ROWS, bodies));
     }
 }

@@ -69,7 +69,7 @@ impl Accelerator {
             self.shape_of[body] = shape;
         }
         segment.advance(records, inputs);
-        let rows = |records: usize| (records * velocity::BEATS).div_ceil(inputs.len()) as u64;
+        let rows = |records: usize| (records * velocity::ROWS).div_ceil(inputs.len()) as u64;
         self.debt += rows(segment.done) - rows(first);
         self.phase = Phase::Load(segment);
         if segment.finished() {
@@ -95,7 +95,7 @@ impl Accelerator {
 
     fn start_pass(&mut self, number: u32) {
         let collisions = self.arguments.collisions as usize;
-        let segment = self.segment(Striping::ByRecord, collision::BEATS, collisions);
+        let segment = self.segment(Striping::ByRecord, collision::ROWS, collisions);
         if number == self.passes() {
             self.start_integration();
             return;
@@ -106,7 +106,7 @@ impl Accelerator {
 
     fn start_integration(&mut self) {
         let bodies = self.arguments.bodies as usize;
-        self.phase = Phase::Integrate(self.segment(Striping::Running, pose::BEATS, bodies));
+        self.phase = Phase::Integrate(self.segment(Striping::Running, pose::ROWS, bodies));
     }
 
     /// Solves the collisions that have arrived, for up to `limit` cycles.
@@ -161,7 +161,7 @@ impl Accelerator {
         pass: u32,
         index: usize,
         now: u64,
-        beats: &[Beat; collision::BEATS],
+        beats: &[Beat; collision::ROWS],
     ) -> Result<u64, PacketError> {
         let collision = Collision::from_beats(beats);
         let unchecked = self.config.hazards == Hazards::Unchecked;
@@ -248,14 +248,14 @@ impl Accelerator {
     ) -> Result<bool, PacketError> {
         let lanes = outputs.len();
         let space = outputs.iter().map(Stream::space).min().unwrap_or(0);
-        let records = segment.available(inputs).min(space * lanes / result::BEATS);
+        let records = segment.available(inputs).min(space * lanes / result::ROWS);
         if records == 0 {
             return Ok(false);
         }
         self.injected()?;
         segment.check(records, inputs)?;
         let first = segment.done;
-        let total = self.arguments.bodies as usize * result::BEATS;
+        let total = self.arguments.bodies as usize * result::ROWS;
         let shapes = self.registers.shapes();
         for ahead in 0..records {
             let beats = segment.record(ahead, inputs);
@@ -274,7 +274,7 @@ impl Accelerator {
             };
             let beats = decode::result_to_beats(&pose, &velocity);
             for (k, beat) in beats.into_iter().enumerate() {
-                let running = body * result::BEATS + k;
+                let running = body * result::ROWS + k;
                 let output = &mut outputs[running % lanes];
                 output.push(&[beat]);
                 if running + lanes >= total {
@@ -286,8 +286,8 @@ impl Accelerator {
         }
         segment.advance(records, inputs);
         let rows = |records: usize| {
-            let poses_in = (records * pose::BEATS).div_ceil(inputs.len());
-            let results_out = (records * result::BEATS).div_ceil(lanes);
+            let poses_in = (records * pose::ROWS).div_ceil(inputs.len());
+            let results_out = (records * result::ROWS).div_ceil(lanes);
             poses_in.max(results_out) as u64
         };
         self.debt += rows(segment.done) - rows(first);

@@ -72,6 +72,27 @@ pub mod features {
     pub const FLUSH_SUBNORMALS: Field = Field::bit("flush_subnormals", 2, Access::ReadOnly);
     /// [`IMPULSE_SUM_LO`](super::IMPULSE_SUM_LO) counts.
     pub const IMPULSE_SUM: Field = Field::bit("impulse_sum", 3, Access::ReadOnly);
+    /// Velocity records carry the world inverse inertia of their body.
+    pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 4, Access::ReadOnly);
+}
+
+/// Fields of NUMBERS: a [`StreamFormat`](super::super::number::StreamFormat) each for the streams, a
+/// [`Precision`](super::super::number::Precision) each for the rest.
+pub mod numbers {
+    use super::{Access, Field};
+
+    /// Collision records.
+    pub const COLLISIONS: Field = Field::bits("collisions", 0, 4, Access::ReadOnly);
+    /// Velocity, pose and result records.
+    pub const BODIES: Field = Field::bits("bodies", 4, 4, Access::ReadOnly);
+    /// Arithmetic of constraint rows.
+    pub const ROWS: Field = Field::bits("rows", 8, 4, Access::ReadOnly);
+    /// Arithmetic of speeds, impulses, velocities and the integration.
+    pub const UPDATES: Field = Field::bits("updates", 12, 4, Access::ReadOnly);
+    /// Velocities on chip.
+    pub const VELOCITIES: Field = Field::bits("velocities", 16, 4, Access::ReadOnly);
+    /// Accumulated impulses on chip.
+    pub const IMPULSES: Field = Field::bits("impulses", 20, 4, Access::ReadOnly);
 }
 
 /// Fields of CHANNELS.
@@ -216,7 +237,7 @@ pub const IDENTIFICATION_VALUE: u32 = 0x5047_5331;
 /// Major interface version of this module.
 pub const VERSION_MAJOR: u32 = 1;
 /// Minor interface version of this module.
-pub const VERSION_MINOR: u32 = 0;
+pub const VERSION_MINOR: u32 = 1;
 
 /// Always [`IDENTIFICATION_VALUE`].
 pub const IDENTIFICATION: Register =
@@ -241,6 +262,7 @@ pub const FEATURES: Register = read_only(
         features::INTERLOCKED,
         features::FLUSH_SUBNORMALS,
         features::IMPULSE_SUM,
+        features::WORLD_INERTIA,
     ],
 );
 /// Numbers of streams.
@@ -272,6 +294,20 @@ pub const MEMORY_PER_RECORD: Register =
     read_only("MEMORY_PER_RECORD", 0x13C, &[memory_per_record::BODY, memory_per_record::COLLISION]);
 /// How the AXI DMAs were built.
 pub const DMA: Register = read_only("DMA", 0x140, &[dma::LENGTH_WIDTH, dma::ADDRESS_WIDTH]);
+
+/// Formats on the streams, in the arithmetic and on chip; all 0 is f32 throughout.
+pub const NUMBERS: Register = read_only(
+    "NUMBERS",
+    0x144,
+    &[
+        numbers::COLLISIONS,
+        numbers::BODIES,
+        numbers::ROWS,
+        numbers::UPDATES,
+        numbers::VELOCITIES,
+        numbers::IMPULSES,
+    ],
+);
 
 /// Sticky error; cleared by a reset only.
 pub const ERROR: Register = read_only("ERROR", 0x180, &[error::CODE, error::CHANNEL]);
@@ -313,8 +349,8 @@ pub const SHAPE_TABLE: u32 = 0x400;
 pub const SHAPE_STRIDE: u32 = 16;
 /// Offset in an entry of the inverse mass, 1/kg, f32; 0 is static.
 pub const SHAPE_INVERSE_MASS: u32 = 0x0;
-/// Offset in an entry of the isotropic inverse inertia, 1/(kg m²), f32. The rest of the entry is
-/// reserved and written 0.
+/// Offset in an entry of the isotropic inverse inertia, 1/(kg m²), f32; without meaning to a
+/// bitstream with world inertia. The rest of the entry is reserved and written 0.
 pub const SHAPE_INVERSE_INERTIA: u32 = 0x4;
 
 /// Every register outside the shape table, by offset.
@@ -353,6 +389,7 @@ pub const REGISTERS: &[Register] = &[
     MEMORY_BYTES,
     MEMORY_PER_RECORD,
     DMA,
+    NUMBERS,
     ERROR,
     ERROR_DETAIL,
     CYCLES_LO,

@@ -8,6 +8,8 @@ pub mod address_map;
 pub mod axi_dma;
 pub mod control;
 pub mod descriptor;
+pub mod number;
 pub mod profile;
 pub mod record;
 pub mod register;
+pub mod stripe;

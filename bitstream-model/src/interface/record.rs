@@ -1,33 +1,43 @@
 //! This file says how records lie in 128-bit beats.
 //!
-//! A record is a row of (vec3, word) beats; lane 0 is bits 31:0, at the lowest address.
+//! A record is rows of four words, (vec3, word); lane 0 is bits 31:0, at the lowest address. In f32
+//! a row is a beat. In sixteen bits a row is half a beat, the first of two in bits 63:0, and the
+//! rows of an array follow each other without a gap: a collision of seven rows takes three beats
+//! and a half.
 //!
 //! ```text
-//!              lane 0   lane 1   lane 2   lane 3
-//! velocity  0  v.x      v.y      v.z      shape
-//!           1  w.x      w.y      w.z      0
-//! collision 0  n.x      n.y      n.z      count
-//!           1  pA.x     pA.y     pA.z     bodyA
-//!           2  pB.x     pB.y     pB.z     bodyB
-//!           3  c0.x     c0.y     c0.z     distance0
-//!           .. 6        up to four contact points
-//! pose      0  p.x      p.y      p.z      0
-//!           1  q.x      q.y      q.z      q.w
-//! result    0  p.x      p.y      p.z      0
-//!           1  q.x      q.y      q.z      q.w
-//!           2  v.x      v.y      v.z      0
-//!           3  w.x      w.y      w.z      0
+//!                lane 0   lane 1   lane 2   lane 3
+//! velocity    0  v.x      v.y      v.z      shape
+//!             1  w.x      w.y      w.z      0
+//!             2  I.xx     I.yy     I.zz     0          with world inertia only: the inverse
+//!             3  I.xy     I.xz     I.yz     0          inertia about world axes
+//! collision   0  n.x      n.y      n.z      count
+//! (absolute)  1  pA.x     pA.y     pA.z     bodyA
+//!             2  pB.x     pB.y     pB.z     bodyB
+//!             3  c0.x     c0.y     c0.z     distance0
+//!             .. 6        up to four contact points
+//! collision   0  n.x      n.y      n.z      bodyA
+//! (relative)  1  r.x      r.y      r.z      bodyB      r = pB - pA
+//!             2  a0.x     a0.y     a0.z     distance0  a = c - pA
+//!             .. 5        up to four contact points; an unused one has distance +infinity
+//! pose        0  p.x      p.y      p.z      0
+//!             1  q.x      q.y      q.z      q.w
+//! result      0  p.x      p.y      p.z      0
+//!             1  q.x      q.y      q.z      q.w
+//!             2  v.x      v.y      v.z      0
+//!             3  w.x      w.y      w.z      0
 //! ```
 //!
-//! Metres, m/s, rad/s, world frame. `n` is the unit normal from B to A; a contact point lies on
-//! B's surface; distance is signed, negative is penetration. Indices and counts are unsigned
-//! integers, everything else f32. A collision of count 0 is padding and has no effect at all.
+//! Metres, m/s, rad/s, 1/(kg m²), world frame. `n` is the unit normal from B to A; a contact point
+//! lies on B's surface; distance is signed, negative is penetration. Indices, shape and count are
+//! unsigned integers, everything else is a number in the stream's format. A collision without
+//! contact points is padding and has no effect at all.
 
 use bytemuck::{Pod, Zeroable};
 
 /// Bytes of a beat.
 pub const BEAT_BYTES: usize = 16;
-/// 32-bit lanes of a beat.
+/// Words of a row, and 32-bit lanes of a beat.
 pub const LANES: usize = 4;
 /// The lane beside a vec3, which takes lanes 0 to 2.
 pub const WORD_LANE: usize = 3;
@@ -43,20 +53,26 @@ const _: () = assert!(size_of::<Beat>() == BEAT_BYTES && align_of::<Beat>() == B
 #[cfg(not(target_endian = "little"))]
 compile_error!("beats and descriptors are little-endian and are accessed as they lie in memory");
 
-/// The velocity record: beat indices.
+/// The velocity record: rows.
 pub mod velocity {
-    /// Beats of a record.
-    pub const BEATS: usize = 2;
+    /// Rows of a record.
+    pub const ROWS: usize = 2;
     /// Linear velocity; the word beside it is the index into the shape table.
     pub const LINEAR: usize = 0;
     /// Angular velocity; the word beside it is 0.
     pub const ANGULAR: usize = 1;
+    /// Rows of a record with world inertia.
+    pub const WORLD_ROWS: usize = 4;
+    /// Diagonal of the inverse inertia: xx, yy, zz; the word beside it is 0.
+    pub const DIAGONAL: usize = 2;
+    /// The rest of the inverse inertia: xy, xz, yz; the word beside it is 0.
+    pub const OFF_DIAGONAL: usize = 3;
 }
 
-/// The collision record: beat indices.
+/// The collision record in world coordinates: rows.
 pub mod collision {
-    /// Beats of a record.
-    pub const BEATS: usize = 7;
+    /// Rows of a record.
+    pub const ROWS: usize = 7;
     /// Normal from B to A; the word beside it is the number of contact points.
     pub const NORMAL: usize = 0;
     /// Position of body A; the word beside it is its index.
@@ -67,20 +83,33 @@ pub mod collision {
     pub const CONTACTS: usize = 3;
 }
 
-/// The pose record: beat indices.
+/// The collision record relative to body A: rows.
+pub mod relative {
+    /// Rows of a record.
+    pub const ROWS: usize = 6;
+    /// Normal from B to A; the word beside it is the index of body A.
+    pub const NORMAL: usize = 0;
+    /// Position of body B less that of body A; the word beside it is the index of body B.
+    pub const OFFSET: usize = 1;
+    /// The first contact point less the position of body A; the word beside each is its distance,
+    /// +infinity where there is no point.
+    pub const CONTACTS: usize = 2;
+}
+
+/// The pose record: rows.
 pub mod pose {
-    /// Beats of a record.
-    pub const BEATS: usize = 2;
+    /// Rows of a record.
+    pub const ROWS: usize = 2;
     /// Position; the word beside it is 0.
     pub const POSITION: usize = 0;
     /// Orientation, a unit quaternion x, y, z, w.
     pub const ORIENTATION: usize = 1;
 }
 
-/// The result record: beat indices.
+/// The result record: rows.
 pub mod result {
-    /// Beats of a record.
-    pub const BEATS: usize = 4;
+    /// Rows of a record.
+    pub const ROWS: usize = 4;
     /// Position; the word beside it is 0.
     pub const POSITION: usize = 0;
     /// Orientation, a unit quaternion x, y, z, w.

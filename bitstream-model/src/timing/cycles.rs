@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn the_streamed_records_take_what_their_beats_take() {
-        let cycles = StepCycles::new(&FLOAT, &FLOAT.words, &THESIS_STEP);
+        let cycles = StepCycles::new(&FLOAT, &FLOAT.default_variant().words(), &THESIS_STEP);
         assert_eq!((cycles.load, cycles.pose_in, cycles.result_out), (19_440, 19_440, 38_880));
         assert_eq!(cycles.total, 19_440 + 2_032_000 + 4 * (364 + 306) + 38_880);
     }
@@ -175,7 +175,9 @@ mod tests {
     #[test]
     fn the_sustained_bandwidth_limits_float_and_the_peak_does_not() {
         let passes_only = StepShape { bodies: 0, ..THESIS_STEP };
-        let time = |bandwidth| StepTime::new(&FLOAT, &FLOAT.words, &passes_only, bandwidth);
+        let time = |bandwidth| {
+            StepTime::new(&FLOAT, &FLOAT.default_variant().words(), &passes_only, bandwidth)
+        };
         let sustained = time(Bandwidth::ZCU102_SUSTAINED);
         assert_eq!(sustained.limit, PassLimit::Memory);
         assert!((sustained.seconds * 1e3 - 8.89).abs() < 0.02, "{sustained:?}");
@@ -186,7 +188,8 @@ mod tests {
 
     #[test]
     fn without_collisions_there_are_no_passes() {
-        let cycles = StepCycles::new(&FLOAT, &FLOAT.words, &StepShape::new(4, 0));
+        let cycles =
+            StepCycles::new(&FLOAT, &FLOAT.default_variant().words(), &StepShape::new(4, 0));
         assert_eq!(cycles.total, 2 + 4);
     }
 }

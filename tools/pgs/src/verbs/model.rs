@@ -153,9 +153,14 @@ pub(crate) fn run(
         &step,
         &bandwidths,
     );
-    let streamed =
-        Estimate::new("records as they are streamed", profile, &profile.words, &step, &bandwidths);
-    let memory = MemoryUse::new(profile, step.bodies, step.collisions);
+    let streamed = Estimate::new(
+        "records as they are streamed",
+        profile,
+        &profile.default_variant().words(),
+        &step,
+        &bandwidths,
+    );
+    let memory = MemoryUse::new(&profile.default_variant(), step.bodies, step.collisions);
     let deviation = (step.bodies == THESIS_STEP.bodies
         && step.collisions == THESIS_STEP.collisions)
         .then(|| packed.cycles.total as f64 / THESIS_STEP.cycles as f64 - 1.0);
@@ -184,7 +189,7 @@ pub(crate) fn run(
                 "capacity": memory.capacity,
                 "shape_indices": memory.shape_indices,
                 "fits": memory.fits(),
-                "collisions_that_fit": MemoryUse::collisions_beside(profile, step.bodies),
+                "collisions_that_fit": MemoryUse::collisions_beside(&profile.default_variant(), step.bodies),
             },
         });
         writeln!(out, "{document:#}")?;
@@ -232,7 +237,7 @@ pub(crate) fn run(
     writeln!(
         out,
         "  room for   {} collisions beside so many bodies",
-        grouped(MemoryUse::collisions_beside(profile, step.bodies)),
+        grouped(MemoryUse::collisions_beside(&profile.default_variant(), step.bodies)),
     )?;
     Ok(Verdict::Done)
 }

@@ -1,0 +1,213 @@
+//! The accelerator's builds as data: what a profile is, and what follows from it.
+//!
+//! [`table`] has one entry a profile. A board reports its profile and what was chosen when it was
+//! built through the capability registers ([`control`](super::control)); driver, emulated board and
+//! the cycle and memory models all compute from the same entry.
+
+pub mod solver;
+pub mod table;
+
+pub use table::{FLOAT, HALF, MIXED, NAIVE, PROFILES};
+
+use super::number::{Numbers, StreamFormat};
+use super::record::collision as absolute;
+use super::record::{LANES, pose, relative, result, velocity};
+use super::stripe::Stripes;
+
+/// Depth of one kind of pass, clock cycles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Depth {
+    /// First collision in to last write-back.
+    pub fill: u32,
+    /// Read of a body's velocity to its write-back.
+    pub window: u32,
+}
+
+/// 32-bit words that a record takes on a stream; two sixteen-bit numbers are one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecordWords {
+    /// Velocity of a body.
+    pub velocity: u32,
+    /// Collision.
+    pub collision: u32,
+    /// Pose of a body.
+    pub pose: u32,
+    /// Result of a body.
+    pub result: u32,
+}
+
+/// The records as the thesis packs them, without padding, in numbers (Tables 4.1 to 4.6).
+pub const THESIS_WORDS: RecordWords =
+    RecordWords { velocity: 6, collision: 27, pose: 7, result: 6 };
+
+/// Which collision record is streamed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Geometry {
+    /// Both positions and the contact points in world coordinates
+    /// ([`record::collision`](super::record::collision)).
+    Absolute,
+    /// Everything relative to body A ([`record::relative`](super::record::relative)).
+    Relative,
+}
+
+/// How a bitstream knows the inertia of its bodies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Inertia {
+    /// One number a shape, the same about every axis: cubes, spheres.
+    #[default]
+    Isotropic,
+    /// The inverse inertia of every body about world axes, six numbers that are streamed with its
+    /// velocity and kept on chip: boxes, capsules, anything.
+    World,
+}
+
+/// On-chip memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OnChipMemory {
+    /// Block RAM that bodies and collisions share, bytes (thesis: 4.0 MiB on the XCZU9EG).
+    pub bytes: u32,
+    /// Copies of the velocities. A read goes to one of them, a write to all.
+    pub velocity_copies: u32,
+    /// Clock of the block RAM as a multiple of the accelerator's: a port serves as many accesses
+    /// each cycle.
+    pub pump: u32,
+    /// Shape index of a body, bytes; kept in distributed RAM, not in the block RAM above. The
+    /// thesis has one shape and needs none.
+    pub shape_index_bytes: u32,
+}
+
+/// One design of the accelerator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Profile {
+    /// Identifier in the PROFILE register.
+    pub id: u32,
+    /// Name on the command line and in reports.
+    pub name: &'static str,
+    /// The collision record.
+    pub geometry: Geometry,
+    /// Formats, unless the bitstream was built with others of the same widths on the streams.
+    pub numbers: Numbers,
+    /// Width of each MM2S stream, bits.
+    pub mm2s_widths: &'static [u32],
+    /// Width of each S2MM stream, bits.
+    pub s2mm_widths: &'static [u32],
+    /// How beats are dealt out to the streams.
+    pub stripes: Stripes,
+    /// Cycles from one issue to the next.
+    pub initiation_interval: u32,
+    /// Collisions that enter the pipeline together. A last issue that is not full is filled up with
+    /// padding collisions.
+    pub collisions_per_issue: u32,
+    /// Contact pipeline.
+    pub contact: Depth,
+    /// Friction pipeline.
+    pub friction: Depth,
+    /// Clock of accelerator and streams, kHz.
+    pub clock_khz: u32,
+    /// On-chip memory.
+    pub memory: OnChipMemory,
+    /// Largest number of bodies, whatever the memory.
+    pub body_capacity: u32,
+    /// Entries of the shape table.
+    pub shape_capacity: u32,
+    /// Where the profile is described.
+    pub source: &'static str,
+}
+
+impl Profile {
+    /// The profile of that name.
+    #[must_use]
+    pub fn by_name(name: &str) -> Option<&'static Self> {
+        PROFILES.iter().copied().find(|profile| profile.name == name)
+    }
+
+    /// The profile with that identifier.
+    #[must_use]
+    pub fn by_id(id: u32) -> Option<&'static Self> {
+        PROFILES.iter().copied().find(|profile| profile.id == id)
+    }
+
+    /// The profile as it is built unless something else is chosen.
+    #[must_use]
+    pub const fn default_variant(&'static self) -> Variant {
+        Variant { profile: self, numbers: self.numbers, inertia: Inertia::Isotropic }
+    }
+}
+
+/// A profile with what was chosen when its bitstream was built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Variant {
+    /// The design.
+    pub profile: &'static Profile,
+    /// Its formats.
+    pub numbers: Numbers,
+    /// How it knows inertia.
+    pub inertia: Inertia,
+}
+
+/// Numbers of a velocity, and of a world inverse inertia.
+const SIX: u32 = 6;
+/// Numbers of the accumulated impulses of a collision.
+const FOUR: u32 = 4;
+
+impl Variant {
+    /// Rows of a velocity record.
+    #[must_use]
+    pub const fn velocity_rows(&self) -> usize {
+        match self.inertia {
+            Inertia::Isotropic => velocity::ROWS,
+            Inertia::World => velocity::WORLD_ROWS,
+        }
+    }
+
+    /// Rows of a collision record.
+    #[must_use]
+    pub const fn collision_rows(&self) -> usize {
+        match self.profile.geometry {
+            Geometry::Absolute => absolute::ROWS,
+            Geometry::Relative => relative::ROWS,
+        }
+    }
+
+    /// What the records take on the streams.
+    #[must_use]
+    pub const fn words(&self) -> RecordWords {
+        const fn words(rows: usize, format: StreamFormat) -> u32 {
+            #[expect(clippy::cast_possible_truncation, reason = "a record has few words")]
+            let numbers = (rows * LANES) as u32;
+            numbers * format.bits() / u32::BITS
+        }
+        let bodies = self.numbers.bodies;
+        RecordWords {
+            velocity: words(self.velocity_rows(), bodies),
+            collision: words(self.collision_rows(), self.numbers.collisions),
+            pose: words(pose::ROWS, bodies),
+            result: words(result::ROWS, bodies),
+        }
+    }
+
+    /// On-chip bytes that a body takes: all copies of its velocity, and its inertia.
+    #[must_use]
+    pub const fn bytes_per_body(&self) -> u32 {
+        let velocities =
+            SIX * self.numbers.velocities.bytes() * self.profile.memory.velocity_copies;
+        let inertia = match self.inertia {
+            Inertia::Isotropic => 0,
+            Inertia::World => SIX * self.numbers.velocities.bytes(),
+        };
+        velocities + inertia
+    }
+
+    /// On-chip bytes that a collision takes: its accumulated impulses.
+    #[must_use]
+    pub const fn bytes_per_collision(&self) -> u32 {
+        FOUR * self.numbers.impulses.bytes()
+    }
+
+    /// Largest number of bodies: what the profile says, and what an index can name.
+    #[must_use]
+    pub fn body_capacity(&self) -> u32 {
+        let by_index = self.numbers.collisions.largest_index().saturating_add(1);
+        self.profile.body_capacity.min(by_index)
+    }
+}
