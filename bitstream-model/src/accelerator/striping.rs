@@ -1,19 +1,18 @@
 //! This file deals the beats of an array out to streams: which stream a beat is on, how many are on
 //! each, how long they take.
 
+use crate::interface::address_map::DMA_COUNT_MAX;
 use crate::interface::record::BEAT_BYTES;
 use crate::interface::stripe::Stripe;
 
 /// The most streams that a profile has.
-pub(crate) const STREAMS_MAX: usize = 8;
+pub(crate) const STREAMS_MAX: usize = DMA_COUNT_MAX;
 /// The most beats of a group.
 pub(crate) const GROUP_MAX: usize = 16;
 
-const BEAT_BITS: u32 = 8 * BEAT_BYTES as u32;
-
 /// Clock cycles that a beat takes on a stream of that width.
 pub(crate) const fn beat_cycles(width: u32) -> u64 {
-    (BEAT_BITS / width) as u64
+    8 * BEAT_BYTES as u64 / width as u64
 }
 
 /// A stripe over streams of known widths.
@@ -26,9 +25,9 @@ pub(super) struct Striping {
     /// For each beat of a group its stream, and its number among the group's beats there.
     place: [(u8, u8); GROUP_MAX],
     /// Beats of a group on each stream.
-    share: [usize; STREAMS_MAX],
-    /// Cycles of a beat on each stream.
-    cycles: [u64; STREAMS_MAX],
+    share: [u8; STREAMS_MAX],
+    /// Bits of each stream.
+    widths: [u32; STREAMS_MAX],
 }
 
 impl Striping {
@@ -41,17 +40,17 @@ impl Striping {
             *place = (*stream, *on_stream);
             *on_stream += 1;
         }
-        let mut cycles = [0; STREAMS_MAX];
-        for (cycles, width) in cycles.iter_mut().zip(widths) {
-            *cycles = beat_cycles(*width);
+        let mut known = [0; STREAMS_MAX];
+        for (known, width) in known.iter_mut().zip(widths) {
+            *known = *width;
         }
         Self {
             group: stripe.streams.len(),
             padded: stripe.padded,
             streams: widths.len(),
             place,
-            share: share.map(usize::from),
-            cycles,
+            share,
+            widths: known,
         }
     }
 
@@ -70,14 +69,14 @@ impl Striping {
     pub(super) fn on(&self, stream: usize, beats: usize) -> usize {
         let rest = &self.place[..beats % self.group];
         let of_rest = rest.iter().filter(|place| usize::from(place.0) == stream).count();
-        beats / self.group * self.share[stream] + of_rest
+        beats / self.group * usize::from(self.share[stream]) + of_rest
     }
 
     /// How many beats in one piece, from the first one, there are when each stream has so many.
     pub(super) fn contiguous(&self, on_stream: impl Fn(usize) -> usize) -> usize {
         // For each stream the number of the first beat that is not there.
         let missing = |stream: usize| {
-            let share = self.share[stream];
+            let share = usize::from(self.share[stream]);
             let have = on_stream(stream);
             let (groups, rest) = (have.checked_div(share)?, have % share);
             let at = self.place[..self.group]
@@ -91,7 +90,7 @@ impl Striping {
     /// Clock cycles that the first `beats` beats take: what the busiest stream takes.
     pub(super) fn cycles(&self, beats: usize) -> u64 {
         (0..self.streams)
-            .map(|stream| self.on(stream, beats) as u64 * self.cycles[stream])
+            .map(|stream| self.on(stream, beats) as u64 * beat_cycles(self.widths[stream]))
             .max()
             .unwrap_or(0)
     }
@@ -112,7 +111,7 @@ impl Places<'_> {
     pub(super) fn take(&mut self) -> (usize, usize) {
         let (stream, number) = self.striping.place[self.at];
         let stream = usize::from(stream);
-        let number = self.group * self.striping.share[stream] + usize::from(number);
+        let number = self.group * usize::from(self.striping.share[stream]) + usize::from(number);
         self.at += 1;
         if self.at == self.striping.group {
             self.at = 0;
