@@ -121,7 +121,7 @@ fn the_sums_are_those_of_all_words_on_the_streams() {
     for scene in [one_cube(), Step::falling(7), Step::on_ground(9, 30)] {
         let mut machine = machine();
         let outcome = machine.step(&scene).expect("the step completes");
-        assert_eq!(outcome.sum_received, scene.sum_of_input());
+        assert_eq!(outcome.sum_received, scene.sum_of_input(&machine.host.variant()));
         assert_eq!(outcome.sum_sent, outcome.sum_of_results);
         assert_ne!(outcome.sum_received, 0);
     }
@@ -131,7 +131,7 @@ fn the_sums_are_those_of_all_words_on_the_streams() {
 fn assert_refused(
     machine: &mut Machine,
     scene: &Step,
-    lanes: &[Lane; CORES],
+    lanes: &[Lane],
     code: ErrorCode,
     channel: u32,
     detail: u32,
@@ -387,7 +387,7 @@ fn a_host_that_waits_for_mm2s_idle_before_it_arms_s2mm_waits_for_ever() {
             assert_eq!(dmasr::IDLE.is_set(value), fits, "{bodies} bodies: {value:#x}");
         }
         // Nothing is lost: armed late, the results come.
-        machine.arm(&mut flight, result_beats(bodies.into()));
+        machine.arm(&mut flight, &result_beats(bodies.into()));
         machine.wait(&flight, LONG).expect("the step completes");
         let outcome = machine.collect(&flight, bodies.into());
         let last = usize::from(bodies) - 1;
@@ -419,7 +419,7 @@ fn arguments_and_shapes_are_not_taken_while_a_step_runs() {
         ]
     );
     let mut flight = Flight::default();
-    machine.arm(&mut flight, result_beats(4));
+    machine.arm(&mut flight, &result_beats(4));
     machine.send(&mut flight, &Step::falling(4).lanes());
     machine.wait(&flight, LONG).expect("the step completes");
     let outcome = machine.collect(&flight, 4);
@@ -435,7 +435,7 @@ fn done_is_cleared_by_reading_and_interrupts_by_toggling() {
     let scene = Step::falling(4);
     scene.write_arguments(host);
     let mut flight = Flight::default();
-    machine.arm(&mut flight, result_beats(4));
+    machine.arm(&mut flight, &result_beats(4));
     machine.start();
     machine.send(&mut flight, &scene.lanes());
     machine.wait(&flight, LONG).expect("the step completes");
