@@ -277,7 +277,7 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
         (
             !stripe(&stripes.collisions, profile.mm2s_widths)
                 || streams.iter().any(|widths| !stripe(&stripes.bodies, widths)),
-            "stripes of 1 to 16 beats on streams that exist are expected",
+            "stripes of 1 to 8 beats on streams that exist are expected",
         ),
         (
             profile.initiation_interval == 0 || profile.collisions_per_issue == 0,

@@ -3,7 +3,7 @@
 //! A row is a beat of 32-bit words, or half a beat of sixteen-bit words, in which case two records
 //! may share a beat.
 
-use super::striping::Striping;
+use super::striping::{PerStream, Striping};
 use crate::interface::number::StreamFormat;
 use crate::interface::record::{Beat, LANES};
 
@@ -28,20 +28,23 @@ pub(super) struct Array {
     pub(super) rows: usize,
     pub(super) rows_per_beat: usize,
     pub(super) records: usize,
-    /// Beats, with padding.
+    /// Beats, with padding, altogether and on each stream.
     pub(super) beats: usize,
+    pub(super) packets: PerStream,
 }
 
 impl Array {
     pub(super) fn new(striping: Striping, records: Records) -> Self {
         let rows_per_beat = (u32::BITS / records.format.bits()) as usize;
         let rows = records.count.next_multiple_of(records.together) * records.rows;
+        let beats = striping.padded(rows.div_ceil(rows_per_beat));
         Self {
             striping,
             rows: records.rows,
             rows_per_beat,
             records: records.count,
-            beats: striping.padded(rows.div_ceil(rows_per_beat)),
+            beats,
+            packets: striping.counts(beats),
         }
     }
 
@@ -57,11 +60,6 @@ impl Array {
         } else {
             (beats * self.rows_per_beat / self.rows).min(self.records.saturating_sub(1))
         }
-    }
-
-    /// Beats of the whole array on a stream.
-    pub(super) fn packet(&self, stream: usize) -> usize {
-        self.striping.on(stream, self.beats)
     }
 
     /// Clock cycles that the streams take for the first `records` records.

@@ -1,4 +1,7 @@
 //! This file decodes rows into records and encodes results, from the interface's layouts alone.
+//!
+//! What a word means is looked up for every word; inlined where the format is known, the look-up is
+//! gone.
 
 use super::array::Row;
 use super::integrate::Pose;
@@ -10,7 +13,7 @@ use crate::interface::record::{
 };
 
 /// A number in a word of that format.
-#[inline]
+#[inline(always)]
 fn number(format: StreamFormat, word: u32) -> f32 {
     match format {
         StreamFormat::F32 => f32::from_bits(word),
@@ -29,14 +32,14 @@ fn word(format: StreamFormat, number: f32) -> u32 {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn vec3(format: StreamFormat, [x, y, z, _]: Row) -> [f32; 3] {
-    [x, y, z].map(|word| number(format, word))
+    [number(format, x), number(format, y), number(format, z)]
 }
 
-#[inline]
-fn vec4(format: StreamFormat, row: Row) -> [f32; 4] {
-    row.map(|word| number(format, word))
+#[inline(always)]
+fn vec4(format: StreamFormat, [x, y, z, w]: Row) -> [f32; 4] {
+    [number(format, x), number(format, y), number(format, z), number(format, w)]
 }
 
 /// A collision as it comes in. `count` is as received and may be out of range.
@@ -54,7 +57,7 @@ pub(super) struct Collision {
 
 impl Collision {
     /// A record in world coordinates.
-    #[inline]
+    #[inline(always)]
     pub(super) fn absolute(format: StreamFormat, rows: &[Row; collision::ROWS]) -> Self {
         let contact = |k: usize| vec4(format, rows[collision::CONTACTS + k]);
         Self {
@@ -70,7 +73,7 @@ impl Collision {
 
     /// A record relative to body A, which then stands at the origin. Points at a distance of
     /// +infinity are left out.
-    #[inline]
+    #[inline(always)]
     pub(super) fn relative(format: StreamFormat, rows: &[Row; relative::ROWS]) -> Self {
         let mut contacts = [[0.0; 4]; CONTACT_POINTS];
         let mut count = 0;

@@ -7,7 +7,7 @@ use super::integrate::integrate;
 use super::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
 use super::pipeline::Entry;
 use super::results::Results;
-use super::segment::{PacketError, Segment};
+use super::segment::{PacketError, Reader, Segment};
 use super::solver::{self, Mass, Velocity};
 use super::striping::Striping;
 use super::{Accelerator, Phase};
@@ -111,14 +111,12 @@ impl Accelerator {
         self.injected()?;
         segment.check(records, inputs)?;
         let format = self.variant.numbers.bodies;
-        for ahead in 0..records {
-            let body = segment.done + ahead;
+        let mut reader = segment.reader(inputs);
+        for body in segment.done..segment.done + records {
             let (velocity, shape) = match self.variant.inertia {
-                Inertia::Isotropic => {
-                    decode::velocity(format, &segment.record::<{ velocity::ROWS }>(ahead, inputs))
-                }
+                Inertia::Isotropic => decode::velocity(format, &reader.record()),
                 Inertia::World => {
-                    let rows = segment.record::<{ velocity::WORLD_ROWS }>(ahead, inputs);
+                    let rows = reader.record::<{ velocity::WORLD_ROWS }>();
                     let inertia = decode::world_inertia(format, &rows);
                     self.inertias[body] = self.stored(self.variant.numbers.velocities, inertia);
                     decode::velocity(format, &[rows[velocity::LINEAR], rows[velocity::ANGULAR]])
@@ -244,12 +242,13 @@ impl Accelerator {
         segment.check(available, inputs)?;
         let mut cycles = 0;
         let mut records = 0;
+        let mut reader = segment.reader(inputs);
         while records < available && cycles <= limit {
             let issue = (available - records).min(per_issue);
-            for ahead in records..records + issue {
-                let collision = self.collision(&segment, ahead, inputs);
+            let first = segment.done + records;
+            for index in first..first + issue {
+                let collision = self.collision(&mut reader);
                 let now = self.clock + cycles;
-                let index = segment.done + ahead;
                 let stall = self.solve::<R, U, I>(number, index, now, &collision)?;
                 cycles += stall;
                 self.counters.stalls += stall;
@@ -271,24 +270,16 @@ impl Accelerator {
         Ok(true)
     }
 
-    /// The collision `ahead` places after the next one.
+    /// The next collision.
     #[inline]
-    fn collision(&self, segment: &Segment, ahead: usize, inputs: &[Stream]) -> Collision {
+    fn collision(&self, reader: &mut Reader<'_>) -> Collision {
         use StreamFormat::{Binary16, F32, Thesis16};
         match (self.variant.profile.geometry, self.variant.numbers.collisions) {
-            (Geometry::Absolute, F32) => Collision::absolute(F32, &segment.record(ahead, inputs)),
-            (Geometry::Absolute, Binary16) => {
-                Collision::absolute(Binary16, &segment.record(ahead, inputs))
-            }
-            (Geometry::Absolute, Thesis16) => {
-                Collision::absolute(Thesis16, &segment.record(ahead, inputs))
-            }
-            (Geometry::Relative, Binary16) => {
-                Collision::relative(Binary16, &segment.record(ahead, inputs))
-            }
-            (Geometry::Relative, format) => {
-                Collision::relative(format, &segment.record(ahead, inputs))
-            }
+            (Geometry::Absolute, F32) => Collision::absolute(F32, &reader.record()),
+            (Geometry::Absolute, Binary16) => Collision::absolute(Binary16, &reader.record()),
+            (Geometry::Absolute, Thesis16) => Collision::absolute(Thesis16, &reader.record()),
+            (Geometry::Relative, Binary16) => Collision::relative(Binary16, &reader.record()),
+            (Geometry::Relative, format) => Collision::relative(format, &reader.record()),
         }
     }
 
@@ -312,12 +303,12 @@ impl Accelerator {
             return Ok(0);
         }
         let sides = [collision.body_a as usize, collision.body_b as usize];
-        let masses = self.checked(index, collision, sides)?;
+        let masses = self.checked::<I>(index, collision, sides)?;
         let moving = [masses[0].inverse_mass != 0.0, masses[1].inverse_mass != 0.0];
         let entry = Entry { bodies: [collision.body_a, collision.body_b], moving };
         let stall = if unchecked { 0 } else { self.pipeline.wait(now, &entry) };
 
-        let mut velocities = sides.map(|body| self.velocities[body]);
+        let mut velocities = [self.velocities[sides[0]], self.velocities[sides[1]]];
         let mut impulses = self.impulses[index];
         let parameters = &self.arguments.solver;
         let contacts = self.arguments.contact_iterations;
@@ -352,7 +343,8 @@ impl Accelerator {
             impulses = self.stored(precision, impulses);
         }
         self.impulses[index] = impulses;
-        let velocities = velocities.map(|velocity| self.stored_velocity(velocity));
+        let [a, b] = velocities;
+        let velocities = [self.stored_velocity(a), self.stored_velocity(b)];
 
         if unchecked {
             let stale = self.pipeline.issue(&entry, velocities);
@@ -371,7 +363,7 @@ impl Accelerator {
 
     /// What the decoder refuses; the mass properties of both bodies otherwise.
     #[inline]
-    fn checked(
+    fn checked<I: inertia::Inertia>(
         &self,
         index: usize,
         collision: &Collision,
@@ -388,18 +380,16 @@ impl Accelerator {
             return Err(error(ErrorCode::SelfCollision));
         }
         let shapes = self.registers.shapes();
-        let masses = sides.map(|body| {
+        let mass = |body: usize| {
             let shape = shapes[usize::from(self.shape_of[body])];
-            let inverse_inertia = match self.variant.inertia {
-                Inertia::Isotropic => [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
-                Inertia::World => self.inertias[body],
-            };
+            let inverse_inertia = I::stored(shape.inverse_inertia, &self.inertias, body);
             Mass { inverse_mass: shape.inverse_mass, inverse_inertia }
-        });
-        if masses.iter().all(|mass| mass.inverse_mass == 0.0) {
+        };
+        let (a, b) = (mass(sides[0]), mass(sides[1]));
+        if a.inverse_mass == 0.0 && b.inverse_mass == 0.0 {
             return Err(error(ErrorCode::StaticPair));
         }
-        Ok(masses)
+        Ok([a, b])
     }
 
     /// Integrates the bodies whose poses have arrived and sends their results, a beat a cycle on
@@ -427,9 +417,9 @@ impl Accelerator {
             (Precision::Binary16, Subnormals::Keep) => integrate::<Half>,
             (Precision::Binary16, Subnormals::Flush) => integrate::<HalfFlushed>,
         };
-        for ahead in 0..records {
-            let body = poses.done + ahead;
-            let pose = decode::pose(format, &poses.record(ahead, inputs));
+        let mut reader = poses.reader(inputs);
+        for body in poses.done..poses.done + records {
+            let pose = decode::pose(format, &reader.record());
             let velocity = self.velocities[body];
             let moves = shapes[usize::from(self.shape_of[body])].inverse_mass != 0.0;
             let (pose, velocity) = if moves && self.arguments.integrate {

@@ -1,7 +1,7 @@
 //! This file sends the results: rows into beats, beats onto streams, padding, TLAST.
 
 use super::array::{Array, Row, beat_of};
-use super::striping::STREAMS_MAX;
+use super::striping::{PerStream, STREAMS_MAX};
 use crate::interface::record::{Beat, result};
 use crate::stream::Stream;
 
@@ -16,7 +16,7 @@ pub(super) struct Results {
     done: usize,
     /// Beats sent so far, altogether and on each stream.
     beats: usize,
-    sent: [usize; STREAMS_MAX],
+    sent: PerStream,
 }
 
 impl Results {
@@ -57,7 +57,7 @@ impl Results {
     fn push(&mut self, beat: Beat, streams: &mut [Stream]) -> u32 {
         let (k, number) = self.array.striping.places(self.beats).take();
         streams[k].push(&[beat]);
-        if number + 1 == self.array.packet(k) {
+        if number + 1 == self.array.packets[k] {
             streams[k].mark_last();
         }
         self.beats += 1;

@@ -2,10 +2,10 @@
 //! how many whole records have arrived, and whether TLAST comes where it must.
 
 use super::array::{Array, Row, half_of};
-use super::striping::STREAMS_MAX;
+use super::striping::{PerStream, Places, STREAMS_MAX};
 use crate::cast::register;
 use crate::interface::control::ErrorCode;
-use crate::interface::record::LANES;
+use crate::interface::record::{Beat, LANES};
 use crate::stream::Stream;
 
 /// A packet that does not end where it must.
@@ -24,7 +24,7 @@ pub(super) struct Segment {
     /// Records read so far.
     pub(super) done: usize,
     /// Beats taken so far from each stream.
-    taken: [usize; STREAMS_MAX],
+    taken: PerStream,
 }
 
 impl Segment {
@@ -52,10 +52,10 @@ impl Segment {
     /// Checks that the next `records` records end packets where they must and nowhere else, with
     /// whole beats.
     pub(super) fn check(&self, records: usize, streams: &[Stream]) -> Result<(), PacketError> {
-        let after = self.array.beats_of(self.done + records);
+        let after = self.array.striping.counts(self.array.beats_of(self.done + records));
         for (k, stream) in streams.iter().enumerate() {
-            let packet = self.array.packet(k);
-            let now = self.array.striping.on(k, after) - self.taken[k];
+            let packet = self.array.packets[k];
+            let now = after[k] - self.taken[k];
             let ends = now > 0 && self.taken[k] + now == packet;
             let error = |code, beat| PacketError { code, channel: k, beat: register(beat) };
             match stream.next_last() {
@@ -77,52 +77,74 @@ impl Segment {
         Ok(())
     }
 
-    /// The rows of the record `ahead` places after the next one.
-    #[inline]
-    pub(super) fn record<const ROWS: usize>(
-        &self,
-        ahead: usize,
-        streams: &[Stream],
-    ) -> [Row; ROWS] {
-        debug_assert!(ROWS == self.array.rows, "the caller knows the record");
-        let first = (self.done + ahead) * ROWS;
-        let mut places = self.array.striping.places(first / self.array.rows_per_beat);
-        let mut next = || {
-            let (stream, number) = places.take();
-            streams[stream].peek(number - self.taken[stream])
-        };
-        let mut rows = [[0; LANES]; ROWS];
-        if self.array.rows_per_beat == 1 {
-            rows.fill_with(|| next().0);
-        } else {
-            let mut beat = next();
-            let mut half = first % 2;
-            for row in &mut rows {
-                if half == 2 {
-                    (beat, half) = (next(), 0);
-                }
-                *row = half_of(beat, half);
-                half += 1;
-            }
+    /// Reads records that have arrived, of which there must be one, one after the other; they stay
+    /// in the streams until [`advance`](Self::advance).
+    pub(super) fn reader<'a>(&'a self, streams: &'a [Stream]) -> Reader<'a> {
+        let first = self.done * self.array.rows;
+        let places = self.array.striping.places(first / self.array.rows_per_beat);
+        let mut reader = Reader { segment: self, streams, places, left: None };
+        if !first.is_multiple_of(self.array.rows_per_beat) {
+            reader.left = Some(half_of(reader.beat(), 1));
         }
-        rows
+        reader
     }
 
     /// The next `records` records have been read; returns the sum of all words that were taken.
     pub(super) fn advance(&mut self, records: usize, streams: &mut [Stream]) -> u32 {
         self.done += records;
-        let after = self.array.beats_of(self.done);
+        let after = self.array.striping.counts(self.array.beats_of(self.done));
         let mut sum = 0_u32;
         for (k, stream) in streams.iter_mut().enumerate() {
-            let taken = self.array.striping.on(k, after);
-            sum = sum.wrapping_add(stream.take_sum(taken - self.taken[k]));
-            self.taken[k] = taken;
+            sum = sum.wrapping_add(stream.take_sum(after[k] - self.taken[k]));
         }
+        self.taken = after;
         sum
     }
 
     pub(super) fn finished(&self) -> bool {
         self.done == self.array.records
+    }
+}
+
+/// Reads one record after the other.
+#[derive(Debug)]
+pub(super) struct Reader<'a> {
+    segment: &'a Segment,
+    streams: &'a [Stream],
+    places: Places<'a>,
+    /// The second row of a beat of which the first has been read.
+    left: Option<Row>,
+}
+
+impl Reader<'_> {
+    #[inline(always)]
+    fn beat(&mut self) -> Beat {
+        let (stream, number) = self.places.take();
+        self.streams[stream].peek(number - self.segment.taken[stream])
+    }
+
+    /// The rows of the next record.
+    #[inline]
+    pub(super) fn record<const ROWS: usize>(&mut self) -> [Row; ROWS] {
+        debug_assert!(ROWS == self.segment.array.rows, "the caller knows the record");
+        let mut rows = [[0; LANES]; ROWS];
+        if self.segment.array.rows_per_beat == 1 {
+            for row in &mut rows {
+                *row = self.beat().0;
+            }
+        } else {
+            for row in &mut rows {
+                *row = match self.left.take() {
+                    Some(row) => row,
+                    None => {
+                        let beat = self.beat();
+                        self.left = Some(half_of(beat, 1));
+                        half_of(beat, 0)
+                    }
+                };
+            }
+        }
+        rows
     }
 }
 
@@ -132,7 +154,6 @@ mod tests {
     use super::super::striping::Striping;
     use super::*;
     use crate::interface::profile::{FLOAT, HALF, Profile};
-    use crate::interface::record::Beat;
 
     fn streams<const N: usize>(lengths: [usize; N]) -> Vec<Stream> {
         lengths
@@ -190,9 +211,11 @@ mod tests {
         let mut segment = collisions(&HALF, 4);
         let numbers = |rows: [Row; 7]| rows.map(|[number, ..]| number);
         assert_eq!(segment.available(&all), 2);
-        assert_eq!(numbers(segment.record(1, &all)), [7, 8, 9, 10, 11, 12, 13]);
+        let mut reader = segment.reader(&all);
+        assert_eq!(numbers(reader.record()), [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(numbers(reader.record()), [7, 8, 9, 10, 11, 12, 13]);
         assert_eq!(segment.advance(1, &mut all), 1 + 2 + 3 + 4 + 5);
-        assert_eq!(numbers(segment.record(0, &all)), [7, 8, 9, 10, 11, 12, 13]);
+        assert_eq!(numbers(segment.reader(&all).record()), [7, 8, 9, 10, 11, 12, 13]);
         segment.advance(1, &mut all);
         assert!(all.iter().all(|stream| stream.len() == 0));
     }

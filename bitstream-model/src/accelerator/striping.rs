@@ -8,12 +8,15 @@ use crate::interface::stripe::Stripe;
 /// The most streams that a profile has.
 pub(crate) const STREAMS_MAX: usize = DMA_COUNT_MAX;
 /// The most beats of a group.
-pub(crate) const GROUP_MAX: usize = 16;
+pub(crate) const GROUP_MAX: usize = 8;
 
 /// Clock cycles that a beat takes on a stream of that width.
 pub(crate) const fn beat_cycles(width: u32) -> u64 {
     8 * BEAT_BYTES as u64 / width as u64
 }
+
+/// A count for each stream.
+pub(super) type PerStream = [usize; STREAMS_MAX];
 
 /// A stripe over streams of known widths.
 #[derive(Debug, Clone, Copy)]
@@ -21,9 +24,10 @@ pub(super) struct Striping {
     /// Beats of a group.
     group: usize,
     padded: bool,
-    streams: usize,
-    /// For each beat of a group its stream, and its number among the group's beats there.
-    place: [(u8, u8); GROUP_MAX],
+    /// For each beat of a group its stream, and how many of the group are on each stream before it.
+    place: [(u8, [u8; STREAMS_MAX]); GROUP_MAX],
+    /// For each stream which beats of a group it carries.
+    carried: [[u8; GROUP_MAX]; STREAMS_MAX],
     /// Beats of a group on each stream.
     share: [u8; STREAMS_MAX],
     /// Bits of each stream.
@@ -33,12 +37,14 @@ pub(super) struct Striping {
 impl Striping {
     /// The stripe of a profile that the configuration has checked.
     pub(super) fn new(stripe: &Stripe, widths: &[u32]) -> Self {
-        let mut place = [(0, 0); GROUP_MAX];
+        let mut place = [(0, [0; STREAMS_MAX]); GROUP_MAX];
+        let mut carried = [[0; GROUP_MAX]; STREAMS_MAX];
         let mut share = [0; STREAMS_MAX];
-        for (place, stream) in place.iter_mut().zip(stripe.streams) {
-            let on_stream = &mut share[usize::from(*stream)];
-            *place = (*stream, *on_stream);
-            *on_stream += 1;
+        for (beat, (place, stream)) in (0..).zip(place.iter_mut().zip(stripe.streams)) {
+            *place = (*stream, share);
+            let k = usize::from(*stream);
+            carried[k][usize::from(share[k])] = beat;
+            share[k] += 1;
         }
         let mut known = [0; STREAMS_MAX];
         for (known, width) in known.iter_mut().zip(widths) {
@@ -47,8 +53,8 @@ impl Striping {
         Self {
             group: stripe.streams.len(),
             padded: stripe.padded,
-            streams: widths.len(),
             place,
+            carried,
             share,
             widths: known,
         }
@@ -65,34 +71,36 @@ impl Striping {
         Places { striping: self, group: beat / self.group, at: beat % self.group }
     }
 
-    /// How many of the first `beats` beats are on a stream.
-    pub(super) fn on(&self, stream: usize, beats: usize) -> usize {
-        let rest = &self.place[..beats % self.group];
-        let of_rest = rest.iter().filter(|place| usize::from(place.0) == stream).count();
-        beats / self.group * usize::from(self.share[stream]) + of_rest
+    /// How many of the first `beats` beats are on each stream.
+    pub(super) fn counts(&self, beats: usize) -> PerStream {
+        let (groups, rest) = (beats / self.group, beats % self.group);
+        let before = self.place[rest].1;
+        std::array::from_fn(|k| groups * usize::from(self.share[k]) + usize::from(before[k]))
     }
 
     /// How many beats in one piece, from the first one, there are when each stream has so many.
     pub(super) fn contiguous(&self, on_stream: impl Fn(usize) -> usize) -> usize {
-        // For each stream the number of the first beat that is not there.
-        let missing = |stream: usize| {
-            let share = usize::from(self.share[stream]);
-            let have = on_stream(stream);
-            let (groups, rest) = (have.checked_div(share)?, have % share);
-            let at = self.place[..self.group]
-                .iter()
-                .position(|place| (usize::from(place.0), usize::from(place.1)) == (stream, rest))?;
-            Some(groups * self.group + at)
-        };
-        (0..self.streams).filter_map(missing).min().unwrap_or(0)
+        let mut beats = usize::MAX;
+        for (k, share) in self.share.into_iter().enumerate() {
+            if share > 0 {
+                // The first beat that this stream does not have.
+                let (have, share) = (on_stream(k), usize::from(share));
+                let missing = usize::from(self.carried[k][have % share]);
+                beats = beats.min(have / share * self.group + missing);
+            }
+        }
+        beats
     }
 
     /// Clock cycles that the first `beats` beats take: what the busiest stream takes.
     pub(super) fn cycles(&self, beats: usize) -> u64 {
-        (0..self.streams)
-            .map(|stream| self.on(stream, beats) as u64 * beat_cycles(self.widths[stream]))
-            .max()
-            .unwrap_or(0)
+        let mut cycles = 0;
+        for (beats, width) in self.counts(beats).into_iter().zip(self.widths) {
+            if width > 0 {
+                cycles = cycles.max(beats as u64 * beat_cycles(width));
+            }
+        }
+        cycles
     }
 }
 
@@ -107,11 +115,12 @@ pub(super) struct Places<'a> {
 
 impl Places<'_> {
     /// The next beat's.
-    #[inline]
+    #[inline(always)]
     pub(super) fn take(&mut self) -> (usize, usize) {
-        let (stream, number) = self.striping.place[self.at];
+        let (stream, before) = self.striping.place[self.at];
         let stream = usize::from(stream);
-        let number = self.group * usize::from(self.striping.share[stream]) + usize::from(number);
+        let share = usize::from(self.striping.share[stream]);
+        let number = self.group * share + usize::from(before[stream]);
         self.at += 1;
         if self.at == self.striping.group {
             self.at = 0;
@@ -160,17 +169,15 @@ mod tests {
         for profile in [&NAIVE, &FLOAT, &HALF, &MIXED] {
             for striping in [collisions(profile), bodies(profile)] {
                 let mut walk = striping.places(0);
-                let mut counts = vec![0; striping.streams];
+                let mut counts = [0; STREAMS_MAX];
                 for beats in 0..40 {
-                    for (stream, count) in counts.iter().enumerate() {
-                        assert_eq!(striping.on(stream, beats), *count, "{} {beats}", profile.name);
-                    }
+                    assert_eq!(striping.counts(beats), counts, "{} {beats}", profile.name);
                     assert_eq!(striping.contiguous(|stream| counts[stream]), beats);
                     let (stream, number) = walk.take();
                     assert_eq!(number, counts[stream]);
                     // A beat too early on the other streams changes nothing.
                     let ahead = |k: usize| counts[k] + usize::from(k != stream);
-                    if striping.streams > 1 {
+                    if profile.mm2s_widths.len() > 1 {
                         assert_eq!(striping.contiguous(ahead), beats);
                     }
                     counts[stream] += 1;

@@ -45,9 +45,9 @@ struct Build {
     length_width: u32,
     address_width: u32,
     scatter_gather: bool,
-    /// Clocks that a beat takes on the streams.
-    mm2s_beat_cycles: u64,
-    s2mm_beat_cycles: u64,
+    /// Binary logarithm of the clocks that a beat takes on the streams.
+    mm2s_beat_shift: u32,
+    s2mm_beat_shift: u32,
     delays: Delays,
 }
 
@@ -79,14 +79,15 @@ impl Core {
     pub(crate) fn new(core: usize, config: &BoardConfig) -> Self {
         let profile = config.profile;
         // A core whose other direction has no stream: any number will do.
-        let cycles = |widths: &[u32]| widths.get(core).map_or(1, |width| beat_cycles(*width));
+        let shift =
+            |widths: &[u32]| widths.get(core).map_or(0, |width| beat_cycles(*width).ilog2());
         let build = Build {
             core,
             length_width: config.quirks.length_register.unwrap_or(config.length_width),
             address_width: config.address_width,
             scatter_gather: config.scatter_gather,
-            mm2s_beat_cycles: cycles(profile.mm2s_widths),
-            s2mm_beat_cycles: cycles(profile.s2mm_widths),
+            mm2s_beat_shift: shift(profile.mm2s_widths),
+            s2mm_beat_shift: shift(profile.s2mm_widths),
             delays: config.delays,
         };
         let held = config.quirks.held_reset == Some(Resettable::Dma(core));

@@ -65,7 +65,7 @@ impl Channel {
                         break;
                     };
                     moved += n;
-                    self.time += n as u64 * self.beat_cycles(build);
+                    self.time += (n as u64) << self.beat_shift(build);
                     bd.rxsof |= !self.in_packet;
                     self.in_packet = true;
                     bd.moved += left.min(register(n * BEAT_BYTES));
@@ -97,7 +97,7 @@ impl Channel {
                         break;
                     };
                     moved += n;
-                    self.time += n as u64 * self.beat_cycles(build);
+                    self.time += (n as u64) << self.beat_shift(build);
                     let done = done + left.min(register(n * BEAT_BYTES));
                     self.work = Work::Direct { moved: done };
                     if ended {
@@ -120,17 +120,19 @@ impl Channel {
         runs && self.direction == Direction::S2mm && self.idle && self.in_packet && stream.len() > 0
     }
 
-    /// Clocks that a beat takes on the stream.
-    fn beat_cycles(&self, build: &Build) -> u64 {
+    /// Binary logarithm of the clocks that a beat takes on the stream.
+    fn beat_shift(&self, build: &Build) -> u32 {
         match self.direction {
-            Direction::Mm2s => build.mm2s_beat_cycles,
-            Direction::S2mm => build.s2mm_beat_cycles,
+            Direction::Mm2s => build.mm2s_beat_shift,
+            Direction::S2mm => build.s2mm_beat_shift,
         }
     }
 
     /// Beats that can be moved now: those that begin before `end`.
     fn portion(&self, build: &Build, left: u32, end: u64, limit: usize, stream: &Stream) -> usize {
-        let clocks = end.saturating_sub(self.time).div_ceil(self.beat_cycles(build));
+        let shift = self.beat_shift(build);
+        let last = (1 << shift) - 1;
+        let clocks = end.saturating_sub(self.time).saturating_add(last) >> shift;
         let clocks = usize::try_from(clocks).unwrap_or(usize::MAX);
         let stream_beats = match self.direction {
             Direction::Mm2s => stream.space(),

@@ -76,8 +76,8 @@ pub mod features {
     pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 4, Access::ReadOnly);
 }
 
-/// Fields of NUMBERS: a [`StreamFormat`](super::super::number::StreamFormat) each for the streams, a
-/// [`Precision`](super::super::number::Precision) each for the rest.
+/// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
+/// [`Precision`](super::number::Precision) each for the rest.
 pub mod numbers {
     use super::{Access, Field};
 
