@@ -46,6 +46,7 @@ use solver::{Impulses, Velocity};
 
 /// Where a step stands.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::large_enum_variant, reason = "an accelerator has one")]
 enum Phase {
     Idle,
     Load(Segment),
