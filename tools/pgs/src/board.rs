@@ -4,7 +4,6 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
-use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::{
@@ -147,8 +146,7 @@ impl Opened {
     }
 
     fn profile(&self) -> &'static str {
-        Profile::by_id(self.accelerator.capabilities().profile_id)
-            .map_or("unknown", |profile| profile.name)
+        self.accelerator.capabilities().variant.profile.name
     }
 
     /// Two lines: which board and why, which bitstream.
