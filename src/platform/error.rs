@@ -244,11 +244,22 @@ pub enum PlatformError {
         /// The UIO node that was looked for.
         node: &'static str,
     },
-    /// Another program uses the board.
-    #[error("{} is locked: another program uses the board; end it first", path.display())]
+    /// Somebody else has a device file.
+    #[error(
+        "{} is locked: another program, or another part of this one, uses it; end that first",
+        path.display()
+    )]
     Busy {
         /// The locked file.
         path: PathBuf,
+    },
+    /// A map is mapped already.
+    #[error("map {map:?} of UIO node {node:?} is mapped already: drop its window first")]
+    MappedAlready {
+        /// Name of the node.
+        node: String,
+        /// Name of the map.
+        map: String,
     },
     /// `/dev/mem` was not given.
     #[error(

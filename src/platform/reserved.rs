@@ -16,7 +16,10 @@ use super::{
 };
 
 /// A contiguous piece of physical memory for DMA, mapped as Device memory.
-#[derive(Debug, Clone)]
+///
+/// As long as it exists nobody else opens its device file, and a store takes it alone: no two
+/// threads meet at a beat.
+#[derive(Debug)]
 pub struct ReservedMemory {
     mapping: Arc<Mapping>,
     address: u64,
@@ -69,7 +72,12 @@ impl ReservedMemory {
     ///
     /// # Errors
     /// [`PlatformError::OutOfRegion`] if they do not lie in the memory, or between its beats.
-    pub fn write(&self, at: u64, beats: &[Beat]) -> Result<(), PlatformError> {
+    pub fn write(&mut self, at: u64, beats: &[Beat]) -> Result<(), PlatformError> {
+        self.store(at, beats)
+    }
+
+    /// For a holder of these beats alone.
+    fn store(&self, at: u64, beats: &[Beat]) -> Result<(), PlatformError> {
         let at = self.checked(at, beats.len())?;
         store_beats(&*self.mapping, at, beats);
         release_to_device();
@@ -104,7 +112,8 @@ impl ReservedMemory {
 }
 
 /// The CPU works on the heap; what changes hands is copied. Shared words take aligned 32-bit
-/// accesses, which Device memory does too.
+/// accesses, which Device memory does too. The pool gives each piece to one holder: no two threads
+/// meet at a beat here either.
 impl Region for ReservedMemory {
     fn address(&self) -> u64 {
         self.address
@@ -130,7 +139,7 @@ impl Region for ReservedMemory {
         access: Access,
     ) -> Result<(), PlatformError> {
         match access {
-            Access::Read => self.write(at as u64, &memory.beats()[..used]),
+            Access::Read => self.store(at as u64, &memory.beats()[..used]),
             Access::Write => Ok(()),
         }
     }
@@ -155,6 +164,12 @@ pub(crate) mod fake {
 
     use super::*;
     use crate::platform::uio_fake::add_node;
+
+    /// The same memory once more, as the device has it.
+    pub(crate) fn as_the_device(memory: &ReservedMemory) -> ReservedMemory {
+        let ReservedMemory { mapping, address, name } = memory;
+        ReservedMemory { mapping: Arc::clone(mapping), address: *address, name: name.clone() }
+    }
 
     /// Memory of `bytes` bytes at `address`; it lasts as long as the folder.
     pub(crate) fn reserved(address: u64, bytes: u64) -> (tempfile::TempDir, ReservedMemory) {
@@ -184,7 +199,7 @@ mod tests {
     #[test]
     fn beats_lie_in_physical_memory_where_the_address_says() {
         let (_root, system) = memory();
-        let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        let mut memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
         assert_eq!((memory.address(), memory.bytes()), (0x6000_0000, 0x2000));
         let beats = [Beat([1, 2, 3, 4]), Beat([5, 6, 7, 8])];
         memory.write(0x1FE0, &beats).expect("inside");
@@ -199,7 +214,7 @@ mod tests {
     #[test]
     fn what_lies_outside_or_between_beats_is_refused_and_not_touched() {
         let (_root, system) = memory();
-        let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        let mut memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
         let mut beats = [Beat([9; 4]); 2];
         for at in [8, 0x1FF0, 0x2000, u64::MAX - 15] {
             let error = memory.write(at, &beats).expect_err("refused");
@@ -208,6 +223,24 @@ mod tests {
         }
         let file = fs::read(system.dev.join("uio1")).expect("read");
         assert!(file.iter().all(|byte| *byte == 0));
+    }
+
+    #[test]
+    fn memory_has_one_user_also_after_its_node_was_closed() {
+        let (_root, system) = memory();
+        let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        let error = ReservedMemory::open_in(&system, "pgs-memory").expect_err("in use");
+        assert!(
+            matches!(&error, PlatformError::Busy { path } if path.ends_with("uio1")),
+            "{error}"
+        );
+        ReservedMemory::open_in(&system, "other").expect("another one");
+        // What the pool gave out keeps it, too.
+        let words = memory.shared(0, 4).expect("inside");
+        drop(memory);
+        ReservedMemory::open_in(&system, "pgs-memory").expect_err("a ring is left");
+        drop(words);
+        ReservedMemory::open_in(&system, "pgs-memory").expect("nobody has it");
     }
 
     #[test]
