@@ -261,6 +261,30 @@ pub enum PlatformError {
         /// Name of the map.
         map: String,
     },
+    /// A property of the device tree is not what it should be.
+    #[error("expected {expected} in {}, found {found:02x?}: correct the device tree", path.display())]
+    DeviceTree {
+        /// Which property.
+        path: PathBuf,
+        /// What it should hold.
+        expected: &'static str,
+        /// Its bytes.
+        found: Vec<u8>,
+    },
+    /// Kernel and device tree disagree on the length of a region.
+    #[error(
+        "region {region}: the kernel gives it {kernel} bytes in whole pages, `reg` in the device \
+         tree {}; refusing to guess where it ends: correct its `reg`",
+        found.map_or_else(|| "nothing".to_owned(), |bytes| format!("{bytes} bytes"))
+    )]
+    RegionLength {
+        /// Name of the region.
+        region: String,
+        /// Length by the kernel, from the region's first byte to the end of its last page.
+        kernel: u64,
+        /// Length by the device tree, if it has that region.
+        found: Option<u64>,
+    },
     /// `/dev/mem` was not given.
     #[error(
         "the kernel does not let {} be {act} at {address:#x}: it needs root, and a kernel with \

@@ -34,6 +34,7 @@
 mod buffer;
 mod copy;
 mod dev_mem;
+mod device_tree;
 #[cfg(feature = "emulation")]
 mod emulated;
 mod error;

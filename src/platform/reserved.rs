@@ -31,7 +31,8 @@ impl ReservedMemory {
     /// one that it has.
     ///
     /// # Errors
-    /// As [`UioDevice::open`], and [`PlatformError::Misaligned`] for memory between beats.
+    /// As [`UioDevice::open`], [`PlatformError::Misaligned`] for memory between beats, and
+    /// [`PlatformError::RegionLength`] if it is not known where the memory ends.
     pub fn open(name: &str) -> Result<Self, PlatformError> {
         Self::open_in(&System::default(), name)
     }
@@ -186,7 +187,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::platform::uio_fake::add_node;
+    use crate::platform::uio_fake::{add_node, add_reg};
 
     fn memory() -> (tempfile::TempDir, System) {
         let root = tempfile::tempdir().expect("a directory");
@@ -241,6 +242,24 @@ mod tests {
         ReservedMemory::open_in(&system, "pgs-memory").expect_err("a ring is left");
         drop(words);
         ReservedMemory::open_in(&system, "pgs-memory").expect("nobody has it");
+    }
+
+    #[test]
+    fn a_reservation_that_is_no_whole_pages_is_not_overrun() {
+        let (_root, system) = memory();
+        add_reg(&system, 1, &[(0x6000_0000, 0x1050)]);
+        let mut memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        assert_eq!(memory.bytes(), 0x1050);
+        memory.write(0x1040, &[Beat([1; 4])]).expect("the last beat");
+        memory.write(0x1050, &[Beat([1; 4])]).expect_err("behind the reservation");
+        drop(memory);
+        add_reg(&system, 1, &[(0x6000_0000, 0x1000), (0x6000_1000, 0x1000)]);
+        let error = ReservedMemory::open_in(&system, "pgs-memory").expect_err("which end?");
+        let (kernel, found) = (0x2000, Some(0x1000));
+        assert!(
+            matches!(error, PlatformError::RegionLength { kernel: k, found: f, .. } if (k, f) == (kernel, found)),
+            "{error}"
+        );
     }
 
     #[test]

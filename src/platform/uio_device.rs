@@ -9,6 +9,7 @@
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
 use std::os::fd::AsFd as _;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -28,6 +29,8 @@ use super::{PlatformError, System, UioMap, UioNode, UioWindow, uio_nodes};
 #[derive(Debug)]
 pub struct UioDevice {
     node: UioNode,
+    /// The node's folder in the device tree, if it comes from one.
+    tree: PathBuf,
     file: Arc<LockedFile>,
     claims: Claims,
 }
@@ -60,7 +63,8 @@ impl UioDevice {
     pub(crate) fn of_node(system: &System, node: UioNode) -> Result<Self, PlatformError> {
         // Without O_NONBLOCK a wake-up that somebody else took would block for ever.
         let file = LockedFile::open(&system.dev.join(&node.device), nix::libc::O_NONBLOCK)?;
-        Ok(Self { node, file: Arc::new(file), claims: Claims::default() })
+        let tree = system.uio.join(&node.device).join("device/of_node");
+        Ok(Self { node, tree, file: Arc::new(file), claims: Claims::default() })
     }
 
     /// What the kernel says of it.
@@ -81,7 +85,7 @@ impl UioDevice {
 
     /// Maps a region.
     pub(crate) fn map(&self, map: &UioMap) -> Result<UioWindow, PlatformError> {
-        UioWindow::new(&self.file, &self.node, map, &self.claims)
+        UioWindow::new(&self.file, &self.node, map, &self.tree, &self.claims)
     }
 
     /// Waits until the interrupt comes: its count since the device was registered. `None` if
@@ -195,7 +199,7 @@ mod tests {
         let node = UioNode { device: "uio0".to_owned(), name: "pgs".to_owned(), maps: Vec::new() };
         let file = File::from(OwnedFd::from(ours));
         let file = Arc::new(LockedFile::of_file(file, "/dev/uio0".as_ref()).expect("locked"));
-        (UioDevice { node, file, claims: Claims::default() }, kernel)
+        (UioDevice { node, tree: PathBuf::new(), file, claims: Claims::default() }, kernel)
     }
 
     #[test]

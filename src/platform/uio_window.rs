@@ -3,8 +3,10 @@
 //! Source: Linux `Documentation/driver-api/uio-howto.rst`, `drivers/uio/uio_pdrv_genirq.c`.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::device_tree::region_lengths;
 use super::lock::LockedFile;
 use super::mapped::Mapping;
 use super::system::page_bytes;
@@ -31,6 +33,7 @@ impl UioWindow {
         lock: &Arc<LockedFile>,
         node: &UioNode,
         map: &UioMap,
+        tree: &Path,
         claims: &Claims,
     ) -> Result<Self, PlatformError> {
         let Some(claim) = claims.claim(map.index) else {
@@ -39,10 +42,7 @@ impl UioWindow {
         };
         let name = format!("{:?} of {}", map.name, node.device);
         let page = page_bytes(lock.path())?;
-        let empty = || PlatformError::ShortRegion { region: name.clone(), expected: 4, found: 0 };
-        // The kernel's length counts from the start of the page.
-        let bytes = map.bytes.checked_sub(map.offset).filter(|bytes| *bytes >= 4);
-        let bytes = bytes.ok_or_else(empty)?;
+        let bytes = length(map, &name, tree, page)?;
         let large = |_| PlatformError::TooLarge { region: name.clone(), bytes };
         let mapping = Mapping::new(
             lock,
@@ -61,7 +61,8 @@ impl UioWindow {
         self.address
     }
 
-    /// Length of the region, bytes. The kernel counts in whole pages.
+    /// Length of the region, bytes, as the device tree gives it; of a device that does not come
+    /// from a device tree, as the kernel gives it.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.mapping.bytes() as u64
@@ -130,6 +131,29 @@ impl From<UioWindow> for Box<dyn RegisterWindow> {
     }
 }
 
+/// Length of a region: exact by the device tree, else what the kernel says. Its number counts from
+/// the start of the first page, and is whole pages.
+fn length(map: &UioMap, name: &str, tree: &Path, page: u64) -> Result<u64, PlatformError> {
+    let kernel = map.bytes.saturating_sub(map.offset);
+    let bytes = match region_lengths(tree)? {
+        None => kernel,
+        Some(lengths) => {
+            let found = usize::try_from(map.index).ok().and_then(|at| lengths.get(at)).copied();
+            let fits = |bytes: &u64| kernel.checked_sub(*bytes).is_some_and(|rest| rest < page);
+            found.filter(fits).ok_or_else(|| PlatformError::RegionLength {
+                region: name.to_owned(),
+                kernel,
+                found,
+            })?
+        }
+    };
+    if bytes < 4 {
+        let region = name.to_owned();
+        return Err(PlatformError::ShortRegion { region, expected: 4, found: bytes });
+    }
+    Ok(bytes)
+}
+
 /// Which maps of an open node are mapped, by number.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Claims(Arc<Mutex<BTreeSet<u32>>>);
@@ -163,7 +187,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, regions};
+    use crate::platform::uio_fake::{add_node, add_reg, regions};
     use crate::platform::{System, UioDevice};
 
     fn system() -> (tempfile::TempDir, System) {
@@ -214,6 +238,36 @@ mod tests {
         assert!(matches!(error, PlatformError::Busy { .. }), "{error}");
         drop(control);
         UioDevice::open_in(&system, "pgs").expect("nobody has it");
+    }
+
+    #[test]
+    fn a_region_ends_where_the_device_tree_says_and_not_with_its_page() {
+        let (_root, system) = system();
+        let page = page_bytes(&system.dev).expect("a size");
+        let window = |map: &str, regions: &[(u64, u64)]| {
+            add_reg(&system, 3, regions);
+            let map = UioDevice::open_in(&system, "pgs").expect("opened").window(map)?;
+            Ok((map.address(), map.bytes()))
+        };
+        // Lengths of the kernel's: four times 0x1_0000, and 0x1000.
+        let mut regions = [(0xA000_0000, 0x1_0000); 5];
+        regions[4] = (0xA004_0000, 0xFF0);
+        let control = window("control", &regions).expect("less than a page less");
+        assert_eq!(control, (0xA004_0000, 0xFF0));
+        regions[1].1 = 0x1_0000 - page + 4;
+        assert_eq!(window("dma1", &regions).expect("the same").1, 0x1_0000 - page + 4);
+
+        regions[2].1 = 0x1_0000 - page;
+        regions[3].1 = 0x1_0004;
+        for map in ["dma2", "dma3"] {
+            let error = window(map, &regions).expect_err("not the pages of this region");
+            assert!(matches!(error, PlatformError::RegionLength { found: Some(_), .. }), "{error}");
+        }
+        let error = window("control", &regions[..4]).expect_err("not in the tree");
+        assert!(error.to_string().contains("`reg` in the device tree nothing"), "{error}");
+        regions[4].1 = 2;
+        let error = window("control", &regions).expect_err("less than a register");
+        assert!(matches!(error, PlatformError::ShortRegion { found: 2, .. }), "{error}");
     }
 
     #[test]
