@@ -221,6 +221,24 @@ pub enum PlatformError {
         /// Where to change it.
         path: PathBuf,
     },
+    /// A u-dma-buf does not keep the mode that was written.
+    #[error(
+        "u-dma-buf {name:?} was given sync_mode {written} for {wanted}, and says {found:?} in {}: \
+         set `sync-mode = <2>` in its device-tree node",
+        path.display()
+    )]
+    SyncModeRefused {
+        /// Name of the buffer.
+        name: String,
+        /// What was written.
+        written: u64,
+        /// What stands there.
+        found: String,
+        /// What was wanted.
+        wanted: &'static str,
+        /// Where.
+        path: PathBuf,
+    },
     /// A memory region is of no use.
     #[error("memory {region} of {bytes} bytes at {address:#x} cannot be used: {reason}")]
     UnusableMemory {

@@ -46,6 +46,7 @@ mod mapped;
 mod memory;
 mod pool;
 mod reserved;
+mod sync_mode;
 mod sysfs;
 mod system;
 mod u_dma_buf;

@@ -28,6 +28,7 @@ use super::lock::LockedFile;
 use super::mapped::Mapping;
 use super::memory::MappedBeats;
 use super::pool::Region;
+use super::sync_mode::set_mode;
 use super::sysfs::{read_if_present, read_number};
 use super::system::open_device;
 use super::{Access, DmaMemory, PlatformError, SharedMemory, System};
@@ -43,14 +44,6 @@ pub enum Caching {
     WriteCombining,
 }
 
-/// Bits 1:0 of `sync_mode`: cached even with `O_SYNC`.
-const MODE_CACHED: u64 = 0;
-/// Uncached with `O_SYNC`: Device memory on arm64.
-const MODE_UNCACHED: u64 = 1;
-/// Write-combining with `O_SYNC`.
-const MODE_WRITE_COMBINING: u64 = 2;
-/// Bit of `sync_mode`: the mode holds without `O_SYNC` too.
-const MODE_ALWAYS: u64 = 4;
 /// The number carries 32 bits of length, in multiples of 16.
 const BYTES_MAX: u64 = 0xFFFF_FFF0;
 /// Maintenance is of whole cache lines; the pool's pieces are too.
@@ -170,36 +163,6 @@ impl UDmaBuf {
         };
         Ok(Self { address, bytes, data, words, sync })
     }
-}
-
-/// Sees to a mode in which the two ways to open give the two mappings that are wanted.
-fn set_mode(
-    name: &str,
-    buffer: &Path,
-    caching: Caching,
-    coherent: bool,
-) -> Result<(), PlatformError> {
-    let path = buffer.join("sync_mode");
-    let found = read_number(&path)?;
-    let (suits, wanted) = match caching {
-        // O_SYNC must not be cached; no O_SYNC must be.
-        Caching::Cached => (
-            (found & MODE_ALWAYS == 0 && (found != MODE_CACHED || coherent))
-                || (coherent && found == MODE_ALWAYS | MODE_CACHED),
-            "cached buffers beside uncached descriptors",
-        ),
-        Caching::WriteCombining => (
-            !matches!(found & !MODE_ALWAYS, MODE_CACHED | MODE_UNCACHED),
-            "write-combining buffers",
-        ),
-    };
-    if suits {
-        return Ok(());
-    }
-    let refused =
-        |_| PlatformError::SyncMode { name: name.to_owned(), found, wanted, path: path.clone() };
-    log::info!("u-dma-buf {name:?}: changing sync_mode from {found} to {MODE_WRITE_COMBINING}");
-    fs::write(&path, format!("{MODE_WRITE_COMBINING}\n")).map_err(refused)
 }
 
 /// The names of the u-dma-buf buffers that there are.
@@ -360,23 +323,6 @@ mod tests {
             pool.allocate_shared(4).expect("there is room");
             assert_eq!(text_of(&system, "sync_for_device"), "", "{mode}");
             assert_eq!(text_of(&system, "sync_mode"), mode);
-        }
-    }
-
-    #[test]
-    fn a_mode_that_does_not_suit_is_changed() {
-        for (mode, caching) in [
-            ("0", Caching::Cached),
-            ("4", Caching::Cached),
-            ("5", Caching::Cached),
-            ("6", Caching::Cached),
-            ("0", Caching::WriteCombining),
-            ("1", Caching::WriteCombining),
-            ("5", Caching::WriteCombining),
-        ] {
-            let (_root, system) = system(mode, "0");
-            UDmaBuf::open(&system, "pgs", caching).expect("changed");
-            assert_eq!(text_of(&system, "sync_mode"), "2", "{mode}");
         }
     }
 
