@@ -1,5 +1,5 @@
-//! This file makes what an echo sends: numbers that differ from each other in every byte, in every
-//! lane that comes back.
+//! This file makes what an echo sends: no beat twice, and every bit of every lane that comes back as
+//! 0 and as 1.
 
 use bitstream_model::interface::record::{Beat, WORD_LANE, result};
 
