@@ -1,5 +1,5 @@
-//! This file makes what an echo sends: numbers that differ from each other in every byte, in every
-//! lane that comes back.
+//! This file makes what an echo sends: no beat twice, and every bit of every lane that comes back as
+//! 0 and as 1.
 //!
 //! They are numbers that every part on their way holds exactly. Where a stream, an array or the
 //! arithmetic for bodies has sixteen bits, that is sign, exponents of -14 to 15 and ten bits of
