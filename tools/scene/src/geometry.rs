@@ -32,6 +32,10 @@ impl Geometry {
 
     /// A name for people.
     #[must_use]
+    #[allow(
+        clippy::float_cmp,
+        reason = "a cube is a box of equal numbers, not of nearly equal ones"
+    )]
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Box { half_extents: [x, y, z] } if *x == *y && *x == *z => "cube",
