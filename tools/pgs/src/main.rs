@@ -7,6 +7,7 @@
 
 mod args;
 mod board;
+mod build;
 mod compare;
 mod digest;
 mod failure;
@@ -17,6 +18,7 @@ mod memory;
 mod npy;
 mod options;
 mod origin;
+mod scenes;
 mod verbs;
 
 use std::io::{self, Write};

@@ -6,7 +6,7 @@ pub(crate) mod load;
 pub(crate) mod model;
 pub(crate) mod run;
 pub(crate) mod solve;
-mod table;
+pub(crate) mod table;
 
 use std::io::Write;
 
