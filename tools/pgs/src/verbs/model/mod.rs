@@ -1,243 +1,235 @@
-//! The verb `model`: what a step costs by formula, without running anything.
+//! The verb `model`: what a step costs by formula, and every table of the thesis beside it, without
+//! running anything.
+
+mod beyond;
+mod comparison;
+mod data;
+mod estimate;
+mod euler;
+mod memory;
+mod ports;
+mod render;
+mod report;
+mod scene;
+mod step;
 
 use std::io::Write;
 
 use bitstream_model::Bandwidth;
-use bitstream_model::interface::profile::{FLOAT, Profile, RecordWords, THESIS_WORDS};
-use bitstream_model::timing::{MemoryUse, PassLimit, StepCycles, StepShape, StepTime};
-use clap::Args;
-use serde_json::{Value, json};
+use bitstream_model::interface::profile::{Inertia, MIXED, PROFILES, Profile, Variant};
+use bitstream_model::timing::{StepShape, thesis};
+use clap::builder::PossibleValuesParser;
+use clap::{Args, ValueEnum};
+use serde_json::json;
 
-use super::SCHEMA;
 use super::table::grouped;
 use crate::args::CommonArgs;
 use crate::failure::{Failure, Verdict};
-use crate::options::{bandwidth, bandwidth_number, bandwidth_text};
+use crate::options::bandwidth;
+use report::Table;
+use scene::Scene;
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs model --collisions 127000 --bodies 38880
-  pgs model --collisions 127000 --bodies 38880 --bandwidth 8.5 --json";
+  pgs model                                              the thesis' step, all profiles, all tables
+  pgs model --collisions 127000 --bodies 38880 --profile mixed
+  pgs model --section step,ports --bandwidth 8.5 --json
+  pgs model --markdown > tables.md
 
-/// Show what a step costs by formula: cycles, time, on-chip memory.
+Every row says what it is: exact (counted), modelled (by formula: a step that stalls on hazards
+takes longer) or recorded (a figure of the thesis). Nothing here was measured.";
+
+/// Number of this verb's JSON layout: 2 since it holds several profiles and the tables.
+const SCHEMA: u32 = 2;
+
+/// Every profile, on the command line.
+const ALL: &str = "all";
+
+/// Show what a step costs by formula, beside every table of the thesis.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ModelArgs {
-    /// Collisions in the step.
-    #[arg(long, value_name = "C")]
-    collisions: u32,
-    /// Bodies in the step.
-    #[arg(long, value_name = "B")]
-    bodies: u32,
-    /// Memory bandwidth in GB/s, or "unlimited" [default: unlimited, 17.07 and 12.8 in turn]
+    /// Collisions in the step [default: 127000, the thesis' step]
+    #[arg(long, value_name = "C", requires = "bodies")]
+    collisions: Option<u32>,
+    /// Bodies in the step [default: 38880, the thesis' step]
+    #[arg(long, value_name = "B", requires = "collisions")]
+    bodies: Option<u32>,
+    /// Profile of the bitstream
+    #[arg(long, value_name = "NAME", default_value = ALL, value_parser = names())]
+    profile: String,
+    /// Profiles with the world inertia of every body, streamed and kept on chip
+    #[arg(long)]
+    world_inertia: bool,
+    /// Memory bandwidth in GB/s, or "unlimited", of the table of times [default: unlimited, 17.07 and
+    /// 12.8 in turn]
     #[arg(long, value_name = "GBPS", value_parser = bandwidth)]
     bandwidth: Option<Bandwidth>,
+    /// Which tables [default: all]
+    #[arg(long, value_name = "SECTION", value_delimiter = ',')]
+    section: Vec<Section>,
+    /// Print Markdown instead of text
+    #[arg(long)]
+    markdown: bool,
 }
 
-/// A step of the thesis, against which the formula is held.
-struct ThesisStep {
-    bodies: u64,
-    collisions: u64,
-    cycles: u64,
-    source: &'static str,
+/// A group of tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Section {
+    /// Cycles and time (T6.4, T6.8)
+    Step,
+    /// mixed against float
+    Mixed,
+    /// Words in and out (T4.1 to T4.6)
+    Data,
+    /// On-chip memory and logic (§4.4.2, T6.4, T6.8)
+    Memory,
+    /// Stream widths and memory bandwidth
+    Streams,
+    /// Block RAM ports and the initiation interval
+    Ports,
+    /// Speed-up and energy (T6.5 to T6.7, T6.9 to T6.11, equation 6.5)
+    Comparison,
+    /// Explicit integration (Figure 2.6)
+    Euler,
 }
 
-const THESIS_STEP: ThesisStep =
-    ThesisStep { bodies: 38_880, collisions: 127_000, cycles: 2_062_697, source: "thesis T6.4" };
+impl Section {
+    fn tables(self, scene: &Scene) -> Vec<Table> {
+        match self {
+            Self::Step => step::tables(scene),
+            Self::Mixed => beyond::tables(scene),
+            Self::Data => data::tables(scene),
+            Self::Memory => memory::tables(scene),
+            Self::Streams => memory::streams(scene),
+            Self::Ports => ports::tables(scene),
+            Self::Comparison => comparison::tables(scene),
+            Self::Euler => euler::tables(),
+        }
+    }
+}
+
+fn names() -> PossibleValuesParser {
+    PROFILES.iter().map(|profile| profile.name).chain([ALL]).collect::<Vec<_>>().into()
+}
 
 const BANDWIDTHS: [Bandwidth; 3] =
     [Bandwidth::Unlimited, Bandwidth::ZCU102_PEAK, Bandwidth::ZCU102_SUSTAINED];
 
-/// Records of one format: cycles, and the time at each bandwidth.
-struct Estimate {
-    format: &'static str,
-    cycles: StepCycles,
-    times: Vec<(Bandwidth, StepTime)>,
-}
-
-impl Estimate {
-    fn new(
-        format: &'static str,
-        profile: &Profile,
-        words: &RecordWords,
-        step: &StepShape,
-        bandwidths: &[Bandwidth],
-    ) -> Self {
-        let time =
-            |bandwidth: &Bandwidth| (*bandwidth, StepTime::new(profile, words, step, *bandwidth));
-        Self {
-            format,
-            cycles: StepCycles::new(profile, words, step),
-            times: bandwidths.iter().map(time).collect(),
+impl ModelArgs {
+    fn scene(&self) -> Scene {
+        let bodies = self.bodies.map_or(thesis::BODIES, u64::from);
+        let collisions = self.collisions.map_or(thesis::COLLISIONS, u64::from);
+        let inertia = if self.world_inertia { Inertia::World } else { Inertia::Isotropic };
+        let asked =
+            |profile: &&&'static Profile| self.profile == ALL || self.profile == profile.name;
+        let variant = |profile: &&'static Profile| Variant { inertia, ..profile.default_variant() };
+        Scene {
+            step: StepShape::new(bodies, collisions),
+            variants: PROFILES.iter().filter(asked).map(variant).collect(),
+            bandwidths: self.bandwidth.map_or_else(|| BANDWIDTHS.to_vec(), |one| vec![one]),
         }
     }
 
-    fn print(&self, out: &mut dyn Write, step: &StepShape) -> std::io::Result<()> {
-        let cycles = &self.cycles;
-        let passes = step.contact_iterations + step.friction_iterations;
-        writeln!(out, "{}", self.format)?;
-        writeln!(
-            out,
-            "  cycles     {} = {} load + {passes} x {} passes + {} fill + {} poses in or results out",
-            grouped(cycles.total),
-            grouped(cycles.load),
-            grouped(cycles.pass),
-            grouped(cycles.fill),
-            grouped(cycles.pose_in.max(cycles.result_out)),
-        )?;
-        for (bandwidth, time) in &self.times {
-            writeln!(
-                out,
-                "  time       {:.3} ms at {} ({} bytes moved; the {} limits the passes)",
-                time.seconds * 1e3,
-                bandwidth_text(*bandwidth),
-                grouped(time.bytes),
-                limit_text(time.limit),
-            )?;
+    /// The section `mixed` is about a profile that must have been asked for.
+    fn check(&self, json: bool) -> Result<(), Failure> {
+        if json && self.markdown {
+            return Err(Failure::input("--json and --markdown exclude each other")
+                .next("leave one of them out"));
+        }
+        if self.section.contains(&Section::Mixed) && ![ALL, MIXED.name].contains(&&*self.profile) {
+            let message = format!("the section mixed has nothing about profile {}", self.profile);
+            return Err(Failure::input(message).next("ask for --profile mixed, or for all"));
         }
         Ok(())
     }
 
-    fn to_json(&self) -> Value {
-        let cycles = &self.cycles;
-        let times: Vec<Value> = self
-            .times
-            .iter()
-            .map(|(bandwidth, time)| {
-                json!({
-                    "bandwidth_bytes_per_second": bandwidth_number(*bandwidth),
-                    "ms": time.seconds * 1e3,
-                    "bytes": time.bytes,
-                    "limit": limit_text(time.limit),
-                })
-            })
-            .collect();
-        json!({
-            "cycles": {
-                "total": cycles.total,
-                "load": cycles.load,
-                "pass": cycles.pass,
-                "fill": cycles.fill,
-                "pose_in": cycles.pose_in,
-                "result_out": cycles.result_out,
-            },
-            "times": times,
-        })
+    fn sections(&self) -> Vec<Section> {
+        let all = Section::value_variants();
+        all.iter()
+            .copied()
+            .filter(|s| self.section.is_empty() || self.section.contains(s))
+            .collect()
     }
 }
 
-fn limit_text(limit: PassLimit) -> &'static str {
-    match limit {
-        PassLimit::Pipeline => "pipeline",
-        PassLimit::Memory => "memory",
-    }
-}
-
-fn mib(bytes: u64) -> f64 {
-    bytes as f64 / f64::from(1 << 20)
-}
-
-/// Computes and shows the costs.
+/// Computes and shows the tables.
 pub(crate) fn run(
     args: &ModelArgs,
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let profile = &FLOAT;
-    let step = StepShape::new(args.bodies.into(), args.collisions.into());
-    let bandwidths = args.bandwidth.map_or_else(|| BANDWIDTHS.to_vec(), |one| vec![one]);
-    let packed = Estimate::new(
-        "records packed as in the thesis",
-        profile,
-        &THESIS_WORDS,
-        &step,
-        &bandwidths,
-    );
-    let streamed = Estimate::new(
-        "records as they are streamed",
-        profile,
-        &profile.default_variant().words(),
-        &step,
-        &bandwidths,
-    );
-    let memory = MemoryUse::new(&profile.default_variant(), step.bodies, step.collisions);
-    let deviation = (step.bodies == THESIS_STEP.bodies
-        && step.collisions == THESIS_STEP.collisions)
-        .then(|| packed.cycles.total as f64 / THESIS_STEP.cycles as f64 - 1.0);
+    args.check(common.json)?;
+    let scene = args.scene();
+    let tables: Vec<Table> =
+        args.sections().into_iter().flat_map(|section| section.tables(&scene)).collect();
+    let step = &scene.step;
 
     if common.json {
         let document = json!({
             "schema": SCHEMA,
             "verb": "model",
-            "profile": profile.name,
-            "clock_khz": profile.clock_khz,
             "bodies": step.bodies,
             "collisions": step.collisions,
             "contact_iterations": step.contact_iterations,
             "friction_iterations": step.friction_iterations,
-            "thesis_words": packed.to_json(),
-            "streamed_words": streamed.to_json(),
-            "thesis": deviation.map(|deviation| json!({
-                "cycles": THESIS_STEP.cycles,
-                "deviation": deviation,
-                "source": THESIS_STEP.source,
-            })),
-            "memory": {
-                "velocities": memory.velocities,
-                "impulses": memory.impulses,
-                "block_ram": memory.block_ram(),
-                "capacity": memory.capacity,
-                "shape_indices": memory.shape_indices,
-                "fits": memory.fits(),
-                "collisions_that_fit": MemoryUse::collisions_beside(&profile.default_variant(), step.bodies),
-            },
+            "thesis_step": scene.is_thesis_step(),
+            "world_inertia": args.world_inertia,
+            "profiles": estimate::profiles(&scene),
+            "tables": tables.iter().map(Table::to_json).collect::<Vec<_>>(),
         });
         writeln!(out, "{document:#}")?;
         return Ok(Verdict::Done);
     }
 
-    writeln!(
-        out,
-        "profile {} at {} kHz: {} bodies, {} collisions, {} contact and {} friction iterations",
-        profile.name,
-        profile.clock_khz,
+    let head = head(args, &scene);
+    if args.markdown {
+        writeln!(out, "## What a step costs\n")?;
+        for line in head {
+            writeln!(out, "{line}\n")?;
+        }
+        for table in &tables {
+            render::markdown(out, table)?;
+        }
+    } else {
+        for line in head {
+            writeln!(out, "{line}")?;
+        }
+        writeln!(out)?;
+        for table in &tables {
+            render::terminal(out, table)?;
+        }
+    }
+    Ok(Verdict::Done)
+}
+
+/// What stands above the tables, line by line.
+fn head(args: &ModelArgs, scene: &Scene) -> Vec<String> {
+    let step = &scene.step;
+    let mut lines = vec![format!(
+        "{} bodies, {} collisions, {} contact and {} friction iterations{}.",
         grouped(step.bodies),
         grouped(step.collisions),
         step.contact_iterations,
         step.friction_iterations,
-    )?;
-    writeln!(out, "By formula: a step that stalls on hazards takes longer.")?;
-    writeln!(out)?;
-    packed.print(out, &step)?;
-    if let Some(deviation) = deviation {
-        writeln!(
-            out,
-            "  recorded   {} cycles ({}), the formula deviates by {:+.2} %",
-            grouped(THESIS_STEP.cycles),
-            THESIS_STEP.source,
-            deviation * 100.0,
-        )?;
+        if scene.is_thesis_step() { ": the thesis' step" } else { "" },
+    )];
+    if !scene.is_thesis_step() {
+        lines.push(format!(
+            "The thesis' figures and the notes on them are of its own step: {} bodies, {} collisions.",
+            grouped(thesis::BODIES),
+            grouped(thesis::COLLISIONS),
+        ));
     }
-    streamed.print(out, &step)?;
-    writeln!(out, "on-chip memory")?;
-    writeln!(
-        out,
-        "  block RAM  {:.2} MiB of {:.1} MiB: {} bytes of velocities, {} of impulses; {}",
-        mib(memory.block_ram()),
-        mib(memory.capacity),
-        grouped(memory.velocities),
-        grouped(memory.impulses),
-        if memory.fits() { "fits" } else { "does not fit" },
-    )?;
-    writeln!(
-        out,
-        "  beside it  {} bytes of shape indices in distributed RAM, which the thesis does without",
-        grouped(memory.shape_indices),
-    )?;
-    writeln!(
-        out,
-        "  room for   {} collisions beside so many bodies",
-        grouped(MemoryUse::collisions_beside(&profile.default_variant(), step.bodies)),
-    )?;
-    Ok(Verdict::Done)
+    if args.world_inertia {
+        lines.push(
+            "With the world inertia of every body, which the thesis does not have.".to_owned(),
+        );
+    }
+    lines.push(
+        "Exact: counted. Modelled: by formula, without stalls on hazards. Recorded: the thesis'. \
+         Nothing was measured."
+            .to_owned(),
+    );
+    lines
 }
