@@ -113,6 +113,7 @@ mod axi_dma;
 mod beat;
 mod check;
 mod error;
+pub mod order;
 pub mod platform;
 mod record;
 pub mod scene;
