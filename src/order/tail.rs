@@ -17,7 +17,7 @@ pub(super) struct Tail {
     /// Collisions that each body has from here to the end.
     left: Vec<u32>,
     /// The latest entry, and the place in the sweep.
-    latest: Vec<(usize, usize)>,
+    latest: Vec<(isize, usize)>,
     swept: Vec<Swept>,
 }
 
@@ -40,8 +40,10 @@ impl Tail {
                     most = most.max(*left);
                 }
             }
+            // Negative where a body can hardly be done in time: the busiest come first.
             let needed = (most as usize + SLACK) * depth;
-            let latest = (start + place).min(end.saturating_sub(needed));
+            let latest =
+                (start + place).cast_signed().min(end.cast_signed() - needed.cast_signed());
             self.latest.push((latest, place));
         }
         // No two are equal.

@@ -140,7 +140,7 @@ impl Scene {
 }
 
 /// A body that stands still, its axes along the world's.
-fn at_rest(position: [f32; 3], shape: u32) -> Body {
+pub(crate) fn at_rest(position: [f32; 3], shape: u32) -> Body {
     Body {
         pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
         velocity: Velocity::default(),

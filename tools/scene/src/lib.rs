@@ -1,4 +1,4 @@
-//! The box-on-plane scene of the thesis, with collision detection.
+//! The box-on-plane scene of the thesis, with collision detection, and a pile of spheres.
 //!
 //! A grid of cubes above a plane, as Bullet's demo `box on plane` builds it. A [`Scene`] holds the
 //! bodies and the collisions of their current poses; the accelerator steps them:
@@ -15,6 +15,8 @@
 //! # Ok::<(), scene::SceneError>(())
 //! ```
 //!
+//! [`Spheres`] is a pile that is no grid, for what depends on the order of collisions.
+//!
 //! The bits of every result are the same on every architecture and with every number of threads:
 //! arithmetic is f32 in a written order, parry3d is built with `enhanced-determinism`, and threads
 //! never decide an order.
@@ -27,12 +29,14 @@ mod error;
 mod grid;
 mod measure;
 mod rotation;
+mod spheres;
 
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
 pub use detect::MARGIN;
 pub use error::SceneError;
 pub use grid::Grid;
 pub use measure::{ground_pairs, kinetic_energy};
+pub use spheres::{RADII, SPHERES_MAX, Spheres};
 
 /// Index of the static ground among the bodies.
 pub const GROUND: u32 = 0;
