@@ -111,6 +111,8 @@
 mod accelerator;
 mod axi_dma;
 mod beat;
+#[cfg(feature = "bench")]
+pub mod bench;
 mod check;
 mod error;
 pub mod order;

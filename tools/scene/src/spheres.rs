@@ -333,11 +333,16 @@ mod tests {
     fn cells_miss_no_pair() {
         let pile = Spheres::new(300, 3).expect("a pile");
         let mut expected = Vec::new();
-        for (i, a) in pile.bodies().iter().enumerate().skip(1) {
-            for (j, b) in pile.bodies().iter().enumerate().skip(i + 1) {
-                let (_, distance) = direction(a.pose.position, b.pose.position);
-                if distance - (radius(i - 1) + radius(j - 1)) <= MARGIN {
-                    expected.push((i as u32, j as u32));
+        let spheres: Vec<(u32, f32, [f32; 3])> = (1..)
+            .zip(RADII.into_iter().cycle())
+            .zip(&pile.bodies()[1..])
+            .map(|((index, radius), body)| (index, radius, body.pose.position))
+            .collect();
+        for (k, (i, r, a)) in spheres.iter().enumerate() {
+            for (j, s, b) in &spheres[k + 1..] {
+                let (_, distance) = direction(*a, *b);
+                if distance - (r + s) <= MARGIN {
+                    expected.push((*i, *j));
                 }
             }
         }
