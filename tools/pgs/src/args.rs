@@ -11,6 +11,7 @@ use crate::verbs::check::CheckArgs;
 use crate::verbs::list::ListArgs;
 use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
+use crate::verbs::order::OrderArgs;
 use crate::verbs::run::RunArgs;
 use crate::verbs::solve::SolveArgs;
 
@@ -20,6 +21,7 @@ Examples:
   pgs --grid 10x10x10 --steps 60       a smaller one; the same as `pgs run --grid ...`
   pgs solve vectors/one_cube --compare
   pgs model --collisions 127000 --bodies 38880
+  pgs order --input vectors/full_step186
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check
@@ -49,6 +51,7 @@ pub(crate) enum Verb {
     Run(RunArgs),
     Solve(SolveArgs),
     Model(ModelArgs),
+    Order(OrderArgs),
     List(ListArgs),
     Load(LoadArgs),
     Check(CheckArgs),

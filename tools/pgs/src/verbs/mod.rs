@@ -4,6 +4,7 @@ pub(crate) mod check;
 pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
+pub(crate) mod order;
 pub(crate) mod run;
 pub(crate) mod solve;
 pub(crate) mod table;
@@ -25,6 +26,7 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
         Verb::Run(args) => run::run(args, &command.common, out),
         Verb::Solve(args) => solve::run(args, &command.common, out),
         Verb::Model(args) => model::run(args, &command.common, out),
+        Verb::Order(args) => order::run(args, &command.common, out),
         Verb::List(args) => list::run(args, &command.common, out),
         Verb::Load(args) => load::run(args, &command.common, out),
         Verb::Check(args) => check::run(args, &command.common, out),
