@@ -112,12 +112,22 @@ impl Row {
 }
 
 /// What a step keeps for the next.
-#[derive(Default)]
 struct Kept {
     buffers: InputBuffers,
     orderer: Orderer,
     checker: Checker,
     packer: CollisionPacker,
+}
+
+impl Kept {
+    fn new() -> Self {
+        Self {
+            buffers: InputBuffers::new(),
+            orderer: Orderer::new(),
+            checker: Checker::new(),
+            packer: CollisionPacker::new(FLOAT.default_variant()),
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -149,7 +159,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         println!(" step collisions  empty     order    verify      pack      pack   order");
         println!("                               ms        ms  in order  as given by pack");
     }
-    let mut kept = Kept::default();
+    let mut kept = Kept::new();
     let mut rows = Vec::new();
     for step in 1..=options.steps {
         scene.detect();
