@@ -12,6 +12,8 @@ const VECTORS: usize = 3;
 /// Checks every number of a collision that is otherwise right, as it would be streamed.
 ///
 /// `positions` are those of bodies A and B.
+// Out of the loop, which most streams leave without it.
+#[inline(never)]
 pub(super) fn check_range(
     index: usize,
     collision: &Collision,
