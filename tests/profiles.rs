@@ -38,6 +38,13 @@ fn step(config: BoardConfig) -> Stepped {
     let grid = "3x3x3".parse().expect("a grid");
     let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
     let mut scene = Scene::new(&options).expect("a small scene");
+    // Off the grid, so that coordinates have more digits than sixteen bits hold.
+    for (index, body) in (0_u16..).zip(scene.bodies_mut()).skip(1) {
+        let off = f32::from(index * 7919 % 101) / 10_007.0;
+        body.pose.position[0] += off;
+        body.pose.position[2] -= 1.7 * off;
+        body.velocity = Velocity { linear: [off, -off, 3.3 * off], angular: [0.0, off, 0.0] };
+    }
     scene.detect();
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     let (bodies, collisions) = scene.parts_mut();
@@ -200,7 +207,7 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     bodies[2].pose.position[0] = 70_000.0;
     assert_eq!(
         refused(of(&HALF), &mut bodies, &collisions),
-        "body 2: position[0] is 70000, but this bitstream streams bodies in binary16, which ends at \
+        "body 2: position[0] is 70000, but this bitstream holds bodies in binary16, which ends at \
          65504: bring it into range, or load another (profiles that could: naive, float, mixed)"
     );
     let thesis = BoardConfig { numbers: Some(THESIS16), ..of(&HALF) };
@@ -211,7 +218,7 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     let text = refused(of(&MIXED), &mut bodies, &collisions);
     assert_eq!(
         text,
-        "collision 1: offset of body B from body A[0] is 70000, but this bitstream streams \
+        "collision 1: offset of body B from body A[0] is 70000, but this bitstream holds \
          collisions in binary16, which ends at 65504: bring it into range, or load another \
          (profiles that could: naive, float)"
     );
@@ -252,14 +259,14 @@ fn results_that_sixteen_bits_cannot_hold_are_a_fault_and_change_nothing() {
             .set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)])
             .expect("shapes that fit");
         let (mut bodies, _) = row(3);
-        bodies[2].velocity.linear[0] = 65_000.0;
+        bodies[2].velocity.linear[0] = 65_400.0;
         let before = bits(&bodies);
-        // A sixtieth of 120,000 m/s² is 2,000 m/s.
+        // A sixtieth of 60,000 m/s² is 1,000 m/s.
         let parameters = StepParameters::default();
         let none: &[Collision] = &[];
         let mut hard = parameters;
-        hard.gravity = [120_000.0, 0.0, 0.0];
-        let error = accelerator.step(&mut bodies, none, &hard).expect_err("67,000 m/s");
+        hard.gravity = [60_000.0, 0.0, 0.0];
+        let error = accelerator.step(&mut bodies, none, &hard).expect_err("66,400 m/s");
         let Error::Step { fault, aftermath: Aftermath::Untouched } = &error else {
             panic!("{error}")
         };
