@@ -127,8 +127,8 @@ pub use platform::{
     Caching, DevMemWindows, MemoryChoice, PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes,
 };
 pub use scene::{
-    Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
-    InputError, Pose, Shape, StepParameters, Velocity,
+    Bodies, Body, BodyArrays, CONTACT_POINTS, Carriers, Collision, CollisionArrays, Collisions,
+    Contact, InputError, Pose, Shape, StepParameters, Velocity,
 };
 pub use step::{
     Accelerator, BoardChoice, BoardDescription, BoardKind, Fault, HostTimes, Limit, OpenOptions,

@@ -73,7 +73,7 @@ fn a_board_as_it_should_be_passes_every_line() {
     let (report, board) = checked(BoardConfig::default());
     assert!(report.passed());
     assert_eq!(detail(&report, "identification"), "0x50475331 (\"PGS1\")");
-    assert_eq!(detail(&report, "interface version"), "1.0");
+    assert_eq!(detail(&report, "interface version"), "1.1");
     assert!(detail(&report, "capabilities").starts_with("profile float, 4 + 4 streams"));
     assert!(detail(&report, "length register").starts_with("26 bits on 8 channels"));
     assert!(detail(&report, "echo").contains("1, 7, 101, 4099 bodies"));

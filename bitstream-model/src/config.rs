@@ -1,9 +1,11 @@
 //! This file says how an emulated board can be built: the choices that a bitstream, a block design
 //! and a device tree fix on a real one.
 
+use crate::accelerator::striping::{GROUP_MAX, STREAMS_MAX};
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
-use crate::interface::number::Numbers;
-use crate::interface::profile::{Depth, FLOAT, Inertia, Profile, Variant};
+use crate::interface::number::{Numbers, Precision, StreamFormat};
+use crate::interface::profile::{Depth, FLOAT, Geometry, Inertia, Profile, Variant};
+use crate::interface::stripe::Stripe;
 use crate::quirks::Quirks;
 
 /// What the pipeline does when a collision needs a velocity that is still being computed.
@@ -141,6 +143,26 @@ pub enum ConfigError {
         /// Bits of the profile's format.
         expected: u32,
     },
+    /// A format that has no word for the distance of a contact point that is not there.
+    #[error(
+        "collisions relative to body A in thesis16, which has no infinity to mark an unused contact \
+         point with; expected f32 or binary16"
+    )]
+    NoInfinity,
+    /// Rows of more precision than what is computed with them.
+    #[error(
+        "constraint rows in f32 and updates in binary16, which cannot take them; expected updates \
+         in f32, or both in binary16"
+    )]
+    RowsBeyondUpdates,
+    /// A profile that is not one of the table's and contradicts itself.
+    #[error("profile {name:?}: {what}")]
+    Profile {
+        /// Its name.
+        name: &'static str,
+        /// What is wrong, and what is expected.
+        what: &'static str,
+    },
     /// A number outside its range.
     #[error("{what} is {found}, expected {low} to {high}")]
     OutOfRange {
@@ -190,15 +212,8 @@ impl BoardConfig {
             LENGTH_WIDTH_MIN.into(),
             LENGTH_WIDTH_MAX.into(),
         )?;
-        let (asked, own) = (self.variant().numbers, self.profile.numbers);
-        for (stream, asked, own) in
-            [("collision", asked.collisions, own.collisions), ("body", asked.bodies, own.bodies)]
-        {
-            let (found, expected) = (asked.bits(), own.bits());
-            if found != expected {
-                return Err(ConfigError::StreamFormat { stream, found, expected });
-            }
-        }
+        check_profile(self.profile)?;
+        self.check_numbers()?;
         range("address width", self.address_width.into(), 32, 64)?;
         // The capability register carries the window in cycles in 16 bits.
         let slots_max = u64::from(u16::MAX) / u64::from(self.profile.initiation_interval);
@@ -219,5 +234,59 @@ impl BoardConfig {
             range("memory bandwidth in bytes per second", bytes, 1_000_000, 1_000_000_000_000)?;
         }
         Ok(())
+    }
+
+    fn check_numbers(&self) -> Result<(), ConfigError> {
+        let (asked, own) = (self.variant().numbers, self.profile.numbers);
+        for (stream, asked, own) in
+            [("collision", asked.collisions, own.collisions), ("body", asked.bodies, own.bodies)]
+        {
+            let (found, expected) = (asked.bits(), own.bits());
+            if found != expected {
+                return Err(ConfigError::StreamFormat { stream, found, expected });
+            }
+        }
+        let relative = self.profile.geometry == Geometry::Relative;
+        if relative && asked.collisions == StreamFormat::Thesis16 {
+            return Err(ConfigError::NoInfinity);
+        }
+        if (asked.rows, asked.updates) == (Precision::F32, Precision::Binary16) {
+            return Err(ConfigError::RowsBeyondUpdates);
+        }
+        Ok(())
+    }
+}
+
+/// A caller may bring a profile of its own.
+fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
+    let streams = [profile.mm2s_widths, profile.s2mm_widths];
+    let stripe = |stripe: &Stripe, widths: &[u32]| {
+        (1..=GROUP_MAX).contains(&stripe.streams.len())
+            && stripe.streams.iter().all(|stream| usize::from(*stream) < widths.len())
+    };
+    let stripes = &profile.stripes;
+    let wrong = [
+        (
+            streams.iter().any(|widths| !(1..=STREAMS_MAX).contains(&widths.len())),
+            "1 to 4 streams each way are expected",
+        ),
+        (
+            streams.into_iter().flatten().any(|width| ![32, 64, 128].contains(width)),
+            "streams of 32, 64 or 128 bits are expected",
+        ),
+        (
+            !stripe(&stripes.collisions, profile.mm2s_widths)
+                || streams.iter().any(|widths| !stripe(&stripes.bodies, widths)),
+            "stripes of 1 to 16 beats on streams that exist are expected",
+        ),
+        (
+            profile.initiation_interval == 0 || profile.collisions_per_issue == 0,
+            "an issue of at least one collision and one cycle is expected",
+        ),
+        (profile.clock_khz == 0, "a clock of at least 1 kHz is expected"),
+    ];
+    match wrong.into_iter().find(|(wrong, _)| *wrong) {
+        Some((_, what)) => Err(ConfigError::Profile { name: profile.name, what }),
+        None => Ok(()),
     }
 }

@@ -1,12 +1,15 @@
-//! This file is a 128-bit AXI4-Stream with a FIFO: beats, TLAST, back-pressure.
+//! This file is an AXI4-Stream with a FIFO of 128-bit beats: beats, TLAST, back-pressure.
+//!
+//! A narrower stream carries a beat in several cycles; that is the mover's and the accelerator's
+//! business, here a beat is a beat.
 
 use std::collections::VecDeque;
+use std::fmt;
 
 use crate::cast::index;
 use crate::interface::record::Beat;
 
 /// A FIFO of beats between a DMA channel and the accelerator.
-#[derive(Debug)]
 pub(crate) struct Stream {
     ring: Box<[Beat]>,
     depth: usize,
@@ -16,6 +19,17 @@ pub(crate) struct Stream {
     /// Beat numbers that carry TLAST, and those with invalid bytes (TKEEP).
     lasts: VecDeque<u64>,
     partials: VecDeque<u64>,
+}
+
+impl fmt::Debug for Stream {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Stream")
+            .field("beats", &self.len())
+            .field("space", &self.space())
+            .field("next_last", &self.next_last())
+            .field("next_partial", &self.next_partial())
+            .finish_non_exhaustive()
+    }
 }
 
 impl Stream {
@@ -87,8 +101,15 @@ impl Stream {
         self.partials.front().map(|number| index(number - self.taken))
     }
 
+    /// Takes `beats` beats out, with their marks; the sum of their words.
+    pub(crate) fn take_sum(&mut self, beats: usize) -> u32 {
+        let sum = (0..beats).flat_map(|ahead| self.peek(ahead).0).fold(0, u32::wrapping_add);
+        self.pop(beats);
+        sum
+    }
+
     /// Takes `beats` beats out, with their marks.
-    pub(crate) fn pop(&mut self, beats: usize) {
+    fn pop(&mut self, beats: usize) {
         assert!(beats <= self.len(), "the receiver looks at the length first");
         self.taken += beats as u64;
         for marks in [&mut self.lasts, &mut self.partials] {
@@ -144,11 +165,20 @@ mod tests {
         stream.mark_last();
         stream.push(&[beat(2)]);
         assert_eq!(stream.next_last(), Some(1));
-        stream.pop(1);
+        assert_eq!(stream.take_sum(1), 0);
         assert_eq!(stream.next_last(), Some(0));
-        stream.pop(1);
+        assert_eq!(stream.take_sum(1), 4);
         assert_eq!(stream.next_last(), None);
         assert_eq!(stream.peek(0), beat(2));
         assert_eq!(stream.space(), 7);
+    }
+
+    #[test]
+    fn the_debug_form_is_short() {
+        let text = format!("{:?}", Stream::new(512));
+        assert_eq!(
+            text,
+            "Stream { beats: 0, space: 512, next_last: None, next_partial: None, .. }"
+        );
     }
 }

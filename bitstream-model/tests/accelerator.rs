@@ -7,7 +7,7 @@ use bitstream_model::interface::control::{self, ErrorCode, ap_ctrl, irq};
 use bitstream_model::interface::profile::FLOAT;
 use bitstream_model::interface::record::Beat;
 use bitstream_model::interface::register::Register;
-use bitstream_model::timing::{StepCycles, StepTime};
+use bitstream_model::timing::{Records, StepCycles, StepTime};
 use bitstream_model::{
     Bandwidth, BoardConfig, Direction, Fault, Hazards, Subnormals, ViolationKind,
 };
@@ -121,7 +121,7 @@ fn the_sums_are_those_of_all_words_on_the_streams() {
     for scene in [one_cube(), Step::falling(7), Step::on_ground(9, 30)] {
         let mut machine = machine();
         let outcome = machine.step(&scene).expect("the step completes");
-        assert_eq!(outcome.sum_received, scene.sum_of_input());
+        assert_eq!(outcome.sum_received, scene.sum_of_input(&machine.host.variant()));
         assert_eq!(outcome.sum_sent, outcome.sum_of_results);
         assert_ne!(outcome.sum_received, 0);
     }
@@ -131,7 +131,7 @@ fn the_sums_are_those_of_all_words_on_the_streams() {
 fn assert_refused(
     machine: &mut Machine,
     scene: &Step,
-    lanes: &[Lane; CORES],
+    lanes: &[Lane],
     code: ErrorCode,
     channel: u32,
     detail: u32,
@@ -387,7 +387,7 @@ fn a_host_that_waits_for_mm2s_idle_before_it_arms_s2mm_waits_for_ever() {
             assert_eq!(dmasr::IDLE.is_set(value), fits, "{bodies} bodies: {value:#x}");
         }
         // Nothing is lost: armed late, the results come.
-        machine.arm(&mut flight, result_beats(bodies.into()));
+        machine.arm(&mut flight, &result_beats(bodies.into()));
         machine.wait(&flight, LONG).expect("the step completes");
         let outcome = machine.collect(&flight, bodies.into());
         let last = usize::from(bodies) - 1;
@@ -419,7 +419,7 @@ fn arguments_and_shapes_are_not_taken_while_a_step_runs() {
         ]
     );
     let mut flight = Flight::default();
-    machine.arm(&mut flight, result_beats(4));
+    machine.arm(&mut flight, &result_beats(4));
     machine.send(&mut flight, &Step::falling(4).lanes());
     machine.wait(&flight, LONG).expect("the step completes");
     let outcome = machine.collect(&flight, 4);
@@ -435,7 +435,7 @@ fn done_is_cleared_by_reading_and_interrupts_by_toggling() {
     let scene = Step::falling(4);
     scene.write_arguments(host);
     let mut flight = Flight::default();
-    machine.arm(&mut flight, result_beats(4));
+    machine.arm(&mut flight, &result_beats(4));
     machine.start();
     machine.send(&mut flight, &scene.lanes());
     machine.wait(&flight, LONG).expect("the step completes");
@@ -463,7 +463,7 @@ fn done_is_cleared_by_reading_and_interrupts_by_toggling() {
 }
 
 fn formula(scene: &Step) -> u64 {
-    StepCycles::new(&FLOAT, &FLOAT.default_variant().words(), &scene.shape()).total
+    StepCycles::new(&FLOAT.default_variant(), Records::Streamed, &scene.shape()).total
 }
 
 fn assert_accounted(outcome: &Outcome, scene: &Step) {
@@ -509,7 +509,7 @@ fn under_a_bandwidth_limit_a_large_step_takes_the_time_by_formula() {
         let outcome = machine.step(&scene).expect("the step completes");
         assert_accounted(&outcome, &scene);
         let expected =
-            StepTime::new(&FLOAT, &FLOAT.default_variant().words(), &scene.shape(), bandwidth)
+            StepTime::new(&FLOAT.default_variant(), Records::Streamed, &scene.shape(), bandwidth)
                 .seconds;
         let cycles = u32::try_from(outcome.cycles).expect("a few million");
         let found = f64::from(cycles) / 275e6;

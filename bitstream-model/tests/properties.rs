@@ -322,7 +322,7 @@ proptest! {
             }
         }
         let mut flight = Flight::default();
-        machine.arm(&mut flight, [usize::from(bodies) + 1; CORES]);
+        machine.arm(&mut flight, &[usize::from(bodies) + 1; CORES]);
         machine.start();
         machine.send(&mut flight, &lanes);
         // It completes, or the sticky error says why not: never a deadline, never a DMA error.

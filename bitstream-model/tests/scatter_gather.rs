@@ -536,7 +536,7 @@ fn after_a_failed_step_a_reset_of_everything_makes_the_next_step_right() {
     let step = Step::falling(6);
     step.write_arguments(&machine.host);
     let mut flight = Flight::default();
-    machine.arm(&mut flight, [3; CORES]);
+    machine.arm(&mut flight, &[3; CORES]);
     machine.start();
     machine.send(&mut flight, &step.lanes());
     let failure = machine.wait(&flight, LONG).expect_err("half of the room");

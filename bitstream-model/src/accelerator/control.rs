@@ -17,7 +17,7 @@ use crate::interface::number::Numbers;
 use crate::interface::profile::{Depth, Inertia};
 
 use super::integrate::Integration;
-use super::solver::{Mass, SolverParameters};
+use super::solver::SolverParameters;
 
 /// The NUMBERS register.
 fn formats(of: &Numbers) -> u32 {
@@ -27,6 +27,14 @@ fn formats(of: &Numbers) -> u32 {
     let word = numbers::UPDATES.put(word, of.updates as u32);
     let word = numbers::VELOCITIES.put(word, of.velocities as u32);
     numbers::IMPULSES.put(word, of.impulses as u32)
+}
+
+/// An entry of the shape table.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Shape {
+    pub(super) inverse_mass: f32,
+    /// Isotropic; with world inertia it means nothing.
+    pub(super) inverse_inertia: f32,
 }
 
 /// What the accelerator has counted in a step.
@@ -75,7 +83,7 @@ pub(super) struct Registers {
     ready: bool,
     pub(super) error: u32,
     pub(super) error_detail: u32,
-    shapes: Vec<Mass>,
+    shapes: Vec<Shape>,
     pub(super) counters: Counters,
 }
 
@@ -109,7 +117,7 @@ impl Registers {
             ready: false,
             error: 0,
             error_detail: 0,
-            shapes: vec![Mass::default(); config.profile.shape_capacity as usize],
+            shapes: vec![Shape::default(); config.profile.shape_capacity as usize],
             counters: Counters::default(),
         }
     }
@@ -124,7 +132,7 @@ impl Registers {
         self.ready = false;
         self.error = 0;
         self.error_detail = 0;
-        self.shapes.fill(Mass::default());
+        self.shapes.fill(Shape::default());
     }
 
     fn argument(&self, offset: u32) -> u32 {
@@ -158,7 +166,7 @@ impl Registers {
         }
     }
 
-    pub(super) fn shapes(&self) -> &[Mass] {
+    pub(super) fn shapes(&self) -> &[Shape] {
         &self.shapes
     }
 

@@ -1,22 +1,42 @@
-//! This file decodes beats into records, from the interface's layouts alone.
+//! This file decodes rows into records and encodes results, from the interface's layouts alone.
 
+use super::array::Row;
 use super::integrate::Pose;
+use super::sixteen;
 use super::solver::Velocity;
+use crate::interface::number::StreamFormat;
 use crate::interface::record::{
-    Beat, CONTACT_POINTS, WORD_LANE, collision, pose, result, velocity,
+    CONTACT_POINTS, WORD_LANE, collision, pose, relative, result, velocity,
 };
 
-fn vec3(beat: Beat) -> [f32; 3] {
-    let [x, y, z, _] = beat.0;
-    [x, y, z].map(f32::from_bits)
+/// A number in a word of that format.
+#[inline]
+fn number(format: StreamFormat, word: u32) -> f32 {
+    match format {
+        StreamFormat::F32 => f32::from_bits(word),
+        StreamFormat::Binary16 => sixteen::from_binary16(word),
+        StreamFormat::Thesis16 => sixteen::from_thesis16(word),
+    }
 }
 
-fn vec4(beat: Beat) -> [f32; 4] {
-    beat.0.map(f32::from_bits)
+/// The word of that format nearest to a number.
+#[inline]
+fn word(format: StreamFormat, number: f32) -> u32 {
+    match format {
+        StreamFormat::F32 => number.to_bits(),
+        StreamFormat::Binary16 => sixteen::to_binary16(number),
+        StreamFormat::Thesis16 => sixteen::to_thesis16(number),
+    }
 }
 
-fn word(beat: Beat) -> u32 {
-    beat.0[WORD_LANE]
+#[inline]
+fn vec3(format: StreamFormat, [x, y, z, _]: Row) -> [f32; 3] {
+    [x, y, z].map(|word| number(format, word))
+}
+
+#[inline]
+fn vec4(format: StreamFormat, row: Row) -> [f32; 4] {
+    row.map(|word| number(format, word))
 }
 
 /// A collision as it comes in. `count` is as received and may be out of range.
@@ -33,43 +53,85 @@ pub(super) struct Collision {
 }
 
 impl Collision {
+    /// A record in world coordinates.
     #[inline]
-    pub(super) fn from_beats(beats: &[Beat; collision::ROWS]) -> Self {
+    pub(super) fn absolute(format: StreamFormat, rows: &[Row; collision::ROWS]) -> Self {
+        let contact = |k: usize| vec4(format, rows[collision::CONTACTS + k]);
+        Self {
+            body_a: rows[collision::BODY_A][WORD_LANE],
+            body_b: rows[collision::BODY_B][WORD_LANE],
+            count: rows[collision::NORMAL][WORD_LANE] as usize,
+            normal: vec3(format, rows[collision::NORMAL]),
+            position_a: vec3(format, rows[collision::BODY_A]),
+            position_b: vec3(format, rows[collision::BODY_B]),
+            contacts: [contact(0), contact(1), contact(2), contact(3)],
+        }
+    }
+
+    /// A record relative to body A, which then stands at the origin. Points at a distance of
+    /// +infinity are left out.
+    #[inline]
+    pub(super) fn relative(format: StreamFormat, rows: &[Row; relative::ROWS]) -> Self {
         let mut contacts = [[0.0; 4]; CONTACT_POINTS];
-        for (contact, beat) in contacts.iter_mut().zip(&beats[collision::CONTACTS..]) {
-            *contact = vec4(*beat);
+        let mut count = 0;
+        for row in &rows[relative::CONTACTS..] {
+            let contact = vec4(format, *row);
+            if contact[WORD_LANE].to_bits() != f32::INFINITY.to_bits() {
+                contacts[count] = contact;
+                count += 1;
+            }
         }
         Self {
-            body_a: word(beats[collision::BODY_A]),
-            body_b: word(beats[collision::BODY_B]),
-            count: word(beats[collision::NORMAL]) as usize,
-            normal: vec3(beats[collision::NORMAL]),
-            position_a: vec3(beats[collision::BODY_A]),
-            position_b: vec3(beats[collision::BODY_B]),
+            body_a: rows[relative::NORMAL][WORD_LANE],
+            body_b: rows[relative::OFFSET][WORD_LANE],
+            count,
+            normal: vec3(format, rows[relative::NORMAL]),
+            position_a: [0.0; 3],
+            position_b: vec3(format, rows[relative::OFFSET]),
             contacts,
         }
     }
 }
 
 /// A velocity record: the velocity and the shape index.
-pub(super) fn velocity_from_beats(beats: &[Beat; velocity::ROWS]) -> (Velocity, u32) {
-    let linear = beats[velocity::LINEAR];
-    let angular = vec3(beats[velocity::ANGULAR]);
-    (Velocity { linear: vec3(linear), angular }, word(linear))
+pub(super) fn velocity(
+    format: StreamFormat,
+    [linear, angular]: &[Row; velocity::ROWS],
+) -> (Velocity, u32) {
+    const _: () = assert!(velocity::LINEAR == 0 && velocity::ANGULAR == 1);
+    let velocity = Velocity { linear: vec3(format, *linear), angular: vec3(format, *angular) };
+    (velocity, linear[WORD_LANE])
+}
+
+/// The rows that world inertia adds to a velocity record: xx, yy, zz, xy, xz, yz.
+pub(super) fn world_inertia(format: StreamFormat, rows: &[Row; velocity::WORLD_ROWS]) -> [f32; 6] {
+    let [xx, yy, zz] = vec3(format, rows[velocity::DIAGONAL]);
+    let [xy, xz, yz] = vec3(format, rows[velocity::OFF_DIAGONAL]);
+    [xx, yy, zz, xy, xz, yz]
 }
 
 /// A pose record.
-pub(super) fn pose_from_beats(beats: &[Beat; pose::ROWS]) -> Pose {
-    Pose { position: vec3(beats[pose::POSITION]), orientation: vec4(beats[pose::ORIENTATION]) }
+pub(super) fn pose(format: StreamFormat, rows: &[Row; pose::ROWS]) -> Pose {
+    Pose {
+        position: vec3(format, rows[pose::POSITION]),
+        orientation: vec4(format, rows[pose::ORIENTATION]),
+    }
 }
 
 /// The result record of a body.
-pub(super) fn result_to_beats(pose: &Pose, velocity: &Velocity) -> [Beat; result::ROWS] {
-    let row = |[x, y, z]: [f32; 3]| Beat([x.to_bits(), y.to_bits(), z.to_bits(), 0]);
-    let mut beats = [Beat::default(); result::ROWS];
-    beats[result::POSITION] = row(pose.position);
-    beats[result::ORIENTATION] = Beat(pose.orientation.map(f32::to_bits));
-    beats[result::LINEAR] = row(velocity.linear);
-    beats[result::ANGULAR] = row(velocity.angular);
-    beats
+pub(super) fn result(
+    format: StreamFormat,
+    pose: &Pose,
+    velocity: &Velocity,
+) -> [Row; result::ROWS] {
+    let row = |[x, y, z]: [f32; 3]| {
+        let [x, y, z] = [x, y, z].map(|number| word(format, number));
+        [x, y, z, 0]
+    };
+    let mut rows = [[0; 4]; result::ROWS];
+    rows[result::POSITION] = row(pose.position);
+    rows[result::ORIENTATION] = pose.orientation.map(|number| word(format, number));
+    rows[result::LINEAR] = row(velocity.linear);
+    rows[result::ANGULAR] = row(velocity.angular);
+    rows
 }

@@ -2,7 +2,7 @@
 //!
 //! Source: Bullet (integrateTransforms of the OpenCL pipeline): position first, then gravity.
 
-use super::number::Number;
+use super::number::{Format, Number};
 use super::solver::Velocity;
 use super::vector::Vec3;
 use crate::interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
@@ -23,22 +23,22 @@ pub(super) struct Integration {
 }
 
 /// The state of a moving body one time step later.
-pub(super) fn integrate<N: Number>(
+pub(super) fn integrate<U: Format>(
     parameters: &Integration,
     pose: &Pose,
     velocity: &Velocity,
 ) -> (Pose, Velocity) {
-    let n = N::new;
+    let n = Number::<U>::new;
     let dt = n(parameters.time_step);
     let half = n(0.5);
-    let v = Vec3::<N>::new(velocity.linear);
-    let w = Vec3::<N>::new(velocity.angular) * n(parameters.angular_damping);
+    let v = Vec3::<U>::new(velocity.linear);
+    let w = Vec3::<U>::new(velocity.angular) * n(parameters.angular_damping);
 
     let mut speed = w.dot(w).sqrt();
-    if (speed * dt).value() > ROTATION_LIMIT {
+    if (speed * dt).above(n(ROTATION_LIMIT)) {
         speed = n(ROTATION_LIMIT) / dt;
     }
-    let h = if speed.value() < SERIES_BELOW {
+    let h = if n(SERIES_BELOW).above(speed) {
         w * (half * dt - ((((dt * dt) * dt) * n(SERIES_TERM)) * speed) * speed)
     } else {
         w * (n(libm::sinf(((half * speed) * dt).value())) / speed)
@@ -53,8 +53,8 @@ pub(super) fn integrate<N: Number>(
     let rw = ((c * qw - x * qx) - y * qy) - z * qz;
     let scale = n(1.0) / (((rx * rx + ry * ry) + rz * rz) + rw * rw).sqrt();
 
-    let position = Vec3::<N>::new(pose.position) + v * dt;
-    let linear = v + Vec3::<N>::new(parameters.gravity) * dt;
+    let position = Vec3::<U>::new(pose.position) + v * dt;
+    let linear = v + Vec3::<U>::new(parameters.gravity) * dt;
     (
         Pose {
             position: position.values(),
@@ -67,7 +67,7 @@ pub(super) fn integrate<N: Number>(
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "the expected values are exact")]
 mod tests {
-    use super::super::number::Keep;
+    use super::super::number::Single;
     use super::*;
 
     const AT_ORIGIN: Pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn the_position_moves_with_the_velocity_before_gravity() {
         let velocity = Velocity { linear: [1.0, 2.0, 0.0], angular: [0.0; 3] };
-        let (pose, after) = integrate::<Keep>(&STEP, &AT_ORIGIN, &velocity);
+        let (pose, after) = integrate::<Single>(&STEP, &AT_ORIGIN, &velocity);
         assert_eq!(pose.position, [0.5, 1.0, 0.0]);
         assert_eq!(after.linear, [1.0, -2.0, 0.0]);
         assert_eq!(pose.orientation, AT_ORIGIN.orientation);
@@ -86,7 +86,7 @@ mod tests {
     #[test]
     fn a_fast_spin_turns_a_quarter_of_pi_and_keeps_its_velocity() {
         let velocity = Velocity { linear: [0.0; 3], angular: [0.0, 1000.0, 0.0] };
-        let (pose, after) = integrate::<Keep>(&STEP, &AT_ORIGIN, &velocity);
+        let (pose, after) = integrate::<Single>(&STEP, &AT_ORIGIN, &velocity);
         assert_eq!(after.angular, [0.0, 1000.0, 0.0]);
         let [x, y, z, w] = pose.orientation;
         assert_eq!([x, z], [0.0, 0.0]);

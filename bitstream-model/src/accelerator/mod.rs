@@ -2,37 +2,46 @@
 //!
 //! ```text
 //! streams -> segment.rs -> decode.rs -> pipeline.rs (hazards) -> solver.rs -> velocities
-//!                                                             -> integrate.rs -> streams
+//!                                              integrate.rs -> results.rs -> streams
 //! ```
+//!
+//! `array.rs` and `striping.rs` say where rows lie in beats and beats on streams, `sixteen.rs` what
+//! their words mean; `number.rs`, `vector.rs` and `inertia.rs` are the arithmetic.
 //!
 //! `control.rs` is its register file, `phases.rs` goes through load, passes and integration. It takes
 //! what has arrived on the streams, keeps account of the clock cycles that this costs, and knows
 //! nothing of who sent it.
 
+mod array;
 mod control;
 mod decode;
+mod inertia;
 mod integrate;
 mod number;
 mod phases;
 mod pipeline;
+mod results;
 mod segment;
+mod sixteen;
 mod solver;
+pub(crate) mod striping;
 mod vector;
 
 use crate::cast::register;
-use crate::config::{BoardConfig, Subnormals};
+use crate::config::BoardConfig;
 use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
-use crate::interface::record::{CONTACT_POINTS, velocity};
+use crate::interface::profile::{Inertia, Variant};
+use crate::interface::record::CONTACT_POINTS;
 use crate::quirks::Resettable;
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
 
 use control::{Arguments, Counters, Registers, Request};
-use number::{Flush, Keep, Number};
 use pipeline::Pipeline;
-use segment::{Segment, Striping};
+use results::Results;
+use segment::Segment;
 use solver::{Impulses, Velocity};
 
 /// Where a step stands.
@@ -44,7 +53,10 @@ enum Phase {
         number: u32,
         segment: Segment,
     },
-    Integrate(Segment),
+    Integrate {
+        poses: Segment,
+        results: Results,
+    },
     /// The last results are on their way out.
     Ending,
     Failed,
@@ -63,6 +75,7 @@ pub(crate) struct Ran {
 #[derive(Debug)]
 pub(crate) struct Accelerator {
     config: BoardConfig,
+    variant: Variant,
     registers: Registers,
     arguments: Arguments,
     phase: Phase,
@@ -77,6 +90,8 @@ pub(crate) struct Accelerator {
     pipeline: Pipeline,
     velocities: Vec<Velocity>,
     shape_of: Vec<u8>,
+    /// With world inertia, that of each body.
+    inertias: Vec<inertia::Stored>,
     impulses: Vec<Impulses>,
 }
 
@@ -86,6 +101,7 @@ impl Accelerator {
         let held = config.quirks.held_reset == Some(Resettable::Accelerator);
         Self {
             config: *config,
+            variant: config.variant(),
             registers: Registers::new(config),
             arguments: Arguments::default(),
             phase: Phase::Idle,
@@ -102,6 +118,7 @@ impl Accelerator {
             ),
             velocities: Vec::new(),
             shape_of: Vec::new(),
+            inertias: Vec::new(),
             impulses: Vec::new(),
         }
     }
@@ -189,18 +206,6 @@ impl Accelerator {
     /// Works for up to `limit` cycles on what has arrived, then returns; it returns early when
     /// there is nothing to do.
     pub(crate) fn run(&mut self, limit: u64, inputs: &mut [Stream], outputs: &mut [Stream]) -> Ran {
-        match self.config.subnormals {
-            Subnormals::Keep => self.run_with::<Keep>(limit, inputs, outputs),
-            Subnormals::Flush => self.run_with::<Flush>(limit, inputs, outputs),
-        }
-    }
-
-    fn run_with<N: Number>(
-        &mut self,
-        limit: u64,
-        inputs: &mut [Stream],
-        outputs: &mut [Stream],
-    ) -> Ran {
         let mut ran = Ran::default();
         if !self.running() {
             return ran;
@@ -222,8 +227,10 @@ impl Accelerator {
             let progress = match self.phase {
                 Phase::Idle | Phase::Failed => break,
                 Phase::Load(segment) => self.load(segment, inputs),
-                Phase::Pass { number, segment } => self.pass::<N>(number, segment, left, inputs),
-                Phase::Integrate(segment) => self.integrate::<N>(segment, inputs, outputs),
+                Phase::Pass { number, segment } => self.pass(number, segment, left, inputs),
+                Phase::Integrate { poses, results } => {
+                    self.integrate(poses, results, inputs, outputs)
+                }
                 Phase::Ending => {
                     self.phase = Phase::Idle;
                     self.end_step();
@@ -264,7 +271,7 @@ impl Accelerator {
         self.clock = 0;
         self.debt = 0;
         let profile = self.config.profile;
-        let variant = self.config.variant();
+        let variant = self.variant;
         let needed = u64::from(arguments.bodies) * u64::from(variant.bytes_per_body())
             + u64::from(arguments.collisions) * u64::from(variant.bytes_per_collision());
         let out_of_range = [
@@ -285,9 +292,13 @@ impl Accelerator {
         self.velocities.resize(bodies, Velocity::default());
         self.shape_of.clear();
         self.shape_of.resize(bodies, 0);
+        self.inertias.clear();
+        if variant.inertia == Inertia::World {
+            self.inertias.resize(bodies, inertia::Stored::default());
+        }
         self.impulses.clear();
         self.impulses.resize(arguments.collisions as usize, [0.0; CONTACT_POINTS]);
         self.pipeline.start_step(bodies);
-        self.phase = Phase::Load(self.segment(Striping::Running, velocity::ROWS, bodies));
+        self.phase = Phase::Load(self.velocities_in());
     }
 }

@@ -1,17 +1,22 @@
 //! This file works through the phases of a step on what has arrived: load, passes, integration.
 
+use super::array::{Array, Records};
 use super::decode::{self, Collision};
-use super::integrate::{Pose, integrate};
-use super::number::Number;
+use super::inertia::{self, Isotropic, World};
+use super::integrate::integrate;
+use super::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
 use super::pipeline::Entry;
-use super::segment::{PacketError, Segment, Striping};
+use super::results::Results;
+use super::segment::{PacketError, Segment};
 use super::solver::{self, Mass, Velocity};
+use super::striping::Striping;
 use super::{Accelerator, Phase};
 use crate::cast::register;
-use crate::config::Hazards;
+use crate::config::{Hazards, Subnormals};
 use crate::interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
-use crate::interface::profile::Depth;
-use crate::interface::record::{Beat, CONTACT_POINTS, collision, pose, result, velocity};
+use crate::interface::number::{Precision, StreamFormat};
+use crate::interface::profile::{Depth, Geometry, Inertia};
+use crate::interface::record::{CONTACT_POINTS, pose, result, velocity};
 use crate::stream::Stream;
 
 /// The integer part, toward zero and stopped at the ends, as the accumulator takes it.
@@ -21,15 +26,42 @@ fn to_fixed(value: f64) -> u64 {
 }
 
 impl Accelerator {
-    pub(super) fn segment(&self, striping: Striping, beats: usize, records: usize) -> Segment {
-        Segment::new(striping, beats, records, self.config.profile.mm2s_widths.len())
+    /// An array of body records that comes in.
+    fn bodies_in(&self, rows: usize) -> Segment {
+        let profile = self.variant.profile;
+        let striping = Striping::new(&profile.stripes.bodies, profile.mm2s_widths);
+        Segment::new(Array::new(striping, self.body_records(rows)))
     }
 
-    fn received(&mut self, beats: &[Beat]) {
-        self.counters.sum_received = beats
-            .iter()
-            .flat_map(|beat| beat.0)
-            .fold(self.counters.sum_received, u32::wrapping_add);
+    fn body_records(&self, rows: usize) -> Records {
+        Records {
+            format: self.variant.numbers.bodies,
+            rows,
+            count: self.arguments.bodies as usize,
+            together: 1,
+        }
+    }
+
+    pub(super) fn velocities_in(&self) -> Segment {
+        self.bodies_in(self.variant.velocity_rows())
+    }
+
+    fn collisions_in(&self) -> Segment {
+        let profile = self.variant.profile;
+        let striping = Striping::new(&profile.stripes.collisions, profile.mm2s_widths);
+        let records = Records {
+            format: self.variant.numbers.collisions,
+            rows: self.variant.collision_rows(),
+            count: self.arguments.collisions as usize,
+            together: profile.collisions_per_issue as usize,
+        };
+        Segment::new(Array::new(striping, records))
+    }
+
+    fn results_out(&self) -> Results {
+        let profile = self.variant.profile;
+        let striping = Striping::new(&profile.stripes.bodies, profile.s2mm_widths);
+        Results::new(Array::new(striping, self.body_records(result::ROWS)))
     }
 
     fn injected(&mut self) -> Result<(), PacketError> {
@@ -39,7 +71,34 @@ impl Accelerator {
         }
     }
 
-    /// Loads the velocities that have arrived: one beat a cycle from each stream.
+    fn received(&mut self, sum: u32) {
+        self.counters.sum_received = self.counters.sum_received.wrapping_add(sum);
+    }
+
+    /// Numbers as an on-chip array of that precision holds them.
+    #[inline]
+    fn stored<const N: usize>(&self, precision: Precision, numbers: [f32; N]) -> [f32; N] {
+        fn rounded<F: Format, const N: usize>(numbers: [f32; N]) -> [f32; N] {
+            numbers.map(|number| Number::<F>::new(number).value())
+        }
+        match (precision, self.config.subnormals) {
+            // What the arithmetic left, as it is.
+            (Precision::F32, _) => numbers,
+            (Precision::Binary16, Subnormals::Keep) => rounded::<Half, N>(numbers),
+            (Precision::Binary16, Subnormals::Flush) => rounded::<HalfFlushed, N>(numbers),
+        }
+    }
+
+    #[inline]
+    fn stored_velocity(&self, velocity: Velocity) -> Velocity {
+        let precision = self.variant.numbers.velocities;
+        Velocity {
+            linear: self.stored(precision, velocity.linear),
+            angular: self.stored(precision, velocity.angular),
+        }
+    }
+
+    /// Loads the velocities that have arrived, a beat a cycle from each stream of 128 bits.
     pub(super) fn load(
         &mut self,
         mut segment: Segment,
@@ -51,12 +110,20 @@ impl Accelerator {
         }
         self.injected()?;
         segment.check(records, inputs)?;
-        let first = segment.done;
+        let format = self.variant.numbers.bodies;
         for ahead in 0..records {
-            let beats = segment.record(ahead, inputs);
-            self.received(&beats);
-            let (velocity, shape) = decode::velocity_from_beats(&beats);
-            let body = first + ahead;
+            let body = segment.done + ahead;
+            let (velocity, shape) = match self.variant.inertia {
+                Inertia::Isotropic => {
+                    decode::velocity(format, &segment.record::<{ velocity::ROWS }>(ahead, inputs))
+                }
+                Inertia::World => {
+                    let rows = segment.record::<{ velocity::WORLD_ROWS }>(ahead, inputs);
+                    let inertia = decode::world_inertia(format, &rows);
+                    self.inertias[body] = self.stored(self.variant.numbers.velocities, inertia);
+                    decode::velocity(format, &[rows[velocity::LINEAR], rows[velocity::ANGULAR]])
+                }
+            };
             let known = (shape as usize) < self.registers.shapes().len();
             let Some(shape) = u8::try_from(shape).ok().filter(|_| known) else {
                 return Err(PacketError {
@@ -65,12 +132,13 @@ impl Accelerator {
                     beat: register(body),
                 });
             };
-            self.velocities[body] = velocity;
+            self.velocities[body] = self.stored_velocity(velocity);
             self.shape_of[body] = shape;
         }
-        segment.advance(records, inputs);
-        let rows = |records: usize| (records * velocity::ROWS).div_ceil(inputs.len()) as u64;
-        self.debt += rows(segment.done) - rows(first);
+        let before = segment.cycles();
+        let sum = segment.advance(records, inputs);
+        self.received(sum);
+        self.debt += segment.cycles() - before;
         self.phase = Phase::Load(segment);
         if segment.finished() {
             self.start_pass(0);
@@ -88,60 +156,109 @@ impl Accelerator {
 
     /// Depth of the pipeline that a pass goes through.
     fn depth(&self, pass: u32) -> Depth {
-        let profile = self.config.profile;
+        let profile = self.variant.profile;
         let contact = pass < self.arguments.contact_iterations;
         self.config.depth(if contact { profile.contact } else { profile.friction })
     }
 
     fn start_pass(&mut self, number: u32) {
-        let collisions = self.arguments.collisions as usize;
-        let segment = self.segment(Striping::ByRecord, collision::ROWS, collisions);
         if number == self.passes() {
-            self.start_integration();
+            let (poses, results) = (self.bodies_in(pose::ROWS), self.results_out());
+            self.phase = Phase::Integrate { poses, results };
             return;
         }
         self.pipeline.start_pass(self.depth(number).window.into());
-        self.phase = Phase::Pass { number, segment };
-    }
-
-    fn start_integration(&mut self) {
-        let bodies = self.arguments.bodies as usize;
-        self.phase = Phase::Integrate(self.segment(Striping::Running, pose::ROWS, bodies));
+        self.phase = Phase::Pass { number, segment: self.collisions_in() };
     }
 
     /// Solves the collisions that have arrived, for up to `limit` cycles.
-    pub(super) fn pass<N: Number>(
+    pub(super) fn pass(
+        &mut self,
+        number: u32,
+        segment: Segment,
+        limit: u64,
+        inputs: &mut [Stream],
+    ) -> Result<bool, PacketError> {
+        match self.config.subnormals {
+            Subnormals::Keep => self.pass_of::<Single, Half>(number, segment, limit, inputs),
+            Subnormals::Flush => {
+                self.pass_of::<SingleFlushed, HalfFlushed>(number, segment, limit, inputs)
+            }
+        }
+    }
+
+    fn pass_of<S: Format, H: Format>(
+        &mut self,
+        number: u32,
+        segment: Segment,
+        limit: u64,
+        inputs: &mut [Stream],
+    ) -> Result<bool, PacketError> {
+        let numbers = self.variant.numbers;
+        match (numbers.updates, numbers.rows) {
+            // Rows that need more than the updates have: the configuration refuses them.
+            (Precision::Binary16, _) => self.pass_with::<H, H>(number, segment, limit, inputs),
+            (Precision::F32, Precision::Binary16) => {
+                self.pass_with::<H, S>(number, segment, limit, inputs)
+            }
+            (Precision::F32, Precision::F32) => {
+                self.pass_with::<S, S>(number, segment, limit, inputs)
+            }
+        }
+    }
+
+    fn pass_with<R: Format, U: Format>(
+        &mut self,
+        number: u32,
+        segment: Segment,
+        limit: u64,
+        inputs: &mut [Stream],
+    ) -> Result<bool, PacketError> {
+        match self.variant.inertia {
+            Inertia::Isotropic => {
+                self.collisions::<R, U, Isotropic>(number, segment, limit, inputs)
+            }
+            Inertia::World => self.collisions::<R, U, World>(number, segment, limit, inputs),
+        }
+    }
+
+    fn collisions<R: Format, U: Format, I: inertia::Inertia>(
         &mut self,
         number: u32,
         mut segment: Segment,
         limit: u64,
         inputs: &mut [Stream],
     ) -> Result<bool, PacketError> {
-        let available = segment.available(inputs);
+        let profile = self.variant.profile;
+        let interval = u64::from(profile.initiation_interval);
+        let per_issue = profile.collisions_per_issue as usize;
+        let mut available = segment.available(inputs);
+        if available < segment.left() {
+            // The collisions of an issue enter together.
+            available -= available % per_issue;
+        }
         if available == 0 {
             return Ok(false);
         }
         self.injected()?;
         segment.check(available, inputs)?;
-        let profile = self.config.profile;
-        let interval = u64::from(profile.initiation_interval);
-        let per_issue = profile.collisions_per_issue as usize;
         let mut cycles = 0;
         let mut records = 0;
         while records < available && cycles <= limit {
-            let beats = segment.record(records, inputs);
-            self.received(&beats);
-            let index = segment.done + records;
-            let now = self.clock + cycles;
-            let stall = self.solve::<N>(number, index, now, &beats)?;
-            cycles += stall;
-            self.counters.stalls += stall;
-            if index.is_multiple_of(per_issue) {
-                cycles += interval;
+            let issue = (available - records).min(per_issue);
+            for ahead in records..records + issue {
+                let collision = self.collision(&segment, ahead, inputs);
+                let now = self.clock + cycles;
+                let index = segment.done + ahead;
+                let stall = self.solve::<R, U, I>(number, index, now, &collision)?;
+                cycles += stall;
+                self.counters.stalls += stall;
             }
-            records += 1;
+            cycles += interval;
+            records += issue;
         }
-        segment.advance(records, inputs);
+        let sum = segment.advance(records, inputs);
+        self.received(sum);
         self.debt += cycles;
         self.phase = Phase::Pass { number, segment };
         if segment.finished() {
@@ -154,16 +271,36 @@ impl Accelerator {
         Ok(true)
     }
 
+    /// The collision `ahead` places after the next one.
+    #[inline]
+    fn collision(&self, segment: &Segment, ahead: usize, inputs: &[Stream]) -> Collision {
+        use StreamFormat::{Binary16, F32, Thesis16};
+        match (self.variant.profile.geometry, self.variant.numbers.collisions) {
+            (Geometry::Absolute, F32) => Collision::absolute(F32, &segment.record(ahead, inputs)),
+            (Geometry::Absolute, Binary16) => {
+                Collision::absolute(Binary16, &segment.record(ahead, inputs))
+            }
+            (Geometry::Absolute, Thesis16) => {
+                Collision::absolute(Thesis16, &segment.record(ahead, inputs))
+            }
+            (Geometry::Relative, Binary16) => {
+                Collision::relative(Binary16, &segment.record(ahead, inputs))
+            }
+            (Geometry::Relative, format) => {
+                Collision::relative(format, &segment.record(ahead, inputs))
+            }
+        }
+    }
+
     /// Solves one collision in one pass; returns the cycles that it waited for its bodies.
     #[inline]
-    fn solve<N: Number>(
+    fn solve<R: Format, U: Format, I: inertia::Inertia>(
         &mut self,
         pass: u32,
         index: usize,
         now: u64,
-        beats: &[Beat; collision::ROWS],
+        collision: &Collision,
     ) -> Result<u64, PacketError> {
-        let collision = Collision::from_beats(beats);
         let unchecked = self.config.hazards == Hazards::Unchecked;
         if unchecked {
             self.pipeline.retire_due(&mut self.velocities);
@@ -175,29 +312,47 @@ impl Accelerator {
             return Ok(0);
         }
         let sides = [collision.body_a as usize, collision.body_b as usize];
-        let masses = self.checked(index, &collision, sides)?;
-        let moving = masses.map(|mass| mass.inverse_mass != 0.0);
+        let masses = self.checked(index, collision, sides)?;
+        let moving = [masses[0].inverse_mass != 0.0, masses[1].inverse_mass != 0.0];
         let entry = Entry { bodies: [collision.body_a, collision.body_b], moving };
         let stall = if unchecked { 0 } else { self.pipeline.wait(now, &entry) };
 
         let mut velocities = sides.map(|body| self.velocities[body]);
-        let impulses = &mut self.impulses[index];
+        let mut impulses = self.impulses[index];
         let parameters = &self.arguments.solver;
         let contacts = self.arguments.contact_iterations;
+        let precision = self.variant.numbers.impulses;
         if pass < contacts {
-            solver::contact::<N>(&collision, parameters, masses, &mut velocities, impulses);
+            solver::contact::<R, U, I>(
+                collision,
+                parameters,
+                &masses,
+                &mut velocities,
+                &mut impulses,
+            );
+            impulses = self.stored(precision, impulses);
             if pass + 1 == contacts {
-                let sum = f64::from(solver::normal_sum::<N>(impulses));
+                let sum = f64::from(solver::normal_sum::<U>(&impulses));
                 let unit = f64::from(1_u32 << IMPULSE_SUM_FRACTION_BITS);
                 self.counters.impulse_sum =
                     self.counters.impulse_sum.saturating_add(to_fixed(sum * unit));
             }
         } else {
             if pass == contacts {
-                *impulses = [solver::normal_sum::<N>(impulses), 0.0, 0.0, 0.0];
+                let sum = solver::normal_sum::<U>(&impulses);
+                impulses = self.stored(precision, [sum, 0.0, 0.0, 0.0]);
             }
-            solver::friction::<N>(&collision, parameters, masses, &mut velocities, impulses);
+            solver::friction::<R, U, I>(
+                collision,
+                parameters,
+                &masses,
+                &mut velocities,
+                &mut impulses,
+            );
+            impulses = self.stored(precision, impulses);
         }
+        self.impulses[index] = impulses;
+        let velocities = velocities.map(|velocity| self.stored_velocity(velocity));
 
         if unchecked {
             let stale = self.pipeline.issue(&entry, velocities);
@@ -231,70 +386,63 @@ impl Accelerator {
             return Err(error(ErrorCode::SelfCollision));
         }
         let shapes = self.registers.shapes();
-        let masses = sides.map(|body| shapes[usize::from(self.shape_of[body])]);
+        let masses = sides.map(|body| {
+            let shape = shapes[usize::from(self.shape_of[body])];
+            let inverse_inertia = match self.variant.inertia {
+                Inertia::Isotropic => [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
+                Inertia::World => self.inertias[body],
+            };
+            Mass { inverse_mass: shape.inverse_mass, inverse_inertia }
+        });
         if masses.iter().all(|mass| mass.inverse_mass == 0.0) {
             return Err(error(ErrorCode::StaticPair));
         }
         Ok(masses)
     }
 
-    /// Integrates the bodies whose poses have arrived and sends their results, one beat a cycle on
-    /// each stream.
-    pub(super) fn integrate<N: Number>(
+    /// Integrates the bodies whose poses have arrived and sends their results, a beat a cycle on
+    /// each stream of 128 bits.
+    pub(super) fn integrate(
         &mut self,
-        mut segment: Segment,
+        mut poses: Segment,
+        mut results: Results,
         inputs: &mut [Stream],
         outputs: &mut [Stream],
     ) -> Result<bool, PacketError> {
-        let lanes = outputs.len();
-        let space = outputs.iter().map(Stream::space).min().unwrap_or(0);
-        let records = segment.available(inputs).min(space * lanes / result::ROWS);
+        let records = poses.available(inputs).min(results.room(outputs));
         if records == 0 {
             return Ok(false);
         }
         self.injected()?;
-        segment.check(records, inputs)?;
-        let first = segment.done;
-        let total = self.arguments.bodies as usize * result::ROWS;
+        poses.check(records, inputs)?;
+        let format = self.variant.numbers.bodies;
+        let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
+        let before = cycles(&poses, &results);
         let shapes = self.registers.shapes();
+        let step = match (self.variant.numbers.updates, self.config.subnormals) {
+            (Precision::F32, Subnormals::Keep) => integrate::<Single>,
+            (Precision::F32, Subnormals::Flush) => integrate::<SingleFlushed>,
+            (Precision::Binary16, Subnormals::Keep) => integrate::<Half>,
+            (Precision::Binary16, Subnormals::Flush) => integrate::<HalfFlushed>,
+        };
         for ahead in 0..records {
-            let beats = segment.record(ahead, inputs);
-            self.counters.sum_received = beats
-                .iter()
-                .flat_map(|beat: &Beat| beat.0)
-                .fold(self.counters.sum_received, u32::wrapping_add);
-            let body = first + ahead;
-            let pose = decode::pose_from_beats(&beats);
+            let body = poses.done + ahead;
+            let pose = decode::pose(format, &poses.record(ahead, inputs));
             let velocity = self.velocities[body];
             let moves = shapes[usize::from(self.shape_of[body])].inverse_mass != 0.0;
-            let (pose, velocity): (Pose, Velocity) = if moves && self.arguments.integrate {
-                integrate::<N>(&self.arguments.integration, &pose, &velocity)
+            let (pose, velocity) = if moves && self.arguments.integrate {
+                step(&self.arguments.integration, &pose, &velocity)
             } else {
                 (pose, velocity)
             };
-            let beats = decode::result_to_beats(&pose, &velocity);
-            for (k, beat) in beats.into_iter().enumerate() {
-                let running = body * result::ROWS + k;
-                let output = &mut outputs[running % lanes];
-                output.push(&[beat]);
-                if running + lanes >= total {
-                    output.mark_last();
-                }
-                self.counters.sum_sent =
-                    beat.0.into_iter().fold(self.counters.sum_sent, u32::wrapping_add);
-            }
+            let sum = results.send(&decode::result(format, &pose, &velocity), outputs);
+            self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sum);
         }
-        segment.advance(records, inputs);
-        let rows = |records: usize| {
-            let poses_in = (records * pose::ROWS).div_ceil(inputs.len());
-            let results_out = (records * result::ROWS).div_ceil(lanes);
-            poses_in.max(results_out) as u64
-        };
-        self.debt += rows(segment.done) - rows(first);
-        self.phase = Phase::Integrate(segment);
-        if segment.finished() {
-            self.phase = Phase::Ending;
-        }
+        let sum = poses.advance(records, inputs);
+        self.received(sum);
+        self.debt += cycles(&poses, &results) - before;
+        let finished = poses.finished();
+        self.phase = if finished { Phase::Ending } else { Phase::Integrate { poses, results } };
         Ok(true)
     }
 }

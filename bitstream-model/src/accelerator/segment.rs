@@ -1,19 +1,12 @@
-//! This file reads one segment of beats from the streams: which stream the next beat is on, how many
-//! whole records have arrived, and whether TLAST comes where it must.
+//! This file reads one segment of records from the streams: where the rows of the next record are,
+//! how many whole records have arrived, and whether TLAST comes where it must.
 
+use super::array::{Array, Row, half_of};
+use super::striping::STREAMS_MAX;
 use crate::cast::register;
 use crate::interface::control::ErrorCode;
-use crate::interface::record::Beat;
+use crate::interface::record::LANES;
 use crate::stream::Stream;
-
-/// How a segment's beats lie on the streams.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Striping {
-    /// Beat b of every record is on stream b mod N.
-    ByRecord,
-    /// The running beat number over the whole segment, mod N.
-    Running,
-}
 
 /// A packet that does not end where it must.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,85 +17,45 @@ pub(super) struct PacketError {
     pub(super) beat: u32,
 }
 
-/// The most streams that a profile has.
-pub(super) const STREAMS_MAX: usize = 8;
-
 /// A segment while it is being read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segment {
-    striping: Striping,
-    beats_per_record: usize,
-    records: usize,
-    streams: usize,
+    array: Array,
     /// Records read so far.
     pub(super) done: usize,
-    /// Beats read so far from each stream.
+    /// Beats taken so far from each stream.
     taken: [usize; STREAMS_MAX],
-    /// Striped by record: the stream of each beat of a record, and its number on that stream.
-    place: [(usize, usize); STREAMS_MAX],
-    /// Striped by record: beats of a record on each stream.
-    share: [usize; STREAMS_MAX],
 }
 
 impl Segment {
-    pub(super) fn new(
-        striping: Striping,
-        beats_per_record: usize,
-        records: usize,
-        streams: usize,
-    ) -> Self {
-        assert!((1..=STREAMS_MAX).contains(&streams), "a profile has 1 to 8 streams");
-        assert!(beats_per_record <= STREAMS_MAX, "a record has at most 8 beats");
-        let mut share = [0; STREAMS_MAX];
-        for beat in 0..beats_per_record {
-            share[beat % streams] += 1;
-        }
-        Self {
-            striping,
-            beats_per_record,
-            records,
-            streams,
-            done: 0,
-            taken: [0; STREAMS_MAX],
-            place: std::array::from_fn(|beat| (beat % streams, beat / streams)),
-            share,
-        }
+    pub(super) fn new(array: Array) -> Self {
+        Self { array, done: 0, taken: [0; STREAMS_MAX] }
     }
 
-    /// Beats on a stream after `records` records.
-    fn beats_after(&self, records: usize, stream: usize) -> usize {
-        match self.striping {
-            Striping::ByRecord => records * self.share[stream],
-            Striping::Running => {
-                (records * self.beats_per_record + self.streams - 1 - stream) / self.streams
-            }
-        }
+    /// Clock cycles that the streams take from the start of the segment to the next record.
+    pub(super) fn cycles(&self) -> u64 {
+        self.array.cycles(self.done)
     }
 
     /// Whole records that have arrived and were not read.
     pub(super) fn available(&self, streams: &[Stream]) -> usize {
-        let mut records = self.records;
-        for (k, stream) in streams.iter().enumerate().take(self.streams) {
-            let arrived = self.taken[k] + stream.len();
-            let whole = match self.striping {
-                Striping::ByRecord => match self.share[k] {
-                    0 => continue,
-                    share => arrived / share,
-                },
-                // All running beats below this stream's next one may have arrived.
-                Striping::Running => (arrived * self.streams + k) / self.beats_per_record,
-            };
-            records = records.min(whole);
-        }
-        records - self.done
+        let arrived = self.array.striping.contiguous(|k| self.taken[k] + streams[k].len());
+        // A record that has begun in a beat that was taken may still lack its end.
+        self.array.records_in(arrived).saturating_sub(self.done)
+    }
+
+    /// Records that were not read, arrived or not.
+    pub(super) fn left(&self) -> usize {
+        self.array.records - self.done
     }
 
     /// Checks that the next `records` records end packets where they must and nowhere else, with
     /// whole beats.
     pub(super) fn check(&self, records: usize, streams: &[Stream]) -> Result<(), PacketError> {
-        for (k, stream) in streams.iter().enumerate().take(self.streams) {
-            let packet = self.beats_after(self.records, k);
-            let now = self.beats_after(self.done + records, k) - self.taken[k];
+        let after = self.array.beats_of(self.done + records);
+        for (k, stream) in streams.iter().enumerate() {
+            let packet = self.array.packet(k);
+            let now = self.array.striping.on(k, after) - self.taken[k];
             let ends = now > 0 && self.taken[k] + now == packet;
             let error = |code, beat| PacketError { code, channel: k, beat: register(beat) };
             match stream.next_last() {
@@ -124,52 +77,64 @@ impl Segment {
         Ok(())
     }
 
-    /// Beat `beat` of the record `ahead` places after the next one.
+    /// The rows of the record `ahead` places after the next one.
     #[inline]
-    pub(super) fn beat(&self, ahead: usize, beat: usize, streams: &[Stream]) -> Beat {
-        match self.striping {
-            Striping::ByRecord => {
-                let (stream, number) = self.place[beat];
-                streams[stream].peek(ahead * self.share[stream] + number)
-            }
-            Striping::Running => {
-                let running = (self.done + ahead) * self.beats_per_record + beat;
-                let stream = running % self.streams;
-                streams[stream].peek(running / self.streams - self.taken[stream])
-            }
-        }
-    }
-
-    /// A whole record.
-    #[inline]
-    pub(super) fn record<const BEATS: usize>(
+    pub(super) fn record<const ROWS: usize>(
         &self,
         ahead: usize,
         streams: &[Stream],
-    ) -> [Beat; BEATS] {
-        std::array::from_fn(|beat| self.beat(ahead, beat, streams))
+    ) -> [Row; ROWS] {
+        debug_assert!(ROWS == self.array.rows, "the caller knows the record");
+        let first = (self.done + ahead) * ROWS;
+        let mut places = self.array.striping.places(first / self.array.rows_per_beat);
+        let mut next = || {
+            let (stream, number) = places.take();
+            streams[stream].peek(number - self.taken[stream])
+        };
+        let mut rows = [[0; LANES]; ROWS];
+        if self.array.rows_per_beat == 1 {
+            rows.fill_with(|| next().0);
+        } else {
+            let mut beat = next();
+            let mut half = first % 2;
+            for row in &mut rows {
+                if half == 2 {
+                    (beat, half) = (next(), 0);
+                }
+                *row = half_of(beat, half);
+                half += 1;
+            }
+        }
+        rows
     }
 
-    /// The next `records` records have been read.
-    pub(super) fn advance(&mut self, records: usize, streams: &mut [Stream]) {
+    /// The next `records` records have been read; returns the sum of all words that were taken.
+    pub(super) fn advance(&mut self, records: usize, streams: &mut [Stream]) -> u32 {
         self.done += records;
-        for (k, stream) in streams.iter_mut().enumerate().take(self.streams) {
-            let taken = self.beats_after(self.done, k);
-            stream.pop(taken - self.taken[k]);
+        let after = self.array.beats_of(self.done);
+        let mut sum = 0_u32;
+        for (k, stream) in streams.iter_mut().enumerate() {
+            let taken = self.array.striping.on(k, after);
+            sum = sum.wrapping_add(stream.take_sum(taken - self.taken[k]));
             self.taken[k] = taken;
         }
+        sum
     }
 
     pub(super) fn finished(&self) -> bool {
-        self.done == self.records
+        self.done == self.array.records
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::array::Records;
+    use super::super::striping::Striping;
     use super::*;
+    use crate::interface::profile::{FLOAT, HALF, Profile};
+    use crate::interface::record::Beat;
 
-    fn streams(lengths: [usize; 4]) -> Vec<Stream> {
+    fn streams<const N: usize>(lengths: [usize; N]) -> Vec<Stream> {
         lengths
             .iter()
             .map(|length| {
@@ -180,9 +145,26 @@ mod tests {
             .collect()
     }
 
+    fn collisions(profile: &'static Profile, count: usize) -> Segment {
+        let variant = profile.default_variant();
+        let striping = Striping::new(&profile.stripes.collisions, profile.mm2s_widths);
+        let format = variant.numbers.collisions;
+        let together = profile.collisions_per_issue as usize;
+        let rows = variant.collision_rows();
+        Segment::new(Array::new(striping, Records { format, rows, count, together }))
+    }
+
+    fn velocities(profile: &'static Profile, count: usize) -> Segment {
+        let variant = profile.default_variant();
+        let striping = Striping::new(&profile.stripes.bodies, profile.mm2s_widths);
+        let format = variant.numbers.bodies;
+        let rows = variant.velocity_rows();
+        Segment::new(Array::new(striping, Records { format, rows, count, together: 1 }))
+    }
+
     #[test]
     fn a_collision_is_there_when_all_its_beats_are() {
-        let segment = Segment::new(Striping::ByRecord, 7, 10, 4);
+        let segment = collisions(&FLOAT, 10);
         assert_eq!(segment.available(&streams([4, 4, 4, 2])), 2);
         assert_eq!(segment.available(&streams([4, 4, 4, 1])), 1);
         assert_eq!(segment.available(&streams([4, 4, 3, 9])), 1);
@@ -190,23 +172,59 @@ mod tests {
 
     #[test]
     fn running_records_alternate_between_halves_of_the_streams() {
-        let segment = Segment::new(Striping::Running, 2, 10, 4);
+        let segment = velocities(&FLOAT, 10);
         assert_eq!(segment.available(&streams([1, 1, 0, 0])), 1);
         assert_eq!(segment.available(&streams([2, 2, 1, 1])), 3);
         assert_eq!(segment.available(&streams([2, 1, 1, 1])), 2);
     }
 
     #[test]
+    fn two_collisions_share_a_beat_of_sixteen_bit_words() {
+        let mut all: Vec<Stream> = (0..3).map(|_| Stream::new(64)).collect();
+        // Rows are numbered through from 0, a word each.
+        let mut row = 0;
+        for stream in [0, 0, 0, 1, 1, 1, 2] {
+            all[stream].push(&[Beat([row, 0, row + 1, 0])]);
+            row += 2;
+        }
+        let mut segment = collisions(&HALF, 4);
+        let numbers = |rows: [Row; 7]| rows.map(|[number, ..]| number);
+        assert_eq!(segment.available(&all), 2);
+        assert_eq!(numbers(segment.record(1, &all)), [7, 8, 9, 10, 11, 12, 13]);
+        assert_eq!(segment.advance(1, &mut all), 1 + 2 + 3 + 4 + 5);
+        assert_eq!(numbers(segment.record(0, &all)), [7, 8, 9, 10, 11, 12, 13]);
+        segment.advance(1, &mut all);
+        assert!(all.iter().all(|stream| stream.len() == 0));
+    }
+
+    #[test]
+    fn the_last_record_waits_for_the_padding_behind_it() {
+        // Three and a half beats of a collision, as many of padding.
+        let segment = collisions(&HALF, 1);
+        assert_eq!(segment.available(&streams([3, 3, 0])), 0);
+        let mut all = streams([3, 3, 1]);
+        assert_eq!(segment.available(&all), 1);
+        let missing = PacketError { code: ErrorCode::TlastMissing, channel: 0, beat: 2 };
+        assert_eq!(segment.check(1, &all), Err(missing));
+        all.iter_mut().for_each(Stream::mark_last);
+        assert_eq!(segment.check(1, &all), Ok(()));
+        // Two beats on each wide stream and one on the narrow one for one body.
+        let segment = velocities(&HALF, 1);
+        assert_eq!(segment.available(&streams([2, 2, 0])), 0);
+        assert_eq!(segment.available(&streams([2, 2, 1])), 1);
+    }
+
+    #[test]
     fn tlast_must_come_with_the_last_beat_of_each_stream() {
         let mut all = streams([2, 2, 2, 1]);
-        let segment = Segment::new(Striping::ByRecord, 7, 1, 4);
+        let segment = collisions(&FLOAT, 1);
         let missing = PacketError { code: ErrorCode::TlastMissing, channel: 0, beat: 1 };
         assert_eq!(segment.check(1, &all), Err(missing));
         for stream in &mut all {
             stream.mark_last();
         }
         assert_eq!(segment.check(1, &all), Ok(()));
-        let longer = Segment::new(Striping::ByRecord, 7, 2, 4);
+        let longer = collisions(&FLOAT, 2);
         let early = PacketError { code: ErrorCode::TlastEarly, channel: 0, beat: 1 };
         assert_eq!(longer.check(1, &all), Err(early));
     }

@@ -2,13 +2,15 @@
 //!
 //! The conversion from the raw contact to the constraint row (effective mass, bias) is part of
 //! both, so that a pass needs nothing but the collision, the velocities and the accumulated
-//! impulses.
+//! impulses. It computes in the format `R`; what changes from collision to collision (relative
+//! speed, impulse, velocities) in `U`, which holds every number of `R`.
 //!
 //! Source: Bullet (b3ContactSolver of the OpenCL pipeline's host reference), in the order of
 //! evaluation that the golden vectors were made with.
 
 use super::decode::Collision;
-use super::number::Number;
+use super::inertia::{Inertia, Stored, Times};
+use super::number::{Format, Number};
 use super::vector::Vec3;
 use crate::interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
 use crate::interface::record::CONTACT_POINTS;
@@ -17,7 +19,7 @@ use crate::interface::record::CONTACT_POINTS;
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Mass {
     pub(super) inverse_mass: f32,
-    pub(super) inverse_inertia: f32,
+    pub(super) inverse_inertia: Stored,
 }
 
 /// Velocities of a body, as they lie in block RAM.
@@ -40,23 +42,35 @@ pub(super) struct SolverParameters {
     pub(super) friction: f32,
 }
 
-/// One body while a collision is being solved.
-#[derive(Debug, Clone, Copy)]
-struct Moving<N> {
-    v: Vec3<N>,
-    w: Vec3<N>,
-    m: N,
-    k: N,
+/// Inverse mass and inertia in numbers of a format.
+#[derive(Clone, Copy)]
+struct Inverse<F: Format, I: Inertia> {
+    m: Number<F>,
+    k: I::In<F>,
 }
 
-impl<N: Number> Moving<N> {
+impl<F: Format, I: Inertia> Inverse<F, I> {
     #[inline]
-    fn new(velocity: &Velocity, mass: Mass) -> Self {
+    fn new(mass: &Mass) -> Self {
+        Self { m: Number::new(mass.inverse_mass), k: Times::new(&mass.inverse_inertia) }
+    }
+}
+
+/// One body while a collision is being solved.
+#[derive(Clone, Copy)]
+struct Moving<U: Format, I: Inertia> {
+    v: Vec3<U>,
+    w: Vec3<U>,
+    inverse: Inverse<U, I>,
+}
+
+impl<U: Format, I: Inertia> Moving<U, I> {
+    #[inline]
+    fn new(velocity: &Velocity, mass: &Mass) -> Self {
         Self {
             v: Vec3::new(velocity.linear),
             w: Vec3::new(velocity.angular),
-            m: N::new(mass.inverse_mass),
-            k: N::new(mass.inverse_inertia),
+            inverse: Inverse::new(mass),
         }
     }
 
@@ -68,62 +82,75 @@ impl<N: Number> Moving<N> {
 
 /// One constraint row: a direction, and the lever arms' moments about it.
 #[derive(Debug, Clone, Copy)]
-struct Row<N> {
-    direction: Vec3<N>,
-    moment_a: Vec3<N>,
-    moment_b: Vec3<N>,
+struct Row<F> {
+    direction: Vec3<F>,
+    moment_a: Vec3<F>,
+    moment_b: Vec3<F>,
     /// Effective mass, negative.
-    jacobian: N,
+    jacobian: Number<F>,
 }
 
-impl<N: Number> Row<N> {
+impl<R: Format> Row<R> {
     #[inline]
-    fn new(
-        direction: Vec3<N>,
-        arm_a: Vec3<N>,
-        arm_b: Vec3<N>,
-        a: &Moving<N>,
-        b: &Moving<N>,
+    fn new<I: Inertia>(
+        direction: Vec3<R>,
+        arm_a: Vec3<R>,
+        arm_b: Vec3<R>,
+        [a, b]: &[Inverse<R, I>; 2],
     ) -> Self {
         let moment_a = arm_a.cross(direction);
         let moment_b = -arm_b.cross(direction);
         let denominator =
-            ((a.m + (moment_a * a.k).dot(moment_a)) + b.m) + (moment_b * b.k).dot(moment_b);
-        Self { direction, moment_a, moment_b, jacobian: N::new(-1.0) / denominator }
+            ((a.m + a.k.times(moment_a).dot(moment_a)) + b.m) + b.k.times(moment_b).dot(moment_b);
+        Self { direction, moment_a, moment_b, jacobian: Number::new(-1.0) / denominator }
     }
 
+    /// The row as what changes is computed with it.
+    #[inline]
+    fn widened<U: Format>(&self) -> Row<U> {
+        Row {
+            direction: self.direction.widened(),
+            moment_a: self.moment_a.widened(),
+            moment_b: self.moment_b.widened(),
+            jacobian: self.jacobian.widened(),
+        }
+    }
+}
+
+impl<U: Format> Row<U> {
     /// Relative velocity along the row.
     #[inline]
-    fn speed(&self, a: &Moving<N>, b: &Moving<N>) -> N {
+    fn speed<I: Inertia>(&self, a: &Moving<U, I>, b: &Moving<U, I>) -> Number<U> {
         ((self.direction.dot(a.v) + self.moment_a.dot(a.w)) + (-self.direction).dot(b.v))
             + self.moment_b.dot(b.w)
     }
 
     #[inline]
-    fn apply(&self, impulse: N, a: &mut Moving<N>, b: &mut Moving<N>) {
-        a.v = a.v + (self.direction * a.m) * impulse;
-        a.w = a.w + (self.moment_a * a.k) * impulse;
-        b.v = b.v + ((-self.direction) * b.m) * impulse;
-        b.w = b.w + (self.moment_b * b.k) * impulse;
+    fn apply<I: Inertia>(&self, impulse: Number<U>, a: &mut Moving<U, I>, b: &mut Moving<U, I>) {
+        a.v = a.v + (self.direction * a.inverse.m) * impulse;
+        a.w = a.w + a.inverse.k.times(self.moment_a) * impulse;
+        b.v = b.v + ((-self.direction) * b.inverse.m) * impulse;
+        b.w = b.w + b.inverse.k.times(self.moment_b) * impulse;
     }
 }
 
 /// Two unit vectors across `n`.
 #[inline]
-fn tangents<N: Number>(n: Vec3<N>) -> [Vec3<N>; 2] {
-    let one = N::new(1.0);
+fn tangents<R: Format>(n: Vec3<R>) -> [Vec3<R>; 2] {
+    let zero = Number::new(0.0);
+    let one = Number::new(1.0);
     let Vec3(x, y, z) = n;
-    let absolute_z = if z.value() < 0.0 { -z } else { z };
-    if absolute_z.value() > TANGENT_Z {
+    let absolute_z = if zero.above(z) { -z } else { z };
+    if absolute_z.above(Number::new(TANGENT_Z)) {
         let s = y * y + z * z;
         let k = one / s.sqrt();
-        let t0 = Vec3(N::new(0.0), -z * k, y * k);
+        let t0 = Vec3(zero, -z * k, y * k);
         let t1 = Vec3(s * k, -x * t0.2, x * t0.1);
         [t0, t1]
     } else {
         let s = x * x + y * y;
         let k = one / s.sqrt();
-        let t0 = Vec3(-y * k, x * k, N::new(0.0));
+        let t0 = Vec3(-y * k, x * k, zero);
         let t1 = Vec3(-z * t0.1, z * t0.0, s * k);
         [t0, t1]
     }
@@ -131,32 +158,34 @@ fn tangents<N: Number>(n: Vec3<N>) -> [Vec3<N>; 2] {
 
 /// One contact pass over one collision.
 #[inline]
-pub(super) fn contact<N: Number>(
+pub(super) fn contact<R: Format, U: Format, I: Inertia>(
     collision: &Collision,
     parameters: &SolverParameters,
-    masses: [Mass; 2],
+    masses: &[Mass; 2],
     velocities: &mut [Velocity; 2],
     impulses: &mut Impulses,
 ) {
-    let mut a = Moving::<N>::new(&velocities[0], masses[0]);
-    let mut b = Moving::<N>::new(&velocities[1], masses[1]);
-    let n = Vec3::<N>::new(collision.normal);
-    let position_a = Vec3::<N>::new(collision.position_a);
-    let position_b = Vec3::<N>::new(collision.position_b);
-    let per_second = N::new(1.0) / N::new(parameters.time_step);
-    let drift = N::new(parameters.drift);
-    let coefficient = N::new(parameters.coefficient);
+    let inverses = [Inverse::<R, I>::new(&masses[0]), Inverse::new(&masses[1])];
+    let mut a = Moving::<U, I>::new(&velocities[0], &masses[0]);
+    let mut b = Moving::<U, I>::new(&velocities[1], &masses[1]);
+    let n = Vec3::<R>::new(collision.normal);
+    let position_a = Vec3::<R>::new(collision.position_a);
+    let position_b = Vec3::<R>::new(collision.position_b);
+    let per_second = Number::<R>::new(1.0) / Number::new(parameters.time_step);
+    let drift = Number::<R>::new(parameters.drift);
+    let coefficient = Number::<R>::new(parameters.coefficient);
     let contacts = &collision.contacts[..collision.count];
     for ([x, y, z, distance], impulse) in contacts.iter().copied().zip(impulses) {
-        let point = Vec3::<N>::new([x, y, z]);
-        let row = Row::new(n, point - position_a, point - position_b, &a, &b);
+        let point = Vec3::<R>::new([x, y, z]);
+        let row = Row::new(n, point - position_a, point - position_b, &inverses);
         if row.jacobian.is_zero() {
             continue;
         }
-        let bias = ((N::new(distance) + drift) * coefficient) * per_second;
-        let wanted = (row.speed(&a, &b) + bias) * row.jacobian;
-        let before = N::new(*impulse);
-        let after = (before + wanted).larger(N::new(0.0));
+        let bias = ((Number::new(distance) + drift) * coefficient) * per_second;
+        let row = row.widened::<U>();
+        let wanted = (row.speed(&a, &b) + bias.widened()) * row.jacobian;
+        let before = Number::new(*impulse);
+        let after = (before + wanted).larger(Number::new(0.0));
         *impulse = after.value();
         row.apply(after - before, &mut a, &mut b);
     }
@@ -165,55 +194,57 @@ pub(super) fn contact<N: Number>(
 
 /// Sum of the four normal impulses, as the friction passes use it.
 #[inline]
-pub(super) fn normal_sum<N: Number>(impulses: &Impulses) -> f32 {
-    let [l0, l1, l2, l3] = impulses.map(N::new);
+pub(super) fn normal_sum<U: Format>(impulses: &Impulses) -> f32 {
+    let [l0, l1, l2, l3] = impulses.map(Number::<U>::new);
     (((l0 + l1) + l2) + l3).value()
 }
 
 /// One friction pass over one collision; `impulses` holds the normal sum and the two friction
 /// impulses.
 #[inline]
-pub(super) fn friction<N: Number>(
+pub(super) fn friction<R: Format, U: Format, I: Inertia>(
     collision: &Collision,
     parameters: &SolverParameters,
-    masses: [Mass; 2],
+    masses: &[Mass; 2],
     velocities: &mut [Velocity; 2],
     impulses: &mut Impulses,
 ) {
-    let mut a = Moving::<N>::new(&velocities[0], masses[0]);
-    let mut b = Moving::<N>::new(&velocities[1], masses[1]);
-    let q = -Vec3::<N>::new(collision.normal);
-    let position_a = Vec3::<N>::new(collision.position_a);
-    let position_b = Vec3::<N>::new(collision.position_b);
+    let inverses = [Inverse::<R, I>::new(&masses[0]), Inverse::new(&masses[1])];
+    let mut a = Moving::<U, I>::new(&velocities[0], &masses[0]);
+    let mut b = Moving::<U, I>::new(&velocities[1], &masses[1]);
+    let q = -Vec3::<R>::new(collision.normal);
+    let position_a = Vec3::<R>::new(collision.position_a);
+    let position_b = Vec3::<R>::new(collision.position_b);
     let point = |i: usize| {
         let [x, y, z, _] = collision.contacts[i];
-        Vec3::<N>::new([x, y, z])
+        Vec3::<R>::new([x, y, z])
     };
     let mut sum = point(0);
     for i in 1..collision.count {
         sum = sum + point(i);
     }
     // At most four points: exact.
-    let centre = sum * (N::new(1.0) / N::new(collision.count as f32));
+    let centre = sum * (Number::new(1.0) / Number::new(collision.count as f32));
     let arm_a = centre - position_a;
     let arm_b = centre - position_b;
-    let limit = N::new(parameters.friction) * N::new(impulses[0]);
+    let limit = Number::<U>::new(parameters.friction) * Number::new(impulses[0]);
     for (t, accumulated) in tangents(q).into_iter().zip(&mut impulses[1..3]) {
-        let row = Row::new(t, arm_a, arm_b, &a, &b);
+        let row = Row::new(t, arm_a, arm_b, &inverses);
         if row.jacobian.is_zero() {
             continue;
         }
+        let row = row.widened::<U>();
         let wanted = row.speed(&a, &b) * row.jacobian;
-        let before = N::new(*accumulated);
+        let before = Number::new(*accumulated);
         let after = (before + wanted).larger(-limit).smaller(limit);
         *accumulated = after.value();
         row.apply(after - before, &mut a, &mut b);
     }
-    let damped = a.m.is_zero()
-        || b.m.is_zero()
-        || (position_b - position_a).unit().dot(arm_a.unit()).value() > SPIN_COSINE;
-    if damped {
-        let share = N::new(SPIN_DAMPING);
+    let cosine = || (position_b - position_a).unit().dot(arm_a.unit());
+    let one_static = a.inverse.m.is_zero() || b.inverse.m.is_zero();
+    if one_static || cosine().above(Number::new(SPIN_COSINE)) {
+        let share = Number::new(SPIN_DAMPING);
+        let q = q.widened::<U>();
         let spin_a = q.dot(a.w);
         let spin_b = q.dot(b.w);
         a.w = a.w - q * (spin_a * share);
@@ -225,11 +256,12 @@ pub(super) fn friction<N: Number>(
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "the expected values are exact")]
 mod tests {
-    use super::super::number::Keep;
+    use super::super::inertia::Isotropic;
+    use super::super::number::Single;
     use super::*;
 
-    const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: 0.0 };
-    const GROUND: Mass = Mass { inverse_mass: 0.0, inverse_inertia: 0.0 };
+    const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: [0.0; 6] };
+    const GROUND: Mass = Mass { inverse_mass: 0.0, inverse_inertia: [0.0; 6] };
     const PARAMETERS: SolverParameters =
         SolverParameters { time_step: 0.5, drift: 0.0, coefficient: 0.0, friction: 0.5 };
 
@@ -255,7 +287,13 @@ mod tests {
         let mut velocities = falling([0.0, -3.0, 0.0]);
         let mut impulses = [0.0; 4];
         let masses = [GROUND, UNIT];
-        contact::<Keep>(&on_the_ground(), &PARAMETERS, masses, &mut velocities, &mut impulses);
+        contact::<Single, Single, Isotropic>(
+            &on_the_ground(),
+            &PARAMETERS,
+            &masses,
+            &mut velocities,
+            &mut impulses,
+        );
         assert_eq!(velocities[1].linear, [0.0, 0.0, 0.0]);
         assert_eq!(impulses, [3.0, 0.0, 0.0, 0.0]);
         assert_eq!(velocities[0], Velocity::default());
@@ -266,7 +304,13 @@ mod tests {
         let mut velocities = falling([0.0, 3.0, 0.0]);
         let mut impulses = [0.0; 4];
         let masses = [GROUND, UNIT];
-        contact::<Keep>(&on_the_ground(), &PARAMETERS, masses, &mut velocities, &mut impulses);
+        contact::<Single, Single, Isotropic>(
+            &on_the_ground(),
+            &PARAMETERS,
+            &masses,
+            &mut velocities,
+            &mut impulses,
+        );
         assert_eq!(velocities[1].linear, [0.0, 3.0, 0.0]);
         assert_eq!(impulses, [0.0; 4]);
     }
@@ -276,17 +320,29 @@ mod tests {
         let mut velocities = falling([5.0, 0.0, 0.0]);
         let mut impulses = [3.0, 0.0, 0.0, 0.0];
         let masses = [GROUND, UNIT];
-        friction::<Keep>(&on_the_ground(), &PARAMETERS, masses, &mut velocities, &mut impulses);
+        friction::<Single, Single, Isotropic>(
+            &on_the_ground(),
+            &PARAMETERS,
+            &masses,
+            &mut velocities,
+            &mut impulses,
+        );
         assert_eq!(velocities[1].linear, [3.5, 0.0, 0.0]);
         let before = velocities;
-        friction::<Keep>(&on_the_ground(), &PARAMETERS, masses, &mut velocities, &mut impulses);
+        friction::<Single, Single, Isotropic>(
+            &on_the_ground(),
+            &PARAMETERS,
+            &masses,
+            &mut velocities,
+            &mut impulses,
+        );
         assert_eq!(velocities, before, "the limit is used up");
     }
 
     #[test]
     fn tangents_are_unit_and_across_the_normal_in_both_branches() {
         for n in [[0.0, -1.0, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, -1.0], [0.48, 0.6, 0.64]] {
-            let normal = Vec3::<Keep>::new(n);
+            let normal = Vec3::<Single>::new(n);
             let [t0, t1] = tangents(normal);
             for t in [t0, t1] {
                 assert!((t.dot(t).value() - 1.0).abs() < 1e-6, "{n:?}");

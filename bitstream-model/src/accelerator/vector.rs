@@ -4,16 +4,16 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::number::Number;
+use super::number::{Format, Number};
 
 /// A vector x, y, z.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Vec3<N>(pub(super) N, pub(super) N, pub(super) N);
+pub(super) struct Vec3<F>(pub(super) Number<F>, pub(super) Number<F>, pub(super) Number<F>);
 
-impl<N: Number> Vec3<N> {
+impl<F: Format> Vec3<F> {
     #[inline]
     pub(super) fn new(v: [f32; 3]) -> Self {
-        Self(N::new(v[0]), N::new(v[1]), N::new(v[2]))
+        Self(Number::new(v[0]), Number::new(v[1]), Number::new(v[2]))
     }
 
     #[inline]
@@ -21,8 +21,14 @@ impl<N: Number> Vec3<N> {
         [self.0.value(), self.1.value(), self.2.value()]
     }
 
+    /// The same vector in a format that holds all numbers of this one's.
     #[inline]
-    pub(super) fn dot(self, b: Self) -> N {
+    pub(super) fn widened<W: Format>(self) -> Vec3<W> {
+        Vec3(self.0.widened(), self.1.widened(), self.2.widened())
+    }
+
+    #[inline]
+    pub(super) fn dot(self, b: Self) -> Number<F> {
         (self.0 * b.0 + self.1 * b.1) + self.2 * b.2
     }
 
@@ -34,11 +40,11 @@ impl<N: Number> Vec3<N> {
     /// One reciprocal of the length, three products.
     #[inline]
     pub(super) fn unit(self) -> Self {
-        self * (N::new(1.0) / self.dot(self).sqrt())
+        self * (Number::new(1.0) / self.dot(self).sqrt())
     }
 }
 
-impl<N: Number> Add for Vec3<N> {
+impl<F: Format> Add for Vec3<F> {
     type Output = Self;
 
     #[inline]
@@ -47,7 +53,7 @@ impl<N: Number> Add for Vec3<N> {
     }
 }
 
-impl<N: Number> Sub for Vec3<N> {
+impl<F: Format> Sub for Vec3<F> {
     type Output = Self;
 
     #[inline]
@@ -56,7 +62,7 @@ impl<N: Number> Sub for Vec3<N> {
     }
 }
 
-impl<N: Number> Neg for Vec3<N> {
+impl<F: Format> Neg for Vec3<F> {
     type Output = Self;
 
     #[inline]
@@ -65,11 +71,11 @@ impl<N: Number> Neg for Vec3<N> {
     }
 }
 
-impl<N: Number> Mul<N> for Vec3<N> {
+impl<F: Format> Mul<Number<F>> for Vec3<F> {
     type Output = Self;
 
     #[inline]
-    fn mul(self, s: N) -> Self {
+    fn mul(self, s: Number<F>) -> Self {
         Self(self.0 * s, self.1 * s, self.2 * s)
     }
 }

@@ -10,6 +10,7 @@ mod mover;
 
 use std::fmt;
 
+use crate::accelerator::striping::beat_cycles;
 use crate::config::{BoardConfig, Delays};
 use crate::interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 use crate::memory::Memory;
@@ -44,6 +45,9 @@ struct Build {
     length_width: u32,
     address_width: u32,
     scatter_gather: bool,
+    /// Clocks that a beat takes on the streams.
+    mm2s_beat_cycles: u64,
+    s2mm_beat_cycles: u64,
     delays: Delays,
 }
 
@@ -73,11 +77,16 @@ pub(crate) struct Core {
 
 impl Core {
     pub(crate) fn new(core: usize, config: &BoardConfig) -> Self {
+        let profile = config.profile;
+        // A core whose other direction has no stream: any number will do.
+        let cycles = |widths: &[u32]| widths.get(core).map_or(1, |width| beat_cycles(*width));
         let build = Build {
             core,
             length_width: config.quirks.length_register.unwrap_or(config.length_width),
             address_width: config.address_width,
             scatter_gather: config.scatter_gather,
+            mm2s_beat_cycles: cycles(profile.mm2s_widths),
+            s2mm_beat_cycles: cycles(profile.s2mm_widths),
             delays: config.delays,
         };
         let held = config.quirks.held_reset == Some(Resettable::Dma(core));

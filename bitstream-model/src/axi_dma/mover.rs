@@ -1,7 +1,8 @@
 //! This file moves beats: it fetches descriptors, reads or writes memory and writes status back.
 //!
-//! An engine moves at most one beat a clock, what its port can carry. It keeps a clock of its own
-//! that follows the board's, so that a stretch of many clocks is moved in a few block copies.
+//! An engine moves at most one beat a clock, what its port can carry; on a stream of less than 128
+//! bits a beat takes several. It keeps a clock of its own that follows the board's, so that a stretch
+//! of many clocks is moved in a few block copies.
 
 use super::channel::{Channel, Descriptor, Work};
 use super::{Build, Direction, Surroundings};
@@ -53,7 +54,7 @@ impl Channel {
                 }
                 Work::Descriptor(mut bd) => {
                     let left = bd.length - bd.moved;
-                    let n = self.portion(left, end, limit - moved, stream);
+                    let n = self.portion(build, left, end, limit - moved, stream);
                     if n == 0 || self.stalls() {
                         break;
                     }
@@ -64,7 +65,7 @@ impl Channel {
                         break;
                     };
                     moved += n;
-                    self.time += n as u64;
+                    self.time += n as u64 * self.beat_cycles(build);
                     bd.rxsof |= !self.in_packet;
                     self.in_packet = true;
                     bd.moved += left.min(register(n * BEAT_BYTES));
@@ -76,7 +77,7 @@ impl Channel {
                 }
                 Work::Direct { moved: done } => {
                     let left = self.length - done;
-                    let n = self.portion(left, end, limit - moved, stream);
+                    let n = self.portion(build, left, end, limit - moved, stream);
                     if n == 0 {
                         if left == 0 {
                             // The buffer is full and the packet goes on.
@@ -96,7 +97,7 @@ impl Channel {
                         break;
                     };
                     moved += n;
-                    self.time += n as u64;
+                    self.time += n as u64 * self.beat_cycles(build);
                     let done = done + left.min(register(n * BEAT_BYTES));
                     self.work = Work::Direct { moved: done };
                     if ended {
@@ -119,9 +120,18 @@ impl Channel {
         runs && self.direction == Direction::S2mm && self.idle && self.in_packet && stream.len() > 0
     }
 
-    /// Beats that can be moved now.
-    fn portion(&self, left: u32, end: u64, limit: usize, stream: &Stream) -> usize {
-        let clocks = usize::try_from(end.saturating_sub(self.time)).unwrap_or(usize::MAX);
+    /// Clocks that a beat takes on the stream.
+    fn beat_cycles(&self, build: &Build) -> u64 {
+        match self.direction {
+            Direction::Mm2s => build.mm2s_beat_cycles,
+            Direction::S2mm => build.s2mm_beat_cycles,
+        }
+    }
+
+    /// Beats that can be moved now: those that begin before `end`.
+    fn portion(&self, build: &Build, left: u32, end: u64, limit: usize, stream: &Stream) -> usize {
+        let clocks = end.saturating_sub(self.time).div_ceil(self.beat_cycles(build));
+        let clocks = usize::try_from(clocks).unwrap_or(usize::MAX);
         let stream_beats = match self.direction {
             Direction::Mm2s => stream.space(),
             Direction::S2mm => match stream.next_last() {

@@ -5,6 +5,7 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub(crate) mod packing;
 pub(crate) mod ring;
 pub(crate) mod scene;
 pub(crate) mod sg;
@@ -14,6 +15,7 @@ use std::time::Duration;
 use bitstream_model::interface::address_map::{CONTROL_BASE, dma_base};
 use bitstream_model::interface::axi_dma::{DMACR, DMASR, S2MM_OFFSET, dmacr, dmasr};
 use bitstream_model::interface::control;
+use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::Beat;
 use bitstream_model::interface::register::Register;
 use bitstream_model::{
@@ -42,6 +44,15 @@ impl Host {
         let board = EmulatedBoard::new(config).expect("the tests' boards can be built");
         let port = board.cpu_port();
         Self { board, port }
+    }
+
+    pub(crate) fn variant(&self) -> Variant {
+        self.board.config().variant()
+    }
+
+    /// DMAs of the board.
+    pub(crate) fn cores(&self) -> usize {
+        self.variant().profile.mm2s_widths.len()
     }
 
     /// A board that counts violations and goes on.
@@ -121,7 +132,7 @@ impl Host {
     }
 
     pub(crate) fn reset_all(&self) {
-        (0..CORES).for_each(|core| self.reset_dma(core));
+        (0..self.cores()).for_each(|core| self.reset_dma(core));
         self.reset_accelerator();
     }
 

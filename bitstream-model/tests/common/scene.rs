@@ -1,10 +1,12 @@
-//! A step's input and output as plain numbers, and how they lie on four 128-bit streams.
+//! A step's input and output as plain numbers.
 
 use bitstream_model::interface::control;
+use bitstream_model::interface::profile::{FLOAT, Variant};
 use bitstream_model::interface::record::Beat;
 use bitstream_model::timing::StepShape;
 
-use super::{CORES, Host};
+use super::Host;
+use super::packing;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Body {
@@ -43,6 +45,9 @@ pub(crate) const MOVING: u32 = 1;
 pub(crate) struct Step {
     /// Inverse mass, inverse inertia.
     pub(crate) shapes: Vec<[f32; 2]>,
+    /// World inverse inertia of each body (xx, yy, zz, xy, xz, yz); where there is none, its
+    /// shape's.
+    pub(crate) inertias: Vec<[f32; 6]>,
     pub(crate) bodies: Vec<Body>,
     pub(crate) collisions: Vec<Collision>,
     /// Contact and friction passes.
@@ -61,6 +66,7 @@ impl Step {
     pub(crate) fn new(bodies: Vec<Body>, collisions: Vec<Collision>) -> Self {
         Self {
             shapes: vec![[0.0, 0.0], [1.0, 0.0]],
+            inertias: Vec::new(),
             bodies,
             collisions,
             iterations: [4, 4],
@@ -152,41 +158,22 @@ impl Step {
         }
     }
 
-    /// What goes out on each stream.
-    pub(crate) fn lanes(&self) -> [Lane; CORES] {
-        let mut lanes: [Lane; CORES] = Default::default();
-        let velocities = self
-            .bodies
-            .iter()
-            .flat_map(|body| [row(body.linear, body.shape), row(body.angular, 0)]);
-        for (running, beat) in velocities.enumerate() {
-            lanes[running % CORES].segments[0].push(beat);
-        }
-        for collision in &self.collisions {
-            for (beat, value) in collision.beats().into_iter().enumerate() {
-                lanes[beat % CORES].segments[1].push(value);
-            }
-        }
-        let poses = self
-            .bodies
-            .iter()
-            .flat_map(|body| [row(body.position, 0), Beat(body.orientation.map(f32::to_bits))]);
-        for (running, beat) in poses.enumerate() {
-            lanes[running % CORES].segments[2].push(beat);
-        }
-        let passes = self.iterations[0] + self.iterations[1];
-        for lane in &mut lanes {
-            lane.packets = vec![0];
-            lane.packets.extend((0..passes).map(|_| 1));
-            lane.packets.push(2);
-            lane.packets.retain(|segment| !lane.segments[*segment].is_empty());
-        }
-        lanes
+    /// World inverse inertia of a body.
+    pub(crate) fn world_inertia(&self, body: usize) -> [f32; 6] {
+        self.inertias.get(body).copied().unwrap_or_else(|| {
+            let [_, k] = self.shapes[self.bodies[body].shape as usize];
+            [k, k, k, 0.0, 0.0, 0.0]
+        })
+    }
+
+    /// What goes out on each stream of `float`.
+    pub(crate) fn lanes(&self) -> Vec<Lane> {
+        self.packed(&FLOAT.default_variant())
     }
 
     /// Sum of all words that the accelerator receives.
-    pub(crate) fn sum_of_input(&self) -> u32 {
-        self.lanes().iter().fold(0, |sum, lane| {
+    pub(crate) fn sum_of_input(&self, variant: &Variant) -> u32 {
+        self.packed(variant).iter().fold(0, |sum, lane| {
             lane.packets.iter().fold(sum, |sum, segment| sum_words(sum, &lane.segments[*segment]))
         })
     }
@@ -210,53 +197,18 @@ pub(crate) fn ground_contact(k: u16, normal: [f32; 3]) -> Collision {
     }
 }
 
-impl Collision {
-    pub(crate) fn beats(&self) -> [Beat; 7] {
-        let [c0, c1, c2, c3] = self.contacts.map(|contact| Beat(contact.map(f32::to_bits)));
-        let [a, b] = self.bodies;
-        [
-            row(self.normal, self.count),
-            row(self.positions[0], a),
-            row(self.positions[1], b),
-            c0,
-            c1,
-            c2,
-            c3,
-        ]
-    }
-}
-
-fn row([x, y, z]: [f32; 3], word: u32) -> Beat {
-    Beat([x.to_bits(), y.to_bits(), z.to_bits(), word])
-}
-
 pub(crate) fn sum_words(sum: u32, beats: &[Beat]) -> u32 {
     beats.iter().flat_map(|beat| beat.0).fold(sum, u32::wrapping_add)
 }
 
-/// Result beats on each stream.
-pub(crate) fn result_beats(bodies: usize) -> [usize; CORES] {
-    // Four beats a body on four streams.
-    [bodies; CORES]
+/// Result beats on each stream of `float`.
+pub(crate) fn result_beats(bodies: usize) -> Vec<usize> {
+    packing::result_beats(&FLOAT.default_variant(), bodies)
 }
 
-/// The bodies out of the result beats of all streams; shapes are not part of a result and read 0.
+/// The bodies out of the result beats of the streams of `float`.
 pub(crate) fn unpack(streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
-    let beat = |running: usize| streams[running % CORES][running / CORES].0;
-    let vec3 = |beat: [u32; 4]| {
-        let [x, y, z, word] = beat;
-        assert_eq!(word, 0, "the fourth word of a result is 0");
-        [x, y, z].map(f32::from_bits)
-    };
-    (0..bodies)
-        .map(|body| Body {
-            shape: 0,
-            position: vec3(beat(4 * body)),
-            orientation: beat(4 * body + 1).map(f32::from_bits),
-            linear: vec3(beat(4 * body + 2)),
-            angular: vec3(beat(4 * body + 3)),
-        })
-        .collect()
+    packing::unpack(&FLOAT.default_variant(), streams, bodies)
 }
 
 /// A body as bits, for comparisons that see the sign of zero.

@@ -8,9 +8,10 @@ use bitstream_model::interface::descriptor::status;
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use bitstream_model::{BoardConfig, Direction};
 
+use super::packing::{result_beats, unpack};
 use super::ring::{EOF, Ring, SOF};
-use super::scene::{Body, Lane, Step, result_beats, unpack};
-use super::{BOTH, CORES, Host, microseconds};
+use super::scene::{Body, Lane, Step};
+use super::{BOTH, Host, microseconds};
 
 /// Longer than any step of the tests takes.
 pub(crate) const LONG: Duration = microseconds(20_000);
@@ -68,7 +69,7 @@ impl Machine {
     pub(crate) fn with_slots(config: BoardConfig, slots: usize) -> Self {
         let host = Host::new(config);
         let rings = |direction| -> Vec<Ring> {
-            (0..CORES).map(|core| Ring::new(&host, core, direction, slots)).collect()
+            (0..host.cores()).map(|core| Ring::new(&host, core, direction, slots)).collect()
         };
         let (mm2s, s2mm) = (rings(Direction::Mm2s), rings(Direction::S2mm));
         let mut machine = Self { host, mm2s, s2mm };
@@ -96,10 +97,10 @@ impl Machine {
     }
 
     /// Queues result buffers of those beats.
-    pub(crate) fn arm(&mut self, flight: &mut Flight, beats: [usize; CORES]) {
+    pub(crate) fn arm(&mut self, flight: &mut Flight, beats: &[usize]) {
         let piece = self.piece();
         for (ring, beats) in self.s2mm.iter_mut().zip(beats) {
-            let address = self.host.writable(beats);
+            let address = self.host.writable(*beats);
             flight.outputs.push(address);
             let mut slot = 0;
             for (offset, bytes) in pieces(beats * BEAT_BYTES, piece) {
@@ -116,7 +117,7 @@ impl Machine {
     }
 
     /// Queues the packets of every stream.
-    pub(crate) fn send(&mut self, flight: &mut Flight, lanes: &[Lane; CORES]) {
+    pub(crate) fn send(&mut self, flight: &mut Flight, lanes: &[Lane]) {
         let piece = self.piece();
         for (ring, lane) in self.mm2s.iter_mut().zip(lanes) {
             let host = &self.host;
@@ -158,7 +159,7 @@ impl Machine {
             }
             // Bounded, so that nothing depends on the interrupt alone.
             let _ = host.port.wait_interrupt(left.min(microseconds(50)));
-            for core in 0..CORES {
+            for core in 0..host.cores() {
                 for direction in BOTH {
                     let value = host.status(core, direction);
                     if value & dmasr::ERRORS != 0 {
@@ -200,7 +201,7 @@ impl Machine {
         let work = u64::from(host.control(control::WORK_CYCLES));
         let waits = u64::from(host.control(control::WAIT_CYCLES));
         Outcome {
-            bodies: unpack(&streams, bodies),
+            bodies: unpack(&host.variant(), &streams, bodies),
             cycles,
             stalls: cycles - work - waits,
             waits,
@@ -215,14 +216,11 @@ impl Machine {
     }
 
     /// A step with those beats on the streams instead of its own.
-    pub(crate) fn step_with(
-        &mut self,
-        step: &Step,
-        lanes: &[Lane; CORES],
-    ) -> Result<Outcome, Failure> {
+    pub(crate) fn step_with(&mut self, step: &Step, lanes: &[Lane]) -> Result<Outcome, Failure> {
         step.write_arguments(&self.host);
         let mut flight = Flight::default();
-        self.arm(&mut flight, result_beats(step.bodies.len()));
+        let beats = result_beats(&self.host.variant(), step.bodies.len());
+        self.arm(&mut flight, &beats);
         self.start();
         self.send(&mut flight, lanes);
         // The widest window is 65,534 cycles, 0.24 ms.
@@ -232,7 +230,8 @@ impl Machine {
     }
 
     pub(crate) fn step(&mut self, step: &Step) -> Result<Outcome, Failure> {
-        self.step_with(step, &step.lanes())
+        let lanes = step.packed(&self.host.variant());
+        self.step_with(step, &lanes)
     }
 }
 

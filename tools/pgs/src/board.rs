@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
-use bitstream_model::interface::profile::{PROFILES, Profile};
+use bitstream_model::interface::profile::PROFILES;
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::{
@@ -175,8 +175,7 @@ impl Opened {
     }
 
     fn profile(&self) -> &'static str {
-        Profile::by_id(self.accelerator.capabilities().profile_id)
-            .map_or("unknown", |profile| profile.name)
+        self.accelerator.capabilities().variant.profile.name
     }
 
     /// Two lines: which board and why, which bitstream.

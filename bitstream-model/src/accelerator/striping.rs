@@ -1,0 +1,201 @@
+//! This file deals the beats of an array out to streams: which stream a beat is on, how many are on
+//! each, how long they take.
+
+use crate::interface::address_map::DMA_COUNT_MAX;
+use crate::interface::record::BEAT_BYTES;
+use crate::interface::stripe::Stripe;
+
+/// The most streams that a profile has.
+pub(crate) const STREAMS_MAX: usize = DMA_COUNT_MAX;
+/// The most beats of a group.
+pub(crate) const GROUP_MAX: usize = 16;
+
+/// Clock cycles that a beat takes on a stream of that width.
+pub(crate) const fn beat_cycles(width: u32) -> u64 {
+    8 * BEAT_BYTES as u64 / width as u64
+}
+
+/// A stripe over streams of known widths.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Striping {
+    /// Beats of a group.
+    group: usize,
+    padded: bool,
+    streams: usize,
+    /// For each beat of a group its stream, and its number among the group's beats there.
+    place: [(u8, u8); GROUP_MAX],
+    /// Beats of a group on each stream.
+    share: [u8; STREAMS_MAX],
+    /// Bits of each stream.
+    widths: [u32; STREAMS_MAX],
+}
+
+impl Striping {
+    /// The stripe of a profile that the configuration has checked.
+    pub(super) fn new(stripe: &Stripe, widths: &[u32]) -> Self {
+        let mut place = [(0, 0); GROUP_MAX];
+        let mut share = [0; STREAMS_MAX];
+        for (place, stream) in place.iter_mut().zip(stripe.streams) {
+            let on_stream = &mut share[usize::from(*stream)];
+            *place = (*stream, *on_stream);
+            *on_stream += 1;
+        }
+        let mut known = [0; STREAMS_MAX];
+        for (known, width) in known.iter_mut().zip(widths) {
+            *known = *width;
+        }
+        Self {
+            group: stripe.streams.len(),
+            padded: stripe.padded,
+            streams: widths.len(),
+            place,
+            share,
+            widths: known,
+        }
+    }
+
+    /// Beats that go out for an array of that many: with the padding of the last group.
+    pub(super) fn padded(&self, beats: usize) -> usize {
+        if self.padded { beats.next_multiple_of(self.group) } else { beats }
+    }
+
+    /// Walks over the beats from `beat` on: the stream of each, and its number on it.
+    #[inline]
+    pub(super) fn places(&self, beat: usize) -> Places<'_> {
+        Places { striping: self, group: beat / self.group, at: beat % self.group }
+    }
+
+    /// How many of the first `beats` beats are on a stream.
+    pub(super) fn on(&self, stream: usize, beats: usize) -> usize {
+        let rest = &self.place[..beats % self.group];
+        let of_rest = rest.iter().filter(|place| usize::from(place.0) == stream).count();
+        beats / self.group * usize::from(self.share[stream]) + of_rest
+    }
+
+    /// How many beats in one piece, from the first one, there are when each stream has so many.
+    pub(super) fn contiguous(&self, on_stream: impl Fn(usize) -> usize) -> usize {
+        // For each stream the number of the first beat that is not there.
+        let missing = |stream: usize| {
+            let share = usize::from(self.share[stream]);
+            let have = on_stream(stream);
+            let (groups, rest) = (have.checked_div(share)?, have % share);
+            let at = self.place[..self.group]
+                .iter()
+                .position(|place| (usize::from(place.0), usize::from(place.1)) == (stream, rest))?;
+            Some(groups * self.group + at)
+        };
+        (0..self.streams).filter_map(missing).min().unwrap_or(0)
+    }
+
+    /// Clock cycles that the first `beats` beats take: what the busiest stream takes.
+    pub(super) fn cycles(&self, beats: usize) -> u64 {
+        (0..self.streams)
+            .map(|stream| self.on(stream, beats) as u64 * beat_cycles(self.widths[stream]))
+            .max()
+            .unwrap_or(0)
+    }
+}
+
+/// Stream and number on it of one beat after the other.
+#[derive(Debug, Clone)]
+pub(super) struct Places<'a> {
+    striping: &'a Striping,
+    group: usize,
+    /// Beat of the group.
+    at: usize,
+}
+
+impl Places<'_> {
+    /// The next beat's.
+    #[inline]
+    pub(super) fn take(&mut self) -> (usize, usize) {
+        let (stream, number) = self.striping.place[self.at];
+        let stream = usize::from(stream);
+        let number = self.group * usize::from(self.striping.share[stream]) + usize::from(number);
+        self.at += 1;
+        if self.at == self.striping.group {
+            self.at = 0;
+            self.group += 1;
+        }
+        (stream, number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
+
+    fn collisions(profile: &Profile) -> Striping {
+        Striping::new(&profile.stripes.collisions, profile.mm2s_widths)
+    }
+
+    fn bodies(profile: &Profile) -> Striping {
+        Striping::new(&profile.stripes.bodies, profile.mm2s_widths)
+    }
+
+    #[test]
+    fn beats_lie_as_the_tables_of_the_specification_say() {
+        let first = |striping: &Striping, beats: usize| -> Vec<_> {
+            let mut places = striping.places(0);
+            (0..beats).map(|_| places.take()).collect()
+        };
+        assert_eq!(
+            first(&collisions(&FLOAT), 9),
+            [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (2, 1), (0, 2), (1, 2)]
+        );
+        assert_eq!(
+            first(&collisions(&HALF), 9),
+            [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (0, 3), (0, 4)]
+        );
+        assert_eq!(
+            first(&bodies(&HALF), 7),
+            [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (0, 2), (0, 3)]
+        );
+        assert_eq!(first(&bodies(&MIXED), 4), [(0, 0), (1, 0), (2, 0), (0, 1)]);
+    }
+
+    #[test]
+    fn counts_and_prefixes_agree_with_a_walk() {
+        for profile in [&NAIVE, &FLOAT, &HALF, &MIXED] {
+            for striping in [collisions(profile), bodies(profile)] {
+                let mut walk = striping.places(0);
+                let mut counts = vec![0; striping.streams];
+                for beats in 0..40 {
+                    for (stream, count) in counts.iter().enumerate() {
+                        assert_eq!(striping.on(stream, beats), *count, "{} {beats}", profile.name);
+                    }
+                    assert_eq!(striping.contiguous(|stream| counts[stream]), beats);
+                    let (stream, number) = walk.take();
+                    assert_eq!(number, counts[stream]);
+                    // A beat too early on the other streams changes nothing.
+                    let ahead = |k: usize| counts[k] + usize::from(k != stream);
+                    if striping.streams > 1 {
+                        assert_eq!(striping.contiguous(ahead), beats);
+                    }
+                    counts[stream] += 1;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_busiest_stream_says_how_long_beats_take() {
+        assert_eq!(bodies(&FLOAT).cycles(77_760), 19_440);
+        assert_eq!(bodies(&FLOAT).cycles(5), 2);
+        // 28 words one after the other.
+        assert_eq!(collisions(&NAIVE).cycles(7), 28);
+        // Three beats on each wide stream take longer than one on the narrow one.
+        assert_eq!(collisions(&HALF).cycles(7), 3);
+        assert_eq!(bodies(&HALF).cycles(38_880), 15_552);
+        assert_eq!(collisions(&MIXED).cycles(3), 1);
+    }
+
+    #[test]
+    fn only_a_padded_stripe_fills_its_last_group() {
+        assert_eq!(bodies(&HALF).padded(6), 10);
+        assert_eq!(bodies(&HALF).padded(10), 10);
+        assert_eq!(collisions(&HALF).padded(4), 7);
+        assert_eq!(bodies(&FLOAT).padded(6), 6);
+    }
+}

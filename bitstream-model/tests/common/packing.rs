@@ -1,0 +1,242 @@
+//! How a step's input lies on the streams of any profile, and its output back: words, rows, beats,
+//! stripes, padding, written from the interface's tables.
+
+use bitstream_model::interface::number::StreamFormat;
+use bitstream_model::interface::profile::{Geometry, Inertia, Variant};
+use bitstream_model::interface::record::{BEAT_BYTES, Beat};
+use bitstream_model::interface::stripe::Stripe;
+use half::f16;
+
+use super::scene::{Body, Collision, Lane, Step};
+
+/// The four words of a row; sixteen-bit ones in the low bits.
+pub(crate) type Row = [u32; 4];
+
+/// The word of a number.
+pub(crate) fn encode(format: StreamFormat, value: f32) -> u32 {
+    match format {
+        StreamFormat::F32 => value.to_bits(),
+        StreamFormat::Binary16 => f16::from_f32(value).to_bits().into(),
+        StreamFormat::Thesis16 => {
+            let bits = value.to_bits();
+            let sign = (bits >> 31) << 15;
+            let magnitude = value.abs();
+            if magnitude < 2.0_f32.powi(-15) {
+                return sign;
+            }
+            if magnitude >= 65_536.0 || magnitude.is_nan() {
+                return sign | 0x7FFF;
+            }
+            // The top bit of the exponent, its four low bits, the ten top bits of the mantissa.
+            let (top, low) = (bits >> 30 & 1, bits >> 23 & 0xF);
+            sign | (top << 14) | (low << 10) | (bits >> 13 & 0x3FF)
+        }
+    }
+}
+
+/// The number of a word.
+pub(crate) fn decode(format: StreamFormat, word: u32) -> f32 {
+    let half = || u16::try_from(word).expect("a word of sixteen bits");
+    match format {
+        StreamFormat::F32 => f32::from_bits(word),
+        StreamFormat::Binary16 => f16::from_bits(half()).to_f32(),
+        StreamFormat::Thesis16 => {
+            let sign = if half() >> 15 == 0 { 1.0 } else { -1.0 };
+            let exponent = i32::from(half() >> 10 & 31) - 15;
+            sign * (1.0 + f32::from(half() & 0x3FF) / 1024.0) * 2.0_f32.powi(exponent)
+        }
+    }
+}
+
+fn row(format: StreamFormat, [x, y, z]: [f32; 3], word: u32) -> Row {
+    let [x, y, z] = [x, y, z].map(|value| encode(format, value));
+    [x, y, z, word]
+}
+
+/// Rows one after the other in beats.
+pub(crate) fn beats(format: StreamFormat, rows: &[Row]) -> Vec<Beat> {
+    if format.bits() == 32 {
+        return rows.iter().copied().map(Beat).collect();
+    }
+    let words: Vec<u32> = rows.iter().flatten().copied().collect();
+    words
+        .chunks(8)
+        .map(|words| {
+            let mut beat = Beat::default();
+            for (k, word) in words.iter().enumerate() {
+                assert!(*word < 0x1_0000, "a word of sixteen bits");
+                beat.0[k / 2] |= word << (16 * (k % 2));
+            }
+            beat
+        })
+        .collect()
+}
+
+/// Beats on each of `streams` streams.
+fn deal(stripe: &Stripe, streams: usize, mut beats: Vec<Beat>) -> Vec<Vec<Beat>> {
+    while stripe.padded && !beats.len().is_multiple_of(stripe.streams.len()) {
+        beats.push(Beat::default());
+    }
+    let mut dealt = vec![Vec::new(); streams];
+    for (beat, stream) in beats.into_iter().zip(stripe.streams.iter().cycle()) {
+        dealt[usize::from(*stream)].push(beat);
+    }
+    dealt
+}
+
+fn velocity_rows(variant: &Variant, step: &Step, body: &Body, k: usize) -> Vec<Row> {
+    let format = variant.numbers.bodies;
+    let mut rows = vec![row(format, body.linear, body.shape), row(format, body.angular, 0)];
+    if variant.inertia == Inertia::World {
+        let [xx, yy, zz, xy, xz, yz] = step.world_inertia(k);
+        rows.push(row(format, [xx, yy, zz], 0));
+        rows.push(row(format, [xy, xz, yz], 0));
+    }
+    rows
+}
+
+fn collision_rows(variant: &Variant, collision: &Collision) -> Vec<Row> {
+    let format = variant.numbers.collisions;
+    let [a, b] = collision.bodies;
+    let [at_a, at_b] = collision.positions;
+    let contact = |[x, y, z, distance]: [f32; 4]| row(format, [x, y, z], encode(format, distance));
+    match variant.profile.geometry {
+        Geometry::Absolute => {
+            let mut rows = vec![
+                row(format, collision.normal, collision.count),
+                row(format, at_a, a),
+                row(format, at_b, b),
+            ];
+            rows.extend(collision.contacts.map(contact));
+            rows
+        }
+        Geometry::Relative => {
+            let from_a = |[x, y, z]: [f32; 3]| [x - at_a[0], y - at_a[1], z - at_a[2]];
+            let mut rows = vec![row(format, collision.normal, a), row(format, from_a(at_b), b)];
+            rows.extend((0..4).zip(collision.contacts).map(|(k, [x, y, z, distance])| {
+                if k < collision.count {
+                    let [x, y, z] = from_a([x, y, z]);
+                    contact([x, y, z, distance])
+                } else {
+                    contact([0.0, 0.0, 0.0, f32::INFINITY])
+                }
+            }));
+            rows
+        }
+    }
+}
+
+fn pose_rows(format: StreamFormat, body: &Body) -> [Row; 2] {
+    [row(format, body.position, 0), body.orientation.map(|value| encode(format, value))]
+}
+
+impl Step {
+    /// What goes out on each stream of a profile.
+    pub(crate) fn packed(&self, variant: &Variant) -> Vec<Lane> {
+        let profile = variant.profile;
+        let streams = profile.mm2s_widths.len();
+        let numbers = variant.numbers;
+        let velocities: Vec<Row> = (0..)
+            .zip(&self.bodies)
+            .flat_map(|(k, body)| velocity_rows(variant, self, body, k))
+            .collect();
+        let mut collisions: Vec<Row> = self
+            .collisions
+            .iter()
+            .flat_map(|collision| collision_rows(variant, collision))
+            .collect();
+        let issue = profile.collisions_per_issue as usize * variant.collision_rows();
+        collisions.resize(collisions.len().next_multiple_of(issue), [0; 4]);
+        let poses: Vec<Row> =
+            self.bodies.iter().flat_map(|body| pose_rows(numbers.bodies, body)).collect();
+        let passes = (self.iterations[0] + self.iterations[1]) as usize;
+        let stripes = &profile.stripes;
+        let segments = [
+            deal(&stripes.bodies, streams, beats(numbers.bodies, &velocities)),
+            deal(&stripes.collisions, streams, beats(numbers.collisions, &collisions)),
+            deal(&stripes.bodies, streams, beats(numbers.bodies, &poses)),
+        ];
+        (0..streams)
+            .map(|stream| {
+                let segments = segments.each_ref().map(|segment| segment[stream].clone());
+                let mut packets = vec![0];
+                packets.extend((0..passes).map(|_| 1));
+                packets.push(2);
+                packets.retain(|segment| !segments[*segment].is_empty());
+                Lane { segments, packets }
+            })
+            .collect()
+    }
+
+    /// Cycles of the step on a profile when nothing stalls and nothing waits.
+    pub(crate) fn cycles(&self, variant: &Variant) -> u64 {
+        let profile = variant.profile;
+        let lanes = self.packed(variant);
+        let inputs = |segment: usize| {
+            let beats: Vec<_> = lanes.iter().map(|lane| lane.segments[segment].len()).collect();
+            slowest(&beats, profile.mm2s_widths)
+        };
+        let results = slowest(&result_beats(variant, self.bodies.len()), profile.s2mm_widths);
+        let collisions = self.collisions.len() as u64;
+        let issues = collisions.div_ceil(profile.collisions_per_issue.into());
+        let pass = issues * u64::from(profile.initiation_interval);
+        let depths = [profile.contact, profile.friction];
+        let passes: u64 = self
+            .iterations
+            .into_iter()
+            .zip(depths)
+            .map(|(passes, depth)| u64::from(passes) * (pass + u64::from(depth.fill)))
+            .sum();
+        inputs(0) + if collisions == 0 { 0 } else { passes } + inputs(2).max(results)
+    }
+}
+
+/// Cycles of so many beats on streams of those widths.
+fn slowest(beats: &[usize], widths: &[u32]) -> u64 {
+    let cycles =
+        beats.iter().zip(widths).map(|(beats, width)| *beats as u64 * 128 / u64::from(*width));
+    cycles.max().expect("a profile has streams")
+}
+
+/// Result beats on each stream.
+pub(crate) fn result_beats(variant: &Variant, bodies: usize) -> Vec<usize> {
+    let bits = variant.numbers.bodies.bits() as usize;
+    let all = vec![Beat::default(); bodies * 4 * 4 * bits / (8 * BEAT_BYTES)];
+    let profile = variant.profile;
+    let dealt = deal(&profile.stripes.bodies, profile.s2mm_widths.len(), all);
+    dealt.iter().map(Vec::len).collect()
+}
+
+/// The bodies out of the result beats of all streams; shapes are not part of a result and read 0.
+/// What is left over is padding and must be zeros.
+pub(crate) fn unpack(variant: &Variant, streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
+    let format = variant.numbers.bodies;
+    let mut next: Vec<_> = streams.iter().map(|stream| stream.iter()).collect();
+    let mut rows = Vec::new();
+    for stream in variant.profile.stripes.bodies.streams.iter().cycle() {
+        let Some(Beat(words)) = next[usize::from(*stream)].next() else { break };
+        if format.bits() == 32 {
+            rows.push(*words);
+        } else {
+            let [a, b, c, d] = words.map(|word| [word & 0xFFFF, word >> 16]);
+            rows.push([a[0], a[1], b[0], b[1]]);
+            rows.push([c[0], c[1], d[0], d[1]]);
+        }
+    }
+    assert!(next.into_iter().all(|mut left| left.next().is_none()), "beats in stripes");
+    let padding = rows.split_off(4 * bodies);
+    assert!(padding.iter().all(|row| *row == [0; 4]), "padding is zeros");
+    let vec3 = |[x, y, z, word]: Row| {
+        assert_eq!(word, 0, "the fourth word of a result is 0");
+        [x, y, z].map(|word| decode(format, word))
+    };
+    rows.chunks_exact(4)
+        .map(|rows| Body {
+            shape: 0,
+            position: vec3(rows[0]),
+            orientation: rows[1].map(|word| decode(format, word)),
+            linear: vec3(rows[2]),
+            angular: vec3(rows[3]),
+        })
+        .collect()
+}
