@@ -18,6 +18,15 @@ pub(crate) enum Sixteen {
 impl Sixteen {
     pub(crate) const ALL: [Self; 3] = [Self::Binary16, Self::Thesis16, Self::Thesis16Literal];
 
+    /// What a stream of that format makes of its numbers; nothing if it has more than sixteen bits.
+    pub(crate) const fn of(stream: StreamFormat) -> Option<Self> {
+        match stream {
+            StreamFormat::F32 => None,
+            StreamFormat::Binary16 => Some(Self::Binary16),
+            StreamFormat::Thesis16 => Some(Self::Thesis16),
+        }
+    }
+
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Binary16 => "binary16",

@@ -15,6 +15,7 @@ use crate::digest;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::origin;
+use crate::sixteen::Sixteen;
 
 /// What a board steps.
 pub(super) enum World<'a> {
@@ -61,7 +62,8 @@ pub(super) struct Measured {
     /// After the step: of the collisions that are found then, or of the step's own contacts,
     /// carried along with their bodies.
     pub(super) penetration: Penetration,
-    /// Share of the position components that the step did not change; none before the first.
+    /// Share of the position components that the step left as the board was sent them; none before
+    /// the first.
     pub(super) unmoved: Option<f64>,
     /// Of the step that led here; none before the first.
     pub(super) report: Option<StepReport>,
@@ -190,9 +192,17 @@ impl<'a> Lane<'a> {
             potential: potential_energy(bodies, shapes, self.gravity),
             momentum: momentum(bodies, shapes),
             penetration: penetration(collisions),
-            unmoved: before.map(|before| unmoved_share(before, bodies, &self.world.moving())),
+            unmoved: before.map(|before| {
+                unmoved_share(before, bodies, &self.world.moving(), |value| self.carried(value))
+            }),
             report,
         }
+    }
+
+    /// A number as the streams of the bodies carry it.
+    fn carried(&self, value: f32) -> f32 {
+        let format = self.side.build.config().variant().numbers.bodies;
+        Sixteen::of(format).and_then(|format| format.round_trip(value)).unwrap_or(value)
     }
 
     pub(super) fn digest(&self) -> String {

@@ -41,9 +41,9 @@ Only moving bodies are compared; A is the original. Relative deviations are |B -
 component (thesis eq. 4.1); where A's component is 0 they leave it out. A velocity is within 1 % if it
 differs by 1 % of A's at most: 0 only with 0. Momenta are shown by their length, and B-A is that of
 the difference; angular momentum is about the origin, potential energy from y = 0. Unmoved is the
-share of position components that the step left at the same bits. Penetration is that of the state
-after the step: of a scene, of all contacts found then; of a folder, whose shapes are not known, of
-the step's own contacts, carried along with their bodies.
+share of position components that the step left at the bits that the board was sent. Penetration is
+that of the state after the step: of a scene, of all contacts found then; of a folder, whose shapes
+are not known, of the step's own contacts, carried along with their bodies.
 
 A board whose step fails stops there and the other goes on. Exit code 0 if every step was taken, 1
 if one failed.";
