@@ -22,7 +22,17 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 
 #[test]
 fn every_help_has_an_example() {
-    for verb in [&[][..], &["run"], &["solve"], &["model"], &["list"], &["load"], &["check"]] {
+    for verb in [
+        &[][..],
+        &["run"],
+        &["solve"],
+        &["model"],
+        &["compare"],
+        &["formats"],
+        &["list"],
+        &["load"],
+        &["check"],
+    ] {
         let ran = run(verb.iter().copied().chain(["--help"]));
         assert_eq!(ran.code, Some(0), "{verb:?}");
         let example = format!("  pgs{}", verb.iter().map(|v| format!(" {v}")).collect::<String>());

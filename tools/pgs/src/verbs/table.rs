@@ -49,7 +49,7 @@ pub(super) fn number(value: f64) -> String {
     if size == 0.0 {
         "0".to_owned()
     } else if (1e-3..1e6).contains(&size) {
-        let whole = if size < 1.0 { 1 } else { size.log10() as usize + 1 };
+        let whole = format!("{:.0}", size.trunc()).len();
         format!("{value:.*}", 5_usize.saturating_sub(whole))
     } else {
         format!("{value:.2e}")

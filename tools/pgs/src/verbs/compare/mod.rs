@@ -198,9 +198,10 @@ pub(crate) fn run(
         done += 1;
         let (a, b) = both(&mut lanes, |lane| lane.step(done, &parameters));
         if done == 1 && a.is_none() && b.is_none() {
-            // Nothing to be compared: the input, or the board, is at fault and no build of it.
-            if let Some(failed) = lanes.0.failed {
-                return Err(failed.failure);
+            // Nothing to be compared, and nothing that one build does better than the other.
+            let Lane { name, side, failed, .. } = &mut lanes.0;
+            if let Some(failed) = failed.take() {
+                return Err(failed.failure.about(format!("board {name} ({side}), and B as well")));
             }
         }
         if done == 1 && !common.json {

@@ -63,7 +63,7 @@ pub(super) fn row(row: &Row, lanes: &(Lane<'_>, Lane<'_>), out: &mut dyn Write) 
         match measured {
             Some(measured) => line(out, &COLUMNS, cells(first, lane.name, measured))?,
             None => {
-                writeln!(out, "{first:>5} {:>5} failed in step {}", lane.name, failed_in(lane))?
+                writeln!(out, "{first:>5} {:>5} failed in step {}", lane.name, failed_in(lane))?;
             }
         }
         first = "";
