@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bitstream_model::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use bitstream_model::interface::control::{IDENTIFICATION_VALUE, VERSION, VERSION_MAJOR, version};
+use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::profile::{Inertia, Variant};
 
 use super::report::{Line, Lines, Outcome};
@@ -128,25 +129,29 @@ fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
     Some(capabilities)
 }
 
-/// A profile, its streams, its formats and its inertia.
+/// A profile, its streams, and what they carry unless it is f32 and isotropic.
 fn described(variant: &Variant) -> String {
     let Variant { profile, numbers, inertia } = variant;
     let widths = |widths: &[u32]| match widths {
         [first, rest @ ..] if rest.iter().all(|width| width == first) => first.to_string(),
         mixed => mixed.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
     };
+    let formats = match (numbers.collisions, numbers.bodies) {
+        (StreamFormat::F32, StreamFormat::F32) => String::new(),
+        (collisions, bodies) => {
+            format!(", collisions in {} and bodies in {}", collisions.name(), bodies.name())
+        }
+    };
     let inertia = match inertia {
         Inertia::Isotropic => "",
         Inertia::World => ", world inertia",
     };
     format!(
-        "{}, {} + {} streams of {} bits, collisions in {} and bodies in {}{inertia}",
+        "{}, {} + {} streams of {} bits{formats}{inertia}",
         profile.name,
         profile.mm2s_widths.len(),
         profile.s2mm_widths.len(),
         widths(profile.mm2s_widths),
-        numbers.collisions.name(),
-        numbers.bodies.name(),
     )
 }
 
@@ -287,6 +292,7 @@ pub(super) fn chain(error: &dyn std::error::Error) -> String {
 mod tests {
     use super::*;
     use crate::accelerator::fake;
+    use crate::interface::profile::{FLOAT, HALF};
     use crate::platform::fake::FakeRegisters;
 
     #[test]
@@ -307,6 +313,17 @@ mod tests {
         }
         // Indices may reach further than the memory.
         assert_eq!(contradiction(&Capabilities { body_capacity: 174_763, ..good }), None);
+    }
+
+    #[test]
+    fn a_profile_is_described_by_what_it_streams() {
+        assert_eq!(described(&FLOAT.default_variant()), "float, 4 + 4 streams of 128 bits");
+        let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
+        assert_eq!(
+            described(&world),
+            "half, 3 + 3 streams of 128, 128, 64 bits, collisions in binary16 and bodies in \
+             binary16, world inertia"
+        );
     }
 
     #[test]
