@@ -111,8 +111,11 @@
 mod accelerator;
 mod axi_dma;
 mod beat;
+#[cfg(feature = "bench")]
+pub mod bench;
 mod check;
 mod error;
+pub mod order;
 pub mod platform;
 mod record;
 pub mod scene;

@@ -13,6 +13,7 @@ use crate::verbs::formats::FormatsArgs;
 use crate::verbs::list::ListArgs;
 use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
+use crate::verbs::order::OrderArgs;
 use crate::verbs::run::RunArgs;
 use crate::verbs::solve::SolveArgs;
 
@@ -24,6 +25,7 @@ Examples:
   pgs compare float half               how far two builds of the board come apart
   pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
+  pgs order --input vectors/full_step186
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check
@@ -55,6 +57,7 @@ pub(crate) enum Verb {
     Compare(CompareArgs),
     Formats(FormatsArgs),
     Model(ModelArgs),
+    Order(OrderArgs),
     List(ListArgs),
     Load(LoadArgs),
     Check(CheckArgs),

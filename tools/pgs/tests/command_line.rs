@@ -29,6 +29,7 @@ fn every_help_has_an_example() {
         &["model"],
         &["compare"],
         &["formats"],
+        &["order"],
         &["list"],
         &["load"],
         &["check"],

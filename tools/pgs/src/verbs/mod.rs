@@ -6,6 +6,7 @@ pub(crate) mod formats;
 pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
+pub(crate) mod order;
 pub(crate) mod run;
 pub(crate) mod solve;
 pub(crate) mod table;
@@ -29,6 +30,7 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
         Verb::Formats(args) => formats::run(args, &command.common, out),
         Verb::Solve(args) => solve::run(args, &command.common, out),
         Verb::Model(args) => model::run(args, &command.common, out),
+        Verb::Order(args) => order::run(args, &command.common, out),
         Verb::List(args) => list::run(args, &command.common, out),
         Verb::Load(args) => load::run(args, &command.common, out),
         Verb::Check(args) => check::run(args, &command.common, out),
