@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
-use bitstream_model::interface::profile::PROFILES;
+use bitstream_model::interface::profile::{PROFILES, Variant};
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::{
@@ -178,6 +178,13 @@ impl Opened {
         self.accelerator.capabilities().variant.profile.name
     }
 
+    /// The profile with its formats and inertia, as the bitstream says.
+    fn design(&self) -> BuildArgs {
+        let Variant { profile, numbers, inertia } = self.accelerator.capabilities().variant;
+        let numbers = Some(numbers);
+        BuildArgs::of(&BoardConfig { profile, numbers, inertia, ..BoardConfig::default() })
+    }
+
     /// Two lines: which board and why, which bitstream.
     pub(crate) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
         let can = self.accelerator.capabilities();
@@ -186,7 +193,7 @@ impl Opened {
             out,
             "bitstream  profile {}, {} kHz, {} + {} channels, one issue every {} cycles, {}, \
              subnormals {}",
-            self.profile(),
+            self.design(),
             can.clock_khz,
             can.mm2s_channels,
             can.s2mm_channels,
@@ -197,8 +204,7 @@ impl Opened {
         if let Some(config) = self.config() {
             writeln!(
                 out,
-                "emulation  {}: memory bandwidth {}, hazard window {}",
-                BuildArgs::of(&config),
+                "emulation  memory bandwidth {}, hazard window {}",
                 bandwidth_text(config.bandwidth),
                 match config.window_slots {
                     Some(slots) => format!("{slots} slots"),
@@ -219,6 +225,7 @@ impl Opened {
             "kind": self.kind(),
             "reason": self.reason,
             "profile": self.profile(),
+            "design": self.design().to_string(),
             "interface_version": [can.version.0, can.version.1],
             "clock_khz": can.clock_khz,
             "interlocked": can.interlocked,

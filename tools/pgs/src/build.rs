@@ -1,7 +1,8 @@
 //! This file writes how an emulated board is built as one text, and reads it.
 //!
 //! ```text
-//! half,thesis16,f32,unchecked,world
+//! half,thesis16,f32,unchecked
+//! mixed,flush,world
 //! float,window=64,bandwidth=unlimited
 //! ```
 //!

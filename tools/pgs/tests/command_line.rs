@@ -184,6 +184,21 @@ fn run_reports_every_step_as_json() {
 }
 
 #[test]
+fn reports_say_how_the_board_is_built() {
+    let options = ["--profile", "half", "--arithmetic", "f32"];
+    let more = ["--inertia", "world", "--hazards", "unchecked", "--window", "64"];
+    let scene = ["--grid", "2x2x2", "--steps", "2", "--drop", "0"];
+    let ran = run([&["--json"], &options[..], &more[..], &scene[..]].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let board = &json(&ran)["board"];
+    assert_eq!(board["profile"], "half");
+    assert_eq!(board["design"], "half,f32,world");
+    assert_eq!(board["emulation"]["build"], "half,f32,unchecked,window=64,world");
+    let text = run([&options[..], &["--format", "thesis16"], &scene[..]].concat()).stdout;
+    assert!(text.contains("bitstream  profile half,thesis16,f32, 250000 kHz"), "{text}");
+}
+
+#[test]
 fn two_runs_have_one_digest_and_another_scene_has_another() {
     let digest = |arguments: &[&str]| {
         let ran = run(arguments);
