@@ -111,8 +111,11 @@
 mod accelerator;
 mod axi_dma;
 mod beat;
+#[cfg(feature = "bench")]
+pub mod bench;
 mod check;
 mod error;
+pub mod order;
 pub mod platform;
 mod record;
 pub mod scene;
@@ -127,8 +130,8 @@ pub use platform::{
     Caching, DevMemWindows, MemoryChoice, PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes,
 };
 pub use scene::{
-    Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
-    InputError, Pose, Shape, StepParameters, Velocity,
+    Bodies, Body, BodyArrays, CONTACT_POINTS, Carriers, Collision, CollisionArrays, Collisions,
+    Contact, InputError, Pose, Shape, StepParameters, Velocity,
 };
 pub use step::{
     Accelerator, BoardChoice, BoardDescription, BoardKind, Fault, HostTimes, Limit, OpenOptions,

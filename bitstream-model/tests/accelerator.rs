@@ -7,7 +7,7 @@ use bitstream_model::interface::control::{self, ErrorCode, ap_ctrl, irq};
 use bitstream_model::interface::profile::FLOAT;
 use bitstream_model::interface::record::Beat;
 use bitstream_model::interface::register::Register;
-use bitstream_model::timing::{StepCycles, StepTime};
+use bitstream_model::timing::{Records, StepCycles, StepTime};
 use bitstream_model::{
     Bandwidth, BoardConfig, Direction, Fault, Hazards, Subnormals, ViolationKind,
 };
@@ -423,7 +423,7 @@ fn done_is_cleared_by_reading_and_interrupts_by_toggling() {
 }
 
 fn formula(scene: &Step) -> u64 {
-    StepCycles::new(&FLOAT, &FLOAT.default_variant().words(), &scene.shape()).total
+    StepCycles::new(&FLOAT.default_variant(), Records::Streamed, &scene.shape()).total
 }
 
 fn assert_accounted(outcome: &Outcome, scene: &Step) {
@@ -469,7 +469,7 @@ fn under_a_bandwidth_limit_a_large_step_takes_the_time_by_formula() {
         let outcome = machine.step(&scene).expect("the step completes");
         assert_accounted(&outcome, &scene);
         let expected =
-            StepTime::new(&FLOAT, &FLOAT.default_variant().words(), &scene.shape(), bandwidth)
+            StepTime::new(&FLOAT.default_variant(), Records::Streamed, &scene.shape(), bandwidth)
                 .seconds;
         let cycles = u32::try_from(outcome.cycles).expect("a few million");
         let found = f64::from(cycles) / 275e6;

@@ -1,15 +1,16 @@
 //! This file reads what a bitstream says of itself, and refuses what the driver does not know.
 
-use bitstream_model::interface::address_map::{CONTROL_BYTES, DMA_COUNT_MAX};
+use bitstream_model::interface::address_map::CONTROL_BYTES;
 use bitstream_model::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use bitstream_model::interface::control::{
     BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY, CONTACT_DEPTH, DMA, FEATURES,
     FRICTION_DEPTH, IDENTIFICATION, IDENTIFICATION_VALUE, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD,
-    MM2S_WIDTHS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_STRIDE, SHAPE_TABLE, VERSION,
-    VERSION_MAJOR, channels, depth, dma, features, issue, memory_per_record, version,
+    MM2S_WIDTHS, NUMBERS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_STRIDE, SHAPE_TABLE, VERSION,
+    VERSION_MAJOR, channels, depth, dma, features, issue, memory_per_record, numbers, version,
 };
-use bitstream_model::interface::profile::{Depth, Profile};
-use bitstream_model::interface::register::Register;
+use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
+use bitstream_model::interface::profile::{Depth, Geometry, Inertia, Profile, Variant};
+use bitstream_model::interface::register::{Field, Register};
 use thiserror::Error;
 
 use crate::platform::Window;
@@ -18,8 +19,8 @@ use crate::platform::Window;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Capabilities {
-    /// Identifier of the [profile](bitstream_model::interface::profile::Profile).
-    pub profile_id: u32,
+    /// The [profile](bitstream_model::interface::profile::Profile), its formats, its inertia.
+    pub variant: Variant,
     /// Interface version, major and minor.
     pub version: (u32, u32),
     /// Whether the pipeline waits on a hazard; without it, it reads stale velocities.
@@ -109,9 +110,6 @@ pub enum IdentityError {
     },
 }
 
-/// Stream width of 128 bits in `MM2S_WIDTHS` and `S2MM_WIDTHS`: log2(16 bytes).
-const WIDTH_128: u32 = 4;
-
 /// Reads and checks what a bitstream says of itself. Only reads.
 pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let read = |register: &Register| window.read32(register.offset);
@@ -128,19 +126,35 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let profile_id = read(&PROFILE);
     let profile = Profile::by_id(profile_id).ok_or(IdentityError::Profile { found: profile_id })?;
 
-    let streams = checked(window, &CHANNELS, "1 to 4 streams each way", |word| {
-        let fits = |count: u32| (1..=DMA_COUNT_MAX).contains(&(count as usize));
-        fits(channels::MM2S.of(word)) && channels::S2MM.of(word) == channels::MM2S.of(word)
-    })?;
-    let count = channels::MM2S.of(streams);
-    for register in [&MM2S_WIDTHS, &S2MM_WIDTHS] {
-        checked(window, register, "128 bits (4) for every stream", |word| {
-            (0..count).all(|stream| (word >> (4 * stream)) & 0xF == WIDTH_128)
+    // Which stream a beat travels on is part of the profile.
+    let streams =
+        checked(window, &CHANNELS, "as many streams each way as the profile has", |word| {
+            channels::MM2S.of(word) as usize == profile.mm2s_widths.len()
+                && channels::S2MM.of(word) as usize == profile.s2mm_widths.len()
+        })?;
+    for (register, widths) in
+        [(&MM2S_WIDTHS, profile.mm2s_widths), (&S2MM_WIDTHS, profile.s2mm_widths)]
+    {
+        checked(window, register, "the stream widths of the profile", |word| {
+            (0..).zip(widths).all(|(stream, width)| (word >> (4 * stream)) & 0xF == coded(*width))
         })?;
     }
-    let interval = checked(window, &ISSUE, "an interval and a number above 0", |word| {
-        issue::INTERVAL.of(word) > 0 && issue::COLLISIONS.of(word) > 0
-    })?;
+    let interval = checked(
+        window,
+        &ISSUE,
+        "an interval above 0, and as many collisions an issue as the profile has",
+        |word| {
+            issue::INTERVAL.of(word) > 0
+                && issue::COLLISIONS.of(word) == profile.collisions_per_issue
+        },
+    )?;
+    let able = read(&FEATURES);
+    let world = features::WORLD_INERTIA.is_set(able);
+    let variant = Variant {
+        profile,
+        numbers: numbers_of(window, profile, world)?,
+        inertia: if world { Inertia::World } else { Inertia::Isotropic },
+    };
     let shape_capacity = checked(
         window,
         &SHAPE_CAPACITY,
@@ -155,19 +169,18 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let memory = checked(window, &MEMORY_PER_RECORD, "bytes above 0", |word| {
         memory_per_record::BODY.of(word) > 0 && memory_per_record::COLLISION.of(word) > 0
     })?;
-    let able = read(&FEATURES);
     let depth_of = |register: &Register| {
         let word = read(register);
         Depth { fill: depth::FILL.of(word), window: depth::WINDOW.of(word) }
     };
     Ok(Capabilities {
-        profile_id,
+        variant,
         version: (major, minor),
         interlocked: features::INTERLOCKED.is_set(able),
         checksums: features::CHECKSUMS.is_set(able),
         flush_subnormals: features::FLUSH_SUBNORMALS.is_set(able),
         impulse_sum: features::IMPULSE_SUM.is_set(able),
-        mm2s_channels: count as usize,
+        mm2s_channels: channels::MM2S.of(streams) as usize,
         s2mm_channels: channels::S2MM.of(streams) as usize,
         initiation_interval: issue::INTERVAL.of(interval),
         collisions_per_issue: issue::COLLISIONS.of(interval),
@@ -183,6 +196,47 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         length_width: dma::LENGTH_WIDTH.of(widths),
         address_width: dma::ADDRESS_WIDTH.of(widths),
     })
+}
+
+/// A stream width as `MM2S_WIDTHS` and `S2MM_WIDTHS` code it: log2 of its bytes.
+const fn coded(width: u32) -> u32 {
+    (width / u8::BITS).ilog2()
+}
+
+/// The formats, which must be known, of the widths that the profile's stripes are made for, and fit
+/// its records.
+fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers, IdentityError> {
+    let found = window.read32(NUMBERS.offset);
+    let refused = |expected| IdentityError::Capability { register: NUMBERS.name, found, expected };
+    let format = |field: Field| {
+        let known = StreamFormat::ALL.into_iter().find(|format| *format as u32 == field.of(found));
+        known.ok_or(refused("formats on the streams that this driver knows"))
+    };
+    let precision = |field: Field| {
+        let known = Precision::ALL.into_iter().find(|known| *known as u32 == field.of(found));
+        known.ok_or(refused("arithmetic and on-chip formats that this driver knows"))
+    };
+    let numbers = Numbers {
+        collisions: format(numbers::COLLISIONS)?,
+        bodies: format(numbers::BODIES)?,
+        rows: precision(numbers::ROWS)?,
+        updates: precision(numbers::UPDATES)?,
+        velocities: precision(numbers::VELOCITIES)?,
+        impulses: precision(numbers::IMPULSES)?,
+    };
+    let own = profile.numbers;
+    if numbers.collisions.bits() != own.collisions.bits()
+        || numbers.bodies.bits() != own.bodies.bits()
+    {
+        return Err(refused("words as wide on the streams as the profile has them"));
+    }
+    if profile.geometry == Geometry::Relative && numbers.collisions == StreamFormat::Thesis16 {
+        return Err(refused("a format with an infinity, which marks an absent contact point"));
+    }
+    if world && numbers.bodies == StreamFormat::Thesis16 {
+        return Err(refused("a format with a zero, which is the inverse inertia of a static body"));
+    }
+    Ok(numbers)
 }
 
 /// A capability register whose value passes `good`.
@@ -210,7 +264,7 @@ pub(crate) mod fake {
         registers.with(|state| {
             state.values.extend([
                 (0x100, 0x5047_5331),
-                (0x104, 0x0001_0000),
+                (0x104, 0x0001_0001),
                 (0x108, 1),
                 (0x10C, 0xB),
                 (0x110, 0x0404),
@@ -226,6 +280,7 @@ pub(crate) mod fake {
                 (0x138, 4 << 20),
                 (0x13C, (16 << 16) | 24),
                 (0x140, (40 << 8) | 26),
+                (0x144, 0),
             ]);
         });
     }
@@ -234,6 +289,7 @@ pub(crate) mod fake {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interface::profile::{FLOAT, HALF, MIXED, NAIVE};
     use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
 
@@ -249,7 +305,7 @@ mod tests {
     #[test]
     fn a_known_bitstream_is_described() {
         let found = identify_with(&[]).expect("well formed");
-        assert_eq!((found.profile_id, found.version), (1, (1, 0)));
+        assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (1, 1)));
         assert!(found.checksums && found.interlocked && found.impulse_sum);
         assert!(!found.flush_subnormals);
         assert_eq!((found.mm2s_channels, found.s2mm_channels), (4, 4));
@@ -280,7 +336,18 @@ mod tests {
             (0x110, 0x0304, "CHANNELS"),
             (0x114, 0x4344, "MM2S_WIDTHS"),
             (0x118, 0x0444, "S2MM_WIDTHS"),
+            (0x110, 0x0404 - 0x0001, "CHANNELS"),
             (0x11C, 0x0001_0000, "ISSUE"),
+            (0x11C, 0x0002_0002, "ISSUE"),
+            (0x144, 0x0000_0003, "NUMBERS"),
+            (0x144, 0x0000_0030, "NUMBERS"),
+            (0x144, 0x0000_0200, "NUMBERS"),
+            (0x144, 0x0000_2000, "NUMBERS"),
+            (0x144, 0x0002_0000, "NUMBERS"),
+            (0x144, 0x0020_0000, "NUMBERS"),
+            // Sixteen bits on streams that are striped for thirty-two.
+            (0x144, 0x0000_0001, "NUMBERS"),
+            (0x144, 0x0000_0020, "NUMBERS"),
             (0x128, 0, "CLOCK_KHZ"),
             (0x134, 0, "SHAPE_CAPACITY"),
             (0x134, 193, "SHAPE_CAPACITY"),
@@ -292,5 +359,84 @@ mod tests {
             let error = identify_with(&[(at, value)]).expect_err(named).to_string();
             assert!(error.contains(named), "{error}");
         }
+    }
+    /// Registers in which the profiles differ, typed out from the specification.
+    const HALF_REGISTERS: [(u32, u32); 6] = [
+        (0x108, 3),
+        (0x110, 0x0303),
+        (0x114, 0x344),
+        (0x118, 0x344),
+        (0x11C, 0x0002_0003),
+        (0x144, 0x0011_1111),
+    ];
+    const MIXED_REGISTERS: [(u32, u32); 6] = [
+        (0x108, 4),
+        (0x110, 0x0303),
+        (0x114, 0x444),
+        (0x118, 0x444),
+        (0x11C, 0x0001_0001),
+        (0x144, 0x0000_0001),
+    ];
+    const NAIVE_REGISTERS: [(u32, u32); 5] =
+        [(0x108, 2), (0x110, 0x0101), (0x114, 0x2), (0x118, 0x2), (0x11C, 0x0001_001C)];
+
+    #[test]
+    fn every_profile_is_known_by_its_registers() {
+        for (registers, profile, channels) in [
+            (&NAIVE_REGISTERS[..], &NAIVE, 1),
+            (&HALF_REGISTERS[..], &HALF, 3),
+            (&MIXED_REGISTERS[..], &MIXED, 3),
+        ] {
+            let found = identify_with(registers).expect(profile.name);
+            assert_eq!(found.variant, profile.default_variant());
+            assert_eq!((found.mm2s_channels, found.s2mm_channels), (channels, channels));
+        }
+    }
+
+    #[test]
+    fn what_was_chosen_when_it_was_built_is_part_of_it() {
+        let with = |registers: &[(u32, u32)], more: &[(u32, u32)]| {
+            identify_with(&[registers, more].concat())
+        };
+        // thesis16 on both streams, arithmetic and arrays of mixed kinds.
+        let found = with(&HALF_REGISTERS, &[(0x144, 0x0010_0122)]).expect("known formats");
+        let expected = Numbers {
+            collisions: StreamFormat::Thesis16,
+            bodies: StreamFormat::Thesis16,
+            rows: Precision::Binary16,
+            updates: Precision::F32,
+            velocities: Precision::F32,
+            impulses: Precision::Binary16,
+        };
+        assert_eq!(found.variant.numbers, expected);
+        let found = with(&[], &[(0x10C, 0x1B)]).expect("with world inertia");
+        assert_eq!(found.variant.inertia, Inertia::World);
+        let error = with(&HALF_REGISTERS, &[(0x144, 0x22), (0x10C, 0x1B)]);
+        let error = error.expect_err("no zero").to_string();
+        assert!(error.starts_with("NUMBERS is 0x00000022") && error.contains("zero"), "{error}");
+        // An absent point cannot be written in thesis16.
+        let error = with(&MIXED_REGISTERS, &[(0x144, 2)]).expect_err("no infinity").to_string();
+        assert!(
+            error.starts_with("NUMBERS is 0x00000002") && error.contains("infinity"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn streams_of_another_width_than_the_profile_has_are_refused() {
+        for (at, value, named) in
+            [(0x114, 0x444, "MM2S_WIDTHS"), (0x118, 0x344 << 4, "S2MM_WIDTHS")]
+        {
+            let registers = [&HALF_REGISTERS[..], &[(at, value)]].concat();
+            let error = identify_with(&registers).expect_err(named).to_string();
+            assert!(error.contains(named), "{error}");
+        }
+    }
+
+    /// A bitstream of version 1.0 has no such register: it reads 0, as in f32 throughout.
+    #[test]
+    fn a_bitstream_of_version_1_0_is_f32_throughout() {
+        let found = identify_with(&[(0x104, 0x0001_0000), (0x144, 0)]).expect("well formed");
+        assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (1, 0)));
     }
 }

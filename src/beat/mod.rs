@@ -1,5 +1,7 @@
 //! This folder lays records out over the channels of a board, and reads results back from them.
 
 pub(crate) mod pack;
+#[cfg(test)]
+mod pack_tests;
 pub(crate) mod stripe;
 pub(crate) mod unpack;

@@ -1,11 +1,10 @@
-//! This file says which channel a beat travels on, and where in that channel's segment it lies.
+//! This file says on which channel a beat travels, and where in that channel's segment it lies.
 //!
-//! Collisions are striped by the beat's place in its record, so that a collision arrives on all
-//! channels at once; everything else by the running beat index over the whole array, so that all
-//! channels are busy:
+//! The beats of a segment are numbered through from the first beat of its first record. The
+//! profile's [`Stripe`] deals them out in groups:
 //!
 //! ```text
-//! four channels     0        1        2        3
+//! float             0        1        2        3
 //! collisions        r0.0     r0.1     r0.2     r0.3       rN.b: beat b of record N
 //!                   r0.4     r0.5     r0.6
 //!                   r1.0     r1.1     r1.2     r1.3
@@ -13,11 +12,21 @@
 //! velocities,       r0.0     r0.1     r1.0     r1.1
 //! poses             r2.0     r2.1
 //! results           r0.0     r0.1     r0.2     r0.3
+//!
+//! half              0        1        2
+//! collisions        r0.0     r0.3/1.0 r1.3       the fourth beat is half r0, half r1
+//!                   r0.1     r1.1
+//!                   r0.2     r1.2
+//! velocities,       r0       r2       r4         zeros fill the last group
+//! poses             r1       r3
 //! ```
 //!
-//! Source: interface specification, channel striping.
+//! Source: interface specification, streams.
 
-use crate::interface::record::{collision, pose, result, velocity};
+use bitstream_model::interface::number::StreamFormat;
+use bitstream_model::interface::profile::Variant;
+use bitstream_model::interface::record::{LANES, pose, result};
+use bitstream_model::interface::stripe::Stripe;
 
 /// What a segment of beats carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,114 +50,253 @@ pub(crate) struct Place {
     pub(crate) slot: usize,
 }
 
+/// How the records of a segment become beats, and these go to the channels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Layout {
+    /// Rows of a record.
+    pub(crate) rows: usize,
+    /// Format of its numbers.
+    pub(crate) format: StreamFormat,
+    /// How beats are dealt out.
+    pub(crate) stripe: Stripe,
+}
+
 impl Segment {
-    /// Beats of one record.
-    pub(crate) const fn beats_per_record(self) -> usize {
-        match self {
-            Self::Velocities => velocity::ROWS,
-            Self::Collisions => collision::ROWS,
-            Self::Poses => pose::ROWS,
-            Self::Results => result::ROWS,
-        }
+    /// How this bitstream has the segment.
+    pub(crate) const fn layout(self, variant: &Variant) -> Layout {
+        let (stripes, numbers) = (&variant.profile.stripes, &variant.numbers);
+        let (rows, format, stripe) = match self {
+            Self::Velocities => (variant.velocity_rows(), numbers.bodies, stripes.bodies),
+            Self::Collisions => (variant.collision_rows(), numbers.collisions, stripes.collisions),
+            Self::Poses => (pose::ROWS, numbers.bodies, stripes.bodies),
+            Self::Results => (result::ROWS, numbers.bodies, stripes.bodies),
+        };
+        Layout { rows, format, stripe }
+    }
+}
+
+impl Layout {
+    /// Rows that fit in a beat.
+    pub(crate) const fn rows_per_beat(&self) -> usize {
+        // A row of four 32-bit words is a beat.
+        (u32::BITS / self.format.bits()) as usize
     }
 
-    /// Where beat `beat` of record `record` goes.
+    /// Beats that so many records take on all channels, padding included.
+    pub(crate) const fn beats(&self, records: usize) -> usize {
+        let filled = (records * self.rows).div_ceil(self.rows_per_beat());
+        if self.stripe.padded { filled.next_multiple_of(self.stripe.streams.len()) } else { filled }
+    }
+
+    /// Beats that so many records put on one channel, padding included; 0 means that the segment
+    /// has no packet there.
+    pub(crate) fn beats_on_channel(&self, records: usize, channel: usize) -> usize {
+        let (group, beats) = (self.stripe.streams, self.beats(records));
+        let rest = &group[..beats % group.len()];
+        beats / group.len() * share(group, channel) + share(rest, channel)
+    }
+
+    /// Where a beat of the segment goes.
     ///
     /// This is the definition. What packs and unpacks without its divisions is tested against it.
-    pub(crate) const fn place(self, record: usize, beat: usize, channels: usize) -> Place {
-        let (index, first_slot) = match self {
-            Self::Collisions => (beat, record * share(collision::ROWS, beat % channels, channels)),
-            Self::Velocities | Self::Poses | Self::Results => {
-                (record * self.beats_per_record() + beat, 0)
-            }
-        };
-        Place { channel: index % channels, slot: first_slot + index / channels }
+    pub(crate) fn place(&self, beat: usize) -> Place {
+        let group = self.stripe.streams;
+        let at = beat % group.len();
+        let channel = usize::from(group[at]);
+        let slot = beat / group.len() * share(group, channel) + share(&group[..at], channel);
+        Place { channel, slot }
+    }
+
+    /// The beat of the segment that goes to a place of one of its channels.
+    pub(crate) fn beat_at(&self, Place { channel, slot }: Place) -> usize {
+        let group = self.stripe.streams;
+        let share = share(group, channel).max(1);
+        let mut of_channel = (0..).zip(group).filter(|(_, of)| usize::from(**of) == channel);
+        let at = of_channel.nth(slot % share).map_or(0, |(at, _)| at);
+        slot / share * group.len() + at
     }
 }
 
-/// Beats that `records` records of a segment put on `channel` of `channels`.
-///
-/// 0 means that the segment has no packet on this channel.
-pub(crate) const fn beats_on_channel(
-    segment: Segment,
-    records: usize,
-    channel: usize,
-    channels: usize,
-) -> usize {
-    match segment {
-        Segment::Collisions => records * share(collision::ROWS, channel, channels),
-        Segment::Velocities | Segment::Poses | Segment::Results => {
-            share(records * segment.beats_per_record(), channel, channels)
+/// Beats of a group, or of a part of one, that go to a channel.
+fn share(group: &[u8], channel: usize) -> usize {
+    group.iter().filter(|stream| usize::from(**stream) == channel).count()
+}
+
+/// The channels of a segment's beats in their order.
+#[derive(Debug)]
+pub(super) struct Deal {
+    group: &'static [u8],
+    at: usize,
+    slots: [usize; CHANNELS],
+}
+
+/// Channels at most.
+const CHANNELS: usize = bitstream_model::interface::address_map::DMA_COUNT_MAX;
+
+impl Deal {
+    /// From the first beat on.
+    pub(super) const fn new(stripe: Stripe) -> Self {
+        Self { group: stripe.streams, at: 0, slots: [0; CHANNELS] }
+    }
+
+    /// Where the next beat goes.
+    #[inline]
+    pub(super) fn next(&mut self) -> Place {
+        let channel = usize::from(self.group[self.at]);
+        self.at += 1;
+        if self.at == self.group.len() {
+            self.at = 0;
         }
+        let slot = self.slots[channel];
+        self.slots[channel] += 1;
+        Place { channel, slot }
+    }
+
+    /// Whether the group is whole.
+    pub(super) const fn at_end_of_group(&self) -> bool {
+        self.at == 0
     }
 }
 
-/// How many of the indices below `count` are `channel` modulo `channels`.
-const fn share(count: usize, channel: usize, channels: usize) -> usize {
-    count.saturating_sub(channel).div_ceil(channels)
-}
+// A row of f32 is a beat.
+const _: () = assert!(LANES * 4 == bitstream_model::interface::record::BEAT_BYTES);
 
 #[cfg(test)]
 mod tests {
     use super::Segment::{Collisions, Poses, Results, Velocities};
     use super::*;
+    use bitstream_model::interface::profile::{
+        FLOAT, Geometry, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile,
+    };
     use proptest::prelude::*;
 
-    fn counts(segment: Segment, records: usize) -> [usize; 4] {
-        [0, 1, 2, 3].map(|channel| beats_on_channel(segment, records, channel, 4))
+    const SEGMENTS: [Segment; 4] = [Velocities, Collisions, Poses, Results];
+
+    fn counts<const N: usize>(
+        profile: &'static Profile,
+        segment: Segment,
+        records: usize,
+    ) -> [usize; N] {
+        let layout = segment.layout(&profile.default_variant());
+        assert_eq!(profile.mm2s_widths.len(), N);
+        std::array::from_fn(|channel| layout.beats_on_channel(records, channel))
     }
 
     #[test]
-    fn four_channels_carry_what_the_specification_says() {
-        assert_eq!(counts(Velocities, 38_880), [19_440; 4]);
-        assert_eq!(counts(Poses, 38_880), [19_440; 4]);
-        assert_eq!(counts(Results, 38_880), [38_880; 4]);
-        assert_eq!(counts(Collisions, 127_000), [254_000, 254_000, 254_000, 127_000]);
+    fn the_channels_of_float_carry_what_the_specification_says() {
+        assert_eq!(counts(&FLOAT, Velocities, 38_880), [19_440; 4]);
+        assert_eq!(counts(&FLOAT, Poses, 38_880), [19_440; 4]);
+        assert_eq!(counts(&FLOAT, Results, 38_880), [38_880; 4]);
+        assert_eq!(counts(&FLOAT, Collisions, 127_000), [254_000, 254_000, 254_000, 127_000]);
+    }
+
+    #[test]
+    fn the_channels_of_half_carry_whole_groups() {
+        // 38,880 beats are 7,776 groups of five; 77,760 of results 15,552.
+        assert_eq!(counts(&HALF, Velocities, 38_880), [15_552, 15_552, 7_776]);
+        assert_eq!(counts(&HALF, Results, 38_880), [31_104, 31_104, 15_552]);
+        assert_eq!(counts(&HALF, Collisions, 127_000), [190_500, 190_500, 63_500]);
+        // One body, one collision: the rest of the group is padding.
+        assert_eq!(counts(&HALF, Poses, 1), [2, 2, 1]);
+        assert_eq!(counts(&HALF, Results, 3), [4, 4, 2]);
+        assert_eq!(counts(&HALF, Collisions, 1), [3, 3, 1]);
+        assert_eq!(counts(&HALF, Collisions, 0), [0; 3]);
+    }
+
+    #[test]
+    fn mixed_and_naive_end_with_the_array() {
+        assert_eq!(counts(&MIXED, Collisions, 127_000), [127_000; 3]);
+        assert_eq!(counts(&MIXED, Velocities, 2), [2, 1, 1]);
+        assert_eq!(counts(&MIXED, Results, 1), [2, 1, 1]);
+        assert_eq!(counts(&NAIVE, Collisions, 3), [21]);
+        assert_eq!(counts(&NAIVE, Poses, 3), [6]);
+    }
+
+    #[test]
+    fn world_inertia_doubles_the_velocities_alone() {
+        let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
+        assert_eq!(Velocities.layout(&world).beats(5), 10);
+        assert_eq!(Poses.layout(&world).beats(5), 5);
     }
 
     #[test]
     fn a_segment_without_beats_on_a_channel_counts_zero_there() {
-        assert_eq!(counts(Velocities, 1), [1, 1, 0, 0]);
-        assert_eq!(counts(Velocities, 3), [2, 2, 1, 1]);
-        assert_eq!(counts(Results, 1), [1; 4]);
-        assert_eq!(counts(Collisions, 0), [0; 4]);
-        assert_eq!(counts(Collisions, 1), [2, 2, 2, 1]);
+        assert_eq!(counts(&FLOAT, Velocities, 1), [1, 1, 0, 0]);
+        assert_eq!(counts(&FLOAT, Velocities, 3), [2, 2, 1, 1]);
+        assert_eq!(counts(&FLOAT, Results, 1), [1; 4]);
+        assert_eq!(counts(&FLOAT, Collisions, 0), [0; 4]);
+        assert_eq!(counts(&FLOAT, Collisions, 1), [2, 2, 2, 1]);
     }
 
     #[test]
     fn the_places_of_the_drawing_are_these() {
-        let at = |segment: Segment, record, beat| {
-            let Place { channel, slot } = segment.place(record, beat, 4);
+        let at = |profile: &'static Profile, segment: Segment, beat| {
+            let Place { channel, slot } = segment.layout(&profile.default_variant()).place(beat);
             (channel, slot)
         };
-        assert_eq!(at(Collisions, 0, 4), (0, 1));
-        assert_eq!(at(Collisions, 0, 6), (2, 1));
-        assert_eq!(at(Collisions, 1, 0), (0, 2));
-        assert_eq!(at(Collisions, 1, 3), (3, 1));
-        assert_eq!(at(Collisions, 1, 6), (2, 3));
-        assert_eq!(at(Velocities, 1, 0), (2, 0));
-        assert_eq!(at(Poses, 1, 1), (3, 0));
-        assert_eq!(at(Velocities, 2, 1), (1, 1));
-        assert_eq!(at(Results, 5, 2), (2, 5));
+        assert_eq!(at(&FLOAT, Collisions, 4), (0, 1));
+        assert_eq!(at(&FLOAT, Collisions, 6), (2, 1));
+        assert_eq!(at(&FLOAT, Collisions, 7), (0, 2));
+        assert_eq!(at(&FLOAT, Collisions, 7 + 3), (3, 1));
+        assert_eq!(at(&FLOAT, Collisions, 7 + 6), (2, 3));
+        assert_eq!(at(&FLOAT, Velocities, 2), (2, 0));
+        assert_eq!(at(&FLOAT, Poses, 3), (3, 0));
+        assert_eq!(at(&FLOAT, Results, 4 * 5 + 2), (2, 5));
+        assert_eq!([2, 3, 5].map(|beat| at(&HALF, Collisions, beat)), [(0, 2), (1, 0), (1, 2)]);
+        assert_eq!([6, 7].map(|beat| at(&HALF, Collisions, beat)), [(2, 0), (0, 3)]);
+        assert_eq!(
+            [1, 2, 4, 9].map(|beat| at(&HALF, Poses, beat)),
+            [(0, 1), (1, 0), (2, 0), (2, 1)]
+        );
+    }
+
+    /// What the packer takes for granted of every profile.
+    #[test]
+    fn zeros_pad_whole_issues_of_every_profile() {
+        for profile in PROFILES {
+            let variant = profile.default_variant();
+            for segment in SEGMENTS {
+                let Stripe { streams, .. } = segment.layout(&variant).stripe;
+                let channels = profile.mm2s_widths.len();
+                assert!(
+                    (1..=CHANNELS).contains(&channels) && profile.s2mm_widths.len() == channels
+                );
+                assert!(streams.iter().all(|stream| usize::from(*stream) < channels));
+            }
+            let layout = Collisions.layout(&variant);
+            if layout.stripe.padded {
+                assert_eq!(profile.geometry, Geometry::Absolute, "{}: 0 is a count", profile.name);
+            }
+            let issue = profile.collisions_per_issue as usize;
+            for records in 0..=2 * issue {
+                let rows = layout.beats(records) * layout.rows_per_beat();
+                let whole = records.next_multiple_of(issue) * layout.rows;
+                assert!(rows >= whole, "{}: {records} collisions", profile.name);
+            }
+        }
     }
 
     proptest! {
         #[test]
         fn striping_is_a_bijection_onto_the_channels(
-            segment in prop::sample::select(vec![Velocities, Collisions, Poses, Results]),
+            segment in prop::sample::select(SEGMENTS.to_vec()),
             records in 0_usize..60,
-            channels in 1_usize..=4,
+            profile in prop::sample::select(PROFILES.to_vec()),
+            inertia in prop::sample::select(vec![Inertia::Isotropic, Inertia::World]),
         ) {
-            let mut places = Vec::new();
-            for record in 0..records {
-                for beat in 0..segment.beats_per_record() {
-                    places.push(segment.place(record, beat, channels));
-                }
+            let layout = segment.layout(&Variant { inertia, ..profile.default_variant() });
+            let beats = layout.beats(records);
+            let mut places: Vec<_> = (0..beats).map(|beat| layout.place(beat)).collect();
+            let mut deal = Deal::new(layout.stripe);
+            for (beat, place) in places.iter().enumerate() {
+                prop_assert_eq!(deal.next(), *place);
+                prop_assert_eq!(layout.beat_at(*place), beat);
             }
+            prop_assert_eq!(deal.at_end_of_group(), beats.is_multiple_of(layout.stripe.streams.len()));
             places.sort_unstable();
             let mut every_slot = Vec::new();
-            for channel in 0..channels {
-                for slot in 0..beats_on_channel(segment, records, channel, channels) {
+            for channel in 0..profile.mm2s_widths.len() {
+                for slot in 0..layout.beats_on_channel(records, channel) {
                     every_slot.push(Place { channel, slot });
                 }
             }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use bitstream_model::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use bitstream_model::interface::control::{IDENTIFICATION_VALUE, VERSION, VERSION_MAJOR, version};
-use bitstream_model::interface::profile::Profile;
+use bitstream_model::interface::number::StreamFormat;
+use bitstream_model::interface::profile::{Inertia, Variant};
 
 use super::report::{Line, Lines, Outcome};
 use crate::accelerator::{Capabilities, Control, ControlError, IdentityError, identify};
@@ -115,19 +116,43 @@ fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
         lines.stop(Line::Capabilities, Outcome::failed(found, expected, next));
         return None;
     }
-    let profile = Profile::by_id(capabilities.profile_id).map_or("unknown", |found| found.name);
     lines.ok(
         Line::Capabilities,
         format!(
-            "profile {profile}, {} + {} streams of 128 bits, {} kHz, up to {} bodies and {} shapes",
-            capabilities.mm2s_channels,
-            capabilities.s2mm_channels,
+            "profile {}, {} kHz, up to {} bodies and {} shapes",
+            described(&capabilities.variant),
             capabilities.clock_khz,
             capabilities.body_capacity,
             capabilities.shape_capacity,
         ),
     );
     Some(capabilities)
+}
+
+/// A profile, its streams, and what they carry unless it is f32 and isotropic.
+fn described(variant: &Variant) -> String {
+    let Variant { profile, numbers, inertia } = variant;
+    let widths = |widths: &[u32]| match widths {
+        [first, rest @ ..] if rest.iter().all(|width| width == first) => first.to_string(),
+        mixed => mixed.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
+    };
+    let formats = match (numbers.collisions, numbers.bodies) {
+        (StreamFormat::F32, StreamFormat::F32) => String::new(),
+        (collisions, bodies) => {
+            format!(", collisions in {} and bodies in {}", collisions.name(), bodies.name())
+        }
+    };
+    let inertia = match inertia {
+        Inertia::Isotropic => "",
+        Inertia::World => ", world inertia",
+    };
+    format!(
+        "{}, {} + {} streams of {} bits{formats}{inertia}",
+        profile.name,
+        profile.mm2s_widths.len(),
+        profile.s2mm_widths.len(),
+        widths(profile.mm2s_widths),
+    )
 }
 
 /// The line that a refused bitstream fails at.
@@ -166,20 +191,27 @@ fn refused(error: &IdentityError) -> (Line, Outcome) {
 }
 
 /// Capabilities that contradict each other: what was found, what was expected.
+///
+/// The capacity for bodies is one whatever the memory; that for collisions is one of the memory.
 fn contradiction(capabilities: &Capabilities) -> Option<(String, String)> {
     let memory = u64::from(capabilities.memory_bytes);
     let records = [
-        ("bodies", capabilities.body_capacity, capabilities.bytes_per_body),
-        ("collisions", capabilities.collision_capacity, capabilities.bytes_per_collision),
+        ("bodies", capabilities.body_capacity, 1, capabilities.bytes_per_body),
+        (
+            "collisions",
+            capabilities.collision_capacity,
+            capabilities.collision_capacity,
+            capabilities.bytes_per_collision,
+        ),
     ];
-    records.into_iter().find_map(|(what, capacity, bytes)| {
-        let needed = u64::from(capacity) * u64::from(bytes);
+    records.into_iter().find_map(|(what, capacity, least, bytes)| {
         if capacity == 0 {
             return Some((format!("room for no {what}"), format!("room for {what}")));
         }
+        let needed = u64::from(least) * u64::from(bytes);
         (needed > memory).then(|| {
             (
-                format!("{capacity} {what} of {bytes} bytes, which take {needed} bytes"),
+                format!("{least} {what} of {bytes} bytes, which take {needed} bytes"),
                 format!("no more than the {memory} bytes of on-chip memory"),
             )
         })
@@ -260,6 +292,7 @@ pub(super) fn chain(error: &dyn std::error::Error) -> String {
 mod tests {
     use super::*;
     use crate::accelerator::fake;
+    use crate::interface::profile::{FLOAT, HALF};
     use crate::platform::fake::FakeRegisters;
 
     #[test]
@@ -268,9 +301,9 @@ mod tests {
         fake::describe(&registers);
         let good = identify(&registers.window(RegisterMap::Control)).expect("well formed");
         assert_eq!(contradiction(&good), None);
-        // 4 MiB hold 174,762 bodies of 24 bytes and 262,144 collisions of 16.
+        // 4 MiB hold 262,144 collisions of 16 bytes.
         let cases = [
-            (Capabilities { body_capacity: 174_763, ..good }, "174763 bodies of 24 bytes"),
+            (Capabilities { memory_bytes: 23, ..good }, "1 bodies of 24 bytes"),
             (Capabilities { collision_capacity: 262_145, ..good }, "262145 collisions"),
             (Capabilities { body_capacity: 0, ..good }, "room for no bodies"),
         ];
@@ -278,7 +311,19 @@ mod tests {
             let (found, _) = contradiction(&capabilities).expect(text);
             assert!(found.contains(text), "{found}");
         }
-        assert_eq!(contradiction(&Capabilities { body_capacity: 174_762, ..good }), None);
+        // Indices may reach further than the memory.
+        assert_eq!(contradiction(&Capabilities { body_capacity: 174_763, ..good }), None);
+    }
+
+    #[test]
+    fn a_profile_is_described_by_what_it_streams() {
+        assert_eq!(described(&FLOAT.default_variant()), "float, 4 + 4 streams of 128 bits");
+        let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
+        assert_eq!(
+            described(&world),
+            "half, 3 + 3 streams of 128, 128, 64 bits, collisions in binary16 and bodies in \
+             binary16, world inertia"
+        );
     }
 
     #[test]
@@ -289,7 +334,7 @@ mod tests {
         let mut lines = Lines::default();
         assert!(identity(&registers.window(RegisterMap::Control), &mut lines).is_none());
         let lines = lines.finish();
-        assert_eq!(lines[1].outcome, Outcome::ok("1.0"));
+        assert_eq!(lines[1].outcome, Outcome::ok("1.1"));
         assert!(
             matches!(&lines[2].outcome, Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503")
         );

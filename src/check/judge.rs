@@ -3,9 +3,10 @@
 
 use std::fmt;
 
-use bitstream_model::interface::record::{BEAT_BYTES, Beat, WORD_LANE};
+use bitstream_model::interface::profile::Variant;
+use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
-use super::pattern::dirt;
+use super::pattern::Pattern;
 use crate::axi_dma::Direction;
 use crate::beat::stripe::Place;
 use crate::step::{Echoed, source_of};
@@ -86,6 +87,8 @@ impl fmt::Display for Words<'_> {
 /// What is known of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run<'a> {
+    /// The bitstream's.
+    pub(super) variant: &'a Variant,
     /// Number of bodies.
     pub(super) bodies: usize,
     /// The results as they should be, by channel.
@@ -96,7 +99,6 @@ pub(super) struct Run<'a> {
 
 /// Compares; `None` if every beat is as it was sent.
 pub(super) fn judge(run: &Run<'_>, echoed: &Echoed) -> Option<Difference> {
-    let channels = run.expected.len();
     let mut differences = Vec::new();
     let mut total = 0;
     for (channel, expected) in run.expected.iter().enumerate() {
@@ -114,10 +116,12 @@ pub(super) fn judge(run: &Run<'_>, echoed: &Echoed) -> Option<Difference> {
         .into_iter()
         .map(|(place, found, expected)| {
             let origin = stale(run, echoed, place, found);
-            let (channel, offset) = match origin {
-                Some(Origin::StaleRead) => source_of(run.bodies, channels, place),
-                _ => (place.channel, (place.slot * BEAT_BYTES) as u64),
+            let source = match origin {
+                Some(Origin::StaleRead) => source_of(run.bodies, run.variant, place),
+                _ => None,
             };
+            let (channel, offset) =
+                source.unwrap_or((place.channel, (place.slot * BEAT_BYTES) as u64));
             (origin, channel, offset, found, expected)
         })
         .min_by_key(|(origin, channel, offset, ..)| (origin.is_none(), *offset, *channel))?;
@@ -132,15 +136,20 @@ fn at(results: &[Vec<Beat>], place: Place) -> Option<Beat> {
 
 /// Whether a wrong beat is one that its buffer held before.
 fn stale(run: &Run<'_>, echoed: &Echoed, place: Place, found: Beat) -> Option<Origin> {
-    let Place { channel, slot } = place;
-    if found == dirt(Direction::S2mm, channel, slot) {
+    let pattern = Pattern::of(run.variant);
+    let dirt = pattern.dirt();
+    if found == dirt(Direction::S2mm, place.channel, place.slot) {
         return Some(Origin::StaleResult);
     }
-    let (sender, offset) = source_of(run.bodies, run.expected.len(), place);
+    // Padding is not sent: the accelerator makes it.
+    let (sender, offset) = source_of(run.bodies, run.variant, place)?;
     let slot = usize::try_from(offset).unwrap_or(usize::MAX) / BEAT_BYTES;
     let sent = dirt(Direction::Mm2s, sender, slot);
-    // The last lane of a beat does not always come back.
-    if found.0[..WORD_LANE] == sent.0[..WORD_LANE] {
+    let returned = pattern.returned();
+    if (0..)
+        .zip(returned)
+        .all(|(lane, bits): (usize, _)| (found.0[lane] ^ sent.0[lane]) & bits == 0)
+    {
         return Some(Origin::StaleRead);
     }
     let before = run.before.and_then(|before| at(before, place));
@@ -159,13 +168,18 @@ fn elsewhere(run: &Run<'_>, found: Beat) -> Origin {
 
 #[cfg(test)]
 mod tests {
-    use super::super::pattern::{bodies, results};
     use super::*;
+    use crate::interface::profile::FLOAT;
 
     const BODIES: u32 = 9;
 
     fn pattern(seed: u32) -> Vec<Vec<Beat>> {
-        results(&bodies(seed, BODIES), 4)
+        let pattern = Pattern::of(&FLOAT.default_variant());
+        pattern.results(&pattern.bodies(seed, BODIES), 4)
+    }
+
+    fn dirt(direction: Direction, channel: usize, slot: usize) -> Beat {
+        Pattern::of(&FLOAT.default_variant()).dirt()(direction, channel, slot)
     }
 
     /// What is found if the results of pattern 2, run after pattern 1, are changed.
@@ -181,7 +195,9 @@ mod tests {
             interrupts: 1,
             descriptors: 1,
         };
-        let run = Run { bodies: BODIES as usize, expected: &expected, before: Some(&before) };
+        let variant = &FLOAT.default_variant();
+        let bodies = BODIES as usize;
+        let run = Run { variant, bodies, expected: &expected, before: Some(&before) };
         judge(&run, &echoed)
     }
 

@@ -6,7 +6,7 @@ use bitstream_model::interface::record::Beat;
 
 use super::bring_up::chain;
 use super::judge::{Difference, Origin, Run, judge};
-use super::pattern;
+use super::pattern::{Pattern, SHAPES};
 use super::report::{Line, Lines, Outcome};
 use crate::beat::unpack::sum_of_words;
 use crate::error::Error;
@@ -26,7 +26,7 @@ const QUIET: Duration = Duration::from_millis(2);
 
 /// Runs the lines that stream.
 pub(super) fn streams(mut accelerator: Accelerator, lines: &mut Lines) {
-    if let Err(error) = accelerator.set_shapes(&pattern::SHAPES) {
+    if let Err(error) = accelerator.set_shapes(&SHAPES) {
         let next = "load the bitstream anew";
         lines.stop(Line::Echo, Outcome::failed(chain(&error), "shapes that can be loaded", next));
         return;
@@ -95,13 +95,14 @@ fn still_moving(registers: &RegisterDump) -> String {
 
 /// Sends patterns of several sizes through fresh buffers. The error is a step that failed.
 fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<Echoed>, Outcome> {
-    let channels = accelerator.capabilities().mm2s_channels;
+    let variant = accelerator.capabilities().variant;
+    let (pattern, channels) = (Pattern::of(&variant), variant.profile.s2mm_widths.len());
     let mut sizes = SIZES.map(|size| fitting(accelerator, size)).to_vec();
     sizes.dedup();
     let mut runs = Vec::new();
     let mut failure = None;
     for (seed, size) in (1..).zip(&sizes) {
-        let bodies = pattern::bodies(seed, *size);
+        let bodies = pattern.bodies(seed, *size);
         let echo = Echo {
             bodies: &bodies,
             short_pieces: *size <= SHORT_PIECES_UP_TO,
@@ -109,8 +110,9 @@ fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<Echoed
             dirt: None,
         };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
-        let expected = pattern::results(&bodies, channels);
-        let run = Run { bodies: bodies.len(), expected: &expected, before: None };
+        let expected = pattern.results(&bodies, channels);
+        let run =
+            Run { variant: &variant, bodies: bodies.len(), expected: &expected, before: None };
         if let Some(difference) = judge(&run, &echoed) {
             let expected = format!("a pattern of {size} bodies back bit for bit");
             let next = advice(&difference);
@@ -178,20 +180,26 @@ fn sums(runs: &[Echoed]) -> Outcome {
 
 /// Sends pattern after pattern through the same buffers, dirtied in between.
 fn coherency(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
-    let channels = accelerator.capabilities().mm2s_channels;
+    let variant = accelerator.capabilities().variant;
+    let (pattern, channels) = (Pattern::of(&variant), variant.profile.s2mm_widths.len());
     let size = fitting(accelerator, COHERENCY_BODIES);
     let mut before: Option<Vec<Vec<Beat>>> = None;
     for round in 0..COHERENCY_ROUNDS {
-        let bodies = pattern::bodies(0x100 + round, size);
+        let bodies = pattern.bodies(0x100 + round, size);
         let echo = Echo {
             bodies: &bodies,
             short_pieces: false,
             fresh_buffers: round == 0,
-            dirt: Some(pattern::dirt),
+            dirt: Some(pattern.dirt()),
         };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
-        let expected = pattern::results(&bodies, channels);
-        let run = Run { bodies: bodies.len(), expected: &expected, before: before.as_deref() };
+        let expected = pattern.results(&bodies, channels);
+        let run = Run {
+            variant: &variant,
+            bodies: bodies.len(),
+            expected: &expected,
+            before: before.as_deref(),
+        };
         if let Some(difference) = judge(&run, &echoed) {
             return Ok(Outcome::failed(
                 difference.to_string(),
@@ -228,7 +236,8 @@ fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
              else drives it",
         ));
     }
-    let bodies = pattern::bodies(0x200, fitting(accelerator, COHERENCY_BODIES));
+    let bodies = Pattern::of(&accelerator.capabilities().variant)
+        .bodies(0x200, fitting(accelerator, COHERENCY_BODIES));
     let mut woken = 0;
     for _ in 0..INTERRUPT_STEPS {
         let echo = Echo { bodies: &bodies, short_pieces: false, fresh_buffers: false, dirt: None };

@@ -1,24 +1,27 @@
 //! This file maps physical memory through `/dev/mem`: only on request, and only inside windows that
 //! were configured.
 //!
+//! `/dev/mem` is locked, and with it every device file that shows memory of these windows too: who
+//! opens a UIO node or a u-dma-buf has it alone, whichever way the other one comes.
+//!
 //! There is no interrupt this way. What the kernel does not map (registers, memory reserved with
 //! `no-map`) is Device memory.
 //!
 //! Source: Linux `Documentation/arch/arm64/memory.rst`, `drivers/char/mem.c`.
 
-use std::fs::File;
 use std::io;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::sync::Arc;
 
 use bitstream_model::interface::address_map::{
     CONTROL_BASE, CONTROL_BYTES, DMA_BYTES, DMA_COUNT_MAX, MEMORY_BASE, MEMORY_BYTES, dma_base,
 };
 
+use super::lock::LockedFile;
 use super::mapped::Mapping;
-use super::sysfs::read_if_present;
-use super::uio_device::page_bytes;
-use super::{PlatformError, ReservedMemory, System};
+use super::sysfs::{read_if_present, read_number};
+use super::system::page_bytes;
+use super::{PlatformError, ReservedMemory, System, u_dma_buf_names, uio_nodes};
 
 /// What may be reached through `/dev/mem`. The default is the address map of the interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -52,12 +55,10 @@ impl DevMemWindows {
         range(self.control, u64::from(CONTROL_BYTES))
     }
 
-    fn contain(&self, wanted: &Range<u64>) -> bool {
-        let registers = (0..DMA_COUNT_MAX).map(|core| self.dma(core)).chain([self.control()]);
-        registers
-            .flatten()
-            .chain([self.memory.clone()])
-            .any(|window| window.start <= wanted.start && wanted.end <= window.end)
+    /// All registers.
+    pub(super) fn registers(&self) -> Vec<Range<u64>> {
+        let dma = (0..DMA_COUNT_MAX).map(|core| self.dma(core));
+        dma.chain([self.control()]).flatten().collect()
     }
 }
 
@@ -65,47 +66,46 @@ fn range(start: u64, bytes: u64) -> Option<Range<u64>> {
     Some(start..start.checked_add(bytes)?)
 }
 
-/// `/dev/mem`, open.
+fn overlap(a: &Range<u64>, b: &Range<u64>) -> bool {
+    a.start < b.end && b.start < a.end
+}
+
+/// `/dev/mem`, open, for one user alone.
 #[derive(Debug)]
 pub(super) struct DevMem {
-    file: File,
-    path: PathBuf,
-    windows: DevMemWindows,
+    file: Arc<LockedFile>,
+    /// What may be mapped.
+    windows: Vec<Range<u64>>,
     /// What the kernel uses as its own, as far as it says.
     kernel: Vec<(Range<u64>, String)>,
 }
 
 impl DevMem {
-    /// Opens it.
-    pub(super) fn open(system: &System, windows: DevMemWindows) -> Result<Self, PlatformError> {
-        let path = system.dev.join("mem");
-        let file = super::system::open_device(&path, nix::libc::O_SYNC);
-        let file = file.map_err(|error| refused("opened", windows.control, error))?;
+    /// Opens it, to map these windows and nothing else.
+    pub(super) fn open(system: &System, windows: Vec<Range<u64>>) -> Result<Self, PlatformError> {
+        let first = windows.first().map_or(0, |window| window.start);
+        let file = LockedFile::open(&system.dev.join("mem"), nix::libc::O_SYNC)
+            .map_err(|error| refused("opened", first, error))?;
+        let file = Arc::new(file.with(lock_others(system, &windows)?));
         let kernel = kernel_memory(&read_if_present(&system.iomem)?.unwrap_or_default());
-        Ok(Self { file, path, windows, kernel })
-    }
-
-    /// What was configured.
-    pub(super) fn windows(&self) -> &DevMemWindows {
-        &self.windows
+        Ok(Self { file, windows, kernel })
     }
 
     /// Maps a range.
     pub(super) fn map(&self, wanted: &Range<u64>) -> Result<Mapping, PlatformError> {
         let (address, bytes) = (wanted.start, wanted.end.saturating_sub(wanted.start));
-        if bytes == 0 || !self.windows.contain(wanted) {
+        let inside = |window: &Range<u64>| window.start <= wanted.start && wanted.end <= window.end;
+        if bytes == 0 || !self.windows.iter().any(inside) {
             return Err(PlatformError::OutOfWindows { address, bytes });
         }
-        let overlaps = |ram: &Range<u64>| ram.start < wanted.end && wanted.start < ram.end;
-        if let Some((_, ram)) = self.kernel.iter().find(|(ram, _)| overlaps(ram)) {
+        if let Some((_, ram)) = self.kernel.iter().find(|(ram, _)| overlap(ram, wanted)) {
             return Err(PlatformError::KernelMemory { address, ram: ram.clone() });
         }
-        let start = address % page_bytes(&self.path)?;
+        let start = address % page_bytes(self.file.path())?;
         let region = || format!("{address:#x} of /dev/mem");
         let large = |_| PlatformError::TooLarge { region: region(), bytes };
         let mapped = Mapping::new(
             &self.file,
-            &self.path,
             address - start,
             usize::try_from(start).map_err(large)?,
             usize::try_from(bytes).map_err(large)?,
@@ -117,6 +117,36 @@ impl DevMem {
     pub(super) fn memory(&self, wanted: &Range<u64>) -> Result<ReservedMemory, PlatformError> {
         ReservedMemory::new(self.map(wanted)?, wanted.start, "of /dev/mem".to_owned())
     }
+}
+
+/// Locks the device files that show memory of these windows too. One whose file is not there nobody
+/// can open.
+fn lock_others(system: &System, windows: &[Range<u64>]) -> Result<Vec<LockedFile>, PlatformError> {
+    let shown = |start: u64, bytes: u64| {
+        let shown = start..start.saturating_add(bytes);
+        windows.iter().any(|window| overlap(window, &shown))
+    };
+    let mut names = Vec::new();
+    for node in uio_nodes(&system.uio)? {
+        if node.maps.iter().any(|map| shown(map.address, map.bytes)) {
+            names.push(node.device);
+        }
+    }
+    for name in u_dma_buf_names(system) {
+        let buffer = system.u_dma_buf.join(&name);
+        if shown(read_number(&buffer.join("phys_addr"))?, read_number(&buffer.join("size"))?) {
+            names.push(name);
+        }
+    }
+    let mut locked = Vec::new();
+    for name in names {
+        match LockedFile::open(&system.dev.join(name), nix::libc::O_NONBLOCK) {
+            Ok(file) => locked.push(file),
+            Err(PlatformError::NoDevice { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(locked)
 }
 
 /// Tells missing rights and the kernel's restrictions from other failures.
@@ -149,12 +179,20 @@ fn kernel_memory(iomem: &str) -> Vec<(Range<u64>, String)> {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::fs::{self, File};
+    use std::path::PathBuf;
 
     use super::*;
-    use crate::platform::uio_fake::write;
-    use crate::platform::{RegisterWindow, release_to_device};
+    use crate::platform::uio_fake::{add_node, write};
+    use crate::platform::{RegisterWindow, UioDevice, release_to_device};
     use bitstream_model::interface::record::Beat;
+
+    /// Opens it for registers and memory.
+    fn open(system: &System, windows: &DevMemWindows) -> Result<DevMem, PlatformError> {
+        let mut wanted = windows.registers();
+        wanted.push(windows.memory.clone());
+        DevMem::open(system, wanted)
+    }
 
     /// A `/dev/mem` of 1 MiB with registers at its start and memory at 0x40040.
     fn memory() -> (tempfile::TempDir, System, DevMemWindows) {
@@ -185,9 +223,9 @@ mod tests {
         let (_root, system, windows) = memory();
         let control = windows.control().expect("no overflow");
         let memory_window = windows.memory.clone();
-        let mem = DevMem::open(&system, windows).expect("opened");
+        let mem = open(&system, &windows).expect("opened");
         mem.map(&control).expect("mapped").write32(8, 0x0403_0201);
-        let memory = mem.memory(&memory_window).expect("mapped");
+        let mut memory = mem.memory(&memory_window).expect("mapped");
         assert_eq!((memory.address(), memory.bytes()), (0x4_0040, 0x1_FFC0));
         memory.write(16, &[Beat([5, 6, 7, 8])]).expect("inside");
         release_to_device();
@@ -199,7 +237,7 @@ mod tests {
     #[test]
     fn nothing_outside_the_windows_is_mapped() {
         let (_root, system, windows) = memory();
-        let mem = DevMem::open(&system, windows).expect("opened");
+        let mem = open(&system, &windows).expect("opened");
         for (wanted, _) in [
             (0xF_0000..0xF_1000, "nowhere"),
             (0x3_FFF0..0x4_0010, "over an end"),
@@ -213,6 +251,62 @@ mod tests {
     }
 
     #[test]
+    fn it_has_one_user_who_may_map_registers_and_memory() {
+        let (_root, system, windows) = memory();
+        let mem = open(&system, &windows).expect("opened");
+        let error = open(&system, &windows).expect_err("in use");
+        assert!(matches!(&error, PlatformError::Busy { path } if path.ends_with("mem")), "{error}");
+        let control = mem.map(&windows.control().expect("no overflow")).expect("mapped");
+        let memory = mem.memory(&windows.memory).expect("mapped");
+        // Either keeps it.
+        drop((mem, control));
+        open(&system, &windows).expect_err("the memory is left");
+        drop(memory);
+        open(&system, &windows).expect("nobody has it");
+    }
+
+    #[test]
+    fn what_shows_the_same_memory_is_kept_too_and_nothing_else() {
+        let (_root, system, windows) = memory();
+        add_node(&system, 0, "pgs", &[("dma0", 0, 0x1_0000), ("control", 0x8_0000, 0x1000)]);
+        add_node(&system, 1, "pgs-memory", &[("memory", 0x4_0000, 0x1_0000)]);
+        add_node(&system, 2, "beside", &[("memory", 0x6_0000, 0x1_0000)]);
+        for (name, address) in [("inside", "0x50000"), ("outside", "0x60000")] {
+            write(system.u_dma_buf.join(name).join("phys_addr"), address);
+            write(system.u_dma_buf.join(name).join("size"), "4096");
+            write(system.dev.join(name), "");
+        }
+        let busy = || {
+            let mut busy = Vec::new();
+            for name in ["uio0", "uio1", "uio2", "inside", "outside"] {
+                match LockedFile::open(&system.dev.join(name), 0) {
+                    Ok(_) => {}
+                    Err(PlatformError::Busy { .. }) => busy.push(name),
+                    Err(error) => panic!("{error}"),
+                }
+            }
+            busy
+        };
+        let mem = open(&system, &windows).expect("opened");
+        assert_eq!(busy(), ["uio0", "uio1", "inside"]);
+        drop(mem);
+        let mem = DevMem::open(&system, vec![windows.memory.clone()]).expect("opened");
+        assert_eq!(busy(), ["uio1", "inside"], "the registers are left to others");
+        drop(mem);
+
+        let device = UioDevice::open_in(&system, "pgs-memory").expect("opened");
+        let error = open(&system, &windows).expect_err("its memory is in use");
+        assert!(
+            matches!(&error, PlatformError::Busy { path } if path.ends_with("uio1")),
+            "{error}"
+        );
+        drop(device);
+        assert_eq!(busy(), [""; 0], "a refusal keeps nothing");
+        fs::remove_file(system.dev.join("uio1")).expect("removed");
+        open(&system, &windows).expect("what cannot be opened is in nobody's hands");
+    }
+
+    #[test]
     fn memory_of_the_kernel_is_refused() {
         let (_root, system, windows) = memory();
         let iomem = "00000000-0000ffff : reserved\n\
@@ -221,7 +315,7 @@ mod tests {
         write(system.iomem.clone(), iomem);
         let memory = windows.memory.clone();
         let control = windows.control().expect("no overflow");
-        let mem = DevMem::open(&system, windows).expect("opened");
+        let mem = open(&system, &windows).expect("opened");
         let error = mem.memory(&memory).expect_err("overlaps");
         assert!(
             matches!(&error, PlatformError::KernelMemory { ram, .. } if ram.contains("0004ffff")),
@@ -241,7 +335,7 @@ mod tests {
     fn a_system_without_the_file_says_so() {
         let (_root, system, windows) = memory();
         fs::remove_file(system.dev.join("mem")).expect("removed");
-        let error = DevMem::open(&system, windows).expect_err("no file");
+        let error = open(&system, &windows).expect_err("no file");
         assert!(matches!(error, PlatformError::NoDevice { .. }), "{error}");
     }
 

@@ -221,6 +221,24 @@ pub enum PlatformError {
         /// Where to change it.
         path: PathBuf,
     },
+    /// A u-dma-buf does not keep the mode that was written.
+    #[error(
+        "u-dma-buf {name:?} was given sync_mode {written} for {wanted}, and says {found:?} in {}: \
+         set `sync-mode = <2>` in its device-tree node",
+        path.display()
+    )]
+    SyncModeRefused {
+        /// Name of the buffer.
+        name: String,
+        /// What was written.
+        written: u64,
+        /// What stands there.
+        found: String,
+        /// What was wanted.
+        wanted: &'static str,
+        /// Where.
+        path: PathBuf,
+    },
     /// A memory region is of no use.
     #[error("memory {region} of {bytes} bytes at {address:#x} cannot be used: {reason}")]
     UnusableMemory {
@@ -244,11 +262,46 @@ pub enum PlatformError {
         /// The UIO node that was looked for.
         node: &'static str,
     },
-    /// Another program uses the board.
-    #[error("{} is locked: another program uses the board; end it first", path.display())]
+    /// Somebody else has a device file.
+    #[error(
+        "{} is locked: another program, or another part of this one, uses it; end that first",
+        path.display()
+    )]
     Busy {
         /// The locked file.
         path: PathBuf,
+    },
+    /// A map is mapped already.
+    #[error("map {map:?} of UIO node {node:?} is mapped already: drop its window first")]
+    MappedAlready {
+        /// Name of the node.
+        node: String,
+        /// Name of the map.
+        map: String,
+    },
+    /// A property of the device tree is not what it should be.
+    #[error("expected {expected} in {}, found {found:02x?}: correct the device tree", path.display())]
+    DeviceTree {
+        /// Which property.
+        path: PathBuf,
+        /// What it should hold.
+        expected: &'static str,
+        /// Its bytes.
+        found: Vec<u8>,
+    },
+    /// Kernel and device tree disagree on the length of a region.
+    #[error(
+        "region {region}: the kernel gives it {kernel} bytes in whole pages, `reg` in the device \
+         tree {}; refusing to guess where it ends: correct its `reg`",
+        found.map_or_else(|| "nothing".to_owned(), |bytes| format!("{bytes} bytes"))
+    )]
+    RegionLength {
+        /// Name of the region.
+        region: String,
+        /// Length by the kernel, from the region's first byte to the end of its last page.
+        kernel: u64,
+        /// Length by the device tree, if it has that region.
+        found: Option<u64>,
     },
     /// `/dev/mem` was not given.
     #[error(

@@ -58,8 +58,8 @@ enum Registers {
     OneNode(UioDevice),
     /// Each region has a node of its own; absent DMAs have none.
     Nodes { control: UioDevice, dma: Vec<(usize, UioDevice)> },
-    /// Through `/dev/mem`.
-    DevMem(DevMem),
+    /// Through `/dev/mem`, at these places.
+    DevMem(DevMem, DevMemWindows),
 }
 
 /// A real board.
@@ -88,12 +88,29 @@ impl HardwarePlatform {
         registers: RegisterChoice,
         memory: &MemoryChoice,
     ) -> Result<Self, PlatformError> {
+        let window = match (memory, &registers) {
+            (MemoryChoice::DevMem { window }, _) => Some(window.clone()),
+            (MemoryChoice::Automatic, RegisterChoice::DevMem(windows)) => {
+                Some(windows.memory.clone())
+            }
+            _ => None,
+        };
         let registers = match registers {
             RegisterChoice::Uio(node) => open_uio(system, &node)?,
-            RegisterChoice::DevMem(windows) => Registers::DevMem(DevMem::open(system, windows)?),
+            RegisterChoice::DevMem(windows) => {
+                // Opened once for both: it has one user at a time.
+                let wanted = windows.registers().into_iter().chain(window.clone()).collect();
+                Registers::DevMem(DevMem::open(system, wanted)?, windows)
+            }
         };
         require_bitstream(system)?;
-        let region = open_memory(system, &registers, memory)?;
+        let region: Box<dyn Region> = match (&registers, window) {
+            (Registers::DevMem(mem, _), Some(window)) => Box::new(mem.memory(&window)?),
+            (_, Some(window)) => {
+                Box::new(DevMem::open(system, vec![window.clone()])?.memory(&window)?)
+            }
+            (_, None) => open_memory(system, memory)?,
+        };
         log::info!("memory for DMA: {} bytes at {:#x}", region.bytes(), region.address());
         Ok(Self {
             registers,
@@ -107,7 +124,7 @@ impl HardwarePlatform {
     fn interrupt(&self) -> Option<&UioDevice> {
         match &self.registers {
             Registers::OneNode(device) | Registers::Nodes { control: device, .. } => Some(device),
-            Registers::DevMem(_) => None,
+            Registers::DevMem(..) => None,
         }
         .filter(|_| !self.no_interrupt.load(Ordering::Relaxed))
     }
@@ -140,14 +157,12 @@ fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
     let nodes = uio_nodes(&system.uio)?;
     let one = nodes.iter().any(|node| node.name == name);
     if one || !has_nodes(&nodes, name) {
-        let device = UioDevice::of_node(system, node_named(&nodes, name)?)?;
+        let node = node_named(&nodes, name)?;
         // What lacks a control block is another device.
-        device.node().map(UIO_CONTROL_MAP)?;
-        device.lock()?;
-        return Ok(Registers::OneNode(device));
+        node.map(UIO_CONTROL_MAP)?;
+        return Ok(Registers::OneNode(UioDevice::of_node(system, node)?));
     }
     let control = UioDevice::of_node(system, node_named(&nodes, UIO_CONTROL_NODE)?)?;
-    control.lock()?;
     let mut dma = Vec::new();
     for (core, name) in UIO_DMA_NODES.into_iter().enumerate() {
         if let Ok(node) = node_named(&nodes, name) {
@@ -157,39 +172,21 @@ fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
     Ok(Registers::Nodes { control, dma })
 }
 
-fn open_memory(
-    system: &System,
-    registers: &Registers,
-    choice: &MemoryChoice,
-) -> Result<Box<dyn Region>, PlatformError> {
+/// Opens memory that does not come from `/dev/mem`. Whichever it is, its device file is locked as
+/// long as the region, or a piece of it, exists.
+fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>, PlatformError> {
     let u_dma_buf = |name: &str, caching| -> Result<Box<dyn Region>, PlatformError> {
         Ok(Box::new(UDmaBuf::open(system, name, caching)?))
     };
     let uio = |node: &str| -> Result<Box<dyn Region>, PlatformError> {
         Ok(Box::new(ReservedMemory::open_in(system, node)?))
     };
-    match (choice, registers) {
-        (MemoryChoice::UDmaBuf { name, caching }, _) => u_dma_buf(name, *caching),
-        (MemoryChoice::Uio { node }, _) => uio(node),
-        (MemoryChoice::DevMem { window }, _) => {
-            let windows = DevMemWindows { memory: window.clone(), ..DevMemWindows::default() };
-            Ok(Box::new(DevMem::open(system, windows)?.memory(window)?))
-        }
-        (MemoryChoice::Automatic, Registers::DevMem(mem)) => {
-            Ok(Box::new(mem.memory(&mem.windows().memory)?))
-        }
-        (MemoryChoice::Automatic, _) if UDmaBuf::exists(system, U_DMA_BUF) => {
-            u_dma_buf(U_DMA_BUF, Caching::default())
-        }
-        (MemoryChoice::Automatic, _) => {
-            if !has_nodes(&uio_nodes(&system.uio)?, UIO_MEMORY_NODE) {
-                return Err(PlatformError::NoMemory {
-                    u_dma_buf: U_DMA_BUF,
-                    node: UIO_MEMORY_NODE,
-                });
-            }
-            uio(UIO_MEMORY_NODE)
-        }
+    match choice {
+        MemoryChoice::UDmaBuf { name, caching } => u_dma_buf(name, *caching),
+        MemoryChoice::Uio { node } => uio(node),
+        _ if UDmaBuf::exists(system, U_DMA_BUF) => u_dma_buf(U_DMA_BUF, Caching::default()),
+        _ if has_nodes(&uio_nodes(&system.uio)?, UIO_MEMORY_NODE) => uio(UIO_MEMORY_NODE),
+        _ => Err(PlatformError::NoMemory { u_dma_buf: U_DMA_BUF, node: UIO_MEMORY_NODE }),
     }
 }
 
@@ -210,7 +207,7 @@ impl Platform for HardwarePlatform {
                 })?;
                 Ok(device.map(device.node().map_or_only(map)?)?.into())
             }
-            Registers::DevMem(mem) => map_registers(mem, mem.windows().dma(core)),
+            Registers::DevMem(mem, windows) => map_registers(mem, windows.dma(core)),
         }
     }
 
@@ -220,7 +217,7 @@ impl Platform for HardwarePlatform {
             Registers::Nodes { control, .. } => {
                 Ok(control.map(control.node().map_or_only(UIO_CONTROL_MAP)?)?.into())
             }
-            Registers::DevMem(mem) => map_registers(mem, mem.windows().control()),
+            Registers::DevMem(mem, windows) => map_registers(mem, windows.control()),
         }
     }
 

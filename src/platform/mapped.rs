@@ -3,37 +3,58 @@
 
 use std::fs::File;
 use std::io;
-use std::path::Path;
+use std::sync::Arc;
 
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use memmap2::{MmapOptions, MmapRaw};
 
 use super::copy::Doublewords;
+use super::lock::LockedFile;
 use super::{PlatformError, RegisterWindow};
 
 /// A region of a device file, mapped readable and writable and shared with the device.
 ///
 /// The region begins on a multiple of 16 of the address space. The only references to it are those
 /// of [`MappedBeats`](super::memory::MappedBeats).
+///
+/// Invariant, on which every access here relies: it has one owner, in whose hands no access to a
+/// word meets a store to the same word from another thread. The lock keeps other mappings of the
+/// device file away, those of this process included. The owners see to the rest: the public types
+/// ask for `&mut self` to store, the accelerator for `&mut self` to step, and the pool gives each
+/// piece of memory to one holder. The device's own accesses are not the language's concern: words
+/// and doublewords are volatile and aligned, and beats are handed over.
 #[derive(Debug)]
 pub(crate) struct Mapping {
     map: MmapRaw,
     /// Where the region begins in the mapping, a multiple of 16.
     start: usize,
     bytes: usize,
+    /// Dropped after the map: while there is one, nobody else opens the device file.
+    _lock: Arc<LockedFile>,
 }
 
 impl Mapping {
-    /// Maps `start + bytes` bytes at `file_offset` of a device file, a multiple of the page size;
-    /// the region is what follows the first `start` of them.
-    pub(crate) fn new(
-        file: &File,
-        path: &Path,
+    /// Maps `start + bytes` bytes at `file_offset` of a locked device file, a multiple of the page
+    /// size; the region is what follows the first `start` of them.
+    pub(super) fn new(
+        lock: &Arc<LockedFile>,
         file_offset: u64,
         start: usize,
         bytes: usize,
     ) -> Result<Self, PlatformError> {
-        let error = |source| PlatformError::File { act: "map", path: path.to_owned(), source };
+        Self::of_file(lock, lock.file(), file_offset, start, bytes)
+    }
+
+    /// The same through `file`, another opening of the locked file.
+    pub(super) fn of_file(
+        lock: &Arc<LockedFile>,
+        file: &File,
+        file_offset: u64,
+        start: usize,
+        bytes: usize,
+    ) -> Result<Self, PlatformError> {
+        let path = || lock.path().to_owned();
+        let error = |source| PlatformError::File { act: "map", path: path(), source };
         let invalid = || {
             let text = format!("a region of {bytes} bytes at {start} cannot be mapped");
             error(io::Error::new(io::ErrorKind::InvalidData, text))
@@ -44,7 +65,7 @@ impl Mapping {
         }
         let map =
             MmapOptions::new().offset(file_offset).len(length).map_raw(file).map_err(error)?;
-        Ok(Self { map, start, bytes })
+        Ok(Self { map, start, bytes, _lock: Arc::clone(lock) })
     }
 
     /// Length of the region.
@@ -93,7 +114,8 @@ impl Mapping {
         let word = self.word(at);
         // SAFETY: `pointer` asserted that the four bytes lie inside the region, and `new` mapped
         // `start + bytes` bytes readable; `map` is alive as long as `self`. The address is a
-        // multiple of 4: a page, plus multiples of 4.
+        // multiple of 4: a page, plus multiples of 4. No other thread stores to the word
+        // meanwhile: the invariant of one owner, kept by `_lock` and the owners.
         unsafe { word.read_volatile() }
     }
 
@@ -110,7 +132,8 @@ impl Doublewords for Mapping {
         let doubleword = self.doubleword(at);
         // SAFETY: `pointer` asserted that the eight bytes lie inside the region, and `new` mapped
         // `start + bytes` bytes readable; `map` is alive as long as `self`. The address is a
-        // multiple of 8: a page, plus `start`, a multiple of 16, plus `at`, a multiple of 8.
+        // multiple of 8: a page, plus `start`, a multiple of 16, plus `at`, a multiple of 8. No
+        // other thread stores to them meanwhile: the invariant of one owner.
         unsafe { doubleword.read_volatile() }
     }
 
@@ -152,6 +175,15 @@ mod tests {
         file
     }
 
+    fn map(
+        file: &tempfile::NamedTempFile,
+        start: usize,
+        bytes: usize,
+    ) -> Result<Mapping, PlatformError> {
+        let lock = Arc::new(LockedFile::open(file.path(), 0).expect("nobody else has it"));
+        Mapping::new(&lock, 0, start, bytes)
+    }
+
     fn content(file: &mut tempfile::NamedTempFile) -> Vec<u8> {
         let mut bytes = Vec::new();
         file.rewind().expect("rewound");
@@ -163,7 +195,7 @@ mod tests {
     fn registers_are_the_little_endian_words_of_the_mapping() {
         let page = page();
         let mut file = file_of(&page);
-        let window = Mapping::new(file.as_file(), file.path(), 0, 0x100, 0x40).expect("mapped");
+        let window = map(&file, 0x100, 0x40).expect("mapped");
         assert_eq!(RegisterWindow::bytes(&window), 0x40);
         let word = |at: usize| u32::from_le_bytes(page[at..at + 4].try_into().expect("four bytes"));
         assert_eq!(window.read32(0), word(0x100));
@@ -178,7 +210,7 @@ mod tests {
     fn beats_lie_in_the_mapping_as_in_the_interface() {
         let page = page();
         let mut file = file_of(&page);
-        let memory = Mapping::new(file.as_file(), file.path(), 0, 0x10, 0x100).expect("mapped");
+        let memory = map(&file, 0x10, 0x100).expect("mapped");
         let beats = [Beat([1, 2, 3, 4]), Beat([5, 6, 7, 8])];
         store_beats(&memory, 0x20, &beats);
         let mut back = [Beat::default(); 2];
@@ -194,17 +226,25 @@ mod tests {
     fn what_cannot_be_a_region_is_an_error_that_names_the_file() {
         let file = file_of(&page());
         for (start, bytes) in [(2, 16), (8, 16), (0, 0), (usize::MAX - 15, 4096)] {
-            let error = Mapping::new(file.as_file(), file.path(), 0, start, bytes)
-                .expect_err("not a region")
-                .to_string();
+            let error = map(&file, start, bytes).expect_err("not a region").to_string();
             assert!(error.contains(&file.path().display().to_string()), "{error}");
         }
+    }
+
+    #[test]
+    fn the_file_is_locked_as_long_as_it_is_mapped() {
+        let file = file_of(&page());
+        let mapping = map(&file, 0, 0x40).expect("mapped");
+        let error = LockedFile::open(file.path(), 0).expect_err("mapped");
+        assert!(matches!(error, PlatformError::Busy { .. }), "{error}");
+        drop(mapping);
+        LockedFile::open(file.path(), 0).expect("free");
     }
 
     #[test]
     #[should_panic(expected = "callers check")]
     fn the_word_after_the_region_is_a_broken_invariant() {
         let file = file_of(&page());
-        Mapping::new(file.as_file(), file.path(), 0, 0, 0x40).expect("mapped").load_word(0x40);
+        map(&file, 0, 0x40).expect("mapped").load_word(0x40);
     }
 }

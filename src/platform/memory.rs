@@ -51,8 +51,9 @@ impl MappedBeats {
     ///
     /// # Safety
     /// The mapping is of normal memory (cached or write-combining). While the value lives, no other
-    /// one is made of a range that overlaps, and whenever one of its slices exists the device does
-    /// not write the range.
+    /// one is made of a range that overlaps: not of this mapping, and, by the lock that the mapping
+    /// holds, not of another one of the same device file. Whenever one of its slices exists the
+    /// device does not write the range.
     pub(super) unsafe fn new(mapping: Arc<Mapping>, at: usize, beats: usize) -> Self {
         mapping.check_beats(at, beats);
         Self { mapping, at, beats }
@@ -63,7 +64,8 @@ impl MappedBeats {
         // SAFETY: `new` checked that `beats` beats from `at` lie inside the mapping, which is
         // readable and alive as long as `self`; `beat` is aligned to 16 bytes; every bit pattern is
         // a beat. Nobody writes them meanwhile: not the CPU, as `new`'s caller promised that no
-        // other range overlaps and `&self` keeps `beats_mut` out; not the device, as promised too.
+        // other range overlaps, the device file's lock keeps other mappings away, and `&self` keeps
+        // `beats_mut` out; not the device, as promised too.
         unsafe { std::slice::from_raw_parts(first, self.beats) }
     }
 

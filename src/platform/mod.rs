@@ -9,11 +9,11 @@
 //! use zynq_pgs::platform::{ReservedMemory, UioDevice};
 //!
 //! # fn main() -> Result<(), zynq_pgs::PlatformError> {
-//! let memory = ReservedMemory::open("my-memory")?;
+//! let mut memory = ReservedMemory::open("my-memory")?;
 //! memory.write(0, &[Beat([1, 2, 3, 4])])?;
 //!
 //! let device = UioDevice::open("my-engine")?;
-//! let registers = device.window("control")?;
+//! let mut registers = device.window("control")?;
 //! device.unmask()?;
 //! // The engine's own registers: where to read, and go. Addresses have two halves.
 //! registers.write32(0x10, memory.address() as u32)?;
@@ -34,21 +34,25 @@
 mod buffer;
 mod copy;
 mod dev_mem;
+mod device_tree;
 #[cfg(feature = "emulation")]
 mod emulated;
 mod error;
 mod fence;
 mod fpga;
 mod hardware;
+mod lock;
 mod mapped;
 mod memory;
 mod pool;
 mod reserved;
+mod sync_mode;
 mod sysfs;
 mod system;
 mod u_dma_buf;
 mod uio;
 mod uio_device;
+mod uio_window;
 mod wait;
 mod window;
 
@@ -69,7 +73,8 @@ pub use reserved::ReservedMemory;
 pub use system::{System, UIO_CLASS};
 pub use u_dma_buf::{Caching, u_dma_buf_names};
 pub use uio::{UioMap, UioNode, uio_nodes};
-pub use uio_device::{UioDevice, UioWindow};
+pub use uio_device::UioDevice;
+pub use uio_window::UioWindow;
 pub(crate) use wait::{Deadline, poll_until};
 pub(crate) use window::{AccessCounts, RegisterMap, RegisterWindow, Window, fields};
 #[cfg(test)]

@@ -209,14 +209,11 @@ fn lines(range: Range<u64>) -> Option<Range<u64>> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use bitstream_model::interface::record::Beat;
     use proptest::prelude::*;
 
     use super::*;
-    use crate::platform::ReservedMemory;
-    use crate::platform::reserved::fake::reserved;
+    use crate::platform::reserved::fake::{as_the_device, reserved};
 
     const KIB: u64 = 1024;
 
@@ -255,7 +252,7 @@ mod tests {
     #[test]
     fn the_device_reads_what_the_cpu_wrote_and_the_cpu_what_the_device_wrote() {
         let (_root, memory) = reserved(0x6000_0000, 4 * KIB);
-        let physical = memory.clone();
+        let mut physical = as_the_device(&memory);
         let pool = Pool::new(Box::new(memory));
         pool.allocate(4).expect("so that the next does not lie at the start");
         let (address, mut memory) = pool.allocate(3).expect("there is room");
@@ -276,7 +273,7 @@ mod tests {
     #[test]
     fn shared_words_are_the_words_of_the_region() {
         let (_root, memory) = reserved(0x6000_0000, KIB);
-        let physical = memory.clone();
+        let mut physical = as_the_device(&memory);
         let pool = Pool::new(Box::new(memory));
         let (address, words) = pool.allocate_shared(16).expect("there is room");
         words.store(5, 0x1234);
@@ -320,9 +317,7 @@ mod tests {
         fn pieces_never_overlap_and_all_of_it_comes_back(
             acts in prop::collection::vec((any::<bool>(), 0_usize..40), 1..60),
         ) {
-            let (_root, memory) = reserved(0x6000_0000, 4 * KIB);
-            let memory: Arc<ReservedMemory> = Arc::new(memory);
-            let pool = Pool::new(Box::new(ReservedMemory::clone(&memory)));
+            let (_root, pool) = pool(0x6000_0000, 4 * KIB);
             let mut held: Vec<(u64, usize)> = Vec::new();
             for (give, number) in acts {
                 if give {

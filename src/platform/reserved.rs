@@ -16,7 +16,10 @@ use super::{
 };
 
 /// A contiguous piece of physical memory for DMA, mapped as Device memory.
-#[derive(Debug, Clone)]
+///
+/// As long as it exists nobody else opens its device file, and a store takes it alone: no two
+/// threads meet at a beat.
+#[derive(Debug)]
 pub struct ReservedMemory {
     mapping: Arc<Mapping>,
     address: u64,
@@ -28,7 +31,8 @@ impl ReservedMemory {
     /// one that it has.
     ///
     /// # Errors
-    /// As [`UioDevice::open`], and [`PlatformError::Misaligned`] for memory between beats.
+    /// As [`UioDevice::open`], [`PlatformError::Misaligned`] for memory between beats, and
+    /// [`PlatformError::RegionLength`] if it is not known where the memory ends.
     pub fn open(name: &str) -> Result<Self, PlatformError> {
         Self::open_in(&System::default(), name)
     }
@@ -69,7 +73,12 @@ impl ReservedMemory {
     ///
     /// # Errors
     /// [`PlatformError::OutOfRegion`] if they do not lie in the memory, or between its beats.
-    pub fn write(&self, at: u64, beats: &[Beat]) -> Result<(), PlatformError> {
+    pub fn write(&mut self, at: u64, beats: &[Beat]) -> Result<(), PlatformError> {
+        self.store(at, beats)
+    }
+
+    /// For a holder of these beats alone.
+    fn store(&self, at: u64, beats: &[Beat]) -> Result<(), PlatformError> {
         let at = self.checked(at, beats.len())?;
         store_beats(&*self.mapping, at, beats);
         release_to_device();
@@ -104,7 +113,8 @@ impl ReservedMemory {
 }
 
 /// The CPU works on the heap; what changes hands is copied. Shared words take aligned 32-bit
-/// accesses, which Device memory does too.
+/// accesses, which Device memory does too. The pool gives each piece to one holder: no two threads
+/// meet at a beat here either.
 impl Region for ReservedMemory {
     fn address(&self) -> u64 {
         self.address
@@ -130,7 +140,7 @@ impl Region for ReservedMemory {
         access: Access,
     ) -> Result<(), PlatformError> {
         match access {
-            Access::Read => self.write(at as u64, &memory.beats()[..used]),
+            Access::Read => self.store(at as u64, &memory.beats()[..used]),
             Access::Write => Ok(()),
         }
     }
@@ -156,6 +166,12 @@ pub(crate) mod fake {
     use super::*;
     use crate::platform::uio_fake::add_node;
 
+    /// The same memory once more, as the device has it.
+    pub(crate) fn as_the_device(memory: &ReservedMemory) -> ReservedMemory {
+        let ReservedMemory { mapping, address, name } = memory;
+        ReservedMemory { mapping: Arc::clone(mapping), address: *address, name: name.clone() }
+    }
+
     /// Memory of `bytes` bytes at `address`; it lasts as long as the folder.
     pub(crate) fn reserved(address: u64, bytes: u64) -> (tempfile::TempDir, ReservedMemory) {
         let root = tempfile::tempdir().expect("a directory");
@@ -171,7 +187,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::platform::uio_fake::add_node;
+    use crate::platform::uio_fake::{add_node, add_reg};
 
     fn memory() -> (tempfile::TempDir, System) {
         let root = tempfile::tempdir().expect("a directory");
@@ -184,7 +200,7 @@ mod tests {
     #[test]
     fn beats_lie_in_physical_memory_where_the_address_says() {
         let (_root, system) = memory();
-        let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        let mut memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
         assert_eq!((memory.address(), memory.bytes()), (0x6000_0000, 0x2000));
         let beats = [Beat([1, 2, 3, 4]), Beat([5, 6, 7, 8])];
         memory.write(0x1FE0, &beats).expect("inside");
@@ -199,7 +215,7 @@ mod tests {
     #[test]
     fn what_lies_outside_or_between_beats_is_refused_and_not_touched() {
         let (_root, system) = memory();
-        let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        let mut memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
         let mut beats = [Beat([9; 4]); 2];
         for at in [8, 0x1FF0, 0x2000, u64::MAX - 15] {
             let error = memory.write(at, &beats).expect_err("refused");
@@ -208,6 +224,42 @@ mod tests {
         }
         let file = fs::read(system.dev.join("uio1")).expect("read");
         assert!(file.iter().all(|byte| *byte == 0));
+    }
+
+    #[test]
+    fn memory_has_one_user_also_after_its_node_was_closed() {
+        let (_root, system) = memory();
+        let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        let error = ReservedMemory::open_in(&system, "pgs-memory").expect_err("in use");
+        assert!(
+            matches!(&error, PlatformError::Busy { path } if path.ends_with("uio1")),
+            "{error}"
+        );
+        ReservedMemory::open_in(&system, "other").expect("another one");
+        // What the pool gave out keeps it, too.
+        let words = memory.shared(0, 4).expect("inside");
+        drop(memory);
+        ReservedMemory::open_in(&system, "pgs-memory").expect_err("a ring is left");
+        drop(words);
+        ReservedMemory::open_in(&system, "pgs-memory").expect("nobody has it");
+    }
+
+    #[test]
+    fn a_reservation_that_is_no_whole_pages_is_not_overrun() {
+        let (_root, system) = memory();
+        add_reg(&system, 1, &[(0x6000_0000, 0x1050)]);
+        let mut memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
+        assert_eq!(memory.bytes(), 0x1050);
+        memory.write(0x1040, &[Beat([1; 4])]).expect("the last beat");
+        memory.write(0x1050, &[Beat([1; 4])]).expect_err("behind the reservation");
+        drop(memory);
+        add_reg(&system, 1, &[(0x6000_0000, 0x1000), (0x6000_1000, 0x1000)]);
+        let error = ReservedMemory::open_in(&system, "pgs-memory").expect_err("which end?");
+        let (kernel, found) = (0x2000, Some(0x1000));
+        assert!(
+            matches!(error, PlatformError::RegionLength { kernel: k, found: f, .. } if (k, f) == (kernel, found)),
+            "{error}"
+        );
     }
 
     #[test]

@@ -62,6 +62,17 @@ pub(super) fn obstacle(path: &Path, source: io::Error) -> PlatformError {
     }
 }
 
+/// The system's page size; `path` is what it is wanted for.
+pub(super) fn page_bytes(path: &Path) -> Result<u64, PlatformError> {
+    let bytes = nix::unistd::sysconf(nix::unistd::SysconfVar::PAGE_SIZE);
+    let source = match bytes {
+        Ok(Some(bytes)) if bytes > 0 => return Ok(bytes.unsigned_abs()),
+        Ok(_) => io::Error::new(io::ErrorKind::Unsupported, "the system gives no page size"),
+        Err(errno) => errno.into(),
+    };
+    Err(PlatformError::File { act: "find the page size for", path: path.to_owned(), source })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,6 @@
 //! This file takes memory for DMA from the kernel module u-dma-buf.
 //!
-//! The device file is mapped twice. Buffers: cached, with maintenance by range when they change
+//! The device file is locked, and mapped twice. Buffers: cached, with maintenance by range when they change
 //! hands, or write-combining. Shared words: with `O_SYNC`, which the module maps uncached.
 //!
 //! Maintenance is one write of a number to `sync_for_device` or `sync_for_cpu`:
@@ -24,9 +24,11 @@ use std::sync::Arc;
 
 use bitstream_model::interface::record::BEAT_BYTES;
 
+use super::lock::LockedFile;
 use super::mapped::Mapping;
 use super::memory::MappedBeats;
 use super::pool::Region;
+use super::sync_mode::set_mode;
 use super::sysfs::{read_if_present, read_number};
 use super::system::open_device;
 use super::{Access, DmaMemory, PlatformError, SharedMemory, System};
@@ -42,14 +44,6 @@ pub enum Caching {
     WriteCombining,
 }
 
-/// Bits 1:0 of `sync_mode`: cached even with `O_SYNC`.
-const MODE_CACHED: u64 = 0;
-/// Uncached with `O_SYNC`: Device memory on arm64.
-const MODE_UNCACHED: u64 = 1;
-/// Write-combining with `O_SYNC`.
-const MODE_WRITE_COMBINING: u64 = 2;
-/// Bit of `sync_mode`: the mode holds without `O_SYNC` too.
-const MODE_ALWAYS: u64 = 4;
 /// The number carries 32 bits of length, in multiples of 16.
 const BYTES_MAX: u64 = 0xFFFF_FFF0;
 /// Maintenance is of whole cache lines; the pool's pieces are too.
@@ -152,51 +146,23 @@ impl UDmaBuf {
         let length = usize::try_from(bytes).map_err(|_| unusable("make it smaller"))?;
         let coherent =
             read_if_present(&buffer.join("dma_coherent"))?.is_some_and(|text| text == "1");
+        // The lock comes first: the mode is for all who map the buffer.
+        let path = system.dev.join(name);
+        let lock = Arc::new(LockedFile::open(&path, nix::libc::O_SYNC)?);
         set_mode(name, &buffer, caching, coherent)?;
 
-        let path = system.dev.join(name);
-        let map = |flags| {
-            let file = open_device(&path, flags)?;
-            Mapping::new(&file, &path, 0, 0, length).map(Arc::new)
+        let words = Mapping::new(&lock, 0, 0, length).map(Arc::new)?;
+        let cached = || {
+            let file = open_device(&path, 0)?;
+            Mapping::of_file(&lock, &file, 0, 0, length).map(Arc::new)
         };
-        let words = map(nix::libc::O_SYNC)?;
         let (data, sync) = match caching {
             Caching::WriteCombining => (Arc::clone(&words), None),
-            Caching::Cached if coherent => (map(0)?, None),
-            Caching::Cached => (map(0)?, Some(Sync::open(&buffer)?)),
+            Caching::Cached if coherent => (cached()?, None),
+            Caching::Cached => (cached()?, Some(Sync::open(&buffer)?)),
         };
         Ok(Self { address, bytes, data, words, sync })
     }
-}
-
-/// Sees to a mode in which the two ways to open give the two mappings that are wanted.
-fn set_mode(
-    name: &str,
-    buffer: &Path,
-    caching: Caching,
-    coherent: bool,
-) -> Result<(), PlatformError> {
-    let path = buffer.join("sync_mode");
-    let found = read_number(&path)?;
-    let (suits, wanted) = match caching {
-        // O_SYNC must not be cached; no O_SYNC must be.
-        Caching::Cached => (
-            (found & MODE_ALWAYS == 0 && (found != MODE_CACHED || coherent))
-                || (coherent && found == MODE_ALWAYS | MODE_CACHED),
-            "cached buffers beside uncached descriptors",
-        ),
-        Caching::WriteCombining => (
-            !matches!(found & !MODE_ALWAYS, MODE_CACHED | MODE_UNCACHED),
-            "write-combining buffers",
-        ),
-    };
-    if suits {
-        return Ok(());
-    }
-    let refused =
-        |_| PlatformError::SyncMode { name: name.to_owned(), found, wanted, path: path.clone() };
-    log::info!("u-dma-buf {name:?}: changing sync_mode from {found} to {MODE_WRITE_COMBINING}");
-    fs::write(&path, format!("{MODE_WRITE_COMBINING}\n")).map_err(refused)
 }
 
 /// The names of the u-dma-buf buffers that there are.
@@ -223,10 +189,12 @@ impl Region for UDmaBuf {
 
     fn memory(&self, at: usize, beats: usize) -> Result<DmaMemory, PlatformError> {
         let mapping = Arc::clone(&self.data);
-        // SAFETY: `set_mode` saw to a mapping that is normal memory. The pool gives each piece out
-        // once until it is released, after its memory was dropped, and pieces do not overlap; the
-        // shared words are pieces too. The device writes a piece only between `to_device` and
-        // `to_cpu`, when the pool holds the value and nobody has a slice of it.
+        // SAFETY: `set_mode` saw to a mapping that is normal memory. The device file is locked as
+        // long as the mapping exists (`LockedFile`, held by both mappings): no other pool, of this
+        // program or another, has this buffer. This one gives each piece out once until it is
+        // released, after its memory was dropped, and pieces do not overlap; the shared words are
+        // pieces too. The device writes a piece only between `to_device` and `to_cpu`, when the
+        // pool holds the value and nobody has a slice of it.
         let memory = unsafe { MappedBeats::new(mapping, at, beats) };
         Ok(DmaMemory::Mapped(memory))
     }
@@ -359,20 +327,21 @@ mod tests {
     }
 
     #[test]
-    fn a_mode_that_does_not_suit_is_changed() {
-        for (mode, caching) in [
-            ("0", Caching::Cached),
-            ("4", Caching::Cached),
-            ("5", Caching::Cached),
-            ("6", Caching::Cached),
-            ("0", Caching::WriteCombining),
-            ("1", Caching::WriteCombining),
-            ("5", Caching::WriteCombining),
-        ] {
-            let (_root, system) = system(mode, "0");
-            UDmaBuf::open(&system, "pgs", caching).expect("changed");
-            assert_eq!(text_of(&system, "sync_mode"), "2", "{mode}");
-        }
+    fn a_buffer_has_one_user_and_is_left_alone_while_it_has() {
+        let (_root, system) = system("2", "0");
+        let open = || UDmaBuf::open(&system, "pgs", Caching::Cached);
+        let buffer = open().expect("mapped");
+        // A second user must not change what the first relies on.
+        write(system.u_dma_buf.join("pgs/sync_mode"), "0");
+        let error = open().expect_err("in use");
+        assert!(matches!(&error, PlatformError::Busy { path } if path.ends_with("pgs")), "{error}");
+        assert_eq!(text_of(&system, "sync_mode"), "0");
+        // A piece of it keeps it, too.
+        let piece = buffer.memory(0, 4).expect("inside");
+        drop(buffer);
+        open().expect_err("a piece is left");
+        drop(piece);
+        open().expect("nobody has it");
     }
 
     #[test]

@@ -149,6 +149,20 @@ pub(crate) mod fake {
         let length = ((maps.len() as u64) << 16) + last;
         fs::File::create(device).and_then(|file| file.set_len(length)).expect("resized");
     }
+
+    /// Gives the node `uio<number>` these addresses and lengths in the device tree, in two cells
+    /// each.
+    pub(crate) fn add_reg(system: &System, number: u32, regions: &[(u64, u64)]) {
+        let device = system.uio.join(format!("uio{number}/device"));
+        let node = device.join("of_node");
+        fs::create_dir_all(&node).expect("made");
+        for cells in ["#address-cells", "#size-cells"] {
+            fs::write(device.join(cells), 2_u32.to_be_bytes()).expect("written");
+        }
+        let numbers = regions.iter().flat_map(|(address, bytes)| [address, bytes]);
+        let reg: Vec<u8> = numbers.flat_map(|number| number.to_be_bytes()).collect();
+        fs::write(node.join("reg"), reg).expect("written");
+    }
 }
 
 #[cfg(test)]

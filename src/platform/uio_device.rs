@@ -1,4 +1,4 @@
-//! This file opens a UIO node: maps its regions and waits for its interrupt.
+//! This file opens a UIO node, for one user alone, and waits for its interrupt.
 //!
 //! The kernel's handler masks the interrupt and counts it; reading four bytes gives the count since
 //! the device was registered, writing a 1 lets the next one through. A count that jumps is no
@@ -6,19 +6,20 @@
 //!
 //! Source: Linux `Documentation/driver-api/uio-howto.rst`, `drivers/uio/uio_pdrv_genirq.c`.
 
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::io::{self, Read as _, Write as _};
 use std::os::fd::AsFd as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
-use super::mapped::Mapping;
-use super::system::open_device;
+use super::lock::LockedFile;
 use super::uio::node_named;
-use super::{PlatformError, RegisterWindow, System, UioMap, UioNode, uio_nodes};
+use super::uio_window::Claims;
+use super::{PlatformError, System, UioMap, UioNode, UioWindow, uio_nodes};
 
 /// An open UIO node.
 ///
@@ -28,20 +29,24 @@ use super::{PlatformError, RegisterWindow, System, UioMap, UioNode, uio_nodes};
 #[derive(Debug)]
 pub struct UioDevice {
     node: UioNode,
-    path: PathBuf,
-    file: File,
+    /// The node's folder in the device tree, if it comes from one.
+    tree: PathBuf,
+    file: Arc<LockedFile>,
+    claims: Claims,
 }
 
 impl UioDevice {
-    /// Opens the node of that name (`linux,uio-name`) on this system, and drops an interrupt that
-    /// came before. No register is touched.
+    /// Opens the node of that name (`linux,uio-name`) on this system. No register is touched.
+    ///
+    /// It is locked (`flock`) until this and all that it mapped is dropped: who opens it meanwhile
+    /// by this library, in this program or another, is refused.
     ///
     /// A node whose registers lie in the programmable logic must be opened only once that is
     /// programmed: see [`require_bitstream`](super::require_bitstream).
     ///
     /// # Errors
-    /// No such node, no device file, no right to open it, no right to list the nodes: each its own
-    /// variant of [`PlatformError`].
+    /// No such node, no device file, no right to open it, no right to list the nodes, somebody else
+    /// has it ([`PlatformError::Busy`]): each its own variant of [`PlatformError`].
     pub fn open(name: &str) -> Result<Self, PlatformError> {
         Self::open_in(&System::default(), name)
     }
@@ -56,22 +61,10 @@ impl UioDevice {
 
     /// Opens a node that was found.
     pub(crate) fn of_node(system: &System, node: UioNode) -> Result<Self, PlatformError> {
-        let path = system.dev.join(&node.device);
         // Without O_NONBLOCK a wake-up that somebody else took would block for ever.
-        let file = open_device(&path, nix::libc::O_NONBLOCK)?;
-        Ok(Self { node, path, file })
-    }
-
-    /// Keeps other programs that ask for it from using the device; until this is dropped.
-    ///
-    /// # Errors
-    /// [`PlatformError::Busy`] if another one does.
-    pub fn lock(&self) -> Result<(), PlatformError> {
-        match self.file.try_lock() {
-            Ok(()) => Ok(()),
-            Err(TryLockError::WouldBlock) => Err(PlatformError::Busy { path: self.path.clone() }),
-            Err(TryLockError::Error(source)) => Err(self.error("lock", source)),
-        }
+        let file = LockedFile::open(&system.dev.join(&node.device), nix::libc::O_NONBLOCK)?;
+        let tree = system.uio.join(&node.device).join("device/of_node");
+        Ok(Self { node, tree, file: Arc::new(file), claims: Claims::default() })
     }
 
     /// What the kernel says of it.
@@ -83,29 +76,16 @@ impl UioDevice {
     /// Maps the registers of that name.
     ///
     /// # Errors
-    /// [`PlatformError::NoMap`], which lists the names that there are; or the kernel refuses.
+    /// [`PlatformError::NoMap`], which lists the names that there are;
+    /// [`PlatformError::MappedAlready`] while there is another window of the map; or the kernel
+    /// refuses.
     pub fn window(&self, map: &str) -> Result<UioWindow, PlatformError> {
         self.map(self.node.map(map)?)
     }
 
     /// Maps a region.
     pub(crate) fn map(&self, map: &UioMap) -> Result<UioWindow, PlatformError> {
-        let name = format!("{:?} of {}", map.name, self.node.device);
-        let empty = || PlatformError::ShortRegion { region: name.clone(), expected: 4, found: 0 };
-        // The kernel's length counts from the start of the page.
-        let bytes = map.bytes.checked_sub(map.offset).filter(|bytes| *bytes >= 4);
-        let bytes = bytes.ok_or_else(empty)?;
-        let large = |_| PlatformError::TooLarge { region: name.clone(), bytes };
-        let mapping = Mapping::new(
-            &self.file,
-            &self.path,
-            u64::from(map.index) * page_bytes(&self.path)?,
-            usize::try_from(map.offset).map_err(large)?,
-            usize::try_from(bytes).map_err(large)?,
-        )?;
-        let address = map.address.checked_add(map.offset);
-        let address = address.ok_or(PlatformError::TooLarge { region: name.clone(), bytes })?;
-        Ok(UioWindow { mapping, name, address })
+        UioWindow::new(&self.file, &self.node, map, &self.tree, &self.claims)
     }
 
     /// Waits until the interrupt comes: its count since the device was registered. `None` if
@@ -117,10 +97,10 @@ impl UioDevice {
         let started = Instant::now();
         loop {
             let remaining = timeout.saturating_sub(started.elapsed());
-            let readable = wait_readable(&self.file, remaining)
+            let readable = wait_readable(self.file.file(), remaining)
                 .map_err(|errno| self.error("wait for", errno.into()))?;
             let mut count = [0; 4];
-            match (&self.file).read(&mut count) {
+            match self.file.file().read(&mut count) {
                 Ok(4) => return Ok(Some(u32::from_ne_bytes(count))),
                 Ok(found) => {
                     let text = format!("expected 4 bytes, found {found}");
@@ -160,7 +140,7 @@ impl UioDevice {
     }
 
     fn control(&self, enable: u32) -> Result<(), PlatformError> {
-        match (&self.file).write(&enable.to_ne_bytes()) {
+        match self.file.file().write(&enable.to_ne_bytes()) {
             Ok(4) => Ok(()),
             Ok(written) => {
                 let text = format!("expected to write 4 bytes, wrote {written}");
@@ -177,7 +157,7 @@ impl UioDevice {
                 node: self.node.name.clone(),
                 device: self.node.device.clone(),
             },
-            _ => PlatformError::File { act, path: self.path.clone(), source },
+            _ => PlatformError::File { act, path: self.file.path().to_owned(), source },
         }
     }
 }
@@ -200,85 +180,6 @@ fn wait_readable(file: &File, timeout: Duration) -> Result<bool, Errno> {
     }
 }
 
-/// A mapped region of registers.
-///
-/// Each access is one aligned 32-bit load or store, in program order with the others of the region.
-#[derive(Debug)]
-pub struct UioWindow {
-    mapping: Mapping,
-    name: String,
-    address: u64,
-}
-
-impl UioWindow {
-    /// Physical address of the region.
-    #[must_use]
-    pub fn address(&self) -> u64 {
-        self.address
-    }
-
-    /// Length of the region, bytes. The kernel counts in whole pages.
-    #[must_use]
-    pub fn bytes(&self) -> u64 {
-        self.mapping.bytes() as u64
-    }
-
-    /// Reads the register at byte `at`.
-    ///
-    /// # Errors
-    /// [`PlatformError::OutOfRegion`] if `at` is not a multiple of 4 inside the region.
-    pub fn read32(&self, at: u32) -> Result<u32, PlatformError> {
-        Ok(self.mapping.load_word(self.checked(at)?))
-    }
-
-    /// Writes the register at byte `at`.
-    ///
-    /// Memory that was written before is visible to the device before the register is.
-    ///
-    /// # Errors
-    /// [`PlatformError::OutOfRegion`] if `at` is not a multiple of 4 inside the region.
-    pub fn write32(&self, at: u32, value: u32) -> Result<(), PlatformError> {
-        let at = self.checked(at)?;
-        super::release_to_device();
-        self.mapping.store_word(at, value);
-        Ok(())
-    }
-
-    fn checked(&self, at: u32) -> Result<usize, PlatformError> {
-        if at.is_multiple_of(4) && u64::from(at) + 4 <= self.bytes() {
-            return Ok(at as usize);
-        }
-        Err(PlatformError::OutOfRegion {
-            region: self.name.clone(),
-            at: u64::from(at),
-            bytes: 4,
-            region_bytes: self.bytes(),
-        })
-    }
-
-    /// The mapping, for callers that check on their own.
-    pub(crate) fn into_mapping(self) -> Mapping {
-        self.mapping
-    }
-}
-
-impl From<UioWindow> for Box<dyn RegisterWindow> {
-    fn from(window: UioWindow) -> Self {
-        Box::new(window.mapping)
-    }
-}
-
-/// The system's page size; `path` is what it is wanted for.
-pub(super) fn page_bytes(path: &Path) -> Result<u64, PlatformError> {
-    let bytes = nix::unistd::sysconf(nix::unistd::SysconfVar::PAGE_SIZE);
-    let source = match bytes {
-        Ok(Some(bytes)) if bytes > 0 => return Ok(bytes.unsigned_abs()),
-        Ok(_) => io::Error::new(io::ErrorKind::Unsupported, "the system gives no page size"),
-        Err(errno) => errno.into(),
-    };
-    Err(PlatformError::File { act: "find the page size for", path: path.to_owned(), source })
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -297,7 +198,8 @@ mod tests {
         ours.set_nonblocking(true).expect("set");
         let node = UioNode { device: "uio0".to_owned(), name: "pgs".to_owned(), maps: Vec::new() };
         let file = File::from(OwnedFd::from(ours));
-        (UioDevice { node, path: "/dev/uio0".into(), file }, kernel)
+        let file = Arc::new(LockedFile::of_file(file, "/dev/uio0".as_ref()).expect("locked"));
+        (UioDevice { node, tree: PathBuf::new(), file, claims: Claims::default() }, kernel)
     }
 
     #[test]
@@ -368,43 +270,6 @@ mod tests {
         let system = System::under(root.path());
         add_node(&system, 3, "pgs", &regions());
         (root, system)
-    }
-
-    #[test]
-    fn a_window_is_the_map_at_its_number_of_pages() {
-        let (_root, system) = system();
-        let page = usize::try_from(page_bytes(&system.dev).expect("a size")).expect("fits");
-        let path = system.dev.join("uio3");
-        let mut file = fs::read(&path).expect("read");
-        file[4 * page..4 * page + 4].copy_from_slice(&[0x31, 0x53, 0x47, 0x50]);
-        fs::write(&path, &file).expect("written");
-        let device = UioDevice::open_in(&system, "pgs").expect("opened");
-        let control = device.window("control").expect("mapped");
-        assert_eq!((control.address(), control.bytes()), (0xA004_0000, 0x1000));
-        assert_eq!(control.read32(0).expect("inside"), 0x5047_5331);
-        control.write32(0xFFC, 0x0403_0201).expect("inside");
-        let after = fs::read(&path).expect("read");
-        assert_eq!(after[4 * page + 0xFFC..4 * page + 0x1000], [1, 2, 3, 4]);
-        for at in [2, 0x1000, 0xFFE, u32::MAX - 3] {
-            control.read32(at).expect_err("outside, or not aligned");
-            let error = control.write32(at, 0).expect_err("outside, or not aligned").to_string();
-            assert!(error.contains("\"control\" of uio3"), "{error}");
-        }
-    }
-
-    #[test]
-    fn a_region_that_begins_inside_its_page_ends_with_the_pages() {
-        let (_root, system) = system();
-        let map = system.uio.join("uio3/maps/map0");
-        fs::write(map.join("offset"), "0x40\n").expect("written");
-        let device = UioDevice::open_in(&system, "pgs").expect("opened");
-        let window = device.window("dma0").expect("mapped");
-        assert_eq!((window.address(), window.bytes()), (0xA000_0040, 0xFFC0));
-        window.write32(0, 7).expect("inside");
-        assert_eq!(fs::read(system.dev.join("uio3")).expect("read")[0x40], 7);
-        fs::write(map.join("size"), "0x40\n").expect("written");
-        let empty = UioDevice::open_in(&system, "pgs").expect("opened").window("dma0");
-        assert!(matches!(empty, Err(PlatformError::ShortRegion { .. })));
     }
 
     #[test]

@@ -1,15 +1,24 @@
-//! This file makes the record of a collision.
+//! This file makes the record of a collision in world coordinates.
 
 use super::vec3_and_word;
 use crate::interface::record::{Beat, CONTACT_POINTS, collision};
 use crate::scene::Collision;
+
+/// Rows whose word is an unsigned integer: count and indices.
+pub(crate) const INTEGERS: [bool; collision::ROWS] = {
+    let mut integers = [false; collision::ROWS];
+    integers[collision::NORMAL] = true;
+    integers[collision::BODY_A] = true;
+    integers[collision::BODY_B] = true;
+    integers
+};
 
 /// The collision record: normal and count, positions and indices of both bodies, contact points.
 ///
 /// Contact points from `count` on are zeros, whatever the caller left there: they may hold anything
 /// (NaN too), and what is sent must not depend on it.
 ///
-/// Shape: 7 beats. Units: metres, world frame; distance negative = penetrating.
+/// Shape: 7 rows. Units: metres, world frame; distance negative = penetrating.
 ///
 /// Source: interface specification, record table.
 #[inline]

@@ -1,11 +1,17 @@
-//! This folder turns a caller's values into the beats of a record, and a result record back.
+//! This folder turns a caller's values into the rows of a record, and a result record back.
 //!
-//! One file a record kind. The layout is that of [`interface::record`](crate::interface::record);
-//! which channel a beat travels on is decided elsewhere (`beat`).
+//! One file a record kind makes rows of 32-bit words, each of which is a beat of an f32 stream;
+//! `sixteen` narrows rows for the streams of sixteen bits and widens what comes back. The layout is
+//! that of [`interface::record`](crate::interface::record); which channel a beat travels on is
+//! decided elsewhere (`beat`).
 
 pub(crate) mod collision;
+pub(crate) mod inertia;
 pub(crate) mod pose;
+pub(crate) mod relative;
 pub(crate) mod result;
+pub(crate) mod sixteen;
+mod thesis16;
 pub(crate) mod velocity;
 
 use crate::interface::record::{Beat, WORD_LANE};

@@ -4,9 +4,12 @@ use super::{vec3_and_word, vec4};
 use crate::interface::record::{Beat, pose};
 use crate::scene::Body;
 
+/// Rows whose word is an unsigned integer: none.
+pub(crate) const INTEGERS: [bool; pose::ROWS] = [false; pose::ROWS];
+
 /// The pose record: position beside 0, orientation.
 ///
-/// Shape: 2 beats. Units: metres, unit quaternion x, y, z, w, world frame.
+/// Shape: 2 rows. Units: metres, unit quaternion x, y, z, w, world frame.
 ///
 /// Source: interface specification, record table.
 #[inline]

@@ -6,7 +6,7 @@ use crate::scene::{Pose, Velocity};
 
 /// The new state of a body from its result record; the words beside the vec3 are not looked at.
 ///
-/// Shape: 4 beats. Units: metres, unit quaternion, m/s, rad/s, world frame.
+/// Shape: 4 rows. Units: metres, unit quaternion, m/s, rad/s, world frame.
 ///
 /// Source: interface specification, record table.
 #[inline]

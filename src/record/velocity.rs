@@ -1,12 +1,27 @@
 //! This file makes the velocity record of a body.
 
+use super::inertia::Inverse;
 use super::vec3_and_word;
 use crate::interface::record::{Beat, velocity};
 use crate::scene::Body;
 
+/// Rows whose word is an unsigned integer: the shape.
+pub(crate) const INTEGERS: [bool; velocity::ROWS] = {
+    let mut integers = [false; velocity::ROWS];
+    integers[velocity::LINEAR] = true;
+    integers
+};
+
+/// Rows whose word is an unsigned integer in a record with world inertia.
+pub(crate) const WORLD_INTEGERS: [bool; velocity::WORLD_ROWS] = {
+    let mut integers = [false; velocity::WORLD_ROWS];
+    integers[velocity::LINEAR] = true;
+    integers
+};
+
 /// The velocity record: linear velocity beside the shape index, angular velocity beside 0.
 ///
-/// Shape: 2 beats. Units: m/s, rad/s, world frame.
+/// Shape: 2 rows. Units: m/s, rad/s, world frame.
 ///
 /// Source: interface specification, record table.
 #[inline]
@@ -16,6 +31,24 @@ pub(crate) fn encode(body: &Body) -> [Beat; velocity::ROWS] {
     beats[velocity::ANGULAR] = vec3_and_word(body.velocity.angular, 0);
     beats
 }
+
+/// The velocity record with world inertia: the two rows above, and the inverse inertia of the body.
+///
+/// Shape: 4 rows. Units: m/s, rad/s, 1/(kg m²), world frame.
+///
+/// Source: interface specification, record table.
+#[inline]
+pub(crate) fn encode_world(body: &Body, inertia: &Inverse) -> [Beat; velocity::WORLD_ROWS] {
+    let [linear, angular] = encode(body);
+    let mut beats = [Beat::default(); velocity::WORLD_ROWS];
+    beats[velocity::LINEAR] = linear;
+    beats[velocity::ANGULAR] = angular;
+    beats[velocity::DIAGONAL] = vec3_and_word(inertia.diagonal, 0);
+    beats[velocity::OFF_DIAGONAL] = vec3_and_word(inertia.off_diagonal, 0);
+    beats
+}
+
+const _: () = assert!(velocity::LINEAR == 0 && velocity::ANGULAR == 1);
 
 #[cfg(test)]
 mod tests {
@@ -40,5 +73,18 @@ mod tests {
             0x00, 0x00, 0x00, 0x00,
         ];
         assert_eq!(bytemuck::bytes_of(&encode(&body)), bytes);
+    }
+    #[test]
+    fn world_inertia_follows_the_velocities() {
+        let body = Body {
+            pose: Pose { position: [9.0; 3], orientation: [9.0; 4] },
+            velocity: Velocity { linear: [1.0, -2.0, 0.5], angular: [3.0, 0.25, -0.0] },
+            shape: 5,
+        };
+        let inertia = Inverse { diagonal: [1.0, 2.0, 3.0], off_diagonal: [-0.5, 0.25, 4.0] };
+        let rows = encode_world(&body, &inertia);
+        assert_eq!(rows[..2], encode(&body));
+        assert_eq!(rows[2], Beat([0x3F80_0000, 0x4000_0000, 0x4040_0000, 0]));
+        assert_eq!(rows[3], Beat([0xBF00_0000, 0x3E80_0000, 0x4080_0000, 0]));
     }
 }

@@ -1,5 +1,7 @@
 //! This file lists everything that a step refuses before anything is sent.
 
+use super::Carriers;
+use crate::interface::number::StreamFormat;
 use crate::interface::record::CONTACT_POINTS;
 
 /// Why input was refused. Nothing was sent, and nothing of the caller's was changed.
@@ -14,26 +16,30 @@ pub enum InputError {
 
     /// More bodies than the bitstream has room for, whatever the memory.
     #[error(
-        "found {found} bodies, the bitstream takes at most {limit}: give fewer, or load a \
-         bitstream with a larger body capacity"
+        "found {found} bodies, the bitstream takes at most {limit}: give fewer, or load another \
+         ({carriers})"
     )]
     TooManyBodies {
         /// Bodies given.
         found: usize,
         /// Bodies that the bitstream takes.
         limit: u32,
+        /// Who takes them.
+        carriers: Carriers,
     },
 
     /// More collisions than the bitstream has room for, whatever the memory.
     #[error(
-        "found {found} collisions, the bitstream takes at most {limit}: give fewer, or load a \
-         bitstream with a larger collision capacity"
+        "found {found} collisions, the bitstream takes at most {limit}: give fewer, or load another \
+         ({carriers})"
     )]
     TooManyCollisions {
         /// Collisions given.
         found: usize,
         /// Collisions that the bitstream takes.
         limit: u32,
+        /// Who takes them.
+        carriers: Carriers,
     },
 
     /// Separate arrays of different lengths.
@@ -46,7 +52,8 @@ pub enum InputError {
     /// Bodies and collisions together exceed the on-chip memory.
     #[error(
         "{bodies} bodies and {collisions} collisions need {needed} bytes of on-chip memory, there \
-         are {available}: with so many bodies at most {fitting} collisions fit"
+         are {available}: with so many bodies at most {fitting} collisions fit; give fewer, or load \
+         another bitstream ({carriers})"
     )]
     MemoryExceeded {
         /// Bodies given.
@@ -59,6 +66,8 @@ pub enum InputError {
         available: u32,
         /// Collisions that fit beside the bodies; 0 if the bodies alone are too many.
         fitting: u32,
+        /// Who has room for both.
+        carriers: Carriers,
     },
 
     /// A number of a body is NaN or infinite.
@@ -72,6 +81,28 @@ pub enum InputError {
         component: usize,
         /// Its value.
         found: f32,
+    },
+
+    /// A number of a body is beyond what the bitstream's streams, arithmetic or arrays hold.
+    #[error(
+        "body {body}: {field}[{component}] is {found}, but this bitstream holds bodies in {}, \
+         which ends at {limit}: bring it into range, or load another ({carriers})", format.name()
+    )]
+    BodyOutOfRange {
+        /// The body.
+        body: usize,
+        /// Position, orientation, linear or angular velocity.
+        field: &'static str,
+        /// Component of the field, 0 for x.
+        component: usize,
+        /// Its value.
+        found: f32,
+        /// The narrowest format on its way.
+        format: StreamFormat,
+        /// Its largest number.
+        limit: f32,
+        /// Who carries the body.
+        carriers: Carriers,
     },
 
     /// A quaternion that stands for no rotation.
@@ -213,6 +244,32 @@ pub enum InputError {
         found: f32,
     },
 
+    /// A number of a collision is beyond what the bitstream's streams or arithmetic hold.
+    #[error(
+        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream holds \
+         collisions in {}, which ends at {limit}: bring it into range, or load another ({carriers})",
+        contact.map_or_else(String::new, |contact| format!(", contact point {contact}")),
+        format.name()
+    )]
+    CollisionOutOfRange {
+        /// The collision.
+        collision: usize,
+        /// The contact point, if it is a number of one.
+        contact: Option<usize>,
+        /// What is streamed: position of a body, offset from body A, normal, distance.
+        field: &'static str,
+        /// Component of the field, 0 for x; 0 for the distance.
+        component: usize,
+        /// Its value as it would be streamed.
+        found: f32,
+        /// The narrowest format on its way.
+        format: StreamFormat,
+        /// Its largest number.
+        limit: f32,
+        /// Who carries the collision.
+        carriers: Carriers,
+    },
+
     /// A parameter is outside its range.
     #[error("the {parameter} is {found}, expected {expected}: correct the step parameters")]
     Parameter {
@@ -222,6 +279,24 @@ pub enum InputError {
         found: f32,
         /// Its range.
         expected: &'static str,
+    },
+
+    /// A parameter is beyond what the bitstream's arithmetic holds.
+    #[error(
+        "the {parameter} is {found:e}, but this bitstream computes in binary16, which takes \
+         {smallest:e} to {largest}: correct the step parameters, or load another ({carriers})"
+    )]
+    ParameterOutOfRange {
+        /// The parameter; a gravity component with its axis.
+        parameter: &'static str,
+        /// Its value.
+        found: f32,
+        /// The smallest magnitude.
+        smallest: f32,
+        /// The largest magnitude.
+        largest: f32,
+        /// Who computes with it.
+        carriers: Carriers,
     },
 
     /// More passes than a step takes.
@@ -272,14 +347,53 @@ pub enum InputError {
 
     /// A shape whose inertia differs between axes.
     #[error(
-        "shape {shape}: its inverse inertia is {found:?}, but this accelerator takes only shapes \
-         with three equal components (cube, sphere): give such a shape"
+        "shape {shape}: its inverse inertia is {found:?}, but this bitstream takes only shapes with \
+         three equal components (cube, sphere): give such a shape, or load another ({carriers})"
     )]
     Anisotropic {
         /// The shape.
         shape: usize,
         /// Its inverse inertia, 1/(kg m²).
         found: [f32; 3],
+        /// Who takes it.
+        carriers: Carriers,
+    },
+
+    /// An inverse mass or inertia is beyond what the bitstream's arithmetic or streams hold.
+    #[error(
+        "shape {shape}: its {field}[{component}] is {found:e}, but this bitstream holds it in {}, \
+         from {smallest:e} to {largest}: give another shape, or load another bitstream ({carriers})",
+        format.name()
+    )]
+    ShapeOutOfRange {
+        /// The shape.
+        shape: usize,
+        /// Inverse mass or inverse inertia.
+        field: &'static str,
+        /// Component of the field, 0 for x; 0 for the mass.
+        component: usize,
+        /// Its value, 1/kg or 1/(kg m²).
+        found: f32,
+        /// The narrowest format on its way.
+        format: StreamFormat,
+        /// The smallest number above 0 that does not become 0.
+        smallest: f32,
+        /// The largest number.
+        largest: f32,
+        /// Who carries it.
+        carriers: Carriers,
+    },
+
+    /// A size or the mass of a shape to be made.
+    #[error(
+        "the {parameter} of a shape is {found:e}, expected a number above 0 with which mass and \
+         inertia stay in the range of f32: correct it"
+    )]
+    ShapeParameter {
+        /// Mass, half extent, half height or radius.
+        parameter: &'static str,
+        /// Its value, kg or m.
+        found: f32,
     },
 
     /// A static shape that could rotate.

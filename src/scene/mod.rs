@@ -1,6 +1,7 @@
 //! What a caller gives a step and gets back.
 
 mod body;
+mod carriers;
 mod collision;
 mod input_error;
 mod parameters;
@@ -8,7 +9,10 @@ mod shape;
 pub(crate) mod validate;
 
 pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
+pub use carriers::Carriers;
 pub use collision::{CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact};
 pub use input_error::InputError;
 pub use parameters::StepParameters;
 pub use shape::Shape;
+
+pub(crate) use carriers::Demand;

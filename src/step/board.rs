@@ -271,6 +271,85 @@ mod tests {
         find(&uio("pgs"), &memory, &system).expect("opened");
     }
 
+    fn assert_busy(found: Result<Found, OpenError>, file: &str) {
+        let error = found.expect_err("in use");
+        assert!(
+            matches!(&error, OpenError::Platform(PlatformError::Busy { path }) if path.ends_with(file)),
+            "{file}: {error}"
+        );
+    }
+
+    #[test]
+    fn two_boards_do_not_share_memory() {
+        let (_root, system) = system_with(bitstream::describe);
+        add_memory(&system);
+        uio_fake::add_node(&system, 2, "pgs2", &uio_fake::regions());
+        let memory = MemoryChoice::Automatic;
+        let first = find(&uio("pgs"), &memory, &system).expect("opened");
+        assert_busy(find(&uio("pgs2"), &memory, &system), "uio7");
+        // Through /dev/mem it is the same memory.
+        uio_fake::write(system.dev.join("mem"), "");
+        let window = MemoryChoice::DevMem { window: 0x6000_0000..0x6000_1000 };
+        assert_busy(find(&uio("pgs2"), &window, &system), "uio7");
+        drop(first);
+        let second = find(&uio("pgs2"), &memory, &system).expect("the first is closed");
+
+        // With a buffer of its own it is another board.
+        for (name, text) in [("phys_addr", "0x70000000"), ("size", "4096"), ("sync_mode", "2")] {
+            uio_fake::write(system.u_dma_buf.join("own").join(name), text);
+        }
+        let device = fs::File::create(system.dev.join("own"));
+        device.and_then(|file| file.set_len(4096)).expect("resized");
+        let own =
+            MemoryChoice::UDmaBuf { name: "own".to_owned(), caching: Caching::WriteCombining };
+        let first = find(&uio("pgs"), &own, &system).expect("nothing is shared");
+        drop(second);
+        assert_busy(find(&uio("pgs2"), &own, &system), "own");
+        drop(first);
+        find(&uio("pgs2"), &own, &system).expect("the first is closed");
+    }
+
+    #[test]
+    fn each_dma_core_behind_a_node_of_its_own_has_one_user() {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        add_memory(&system);
+        let regions = uio_fake::regions();
+        uio_fake::add_node(&system, 0, "pgs-control", &regions[4..]);
+        uio_fake::add_node(&system, 2, "pgs-dma1", &regions[1..2]);
+        let core = crate::platform::UioDevice::open_in(&system, "pgs-dma1").expect("opened");
+        let find = || find(&BoardChoice::Automatic, &MemoryChoice::Automatic, &system);
+        assert_busy(find(), "uio2");
+        drop(core);
+        find().expect("nobody has it");
+    }
+
+    #[test]
+    fn dev_mem_carries_registers_and_memory_of_one_board() {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        uio_fake::write(system.dev.join("mem"), "");
+        let device = fs::File::create(system.dev.join("mem"));
+        device.and_then(|file| file.set_len(0x10_0000)).expect("resized");
+        let windows = DevMemWindows {
+            dma: [0, 0x1_0000, 0x2_0000, 0x3_0000],
+            control: 0x4_0000,
+            memory: 0x8_0000..0x9_0000,
+        };
+        let choice = BoardChoice::DevMem(windows);
+        for memory in [MemoryChoice::Automatic, MemoryChoice::DevMem { window: 0xA_0000..0xB_0000 }]
+        {
+            let Found { platform, .. } = find(&choice, &memory, &system).expect("opened once");
+            platform.dma_window(3).expect("mapped").write32(4, 0x66);
+            assert_eq!(fs::read(system.dev.join("mem")).expect("read")[0x3_0004], 0x66);
+            let (address, _) = platform.allocate(4).expect("there is room");
+            let expected = if memory == MemoryChoice::Automatic { 0x8_0000 } else { 0xA_0000 };
+            assert_eq!(address, expected);
+            assert_busy(find(&choice, &memory, &system), "mem");
+        }
+        find(&choice, &MemoryChoice::Automatic, &system).expect("nobody has it");
+    }
+
     #[test]
     fn separate_nodes_are_a_board_and_an_absent_core_is_named() {
         let root = tempfile::tempdir().expect("a directory");

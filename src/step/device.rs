@@ -70,7 +70,8 @@ impl Device {
         let last = cores.len().saturating_sub(1);
         for (place, Core { sender, receiver }) in cores.into_iter().enumerate() {
             mm2s.push(Lane::new(sender, Access::Read, Dmacr::RUNNING));
-            // The last beat of the results goes to the last channel: its completion is the step's.
+            // Every step has results on the last channel, and they end within a beat of the others'
+            // (three channels: 4 B beats): its completion is taken for the step's.
             let completion = place == last;
             let running = if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
             s2mm.push(Lane::new(receiver, Access::Write, running));

@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MIN;
+use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::Beat;
 
 use super::fault::Fault;
@@ -65,7 +66,7 @@ impl Accelerator {
     }
 
     fn run_echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Fault> {
-        let plan = plan(echo.bodies.len(), self.device.mm2s.len());
+        let plan = plan(echo.bodies.len(), self.device.capabilities.variant);
         if echo.fresh_buffers {
             self.device.lanes_mut().for_each(super::lane::Lane::drop_buffer);
         }
@@ -100,7 +101,7 @@ impl Accelerator {
         let mut channels = Default::default();
         self.results(&plan, &mut channels);
         Ok(Echoed {
-            results: channels[..plan.channels].iter().map(|beats| beats.to_vec()).collect(),
+            results: channels[..plan.channels()].iter().map(|beats| beats.to_vec()).collect(),
             sent: sent.velocities.wrapping_add(sent.poses),
             sums: counters.sums,
             interrupts,
@@ -118,34 +119,47 @@ impl Accelerator {
     }
 }
 
-fn plan(bodies: usize, channels: usize) -> Plan {
-    Plan { bodies, collisions: 0, passes: 0, channels }
+fn plan(bodies: usize, variant: Variant) -> Plan {
+    Plan { bodies, collisions: 0, passes: 0, variant }
 }
 
 /// The MM2S channel on which a beat of the results was sent, and its offset in that channel's
-/// buffer, bytes.
-pub(crate) fn source_of(bodies: usize, channels: usize, result: Place) -> (usize, u64) {
-    let index = result.slot * channels + result.channel;
-    let per_record = Segment::Results.beats_per_record();
-    let (record, beat) = (index / per_record, index % per_record);
-    // A result is the pose and then the velocity.
-    let poses = Segment::Poses.beats_per_record();
-    let (place, start) = if beat < poses {
-        let place = Segment::Poses.place(record, beat, channels);
-        (place, plan(bodies, channels).segments(place.channel).poses.start)
-    } else {
-        (Segment::Velocities.place(record, beat - poses, channels), 0)
+/// buffer, bytes; `None` for padding, which was not.
+pub(crate) fn source_of(bodies: usize, variant: &Variant, result: Place) -> Option<(usize, u64)> {
+    let layout = |segment: Segment| {
+        let layout = segment.layout(variant);
+        // These records are whole beats in every format.
+        (layout, layout.rows / layout.rows_per_beat())
     };
-    (place.channel, bytes(start + place.slot))
+    let (results, per_result) = layout(Segment::Results);
+    let (poses, per_pose) = layout(Segment::Poses);
+    let (velocities, per_velocity) = layout(Segment::Velocities);
+    let index = results.beat_at(result);
+    let (record, beat) = (index / per_result, index % per_result);
+    if record >= bodies {
+        return None;
+    }
+    // A result is the pose and then the velocity.
+    let (place, start) = if let Some(beat) = beat.checked_sub(per_pose) {
+        (velocities.place(record * per_velocity + beat), 0)
+    } else {
+        let place = poses.place(record * per_pose + beat);
+        (place, plan(bodies, *variant).segments(place.channel).poses.start)
+    };
+    Some((place.channel, bytes(start + place.slot)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interface::profile::{FLOAT, HALF, Inertia};
 
     #[test]
     fn a_result_is_traced_to_the_beat_that_was_sent() {
-        let at = |channel, slot| source_of(7, 4, Place { channel, slot });
+        let at = |channel, slot| {
+            let place = Place { channel, slot };
+            source_of(7, &FLOAT.default_variant(), place).expect("not padding")
+        };
         // Body 0: pose on channels 0 and 1, velocity on 0 and 1. Seven bodies are four beats of
         // velocities on channel 0, so that the poses begin at beat 4.
         assert_eq!([at(0, 0), at(1, 0), at(2, 0), at(3, 0)], [(0, 64), (1, 64), (0, 0), (1, 0)]);
@@ -153,5 +167,23 @@ mod tests {
         assert_eq!([at(0, 1), at(3, 1)], [(2, 64), (3, 0)]);
         // Body 6: beats 12 and 13.
         assert_eq!([at(1, 6), at(2, 6)], [(1, 64 + 48), (0, 48)]);
+    }
+    #[test]
+    fn a_result_of_half_is_traced_too_and_its_padding_to_nowhere() {
+        let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
+        let at = |variant: Variant, channel, slot| source_of(7, &variant, Place { channel, slot });
+        let half = |channel, slot| at(HALF.default_variant(), channel, slot);
+        // Velocities are seven beats, two groups: four on channel 0, so that the poses begin at beat
+        // 4 there, and on channel 2, with two, at beat 4 too (64 bytes).
+        // Body 0: pose and velocity are the first beats of channel 0.
+        assert_eq!([half(0, 0), half(0, 1)], [Some((0, 64)), Some((0, 0))]);
+        // Body 2: beats 4 and 5 of the results; its pose and velocity are each beat 2 of theirs.
+        assert_eq!([half(2, 0), half(0, 2)], [Some((1, 64)), Some((1, 0))]);
+        // Body 6: beats 12 and 13; beat 6 of the velocities is the second group's second.
+        assert_eq!(half(1, 5), Some((0, 48)));
+        // Beat 14 is the last of the third group, and padding.
+        assert_eq!(half(2, 2), None);
+        // With world inertia body 2's velocity is beats 4 and 5.
+        assert_eq!(at(world, 0, 2), Some((2, 0)));
     }
 }

@@ -24,6 +24,6 @@ pub(crate) use {
     board::Found,
     bring_up::{Core, check_given_width, connect, drain_interrupt},
     device::Device,
-    echo::{ECHO_LIMIT, Echo, Echoed, source_of},
+    echo::{Dirt, ECHO_LIMIT, Echo, Echoed, source_of},
     solver::find,
 };

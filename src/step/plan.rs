@@ -8,12 +8,13 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::BEAT_BYTES;
 
 use super::report::time_of;
 use crate::accelerator::Capabilities;
 use crate::axi_dma::pieces;
-use crate::beat::stripe::{Segment, beats_on_channel};
+use crate::beat::stripe::Segment;
 use crate::scene::StepParameters;
 
 /// A memory slower than 100 MB/s is taken for one that does not answer.
@@ -27,7 +28,8 @@ pub(super) struct Plan {
     pub(super) bodies: usize,
     pub(super) collisions: usize,
     pub(super) passes: u64,
-    pub(super) channels: usize,
+    /// How records lie on the channels.
+    pub(super) variant: Variant,
 }
 
 /// Where the segments lie in the buffer of one MM2S channel, beats.
@@ -44,11 +46,16 @@ pub(super) const fn bytes(beats: usize) -> u64 {
 }
 
 impl Plan {
+    /// Channels each way.
+    pub(super) const fn channels(&self) -> usize {
+        self.variant.profile.mm2s_widths.len()
+    }
+
     /// The segments of one MM2S channel.
     pub(super) fn segments(&self, channel: usize) -> Segments {
-        let place = |segment, records, start: usize| {
+        let place = |segment: Segment, records, start: usize| {
             let start = start.next_multiple_of(ALIGNMENT);
-            start..start + beats_on_channel(segment, records, channel, self.channels)
+            start..start + segment.layout(&self.variant).beats_on_channel(records, channel)
         };
         let velocities = place(Segment::Velocities, self.bodies, 0);
         let collisions = place(Segment::Collisions, self.collisions, velocities.end);
@@ -58,7 +65,7 @@ impl Plan {
 
     /// Beats of results on one S2MM channel.
     pub(super) fn results(&self, channel: usize) -> usize {
-        beats_on_channel(Segment::Results, self.bodies, channel, self.channels)
+        Segment::Results.layout(&self.variant).beats_on_channel(self.bodies, channel)
     }
 
     /// Descriptors of one MM2S channel, whose descriptors carry at most `largest` bytes.
@@ -71,7 +78,7 @@ impl Plan {
 
     /// Bytes streamed to the accelerator, all channels.
     pub(super) fn bytes_to_device(&self) -> u64 {
-        (0..self.channels)
+        (0..self.channels())
             .map(|channel| {
                 let Segments { velocities, collisions, poses } = self.segments(channel);
                 bytes(velocities.len() + poses.len())
@@ -82,7 +89,7 @@ impl Plan {
 
     /// Bytes streamed from the accelerator, all channels.
     pub(super) fn bytes_from_device(&self) -> u64 {
-        (0..self.channels).map(|channel| bytes(self.results(channel))).sum()
+        (0..self.channels()).map(|channel| bytes(self.results(channel))).sum()
     }
 
     /// How long the step may last: four times what it takes if every collision waits for the one
@@ -111,10 +118,12 @@ impl Plan {
 mod tests {
     use super::*;
     use crate::accelerator::{fake, identify};
+    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE};
     use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
 
-    const FOUR: Plan = Plan { bodies: 38_881, collisions: 127_746, passes: 8, channels: 4 };
+    const FOUR: Plan =
+        Plan { bodies: 38_881, collisions: 127_746, passes: 8, variant: FLOAT.default_variant() };
 
     #[test]
     fn a_wide_length_register_takes_ten_descriptors_a_channel() {
@@ -138,9 +147,45 @@ mod tests {
 
     #[test]
     fn a_channel_without_beats_has_no_descriptors() {
-        let one = Plan { bodies: 1, collisions: 0, passes: 8, channels: 4 };
+        let one = Plan { bodies: 1, collisions: 0, ..FOUR };
         let counts: Vec<_> = (0..4).map(|channel| one.descriptors(channel, 192)).collect();
         assert_eq!(counts, [2, 2, 0, 0]);
+    }
+
+    /// B = 38,881 and C = 127,746 by hand from the record table and the stripes.
+    #[test]
+    fn bytes_of_every_profile_include_its_padding() {
+        let bytes = |variant| {
+            let plan = Plan { variant, ..FOUR };
+            (plan.bytes_to_device() / 16, plan.bytes_from_device() / 16)
+        };
+        let (bodies, collisions) = (38_881, 127_746);
+        assert_eq!(bytes(NAIVE.default_variant()), (4 * bodies + 8 * 7 * collisions, 4 * bodies));
+        // A beat a record, filled up to five: 38,885. Two collisions in seven beats. 77,762 beats of
+        // results, filled up to five: 77,765.
+        assert_eq!(bytes(HALF.default_variant()), (2 * 38_885 + 8 * 7 * (collisions / 2), 77_765));
+        assert_eq!(bytes(MIXED.default_variant()), (4 * bodies + 8 * 3 * collisions, 4 * bodies));
+        // Twice the velocities: four beats a body in f32; in half two, 77,762 filled up to five.
+        let world = |variant| Variant { inertia: Inertia::World, ..variant };
+        assert_eq!(
+            bytes(world(FLOAT.default_variant())),
+            (6 * bodies + 8 * 7 * collisions, 4 * bodies)
+        );
+        assert_eq!(
+            bytes(world(HALF.default_variant())),
+            (77_765 + 38_885 + 8 * 7 * (collisions / 2), 77_765)
+        );
+    }
+
+    #[test]
+    fn an_odd_collision_of_half_is_paid_for_as_a_pair() {
+        let bytes = |collisions| {
+            let variant = HALF.default_variant();
+            let plan = Plan { bodies: 5, collisions, passes: 1, variant };
+            plan.bytes_to_device()
+        };
+        assert_eq!(bytes(3), bytes(4));
+        assert_eq!(bytes(1), 16 * (5 + 7 + 5));
     }
 
     #[test]

@@ -53,7 +53,7 @@ impl Device {
                 log::error!("a buffer was lost: {error}");
             }
         }
-        self.control.load_shapes(shapes);
+        self.control.load_shapes(shapes, self.capabilities.variant.inertia);
         log::info!("the board was reset after a fault");
         Ok(())
     }

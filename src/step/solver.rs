@@ -15,7 +15,8 @@ use super::plan::Plan;
 use super::report::{HostTimes, StepCycles, StepReport};
 use crate::accelerator::{Capabilities, Counters};
 use crate::beat::pack::{pack_collisions, pack_poses, pack_velocities};
-use crate::beat::unpack::{sum_of_words, unpack_result};
+use crate::beat::stripe::Segment;
+use crate::beat::unpack::{Results, sum_of_words};
 use crate::error::{Error, OpenError};
 use crate::platform::{Deadline, System};
 use crate::scene::validate::{Limits, validate, validate_shapes};
@@ -65,14 +66,18 @@ impl Accelerator {
 
     /// The accelerator of a board that was brought up.
     pub(crate) fn assemble(board: BoardDescription, device: Device) -> Self {
-        let Capabilities { profile_id, version, clock_khz, .. } = device.capabilities;
+        let Capabilities { variant, version, clock_khz, .. } = device.capabilities;
         log::info!(
-            "opened {board}: profile {profile_id}, interface {}.{}, {clock_khz} kHz",
+            "opened {board}: profile {}, interface {}.{}, {clock_khz} kHz",
+            variant.profile.name,
             version.0,
             version.1
         );
         let limits = Limits {
-            body_capacity: device.capabilities.body_capacity,
+            variant,
+            flush_subnormals: device.capabilities.flush_subnormals,
+            // An index has to name every body, whatever the bitstream says.
+            body_capacity: device.capabilities.body_capacity.min(variant.body_capacity()),
             collision_capacity: device.capabilities.collision_capacity,
             shape_capacity: device.capabilities.shape_capacity,
             memory_bytes: device.capabilities.memory_bytes,
@@ -103,8 +108,8 @@ impl Accelerator {
         if self.device.dead {
             return Err(Error::MustReopen);
         }
-        validate_shapes(shapes, self.limits.shape_capacity)?;
-        self.device.control.load_shapes(shapes);
+        validate_shapes(shapes, &self.limits)?;
+        self.device.control.load_shapes(shapes, self.limits.variant.inertia);
         self.shapes.clear();
         self.shapes.extend_from_slice(shapes);
         Ok(())
@@ -139,7 +144,7 @@ impl Accelerator {
             collisions: collisions.len(),
             passes: u64::from(parameters.contact_iterations)
                 + u64::from(parameters.friction_iterations),
-            channels: self.device.mm2s.len(),
+            variant: self.limits.variant,
         };
         let counts = &self.device.counts;
         let before = (counts.reads(), counts.writes());
@@ -230,14 +235,19 @@ impl Accelerator {
             channels[place] = &mut beats[segments.velocities];
             later[place] = (&mut collisions[..segments.collisions.len()], poses);
         }
-        let velocities = pack_velocities(bodies, &mut channels[..plan.channels]);
+        let (variant, count) = (&plan.variant, plan.bodies);
+        let active = ..plan.channels();
+        let views = &mut channels[active];
+        let velocities = pack_velocities(variant, bodies, count, &self.shapes, views);
         let mut poses_of: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
         for (place, (collisions, poses)) in later.into_iter().enumerate() {
             channels[place] = collisions;
             poses_of[place] = poses;
         }
-        let collisions = pack_collisions(bodies, collisions, &mut channels[..plan.channels]);
-        let poses = pack_poses(bodies, &mut poses_of[..plan.channels]);
+        let views = &mut channels[active];
+        let collisions =
+            pack_collisions(variant, bodies, collisions, plan.collisions, &self.shapes, views);
+        let poses = pack_poses(variant, bodies, count, &mut poses_of[active]);
         Sent { velocities, collisions, poses }
     }
 
@@ -278,9 +288,11 @@ impl Accelerator {
         spare.reserve(plan.bodies);
         let mut channels = Default::default();
         self.results(plan, &mut channels);
-        let channels = &channels[..plan.channels];
+        let layout = Segment::Results.layout(&plan.variant);
+        let mut results = Results::new(&layout, &channels[..plan.channels()]);
         let mut broken = None;
         for index in 0..plan.bodies {
+            let (pose, velocity) = results.next();
             let own = bodies.body(index);
             let shape = usize::try_from(own.shape).ok().and_then(|shape| self.shapes.get(shape));
             if shape.is_none_or(|shape| shape.inverse_mass == 0.0) {
@@ -288,7 +300,6 @@ impl Accelerator {
                 spare.push((own.pose, own.velocity));
                 continue;
             }
-            let (pose, velocity) = unpack_result(index, channels);
             if !finite(&pose, &velocity) {
                 broken = Some(index);
                 break;

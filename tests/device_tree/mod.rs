@@ -24,9 +24,12 @@ fn say(what: &str) {
 
 /// Whether the tools are there; says once if they are not.
 pub(crate) fn tools_found() -> bool {
-    let found = ["dtc", "fdtoverlay", "fdtget"]
-        .iter()
-        .all(|tool| Command::new(tool).arg("--version").output().is_ok());
+    // Emulated by qemu-user, starting a program that is not there succeeds, and ends with 127.
+    let answers = |tool: &&str| {
+        let asked = Command::new(tool).arg("--version").output();
+        asked.is_ok_and(|answer| answer.status.success())
+    };
+    let found = ["dtc", "fdtoverlay", "fdtget"].iter().all(answers);
     if !found {
         static SAID: Once = Once::new();
         SAID.call_once(|| {

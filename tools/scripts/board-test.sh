@@ -16,19 +16,16 @@ guest=$repository/tools/guest
 [ -x "$scripts/kernel/$kernel.sh" ] || { sed -n '2,10s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; exit 2; }
 cd "$repository"
 
-cargo build --quiet --release --locked -p pgs -p guest-board
+attend cargo build --quiet --release --locked -p pgs -p guest-board
 host=${CARGO_TARGET_DIR:-target}/release
 steps=${STEPS:-120}
 digest=$("$host/pgs" --board emulated run --grid 5x5x5 --steps "$steps" |
 	sed -n 's/^digest  *fnv1a-64 \([0-9a-f]\{16\}\)$/\1/p')
 [ -n "$digest" ] || fail "the run on this machine gave no digest"
 
-(
-	. "$scripts/aarch64-env.sh"
-	timeout 1800 cargo build --release --locked --target "$aarch64" -p pgs -p guest-board
-)
+attend "$scripts/cross-aarch64.sh"
 work=$target_root/kernel-test
-"$scripts/kernel/$kernel.sh" "$work/$kernel"
+attend "$scripts/kernel/$kernel.sh" "$work/$kernel"
 
 content=$work/board-content
 rm -rf "$content"
@@ -41,7 +38,7 @@ echo "$digest" > "$content/expected/digest"
 echo "$steps" > "$content/expected/steps"
 echo "${BOOT_LIMIT:-1200}" > "$content/limit"
 
-CHECKS=$guest/board/checks "$scripts/kernel/initrd.sh" "$work/$kernel" "$content" \
+CHECKS=$guest/board/checks attend "$scripts/kernel/initrd.sh" "$work/$kernel" "$content" \
 	"$work/$kernel-board.initrd"
 TREE=$guest/zcu102-board.dts BOARD=$host/guest-board BOOT_LIMIT=${BOOT_LIMIT:-1200} \
-	"$scripts/kernel/boot.sh" "$work/$kernel" "$work/$kernel-board.initrd" "$work/$kernel-board.log"
+	attend "$scripts/kernel/boot.sh" "$work/$kernel" "$work/$kernel-board.initrd" "$work/$kernel-board.log"

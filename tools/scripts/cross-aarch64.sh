@@ -21,8 +21,9 @@ esac
 cd "$repository"
 time_of() { local begin=$SECONDS; "$@"; echo "($((SECONDS - begin)) s for: $*)"; }
 
-# With the guest programs of tools/guest, so that one build has both.
-time_of timeout 1200 cargo build --release --locked --target "$aarch64" -p pgs -p zdma
+# With the guest programs of tools/guest, so that one build has all.
+time_of attend timeout 1800 cargo build --release --locked --target "$aarch64" \
+	-p pgs -p zdma -p guest-board
 binary=$CARGO_TARGET_DIR/$aarch64/release/pgs
 file -b "$binary"
 file -b "$binary" | grep -q 'ARM aarch64.*statically linked' ||
@@ -32,7 +33,7 @@ echo "$binary: $(stat -c %s "$binary") bytes"
 if [ $run_tests = yes ]; then
 	# What computes, and what drives; not what only reads command lines.
 	test_all() {
-		timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" "$@"
+		attend timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" "$@"
 	}
 	time_of test_all -p zynq-pgs -p bitstream-model -p zynq-pgs-scene --lib --tests
 	time_of test_all -p pgs --bins --test golden

@@ -14,14 +14,14 @@ scripts=$repository/tools/scripts
 cd "$repository"
 
 # What the same run ends with on this machine.
-cargo build --quiet --release --locked -p pgs
+attend cargo build --quiet --release --locked -p pgs
 digest=$("${CARGO_TARGET_DIR:-target}/release/pgs" --board emulated run --grid 5x5x5 --steps 120 --json |
 	sed -n 's/.*"value": "\([0-9a-f]\{16\}\)".*/\1/p')
 [ -n "$digest" ] || fail "the run on this machine gave no digest"
 
-"$scripts/cross-aarch64.sh"
+attend "$scripts/cross-aarch64.sh"
 work=$target_root/kernel-test
-"$scripts/kernel/$kernel.sh" "$work/$kernel"
+attend "$scripts/kernel/$kernel.sh" "$work/$kernel"
 
 content=$work/content
 rm -rf "$content"
@@ -33,5 +33,5 @@ cp -r tests/golden "$content/golden"
 echo "$digest" > "$content/expected/digest"
 echo "$kernel" > "$content/expected/kernel"
 
-"$scripts/kernel/initrd.sh" "$work/$kernel" "$content" "$work/$kernel.initrd"
-"$scripts/kernel/boot.sh" "$work/$kernel" "$work/$kernel.initrd" "$work/$kernel.log"
+attend "$scripts/kernel/initrd.sh" "$work/$kernel" "$content" "$work/$kernel.initrd"
+attend "$scripts/kernel/boot.sh" "$work/$kernel" "$work/$kernel.initrd" "$work/$kernel.log"

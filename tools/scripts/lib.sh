@@ -10,21 +10,61 @@ target_root=${CARGO_TARGET_DIR:-$repository/target}
 fail() { echo "error: $*" >&2; exit 1; }
 skip() { echo "skipped: $*" >&2; exit "$SKIPPED"; }
 
-# Runs apt-get, and waits for another one that holds its locks.
+# What a script leaves neither running nor lying about, whatever ends it.
+declare -A running=()
+litter=()
+end_all() {
+	local code=$?
+	trap - EXIT
+	[ ${#running[@]} = 0 ] || kill "${!running[@]}" 2>/dev/null || true
+	wait
+	[ ${#litter[@]} = 0 ] || rm -rf "${litter[@]}"
+	exit "$code"
+}
+trap end_all EXIT
+trap 'exit 129' HUP
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+# Starts a program that ends with the script; the kernel sees to it where the script is killed.
+begin() {
+	local tied=(setpriv --pdeathsig TERM)
+	command -v setpriv >/dev/null || tied=()
+	"${tied[@]}" "$@" &
+	running[$!]=
+}
+
+# Waits for a program that was begun; its exit code. A signal ends the wait, and the script.
+await() {
+	local code=0
+	wait "$1" || code=$?
+	unset "running[$1]"
+	return "$code"
+}
+
+# Runs a program that ends with the script. One that is simply run keeps signals from the script.
+attend() {
+	begin "$@"
+	await $!
+}
+
+# Runs apt-get; tries again while another one holds its locks, and what hangs. A quarter of an hour
+# is the most that it takes.
 apt() {
-	local log try
+	local log code end=$((SECONDS + 600))
 	log=$(mktemp)
-	for try in $(seq 30); do
-		if timeout 600 apt-get -q -o DPkg::Lock::Timeout=300 -o APT::Sandbox::User=root "$@" > "$log" 2>&1; then
-			rm -f "$log"
-			return 0
-		fi
-		grep -q -E 'Unable to (lock|acquire)|rename failed' "$log" || break
+	while :; do
+		code=0
+		DEBIAN_FRONTEND=noninteractive timeout --kill-after=10 300 apt-get -q \
+			-o DPkg::Lock::Timeout=60 -o APT::Sandbox::User=root "$@" > "$log" 2>&1 || code=$?
+		[ $code != 0 ] || break
+		[ $code = 124 ] || grep -q -E 'Unable to (lock|acquire)|rename failed' "$log" || break
+		[ $SECONDS -lt $end ] || break
 		sleep 5
 	done
-	tail -n 5 "$log" >&2
+	[ $code = 0 ] || tail -n 5 "$log" >&2
 	rm -f "$log"
-	return 1
+	return $code
 }
 
 # The packages among the arguments that are not installed.
@@ -43,22 +83,30 @@ need_packages() {
 		skip "needs Debian's packages $*, and this is no Debian (no apt-get)"
 	missing=$(missing_packages "$@")
 	[ -n "$missing" ] || return 0
-	local by_hand="dpkg --add-architecture arm64 && apt-get update && apt-get install ${missing% }"
+	local by_hand="apt-get update && apt-get install ${missing% }"
+	case $missing in *:arm64*) by_hand="dpkg --add-architecture arm64 && $by_hand" ;; esac
 	[ "$(id -u)" = 0 ] || skip "these packages are missing; as root: $by_hand"
 	echo "installing ${missing% }"
+	case $missing in *:arm64*) need_arm64 ;; esac
 	need_lists
+	# What may hang is fetched first: dpkg is not to be stopped between two packages.
 	# shellcheck disable=SC2086 # a list of words
-	apt install -y --no-install-recommends $missing ||
+	apt install -y --no-install-recommends --download-only $missing &&
+		apt install -y --no-install-recommends $missing ||
 		skip "these packages cannot be installed: ${missing% }"
 }
 
-# Brings the package lists up to date, with those of arm64; an ordinary user has to take them as
-# they are.
+# Has apt know the packages of arm64.
+need_arm64() {
+	! dpkg --print-foreign-architectures | grep -qx arm64 || return 0
+	[ "$(id -u)" = 0 ] ||
+		skip "needs the packages of arm64; as root: dpkg --add-architecture arm64 && apt-get update"
+	dpkg --add-architecture arm64
+	lists_are_new=
+}
+
+# Brings the package lists up to date; an ordinary user has to take them as they are.
 need_lists() {
-	if ! dpkg --print-foreign-architectures | grep -qx arm64; then
-		[ "$(id -u)" = 0 ] || skip "needs the packages of arm64; as root: dpkg --add-architecture arm64 && apt-get update"
-		dpkg --add-architecture arm64
-	fi
 	if [ -z "${lists_are_new:-}" ] && [ "$(id -u)" = 0 ]; then
 		apt update || skip "the package lists cannot be fetched"
 		lists_are_new=yes

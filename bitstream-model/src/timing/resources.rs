@@ -1,20 +1,69 @@
-//! This file is the account of on-chip memory.
+//! This file is the account of on-chip memory: by array and copy, in bytes and in block RAMs.
 //!
 //! Source: thesis §4.4.2 (24 bytes a body and 16 a collision; 4.0 MiB on the XCZU9EG).
 
+use super::blocks::{BLOCK_BITS, ShapedBlocks};
+use super::ports::{MemoryKind, OnChipArray, PortAccount};
 use crate::interface::profile::Variant;
 
-/// On-chip memory of a step, bytes.
+/// Numbers of a velocity, and of a world inverse inertia.
+const SIX: u32 = 6;
+/// Numbers of the accumulated impulses of a collision.
+const FOUR: u32 = 4;
+/// Numbers of a position.
+const THREE: u32 = 3;
+const BITS_PER_BYTE: u32 = 8;
+
+/// On-chip memory of one array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ArrayUse {
+    /// The array.
+    pub array: OnChipArray,
+    /// Where it lies.
+    pub memory: MemoryKind,
+    /// Rows: bodies or collisions.
+    pub rows: u64,
+    /// Bytes of a row.
+    pub row_bytes: u32,
+    /// Copies.
+    pub copies: u32,
+    /// Whether one port to read and one to write are enough.
+    pub simple: bool,
+}
+
+impl ArrayUse {
+    /// Bytes of all copies.
+    #[must_use]
+    pub const fn bytes(&self) -> u64 {
+        self.rows.saturating_mul((self.row_bytes * self.copies) as u64)
+    }
+
+    /// Blocks of all copies if no bit of a block were lost.
+    #[must_use]
+    pub const fn ideal_blocks(&self) -> u64 {
+        self.bytes().saturating_mul(BITS_PER_BYTE as u64).div_ceil(BLOCK_BITS)
+    }
+
+    /// Blocks of all copies by the shapes of the block; nothing for distributed RAM.
+    #[must_use]
+    pub fn shaped_blocks(&self) -> Option<ShapedBlocks> {
+        let bits = u64::from(self.row_bytes * BITS_PER_BYTE);
+        let one = ShapedBlocks::fewest(self.rows, bits, self.simple);
+        let blocks = one.blocks.saturating_mul(self.copies.into());
+        (self.memory == MemoryKind::Block).then_some(ShapedBlocks { blocks, ..one })
+    }
+}
+
+/// On-chip memory of a step.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MemoryUse {
-    /// Velocities.
-    pub velocities: u64,
-    /// Accumulated impulses.
-    pub impulses: u64,
-    /// Shape indices, in distributed RAM; the thesis has none.
-    pub shape_indices: u64,
-    /// Block RAM that there is.
+    /// Each array.
+    pub arrays: Vec<ArrayUse>,
+    /// Block RAM that there is, bytes.
     pub capacity: u64,
+    /// Bytes that the positions of all bodies would take beside them, in as many copies as the
+    /// velocities have.
+    pub positions: u64,
 }
 
 impl MemoryUse {
@@ -22,23 +71,70 @@ impl MemoryUse {
     #[must_use]
     pub fn new(variant: &Variant, bodies: u64, collisions: u64) -> Self {
         let memory = variant.profile.memory;
+        let number = variant.numbers.velocities.bytes();
+        let arrays = PortAccount::new(variant)
+            .arrays
+            .into_iter()
+            .map(|ports| {
+                let (rows, row_bytes) = match ports.array {
+                    OnChipArray::Velocities | OnChipArray::Inertia => (bodies, SIX * number),
+                    OnChipArray::Impulses => (collisions, FOUR * variant.numbers.impulses.bytes()),
+                    OnChipArray::ShapeIndices => (bodies, memory.shape_index_bytes),
+                };
+                let simple = ports.reads <= 1 && ports.writes <= 1;
+                let (array, copies) = (ports.array, ports.copies);
+                ArrayUse { array, memory: ports.memory, rows, row_bytes, copies, simple }
+            })
+            .collect();
+        let position = THREE * number * memory.velocity_copies;
         Self {
-            velocities: bodies * u64::from(variant.bytes_per_body()),
-            impulses: collisions * u64::from(variant.bytes_per_collision()),
-            shape_indices: bodies * u64::from(memory.shape_index_bytes),
+            arrays,
             capacity: memory.bytes.into(),
+            positions: bodies.saturating_mul(position.into()),
         }
     }
 
-    /// Block RAM used.
+    /// Bytes of one array; 0 if it is not on chip.
     #[must_use]
-    pub const fn block_ram(&self) -> u64 {
-        self.velocities + self.impulses
+    pub fn bytes_of(&self, array: OnChipArray) -> u64 {
+        self.arrays.iter().filter(|a| a.array == array).map(ArrayUse::bytes).sum()
     }
 
-    /// Whether it fits.
+    fn block_arrays(&self) -> impl Iterator<Item = &ArrayUse> {
+        self.arrays.iter().filter(|array| array.memory == MemoryKind::Block)
+    }
+
+    fn sum(&self, of: impl Fn(&ArrayUse) -> u64) -> u64 {
+        self.block_arrays().map(of).fold(0, u64::saturating_add)
+    }
+
+    /// Block RAM used, bytes.
     #[must_use]
-    pub const fn fits(&self) -> bool {
+    pub fn block_ram(&self) -> u64 {
+        self.sum(ArrayUse::bytes)
+    }
+
+    /// Block RAM used if the positions were kept as well, bytes (thesis §4.4.2).
+    #[must_use]
+    pub fn with_positions(&self) -> u64 {
+        self.block_ram().saturating_add(self.positions)
+    }
+
+    /// Blocks used if no bit of a block were lost.
+    #[must_use]
+    pub fn ideal_blocks(&self) -> u64 {
+        self.block_ram().saturating_mul(BITS_PER_BYTE.into()).div_ceil(BLOCK_BITS)
+    }
+
+    /// Blocks used by the shapes that a block can take.
+    #[must_use]
+    pub fn shaped_blocks(&self) -> u64 {
+        self.sum(|array| array.shaped_blocks().map_or(0, |shaped| shaped.blocks))
+    }
+
+    /// Whether it fits, by bytes: what the capacity registers say.
+    #[must_use]
+    pub fn fits(&self) -> bool {
         self.block_ram() <= self.capacity
     }
 
@@ -46,25 +142,65 @@ impl MemoryUse {
     #[must_use]
     pub fn collisions_beside(variant: &Variant, bodies: u64) -> u64 {
         let memory = variant.profile.memory;
-        let left =
-            u64::from(memory.bytes).saturating_sub(bodies * u64::from(variant.bytes_per_body()));
-        left / u64::from(variant.bytes_per_collision())
+        let taken = bodies.saturating_mul(variant.bytes_per_body().into());
+        u64::from(memory.bytes).saturating_sub(taken) / u64::from(variant.bytes_per_collision())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile::FLOAT;
+    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile};
+
+    fn thesis_step(profile: &'static Profile) -> MemoryUse {
+        MemoryUse::new(&profile.default_variant(), 38_880, 127_000)
+    }
+
+    fn hundredths_of_mib(bytes: u64) -> u64 {
+        (bytes * 100 + (1 << 19)) >> 20
+    }
+
+    /// Thesis §4.4.2: 2.83 and 1.86, with positions 3.27 and 2.30; the positions alone 0.44 in
+    /// float, and 0.22 in each of half's two copies.
+    #[test]
+    fn float_and_half_take_what_the_thesis_says() {
+        let float = thesis_step(&FLOAT);
+        assert_eq!(float.block_ram(), 2_965_120);
+        assert_eq!(hundredths_of_mib(float.block_ram()), 283);
+        assert_eq!(hundredths_of_mib(float.with_positions()), 327);
+        assert_eq!(hundredths_of_mib(float.positions), 44);
+        let half = thesis_step(&HALF);
+        assert_eq!(half.block_ram(), 1_949_120);
+        assert_eq!(hundredths_of_mib(half.block_ram()), 186);
+        assert_eq!(hundredths_of_mib(half.with_positions()), 230);
+        assert_eq!(hundredths_of_mib(half.positions / 2), 22);
+        assert_eq!(hundredths_of_mib(half.block_ram() - half.arrays[0].bytes() / 2), 141);
+        for profile in [&MIXED, &NAIVE] {
+            assert_eq!(thesis_step(profile).block_ram(), float.block_ram(), "{}", profile.name);
+        }
+    }
+
+    /// By hand: float 38 x 11 + 63 x 15, half 2 x 19 x 11 + 249 x 2.
+    #[test]
+    fn shaped_blocks_are_a_little_more_than_the_bits() {
+        let blocks = |profile| {
+            let memory = thesis_step(profile);
+            (memory.ideal_blocks(), memory.shaped_blocks())
+        };
+        assert_eq!(blocks(&FLOAT), (1_287, 418 + 945));
+        assert_eq!(blocks(&HALF), (846, 418 + 498));
+    }
 
     #[test]
-    fn float_takes_the_thesis_2_83_of_4_0_mib() {
-        let memory = MemoryUse::new(&FLOAT.default_variant(), 38_880, 127_000);
-        assert_eq!(memory.block_ram(), 2_965_120);
-        let mib = memory.block_ram() as f64 / f64::from(1 << 20);
-        assert!((mib - 2.83).abs() < 0.005, "{mib}");
-        assert!((memory.capacity as f64 / f64::from(1 << 20) - 4.0).abs() < 1e-9);
-        assert!(memory.fits());
+    fn the_arrays_are_what_the_interface_counts_for_each_record() {
+        for profile in PROFILES {
+            for inertia in [Inertia::Isotropic, Inertia::World] {
+                let variant = Variant { inertia, ..profile.default_variant() };
+                let memory = MemoryUse::new(&variant, 7, 5);
+                let by_record = 7 * variant.bytes_per_body() + 5 * variant.bytes_per_collision();
+                assert_eq!(memory.block_ram(), u64::from(by_record), "{}", profile.name);
+            }
+        }
     }
 
     #[test]

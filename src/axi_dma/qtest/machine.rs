@@ -62,17 +62,20 @@ impl Drop for Qemu {
 impl Machine {
     /// A machine with its cable plugged in; `None` if QEMU is not installed.
     pub(super) fn start() -> Option<Started> {
+        if !answers(Command::new(QEMU).arg("--version")) {
+            return None;
+        }
         let mut failures = Vec::new();
         for _ in 0..STARTS {
             match Self::try_start() {
-                Ok(started) => return started,
+                Ok(started) => return Some(started),
                 Err(failure) => failures.push(failure),
             }
         }
         panic!("{QEMU} did not start: {failures:?}");
     }
 
-    fn try_start() -> Result<Option<Started>, String> {
+    fn try_start() -> Result<Started, String> {
         let folder = tempfile::tempdir().expect("a folder");
         let socket = folder.path().join("qtest");
         let listener = UnixListener::bind(&socket).expect("a socket");
@@ -86,15 +89,12 @@ impl Machine {
         let nic = format!(
             "socket,udp={here},localaddr={there},model=xlnx.axi-ethernet,mac=52:54:00:12:34:56"
         );
-        let child = match command(&socket, &nic, &folder).spawn() {
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            child => child.expect("a process"),
-        };
+        let child = command(&socket, &nic, &folder).spawn().expect("a process");
         let mut qemu = Qemu { child, folder };
         let stream = accept(&listener, &mut qemu)?;
         stream.set_write_timeout(Some(PATIENCE)).expect("not zero");
         let lines = BufReader::new(stream);
-        Ok(Some((Self { qemu, lines, line: Vec::new(), interrupt: false }, cable)))
+        Ok((Self { qemu, lines, line: Vec::new(), interrupt: false }, cable))
     }
 
     /// One 32-bit read on the bus.
@@ -199,10 +199,35 @@ impl Machine {
     }
 }
 
+/// Whether a program is there and does what it is told.
+fn answers(command: &mut Command) -> bool {
+    command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
+/// A program that ends with the thread that starts it: the kernel sees to it where the test is
+/// killed, and nothing is dropped.
+fn tied(program: &str) -> Command {
+    let setpriv = || {
+        let mut command = Command::new("setpriv");
+        command.args(["--pdeathsig", "KILL"]);
+        command
+    };
+    if !answers(setpriv().arg("true")) {
+        return Command::new(program);
+    }
+    let mut command = setpriv();
+    command.arg(program);
+    command
+}
+
 /// The machine whose AXI DMA has an Ethernet MAC at its streams, which has a UDP socket as cable.
 fn command(socket: &Path, nic: &str, folder: &TempDir) -> Command {
     let stderr = std::fs::File::create(folder.path().join("stderr")).expect("a file");
-    let mut command = Command::new(QEMU);
+    let mut command = tied(QEMU);
     command
         .args(["-M", "petalogix-ml605", "-m", "256M", "-accel", "tcg", "-display", "none"])
         // A branch to itself at the reset vector. A processor that is stopped instead (-S) would

@@ -1,24 +1,21 @@
 //! This file refuses bodies that cannot be solved.
 
-use super::{all_finite, first};
-use crate::scene::{Body, InputError, Shape};
+use bitstream_model::interface::number::StreamFormat;
+use bitstream_model::interface::profile::Variant;
+
+use super::range::Held;
+use super::{Scene, all_within, first};
+use crate::scene::{Body, InputError};
 
 const LINEAR: &str = "linear velocity";
 const ANGULAR: &str = "angular velocity";
 
 /// What of one body a step refuses.
 #[inline]
-pub(super) fn check_body(index: usize, body: &Body, shapes: &[Shape]) -> Result<(), InputError> {
-    let fields: [(&'static str, &[f32]); 4] = [
-        ("position", &body.pose.position),
-        ("orientation", &body.pose.orientation),
-        (LINEAR, &body.velocity.linear),
-        (ANGULAR, &body.velocity.angular),
-    ];
-    for (field, values) in fields {
-        if !all_finite(values) {
-            let (component, found) = first(values, |value| !value.is_finite());
-            return Err(InputError::BodyNotFinite { body: index, field, component, found });
+pub(super) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result<(), InputError> {
+    for (field, values, format) in fields(body, &scene.held) {
+        if !all_within(values, format.largest()) {
+            return Err(number_refused(index, body, (field, values, format), scene));
         }
     }
     let [x, y, z, w] = body.pose.orientation;
@@ -26,8 +23,8 @@ pub(super) fn check_body(index: usize, body: &Body, shapes: &[Shape]) -> Result<
     if !(InputError::SHORTEST_ORIENTATION..=f32::MAX).contains(&length) {
         return Err(InputError::Orientation { body: index, length });
     }
-    let Some(shape) = shapes.get(shape_of(body)) else {
-        let shapes = shapes.len();
+    let Some(shape) = scene.shapes.get(shape_of(body)) else {
+        let shapes = scene.shapes.len();
         return Err(InputError::ShapeIndex { body: index, found: body.shape, shapes });
     };
     if shape.is_static() {
@@ -41,6 +38,41 @@ pub(super) fn check_body(index: usize, body: &Body, shapes: &[Shape]) -> Result<
     Ok(())
 }
 
+/// Numbers of a body: name, values, format.
+type Field<'a> = (&'static str, &'a [f32], StreamFormat);
+
+/// The numbers of a body that are streamed.
+#[inline]
+fn fields<'a>(body: &'a Body, held: &Held) -> [Field<'a>; 4] {
+    [
+        ("position", &body.pose.position, held.poses),
+        ("orientation", &body.pose.orientation, held.poses),
+        (LINEAR, &body.velocity.linear, held.velocities),
+        (ANGULAR, &body.velocity.angular, held.velocities),
+    ]
+}
+
+/// Names the number of a field that is known not to be finite or to be out of range.
+#[cold]
+fn number_refused(
+    index: usize,
+    body: &Body,
+    (field, values, format): Field<'_>,
+    scene: &Scene<'_>,
+) -> InputError {
+    if !all_within(values, f32::MAX) {
+        let (component, found) = first(values, |value| !value.is_finite());
+        return InputError::BodyNotFinite { body: index, field, component, found };
+    }
+    let limit = format.largest();
+    let (component, found) = first(values, |value| value.abs() > limit);
+    let carriers = scene.demand.carriers(|variant: &Variant| {
+        let fields = fields(body, &Held::by(&variant.numbers));
+        fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
+    });
+    InputError::BodyOutOfRange { body: index, field, component, found, format, limit, carriers }
+}
+
 /// A body's shape as an index; an index that this machine cannot address is in no table.
 pub(super) fn shape_of(body: &Body) -> usize {
     usize::try_from(body.shape).unwrap_or(usize::MAX)
@@ -49,7 +81,8 @@ pub(super) fn shape_of(body: &Body) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Pose, Velocity};
+    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
+    use crate::scene::{Demand, Pose, Shape, Velocity};
 
     const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
     const MOVING: Body = Body {
@@ -58,21 +91,65 @@ mod tests {
         shape: 1,
     };
 
+    fn check_on(profile: &'static Profile, body: &Body) -> Result<(), InputError> {
+        let demand = Demand { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
+        let variant = &profile.default_variant();
+        let held = Held::by(&variant.numbers);
+        check_body(7, body, &Scene { shapes: &SHAPES, demand, variant, held })
+    }
+
+    fn check(body: &Body) -> Result<(), InputError> {
+        check_on(&FLOAT, body)
+    }
+
     fn refused(body: &Body) -> InputError {
-        check_body(7, body, &SHAPES).expect_err("a body to be refused")
+        check(body).expect_err("a body to be refused")
+    }
+
+    #[test]
+    fn numbers_beyond_the_format_are_refused_on_streams_of_sixteen_bits_alone() {
+        let edge = [65_504.0, -65_504.0, 0.0];
+        let mut body = Body { velocity: Velocity { linear: edge, angular: edge }, ..MOVING };
+        body.pose.position = edge;
+        assert_eq!(check_on(&HALF, &body), Ok(()));
+        body.velocity.angular[1] = -65_504.0_f32.next_up();
+        assert_eq!(check_on(&MIXED, &body), Ok(()), "bodies are f32 there");
+        let refused = check_on(&HALF, &body).expect_err("beyond binary16");
+        assert!(
+            matches!(
+                refused,
+                InputError::BodyOutOfRange {
+                    body: 7,
+                    field: "angular velocity",
+                    component: 1,
+                    format: StreamFormat::Binary16,
+                    ..
+                }
+            ),
+            "{refused}"
+        );
+        assert_eq!(
+            refused.to_string(),
+            "body 7: angular velocity[1] is -65504.004, but this bitstream holds bodies in \
+             binary16, which ends at 65504: bring it into range, or load another (profiles that \
+             could: naive, float, mixed)"
+        );
+        body.velocity.angular[1] = f32::NAN;
+        let refused = check_on(&HALF, &body).expect_err("no number");
+        assert!(matches!(refused, InputError::BodyNotFinite { component: 1, .. }), "{refused}");
     }
 
     #[test]
     fn moving_and_resting_bodies_are_accepted() {
-        assert_eq!(check_body(0, &MOVING, &SHAPES), Ok(()));
+        assert_eq!(check(&MOVING), Ok(()));
         let zero = Velocity { linear: [0.0, -0.0, 0.0], angular: [-0.0; 3] };
-        assert_eq!(check_body(0, &Body { velocity: zero, shape: 0, ..MOVING }, &SHAPES), Ok(()));
+        assert_eq!(check(&Body { velocity: zero, shape: 0, ..MOVING }), Ok(()));
     }
 
     #[test]
     fn every_number_that_is_not_finite_is_refused() {
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            let check = |body: Body, name: &str, index: usize| {
+            let names = |body: Body, name: &str, index: usize| {
                 assert!(
                     matches!(
                         refused(&body),
@@ -86,18 +163,18 @@ mod tests {
             for component in 0..3 {
                 let mut body = MOVING;
                 body.pose.position[component] = value;
-                check(body, "position", component);
+                names(body, "position", component);
                 let mut body = MOVING;
                 body.velocity.linear[component] = value;
-                check(body, "linear velocity", component);
+                names(body, "linear velocity", component);
                 let mut body = MOVING;
                 body.velocity.angular[component] = value;
-                check(body, "angular velocity", component);
+                names(body, "angular velocity", component);
             }
             for component in 0..4 {
                 let mut body = MOVING;
                 body.pose.orientation[component] = value;
-                check(body, "orientation", component);
+                names(body, "orientation", component);
             }
         }
     }
@@ -119,7 +196,7 @@ mod tests {
         }
         let mut body = MOVING;
         body.pose.orientation = [0.0, 0.0, 0.0, -2e-6];
-        assert_eq!(check_body(7, &body, &SHAPES), Ok(()));
+        assert_eq!(check(&body), Ok(()));
     }
 
     #[test]

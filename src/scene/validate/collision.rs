@@ -1,6 +1,6 @@
 //! This file refuses collisions that cannot be solved.
 
-use super::{all_finite, first};
+use super::{all_within, first};
 use crate::scene::{CONTACT_POINTS, Collision, Contact, InputError};
 
 /// Checks what a collision says by itself; returns the indices of its two bodies.
@@ -24,7 +24,7 @@ pub(super) fn check_collision(
             return Err(InputError::ContactCount { collision: index, found: collision.count });
         }
     };
-    if !all_finite(&collision.normal) {
+    if !all_within(&collision.normal, f32::MAX) {
         let (component, found) = first(&collision.normal, |value| !value.is_finite());
         return Err(InputError::NormalNotFinite { collision: index, component, found });
     }
@@ -36,7 +36,7 @@ pub(super) fn check_collision(
     // All four points without a branch: counts follow no pattern that could be predicted.
     let mut finite = true;
     for (ordinal, Contact { point, distance }) in collision.contacts.iter().enumerate() {
-        finite &= (all_finite(point) & distance.is_finite()) | (ordinal >= count);
+        finite &= (all_within(point, f32::MAX) & distance.is_finite()) | (ordinal >= count);
     }
     if !finite {
         return Err(contact_not_finite(index, &collision.contacts[..count]));

@@ -6,6 +6,7 @@
 mod body;
 mod collision;
 mod parameters;
+mod range;
 mod shape;
 
 pub(crate) use shape::validate_shapes;
@@ -13,11 +14,20 @@ pub(crate) use shape::validate_shapes;
 use self::body::{check_body, shape_of};
 use self::collision::check_collision;
 use self::parameters::check_parameters;
-use super::{Bodies, Collisions, InputError, Shape, StepParameters};
+use self::range::{Held, check_range};
+use self::shape::needed;
+use super::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
+use crate::record::relative::anchors;
+use bitstream_model::interface::number::StreamFormat;
+use bitstream_model::interface::profile::{Geometry, Variant};
 
-/// What a bitstream has room for.
+/// What a bitstream carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Limits {
+    /// Its profile, formats and inertia.
+    pub(crate) variant: Variant,
+    /// Whether subnormal numbers count as zero.
+    pub(crate) flush_subnormals: bool,
     /// Largest number of bodies, whatever the memory.
     pub(crate) body_capacity: u32,
     /// Largest number of collisions, whatever the memory.
@@ -51,38 +61,65 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         }
     }
     let body_count = bodies.len();
-    check_parameters(parameters)?;
-    check_room(body_count, collisions.len(), limits)?;
-    validate_shapes(shapes, limits.shape_capacity)?;
+    let demand =
+        Demand { bodies: body_count, collisions: collisions.len(), inertia: needed(shapes) };
+    check_parameters(parameters, &demand, limits)?;
+    check_room(&demand, limits)?;
+    validate_shapes(shapes, limits)?;
+    let held = Held::by(&limits.variant.numbers);
+    let scene = Scene { shapes, demand, variant: &limits.variant, held };
     for index in 0..body_count {
-        check_body(index, &bodies.body(index), shapes)?;
+        check_body(index, &bodies.body(index), &scene)?;
     }
     let is_static =
         |index: usize| shapes.get(shape_of(&bodies.body(index))).is_some_and(Shape::is_static);
+    // What is finite in world coordinates is in the range of f32 as it is.
+    let in_range = held.collisions == StreamFormat::F32
+        && limits.variant.profile.geometry == Geometry::Absolute;
     for index in 0..collisions.len() {
         let collision = collisions.collision(index);
         let (body_a, body_b) = check_collision(index, &collision, body_count)?;
-        if is_static(body_a) && is_static(body_b) {
+        let moves = [!is_static(body_a), !is_static(body_b)];
+        if moves == [false, false] {
             return Err(InputError::BothStatic {
                 collision: index,
                 body_a: collision.body_a,
                 body_b: collision.body_b,
             });
         }
+        if !in_range {
+            let mut positions = [body_a, body_b].map(|body| bodies.body(body).pose.position);
+            if limits.variant.profile.geometry == Geometry::Relative {
+                positions = anchors(positions, moves);
+            }
+            check_range(index, &collision, positions, &scene)?;
+        }
     }
     Ok(())
 }
 
-fn check_room(bodies: usize, collisions: usize, limits: &Limits) -> Result<(), InputError> {
+/// What the checks of single bodies and collisions look at beside them.
+#[derive(Debug)]
+struct Scene<'a> {
+    shapes: &'a [Shape],
+    demand: Demand,
+    variant: &'a Variant,
+    held: Held,
+}
+
+fn check_room(demand: &Demand, limits: &Limits) -> Result<(), InputError> {
+    let Demand { bodies, collisions, .. } = *demand;
     if bodies == 0 {
         return Err(InputError::NoBodies);
     }
+    let carriers = || demand.carriers(|_| true);
     if exceeds(bodies, limits.body_capacity) {
-        return Err(InputError::TooManyBodies { found: bodies, limit: limits.body_capacity });
+        let (limit, carriers) = (limits.body_capacity, carriers());
+        return Err(InputError::TooManyBodies { found: bodies, limit, carriers });
     }
     if exceeds(collisions, limits.collision_capacity) {
-        let limit = limits.collision_capacity;
-        return Err(InputError::TooManyCollisions { found: collisions, limit });
+        let (limit, carriers) = (limits.collision_capacity, carriers());
+        return Err(InputError::TooManyCollisions { found: collisions, limit, carriers });
     }
     // Neither product leaves 64 bits: both factors are below 2^32 by now.
     let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
@@ -93,7 +130,15 @@ fn check_room(bodies: usize, collisions: usize, limits: &Limits) -> Result<(), I
         let free = u64::from(available).saturating_sub(for_bodies);
         let fitting = free.checked_div(u64::from(limits.bytes_per_collision)).unwrap_or(0);
         let fitting = u32::try_from(fitting).unwrap_or(u32::MAX);
-        return Err(InputError::MemoryExceeded { bodies, collisions, needed, available, fitting });
+        let carriers = carriers();
+        return Err(InputError::MemoryExceeded {
+            bodies,
+            collisions,
+            needed,
+            available,
+            fitting,
+            carriers,
+        });
     }
     Ok(())
 }
@@ -103,9 +148,10 @@ fn exceeds(found: usize, limit: u32) -> bool {
     !u32::try_from(found).is_ok_and(|found| found <= limit)
 }
 
-/// Without a branch per number: these loops see every number of a step.
-fn all_finite(values: &[f32]) -> bool {
-    values.iter().fold(true, |finite, value| finite & value.is_finite())
+/// Whether all are numbers of at most that magnitude. Without a branch per number: these loops see
+/// every number of a step.
+fn all_within(values: &[f32], limit: f32) -> bool {
+    values.iter().fold(true, |within, value| within & (value.abs() <= limit))
 }
 
 /// The first value that is wrong, which the caller has found to exist, and where it stands.
@@ -116,11 +162,28 @@ fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use crate::interface::profile::{self, Inertia, Profile};
     use crate::scene::{Body, BodyArrays, Collision, CollisionArrays, Contact, Pose, Velocity};
 
-    const FLOAT: Limits = Limits {
+    /// What a bitstream of that profile reports.
+    pub(in crate::scene::validate) const fn on(
+        profile: &'static Profile,
+        inertia: Inertia,
+    ) -> Limits {
+        Limits { variant: Variant { profile, numbers: profile.numbers, inertia }, ..FLOAT }
+    }
+
+    pub(in crate::scene::validate) const HALF: Limits = Limits {
+        body_capacity: 65_536,
+        collision_capacity: 524_288,
+        bytes_per_collision: 8,
+        ..on(&profile::HALF, Inertia::Isotropic)
+    };
+    pub(in crate::scene::validate) const FLOAT: Limits = Limits {
+        variant: profile::FLOAT.default_variant(),
+        flush_subnormals: false,
         body_capacity: 131_072,
         collision_capacity: 262_144,
         shape_capacity: 64,
@@ -150,6 +213,10 @@ mod tests {
 
     fn validated(bodies: &[Body], collisions: &[Collision]) -> Result<(), InputError> {
         validate(bodies, collisions, &SHAPES, &StepParameters::default(), &FLOAT)
+    }
+
+    fn room(bodies: usize, collisions: usize, limits: &Limits) -> Result<(), InputError> {
+        check_room(&Demand { bodies, collisions, inertia: Inertia::Isotropic }, limits)
     }
 
     #[test]
@@ -197,44 +264,56 @@ mod tests {
 
     #[test]
     fn more_bodies_than_the_capacity_are_refused() {
-        assert_eq!(check_room(131_072, 0, &FLOAT), Ok(()));
+        assert_eq!(room(131_072, 0, &FLOAT), Ok(()));
+        let text = room(131_073, 0, &FLOAT).expect_err("one too many").to_string();
         assert_eq!(
-            check_room(131_073, 0, &FLOAT),
-            Err(InputError::TooManyBodies { found: 131_073, limit: 131_072 })
+            text,
+            "found 131073 bodies, the bitstream takes at most 131072: give fewer, or load another \
+             (no profile could)"
         );
+        // Indices of sixteen bits name fewer.
+        assert_eq!(room(65_536, 0, &HALF), Ok(()));
+        let text = room(65_537, 0, &HALF).expect_err("one too many").to_string();
+        assert!(text.contains("found 65537 bodies") && text.contains("at most 65536"), "{text}");
+        assert!(text.ends_with("(profiles that could: naive, float)"), "{text}");
     }
 
     #[test]
     fn memory_of_four_mebibytes_carries_203_822_collisions_of_the_big_pile() {
         // (4,194,304 - 38,881 * 24) / 16 = 203,822.5
-        assert_eq!(check_room(38_881, 203_822, &FLOAT), Ok(()));
-        let refused = check_room(38_881, 203_823, &FLOAT).expect_err("one too many");
-        assert_eq!(
-            refused,
-            InputError::MemoryExceeded {
-                bodies: 38_881,
-                collisions: 203_823,
-                needed: 4_194_312,
-                available: 4_194_304,
-                fitting: 203_822,
-            }
+        assert_eq!(room(38_881, 203_822, &FLOAT), Ok(()));
+        let refused = room(38_881, 203_823, &FLOAT).expect_err("one too many");
+        assert!(
+            matches!(
+                refused,
+                InputError::MemoryExceeded {
+                    bodies: 38_881,
+                    collisions: 203_823,
+                    needed: 4_194_312,
+                    available: 4_194_304,
+                    fitting: 203_822,
+                    ..
+                }
+            ),
+            "{refused}"
         );
         let text = refused.to_string();
         for number in ["38881", "203823", "4194312", "4194304", "203822"] {
             assert!(text.contains(number), "{text}");
         }
+        assert!(text.ends_with("(profiles that could: half)"), "{text}");
     }
 
     #[test]
     fn bodies_that_fill_the_memory_alone_leave_room_for_no_collision() {
         let small = Limits { memory_bytes: 47, ..FLOAT };
         assert!(matches!(
-            check_room(2, 0, &small),
+            room(2, 0, &small),
             Err(InputError::MemoryExceeded { needed: 48, available: 47, fitting: 0, .. })
         ));
         let free = Limits { bytes_per_collision: 0, ..small };
         assert!(matches!(
-            check_room(2, 9, &free),
+            room(2, 9, &free),
             Err(InputError::MemoryExceeded { needed: 48, fitting: 0, .. })
         ));
     }
@@ -242,9 +321,12 @@ mod tests {
     #[test]
     fn more_collisions_than_the_capacity_are_refused_whatever_the_memory() {
         let free = Limits { bytes_per_collision: 0, collision_capacity: 9, ..FLOAT };
-        assert_eq!(check_room(1, 9, &free), Ok(()));
-        let refused = InputError::TooManyCollisions { found: 10, limit: 9 };
-        assert_eq!(check_room(1, 10, &free), Err(refused));
+        assert_eq!(room(1, 9, &free), Ok(()));
+        let refused = room(1, 10, &free).expect_err("one too many");
+        assert!(
+            matches!(refused, InputError::TooManyCollisions { found: 10, limit: 9, .. }),
+            "{refused}"
+        );
     }
 
     #[test]
@@ -275,6 +357,27 @@ mod tests {
         assert_eq!(check(&[0], &[1]), unequal("bodies"));
         assert_eq!(check(&[0, 1, 1], &[1]), unequal("bodies"));
         assert_eq!(check(&[0, 1], &[]), unequal("collisions"));
+    }
+
+    /// A number that is right by itself, in a scene that a stream of sixteen bits does not carry.
+    #[test]
+    fn ranges_are_checked_where_the_streams_are_narrow() {
+        let mut bodies = [body(0), body(1)];
+        let parameters = StepParameters::default();
+        let check = |bodies: &[Body], limits| {
+            validate(bodies, [collision(0, 1)].as_slice(), &SHAPES, &parameters, limits)
+        };
+        assert_eq!(check(&bodies, &HALF), Ok(()));
+        bodies[1].pose.position[2] = 7e4;
+        assert_eq!(check(&bodies, &FLOAT), Ok(()));
+        let refused = check(&bodies, &HALF).expect_err("beyond binary16");
+        assert!(matches!(refused, InputError::BodyOutOfRange { body: 1, .. }), "{refused}");
+        let refused = check(&bodies, &on(&profile::MIXED, Inertia::Isotropic));
+        let refused = refused.expect_err("body B is far from A");
+        assert!(
+            matches!(refused, InputError::CollisionOutOfRange { collision: 0, component: 2, .. }),
+            "{refused}"
+        );
     }
 
     #[test]

@@ -8,9 +8,12 @@ use zynq_pgs::MemoryChoice;
 
 use crate::memory::memory;
 use crate::verbs::check::CheckArgs;
+use crate::verbs::compare::CompareArgs;
+use crate::verbs::formats::FormatsArgs;
 use crate::verbs::list::ListArgs;
 use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
+use crate::verbs::order::OrderArgs;
 use crate::verbs::run::RunArgs;
 use crate::verbs::solve::SolveArgs;
 
@@ -19,7 +22,10 @@ Examples:
   pgs                                  step the thesis' scene of 38,880 cubes
   pgs --grid 10x10x10 --steps 60       a smaller one; the same as `pgs run --grid ...`
   pgs solve vectors/one_cube --compare
+  pgs compare float half               how far two builds of the board come apart
+  pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
+  pgs order --input vectors/full_step186
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check
@@ -48,7 +54,10 @@ struct Cli {
 pub(crate) enum Verb {
     Run(RunArgs),
     Solve(SolveArgs),
+    Compare(CompareArgs),
+    Formats(FormatsArgs),
     Model(ModelArgs),
+    Order(OrderArgs),
     List(ListArgs),
     Load(LoadArgs),
     Check(CheckArgs),

@@ -4,17 +4,22 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
-use bitstream_model::interface::profile::Profile;
-use bitstream_model::{BoardConfig, EmulatedBoard, Hazards, Subnormals};
+use bitstream_model::interface::number::Numbers;
+use bitstream_model::interface::profile::{PROFILES, Variant};
+use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::{
-    Accelerator, BoardChoice, BoardKind, DevMemWindows, Fault, MemoryChoice, OpenOptions,
-    UIO_CLASS, uio_nodes,
+    Accelerator, BoardChoice, BoardKind, DevMemWindows, Fault, InputError, MemoryChoice,
+    OpenOptions, UIO_CLASS, uio_nodes,
 };
 
 use crate::args::{BoardName, CommonArgs};
 use crate::failure::{Cause, Failure};
 use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
+
+/// What to do about bodies that the board's inertia is too simple for.
+const WORLD_INERTIA: &str =
+    "build the board with --inertia world (in a text for `pgs compare`: the word world)";
 
 /// An open board.
 #[derive(Debug)]
@@ -84,7 +89,7 @@ pub(crate) fn find(
             let error = "--memory is for real boards, this one is emulated and has its own";
             return Err(Failure::input(error).next("leave out --memory, or add --board uio"));
         }
-        let emulated = EmulatedBoard::new(config).map_err(Failure::input)?;
+        let emulated = EmulatedBoard::new(config).map_err(not_built)?;
         (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
     } else if let Some(option) = given {
         let error = format!("{option} says how to build an emulated board, this one is real");
@@ -98,6 +103,24 @@ pub(crate) fn find(
     };
     let options = OpenOptions { board, memory: memory.clone(), ..OpenOptions::default() };
     Ok(Chosen { kind, options, observer, reason })
+}
+
+/// There is no such emulated board.
+fn not_built(error: ConfigError) -> Failure {
+    let narrow = |numbers: &Numbers| {
+        [numbers.collisions, numbers.bodies].iter().any(|stream| stream.bits() < u32::BITS)
+    };
+    let narrow: Vec<&str> =
+        PROFILES.iter().filter(|p| narrow(&p.numbers)).map(|profile| profile.name).collect();
+    let is_format = matches!(error, ConfigError::StreamFormat { .. });
+    let failure = Failure::input(error);
+    match is_format {
+        true => failure.next(format!(
+            "leave out the format, or take a profile with streams of 16 bits ({})",
+            narrow.join(", ")
+        )),
+        false => failure,
+    }
 }
 
 /// Opens a board.
@@ -116,8 +139,13 @@ pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
 impl Opened {
     /// The failure that an error of the driver is.
     pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {
-        if error.is_input() {
-            return Failure::input(error);
+        if let zynq_pgs::Error::Input(input) = &error {
+            let anisotropic = matches!(input, InputError::Anisotropic { .. });
+            let failure = Failure::input(error);
+            return match anisotropic && self.observer.is_some() {
+                true => failure.next(WORLD_INERTIA),
+                false => failure,
+            };
         }
         let diverged = matches!(&error, zynq_pgs::Error::Step { fault, .. }
             if matches!(**fault, Fault::NotFinite { .. }));
@@ -147,8 +175,14 @@ impl Opened {
     }
 
     fn profile(&self) -> &'static str {
-        Profile::by_id(self.accelerator.capabilities().profile_id)
-            .map_or("unknown", |profile| profile.name)
+        self.accelerator.capabilities().variant.profile.name
+    }
+
+    /// The profile with its formats and inertia, as the bitstream says.
+    fn design(&self) -> BuildArgs {
+        let Variant { profile, numbers, inertia } = self.accelerator.capabilities().variant;
+        let numbers = Some(numbers);
+        BuildArgs::of(&BoardConfig { profile, numbers, inertia, ..BoardConfig::default() })
     }
 
     /// Two lines: which board and why, which bitstream.
@@ -159,7 +193,7 @@ impl Opened {
             out,
             "bitstream  profile {}, {} kHz, {} + {} channels, one issue every {} cycles, {}, \
              subnormals {}",
-            self.profile(),
+            self.design(),
             can.clock_khz,
             can.mm2s_channels,
             can.s2mm_channels,
@@ -191,6 +225,7 @@ impl Opened {
             "kind": self.kind(),
             "reason": self.reason,
             "profile": self.profile(),
+            "design": self.design().to_string(),
             "interface_version": [can.version.0, can.version.1],
             "clock_khz": can.clock_khz,
             "interlocked": can.interlocked,
@@ -208,6 +243,7 @@ impl Opened {
             "length_width": can.length_width,
             "address_width": can.address_width,
             "emulation": self.config().map(|config| json!({
+                "build": BuildArgs::of(&config).to_string(),
                 "hazards": hazards_text(config.hazards == Hazards::Interlocked),
                 "window_slots": config.window_slots,
                 "subnormals": subnormals_text(config.subnormals == Subnormals::Flush),

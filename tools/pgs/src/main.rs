@@ -7,7 +7,9 @@
 
 mod args;
 mod board;
+mod build;
 mod compare;
+mod deviation;
 mod digest;
 mod failure;
 mod folder;
@@ -17,6 +19,8 @@ mod memory;
 mod npy;
 mod options;
 mod origin;
+mod scenes;
+mod sixteen;
 mod verbs;
 
 use std::io::{self, Write};

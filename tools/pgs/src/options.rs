@@ -3,80 +3,205 @@
 
 use std::time::Duration;
 
+use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
+use bitstream_model::interface::profile::{FLOAT, Inertia, PROFILES, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use zynq_pgs::StepParameters;
 
 /// How the emulated board is built; a real board is as its bitstream is.
-#[derive(Debug, Clone, Copy, Default, Args)]
+///
+/// [`build`](crate::build) writes and reads all of it as one text.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 #[command(next_help_heading = "Emulated board")]
 pub(crate) struct BuildArgs {
+    /// Design of the accelerator [default: float]
+    #[arg(long, value_name = "PROFILE", value_parser = profile())]
+    pub(crate) profile: Option<&'static Profile>,
+    /// Numbers on streams of 16 bits [default: binary16]
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<FormatName>,
+    /// Operators of the pipeline; what it stores stays as wide as the profile has it [default: that
+    /// of the profile]
+    #[arg(long, value_enum)]
+    pub(crate) arithmetic: Option<ArithmeticName>,
+    /// Inertia that is the same about every axis, or any (boxes, capsules), streamed with every body
+    /// [default: isotropic]
+    #[arg(long, value_enum)]
+    pub(crate) inertia: Option<InertiaName>,
     /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
-    #[arg(long)]
-    hazards: Option<HazardsName>,
+    #[arg(long, value_enum)]
+    pub(crate) hazards: Option<HazardsName>,
     /// Hazard window in issue slots [default: that of the profile]
-    #[arg(long, value_name = "SLOTS", value_parser = clap::value_parser!(u32).range(1..))]
-    window: Option<u32>,
+    #[arg(long, value_name = "SLOTS", value_parser = window)]
+    pub(crate) window: Option<u32>,
     /// Keep subnormal numbers or flush them to zero [default: keep]
-    #[arg(long)]
-    subnormals: Option<SubnormalsName>,
+    #[arg(long, value_enum)]
+    pub(crate) subnormals: Option<SubnormalsName>,
     /// Memory bandwidth in GB/s, or "unlimited" [default: 12.8]
     #[arg(long, value_name = "GBPS", value_parser = bandwidth)]
-    bandwidth: Option<Bandwidth>,
+    pub(crate) bandwidth: Option<Bandwidth>,
     /// Width of the DMA length registers in bits, 8 to 26 [default: 26]
-    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(8..=26))]
-    length_width: Option<u32>,
+    #[arg(long, value_name = "BITS", value_parser = length_width)]
+    pub(crate) length_width: Option<u32>,
     /// Width of DMA addresses in bits, 32 to 64 [default: 40]
-    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(32..=64))]
-    address_width: Option<u32>,
+    #[arg(long, value_name = "BITS", value_parser = address_width)]
+    pub(crate) address_width: Option<u32>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum HazardsName {
-    Interlocked,
-    Unchecked,
+/// A choice of a build whose names stand on the command line and in its text.
+pub(crate) trait Choice: ValueEnum + PartialEq + 'static {
+    /// What it means.
+    type Meaning: PartialEq;
+
+    /// What this name means.
+    fn meaning(&self) -> Self::Meaning;
+
+    /// The name of a meaning, if it has one.
+    fn of(meaning: &Self::Meaning) -> Option<Self> {
+        Self::value_variants().iter().find(|name| name.meaning() == *meaning).cloned()
+    }
+
+    /// As it is written.
+    fn text(&self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+    }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum SubnormalsName {
-    Keep,
-    Flush,
+/// Names of one choice, and what each means.
+macro_rules! choice {
+    ($name:ident means $meaning:ty: $($(#[$doc:meta])* $variant:ident is $value:expr),+ $(,)?) => {
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+        pub(crate) enum $name {
+            $($(#[$doc])* $variant,)+
+        }
+
+        impl Choice for $name {
+            type Meaning = $meaning;
+
+            fn meaning(&self) -> $meaning {
+                match self {
+                    $(Self::$variant => $value,)+
+                }
+            }
+        }
+    };
+}
+
+choice!(FormatName means StreamFormat:
+    /// IEEE 754, rounded to nearest even
+    Binary16 is StreamFormat::Binary16,
+    /// The thesis' own, cut off; it has no zero
+    Thesis16 is StreamFormat::Thesis16,
+);
+choice!(ArithmeticName means Precision:
+    F32 is Precision::F32,
+    Binary16 is Precision::Binary16,
+);
+choice!(InertiaName means Inertia:
+    Isotropic is Inertia::Isotropic,
+    World is Inertia::World,
+);
+choice!(HazardsName means Hazards:
+    Interlocked is Hazards::Interlocked,
+    Unchecked is Hazards::Unchecked,
+);
+choice!(SubnormalsName means Subnormals:
+    Keep is Subnormals::Keep,
+    Flush is Subnormals::Flush,
+);
+
+/// Reads the name of a profile.
+fn profile() -> impl TypedValueParser<Value = &'static Profile> {
+    PossibleValuesParser::new(PROFILES.iter().map(|profile| profile.name))
+        .try_map(|name| Profile::by_name(&name).ok_or("there is no such profile"))
+}
+
+/// Reads a number of slots.
+pub(crate) fn window(text: &str) -> Result<u32, String> {
+    whole(text, 1, u32::MAX)
+}
+
+/// Reads the width of a length register.
+pub(crate) fn length_width(text: &str) -> Result<u32, String> {
+    whole(text, 8, 26)
+}
+
+/// Reads the width of an address.
+pub(crate) fn address_width(text: &str) -> Result<u32, String> {
+    whole(text, 32, 64)
+}
+
+fn whole(text: &str, low: u32, high: u32) -> Result<u32, String> {
+    match text.parse() {
+        Ok(number) if (low..=high).contains(&number) => Ok(number),
+        _ => Err(format!("expected a whole number from {low} to {high}")),
+    }
 }
 
 impl BuildArgs {
-    /// The first option that was given.
-    pub(crate) fn given(&self) -> Option<&'static str> {
-        [
-            ("--hazards", self.hazards.is_some()),
-            ("--window", self.window.is_some()),
-            ("--subnormals", self.subnormals.is_some()),
-            ("--bandwidth", self.bandwidth.is_some()),
-            ("--length-width", self.length_width.is_some()),
-            ("--address-width", self.address_width.is_some()),
-        ]
-        .into_iter()
-        .find_map(|(name, given)| given.then_some(name))
-    }
-
     /// The board that they describe.
     pub(crate) fn config(&self) -> BoardConfig {
         let default = BoardConfig::default();
+        let profile = self.profile.unwrap_or(&FLOAT);
+        let numbers = self.numbers(&profile.numbers);
         BoardConfig {
-            hazards: match self.hazards {
-                None => default.hazards,
-                Some(HazardsName::Interlocked) => Hazards::Interlocked,
-                Some(HazardsName::Unchecked) => Hazards::Unchecked,
-            },
+            profile,
+            numbers: (numbers != profile.numbers).then_some(numbers),
+            inertia: self.inertia.map_or(default.inertia, |name| name.meaning()),
+            hazards: self.hazards.map_or(default.hazards, |name| name.meaning()),
             window_slots: self.window,
-            subnormals: match self.subnormals {
-                None => default.subnormals,
-                Some(SubnormalsName::Keep) => Subnormals::Keep,
-                Some(SubnormalsName::Flush) => Subnormals::Flush,
-            },
+            subnormals: self.subnormals.map_or(default.subnormals, |name| name.meaning()),
             bandwidth: self.bandwidth.unwrap_or(default.bandwidth),
             length_width: self.length_width.unwrap_or(default.length_width),
             address_width: self.address_width.unwrap_or(default.address_width),
             ..default
+        }
+    }
+
+    /// The profile's formats with what is asked for instead.
+    fn numbers(&self, own: &Numbers) -> Numbers {
+        let mut numbers = *own;
+        if let Some(format) = self.format.map(|name| name.meaning()) {
+            let narrow = |stream: StreamFormat| stream.bits() == format.bits();
+            // Where no stream has 16 bits the board says which widths do not fit.
+            let none = !narrow(own.collisions) && !narrow(own.bodies);
+            for stream in [&mut numbers.collisions, &mut numbers.bodies] {
+                if none || narrow(*stream) {
+                    *stream = format;
+                }
+            }
+        }
+        if let Some(arithmetic) = self.arithmetic.map(|name| name.meaning()) {
+            (numbers.rows, numbers.updates) = (arithmetic, arithmetic);
+        }
+        numbers
+    }
+
+    /// What makes this board of the default board of its profile.
+    pub(crate) fn of(config: &BoardConfig) -> Self {
+        fn unlike<T: PartialEq + Copy>(value: T, default: T) -> Option<T> {
+            (value != default).then_some(value)
+        }
+        let default = BoardConfig::default();
+        let (own, numbers) = (config.profile.numbers, config.variant().numbers);
+        let format = unlike(numbers.collisions, own.collisions)
+            .or_else(|| unlike(numbers.bodies, own.bodies));
+        let arithmetic =
+            unlike(numbers.updates, own.updates).or_else(|| unlike(numbers.rows, own.rows));
+        Self {
+            profile: Some(config.profile),
+            format: format.and_then(|format| FormatName::of(&format)),
+            arithmetic: arithmetic.and_then(|precision| ArithmeticName::of(&precision)),
+            inertia: unlike(config.inertia, default.inertia).and_then(|i| InertiaName::of(&i)),
+            hazards: unlike(config.hazards, default.hazards).and_then(|h| HazardsName::of(&h)),
+            window: config.window_slots,
+            subnormals: unlike(config.subnormals, default.subnormals)
+                .and_then(|s| SubnormalsName::of(&s)),
+            bandwidth: unlike(config.bandwidth, default.bandwidth),
+            length_width: unlike(config.length_width, default.length_width),
+            address_width: unlike(config.address_width, default.address_width),
         }
     }
 }
@@ -131,10 +256,15 @@ pub(crate) fn bandwidth(text: &str) -> Result<Bandwidth, String> {
 
 /// A bandwidth for people.
 pub(crate) fn bandwidth_text(bandwidth: Bandwidth) -> String {
-    match bandwidth {
-        Bandwidth::Unlimited => "unlimited".to_owned(),
-        Bandwidth::BytesPerSecond(rate) => format!("{} GB/s", rate as f64 / BYTES_PER_GB),
+    match bandwidth_gigabytes(bandwidth) {
+        None => "unlimited".to_owned(),
+        Some(rate) => format!("{rate} GB/s"),
     }
+}
+
+/// A bandwidth in GB/s, or nothing if it is unlimited.
+pub(crate) fn bandwidth_gigabytes(bandwidth: Bandwidth) -> Option<f64> {
+    bandwidth_number(bandwidth).map(|rate| rate as f64 / BYTES_PER_GB)
 }
 
 /// A bandwidth for programs: bytes a second, or null.
@@ -164,5 +294,26 @@ mod tests {
     fn no_option_is_the_default_board() {
         assert_eq!(BuildArgs::default().config(), BoardConfig::default());
         assert_eq!(BuildArgs::default().given(), None);
+    }
+
+    #[test]
+    fn a_format_goes_where_the_streams_have_its_width() {
+        let numbers = |profile, format, arithmetic| {
+            let profile = Profile::by_name(profile);
+            let config = BuildArgs { profile, format, arithmetic, ..BuildArgs::default() }.config();
+            (config.numbers.is_some(), config.variant().numbers)
+        };
+        let (changed, half) = numbers("half", Some(FormatName::Binary16), None);
+        assert_eq!((changed, half), (false, Numbers::BINARY16));
+        let thesis = StreamFormat::Thesis16;
+        let (_, half) = numbers("half", Some(FormatName::Thesis16), Some(ArithmeticName::F32));
+        assert_eq!((half.collisions, half.bodies), (thesis, thesis));
+        assert_eq!((half.rows, half.updates), (Precision::F32, Precision::F32));
+        assert_eq!(half.velocities, Precision::Binary16, "storage stays");
+        let (_, mixed) = numbers("mixed", Some(FormatName::Thesis16), None);
+        assert_eq!((mixed.collisions, mixed.bodies), (thesis, StreamFormat::F32));
+        // Refused by the board, which says why.
+        let (_, float) = numbers("float", Some(FormatName::Thesis16), None);
+        assert_eq!((float.collisions, float.bodies), (thesis, thesis));
     }
 }

@@ -34,6 +34,7 @@ fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
     let shape = match error {
         InputError::ShapeValue { shape, .. }
         | InputError::Anisotropic { shape, .. }
+        | InputError::ShapeOutOfRange { shape, .. }
         | InputError::StaticShapeRotates { shape, .. } => Some(*shape),
         _ => None,
     };
@@ -46,21 +47,23 @@ fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
 /// The array that holds the refused value.
 fn file_of(error: &InputError) -> &'static str {
     match error {
-        InputError::BodyNotFinite { field, .. } | InputError::StaticBodyMoves { field, .. } => {
-            match *field {
-                "orientation" => BODY_ORIENTATION,
-                "linear velocity" => BODY_LINEAR,
-                "angular velocity" => BODY_ANGULAR,
-                _ => BODY_POSITION,
-            }
-        }
+        InputError::BodyNotFinite { field, .. }
+        | InputError::BodyOutOfRange { field, .. }
+        | InputError::StaticBodyMoves { field, .. } => match *field {
+            "orientation" => BODY_ORIENTATION,
+            "linear velocity" => BODY_LINEAR,
+            "angular velocity" => BODY_ANGULAR,
+            _ => BODY_POSITION,
+        },
         InputError::Orientation { .. } => BODY_ORIENTATION,
         InputError::ShapeIndex { .. }
         | InputError::NoShapes
         | InputError::TooManyShapes { .. }
+        | InputError::ShapeOutOfRange { field: "inverse mass", .. }
         | InputError::ShapeValue { field: "inverse mass", .. } => BODY_INVERSE_MASS,
         InputError::ShapeValue { .. }
         | InputError::Anisotropic { .. }
+        | InputError::ShapeOutOfRange { .. }
         | InputError::StaticShapeRotates { .. } => BODY_INVERSE_INERTIA,
         InputError::TooManyCollisions { .. }
         | InputError::MemoryExceeded { .. }
@@ -69,8 +72,11 @@ fn file_of(error: &InputError) -> &'static str {
         | InputError::BothStatic { .. } => COLLISION_BODIES,
         InputError::ContactCount { .. } => COLLISION_COUNT,
         InputError::NormalNotFinite { .. } | InputError::NormalLength { .. } => COLLISION_NORMAL,
-        InputError::ContactNotFinite { .. } => COLLISION_POINTS,
-        InputError::Parameter { .. } => PARAMS,
+        InputError::ContactNotFinite { .. }
+        | InputError::CollisionOutOfRange { contact: Some(_), .. } => COLLISION_POINTS,
+        // Positions of its bodies; a normal of unit length is in range.
+        InputError::CollisionOutOfRange { contact: None, .. } => BODY_POSITION,
+        InputError::Parameter { .. } | InputError::ParameterOutOfRange { .. } => PARAMS,
         InputError::TooManyIterations { .. } => ITERATIONS,
         // No bodies, too many bodies, and what later versions of the driver add.
         _ => BODY_POSITION,

@@ -22,7 +22,18 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 
 #[test]
 fn every_help_has_an_example() {
-    for verb in [&[][..], &["run"], &["solve"], &["model"], &["list"], &["load"], &["check"]] {
+    for verb in [
+        &[][..],
+        &["run"],
+        &["solve"],
+        &["model"],
+        &["compare"],
+        &["formats"],
+        &["order"],
+        &["list"],
+        &["load"],
+        &["check"],
+    ] {
         let ran = run(verb.iter().copied().chain(["--help"]));
         assert_eq!(ran.code, Some(0), "{verb:?}");
         let example = format!("  pgs{}", verb.iter().map(|v| format!(" {v}")).collect::<String>());
@@ -173,6 +184,21 @@ fn run_reports_every_step_as_json() {
 }
 
 #[test]
+fn reports_say_how_the_board_is_built() {
+    let options = ["--profile", "half", "--arithmetic", "f32"];
+    let more = ["--inertia", "world", "--hazards", "unchecked", "--window", "64"];
+    let scene = ["--grid", "2x2x2", "--steps", "2", "--drop", "0"];
+    let ran = run([&["--json"], &options[..], &more[..], &scene[..]].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let board = &json(&ran)["board"];
+    assert_eq!(board["profile"], "half");
+    assert_eq!(board["design"], "half,f32,world");
+    assert_eq!(board["emulation"]["build"], "half,f32,unchecked,window=64,world");
+    let text = run([&options[..], &["--format", "thesis16"], &scene[..]].concat()).stdout;
+    assert!(text.contains("bitstream  profile half,thesis16,f32, 250000 kHz"), "{text}");
+}
+
+#[test]
 fn two_runs_have_one_digest_and_another_scene_has_another() {
     let digest = |arguments: &[&str]| {
         let ran = run(arguments);
@@ -183,7 +209,7 @@ fn two_runs_have_one_digest_and_another_scene_has_another() {
     let first = digest(&scene);
     assert!(first.starts_with("digest     fnv1a-64 "), "{first}");
     assert_eq!(first, digest(&scene[1..]), "without the verb");
-    assert_ne!(first, digest(&[&scene[..], &["--inertia", "textbook"]].concat()));
+    assert_ne!(first, digest(&[&scene[..], &["--cube-inertia", "textbook"]].concat()));
 }
 
 #[test]
@@ -265,30 +291,6 @@ fn written_results_are_the_golden_files() {
         let bytes = |path: &std::path::Path| std::fs::read(path.join(name)).expect(name);
         assert!(bytes(&into) == bytes(&folder), "{name}");
     }
-}
-
-#[test]
-fn model_reproduces_the_thesis_step() {
-    let ran = run(["model", "--collisions", "127000", "--bodies", "38880", "--json"]);
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let document = json(&ran);
-    assert_keys(&document, &["schema", "thesis_words", "streamed_words", "thesis", "memory"]);
-    // Thesis Table 6.4: 2,062,697 cycles; §4.4.2: 2.83 MiB.
-    let cycles = document["thesis_words"]["cycles"]["total"].as_f64().expect("a number");
-    assert!((cycles / 2_062_697.0 - 1.0).abs() < 0.006, "{cycles}");
-    assert_eq!(document["streamed_words"]["cycles"]["total"], 2_093_000);
-    assert_eq!(document["memory"]["block_ram"], 2_965_120);
-    assert_eq!(document["thesis_words"]["times"].as_array().map(Vec::len), Some(3));
-    let text = run(["model", "--collisions", "127000", "--bodies", "38880"]).stdout;
-    assert!(text.contains("2.83 MiB of 4.0 MiB"), "{text}");
-}
-
-#[test]
-fn model_takes_the_largest_numbers() {
-    let most = u32::MAX.to_string();
-    let ran = run(["model", "--collisions", &most, "--bodies", &most]);
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    assert!(ran.stdout.contains("does not fit"), "{}", ran.stdout);
 }
 
 #[test]

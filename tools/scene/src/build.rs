@@ -2,8 +2,8 @@
 
 use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
 
-use crate::detect::Detector;
-use crate::{CUBE_HALF_EXTENT, GROUND_HALF_EXTENT, Grid, SceneError};
+use crate::detect::{Detector, Geometries};
+use crate::{CUBE_HALF_EXTENT, GROUND_HALF_EXTENT, Geometry, Grid, SceneError};
 
 /// Largest drop, m.
 pub const DROP_MAX: f32 = 1000.0;
@@ -54,29 +54,28 @@ impl Default for SceneOptions {
     }
 }
 
-/// Cubes of 1 kg above a plane.
+/// Bodies above a plane: cubes of 1 kg, or [several shapes](Self::of_shapes).
 ///
-/// Body 0 is the ground: a static box whose top is the plane y = 0. The cubes follow, those along z
-/// next to each other, then those along y, then those along x.
+/// Body 0 is the ground: a static box whose top is the plane y = 0. The others follow, those along
+/// z next to each other, then those along y, then those along x.
 #[derive(Debug)]
 pub struct Scene {
-    shapes: [Shape; 2],
+    shapes: Vec<Shape>,
+    /// What the shapes look like; nothing for the ground.
+    geometries: Vec<Option<Geometry>>,
     bodies: Vec<Body>,
     collisions: Vec<Collision>,
     detector: Detector,
 }
 
 impl Scene {
-    /// Builds the scene, at rest.
+    /// Builds the scene of cubes, at rest.
     ///
     /// # Errors
     /// [`SceneError::Drop`] if the drop is negative, not a number or above [`DROP_MAX`].
     pub fn new(options: &SceneOptions) -> Result<Self, SceneError> {
-        let drop = options.drop;
-        if !(0.0..=DROP_MAX).contains(&drop) {
-            return Err(SceneError::Drop { found: drop, most: DROP_MAX });
-        }
-        let mut bodies = vec![at_rest([0.0, -GROUND_HALF_EXTENT, 0.0], STATIC_SHAPE)];
+        let drop = check_drop(options.drop)?;
+        let mut bodies = Vec::new();
         for i in 0..options.grid.x() {
             for j in 0..options.grid.y() {
                 let shift = f32::from((j + 1) & 1);
@@ -90,15 +89,29 @@ impl Scene {
                 }
             }
         }
-        Ok(Self {
-            shapes: [Shape::STATIC, Shape::isotropic(1.0, options.inertia.inverse())],
-            bodies,
-            collisions: Vec::new(),
-            detector: Detector::default(),
-        })
+        let cube = (Shape::isotropic(1.0, options.inertia.inverse()), Geometry::CUBE);
+        Ok(Self::on_ground(&[cube], bodies))
     }
 
-    /// The shape table: 0 is static, 1 is a cube.
+    /// A scene of `bodies` on the ground, whose shapes are numbered from 1 in the order of `kinds`.
+    pub(crate) fn on_ground(kinds: &[(Shape, Geometry)], bodies: Vec<Body>) -> Self {
+        let ground = at_rest([0.0, -GROUND_HALF_EXTENT, 0.0], STATIC_SHAPE);
+        Self {
+            shapes: std::iter::once(Shape::STATIC).chain(kinds.iter().map(|kind| kind.0)).collect(),
+            geometries: std::iter::once(None).chain(kinds.iter().map(|k| Some(k.1))).collect(),
+            bodies: std::iter::once(ground).chain(bodies).collect(),
+            collisions: Vec::new(),
+            detector: Detector::default(),
+        }
+    }
+
+    /// What the bodies of each shape look like; nothing for the ground.
+    #[must_use]
+    pub fn geometries(&self) -> &[Option<Geometry>] {
+        &self.geometries
+    }
+
+    /// The shape table: 0 is static, the others move.
     #[must_use]
     pub fn shapes(&self) -> &[Shape] {
         &self.shapes
@@ -131,16 +144,24 @@ impl Scene {
     /// Finds the collisions of the current poses, sorted by body A, then body B.
     ///
     /// Pairs up to [`MARGIN`](crate::MARGIN) apart are collisions too. The ground is always body A,
-    /// of two cubes the one with the lower index is. A body whose pose is not finite collides with
+    /// of two other bodies the one with the lower index is. A body whose pose is not finite collides with
     /// nothing; a step refuses it.
     pub fn detect(&mut self) -> &[Collision] {
-        self.detector.detect(&self.bodies, &mut self.collisions);
+        self.detector.detect(&self.bodies, Geometries(&self.geometries), &mut self.collisions);
         &self.collisions
     }
 }
 
+/// The drop, if a scene can start from it.
+pub(crate) fn check_drop(drop: f32) -> Result<f32, SceneError> {
+    match (0.0..=DROP_MAX).contains(&drop) {
+        true => Ok(drop),
+        false => Err(SceneError::Drop { found: drop, most: DROP_MAX }),
+    }
+}
+
 /// A body that stands still, its axes along the world's.
-fn at_rest(position: [f32; 3], shape: u32) -> Body {
+pub(crate) fn at_rest(position: [f32; 3], shape: u32) -> Body {
     Body {
         pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
         velocity: Velocity::default(),

@@ -32,4 +32,12 @@ pub enum SceneError {
         /// Largest height, m.
         most: f32,
     },
+    /// No spheres, or too many.
+    #[error("expected 1 to {most} spheres, found {found}")]
+    Spheres {
+        /// Spheres asked for.
+        found: u32,
+        /// Most spheres.
+        most: u32,
+    },
 }

@@ -1,4 +1,5 @@
-//! The box-on-plane scene of the thesis, with collision detection.
+//! The box-on-plane scene of the thesis, a scene of several shapes and a pile of spheres, with
+//! collision detection.
 //!
 //! A grid of cubes above a plane, as Bullet's demo `box on plane` builds it. A [`Scene`] holds the
 //! bodies and the collisions of their current poses; the accelerator steps them:
@@ -15,6 +16,9 @@
 //! # Ok::<(), scene::SceneError>(())
 //! ```
 //!
+//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes and capsules of several masses instead.
+//! [`Spheres`] is a pile that is no grid, for what depends on the order of collisions.
+//!
 //! The bits of every result are the same on every architecture and with every number of threads:
 //! arithmetic is f32 in a written order, parry3d is built with `enhanced-determinism`, and threads
 //! never decide an order.
@@ -24,15 +28,24 @@
 mod build;
 mod detect;
 mod error;
+mod geometry;
 mod grid;
 mod measure;
 mod rotation;
+mod several;
+mod spheres;
 
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
 pub use detect::MARGIN;
 pub use error::SceneError;
+pub use geometry::Geometry;
 pub use grid::Grid;
-pub use measure::{ground_pairs, kinetic_energy};
+pub use measure::{
+    KineticEnergy, Momentum, Penetration, carry_along, ground_pairs, kinetic_energy,
+    kinetic_energy_parts, momentum, penetration, potential_energy,
+};
+pub use several::ShapesOptions;
+pub use spheres::{RADII, SPHERES_MAX, Spheres};
 
 /// Index of the static ground among the bodies.
 pub const GROUND: u32 = 0;

@@ -14,7 +14,7 @@ kernel=$1 initrd=$2 log=$3
 limit=${BOOT_LIMIT:-900}
 scratch=$(mktemp -d) # the path of a socket must be short
 ram=$log.ram
-trap 'rm -rf "$scratch" "$ram"' EXIT
+litter+=("$scratch" "$ram")
 tree=$scratch/dtb
 dtc -q -I dts -O dtb -o "$tree" "${TREE:-$repository/tools/guest/zcu102.dts}"
 machine=xlnx-zcu102 shared=()
@@ -23,25 +23,27 @@ if [ -n "${BOARD:-}" ]; then
 	machine+=,memory-backend=ddr
 	shared=(-object "memory-backend-file,id=ddr,size=2G,mem-path=$ram,share=on" -accel tcg
 		-qtest "unix:$scratch/qtest,server=on,wait=off" -qtest-log /dev/null)
-	"$BOARD" --memory "$ram" --qtest "$scratch/qtest" --mailbox 0x31000000 \
-		--limit "$limit" > "$log.board" 2>&1 &
+	begin "$BOARD" --memory "$ram" --qtest "$scratch/qtest" --mailbox 0x31000000 \
+		--limit "$limit" > "$log.board" 2>&1
 	board=$!
 fi
-begin=$(date +%s%N)
+began=$(date +%s%N)
 code=0
 # The module takes its option where it is loaded; a kernel that has it built in takes it here.
-QEMU_AUDIO_DRV=none timeout "$limit" "${QEMU:-qemu-system-aarch64}" \
+QEMU_AUDIO_DRV=none begin timeout --kill-after=10 "$limit" "${QEMU:-qemu-system-aarch64}" \
 	-M "$machine" "${shared[@]}" -smp 2 -m 2G -display none -monitor none -serial stdio -no-reboot \
 	-kernel "$kernel/Image" -dtb "$tree" -initrd "$initrd" \
 	-append 'console=ttyPS0,115200n8 panic=-1 quiet uio_pdrv_genirq.of_id=generic-uio' \
-	< /dev/null 2> "$log.qemu" | tr -d '\r' > "$log" || code=$?
+	< /dev/null > "$log" 2> "$log.qemu"
+await $! || code=$?
+sed -i 's/\r//g' "$log"
 grep -a -E '^(guest:|ok |FAIL |  )' "$log" || true
-printf 'QEMU ended with %s after %s ms, log %s\n' "$code" $((($(date +%s%N) - begin) / 1000000)) "$log"
+printf 'QEMU ended with %s after %s ms, log %s\n' "$code" $((($(date +%s%N) - began) / 1000000)) "$log"
 
 if [ -n "${BOARD:-}" ]; then
 	served=0
-	[ $code = 0 ] || kill $board 2>/dev/null || true
-	wait $board || served=$?
+	[ $code = 0 ] || kill "$board" 2>/dev/null || true
+	await "$board" || served=$?
 	cat "$log.board"
 	[ $code != 0 ] || [ $served = 0 ] || fail "the board ended with $served"
 fi

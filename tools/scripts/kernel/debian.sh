@@ -12,6 +12,7 @@ if [ -f "$out/version" ]; then
 	exit 0
 fi
 need_packages make gcc-aarch64-linux-gnu xz-utils bc
+need_arm64
 need_lists
 image=$(apt-cache depends linux-image-arm64:arm64 | sed -n 's/.*Depends: \(linux-image-[^:]*\).*/\1/p' | head -n 1 || true)
 [ -n "$image" ] || skip "Debian's package linux-image-arm64:arm64 is not in the package lists"
@@ -38,7 +39,7 @@ echo 'obj-m := uio_pdrv_genirq.o' > uio/Makefile
 headers=$scratch/root/usr/src/linux-headers-$version
 # Its only absolute path: it expects to be installed.
 sed -i "s#^include /usr/src/#include $scratch/root/usr/src/#" "$headers/Makefile"
-timeout 300 make -s -C "$headers" M="$scratch/uio" ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu- modules
+attend timeout 300 make -s -C "$headers" M="$scratch/uio" ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu- modules
 
 cp "root/boot/vmlinuz-$version" "$out/Image"
 for module in "root/lib/modules/$version/kernel/drivers/uio/uio.ko" uio/uio_pdrv_genirq.ko; do

@@ -11,6 +11,7 @@ need_packages cpio
 kernel=$1 content=$2 output=$3
 cache=$target_root/kernel-test/busybox
 if [ ! -x "$cache/bin/busybox" ]; then
+	need_arm64
 	need_lists
 	mkdir -p "$cache"
 	(cd "$cache" && apt download busybox-static:arm64 && dpkg -x busybox-static_*.deb .) ||
@@ -18,7 +19,7 @@ if [ ! -x "$cache/bin/busybox" ]; then
 fi
 
 root=$(mktemp -d)
-trap 'rm -rf "$root"' EXIT
+litter+=("$root")
 chmod 755 "$root" # the guest's ordinary user is to see it too
 mkdir -p "$root"/{bin,sbin,usr/bin,usr/sbin,etc,proc,sys,dev,tmp,modules,checks}
 cp "$cache/bin/busybox" "$root/bin/"

@@ -24,7 +24,7 @@ apt download "$source" || skip "Debian's package $source cannot be fetched"
 dpkg -x "$source"_*.deb package
 tar -xJf "package/usr/src/$source.tar.xz"
 rm -r package
-kernel() { timeout 3600 make -s -C "$source" O="$PWD/build" ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu- "$@"; }
+kernel() { attend timeout 3600 make -s -C "$source" O="$PWD/build" ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu- "$@"; }
 kernel KCONFIG_ALLCONFIG="$config" allnoconfig
 for option in $(grep -o '^CONFIG_[A-Z0-9_]*=y' "$config"); do
 	grep -qx "$option" build/.config || fail "$source does not know $option, or drops it"

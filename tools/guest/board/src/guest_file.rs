@@ -110,7 +110,7 @@ impl Words for GuestPage {
         self.memory.load(self.address + u64::from(at))
     }
 
-    fn store(&self, at: u32, value: u32) -> io::Result<()> {
+    fn store(&mut self, at: u32, value: u32) -> io::Result<()> {
         self.memory.store(self.address + u64::from(at), value)
     }
 }
@@ -131,7 +131,7 @@ mod tests {
         let (file, mut memory) = memory(0x3000);
         memory.write_beats(0x2000, &[Beat([0x0403_0201, 5, 6, 7])]).expect("inside");
         memory.write_word(0x2008, 0x8000_0010).expect("inside");
-        let page = memory.page(0x2000).expect("inside");
+        let mut page = memory.page(0x2000).expect("inside");
         page.store(0x10, 9).expect("inside");
         let bytes = std::fs::read(file.path()).expect("read");
         assert_eq!(bytes[0x2000..0x2004], [1, 2, 3, 4]);

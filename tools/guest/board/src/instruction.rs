@@ -65,6 +65,13 @@ impl Registers {
     }
 }
 
+/// The instruction at `pc`, of the aligned pair around it.
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "one of the two")]
+pub const fn of_pair(pair: u64, pc: u64) -> u32 {
+    if pc & 4 == 0 { pair as u32 } else { (pair >> 32) as u32 }
+}
+
 fn bits(word: u32, low: u32, width: u32) -> u32 {
     (word >> low) & ((1 << width) - 1)
 }
@@ -158,6 +165,13 @@ mod tests {
     }
 
     // The words were made by GNU as.
+    #[test]
+    fn of_a_pair_the_instruction_at_the_counter_is_taken() {
+        let pair = 0xB940_0001_B900_0002;
+        assert_eq!(of_pair(pair, 0x40_0000), 0xB900_0002);
+        assert_eq!(of_pair(pair, 0x40_0004), 0xB940_0001);
+    }
+
     #[test]
     fn offsets_of_every_kind_are_added() {
         assert_eq!(decoded(0xB940_0020), plain(0x1000, false, 0)); // ldr w0, [x1]

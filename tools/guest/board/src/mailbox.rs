@@ -54,7 +54,7 @@ pub trait Words {
     ///
     /// # Errors
     /// The page cannot be reached.
-    fn store(&self, at: u32, value: u32) -> Result<(), Self::Error>;
+    fn store(&mut self, at: u32, value: u32) -> Result<(), Self::Error>;
 }
 
 /// One access to a register.
@@ -147,7 +147,7 @@ impl<W: Words> Client<W> {
         self.words.load(at).map_err(MailboxError::Page)
     }
 
-    fn store(&self, at: u32, value: u32) -> Result<(), MailboxError<W::Error>> {
+    fn store(&mut self, at: u32, value: u32) -> Result<(), MailboxError<W::Error>> {
         self.words.store(at, value).map_err(MailboxError::Page)
     }
 
@@ -211,7 +211,7 @@ impl<W: Words> Desk<W> {
     /// # Errors
     /// The page cannot be reached.
     pub fn open(words: W) -> Result<Self, MailboxError<W::Error>> {
-        let desk = Self { last: words.load(REQUEST).map_err(MailboxError::Page)?, words };
+        let mut desk = Self { last: words.load(REQUEST).map_err(MailboxError::Page)?, words };
         desk.words.store(ANSWER, desk.last).map_err(MailboxError::Page)?;
         desk.words.store(MARK, MARK_VALUE).map_err(MailboxError::Page)?;
         Ok(desk)
@@ -269,7 +269,7 @@ mod tests {
             Ok(self.0[at as usize / 4].load(Ordering::SeqCst))
         }
 
-        fn store(&self, at: u32, value: u32) -> Result<(), Infallible> {
+        fn store(&mut self, at: u32, value: u32) -> Result<(), Infallible> {
             self.0[at as usize / 4].store(value, Ordering::SeqCst);
             Ok(())
         }

@@ -38,12 +38,20 @@ pub(crate) fn nodes_by_name() -> Outcome {
         Err(PlatformError::NoMap { .. }) => {}
         other => return Err(format!("expected no map, found {other:?}").into()),
     }
-    match ReservedMemory::open(UIO_MEMORY_NODE).and_then(|_| UioDevice::open(UIO_MEMORY_NODE)) {
-        Ok(silent) => match silent.unmask() {
-            Err(PlatformError::NoInterrupt { .. }) => {}
-            other => return Err(format!("expected no interrupt, found {other:?}").into()),
-        },
-        Err(error) => return Err(error.into()),
+    for second in [
+        ReservedMemory::open(UIO_MEMORY_NODE).map(|_| ()),
+        UioDevice::open(UIO_MEMORY_NODE).map(|_| ()),
+        UioDevice::open(ZDMA_NODE).map(|_| ()),
+    ] {
+        match second {
+            Err(PlatformError::Busy { .. }) => {}
+            other => return Err(format!("expected it to be in use, found {other:?}").into()),
+        }
+    }
+    drop(memory);
+    match UioDevice::open(UIO_MEMORY_NODE)?.unmask() {
+        Err(PlatformError::NoInterrupt { .. }) => {}
+        other => return Err(format!("expected no interrupt, found {other:?}").into()),
     }
     Ok(format!("{} at {:#x}, memory at {:#x}", device.node().device, CHANNEL.0, MEMORY_BASE))
 }
@@ -51,7 +59,7 @@ pub(crate) fn nodes_by_name() -> Outcome {
 /// Nothing outside of a region can be reached, nothing between its words or beats.
 pub(crate) fn confined() -> Outcome {
     let device = UioDevice::open(ZDMA_NODE)?;
-    let registers = device.window("channel")?;
+    let mut registers = device.window("channel")?;
     let mut refused = 0;
     for at in [0x1000, 0x1004, 0xFFE, 1, 2, u32::MAX, u32::MAX - 3] {
         for result in [registers.read32(at).map(|_| ()), registers.write32(at, 0)] {
@@ -61,7 +69,7 @@ pub(crate) fn confined() -> Outcome {
             }
         }
     }
-    let memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
+    let mut memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
     let mut two = [Beat::default(); 2];
     let end = memory.bytes();
     for at in [end, end - 16, end - 8, 8, 1, u64::MAX, u64::MAX - 15] {
@@ -79,7 +87,7 @@ pub(crate) fn confined() -> Outcome {
 
 /// What is written to the memory is read from it, from its first beat to its last.
 pub(crate) fn memory() -> Outcome {
-    let memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
+    let mut memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
     let beats = 4097;
     let written = pattern(beats, 7);
     let last = memory.bytes() - (beats * BEAT_BYTES) as u64;

@@ -66,7 +66,7 @@ impl Engine {
         let memory = ReservedMemory::open(memory)?;
         let device = UioDevice::open(node)?;
         let registers = device.window("channel")?;
-        let this = Self { device, registers, memory };
+        let mut this = Self { device, registers, memory };
         this.disable_interrupt()?;
         this.registers.write32(ISR, ALL)?;
         this.registers.write32(CTRL0, SIMPLE_MODE)?;
@@ -81,17 +81,17 @@ impl Engine {
     }
 
     /// The engine's interrupt reaches the processor.
-    pub(crate) fn enable_interrupt(&self) -> Result<(), PlatformError> {
+    pub(crate) fn enable_interrupt(&mut self) -> Result<(), PlatformError> {
         self.registers.write32(IEN, DONE)
     }
 
     /// It does not.
-    pub(crate) fn disable_interrupt(&self) -> Result<(), PlatformError> {
+    pub(crate) fn disable_interrupt(&mut self) -> Result<(), PlatformError> {
         self.registers.write32(IDS, ALL)
     }
 
     /// Starts to copy `beats` from byte `from` of the memory to byte `to`.
-    pub(crate) fn start(&self, from: u64, to: u64, beats: usize) -> Result<(), PlatformError> {
+    pub(crate) fn start(&mut self, from: u64, to: u64, beats: usize) -> Result<(), PlatformError> {
         let bytes = beats as u64 * BEAT_BYTES as u64;
         for (register, at) in [(SOURCE, from), (DESTINATION, to)] {
             let [low, high] = halves(self.memory.address() + at);
@@ -128,7 +128,7 @@ impl Engine {
     }
 
     /// Takes the interrupt back, in the engine.
-    pub(crate) fn acknowledge(&self) -> Result<(), PlatformError> {
+    pub(crate) fn acknowledge(&mut self) -> Result<(), PlatformError> {
         self.registers.write32(ISR, ALL)
     }
 }

@@ -40,7 +40,7 @@ struct Transfer {
 
 impl Transfer {
     /// Source in the lower half of the memory, destination in the upper, moved by the seed.
-    fn prepare(engine: &Engine, beats: usize, seed: u32) -> Result<Self, Box<dyn Error>> {
+    fn prepare(engine: &mut Engine, beats: usize, seed: u32) -> Result<Self, Box<dyn Error>> {
         let half = engine.memory.bytes() / 2;
         let beat = BEAT_BYTES as u64;
         let room = half / beat - beats as u64 - 2;
@@ -55,7 +55,7 @@ impl Transfer {
         Ok(Self { data, from, to })
     }
 
-    fn start(&self, engine: &Engine) -> Result<(), Box<dyn Error>> {
+    fn start(&self, engine: &mut Engine) -> Result<(), Box<dyn Error>> {
         Ok(engine.start(self.from, self.to, self.data.len())?)
     }
 
@@ -82,7 +82,7 @@ impl Transfer {
 
 /// One transfer that is ended by its interrupt: its count, and how long it took.
 fn by_interrupt(
-    engine: &Engine,
+    engine: &mut Engine,
     beats: usize,
     seed: u32,
 ) -> Result<(u32, Duration), Box<dyn Error>> {
@@ -106,14 +106,14 @@ fn open() -> Result<Engine, crate::engine::EngineError> {
 
 /// Every power of two from 16 bytes to 1 MiB, and its neighbours.
 pub(crate) fn sizes() -> Outcome {
-    let engine = open()?;
+    let mut engine = open()?;
     engine.enable_interrupt()?;
     let (mut done, mut seed, mut slowest) = (0, 1, Duration::ZERO);
     for power in 0..=LARGEST.ilog2() {
         for beats in [(1usize << power) - 1, 1 << power, (1 << power) + 1] {
             if (1..=LARGEST).contains(&beats) {
                 let error = |error| format!("{} bytes: {error}", beats * BEAT_BYTES);
-                slowest = slowest.max(by_interrupt(&engine, beats, seed).map_err(error)?.1);
+                slowest = slowest.max(by_interrupt(&mut engine, beats, seed).map_err(error)?.1);
                 done += 1;
                 seed += 1;
             }
@@ -128,7 +128,7 @@ pub(crate) fn thousand() -> Outcome {
     const TRANSFERS: u32 = 1000;
     /// Each may have taken a whole wait.
     const ERRORS_SHOWN: usize = 5;
-    let engine = open()?;
+    let mut engine = open()?;
     engine.enable_interrupt()?;
     let (mut bytes, mut errors, mut lost) = (0, Vec::new(), 0);
     let mut last: Option<u32> = None;
@@ -137,7 +137,7 @@ pub(crate) fn thousand() -> Outcome {
         let octave = (seed * 7) % (LARGEST.ilog2() + 1);
         let beats = (1usize << octave) - (seed as usize % 97) % (1usize << octave).div_ceil(2);
         bytes += beats * BEAT_BYTES;
-        match by_interrupt(&engine, beats, seed) {
+        match by_interrupt(&mut engine, beats, seed) {
             Ok((count, _)) => {
                 if last.is_some_and(|last| count != last.wrapping_add(1)) {
                     lost += 1;
@@ -164,7 +164,7 @@ pub(crate) fn thousand() -> Outcome {
 
 /// No interrupt comes, the wait ends in time, polling finds the transfer done; afterwards
 /// interrupts work again.
-fn survive(engine: &Engine, seed: u32) -> Result<(), Box<dyn Error>> {
+fn survive(engine: &mut Engine, seed: u32) -> Result<(), Box<dyn Error>> {
     let transfer = Transfer::prepare(engine, 256, seed)?;
     transfer.start(engine)?;
     let begin = Instant::now();
@@ -183,23 +183,23 @@ fn survive(engine: &Engine, seed: u32) -> Result<(), Box<dyn Error>> {
 
 /// The engine keeps its interrupt to itself.
 pub(crate) fn suppressed_in_engine() -> Outcome {
-    let engine = open()?;
+    let mut engine = open()?;
     for seed in 1..=5 {
-        survive(&engine, seed)?;
+        survive(&mut engine, seed)?;
     }
     engine.enable_interrupt()?;
-    by_interrupt(&engine, 256, 6)?;
+    by_interrupt(&mut engine, 256, 6)?;
     engine.disable_interrupt()?;
     Ok("5 transfers found done by polling, then one by interrupt".to_owned())
 }
 
 /// The engine raises it, and the kernel keeps it back.
 pub(crate) fn masked_in_kernel() -> Outcome {
-    let engine = open()?;
+    let mut engine = open()?;
     engine.enable_interrupt()?;
     for seed in 1..=5 {
         engine.device.mask()?;
-        survive(&engine, seed)?;
+        survive(&mut engine, seed)?;
     }
     engine.device.unmask()?;
     if engine.device.wait_interrupt(QUIET)?.is_some() {
@@ -209,17 +209,17 @@ pub(crate) fn masked_in_kernel() -> Outcome {
             return Err("interrupts without a cause".into());
         }
     }
-    by_interrupt(&engine, 256, 6)?;
+    by_interrupt(&mut engine, 256, 6)?;
     engine.disable_interrupt()?;
     Ok("5 transfers found done by polling, then one by interrupt".to_owned())
 }
 
 /// The line is a level: let through before it is acknowledged in the engine, it comes again.
 pub(crate) fn not_acknowledged() -> Outcome {
-    let engine = open()?;
+    let mut engine = open()?;
     engine.enable_interrupt()?;
-    let transfer = Transfer::prepare(&engine, 64, 3)?;
-    transfer.start(&engine)?;
+    let transfer = Transfer::prepare(&mut engine, 64, 3)?;
+    transfer.start(&mut engine)?;
     let first = engine.device.wait_interrupt(LIMIT)?.ok_or("no interrupt came")?;
     engine.device.unmask()?;
     let second = engine.device.wait_interrupt(LIMIT)?.ok_or("it did not come again")?;

@@ -26,8 +26,8 @@ pub(crate) enum LoadError {
     NoFirmwareFile { manager: String, directory: PathBuf },
     #[error("{manager} has no file \"flags\" in {}: it loads full bitstreams only", directory.display())]
     NoFlags { manager: String, directory: PathBuf },
-    #[error("/dev/{device} ({node:?}) is open in {users}: its DMA cores may be running")]
-    InUse { device: String, node: String, users: String },
+    #[error("{device} is open in {users}: DMA cores may be running")]
+    InUse { device: String, users: String },
     #[error("no overlays in {}: {reason}", searched.display())]
     NoOverlays { searched: PathBuf, reason: &'static str, mounted: bool },
     #[error("the overlay {} is there already, {status}", directory.display())]

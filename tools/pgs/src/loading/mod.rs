@@ -2,8 +2,10 @@
 //! refusal leaves the board as it was.
 //!
 //! ```text
-//! users -> overlays -> firmware file -> fpga_manager -> state? -> overlay -> status? -> UIO node?
+//! users -> overlays -> firmware file -> users -> fpga_manager -> state? -> overlay -> status? -> UIO node?
 //! ```
+//!
+//! Who opens a node between the second look for users and the write to the manager is not seen.
 //!
 //! Source: linux-xlnx, `drivers/fpga/fpga-mgr.c` (attributes `flags`, `firmware`, `state`) and
 //! `drivers/of/configfs.c` (`overlays/<name>/{dtbo,status}`); mainline has neither.
@@ -84,6 +86,8 @@ pub(crate) fn load(system: &dyn System, request: &Request) -> Result<Loaded, Loa
 
     let state_before = manager.state()?;
     let firmware = Firmware::provide(system, &request.bitstream)?;
+    // Copying a bitstream takes long enough for a program to start.
+    users::refuse_if_open(system, &our_nodes(system)?)?;
     let start = Instant::now();
     let state = manager.program(system, firmware.name(), request.partial)?;
     let time = start.elapsed();

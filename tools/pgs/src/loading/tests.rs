@@ -23,6 +23,8 @@ struct FakeKernel {
     denied: Cell<&'static str>,
     /// Whether a UIO driver binds to the overlay's node.
     binds: Cell<bool>,
+    /// What a program opens while the bitstream is copied.
+    opened_meanwhile: Cell<Option<&'static str>>,
 }
 
 impl FakeKernel {
@@ -35,6 +37,7 @@ impl FakeKernel {
             status_after: Cell::new("applied"),
             denied: Cell::new("nothing"),
             binds: Cell::new(true),
+            opened_meanwhile: Cell::default(),
         };
         for (file, text) in
             [("name", "Xilinx ZynqMP FPGA Manager"), ("state", "unknown"), ("flags", "0")]
@@ -142,6 +145,9 @@ impl System for FakeKernel {
 
     fn copy(&self, from: &Path, to: &Path) -> io::Result<()> {
         self.allow(to.parent().expect("a folder"))?;
+        if let Some(device) = self.opened_meanwhile.get() {
+            self.add_process(4712, "late", device);
+        }
         Linux { root: PathBuf::new() }.copy(from, to)
     }
 }
@@ -249,6 +255,52 @@ fn a_node_that_a_program_has_open_keeps_the_bitstream() {
     let error = kernel.load(&file, false).expect_err("in use");
     assert_refused(&kernel, &error, "/dev/uio3 (\"pgs-dma1\")", "stop");
     assert!(error.to_string().contains("process 4711 (game)"), "{error}");
+}
+
+#[test]
+fn all_memory_that_a_program_has_open_keeps_the_bitstream() {
+    let kernel = FakeKernel::vendor();
+    let file = kernel.installed();
+    // Also where there is no node yet.
+    kernel.add_process(4711, "peek", "/dev/mem");
+    let error = kernel.load(&file, false).expect_err("in use");
+    assert_refused(&kernel, &error, "/dev/mem is open in process 4711 (peek)", "stop");
+    kernel.remove("proc/4711");
+    kernel.add_process(4711, "peek", "/dev/memory");
+    kernel.load(&file, false).expect("another file");
+}
+
+#[test]
+fn a_mapping_without_an_open_file_keeps_the_bitstream_too() {
+    let kernel = FakeKernel::vendor();
+    let file = kernel.installed();
+    kernel.add_node(3, "pgs");
+    let line = |file| format!("ffff8000-ffff9000 rw-s 00004000 00:06 431 {:20}{file}\n", "");
+    kernel.add_process(21, "other", "/dev/null");
+    kernel.file("proc/21/maps", &(line("/dev/uio33") + &line("")));
+    kernel.load(&file, false).expect("another device is no obstacle");
+    kernel.writes.borrow_mut().clear();
+    for device in ["/dev/uio3", "/dev/mem"] {
+        kernel.file("proc/21/maps", &(line("/usr/bin/other") + &line(device)));
+        let error = kernel.load(&file, false).expect_err("in use");
+        assert_refused(&kernel, &error, "is open in process 21 (other)", "stop");
+        assert!(error.to_string().starts_with(device), "{error}");
+    }
+}
+
+#[test]
+fn a_program_that_starts_while_the_bitstream_is_copied_keeps_it() {
+    for device in ["/dev/uio3", "/dev/mem"] {
+        let kernel = FakeKernel::vendor();
+        kernel.add_node(3, "pgs");
+        let file = kernel.file("home/zynq-pgs.bit.bin", "a bitstream");
+        kernel.opened_meanwhile.set(Some(device));
+        let error = kernel.load(&file, false).expect_err("in use");
+        assert_refused(&kernel, &error, "process 4712 (late)", "stop");
+        assert!(error.to_string().starts_with(device), "{error}");
+        let left = fs::read_dir(kernel.path("lib/firmware")).expect("the folder").count();
+        assert_eq!(left, 0, "the copy goes");
+    }
 }
 
 #[test]

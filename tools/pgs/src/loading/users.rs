@@ -1,29 +1,42 @@
-//! This file finds the programs that have a UIO node open.
+//! This file finds the programs that may be using the logic: that have one of its UIO nodes, or
+//! `/dev/mem`, open or mapped.
 
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use zynq_pgs::UioNode;
 
 use super::LoadError;
 use super::system::{System, read};
 
-/// Refuses if a program has one of the nodes open.
+/// Through it every register is reached past the nodes.
+const ALL_MEMORY: &str = "/dev/mem";
+
+/// Refuses if a program has one of the nodes, or all memory.
 pub(super) fn refuse_if_open(system: &dyn System, nodes: &[UioNode]) -> Result<(), LoadError> {
-    for node in nodes {
-        let users = users(&system.path("proc"), &node.device)?;
-        if !users.is_empty() {
-            let (device, node) = (node.device.clone(), node.name.clone());
-            return Err(LoadError::InUse { device, node, users: users.join(", ") });
-        }
-    }
-    Ok(())
+    let named = nodes.iter().map(|node| {
+        let path = Path::new("/dev").join(&node.device);
+        let name = format!("{} ({:?})", path.display(), node.name);
+        (path, name)
+    });
+    let devices: Vec<_> = named.chain([(ALL_MEMORY.into(), ALL_MEMORY.to_owned())]).collect();
+    let found = users(&system.path("proc"), &devices)?;
+    let Some(first) = found.first() else { return Ok(()) };
+    let device = first.device.to_owned();
+    let of_it = found.iter().filter(|user| user.device == device).map(|user| user.text.as_str());
+    Err(LoadError::InUse { users: of_it.collect::<Vec<_>>().join(", "), device })
 }
 
-/// Processes that have the device open, by number; what ends meanwhile does not count.
-fn users(proc: &Path, device: &str) -> Result<Vec<String>, LoadError> {
-    let device = Path::new("/dev").join(device);
+/// A process, and what it has.
+#[derive(Debug)]
+struct User<'a> {
+    device: &'a str,
+    text: String,
+}
+
+/// Processes that have one of the devices, by device and number; what ends meanwhile does not count.
+fn users<'a>(proc: &Path, devices: &'a [(PathBuf, String)]) -> Result<Vec<User<'a>>, LoadError> {
     let entries = match fs::read_dir(proc) {
         Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries.map_err(|source| LoadError::file("list", proc, source))?,
@@ -33,26 +46,37 @@ fn users(proc: &Path, device: &str) -> Result<Vec<String>, LoadError> {
     for entry in entries.filter_map(Result::ok) {
         let name = entry.file_name();
         let Some(id) = name.to_str().and_then(|name| name.parse::<u32>().ok()) else { continue };
-        let files = match fs::read_dir(entry.path().join("fd")) {
-            Ok(files) => files,
-            Err(error) => {
-                hidden += usize::from(error.kind() == io::ErrorKind::PermissionDenied);
-                continue;
+        let mut files = Vec::new();
+        let seen = add_open(&entry.path(), &mut files);
+        let seen = seen.and(add_mapped(&entry.path(), &mut files));
+        let denied = |error: io::Error| error.kind() == io::ErrorKind::PermissionDenied;
+        hidden += usize::from(seen.is_err_and(denied));
+        for (place, (path, device)) in devices.iter().enumerate() {
+            if files.contains(path) {
+                let name = read(&entry.path().join("comm")).unwrap_or_default();
+                let text = format!("process {id} ({name})");
+                users.push((place, id, User { device, text }));
             }
-        };
-        let is_device =
-            |file: fs::DirEntry| fs::read_link(file.path()).is_ok_and(|to| to == device);
-        if files.filter_map(Result::ok).any(is_device) {
-            let name = read(&entry.path().join("comm")).unwrap_or_default();
-            users.push((id, format!("process {id} ({name})")));
         }
     }
     if hidden > 0 {
-        log::warn!(
-            "whether {hidden} processes of others have {} open is not known",
-            device.display()
-        );
+        log::warn!("what {hidden} processes of others have open is not known");
     }
-    users.sort_unstable();
-    Ok(users.into_iter().map(|(_, text)| text).collect())
+    users.sort_unstable_by_key(|(place, id, _)| (*place, *id));
+    Ok(users.into_iter().map(|(.., user)| user).collect())
+}
+
+/// Adds the files that a process has open.
+fn add_open(process: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
+    let open = fs::read_dir(process.join("fd"))?.filter_map(Result::ok);
+    files.extend(open.filter_map(|file| fs::read_link(file.path()).ok()));
+    Ok(())
+}
+
+/// Adds the files that it has mapped: a mapping stays when its file is closed.
+fn add_mapped(process: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
+    // Addresses, rights, offset, device, inode, and the file if there is one.
+    let file = |line: &str| line.split_ascii_whitespace().nth(5).map(PathBuf::from);
+    files.extend(fs::read_to_string(process.join("maps"))?.lines().filter_map(file));
+    Ok(())
 }

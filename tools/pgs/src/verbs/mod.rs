@@ -1,12 +1,15 @@
 //! The verbs, one file each.
 
 pub(crate) mod check;
+pub(crate) mod compare;
+pub(crate) mod formats;
 pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
+pub(crate) mod order;
 pub(crate) mod run;
 pub(crate) mod solve;
-mod table;
+pub(crate) mod table;
 
 use std::io::Write;
 
@@ -23,8 +26,11 @@ pub(crate) const SCHEMA: u32 = 1;
 pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Failure> {
     match &command.verb {
         Verb::Run(args) => run::run(args, &command.common, out),
+        Verb::Compare(args) => compare::run(args, &command.common, out),
+        Verb::Formats(args) => formats::run(args, &command.common, out),
         Verb::Solve(args) => solve::run(args, &command.common, out),
         Verb::Model(args) => model::run(args, &command.common, out),
+        Verb::Order(args) => order::run(args, &command.common, out),
         Verb::List(args) => list::run(args, &command.common, out),
         Verb::Load(args) => load::run(args, &command.common, out),
         Verb::Check(args) => check::run(args, &command.common, out),

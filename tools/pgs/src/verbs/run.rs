@@ -3,9 +3,9 @@
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use scene::{Grid, Inertia, Scene, SceneOptions, ground_pairs, kinetic_energy};
+use scene::{Scene, ground_pairs, kinetic_energy};
 use serde_json::{Value, json};
 use zynq_pgs::{Limit, StepParameters, StepReport};
 
@@ -17,33 +17,29 @@ use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
 use crate::options::{BuildArgs, DeadlineArgs};
+use crate::scenes::SceneArgs;
 
 const EXAMPLES: &str = "\
 Examples:
   pgs run                                        the thesis' scene
   pgs run --grid 10x10x10 --steps 60 --report-every 10
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
+  pgs run --profile half --format thesis16       the thesis' design in sixteen bits
+  pgs run --scene shapes --inertia world --grid 8x8x8
   pgs run --bandwidth unlimited --json > run.json";
 
 /// Rows of the table, if not said otherwise.
 const ROWS: u32 = 15;
 
-/// Step a pile of cubes dropped on the ground.
+/// Step a pile dropped on the ground.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct RunArgs {
     /// Steps of 1/60 s.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: u32,
-    /// Cubes along each axis; y is up.
-    #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
-    grid: Grid,
-    /// Height of the lowest cubes above the ground at the start, m.
-    #[arg(long, value_name = "H", default_value_t = SceneOptions::default().drop, value_parser = drop_height)]
-    drop: f32,
-    /// Inverse inertia of the cubes: what Bullet computes (0.3676), or a textbook's (1.5).
-    #[arg(long, value_enum, default_value_t = InertiaName::Bullet)]
-    inertia: InertiaName,
+    #[command(flatten)]
+    scene: SceneArgs,
     /// Show every N-th step [default: a fifteenth of the steps]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     report_every: Option<u32>,
@@ -51,29 +47,6 @@ pub(crate) struct RunArgs {
     deadline: DeadlineArgs,
     #[command(flatten)]
     build: BuildArgs,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum InertiaName {
-    Bullet,
-    Textbook,
-}
-
-impl From<InertiaName> for Inertia {
-    fn from(name: InertiaName) -> Self {
-        match name {
-            InertiaName::Bullet => Self::Bullet,
-            InertiaName::Textbook => Self::Textbook,
-        }
-    }
-}
-
-fn drop_height(text: &str) -> Result<f32, String> {
-    let most = scene::DROP_MAX;
-    match text.parse::<f32>() {
-        Ok(height) if (0.0..=most).contains(&height) => Ok(height),
-        _ => Err(format!("expected a height from 0 to {most} m")),
-    }
 }
 
 /// What one step did.
@@ -161,10 +134,9 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let options = SceneOptions { grid: args.grid, drop: args.drop, inertia: args.inertia.into() };
     let mut opened = board::open(common, &args.build)?;
-    check_size(args.grid, &opened)?;
-    let mut scene = Scene::new(&options).map_err(Failure::input)?;
+    args.scene.check_size(&opened)?;
+    let mut scene = args.scene.build()?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
 
     let interrupt = Interrupt::install();
@@ -193,18 +165,12 @@ pub(crate) fn run(
     let digest = format!("{:016x}", digest::of_bodies(scene.bodies()));
     let complete = done == args.steps;
     if common.json {
+        let mut config = args.scene.to_json();
+        config["steps"] = args.steps.into();
         let document = json!({
             "schema": SCHEMA,
             "verb": "run",
-            "config": {
-                "grid": args.grid.to_string(),
-                "drop_m": args.drop,
-                "inertia": match args.inertia {
-                    InertiaName::Bullet => "bullet",
-                    InertiaName::Textbook => "textbook",
-                },
-                "steps": args.steps,
-            },
+            "config": config,
             "board": opened.to_json(),
             "complete": complete,
             "steps": documents,
@@ -224,30 +190,10 @@ pub(crate) fn run(
 /// Which board, which scene, and the names of the columns.
 fn print_heading(args: &RunArgs, opened: &Opened, out: &mut dyn Write) -> io::Result<()> {
     opened.print(out)?;
-    writeln!(
-        out,
-        "scene      {} cubes ({}) on a static ground, dropped from {} m, {} steps",
-        grouped(args.grid.cubes().into()),
-        args.grid,
-        args.drop,
-        args.steps
-    )?;
+    writeln!(out, "scene      {}, {} steps", args.scene.text(), args.steps)?;
     writeln!(out)?;
     heading(out, &COLUMNS)?;
     out.flush()
-}
-
-/// Refuses a grid that does not fit before memory is taken for it.
-fn check_size(grid: Grid, opened: &Opened) -> Result<(), Failure> {
-    let capacity = opened.accelerator.capabilities().body_capacity;
-    if grid.cubes() < capacity {
-        return Ok(());
-    }
-    let error = format!(
-        "a grid of {grid} is {} bodies with the ground, the board takes at most {capacity}",
-        u64::from(grid.cubes()) + 1
-    );
-    Err(Failure::input(error).next("give a smaller --grid"))
 }
 
 /// Detects collisions and takes one step.
@@ -270,7 +216,7 @@ fn step(
 }
 
 /// On stderr, and only if that is a terminal.
-fn progress_bar(steps: u32) -> ProgressBar {
+pub(super) fn progress_bar(steps: u32) -> ProgressBar {
     let bar = ProgressBar::new(steps.into());
     let style = "{bar:30} {pos}/{len} steps, {per_sec}, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(style) {

@@ -1,30 +1,31 @@
-//! This file finds the pairs of cubes that may touch.
+//! This file finds the pairs of bodies that may touch.
 //!
-//! Space is cut into cells as wide as two cubes are apart at most when they touch, so that partners
-//! of a cube have their centres in its own cell or one of the 26 around it. The cells are not stored:
-//! the cubes are sorted by their cell (x, then y, then z), and each cube looks forward only, at the
-//! rest of its own row of cells along z and at four neighbouring rows. In each of the five the
-//! partners are a range of the sorted cubes that moves forward as the cube does.
+//! Space is cut into cells as wide as the largest two bodies are apart at most when they touch, so
+//! that partners of a body have their centres in its own cell or one of the 26 around it. The cells
+//! are not stored: the bodies are sorted by their cell (x, then y, then z), and each body looks
+//! forward only, at the rest of its own row of cells along z and at four neighbouring rows. In each
+//! of the five the partners are a range of the sorted bodies that moves forward as the body does.
 
 use zynq_pgs::Body;
 
-use super::MARGIN;
-use crate::{CUBE_HALF_EXTENT, rotation};
+use super::{Geometries, MARGIN};
+use crate::{Geometry, rotation};
 
-/// Width of a cell, m: above the diagonal of a cube (3.4641 m) and the margin.
+/// Width of a cell, m: above the diagonal of a cube (3.4641 m) and the margin. No body of any scene
+/// is larger.
 const CELL: f32 = 3.5;
 
 /// What rounding may take away from a gap between two boxes, m; the narrow phase decides.
 const SLACK: f32 = 1e-3;
 
-/// Cells on either side of the origin. Beyond it cubes share the outermost cell, which costs time but
+/// Cells on either side of the origin. Beyond it bodies share the outermost cell, which costs time but
 /// loses no pair. 20 bits, less the neighbours' 1.
 const CELLS: f32 = 1_048_574.0;
 
 /// Bits of a cell's number along one axis.
 const BITS: u32 = 21;
 
-/// A cube in its cell.
+/// A body in its cell.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     /// Numbers of the cell along x, y and z, 21 bits each.
@@ -33,7 +34,7 @@ struct Entry {
     index: u32,
     /// Centre of mass, m.
     centre: [f32; 3],
-    /// Half extents of the box along the world's axes around the cube, m.
+    /// Half extents of the box along the world's axes around the body, m.
     reach: [f32; 3],
 }
 
@@ -45,11 +46,17 @@ pub(super) struct Broad {
 }
 
 impl Broad {
-    /// Writes the pairs of cubes whose boxes are not farther apart than the margin, lower index
+    /// Writes the pairs of bodies whose boxes are not farther apart than the margin, lower index
     /// first, sorted. `bodies[0]` is the ground and takes no part.
-    pub(super) fn pairs(&mut self, bodies: &[Body], pairs: &mut Vec<(u32, u32)>) {
+    pub(super) fn pairs(
+        &mut self,
+        bodies: &[Body],
+        geometries: Geometries<'_>,
+        pairs: &mut Vec<(u32, u32)>,
+    ) {
         self.entries.clear();
-        self.entries.extend((0..).zip(bodies).skip(1).filter_map(|(i, b)| entry(i, b)));
+        let placed = (0..).zip(bodies).skip(1);
+        self.entries.extend(placed.filter_map(|(i, b)| entry(i, b, geometries.of(b)?)));
         self.entries.sort_unstable_by_key(|entry| (entry.cell, entry.index));
 
         self.keys.clear();
@@ -67,7 +74,7 @@ impl Broad {
                 while end < entries.len() && entries[end].cell <= cell + 1 {
                     end += 1;
                 }
-                // In the own row each pair is seen from its first cube only.
+                // In the own row each pair is seen from its first body only.
                 let from = if row == 0 { position + 1 } else { start };
                 for other in &entries[from..end] {
                     if near(own, other) {
@@ -93,11 +100,19 @@ impl Broad {
     }
 }
 
-/// Where a cube is; `None` if its pose is not finite.
-fn entry(index: u32, body: &Body) -> Option<Entry> {
+/// Where a body is; `None` if its pose is not finite.
+fn entry(index: u32, body: &Body, geometry: Geometry) -> Option<Entry> {
     let centre = body.pose.position;
-    let reach = rotation::matrix(body.pose.orientation)
-        .map(|[x, y, z]| ((x.abs() + y.abs()) + z.abs()) * CUBE_HALF_EXTENT);
+    let rows = rotation::matrix(body.pose.orientation);
+    let reach = match geometry {
+        Geometry::Box { half_extents: [hx, hy, hz] } => {
+            rows.map(|[x, y, z]| (x.abs() * hx + y.abs() * hy) + z.abs() * hz)
+        }
+        Geometry::Sphere { radius } => [radius; 3],
+        Geometry::Capsule { half_height, radius } => {
+            rows.map(|[_, y, _]| y.abs() * half_height + radius)
+        }
+    };
     if !centre.iter().chain(&reach).all(|value| value.is_finite()) {
         return None;
     }
@@ -118,7 +133,7 @@ fn cell_number(coordinate: f32) -> u64 {
     number
 }
 
-/// Whether the boxes around two cubes are not farther apart than the margin.
+/// Whether the boxes around two bodies are not farther apart than the margin.
 fn near(a: &Entry, b: &Entry) -> bool {
     (0..3).all(|axis| {
         (a.centre[axis] - b.centre[axis]).abs()
@@ -133,6 +148,8 @@ mod tests {
 
     use super::*;
 
+    const CUBES: Geometries<'static> = Geometries(&[None, Some(Geometry::CUBE)]);
+
     fn body(position: [f32; 3], q: [f32; 4]) -> Body {
         let length = (((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]).sqrt();
         let orientation = q.map(|value| value / length);
@@ -141,7 +158,7 @@ mod tests {
 
     fn every_pair(bodies: &[Body]) -> Vec<(u32, u32)> {
         let entries: Vec<Entry> =
-            (0..).zip(bodies).skip(1).filter_map(|(i, b)| entry(i, b)).collect();
+            (0..).zip(bodies).skip(1).filter_map(|(i, b)| entry(i, b, Geometry::CUBE)).collect();
         let mut pairs = Vec::new();
         for (n, a) in entries.iter().enumerate() {
             for b in &entries[n + 1..] {
@@ -165,7 +182,7 @@ mod tests {
             bodies.extend(cubes.into_iter().map(|(position, q)| body(position, q)));
             bodies.extend(far.into_iter().map(|position| body(position, [0.0, 0.0, 0.0, 1.0])));
             let mut pairs = Vec::new();
-            Broad::default().pairs(&bodies, &mut pairs);
+            Broad::default().pairs(&bodies, CUBES, &mut pairs);
             prop_assert_eq!(pairs, every_pair(&bodies));
         }
     }
@@ -176,7 +193,7 @@ mod tests {
         let bodies = [[0.0; 3], [9e6, 0.0, 0.0], [9e6, 2.0, 0.0], [-9e30, 0.0, 9e30]]
             .map(|position| body(position, level));
         let mut pairs = Vec::new();
-        Broad::default().pairs(&bodies, &mut pairs);
+        Broad::default().pairs(&bodies, CUBES, &mut pairs);
         assert_eq!(pairs, [(1, 2)]);
     }
 
@@ -186,7 +203,7 @@ mod tests {
         let mut bodies = [[0.0; 3], [1.0; 3], [1.5; 3]].map(|position| body(position, level));
         bodies[2].pose.orientation[0] = f32::NAN;
         let mut pairs = vec![(9, 9)];
-        Broad::default().pairs(&bodies, &mut pairs);
+        Broad::default().pairs(&bodies, CUBES, &mut pairs);
         assert!(pairs.is_empty());
     }
 }

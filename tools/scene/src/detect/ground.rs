@@ -1,54 +1,86 @@
-//! This file finds where a cube touches the ground.
+//! This file finds where a body touches the ground.
 //!
 //! The ground is taken as the plane y = 0, not as the box of 400 m half extent that it is: relative
 //! to the centre of that box an f32 carries the height of a corner in steps of 0.03 mm, while from
-//! the plane it is the corner's own y. Cubes touch it with the corners of the face that looks down
-//! most; the three lowest corners of a cube always belong to that face.
+//! the plane it is the corner's own y. Boxes touch it with the corners of the face that looks down
+//! most, to which the three lowest corners always belong; spheres with their lowest point, capsules
+//! with the lowest point of either end.
 
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
 
 use super::MARGIN;
-use crate::{CUBE_HALF_EXTENT, GROUND, rotation};
+use crate::{GROUND, Geometry, rotation};
 
-/// From the cube (B) down to the ground (A).
+/// From the body (B) down to the ground (A).
 const NORMAL: [f32; 3] = [0.0, -1.0, 0.0];
 
-/// The collision of the cube `body` of index `index` with the ground, if there is one.
-pub(super) fn collide(index: u32, body: &Body) -> Option<Collision> {
+/// The contact points of a body while they are found.
+#[derive(Default)]
+struct Points {
+    contacts: [Contact; CONTACT_POINTS],
+    count: usize,
+}
+
+impl Points {
+    /// Takes a point that is near enough; a body has four at most.
+    fn offer(&mut self, point: [f32; 3]) {
+        // Written so that a NaN is no contact.
+        if point[1] <= MARGIN && point.iter().all(|value| value.is_finite()) {
+            self.contacts[self.count] = Contact { point, distance: point[1] };
+            self.count += 1;
+        }
+    }
+}
+
+/// The collision of the body of index `index` with the ground, if there is one.
+pub(super) fn collide(index: u32, body: &Body, geometry: Geometry) -> Option<Collision> {
+    let centre = body.pose.position;
+    let mut points = Points::default();
+    match geometry {
+        Geometry::Box { half_extents } => offer_face(body, half_extents, &mut points),
+        Geometry::Sphere { radius } => points.offer([centre[0], centre[1] - radius, centre[2]]),
+        Geometry::Capsule { half_height, radius } => {
+            let rows = rotation::matrix(body.pose.orientation);
+            for end in [half_height, -half_height] {
+                let [x, y, z] = [0, 1, 2].map(|row| centre[row] + rows[row][1] * end);
+                points.offer([x, y - radius, z]);
+            }
+        }
+    }
+    let Points { contacts, count } = points;
+    // At most four.
+    let count = u32::try_from(count).ok().filter(|&count| count > 0)?;
+    Some(Collision { body_a: GROUND, body_b: index, normal: NORMAL, count, contacts })
+}
+
+/// Offers the corners of the face of a box that looks down most.
+fn offer_face(body: &Body, half_extents: [f32; 3], points: &mut Points) {
     let centre = body.pose.position;
     let rows = rotation::matrix(body.pose.orientation);
 
-    // The body axis closest to the vertical, of equals the first.
+    // The body axis along which the faces are farthest apart in height, of equals the first.
+    let height = |axis: usize| rows[1][axis].abs() * half_extents[axis];
     let mut axis = 0;
     for other in 1..3 {
-        if rows[1][other].abs() > rows[1][axis].abs() {
+        if height(other) > height(axis) {
             axis = other;
         }
     }
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let down = if rows[1][axis] > 0.0 { -CUBE_HALF_EXTENT } else { CUBE_HALF_EXTENT };
+    let down = if rows[1][axis] > 0.0 { -half_extents[axis] } else { half_extents[axis] };
 
-    let mut contacts = [Contact::default(); CONTACT_POINTS];
-    let mut count = 0;
     for (su, sv) in [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)] {
         let mut corner = [0.0; 3];
         corner[axis] = down;
-        corner[u] = su * CUBE_HALF_EXTENT;
-        corner[v] = sv * CUBE_HALF_EXTENT;
+        corner[u] = su * half_extents[u];
+        corner[v] = sv * half_extents[v];
         let mut point = [0.0; 3];
         for row in 0..3 {
             let [x, y, z] = rows[row];
             point[row] = centre[row] + ((x * corner[0] + y * corner[1]) + z * corner[2]);
         }
-        // Written so that a NaN is no contact.
-        if point[1] <= MARGIN && point.iter().all(|value| value.is_finite()) {
-            contacts[count] = Contact { point, distance: point[1] };
-            count += 1;
-        }
+        points.offer(point);
     }
-    // At most four.
-    let count = u32::try_from(count).ok().filter(|&count| count > 0)?;
-    Some(Collision { body_a: GROUND, body_b: index, normal: NORMAL, count, contacts })
 }
 
 #[cfg(test)]
@@ -57,6 +89,11 @@ mod tests {
     use zynq_pgs::{Pose, Velocity};
 
     use super::*;
+
+    /// The collision of a cube.
+    fn collide(index: u32, body: &Body) -> Option<Collision> {
+        super::collide(index, body, Geometry::CUBE)
+    }
 
     fn cube(position: [f32; 3], orientation: [f32; 4]) -> Body {
         Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
@@ -125,5 +162,41 @@ mod tests {
             assert!(collide(1, &cube([0.0, value, 0.0], [0.0, 0.0, 0.0, 1.0])).is_none());
             assert!(collide(1, &cube([0.0; 3], [value, 0.0, 0.0, 1.0])).is_none());
         }
+    }
+
+    #[test]
+    fn a_sphere_touches_with_its_lowest_point_and_a_capsule_with_its_ends() {
+        let level = [0.0, 0.0, 0.0, 1.0];
+        let sphere = Geometry::Sphere { radius: 0.5 };
+        let found = super::collide(3, &cube([2.0, 0.49, 1.0], level), sphere).expect("contact");
+        assert_eq!(found.count, 1);
+        assert!((found.contacts[0].distance + 0.01).abs() < 1e-6, "{found:?}");
+        assert_eq!(found.contacts[0].point[0], 2.0);
+        assert!(super::collide(3, &cube([2.0, 0.521, 1.0], level), sphere).is_none());
+
+        let capsule = Geometry::Capsule { half_height: 0.6, radius: 0.4 };
+        let upright = super::collide(3, &cube([0.0, 1.0, 0.0], level), capsule).expect("contact");
+        assert_eq!(upright.count, 1, "on one end");
+        // A quarter turn about x lays it along z.
+        let half = 0.5_f32.sqrt();
+        let lying = cube([0.0, 0.39, 0.0], [half, 0.0, 0.0, half]);
+        let lying = super::collide(3, &lying, capsule).expect("contact");
+        assert_eq!(lying.count, 2, "on both");
+        assert!((lying.contacts[0].point[2] - 0.6).abs() < 1e-6, "{lying:?}");
+        assert!((lying.contacts[1].distance + 0.01).abs() < 1e-6, "{lying:?}");
+    }
+
+    #[test]
+    fn a_slab_lies_on_its_broad_face_even_when_tilted() {
+        let slab = Geometry::Box { half_extents: [1.0, 0.25, 0.5] };
+        let flat = cube([0.0, 0.245, 0.0], [0.0, 0.0, 0.0, 1.0]);
+        let found = super::collide(1, &flat, slab).expect("contact");
+        assert_eq!(found.count, 4);
+        // Turned by half a degree about z, which lowers one end by 9 mm: all four are near.
+        let tilted = cube([0.0, 0.25, 0.0], [0.0, 0.0, 0.004_363_3, 0.999_990_5]);
+        let found = super::collide(1, &tilted, slab).expect("contact");
+        assert_eq!(found.count, 4);
+        let depths = found.contacts.map(|contact| contact.distance);
+        assert!(depths.iter().filter(|depth| **depth < -0.008).count() == 2, "{depths:?}");
     }
 }

@@ -17,11 +17,24 @@ use zynq_pgs::{Body, Collision};
 use broad::Broad;
 use narrow::Narrow;
 
+use crate::Geometry;
+
 /// Distance up to which two bodies collide, m (Bullet's contact threshold).
 pub const MARGIN: f32 = 0.02;
 
 /// Fewest pairs for which a further thread pays.
 const PAIRS_PER_THREAD: usize = 4096;
+
+/// What bodies look like, by their index into the shape table; nothing for the ground.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Geometries<'a>(pub(crate) &'a [Option<Geometry>]);
+
+impl Geometries<'_> {
+    /// What a body looks like; `None` if it touches nothing but as the ground.
+    fn of(self, body: &Body) -> Option<Geometry> {
+        self.0.get(usize::try_from(body.shape).ok()?).copied().flatten()
+    }
+}
 
 /// Finds collisions, keeping its buffers from one time to the next.
 #[derive(Debug)]
@@ -52,11 +65,17 @@ impl Detector {
     }
 
     /// Replaces `collisions` by those of `bodies`, sorted by body A, then body B.
-    pub(crate) fn detect(&mut self, bodies: &[Body], collisions: &mut Vec<Collision>) {
+    pub(crate) fn detect(
+        &mut self,
+        bodies: &[Body],
+        geometries: Geometries<'_>,
+        collisions: &mut Vec<Collision>,
+    ) {
         collisions.clear();
-        collisions.extend((0..).zip(bodies).skip(1).filter_map(|(i, b)| ground::collide(i, b)));
+        let placed = (0..).zip(bodies).skip(1);
+        collisions.extend(placed.filter_map(|(i, b)| ground::collide(i, b, geometries.of(b)?)));
 
-        self.broad.pairs(bodies, &mut self.pairs);
+        self.broad.pairs(bodies, geometries, &mut self.pairs);
         let threads = self.threads.min(self.pairs.len() / PAIRS_PER_THREAD).max(1);
         let share = self.pairs.len().div_ceil(threads).max(1);
         if self.workers.len() < threads {
@@ -66,10 +85,10 @@ impl Detector {
         let own = work.next();
         thread::scope(|scope| {
             for (worker, pairs) in work {
-                scope.spawn(|| worker.collide(bodies, pairs));
+                scope.spawn(|| worker.collide(bodies, geometries, pairs));
             }
             if let Some((worker, pairs)) = own {
-                worker.collide(bodies, pairs);
+                worker.collide(bodies, geometries, pairs);
             }
         });
         let used = self.pairs.chunks(share).len();
@@ -80,10 +99,11 @@ impl Detector {
 }
 
 impl Worker {
-    fn collide(&mut self, bodies: &[Body], pairs: &[(u32, u32)]) {
+    fn collide(&mut self, bodies: &[Body], geometries: Geometries<'_>, pairs: &[(u32, u32)]) {
         self.found.clear();
         let narrow = &mut self.narrow;
-        self.found.extend(pairs.iter().filter_map(|&pair| narrow.collide(bodies, pair)));
+        self.found
+            .extend(pairs.iter().filter_map(|&pair| narrow.collide(bodies, geometries, pair)));
     }
 }
 
@@ -92,6 +112,8 @@ mod tests {
     use zynq_pgs::{Pose, Velocity};
 
     use super::*;
+
+    const CUBES: Geometries<'static> = Geometries(&[None, Some(Geometry::CUBE)]);
 
     /// A heap of cubes in all orientations, as deep in each other as a pile never is.
     fn heap(cubes: u32) -> Vec<Body> {
@@ -132,7 +154,7 @@ mod tests {
     fn collisions_are_what_a_step_takes() {
         let bodies = heap(4000);
         let mut collisions = Vec::new();
-        Detector::default().detect(&bodies, &mut collisions);
+        Detector::default().detect(&bodies, CUBES, &mut collisions);
         let grounded = crate::ground_pairs(&collisions);
         assert!(grounded > 100 && collisions.len() > 4000, "{grounded} of {}", collisions.len());
 
@@ -155,7 +177,7 @@ mod tests {
         let bodies = heap(6000);
         let mut one = Detector::with_threads(1);
         let mut found = Vec::new();
-        one.detect(&bodies, &mut found);
+        one.detect(&bodies, CUBES, &mut found);
         assert!(one.pairs.len() > 3 * PAIRS_PER_THREAD, "{} pairs", one.pairs.len());
         let expected = bits(&found);
 
@@ -164,7 +186,7 @@ mod tests {
             let mut found = Vec::new();
             // The second time with used buffers, after another scene.
             for cubes in [bodies.len(), 3000, bodies.len()] {
-                detector.detect(&bodies[..cubes], &mut found);
+                detector.detect(&bodies[..cubes], CUBES, &mut found);
             }
             assert_eq!(bits(&found), expected, "{threads} threads");
         }
@@ -173,7 +195,7 @@ mod tests {
     #[test]
     fn the_bits_are_the_same_in_every_build_and_on_every_architecture() {
         let mut collisions = Vec::new();
-        Detector::default().detect(&heap(4000), &mut collisions);
+        Detector::default().detect(&heap(4000), CUBES, &mut collisions);
         // FNV-1a, 64 bits, over the words.
         let mut digest = 0xCBF2_9CE4_8422_2325_u64;
         for word in bits(&collisions) {
@@ -185,7 +207,7 @@ mod tests {
     #[test]
     fn no_bodies_have_no_collisions() {
         let mut collisions = Vec::new();
-        Detector::default().detect(&[], &mut collisions);
+        Detector::default().detect(&[], CUBES, &mut collisions);
         assert!(collisions.is_empty());
     }
 }

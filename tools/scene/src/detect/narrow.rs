@@ -1,25 +1,31 @@
-//! This file finds where two cubes touch.
+//! This file finds where two bodies touch.
 //!
 //! parry3d computes the contact manifold in the frame of its first shape, which is our body A. Its
 //! normal points from A to B, ours from B to A; its distances mean the same.
 
 use parry3d::math::{Pose, Rotation, Vector};
-use parry3d::query::ContactManifold;
 use parry3d::query::details::contact_manifold_cuboid_cuboid;
-use parry3d::shape::Cuboid;
+use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use parry3d::shape::{Ball, Capsule, Cuboid, PackedFeatureId, Shape};
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
 
-use super::MARGIN;
 use super::reduce::{Candidate, reduce};
-use crate::CUBE_HALF_EXTENT;
+use super::{Geometries, MARGIN};
+use crate::Geometry;
 
 /// How far from 1 the length of a normal may be: rounding is far below, a broken pose above.
 const NORMAL_TOLERANCE: f32 = 5e-4;
 
+/// Points nearer to each other than this are one, m². Pieces of a line are cut off in equal points
+/// where only one is left.
+const SAME_POINT: f32 = 1e-8;
+
+/// What rounding may make of two equal distances, m.
+const SAME_DEPTH: f32 = 1e-4;
+
 /// The narrow phase, with its buffers.
 #[derive(Debug)]
 pub(super) struct Narrow {
-    cube: Cuboid,
     manifold: ContactManifold<(), ()>,
     candidates: Vec<Candidate>,
     on_b: Vec<Vector>,
@@ -27,30 +33,30 @@ pub(super) struct Narrow {
 
 impl Default for Narrow {
     fn default() -> Self {
-        Self {
-            cube: Cuboid::new(Vector::splat(CUBE_HALF_EXTENT)),
-            manifold: ContactManifold::new(),
-            candidates: Vec::new(),
-            on_b: Vec::new(),
-        }
+        Self { manifold: ContactManifold::new(), candidates: Vec::new(), on_b: Vec::new() }
     }
 }
 
 impl Narrow {
-    /// The collision of the cubes `a` and `b` of `bodies`, if there is one.
-    pub(super) fn collide(&mut self, bodies: &[Body], (a, b): (u32, u32)) -> Option<Collision> {
-        let pose_a = pose(bodies.get(usize::try_from(a).ok()?)?);
-        let pose_b = pose(bodies.get(usize::try_from(b).ok()?)?);
-
-        // Without points of an earlier pair parry starts afresh, so that a result depends on the
-        // two poses alone.
-        self.manifold.clear();
-        let b_in_a = pose_a.inv_mul(&pose_b);
-        contact_manifold_cuboid_cuboid(&b_in_a, &self.cube, &self.cube, MARGIN, &mut self.manifold);
+    /// The collision of the bodies `a` and `b` of `bodies`, if there is one.
+    pub(super) fn collide(
+        &mut self,
+        bodies: &[Body],
+        geometries: Geometries<'_>,
+        (a, b): (u32, u32),
+    ) -> Option<Collision> {
+        let body_a = bodies.get(usize::try_from(a).ok()?)?;
+        let body_b = bodies.get(usize::try_from(b).ok()?)?;
+        let (pose_a, pose_b) = (pose(body_a), pose(body_b));
+        let (geometry_a, geometry_b) = (geometries.of(body_a)?, geometries.of(body_b)?);
+        let curved = self.touch(&pose_a.inv_mul(&pose_b), geometry_a, geometry_b)?;
 
         self.candidates.clear();
         self.on_b.clear();
         for point in &self.manifold.points {
+            if curved && self.on_b.iter().any(|p| p.distance_squared(point.local_p2) < SAME_POINT) {
+                continue;
+            }
             // Written so that a NaN is no contact.
             if point.dist <= MARGIN && point.dist.is_finite() && point.local_p2.is_finite() {
                 self.candidates
@@ -81,6 +87,49 @@ impl Narrow {
     }
 }
 
+impl Narrow {
+    /// Has parry compute the manifold of two geometries; whether one has a curved side. `None` if
+    /// parry does not know the pair.
+    fn touch(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<bool> {
+        // Without points and normals of an earlier pair parry starts afresh, so that a result
+        // depends on the two poses alone.
+        let manifold = &mut self.manifold;
+        manifold.clear();
+        manifold.local_n1 = Vector::ZERO;
+        manifold.local_n2 = Vector::ZERO;
+        if let (Geometry::Box { half_extents: a }, Geometry::Box { half_extents: b }) = (a, b) {
+            let (a, b) = (Cuboid::new(Vector::from_array(a)), Cuboid::new(Vector::from_array(b)));
+            contact_manifold_cuboid_cuboid(b_in_a, &a, &b, MARGIN, manifold);
+            return Some(false);
+        }
+        with_shape(a, |a| {
+            with_shape(b, |b| {
+                let parry = DefaultQueryDispatcher;
+                parry.contact_manifold_convex_convex(b_in_a, a, b, None, None, MARGIN, manifold)
+            })
+        })
+        .ok()?;
+        // To the points of two features parry adds the nearest one, last and without a feature.
+        // Where a capsule lies flat that is any point of a line whose ends are there already.
+        if let [others @ .., nearest] = &self.manifold.points[..]
+            && nearest.fid1 == PackedFeatureId::UNKNOWN
+            && others.iter().any(|other| other.dist <= nearest.dist + SAME_DEPTH)
+        {
+            self.manifold.points.pop();
+        }
+        Some(true)
+    }
+}
+
+/// Hands parry's shape of that geometry to `then`.
+fn with_shape<R>(geometry: Geometry, then: impl FnOnce(&dyn Shape) -> R) -> R {
+    match geometry {
+        Geometry::Box { half_extents } => then(&Cuboid::new(Vector::from_array(half_extents))),
+        Geometry::Sphere { radius } => then(&Ball::new(radius)),
+        Geometry::Capsule { half_height, radius } => then(&Capsule::new_y(half_height, radius)),
+    }
+}
+
 fn pose(body: &Body) -> Pose {
     Pose::from_parts(
         Vector::from_array(body.pose.position),
@@ -102,7 +151,8 @@ mod tests {
     }
 
     fn collide(a: Body, b: Body) -> Option<Collision> {
-        Narrow::default().collide(&[a, b], (0, 1))
+        let cubes = Geometries(&[None, Some(Geometry::CUBE)]);
+        Narrow::default().collide(&[a, b], cubes, (0, 1))
     }
 
     #[test]
@@ -214,5 +264,87 @@ mod tests {
         let contact = found.contacts[0];
         assert!((contact.distance + 0.008_427).abs() < 1e-3, "{found:?}");
         assert!(contact.point[0].abs() < 1e-3 && contact.point[2].abs() < 1e-3, "{found:?}");
+    }
+
+    const SPHERE: Geometry = Geometry::Sphere { radius: 0.5 };
+    const CAPSULE: Geometry = Geometry::Capsule { half_height: 0.6, radius: 0.4 };
+
+    /// The collision of two bodies of these geometries, and that of the two the other way round.
+    fn pair(a: (Geometry, Body), b: (Geometry, Body)) -> Option<[Collision; 2]> {
+        let shaped = |(_, body): (Geometry, Body), shape| Body { shape, ..body };
+        let bodies = [shaped(a, 0), shaped(b, 1)];
+        let outlines = [Some(a.0), Some(b.0)];
+        let mut narrow = Narrow::default();
+        let mut of = |pair| narrow.collide(&bodies, Geometries(&outlines), pair);
+        match (of((0, 1)), of((1, 0))) {
+            (Some(found), Some(reverse)) => Some([found, reverse]),
+            (None, None) => None,
+            other => panic!("one way only: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn spheres_touch_in_one_point_between_their_centres() {
+        let b = (SPHERE, cube([0.0, 1.99, 0.0], LEVEL));
+        let [found, reverse] = pair((SPHERE, cube([0.0, 1.0, 0.0], LEVEL)), b).expect("contact");
+        assert_eq!((found.count, found.normal), (1, [0.0, -1.0, 0.0]));
+        assert_eq!(reverse.normal, [0.0, 1.0, 0.0]);
+        assert!((found.contacts[0].distance + 0.01).abs() < 1e-6, "{found:?}");
+        assert!((found.contacts[0].point[1] - 1.49).abs() < 1e-6, "{found:?}");
+        assert!((reverse.contacts[0].point[1] - 1.5).abs() < 1e-6, "{reverse:?}");
+        assert!(pair((SPHERE, cube([0.0, 0.969, 0.0], LEVEL)), b).is_none());
+    }
+
+    #[test]
+    fn a_sphere_on_a_box_touches_its_face_edge_or_corner() {
+        let a = (Geometry::CUBE, cube([0.0; 3], LEVEL));
+        let on = |position| pair(a, (SPHERE, cube(position, LEVEL)));
+        let [face, _] = on([0.3, 1.495, -0.2]).expect("face");
+        assert_eq!(face.count, 1);
+        assert!((face.normal[1] + 1.0).abs() < 1e-6, "{face:?}");
+        assert!((face.contacts[0].distance + 0.005).abs() < 1e-5, "{face:?}");
+        // Beyond a corner, along its diagonal: 0.49 m away.
+        let beyond = 1.0 + 0.49 / 3.0_f32.sqrt();
+        let [corner, _] = on([beyond; 3]).expect("corner");
+        assert!((corner.contacts[0].distance + 0.01).abs() < 1e-5, "{corner:?}");
+        assert!(corner.normal.iter().all(|n| (n + 3.0_f32.sqrt().recip()).abs() < 1e-5));
+    }
+
+    #[test]
+    fn a_capsule_lies_on_a_box_with_both_ends_and_stands_on_one() {
+        let half = 0.5_f32.sqrt();
+        let a = (Geometry::CUBE, cube([0.0; 3], LEVEL));
+        // A quarter turn about x lays it along z.
+        let [lying, _] =
+            pair(a, (CAPSULE, cube([0.0, 1.39, 0.0], [half, 0.0, 0.0, half]))).expect("lying");
+        assert_eq!(lying.count, 2, "{lying:?}");
+        for contact in &lying.contacts[..2] {
+            assert!((contact.distance + 0.01).abs() < 1e-4, "{lying:?}");
+            assert!((contact.point[1] - 0.99).abs() < 1e-4, "{lying:?}");
+            assert!((contact.point[2].abs() - 0.6).abs() < 1e-4, "{lying:?}");
+        }
+        let [standing, _] = pair(a, (CAPSULE, cube([0.0, 1.99, 0.0], LEVEL))).expect("standing");
+        assert_eq!(standing.count, 1, "{standing:?}");
+        assert!((standing.contacts[0].distance + 0.01).abs() < 1e-4, "{standing:?}");
+        // Its round end reaches a corner's diagonal no farther than its radius.
+        let beyond = 1.0 + 0.43 / 3.0_f32.sqrt();
+        let far = cube([beyond, beyond + 0.6, beyond], LEVEL);
+        assert!(pair(a, (CAPSULE, far)).is_none());
+    }
+
+    #[test]
+    fn capsules_and_spheres_touch_where_they_are_nearest() {
+        let half = 0.5_f32.sqrt();
+        let a = (CAPSULE, cube([0.0; 3], [half, 0.0, 0.0, half]));
+        // Crossed: one along z, the other along x above it.
+        let crossed = cube([0.0, 0.79, 0.3], [0.0, 0.0, half, half]);
+        let [found, _] = pair(a, (CAPSULE, crossed)).expect("crossed");
+        assert_eq!(found.count, 1);
+        assert!((found.contacts[0].distance + 0.01).abs() < 1e-5, "{found:?}");
+        assert!((found.contacts[0].point[2] - 0.3).abs() < 1e-5, "{found:?}");
+        let [found, _] = pair(a, (SPHERE, cube([0.0, 0.0, 1.49], LEVEL))).expect("sphere");
+        assert_eq!(found.count, 1);
+        assert!((found.normal[2] + 1.0).abs() < 1e-5, "{found:?}");
+        assert!((found.contacts[0].distance + 0.01).abs() < 1e-5, "{found:?}");
     }
 }

@@ -34,14 +34,14 @@ impl Board {
     }
 
     /// The window and the offset in it.
-    fn place(&self, address: u64) -> (&UioWindow, u32) {
-        let dma = self.dmas.iter().enumerate().find_map(|(core, window)| {
+    fn place(&mut self, address: u64) -> (&mut UioWindow, u32) {
+        let dma = self.dmas.iter_mut().enumerate().find_map(|(core, window)| {
             let offset = u32::try_from(address.checked_sub(dma_base(core))?).ok()?;
             (offset < DMA_BYTES).then_some((window, offset))
         });
         // What is nowhere is refused by the window.
         let offset = address.checked_sub(CONTROL_BASE).and_then(|at| u32::try_from(at).ok());
-        dma.unwrap_or((&self.control, offset.unwrap_or(u32::MAX)))
+        dma.unwrap_or((&mut self.control, offset.unwrap_or(u32::MAX)))
     }
 }
 

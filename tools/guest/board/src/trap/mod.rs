@@ -24,7 +24,7 @@ impl Words for UioWindow {
         self.read32(at)
     }
 
-    fn store(&self, at: u32, value: u32) -> Result<(), PlatformError> {
+    fn store(&mut self, at: u32, value: u32) -> Result<(), PlatformError> {
         self.write32(at, value)
     }
 }

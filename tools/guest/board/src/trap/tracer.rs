@@ -14,7 +14,7 @@ use std::time::Duration;
 use nix::errno::Errno;
 use nix::libc::{self, user_regs_struct};
 use nix::sys::ptrace::{self, Options};
-use nix::sys::signal::Signal;
+use nix::sys::signal::{Signal, kill};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::{Pid, SysconfVar, sysconf};
 use zynq_pgs::platform::{System, UioDevice, UioWindow};
@@ -136,6 +136,21 @@ pub fn run(program: &[OsString]) -> Result<(u8, Counts), TraceError> {
     let child = i32::try_from(child.id())
         .map(Pid::from_raw)
         .map_err(|_| TraceError::Kernel { act: "name the process", source: Errno::ERANGE })?;
+    let traced = trace(child, nodes, page_bytes, host);
+    if traced.is_err() {
+        // It may have ended by itself.
+        let _ = kill(child, Signal::SIGKILL);
+    }
+    traced
+}
+
+/// Traces a process that asks for it, to its end.
+fn trace(
+    child: Pid,
+    nodes: Vec<Node>,
+    page_bytes: u64,
+    host: Client<UioWindow>,
+) -> Result<(u8, Counts), TraceError> {
     // The program's first stop is the end of its exec; a failed one ends it before.
     match waitpid(child, None).map_err(kernel("wait for the program"))? {
         WaitStatus::Stopped(..) => {}
@@ -162,6 +177,8 @@ enum Call {
     Other,
     /// A mapping of registers.
     Map { bytes: u64, physical: u64, rights: u64 },
+    /// Another mapping, which may come to lie over registers.
+    MapOther { bytes: u64 },
     /// The end of a mapping.
     Unmap { start: u64, bytes: u64 },
 }
@@ -182,31 +199,34 @@ impl Tracer {
         loop {
             let any = Pid::from_raw(-1);
             let status = waitpid(any, Some(WaitPidFlag::__WALL));
-            let (thread, signal) = match status.map_err(kernel("wait for the program"))? {
+            let stopped = match status.map_err(kernel("wait for the program"))? {
                 WaitStatus::Exited(pid, code) if pid == self.child => {
                     return Ok((exit_code(code), self.counts));
                 }
                 WaitStatus::Signaled(pid, signal, _) if pid == self.child => {
                     return Ok((exit_code(128 + signal as i32), self.counts));
                 }
-                WaitStatus::PtraceSyscall(pid) => {
-                    self.system_call(pid)?;
-                    (pid, None)
-                }
+                WaitStatus::PtraceSyscall(pid) => self.system_call(pid).map(|()| (pid, None)),
                 WaitStatus::Stopped(pid, Signal::SIGSEGV) => {
-                    (pid, (!self.register_access(pid)?).then_some(Signal::SIGSEGV))
+                    let signal = |made: bool| (!made).then_some(Signal::SIGSEGV);
+                    self.register_access(pid).map(|made| (pid, signal(made)))
                 }
                 WaitStatus::Stopped(pid, signal) => {
                     // A new thread begins with a stop of the trace's own.
                     let new = self.threads.insert(pid, None).is_none();
-                    (pid, (!new || signal != Signal::SIGSTOP).then_some(signal))
+                    Ok((pid, (!new || signal != Signal::SIGSTOP).then_some(signal)))
                 }
-                WaitStatus::PtraceEvent(pid, ..) => (pid, None),
+                WaitStatus::PtraceEvent(pid, ..) => Ok((pid, None)),
                 WaitStatus::Exited(pid, _) | WaitStatus::Signaled(pid, ..) => {
                     self.threads.remove(&pid);
                     continue;
                 }
                 _ => continue,
+            };
+            let (thread, signal) = match stopped {
+                // Another thread has ended the program meanwhile: the next wait says so.
+                Err(TraceError::Kernel { source: Errno::ESRCH, .. }) => continue,
+                stopped => stopped?,
             };
             match ptrace::syscall(thread, signal) {
                 // It was killed meanwhile: the next wait says so.
@@ -236,7 +256,7 @@ impl Tracer {
         match number {
             libc::SYS_mmap => {
                 let Some((physical, _)) = self.registers_behind(thread, file, offset) else {
-                    return Ok(Call::Other);
+                    return Ok(Call::MapOther { bytes: second });
                 };
                 let call = Call::Map { bytes: second, physical, rights: third };
                 // Rights: none.
@@ -275,10 +295,13 @@ impl Tracer {
                     self.regions.add(result, bytes, physical);
                 }
             }
+            Call::MapOther { bytes } if !failed => {
+                self.regions.remove(result, bytes.next_multiple_of(self.page_bytes));
+            }
             Call::Unmap { start, bytes } if !failed => {
                 self.regions.remove(start, bytes.next_multiple_of(self.page_bytes));
             }
-            Call::Unmap { .. } | Call::Other => {}
+            Call::MapOther { .. } | Call::Unmap { .. } | Call::Other => {}
         }
         Ok(())
     }
@@ -294,12 +317,15 @@ impl Tracer {
     fn register_access(&mut self, thread: Pid) -> Result<bool, TraceError> {
         let mut registers = ptrace::getregs(thread).map_err(kernel("read registers"))?;
         let pc = registers.pc;
-        let Ok(place) = usize::try_from(pc).map(std::ptr::without_provenance_mut) else {
-            return Ok(false);
+        // Two instructions are read at once: never those behind the end of the program's last page.
+        let place = usize::try_from(pc & !7).map(std::ptr::without_provenance_mut);
+        let Ok(place) = place else { return Ok(false) };
+        let pair = match ptrace::read(thread, place) {
+            Ok(pair) => pair,
+            Err(errno @ Errno::ESRCH) => return Err(kernel("read an instruction")(errno)),
+            Err(_) => return Ok(false),
         };
-        let Ok(words) = ptrace::read(thread, place) else { return Ok(false) };
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low half")]
-        let instruction = words as u32;
+        let instruction = instruction::of_pair(pair.cast_unsigned(), pc);
         let mut general = Registers { x: registers.regs, sp: registers.sp };
         let Some(access) = instruction::decode(instruction, &general) else {
             return self.foreign(instruction, &registers);

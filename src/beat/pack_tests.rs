@@ -1,0 +1,444 @@
+//! What the packer writes, read back by a decoder that was written from the specification's tables
+//! and shares nothing with it: no stripe, no record, no conversion.
+
+use proptest::prelude::*;
+
+use super::pack::{pack_collisions, pack_poses, pack_velocities};
+use super::stripe::Segment;
+use crate::interface::number::{Numbers, StreamFormat};
+use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, Variant};
+use crate::interface::record::Beat;
+use crate::scene::{
+    Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
+    Velocity,
+};
+
+/// How the words of a stream are written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Words {
+    F32,
+    Binary16,
+    Thesis16,
+}
+
+/// A bitstream as the specification describes it.
+#[derive(Debug, Clone, Copy)]
+struct Spec {
+    variant: Variant,
+    channels: usize,
+    /// Channel of each beat of a group.
+    collision_group: &'static [usize],
+    body_group: &'static [usize],
+    /// Whether groups are always whole.
+    whole: bool,
+    collisions: Words,
+    bodies: Words,
+    relative: bool,
+    world: bool,
+}
+
+const NAIVE_SPEC: Spec = Spec {
+    variant: NAIVE.default_variant(),
+    channels: 1,
+    collision_group: &[0],
+    body_group: &[0],
+    whole: false,
+    collisions: Words::F32,
+    bodies: Words::F32,
+    relative: false,
+    world: false,
+};
+const FLOAT_SPEC: Spec = Spec {
+    variant: FLOAT.default_variant(),
+    channels: 4,
+    collision_group: &[0, 1, 2, 3, 0, 1, 2],
+    body_group: &[0, 1, 2, 3],
+    ..NAIVE_SPEC
+};
+const HALF_SPEC: Spec = Spec {
+    variant: HALF.default_variant(),
+    channels: 3,
+    collision_group: &[0, 0, 0, 1, 1, 1, 2],
+    body_group: &[0, 0, 1, 1, 2],
+    whole: true,
+    collisions: Words::Binary16,
+    bodies: Words::Binary16,
+    relative: false,
+    world: false,
+};
+const THESIS_SPEC: Spec = Spec {
+    variant: Variant {
+        numbers: Numbers {
+            collisions: StreamFormat::Thesis16,
+            bodies: StreamFormat::Thesis16,
+            ..HALF.numbers
+        },
+        ..HALF.default_variant()
+    },
+    collisions: Words::Thesis16,
+    bodies: Words::Thesis16,
+    ..HALF_SPEC
+};
+const MIXED_SPEC: Spec = Spec {
+    variant: MIXED.default_variant(),
+    channels: 3,
+    collision_group: &[0, 1, 2],
+    body_group: &[0, 1, 2],
+    collisions: Words::Binary16,
+    relative: true,
+    ..NAIVE_SPEC
+};
+
+fn any_spec() -> impl Strategy<Value = Spec> {
+    let specs = vec![NAIVE_SPEC, FLOAT_SPEC, HALF_SPEC, THESIS_SPEC, MIXED_SPEC];
+    (prop::sample::select(specs), any::<bool>()).prop_map(|(spec, world)| {
+        let inertia = if world { Inertia::World } else { Inertia::Isotropic };
+        Spec { variant: Variant { inertia, ..spec.variant }, world, ..spec }
+    })
+}
+
+/// The word of a number in sixteen bits, or all thirty-two.
+fn word(words: Words, value: f32) -> u32 {
+    match words {
+        Words::F32 => value.to_bits(),
+        Words::Binary16 => half::f16::from_f32(value).to_bits().into(),
+        Words::Thesis16 => thesis(value),
+    }
+}
+
+/// Sign, F and mantissa of the written definition, by arithmetic.
+fn thesis(value: f32) -> u32 {
+    let sign = if value.is_sign_negative() { 0x8000 } else { 0 };
+    let magnitude = f64::from(value).abs();
+    let Some(f) = (0..31_i32).rev().find(|f| magnitude >= 2.0_f64.powi(f - 15)) else {
+        return sign;
+    };
+    if magnitude >= 65_536.0 {
+        return sign | 31 << 10;
+    }
+    let mantissa = ((magnitude / 2.0_f64.powi(f - 15) - 1.0) * 1024.0).floor();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1023")]
+    let mantissa = mantissa as u32;
+    sign | (u32::try_from(f).expect("0 to 30") << 10) | mantissa
+}
+
+/// The rows of a segment in their order, and how many beats there were.
+fn rows(buffers: &[Vec<Beat>], group: &[usize], words: Words) -> (Vec<[u32; 4]>, usize) {
+    let total: usize = buffers.iter().map(Vec::len).sum();
+    let mut channels: Vec<_> = buffers.iter().map(|beats| beats.iter()).collect();
+    let mut rows = Vec::new();
+    for beat in 0..total {
+        let Beat(lanes) = channels[group[beat % group.len()]].next().expect("a beat in its turn");
+        if words == Words::F32 {
+            rows.push(*lanes);
+        } else {
+            let halves = lanes.map(|lane| [lane & 0xFFFF, lane >> 16]);
+            rows.extend(
+                [[halves[0], halves[1]].concat(), [halves[2], halves[3]].concat()]
+                    .map(|row| <[u32; 4]>::try_from(row).expect("four words")),
+            );
+        }
+    }
+    (rows, total)
+}
+
+/// Takes rows apart and, at the end, the padding.
+struct Reader {
+    rows: std::vec::IntoIter<[u32; 4]>,
+    words: Words,
+}
+
+impl Reader {
+    /// Checks that there are as many beats as so many rows need.
+    fn new(
+        spec: &Spec,
+        group: &[usize],
+        words: Words,
+        buffers: &[Vec<Beat>],
+        needed: usize,
+    ) -> Self {
+        assert_eq!(buffers.len(), spec.channels);
+        let (rows, total) = rows(buffers, group, words);
+        let mut expected = if words == Words::F32 { needed } else { needed.div_ceil(2) };
+        if spec.whole {
+            expected = expected.div_ceil(group.len()) * group.len();
+        }
+        assert_eq!(total, expected, "beats");
+        Self { rows: rows.into_iter(), words }
+    }
+
+    #[track_caller]
+    fn numbers(&mut self, numbers: [f32; 4]) {
+        let expected = numbers.map(|number| word(self.words, number));
+        assert_eq!(self.rows.next(), Some(expected), "{numbers:?}");
+    }
+
+    #[track_caller]
+    fn vector(&mut self, [x, y, z]: [f32; 3], integer: u32) {
+        let [x, y, z] = [x, y, z].map(|number| word(self.words, number));
+        assert_eq!(self.rows.next(), Some([x, y, z, integer]));
+    }
+
+    fn end(self) {
+        assert!(self.rows.into_iter().all(|row| row == [0; 4]), "padding is zeros");
+    }
+}
+
+/// Packs into buffers full of ones, so that a beat left out is seen; checks the sum.
+fn packed(
+    spec: &Spec,
+    segment: Segment,
+    records: usize,
+    pack: impl FnOnce(&mut [&mut [Beat]]) -> u32,
+) -> Vec<Vec<Beat>> {
+    let layout = segment.layout(&spec.variant);
+    let mut buffers: Vec<_> = (0..spec.channels)
+        .map(|channel| vec![Beat([u32::MAX; 4]); layout.beats_on_channel(records, channel)])
+        .collect();
+    let mut views: Vec<&mut [Beat]> = buffers.iter_mut().map(Vec::as_mut_slice).collect();
+    let sum = pack(&mut views);
+    let words = buffers.iter().flatten().flat_map(|beat| beat.0);
+    assert_eq!(sum, words.fold(0, u32::wrapping_add), "padding counts");
+    buffers
+}
+
+/// Shapes that every bitstream takes but the last.
+const SHAPES: [Shape; 3] = [
+    Shape::STATIC,
+    Shape::isotropic(1.0, 1.5),
+    Shape { inverse_mass: 2.0, inverse_inertia: [1.0, 2.0, 3.0] },
+];
+
+fn velocities(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
+    let count = bodies.len();
+    packed(spec, Segment::Velocities, count, |views| {
+        pack_velocities(&spec.variant, bodies, count, &SHAPES, views)
+    })
+}
+
+fn poses(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
+    let count = bodies.len();
+    packed(spec, Segment::Poses, count, |views| pack_poses(&spec.variant, bodies, count, views))
+}
+
+fn collisions(
+    spec: &Spec,
+    bodies: &(impl Bodies + ?Sized),
+    collisions: &(impl Collisions + ?Sized),
+) -> Vec<Vec<Beat>> {
+    let count = collisions.len();
+    packed(spec, Segment::Collisions, count, |views| {
+        pack_collisions(&spec.variant, bodies, collisions, count, &SHAPES, views)
+    })
+}
+
+/// Any number that every format has a word for: within 65,504, tiny ones and both zeros among them.
+fn any_f32() -> impl Strategy<Value = f32> {
+    let bits = any::<u32>().prop_map(f32::from_bits);
+    let near = bits.prop_filter("in range", |value| value.abs() <= 65_504.0);
+    prop_oneof![4 => -100.0_f32..100.0, 2 => near, 1 => Just(0.0), 1 => Just(-0.0)]
+}
+
+fn any_vec3() -> impl Strategy<Value = [f32; 3]> {
+    [any_f32(), any_f32(), any_f32()]
+}
+
+fn any_vec4() -> impl Strategy<Value = [f32; 4]> {
+    [any_f32(), any_f32(), any_f32(), any_f32()]
+}
+
+prop_compose! {
+    fn any_body()(
+        position in any_vec3(),
+        orientation in any_vec4(),
+        linear in any_vec3(),
+        angular in any_vec3(),
+        shape in 0_u32..2,
+    ) -> Body {
+        Body {
+            pose: Pose { position, orientation },
+            velocity: Velocity { linear, angular },
+            shape,
+        }
+    }
+}
+
+/// Contact points that are not in use hold anything.
+fn any_contact() -> impl Strategy<Value = [f32; 4]> {
+    any_vec4()
+}
+
+prop_compose! {
+    fn any_collision()(
+        body_a in 0_u32..12,
+        body_b in 0_u32..12,
+        normal in any_vec3(),
+        count in 1_u32..=4,
+        contacts in prop::array::uniform4(any_contact()),
+        unused in any::<u32>().prop_map(f32::from_bits),
+    ) -> Collision {
+        let mut contacts =
+            contacts.map(|[x, y, z, distance]| Contact { point: [x, y, z], distance });
+        for contact in &mut contacts[count as usize..] {
+            *contact = Contact { point: [unused; 3], distance: unused };
+        }
+        Collision { body_a, body_b, normal, count, contacts }
+    }
+}
+
+fn minus(to: [f32; 3], from: [f32; 3]) -> [f32; 3] {
+    [to[0] - from[0], to[1] - from[1], to[2] - from[2]]
+}
+
+proptest! {
+    #[test]
+    fn velocities_arrive_as_they_were(
+        spec in any_spec(),
+        bodies in prop::collection::vec(any_body(), 0..40),
+    ) {
+        let per_body = if spec.world { 4 } else { 2 };
+        let buffers = velocities(&spec, &bodies);
+        let needed = per_body * bodies.len();
+        let mut reader = Reader::new(&spec, spec.body_group, spec.bodies, &buffers, needed);
+        for body in &bodies {
+            reader.vector(body.velocity.linear, body.shape);
+            reader.vector(body.velocity.angular, 0);
+            if spec.world {
+                let k = SHAPES[body.shape as usize].inverse_inertia[0];
+                // Zeros are the word 0 in every format.
+                reader.vector([k; 3], 0);
+                reader.vector([0.0; 3], 0);
+            }
+        }
+        reader.end();
+    }
+
+    #[test]
+    fn poses_arrive_as_they_were(
+        spec in any_spec(),
+        bodies in prop::collection::vec(any_body(), 0..40),
+    ) {
+        let buffers = poses(&spec, &bodies);
+        let needed = 2 * bodies.len();
+        let mut reader = Reader::new(&spec, spec.body_group, spec.bodies, &buffers, needed);
+        for body in &bodies {
+            reader.vector(body.pose.position, 0);
+            reader.numbers(body.pose.orientation);
+        }
+        reader.end();
+    }
+
+    #[test]
+    fn collisions_arrive_as_they_were(
+        spec in any_spec(),
+        bodies in prop::collection::vec(any_body(), 12..14),
+        list in prop::collection::vec(any_collision(), 0..40),
+    ) {
+        let per_collision = if spec.relative { 6 } else { 7 };
+        let buffers = collisions(&spec, &bodies, &list);
+        let needed = per_collision * list.len();
+        let mut reader =
+            Reader::new(&spec, spec.collision_group, spec.collisions, &buffers, needed);
+        for collision in &list {
+            let ends = [collision.body_a, collision.body_b].map(|index| bodies[index as usize]);
+            let [mut a, mut b] = ends.map(|body| body.pose.position);
+            if spec.relative {
+                // What does not move is where the other body is.
+                let [a_moves, b_moves] =
+                    ends.map(|body| SHAPES[body.shape as usize].inverse_mass != 0.0);
+                a = if a_moves { a } else { b };
+                b = if b_moves { b } else { a };
+            }
+            if spec.relative {
+                reader.vector(collision.normal, collision.body_a);
+                reader.vector(minus(b, a), collision.body_b);
+            } else {
+                reader.vector(collision.normal, collision.count);
+                reader.vector(a, collision.body_a);
+                reader.vector(b, collision.body_b);
+            }
+            for (ordinal, Contact { point, distance }) in (0..).zip(collision.contacts) {
+                if ordinal < collision.count {
+                    let [x, y, z] = if spec.relative { minus(point, a) } else { point };
+                    reader.numbers([x, y, z, distance]);
+                } else if spec.relative {
+                    reader.numbers([0.0, 0.0, 0.0, f32::INFINITY]);
+                } else {
+                    reader.vector([0.0; 3], 0);
+                }
+            }
+        }
+        reader.end();
+    }
+
+    #[test]
+    fn separate_arrays_give_the_beats_of_an_array_of_structures(
+        spec in any_spec(),
+        bodies in prop::collection::vec(any_body(), 12..20),
+        list in prop::collection::vec(any_collision(), 0..20),
+    ) {
+        let mut positions: Vec<_> = bodies.iter().map(|body| body.pose.position).collect();
+        let mut orientations: Vec<_> = bodies.iter().map(|body| body.pose.orientation).collect();
+        let mut linear: Vec<_> = bodies.iter().map(|body| body.velocity.linear).collect();
+        let mut angular: Vec<_> = bodies.iter().map(|body| body.velocity.angular).collect();
+        let shapes: Vec<_> = bodies.iter().map(|body| body.shape).collect();
+        let body_arrays = BodyArrays {
+            positions: &mut positions,
+            orientations: &mut orientations,
+            linear_velocities: &mut linear,
+            angular_velocities: &mut angular,
+            shapes: &shapes,
+        };
+        let pairs: Vec<_> =
+            list.iter().map(|collision| [collision.body_a, collision.body_b]).collect();
+        let normals: Vec<_> = list.iter().map(|collision| collision.normal).collect();
+        let counts: Vec<_> = list.iter().map(|collision| collision.count).collect();
+        let contacts: Vec<_> = list
+            .iter()
+            .map(|collision| {
+                collision.contacts.map(|contact| {
+                    let [x, y, z] = contact.point;
+                    [x, y, z, contact.distance]
+                })
+            })
+            .collect();
+        let collision_arrays =
+            CollisionArrays { bodies: &pairs, normals: &normals, counts: &counts, contacts: &contacts };
+        prop_assert_eq!(velocities(&spec, &bodies), velocities(&spec, &body_arrays));
+        prop_assert_eq!(poses(&spec, &bodies), poses(&spec, &body_arrays));
+        prop_assert_eq!(
+            collisions(&spec, &bodies, &list),
+            collisions(&spec, &body_arrays, &collision_arrays)
+        );
+    }
+}
+
+#[test]
+fn a_body_that_does_not_exist_is_sent_with_a_position_of_zeros() {
+    let collision = Collision {
+        body_a: 3,
+        body_b: u32::MAX,
+        normal: [0.0, 1.0, 0.0],
+        count: 1,
+        contacts: [Contact::default(); 4],
+    };
+    let bodies: [Body; 0] = [];
+    let buffers = collisions(&FLOAT_SPEC, bodies.as_slice(), [collision].as_slice());
+    assert_eq!(buffers[1][0], Beat([0, 0, 0, 3]));
+    assert_eq!(buffers[2][0], Beat([0, 0, 0, u32::MAX]));
+}
+
+/// A shape that turns with its body, and one that is not there.
+#[test]
+fn world_inertia_is_that_of_the_bodys_shape_about_world_axes() {
+    let variant = Variant { inertia: Inertia::World, ..FLOAT.default_variant() };
+    let spec = Spec { variant, world: true, ..FLOAT_SPEC };
+    // A quarter turn about z exchanges x and y.
+    let pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 1.0, 1.0] };
+    let body = |shape| Body { pose, velocity: Velocity::default(), shape };
+    let buffers = velocities(&spec, [body(2), body(9)].as_slice());
+    let numbers = [2.0_f32, 1.0, 3.0].map(f32::to_bits);
+    assert_eq!(buffers[2][0].0[..3], numbers);
+    assert_eq!(buffers[3][0], Beat([0; 4]));
+    assert_eq!((buffers[2][1], buffers[3][1]), (Beat([0; 4]), Beat([0; 4])));
+}

@@ -1,0 +1,148 @@
+//! This file is the thesis' order: collisions body by body, to keep few bodies alive at once.
+//!
+//! All collisions of one body, then all that are left of the active body with the fewest left, and
+//! so on; a body becomes active with its first collision. What the thesis leaves open is a choice:
+//! its first body is the moving body of the lowest index, a body's collisions are taken in
+//! ascending order, static bodies are never active, and of several bodies with equally few left the
+//! tie rule decides. If no active body is left, the next one of the lowest index begins again.
+//!
+//! Source: thesis §4.7, Algorithm 3.
+
+use std::collections::BTreeSet;
+
+use super::{OrderInput, Schedule};
+
+/// Which of the active bodies with the fewest collisions left comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ties {
+    /// That of the lowest index.
+    LowestIndex,
+    /// That which became active first.
+    Oldest,
+    /// That which became active last.
+    Newest,
+}
+
+impl Ties {
+    fn rank(self, age: u32) -> u32 {
+        match self {
+            Self::LowestIndex => 0,
+            Self::Oldest => age,
+            Self::Newest => u32::MAX - age,
+        }
+    }
+}
+
+/// The state of the algorithm.
+struct Bodies<'a> {
+    input: &'a OrderInput<'a>,
+    ties: Ties,
+    /// Collisions left of each body.
+    left: Vec<u32>,
+    /// When each body became active.
+    age: Vec<Option<u32>>,
+    activated: u32,
+    /// Collisions left, tie rank and index of the active bodies.
+    active: BTreeSet<(u32, u32, u32)>,
+}
+
+impl Bodies<'_> {
+    fn key(&self, body: u32) -> Option<(u32, u32, u32)> {
+        let age = self.age[body as usize]?;
+        Some((self.left[body as usize], self.ties.rank(age), body))
+    }
+
+    /// A collision of the body is taken.
+    fn take_one(&mut self, body: u32) {
+        if !self.input.moving[body as usize] {
+            return;
+        }
+        if let Some(key) = self.key(body) {
+            self.active.remove(&key);
+        } else {
+            self.age[body as usize] = Some(self.activated);
+            self.activated += 1;
+        }
+        self.left[body as usize] -= 1;
+        if self.left[body as usize] > 0 {
+            self.active.extend(self.key(body));
+        }
+    }
+
+    fn activate(&mut self, body: u32) {
+        if self.age[body as usize].is_none() {
+            self.age[body as usize] = Some(self.activated);
+            self.activated += 1;
+        }
+    }
+}
+
+/// Orders the collisions of an input that was checked.
+pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule) {
+    let count = input.moving.len();
+    // The collisions of body `b` are `of[starts[b]..starts[b + 1]]`, in ascending order.
+    let mut starts = vec![0_usize; count + 1];
+    for body in input.pairs.iter().flatten() {
+        starts[*body as usize + 1] += 1;
+    }
+    let left = (0..count).map(|body| u32::try_from(starts[body + 1]).unwrap_or(u32::MAX)).collect();
+    for body in 0..count {
+        starts[body + 1] += starts[body];
+    }
+    let mut next = starts.clone();
+    let mut of = vec![0_u32; 2 * input.pairs.len()];
+    for (index, pair) in (0..).zip(input.pairs) {
+        for body in pair {
+            of[next[*body as usize]] = index;
+            next[*body as usize] += 1;
+        }
+    }
+
+    let mut bodies =
+        Bodies { input, ties, left, age: vec![None; count], activated: 0, active: BTreeSet::new() };
+    let mut done = vec![false; input.pairs.len()];
+    schedule.clear();
+    let lowest = (0..).zip(input.moving).filter(|(_, moving)| **moving).map(|(body, _)| body);
+    for first in lowest {
+        let mut current = Some(first).filter(|body: &u32| bodies.left[*body as usize] > 0);
+        while let Some(body) = current {
+            bodies.activate(body);
+            for index in &of[starts[body as usize]..starts[body as usize + 1]] {
+                if !std::mem::replace(&mut done[*index as usize], true) {
+                    let [a, b] = input.pairs[*index as usize];
+                    schedule.entries.push(*index);
+                    bodies.take_one(body);
+                    bodies.take_one(if a == body { b } else { a });
+                }
+            }
+            current = bodies.active.first().map(|(_, _, body)| *body);
+        }
+    }
+    // Pairs of two static bodies belong to no body's turn.
+    let rest = (0..).zip(&done).filter(|(_, done)| !**done).map(|(index, _)| index);
+    schedule.entries.extend(rest);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bodies_are_taken_by_fewest_left_then_by_the_tie_rule() {
+        // 1 meets 2, 3, 4; then 2, 3 and 4 have 1, 1 and 2 left.
+        let input = OrderInput {
+            pairs: &[[1, 4], [1, 3], [1, 2], [2, 5], [3, 6], [4, 7], [4, 8], [0, 9]],
+            moving: &[false, true, true, true, true, true, true, true, true, true],
+            positions: &[[0.0; 3]; 10],
+        };
+        let ordered = |ties| {
+            let mut schedule = Schedule::default();
+            order(&input, ties, &mut schedule);
+            schedule.entries
+        };
+        // Active in the order 1, 4, 3, 2.
+        assert_eq!(ordered(Ties::LowestIndex), [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(ordered(Ties::Oldest), [0, 1, 2, 4, 3, 5, 6, 7]);
+        assert_eq!(ordered(Ties::Newest), [0, 1, 2, 3, 4, 5, 6, 7]);
+    }
+}

@@ -1,0 +1,212 @@
+//! This file places swept collisions in issue slots so that no hazard can occur.
+//!
+//! Slots are taken in groups of an eighth of the depth. A body is used at most once in any nine
+//! groups in a row, so that a whole depth lies between two uses wherever in their groups they
+//! stand: nothing is compared within a group.
+//!
+//! ```text
+//! group      base                                    base + 63
+//! full       1 1 0 1 0 0 0 0 0 0 0 ...  0 0 0 1 1 1 1 1 1 1 1   the last eight: beyond reach
+//! body A     0 0 0 0 1 1 1 1 1 1 1 ...  each use closes the groups around it
+//! body B     1 1 1 0 0 0 0 0 0 0 0 ...
+//!                    ^ the first group that is closed for neither and not full: taken
+//! ```
+//!
+//! A set of groups is a 64-bit word, and finding the group a few instructions. The window of groups
+//! moves on when its first is full. A collision that fits nowhere in it waits in a queue of bounded
+//! length and is tried again at every move; if the queue is full, the window moves on although
+//! slots stay empty.
+
+use super::schedule::EMPTY;
+use super::sweep::Swept;
+use super::{IssueWindow, OrderError, Schedule};
+
+/// Parts that a depth is divided into.
+const PARTS: usize = 8;
+/// Groups in the window.
+const GROUPS: usize = u64::BITS as usize;
+/// Most collisions that wait.
+const WAITING_MAX: usize = 256;
+
+/// Which groups are closed for a body: bit `i` is group `base + i`.
+#[derive(Debug, Clone, Copy, Default)]
+struct Closed {
+    groups: u64,
+    base: u64,
+}
+
+impl Closed {
+    /// The same, counted from a later base.
+    #[inline]
+    fn from(self, base: u64) -> u64 {
+        let moved = base - self.base;
+        if moved < u64::from(u64::BITS) { self.groups >> moved } else { 0 }
+    }
+}
+
+/// Memory of the placement, which is kept.
+#[derive(Debug, Default)]
+pub(super) struct Groups {
+    /// By rank; the last is for everything static and never closed.
+    bodies: Vec<Closed>,
+    waiting: Vec<Swept>,
+}
+
+impl Groups {
+    /// Places every collision of the sweep; `moving` is the rank of what does not move.
+    ///
+    /// # Errors
+    /// [`OrderError::TooLong`] if that takes more than `limit` entries.
+    pub(super) fn place(
+        &mut self,
+        sweep: &[Swept],
+        moving: u32,
+        window: IssueWindow,
+        limit: usize,
+        schedule: &mut Schedule,
+    ) -> Result<(), OrderError> {
+        self.bodies.clear();
+        self.bodies.resize(moving as usize + 1, Closed::default());
+        self.waiting.clear();
+        schedule.clear();
+        let too_long =
+            OrderError::TooLong { depth: window.depth(), limit, collisions: sweep.len() };
+        let mut open = Open::new(window, moving, &mut self.bodies, &mut schedule.entries);
+        for swept in sweep {
+            while open.first_is_full() {
+                open.advance();
+                open.retry(&mut self.waiting);
+            }
+            if !open.place(swept) {
+                self.waiting.push(*swept);
+                while self.waiting.len() > WAITING_MAX {
+                    open.advance();
+                    open.retry(&mut self.waiting);
+                    if open.entries.len() > limit.saturating_add(open.window_entries()) {
+                        return Err(too_long);
+                    }
+                }
+            }
+        }
+        while !self.waiting.is_empty() {
+            open.advance();
+            open.retry(&mut self.waiting);
+            if open.entries.len() > limit.saturating_add(open.window_entries()) {
+                return Err(too_long);
+            }
+        }
+        let entries = &mut schedule.entries;
+        while entries.last() == Some(&EMPTY) {
+            entries.pop();
+        }
+        schedule.empty = entries.len() - sweep.len();
+        if entries.len() > limit { Err(too_long) } else { Ok(()) }
+    }
+}
+
+/// The groups that are open.
+struct Open<'a> {
+    /// Entries of a group.
+    size: usize,
+    /// Groups on either side of a use that it closes.
+    reach: usize,
+    /// The groups that a use closes, `reach` groups behind the first of them.
+    around: u64,
+    /// The groups that are too near the end of the window to be used yet.
+    beyond: u64,
+    full: u64,
+    base: u64,
+    /// Where the first group begins.
+    start: usize,
+    /// Entries taken of each group, by its number modulo 64.
+    taken: [u32; GROUPS],
+    moving: usize,
+    bodies: &'a mut [Closed],
+    entries: &'a mut Vec<u32>,
+}
+
+impl<'a> Open<'a> {
+    fn new(
+        window: IssueWindow,
+        moving: u32,
+        bodies: &'a mut [Closed],
+        entries: &'a mut Vec<u32>,
+    ) -> Self {
+        let depth = window.depth() as usize;
+        let slots = depth.div_ceil(PARTS);
+        // With `reach` groups in between, `reach * slots + 1 >= depth` slots lie between two uses.
+        let reach = (depth - 1).div_ceil(slots);
+        let size = slots * window.per_issue() as usize;
+        let beyond = !(u64::MAX >> reach);
+        entries.resize(GROUPS * size, EMPTY);
+        Self {
+            size,
+            reach,
+            around: (1 << (2 * reach + 1)) - 1,
+            beyond,
+            full: beyond,
+            base: 0,
+            start: 0,
+            taken: [0; GROUPS],
+            moving: moving as usize,
+            bodies,
+            entries,
+        }
+    }
+
+    fn window_entries(&self) -> usize {
+        GROUPS * self.size
+    }
+
+    fn first_is_full(&self) -> bool {
+        self.full & 1 == 1
+    }
+
+    /// Moves the window on by one group.
+    fn advance(&mut self) {
+        self.full = ((self.full & !self.beyond) >> 1) | self.beyond;
+        self.taken[ring(self.base)] = 0;
+        self.base += 1;
+        self.start += self.size;
+        self.entries.resize(self.start + GROUPS * self.size, EMPTY);
+    }
+
+    /// Places a collision in the first group that can take it, if there is one.
+    #[inline]
+    fn place(&mut self, swept: &Swept) -> bool {
+        let [a, b] = swept.ranks.map(|rank| rank as usize);
+        let closed = [self.bodies[a].from(self.base), self.bodies[b].from(self.base)];
+        let free = !(closed[0] | closed[1] | self.full);
+        if free == 0 {
+            return false;
+        }
+        let group = free.trailing_zeros();
+        let around = (u128::from(self.around) << group) >> self.reach;
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "a group that is taken is at least `reach` groups before the end"
+        )]
+        let around = around as u64;
+        self.bodies[a] = Closed { groups: closed[0] | around, base: self.base };
+        self.bodies[b] = Closed { groups: closed[1] | around, base: self.base };
+        self.bodies[self.moving] = Closed::default();
+        let taken = &mut self.taken[ring(self.base + u64::from(group))];
+        self.entries[self.start + group as usize * self.size + *taken as usize] = swept.index;
+        *taken += 1;
+        if *taken as usize == self.size {
+            self.full |= 1 << group;
+        }
+        true
+    }
+
+    /// Tries again what waits, in its order.
+    fn retry(&mut self, waiting: &mut Vec<Swept>) {
+        waiting.retain(|swept| !self.place(swept));
+    }
+}
+
+/// Where a group's count is.
+#[allow(clippy::cast_possible_truncation, reason = "below 64")]
+fn ring(group: u64) -> usize {
+    (group % GROUPS as u64) as usize
+}

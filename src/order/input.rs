@@ -1,0 +1,94 @@
+//! This file says what an order is made from: pairs of bodies, which bodies move, where they are.
+
+use super::OrderError;
+use crate::scene::{Bodies, Collisions, Shape};
+
+/// What an order is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct OrderInput<'a> {
+    /// Bodies A and B of each collision.
+    pub pairs: &'a [[u32; 2]],
+    /// Whether each body moves. What stands still is no hazard.
+    pub moving: &'a [bool],
+    /// Centres of mass, world frame, m.
+    pub positions: &'a [[f32; 3]],
+}
+
+impl OrderInput<'_> {
+    /// Refuses what cannot be ordered; of several mistakes the one with the lowest index.
+    pub(super) fn check(&self) -> Result<(), OrderError> {
+        let bodies = self.moving.len();
+        if bodies != self.positions.len() {
+            let (moving, positions) = (bodies, self.positions.len());
+            return Err(OrderError::UnequalLengths { moving, positions });
+        }
+        // Sums of two ranks are kept in 32 bits.
+        let too_many = |what, found: usize, most: usize| match found <= most {
+            true => Ok(()),
+            false => Err(OrderError::TooMany { what, found, most }),
+        };
+        too_many("bodies", bodies, 1 << 30)?;
+        too_many("collisions", self.pairs.len(), 1 << 30)?;
+        let limit = u32::try_from(bodies).unwrap_or(u32::MAX);
+        // Without a branch per pair.
+        let wrong = |[a, b]: [u32; 2]| (a >= limit) | (b >= limit) | (a == b);
+        if !self.pairs.iter().fold(false, |any, pair| any | wrong(*pair)) {
+            return Ok(());
+        }
+        for (collision, [a, b]) in self.pairs.iter().copied().enumerate() {
+            if let Some(body) = [a, b].into_iter().find(|body| *body >= limit) {
+                return Err(OrderError::NoSuchBody { collision, body, bodies });
+            }
+            if a == b {
+                return Err(OrderError::SelfCollision { collision, body: a });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Input read from a caller's own bodies and collisions, in memory that is kept.
+#[derive(Debug, Clone, Default)]
+pub struct InputBuffers {
+    pairs: Vec<[u32; 2]>,
+    moving: Vec<bool>,
+    positions: Vec<[f32; 3]>,
+}
+
+impl InputBuffers {
+    /// Without anything in them.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Reads the input of an order. A body whose shape is not in `shapes` does not move; a step
+    /// refuses it.
+    pub fn gather<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &B,
+        collisions: &C,
+        shapes: &[Shape],
+    ) -> OrderInput<'_> {
+        self.pairs.clear();
+        self.pairs.extend((0..collisions.len()).map(|index| {
+            let collision = collisions.collision(index);
+            [collision.body_a, collision.body_b]
+        }));
+        self.moving.clear();
+        self.positions.clear();
+        for index in 0..bodies.len() {
+            let body = bodies.body(index);
+            let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
+            self.moving.push(shape.is_some_and(|shape| shape.inverse_mass != 0.0));
+            self.positions.push(body.pose.position);
+        }
+        self.input()
+    }
+
+    /// What was read last.
+    #[must_use]
+    pub fn input(&self) -> OrderInput<'_> {
+        OrderInput { pairs: &self.pairs, moving: &self.moving, positions: &self.positions }
+    }
+}

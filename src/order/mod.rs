@@ -1,0 +1,63 @@
+//! This folder decides in which order the collisions of a step enter the pipeline.
+//!
+//! ```text
+//! bodies, collisions -> input -> sweep -> groups -> schedule -> check
+//! ```
+//!
+//! A collision reads the velocities of its bodies when it enters and writes them back a *window*
+//! later. A collision that shares a moving body with one of the `depth - 1` issue slots before it
+//! reads a stale velocity, and the impulse of the earlier one is lost. [`Order::HazardFree`] spaces
+//! the uses of every body so that this never happens, keeps few bodies alive at once (alive: from a
+//! body's first use to its last), and leaves slots empty only where nothing fits. Hardware that
+//! ignores hazards, hardware that waits on them and a sequential solver then give the same bits.
+//!
+//! An order is a function of its input alone: the same on every machine, and the same whatever was
+//! ordered before, so that a step taken again from a stored state is the same step.
+//!
+//! # Example
+//!
+//! ```
+//! use zynq_pgs::order::{Checker, IssueWindow, Order, OrderInput, Orderer};
+//!
+//! # fn main() -> Result<(), zynq_pgs::order::OrderError> {
+//! // A row of five bodies on the ground, which is body 0.
+//! let input = OrderInput {
+//!     pairs: &[[0, 1], [0, 2], [0, 3], [0, 4], [0, 5], [1, 2], [2, 3], [3, 4], [4, 5]],
+//!     moving: &[false, true, true, true, true, true],
+//!     positions: &[[0.0; 3], [0.0; 3], [2.0, 0.0, 0.0], [4.0, 0.0, 0.0], [6.0, 0.0, 0.0], [8.0, 0.0, 0.0]],
+//! };
+//! let window = IssueWindow::new(3, 1)?;
+//! let mut orderer = Orderer::new();
+//! let schedule = orderer.order(&input, Order::HazardFree, window)?;
+//! Checker::new().verify(schedule, &input, window)?;
+//! assert_eq!(schedule.collisions(), 9);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Source: thesis §4.7 and §5.4.4; interface specification, hazards.
+
+mod body_by_body;
+mod check;
+mod colours;
+mod error;
+mod groups;
+mod input;
+mod orderer;
+mod report;
+mod schedule;
+mod sweep;
+mod tail;
+mod window;
+
+pub use body_by_body::Ties;
+pub use check::Checker;
+pub use error::OrderError;
+pub use input::{InputBuffers, OrderInput};
+pub use orderer::{Order, Orderer, colour_count};
+pub use report::{OrderReport, live_curve};
+pub use schedule::{Ordered, Schedule};
+pub use window::IssueWindow;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,113 @@
+//! This file makes an order of the kind that is asked for.
+
+use super::groups::Groups;
+use super::sweep::Sweep;
+use super::tail::Tail;
+use super::{IssueWindow, OrderError, OrderInput, Schedule, Ties, body_by_body, colours};
+
+/// A kind of order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Order {
+    /// As given. Sorted collisions use the same body many times in a row: hazards abound.
+    AsGiven,
+    /// Body by body, as the thesis proposes (§4.7): few bodies alive, nearly every use a hazard.
+    BodyByBody(Ties),
+    /// By colour, no body twice in a colour: no hazards if colours are large, but nearly all bodies
+    /// alive at once.
+    Colours,
+    /// No hazards at all and few bodies alive: swept along the longest axis of the scene, with uses
+    /// of a body a whole depth apart and empty entries where nothing fits.
+    HazardFree,
+}
+
+/// Makes orders, keeping its memory from one to the next: no allocation once it has seen a scene of
+/// that size, for [`Order::AsGiven`] and [`Order::HazardFree`].
+#[derive(Debug)]
+pub struct Orderer {
+    sweep: Sweep,
+    tail: Tail,
+    groups: Groups,
+    schedule: Schedule,
+    limit: usize,
+}
+
+impl Default for Orderer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Orderer {
+    /// Entries of a schedule, at most, if not said otherwise.
+    pub const ENTRIES_MAX: usize = 1 << 26;
+
+    /// Without memory of its own yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            sweep: Sweep::default(),
+            tail: Tail::default(),
+            groups: Groups::default(),
+            schedule: Schedule::default(),
+            limit: Self::ENTRIES_MAX,
+        }
+    }
+
+    /// Allows schedules of so many entries, empty ones included, and no longer ones.
+    pub fn set_limit(&mut self, entries: usize) {
+        self.limit = entries.min(Self::ENTRIES_MAX);
+    }
+
+    /// Orders the collisions of a step.
+    ///
+    /// Only [`Order::HazardFree`] looks at the window. The order is a function of the arguments
+    /// alone.
+    ///
+    /// # Errors
+    /// [`OrderError`]: arrays of unequal lengths, a pair that names a body that is not there or one
+    /// body twice, too many of either, or a body with so many collisions that the schedule would be
+    /// longer than the [limit](Self::set_limit).
+    pub fn order(
+        &mut self,
+        input: &OrderInput<'_>,
+        order: Order,
+        window: IssueWindow,
+    ) -> Result<&Schedule, OrderError> {
+        input.check()?;
+        let schedule = &mut self.schedule;
+        match order {
+            Order::AsGiven => {
+                schedule.clear();
+                schedule.entries.extend((0..).zip(input.pairs).map(|(index, _): (u32, _)| index));
+            }
+            Order::BodyByBody(ties) => body_by_body::order(input, ties, schedule),
+            Order::Colours => {
+                colours::order(input, schedule);
+            }
+            Order::HazardFree => {
+                self.sweep.run(input);
+                let moving = self.sweep.moving();
+                let sweep = &mut self.sweep.collisions;
+                self.tail.bring_forward(sweep, window.entries(), moving);
+                self.groups.place(sweep, moving, window, self.limit, schedule)?;
+            }
+        }
+        Ok(&self.schedule)
+    }
+
+    /// The order made last; empty before the first.
+    #[must_use]
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
+    }
+}
+
+/// Number of colours of [`Order::Colours`].
+///
+/// # Errors
+/// [`OrderError`], as [`Orderer::order`].
+pub fn colour_count(input: &OrderInput<'_>) -> Result<usize, OrderError> {
+    input.check()?;
+    Ok(colours::order(input, &mut Schedule::default()))
+}

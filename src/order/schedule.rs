@@ -1,0 +1,103 @@
+//! This file holds an order: which collision stands in which entry, and which entries are empty.
+
+use crate::scene::{CONTACT_POINTS, Collision, Collisions, Contact};
+
+/// What an empty entry holds. No collision has this index: there are fewer.
+pub(super) const EMPTY: u32 = u32::MAX;
+
+/// The order in which collisions enter the pipeline.
+///
+/// One entry a collision, `per_issue` of them an issue slot; an empty entry is sent as a collision
+/// without contact points.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Schedule {
+    pub(super) entries: Vec<u32>,
+    pub(super) empty: usize,
+}
+
+impl Schedule {
+    /// Number of entries, empty ones included.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Number of entries with a collision.
+    #[must_use]
+    pub fn collisions(&self) -> usize {
+        self.entries.len() - self.empty
+    }
+
+    /// Number of empty entries.
+    #[must_use]
+    pub fn empty(&self) -> usize {
+        self.empty
+    }
+
+    /// The collision in an entry; `None` if the entry is empty or not there.
+    #[must_use]
+    pub fn get(&self, entry: usize) -> Option<usize> {
+        let index = *self.entries.get(entry)?;
+        if index == EMPTY { None } else { usize::try_from(index).ok() }
+    }
+
+    /// The collision of each entry, `None` where it is empty.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = Option<u32>> + '_ {
+        self.entries.iter().map(|index| if *index == EMPTY { None } else { Some(*index) })
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.entries.clear();
+        self.empty = 0;
+    }
+}
+
+/// From the collision of each entry; `None` is an empty one.
+impl FromIterator<Option<u32>> for Schedule {
+    fn from_iter<I: IntoIterator<Item = Option<u32>>>(entries: I) -> Self {
+        let entries: Vec<u32> = entries.into_iter().map(|entry| entry.unwrap_or(EMPTY)).collect();
+        let empty = entries.iter().filter(|index| **index == EMPTY).count();
+        Self { entries, empty }
+    }
+}
+
+/// Collisions in the order of a schedule, an empty entry being one without contact points.
+///
+/// Such padding has no effect on the hardware, and is refused from callers: this view is for what
+/// is packed, not for what is validated.
+#[derive(Debug)]
+pub struct Ordered<'a, C: ?Sized> {
+    /// The collisions, as given.
+    pub collisions: &'a C,
+    /// Their order, made for as many collisions.
+    pub schedule: &'a Schedule,
+}
+
+/// An entry without a collision.
+const PADDING: Collision = Collision {
+    body_a: 0,
+    body_b: 0,
+    normal: [0.0; 3],
+    count: 0,
+    contacts: [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS],
+};
+
+impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
+    fn len(&self) -> usize {
+        self.schedule.len()
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        self.schedule.get(index).map_or(PADDING, |index| self.collisions.collision(index))
+    }
+
+    fn lengths_agree(&self) -> bool {
+        self.collisions.lengths_agree() && self.schedule.collisions() == self.collisions.len()
+    }
+}

@@ -1,0 +1,272 @@
+//! Properties that every order has, whatever the scene.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::scene::{Body, Collision, Collisions, Contact, Pose, Shape, Velocity};
+
+/// A scene without geometry: pairs, which bodies move, where they are.
+#[derive(Debug, Clone)]
+struct Given {
+    pairs: Vec<[u32; 2]>,
+    moving: Vec<bool>,
+    positions: Vec<[f32; 3]>,
+}
+
+impl Given {
+    fn input(&self) -> OrderInput<'_> {
+        OrderInput { pairs: &self.pairs, moving: &self.moving, positions: &self.positions }
+    }
+}
+
+fn any_given(bodies: u32, pairs: usize) -> impl Strategy<Value = Given> {
+    (2..=bodies).prop_flat_map(move |bodies| {
+        let size = bodies as usize;
+        // The second body is another one.
+        let pair = (0..bodies, 1..bodies).prop_map(move |(a, b)| [a, (a + b) % bodies]);
+        (
+            prop::collection::vec(pair, 0..pairs),
+            prop::collection::vec(prop::bool::weighted(0.8), size),
+            prop::collection::vec(prop::array::uniform3(-80.0_f32..80.0), size),
+        )
+            .prop_map(|(pairs, moving, positions)| Given { pairs, moving, positions })
+    })
+}
+
+fn any_window() -> impl Strategy<Value = IssueWindow> {
+    let depth = prop_oneof![1_u32..20, 20_u32..400];
+    (depth, 1_u32..4).prop_map(|(depth, per)| IssueWindow::new(depth, per).expect("a window"))
+}
+
+const ORDERS: [Order; 6] = [
+    Order::AsGiven,
+    Order::BodyByBody(Ties::LowestIndex),
+    Order::BodyByBody(Ties::Oldest),
+    Order::BodyByBody(Ties::Newest),
+    Order::Colours,
+    Order::HazardFree,
+];
+
+fn ordered(given: &Given, order: Order, window: IssueWindow) -> Schedule {
+    let mut orderer = Orderer::new();
+    orderer.order(&given.input(), order, window).expect("an order").clone()
+}
+
+proptest! {
+    #[test]
+    fn every_order_is_a_permutation(given in any_given(60, 300), window in any_window()) {
+        for order in ORDERS {
+            let schedule = ordered(&given, order, window);
+            let mut found: Vec<u32> = schedule.iter().flatten().collect();
+            found.sort_unstable();
+            let all: Vec<u32> = (0..).zip(&given.pairs).map(|(index, _)| index).collect();
+            prop_assert_eq!(found, all);
+            prop_assert_eq!(schedule.collisions() + schedule.empty(), schedule.len());
+        }
+    }
+
+    #[test]
+    fn the_hazard_free_order_has_no_hazard(
+        given in any_given(200, 600),
+        window in any_window(),
+    ) {
+        let schedule = ordered(&given, Order::HazardFree, window);
+        let input = given.input();
+        prop_assert_eq!(Checker::new().verify(&schedule, &input, window), Ok(()));
+        let report = OrderReport::measure(&schedule, &input, window).expect("a schedule");
+        prop_assert_eq!((report.hazards, report.lost_updates), (0, 0));
+        prop_assert!(schedule.iter().last().is_none_or(|last| last.is_some()));
+    }
+
+    /// Every pair of uses is compared with every other.
+    #[test]
+    fn hazards_are_those_of_the_definition(given in any_given(40, 120), window in any_window()) {
+        let input = given.input();
+        for order in [Order::AsGiven, Order::Colours, Order::BodyByBody(Ties::Oldest)] {
+            let schedule = ordered(&given, order, window);
+            let entries: Vec<(usize, [u32; 2])> = schedule
+                .iter()
+                .enumerate()
+                .filter_map(|(entry, index)| Some((entry, given.pairs[index? as usize])))
+                .collect();
+            let slot = |entry: usize| entry / window.per_issue() as usize;
+            let hazards = entries.iter().enumerate().filter(|(k, (entry, pair))| {
+                entries[..*k].iter().any(|(before, other)| {
+                    slot(*entry) - slot(*before) < window.depth() as usize
+                        && pair.iter().any(|b| other.contains(b) && given.moving[*b as usize])
+                })
+            });
+            let hazards = hazards.count();
+            let report = OrderReport::measure(&schedule, &input, window).expect("a schedule");
+            prop_assert_eq!(report.hazards, hazards);
+            let verified = Checker::new().verify(&schedule, &input, window);
+            prop_assert_eq!(verified.is_ok(), hazards == 0);
+        }
+    }
+
+    #[test]
+    fn what_was_ordered_before_changes_nothing(
+        first in any_given(150, 300),
+        second in any_given(80, 200),
+        windows in [any_window(), any_window()],
+    ) {
+        let mut orderer = Orderer::new();
+        for order in ORDERS {
+            orderer.order(&first.input(), order, windows[0]).expect("an order");
+            let again = orderer.order(&second.input(), order, windows[1]).expect("an order");
+            prop_assert_eq!(again, &ordered(&second, order, windows[1]));
+        }
+    }
+}
+
+/// A sheet of spheres, each touching its four neighbours and the ground.
+fn sheet(side: u32) -> Given {
+    let at = |x: u32, z: u32| 1 + x * side + z;
+    let mut pairs = Vec::new();
+    let mut positions = vec![[0.0; 3]];
+    for x in 0..side {
+        for z in 0..side {
+            positions.push([2.0 * x as f32, 1.0, 2.0 * z as f32]);
+            pairs.push([0, at(x, z)]);
+            if x + 1 < side {
+                pairs.push([at(x, z), at(x + 1, z)]);
+            }
+            if z + 1 < side {
+                pairs.push([at(x, z), at(x, z + 1)]);
+            }
+        }
+    }
+    let moving = (0..positions.len()).map(|body| body > 0).collect();
+    Given { pairs, moving, positions }
+}
+
+#[test]
+fn a_sheet_is_ordered_with_few_bodies_alive_and_hardly_an_empty_entry() {
+    let given = sheet(60);
+    for (depth, per_issue) in [(16, 1), (64, 1), (16, 2)] {
+        let window = IssueWindow::new(depth, per_issue).expect("a window");
+        let schedule = ordered(&given, Order::HazardFree, window);
+        let report = OrderReport::measure(&schedule, &given.input(), window).expect("a schedule");
+        // Two rows of 60, and two windows of two bodies a collision.
+        assert!(report.most_alive <= 120 + 4 * window.entries(), "{report:?}");
+        // Emptying the pipeline at the end is all that costs.
+        assert!(report.empty <= 2 * window.entries(), "{report:?}");
+        let sorted = ordered(&given, Order::AsGiven, window);
+        let sorted = OrderReport::measure(&sorted, &given.input(), window).expect("a schedule");
+        assert!(sorted.hazards > given.pairs.len() / 2, "{sorted:?}");
+    }
+}
+
+#[test]
+fn a_body_that_meets_all_others_takes_one_collision_a_window() {
+    let pairs: Vec<[u32; 2]> = (1..=40).map(|body| [0, body]).collect();
+    let given = Given { pairs, moving: vec![true; 41], positions: vec![[0.0; 3]; 41] };
+    let window = IssueWindow::new(24, 1).expect("a window");
+    let mut orderer = Orderer::new();
+    let schedule = orderer.order(&given.input(), Order::HazardFree, window).expect("an order");
+    assert_eq!(Checker::new().verify(schedule, &given.input(), window), Ok(()));
+    // 39 windows between 40 uses; a group is three slots, so that nothing lies closer than 27.
+    assert!((39 * 24 + 1..=39 * 27 + 1).contains(&schedule.len()), "{}", schedule.len());
+
+    orderer.set_limit(500);
+    let refused = orderer.order(&given.input(), Order::HazardFree, window).expect_err("too long");
+    assert_eq!(refused, OrderError::TooLong { depth: 24, limit: 500, collisions: 40 });
+}
+
+#[test]
+fn a_scene_without_collisions_or_bodies_has_an_empty_order() {
+    let window = IssueWindow::new(158, 1).expect("a window");
+    for bodies in [0, 3] {
+        let none =
+            Given { pairs: vec![], moving: vec![true; bodies], positions: vec![[0.0; 3]; bodies] };
+        for order in ORDERS {
+            assert!(ordered(&none, order, window).is_empty());
+        }
+    }
+}
+
+#[test]
+fn input_that_cannot_be_ordered_is_refused_by_its_index() {
+    let window = IssueWindow::new(4, 1).expect("a window");
+    let good =
+        OrderInput { pairs: &[[0, 1], [1, 2]], moving: &[true; 3], positions: &[[0.0; 3]; 3] };
+    let refused = |input: &OrderInput<'_>| {
+        let of_order = Orderer::new().order(input, Order::HazardFree, window).map(|_| ());
+        let of_check = Checker::new().verify(&Schedule::default(), input, window);
+        assert_eq!(of_order, of_check);
+        of_order.expect_err("refused")
+    };
+    let pairs = &[[0, 1], [3, 1]];
+    assert_eq!(
+        refused(&OrderInput { pairs, ..good }),
+        OrderError::NoSuchBody { collision: 1, body: 3, bodies: 3 }
+    );
+    let pairs = &[[0, 1], [1, 1]];
+    assert_eq!(
+        refused(&OrderInput { pairs, ..good }),
+        OrderError::SelfCollision { collision: 1, body: 1 }
+    );
+    assert_eq!(
+        refused(&OrderInput { moving: &[true; 2], ..good }),
+        OrderError::UnequalLengths { moving: 2, positions: 3 }
+    );
+}
+
+#[test]
+fn a_wrong_schedule_is_refused_where_it_is_wrong() {
+    let input = OrderInput {
+        pairs: &[[0, 1], [1, 2], [3, 4]],
+        moving: &[false, true, true, true, true],
+        positions: &[[0.0; 3]; 5],
+    };
+    let window = IssueWindow::new(2, 1).expect("a window");
+    let verified = |entries: &[Option<u32>]| {
+        Checker::new().verify(&entries.iter().copied().collect(), &input, window)
+    };
+    assert_eq!(verified(&[Some(0), Some(2), Some(1)]), Ok(()));
+    assert_eq!(verified(&[Some(0), None, Some(1), Some(2)]), Ok(()));
+    assert_eq!(
+        verified(&[Some(2), Some(0), Some(1)]),
+        Err(OrderError::Hazard { body: 1, earlier: 1, slot: 2, depth: 2 })
+    );
+    assert_eq!(verified(&[Some(0), Some(2)]), Err(OrderError::Missing { collision: 1 }));
+    assert_eq!(
+        verified(&[Some(0), Some(2), Some(0)]),
+        Err(OrderError::Repeated { collision: 0, entry: 2 })
+    );
+    assert_eq!(
+        verified(&[Some(3)]),
+        Err(OrderError::NoSuchCollision { entry: 0, found: 3, collisions: 3 })
+    );
+}
+
+#[test]
+fn ordered_collisions_are_the_callers_with_padding_between() {
+    let body = |shape| Body {
+        pose: Pose { position: [shape as f32, 0.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity: Velocity::default(),
+        shape,
+    };
+    let collision = |body_a, body_b| Collision {
+        body_a,
+        body_b,
+        normal: [0.0, 1.0, 0.0],
+        count: 2,
+        contacts: [Contact::default(); 4],
+    };
+    let bodies = vec![body(0), body(1), body(1), body(7)];
+    let collisions = vec![collision(0, 1), collision(2, 1), collision(3, 1)];
+    let shapes = [Shape::STATIC, Shape::isotropic(1.0, 1.0)];
+    let mut buffers = InputBuffers::new();
+    let input = buffers.gather(&bodies, &collisions, &shapes);
+    assert_eq!(input.pairs, [[0, 1], [2, 1], [3, 1]]);
+    assert_eq!(input.moving, [false, true, true, false]);
+    assert_eq!(input.positions[2].map(f32::to_bits), [1.0_f32, 0.0, 0.0].map(f32::to_bits));
+
+    let schedule: Schedule = [Some(2), None, Some(0), Some(1)].into_iter().collect();
+    let ordered = Ordered { collisions: &collisions, schedule: &schedule };
+    assert_eq!((ordered.len(), ordered.lengths_agree()), (4, true));
+    assert_eq!(ordered.collision(0), collisions[2]);
+    assert_eq!((ordered.collision(1).count, ordered.collision(9).count), (0, 0));
+    assert_eq!(ordered.collision(3), collisions[1]);
+}

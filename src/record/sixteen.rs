@@ -1,0 +1,146 @@
+//! This file narrows rows to words of sixteen bits and widens them again.
+
+use bitstream_model::interface::number::StreamFormat;
+use bitstream_model::interface::record::{Beat, LANES, WORD_LANE};
+use half::f16;
+use half::slice::{HalfBitsSliceExt as _, HalfFloatSliceExt as _};
+
+use super::thesis16;
+
+/// A row in sixteen bits: half a beat.
+pub(crate) type Row = [u16; LANES];
+
+/// A format of sixteen bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sixteen {
+    /// Binary16, rounded to nearest even.
+    Binary16,
+    /// The thesis', cut off.
+    Thesis16,
+}
+
+impl Sixteen {
+    /// The format of a stream, if its words have sixteen bits.
+    pub(crate) const fn of(format: StreamFormat) -> Option<Self> {
+        match format {
+            StreamFormat::F32 => None,
+            StreamFormat::Binary16 => Some(Self::Binary16),
+            StreamFormat::Thesis16 => Some(Self::Thesis16),
+        }
+    }
+
+    /// Rows of f32 as rows of this format. Where `integers` says so the word beside the vec3 is an
+    /// unsigned integer, which validation has found to fit.
+    #[inline]
+    pub(crate) fn narrow<const ROWS: usize>(
+        self,
+        rows: &[Beat; ROWS],
+        integers: &[bool; ROWS],
+    ) -> [Row; ROWS] {
+        let mut narrow = [[0; LANES]; ROWS];
+        match self {
+            Self::Binary16 => {
+                let numbers: &mut [f16] = narrow.as_flattened_mut().reinterpret_cast_mut();
+                numbers.convert_from_f32_slice(bytemuck::cast_slice(rows));
+            }
+            Self::Thesis16 => {
+                for (to, from) in narrow.iter_mut().zip(rows) {
+                    *to = from.0.map(thesis16::narrow);
+                }
+            }
+        }
+        for ((to, from), integer) in narrow.iter_mut().zip(rows).zip(integers) {
+            if *integer {
+                #[expect(clippy::cast_possible_truncation, reason = "validated to fit")]
+                let word = from.0[WORD_LANE] as u16;
+                to[WORD_LANE] = word;
+            }
+        }
+        narrow
+    }
+
+    /// Rows of f32 numbers from rows of this format.
+    #[inline]
+    pub(crate) fn widen<const ROWS: usize>(self, rows: &[Row; ROWS]) -> [Beat; ROWS] {
+        let mut wide = [Beat::default(); ROWS];
+        match self {
+            Self::Binary16 => {
+                let numbers: &[f16] = rows.as_flattened().reinterpret_cast();
+                numbers.convert_to_f32_slice(bytemuck::cast_slice_mut(&mut wide));
+            }
+            Self::Thesis16 => {
+                for (to, from) in wide.iter_mut().zip(rows) {
+                    *to = Beat(from.map(thesis16::widen));
+                }
+            }
+        }
+        wide
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn narrowed(format: Sixteen, value: f32) -> u16 {
+        format.narrow(&[Beat([value.to_bits(); 4])], &[false])[0][1]
+    }
+
+    #[test]
+    fn formats_of_sixteen_bits_are_known_as_such() {
+        assert_eq!(Sixteen::of(StreamFormat::F32), None);
+        for format in StreamFormat::ALL {
+            assert_eq!(Sixteen::of(format).is_some(), format.bits() == 16);
+        }
+    }
+
+    #[test]
+    fn integers_are_integers_in_either_format() {
+        for format in [Sixteen::Binary16, Sixteen::Thesis16] {
+            let row = Beat([0x3F80_0000, 0xC000_0000, 0x4248_0000, 0xABCD]);
+            let [with, without] = format.narrow(&[row; 2], &[true, false]);
+            // 1, -2, 50 are exact in both.
+            assert_eq!(with, [0x3C00, 0xC000, 0x5240, 0xABCD]);
+            assert_eq!(without, [0x3C00, 0xC000, 0x5240, 0x0000]);
+        }
+    }
+
+    /// Every word comes back, and between two neighbours the nearer one is taken, the even one in
+    /// the middle.
+    #[test]
+    fn binary16_is_rounded_to_nearest_even_over_its_whole_range() {
+        for bits in 0..0x7BFF_u16 {
+            let [low, high] = Sixteen::Binary16.widen(&[[bits, bits + 1, 0, 0]])[0]
+                .0
+                .first_chunk()
+                .map(|[low, high]| [f32::from_bits(*low), f32::from_bits(*high)])
+                .expect("four lanes");
+            // Both have eleven significant bits, so that the middle is exact in f32.
+            let middle = f32::midpoint(low, high);
+            let even = if bits % 2 == 0 { bits } else { bits + 1 };
+            for (value, expected) in [
+                (low, bits),
+                (middle.next_down(), bits),
+                (middle, even),
+                (middle.next_up(), bits + 1),
+            ] {
+                assert_eq!(narrowed(Sixteen::Binary16, value), expected, "{value:e}");
+                assert_eq!(narrowed(Sixteen::Binary16, -value), expected | 0x8000, "-{value:e}");
+            }
+        }
+        assert_eq!(narrowed(Sixteen::Binary16, 65_504.0), 0x7BFF);
+        assert_eq!(narrowed(Sixteen::Binary16, f32::INFINITY), 0x7C00);
+    }
+
+    #[test]
+    fn what_is_not_finite_comes_back_as_such() {
+        let finite = |format: Sixteen, word: u16| {
+            f32::from_bits(format.widen(&[[word, 0, 0, 0]])[0].0[0]).is_finite()
+        };
+        for format in [Sixteen::Binary16, Sixteen::Thesis16] {
+            for word in 0..=u16::MAX {
+                assert_eq!(finite(format, word), word & 0x7C00 != 0x7C00, "{format:?} {word:#06x}");
+            }
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! Ordering the collisions of a step against packing them in that order.
+//!
+//! ```sh
+//! cargo bench --bench order
+//! cargo bench --bench order -- --grid 10x10x10 --steps 4 --json
+//! ```
+//!
+//! The thesis' cubes, standing on the ground, are stepped on the emulated board. The first step
+//! shows what ordering costs with no memory of its own yet; on the following ones ordering, its
+//! verification, and packing run in turn. Ordering includes reading the caller's bodies and
+//! collisions; packing is that of four channels and f32 records.
+
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
+
+use std::error::Error;
+use std::hint::black_box;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use bench::{Run, medians};
+use bitstream_model::interface::profile::FLOAT;
+use bitstream_model::{BoardConfig, EmulatedBoard};
+use scene::{Grid, Scene, SceneOptions};
+use serde_json::json;
+use zynq_pgs::bench::CollisionPacker;
+use zynq_pgs::order::{Checker, InputBuffers, IssueWindow, Order, OrderReport, Ordered, Orderer};
+use zynq_pgs::{Accelerator, BoardChoice, OpenOptions, StepParameters};
+
+/// What the command line asks for.
+struct Options {
+    grid: Grid,
+    drop: f32,
+    steps: u32,
+    runs: usize,
+    json: bool,
+}
+
+impl Options {
+    fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Self, Box<dyn Error>> {
+        let mut options =
+            Self { grid: Grid::default(), drop: 0.0, steps: 5, runs: 21, json: false };
+        while let Some(argument) = arguments.next() {
+            let mut value = || arguments.next().ok_or(format!("{argument} needs a value"));
+            match argument.as_str() {
+                "--grid" => options.grid = value()?.parse()?,
+                "--drop" => options.drop = value()?.parse()?,
+                "--steps" => options.steps = value()?.parse()?,
+                "--runs" => options.runs = value()?.parse()?,
+                "--json" => options.json = true,
+                // What cargo adds.
+                "--bench" => {}
+                other => {
+                    return Err(format!(
+                        "unknown {other:?}, expected --grid, --drop, --steps, --runs or --json"
+                    )
+                    .into());
+                }
+            }
+        }
+        Ok(options)
+    }
+}
+
+/// Times of one step.
+struct Row {
+    step: u32,
+    collisions: usize,
+    empty: usize,
+    first: bool,
+    order: Duration,
+    verify: Duration,
+    pack: Duration,
+    pack_as_given: Duration,
+}
+
+impl Row {
+    fn ratio(&self) -> f64 {
+        self.order.as_secs_f64() / self.pack.as_secs_f64()
+    }
+
+    fn print(&self) {
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        println!(
+            "{:>5} {:>10} {:>6} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>7.2}{}",
+            self.step,
+            self.collisions,
+            self.empty,
+            ms(self.order),
+            ms(self.verify),
+            ms(self.pack),
+            ms(self.pack_as_given),
+            self.ratio(),
+            if self.first { "  (once, without memory of its own)" } else { "" },
+        );
+    }
+
+    fn to_json(&self) -> serde_json::Value {
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        json!({
+            "step": self.step,
+            "first": self.first,
+            "collisions": self.collisions,
+            "empty": self.empty,
+            "order_ms": ms(self.order),
+            "verify_ms": ms(self.verify),
+            "pack_in_order_ms": ms(self.pack),
+            "pack_as_given_ms": ms(self.pack_as_given),
+            "order_by_pack": self.ratio(),
+        })
+    }
+}
+
+/// What a step keeps for the next.
+struct Kept {
+    buffers: InputBuffers,
+    orderer: Orderer,
+    checker: Checker,
+    packer: CollisionPacker,
+}
+
+impl Kept {
+    fn new() -> Self {
+        Self {
+            buffers: InputBuffers::new(),
+            orderer: Orderer::new(),
+            checker: Checker::new(),
+            packer: CollisionPacker::new(FLOAT.default_variant()),
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    match Options::parse(std::env::args().skip(1)).and_then(|options| run(&options)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    let scene = SceneOptions { grid: options.grid, drop: options.drop, ..Default::default() };
+    let mut scene = Scene::new(&scene)?;
+    let emulated = EmulatedBoard::new(BoardConfig::default())?;
+    let board = BoardChoice::Emulated(emulated.cpu_port());
+    let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
+    accelerator.set_shapes(scene.shapes())?;
+    let window = IssueWindow::of(accelerator.capabilities())?;
+    if !options.json {
+        println!(
+            "{} cubes dropped from {} m, depth {} issue slots, medians of {} runs in turn\n",
+            options.grid,
+            options.drop,
+            window.depth(),
+            options.runs,
+        );
+        println!(" step collisions  empty     order    verify      pack      pack   order");
+        println!("                               ms        ms  in order  as given by pack");
+    }
+    let mut kept = Kept::new();
+    let mut rows = Vec::new();
+    for step in 1..=options.steps {
+        scene.detect();
+        let row = measure(step, options.runs, &scene, &mut kept, window)?;
+        if !options.json {
+            row.print();
+        }
+        rows.push(row);
+        let (bodies, collisions) = scene.parts_mut();
+        accelerator.step(bodies, collisions, &StepParameters::default())?;
+    }
+    if options.json {
+        let rows: Vec<_> = rows.iter().map(Row::to_json).collect();
+        let document = json!({
+            "schema": 1,
+            "bench": "order",
+            "grid": options.grid.to_string(),
+            "drop_m": options.drop,
+            "depth": window.depth(),
+            "runs": options.runs,
+            "steps": rows,
+        });
+        println!("{document:#}");
+    }
+    Ok(())
+}
+
+/// Orders, verifies and packs the collisions of one step.
+fn measure(
+    step: u32,
+    runs: usize,
+    scene: &Scene,
+    kept: &mut Kept,
+    window: IssueWindow,
+) -> Result<Row, Box<dyn Error>> {
+    let (bodies, collisions, shapes) = (scene.bodies(), scene.collisions(), scene.shapes());
+    let Kept { buffers, orderer, checker, packer } = kept;
+    let first = step == 1;
+    let begin = Instant::now();
+    buffers.gather(bodies, collisions, shapes);
+    let schedule = orderer.order(&buffers.input(), Order::HazardFree, window)?.clone();
+    let once = begin.elapsed();
+    let input = buffers.input();
+    checker.verify(&schedule, &input, window)?;
+    let empty = OrderReport::measure(&schedule, &input, window)?.empty;
+
+    let ordered = Ordered { collisions, schedule: &schedule };
+    let mut as_given = CollisionPacker::new(FLOAT.default_variant());
+    let mut again = InputBuffers::new();
+    let mut contestants: [Run<'_>; 4] = [
+        Box::new(|| {
+            let input = again.gather(bodies, collisions, shapes);
+            let _ = black_box(orderer.order(&input, Order::HazardFree, window));
+        }),
+        Box::new(|| {
+            let _ = black_box(checker.verify(&schedule, &input, window));
+        }),
+        Box::new(|| {
+            black_box(packer.pack(bodies, &ordered, &shapes));
+        }),
+        Box::new(|| {
+            black_box(as_given.pack(bodies, collisions, &shapes));
+        }),
+    ];
+    // Once without looking, so that all memory is there.
+    medians(1, &mut contestants);
+    let medians = medians(runs, &mut contestants);
+    let [order, verify, pack, pack_as_given] = medians[..] else {
+        return Err("a time for each".into());
+    };
+    let order = if first { once } else { order };
+    let collisions = collisions.len();
+    Ok(Row { step, collisions, empty, first, order, verify, pack, pack_as_given })
+}

@@ -1,0 +1,58 @@
+//! What the benchmarks share: medians of interleaved runs.
+//!
+//! Times of one machine mean little on another, and on a busy machine little from one minute to the
+//! next. So the things that are compared run in turn, a run of each, and what is said is the ratio
+//! of their medians.
+
+#![forbid(unsafe_code)]
+
+use std::time::{Duration, Instant};
+
+/// Something that is timed; its result is kept from being optimised away by the caller.
+pub type Run<'a> = Box<dyn FnMut() + 'a>;
+
+/// Runs all in turn, so many times each; the median time of each.
+pub fn medians(runs: usize, contestants: &mut [Run<'_>]) -> Vec<Duration> {
+    let mut times = vec![Vec::with_capacity(runs); contestants.len()];
+    for _ in 0..runs {
+        for (run, times) in contestants.iter_mut().zip(&mut times) {
+            let begin = Instant::now();
+            run();
+            times.push(begin.elapsed());
+        }
+    }
+    times.into_iter().map(median).collect()
+}
+
+/// The middle one, the later of two; zero of none.
+fn median(mut times: Vec<Duration>) -> Duration {
+    times.sort_unstable();
+    times.get(times.len() / 2).copied().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+
+    #[test]
+    fn contestants_take_turns() {
+        let order = RefCell::new(Vec::new());
+        let mut contestants: Vec<Run<'_>> = vec![
+            Box::new(|| order.borrow_mut().push('a')),
+            Box::new(|| order.borrow_mut().push('b')),
+        ];
+        assert_eq!(medians(2, &mut contestants).len(), 2);
+        drop(contestants);
+        assert_eq!(order.into_inner(), ['a', 'b', 'a', 'b']);
+    }
+
+    #[test]
+    fn a_median_is_the_middle() {
+        let times =
+            |list: &[u64]| median(list.iter().copied().map(Duration::from_millis).collect());
+        assert_eq!(times(&[9, 1, 5]), Duration::from_millis(5));
+        assert_eq!(times(&[]), Duration::ZERO);
+    }
+}

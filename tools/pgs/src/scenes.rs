@@ -1,0 +1,131 @@
+//! This file is the choice of a scene on the command line.
+
+use clap::{Args, ValueEnum};
+use scene::{Grid, Inertia, Scene, SceneOptions, ShapesOptions};
+use serde_json::{Value, json};
+
+use crate::board::Opened;
+use crate::failure::Failure;
+use crate::verbs::table::grouped;
+
+/// Which scene, and how large.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SceneArgs {
+    /// What falls: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules of
+    /// several masses), which takes a board with --inertia world.
+    #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
+    scene: SceneName,
+    /// Bodies along each axis; y is up.
+    #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
+    grid: Grid,
+    /// Height of the lowest bodies above the ground at the start, m.
+    #[arg(long, value_name = "H", default_value_t = SceneOptions::default().drop, value_parser = drop_height)]
+    drop: f32,
+    /// Inverse inertia of the cubes: what Bullet computes (0.3676), or a textbook's (1.5) [default:
+    /// bullet]
+    #[arg(long, value_enum)]
+    cube_inertia: Option<CubeInertia>,
+    /// Decides which of the shapes lies where, and how it is turned [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SceneName {
+    Cubes,
+    Shapes,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CubeInertia {
+    Bullet,
+    Textbook,
+}
+
+impl From<CubeInertia> for Inertia {
+    fn from(name: CubeInertia) -> Self {
+        match name {
+            CubeInertia::Bullet => Self::Bullet,
+            CubeInertia::Textbook => Self::Textbook,
+        }
+    }
+}
+
+fn drop_height(text: &str) -> Result<f32, String> {
+    let most = scene::DROP_MAX;
+    match text.parse::<f32>() {
+        Ok(height) if (0.0..=most).contains(&height) => Ok(height),
+        _ => Err(format!("expected a height from 0 to {most} m")),
+    }
+}
+
+impl SceneArgs {
+    /// Builds the scene.
+    pub(crate) fn build(&self) -> Result<Scene, Failure> {
+        let Self { grid, drop, .. } = *self;
+        let built = match self.scene {
+            SceneName::Cubes if self.seed.is_some() => {
+                let error = "--seed is for --scene shapes, the cubes are not placed at random";
+                return Err(Failure::input(error));
+            }
+            SceneName::Cubes => Scene::new(&SceneOptions { grid, drop, inertia: self.inertia() }),
+            SceneName::Shapes if self.cube_inertia.is_some() => {
+                let error = "--cube-inertia is for --scene cubes, the shapes have a textbook's";
+                return Err(Failure::input(error));
+            }
+            SceneName::Shapes => Scene::of_shapes(&ShapesOptions { grid, drop, seed: self.seed() }),
+        };
+        built.map_err(Failure::input)
+    }
+
+    fn inertia(&self) -> Inertia {
+        self.cube_inertia.map_or(Inertia::default(), Into::into)
+    }
+
+    fn seed(&self) -> u64 {
+        self.seed.unwrap_or(ShapesOptions::default().seed)
+    }
+
+    /// Refuses a grid that does not fit before memory is taken for it.
+    pub(crate) fn check_size(&self, opened: &Opened) -> Result<(), Failure> {
+        let capacity = opened.accelerator.capabilities().body_capacity;
+        if self.grid.cubes() < capacity {
+            return Ok(());
+        }
+        let error = format!(
+            "a grid of {} is {} bodies with the ground, the board takes at most {capacity}",
+            self.grid,
+            u64::from(self.grid.cubes()) + 1
+        );
+        Err(Failure::input(error).next("give a smaller --grid"))
+    }
+
+    /// The scene for people.
+    pub(crate) fn text(&self) -> String {
+        let Self { grid, drop, .. } = self;
+        let what = match self.scene {
+            SceneName::Cubes => format!("cubes ({grid})"),
+            SceneName::Shapes => {
+                format!("cubes, spheres, boxes and capsules ({grid}, seed {})", self.seed())
+            }
+        };
+        let count = grouped(grid.cubes().into());
+        format!("{count} {what} on a static ground, dropped from {drop} m")
+    }
+
+    /// The scene for programs.
+    pub(crate) fn to_json(&self) -> Value {
+        let cubes = self.scene == SceneName::Cubes;
+        json!({
+            "scene": if cubes { "cubes" } else { "shapes" },
+            "grid": self.grid.to_string(),
+            "drop_m": self.drop,
+            "inertia": match self.inertia() {
+                _ if !cubes => None,
+                Inertia::Bullet => Some("bullet"),
+                Inertia::Textbook => Some("textbook"),
+            },
+            "seed": (!cubes).then(|| self.seed()),
+        })
+    }
+}

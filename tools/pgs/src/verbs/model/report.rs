@@ -1,0 +1,109 @@
+//! This file is what the verb shows: tables of typed cells, laid out by `render`.
+
+use serde_json::{Map, Value, json};
+
+/// Where a row's figures come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Counted.
+    Exact,
+    /// Computed from a cycle, memory or bandwidth model.
+    Modelled,
+    /// Taken from the thesis.
+    Recorded,
+}
+
+impl Kind {
+    pub(super) fn cell(self) -> Cell {
+        text(match self {
+            Self::Exact => "exact",
+            Self::Modelled => "modelled",
+            Self::Recorded => "recorded",
+        })
+    }
+}
+
+/// What stands in one place of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Cell {
+    Text(String),
+    Whole(u64),
+    /// A number, shown with so many digits behind the point.
+    Number(f64, usize),
+    /// Percent, shown with its sign.
+    Difference(f64),
+    /// Percent.
+    Share(f64),
+    /// Not known, or of another scene.
+    Missing,
+}
+
+pub(super) fn text(value: impl Into<String>) -> Cell {
+    Cell::Text(value.into())
+}
+
+impl Cell {
+    fn to_json(&self) -> Value {
+        match self {
+            Self::Text(text) => json!(text),
+            Self::Whole(number) => json!(number),
+            Self::Number(value, _) | Self::Difference(value) | Self::Share(value) => json!(value),
+            Self::Missing => Value::Null,
+        }
+    }
+}
+
+/// A column: its key in JSON, and its heading.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Column {
+    pub(super) key: &'static str,
+    pub(super) head: &'static str,
+}
+
+/// A table with what has to be said about it.
+#[derive(Debug, Clone)]
+pub(super) struct Table {
+    pub(super) id: &'static str,
+    pub(super) title: String,
+    pub(super) columns: Vec<Column>,
+    pub(super) rows: Vec<Vec<Cell>>,
+    pub(super) notes: Vec<String>,
+}
+
+impl Table {
+    /// A table without rows; columns are (key, heading).
+    pub(super) fn new(
+        id: &'static str,
+        title: impl Into<String>,
+        columns: &[(&'static str, &'static str)],
+    ) -> Self {
+        let columns = columns.iter().map(|(key, head)| Column { key, head }).collect();
+        Self { id, title: title.into(), columns, rows: Vec::new(), notes: Vec::new() }
+    }
+
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        let cells: Vec<Cell> = cells.into_iter().collect();
+        debug_assert_eq!(cells.len(), self.columns.len(), "{}", self.id);
+        self.rows.push(cells);
+    }
+
+    pub(super) fn note(&mut self, note: impl Into<String>) {
+        self.notes.push(note.into());
+    }
+
+    pub(super) fn to_json(&self) -> Value {
+        let row = |cells: &Vec<Cell>| {
+            let members = self.columns.iter().zip(cells);
+            members
+                .map(|(column, cell)| (column.key.to_owned(), cell.to_json()))
+                .collect::<Map<_, _>>()
+        };
+        json!({
+            "id": self.id,
+            "title": self.title,
+            "columns": self.columns.iter().map(|column| column.key).collect::<Vec<_>>(),
+            "rows": self.rows.iter().map(row).collect::<Vec<_>>(),
+            "notes": self.notes,
+        })
+    }
+}

@@ -1,0 +1,139 @@
+//! This file measures every order of the collisions at every depth.
+
+use zynq_pgs::order::{
+    Checker, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer, Schedule, Ties,
+    colour_count,
+};
+
+use super::cost;
+use super::source::Source;
+
+/// Where the random order comes from; any number does.
+const SEED: u64 = 20_260_101;
+
+/// An order at a depth.
+pub(super) struct Row {
+    pub(super) order: String,
+    pub(super) depth: u32,
+    pub(super) report: OrderReport,
+    /// What making the order costs, ns a collision; not if it is not made here.
+    pub(super) host_ns: Option<f64>,
+}
+
+/// Everything that was measured.
+pub(super) struct Measured {
+    pub(super) rows: Vec<Row>,
+    /// Schedules at the last depth, by the name of their order.
+    pub(super) last: Vec<(String, Schedule)>,
+    /// What verifying the hazard-free schedule of the last depth costs, ns a collision.
+    pub(super) verify_ns: f64,
+}
+
+/// Where an order comes from.
+enum Kind {
+    Made(Order),
+    /// The same at every depth, made elsewhere.
+    Fixed(Schedule),
+}
+
+/// Measures all orders, for every window.
+pub(super) fn measure(
+    source: &Source,
+    windows: &[IssueWindow],
+    runs: u32,
+) -> Result<Measured, OrderError> {
+    let input = source.input();
+    let mut rows = Vec::new();
+    let mut last = Vec::new();
+    let mut verify_ns = 0.0;
+    let mut orderer = Orderer::new();
+    for (name, kind) in kinds(source)? {
+        let mut schedule = Schedule::default();
+        let mut host_ns = None;
+        for (place, window) in windows.iter().copied().enumerate() {
+            match &kind {
+                Kind::Fixed(fixed) => schedule.clone_from(fixed),
+                Kind::Made(order) => {
+                    // Only the hazard-free order depends on the depth.
+                    if place == 0 || *order == Order::HazardFree {
+                        let cost = || orderer.order(&input, *order, window).map(|_| ());
+                        host_ns = Some(cost::per_collision(&input, runs, cost)?);
+                        schedule.clone_from(orderer.schedule());
+                    }
+                    if *order == Order::HazardFree {
+                        verify_ns = verified(&schedule, &input, window, runs)?;
+                    }
+                }
+            }
+            let report = OrderReport::measure(&schedule, &input, window)?;
+            rows.push(Row { order: name.clone(), depth: window.depth(), report, host_ns });
+        }
+        last.push((name, schedule));
+    }
+    Ok(Measured { rows, last, verify_ns })
+}
+
+/// What verifying a schedule costs; it must be right.
+fn verified(
+    schedule: &Schedule,
+    input: &OrderInput<'_>,
+    window: IssueWindow,
+    runs: u32,
+) -> Result<f64, OrderError> {
+    let mut checker = Checker::new();
+    cost::per_collision(input, runs, || checker.verify(schedule, input, window))
+}
+
+fn kinds(source: &Source) -> Result<Vec<(String, Kind)>, OrderError> {
+    let input = source.input();
+    let thesis = |ties| Kind::Made(Order::BodyByBody(ties));
+    let fixed = |order: Vec<u32>| Kind::Fixed(order.into_iter().map(Some).collect());
+    let colours = colour_count(&input)?;
+    let mut kinds = vec![("as given".to_owned(), Kind::Made(Order::AsGiven))];
+    if let Some(order) = &source.gpu_order {
+        kinds.push(("Bullet's GPU batches".to_owned(), fixed(order.clone())));
+    }
+    kinds.extend([
+        ("random".to_owned(), fixed(shuffled(input.pairs.len()))),
+        ("thesis, lowest index".to_owned(), thesis(Ties::LowestIndex)),
+        ("thesis, oldest".to_owned(), thesis(Ties::Oldest)),
+        ("thesis, newest".to_owned(), thesis(Ties::Newest)),
+        (format!("{colours} colours"), Kind::Made(Order::Colours)),
+        ("hazard-free".to_owned(), Kind::Made(Order::HazardFree)),
+    ]);
+    Ok(kinds)
+}
+
+/// Fisher and Yates' shuffle with numbers of `SplitMix64`.
+fn shuffled(count: usize) -> Vec<u32> {
+    let mut state = SEED;
+    let mut random = |below: usize| {
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        let z = u128::from(z ^ (z >> 31));
+        // The upper half of the product is below `below`.
+        usize::try_from((z * below as u128) >> 64).unwrap_or(0)
+    };
+    let mut order: Vec<u32> = (0..).take(count).collect();
+    for k in (1..count).rev() {
+        order.swap(k, random(k + 1));
+    }
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shuffle_is_a_permutation_and_far_from_the_order_given() {
+        let order = shuffled(1000);
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..1000).collect::<Vec<_>>());
+        let near = (0..).zip(&order).filter(|(k, index)| u32::abs_diff(*k, **index) < 100);
+        assert!(near.count() < 300);
+    }
+}

@@ -1,0 +1,129 @@
+//! This file gets the collisions that are ordered: from a folder, a pile of spheres or of cubes.
+
+use std::path::Path;
+
+use scene::{Scene, SceneOptions, Spheres};
+use zynq_pgs::order::{InputBuffers, OrderInput};
+use zynq_pgs::{Body, Collision, Shape, StepParameters};
+
+use super::OrderArgs;
+use crate::args::CommonArgs;
+use crate::board;
+use crate::failure::Failure;
+use crate::folder::Folder;
+use crate::npy::{self, Dimensions};
+use crate::options::BuildArgs;
+
+/// The order in which Bullet's GPU takes the collisions, if the folder has it.
+const GPU_ORDER: &str = "gpu_order.npy";
+
+/// Collisions to be ordered.
+pub(super) struct Source {
+    pub(super) name: String,
+    /// A permutation of the collisions.
+    pub(super) gpu_order: Option<Vec<u32>>,
+    buffers: InputBuffers,
+}
+
+impl Source {
+    /// Gets what the command line asks for.
+    pub(super) fn load(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
+        if let Some(path) = &args.input {
+            return Self::folder(path);
+        }
+        if let Some(count) = args.spheres {
+            let spheres = Spheres::new(count, args.seed).map_err(Failure::input)?;
+            let name = format!("{count} spheres, seed {}", args.seed);
+            return Ok(Self::new(
+                name,
+                spheres.bodies(),
+                spheres.collisions(),
+                spheres.shapes(),
+                None,
+            ));
+        }
+        Self::grid(args, common)
+    }
+
+    fn new(
+        name: String,
+        bodies: &[Body],
+        collisions: &[Collision],
+        shapes: &[Shape],
+        gpu_order: Option<Vec<u32>>,
+    ) -> Self {
+        let mut buffers = InputBuffers::new();
+        buffers.gather(bodies, collisions, shapes);
+        Self { name, gpu_order, buffers }
+    }
+
+    fn folder(path: &Path) -> Result<Self, Failure> {
+        let folder = Folder::load(path).map_err(|error| {
+            Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
+        })?;
+        let gpu_order = gpu_order(&path.join(GPU_ORDER), folder.collisions.len())?;
+        let Folder { bodies, collisions, shapes, .. } = folder;
+        Ok(Self::new(path.display().to_string(), &bodies, &collisions, &shapes, gpu_order))
+    }
+
+    /// Cubes, after some steps on the board.
+    fn grid(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
+        let options = SceneOptions { grid: args.grid, drop: args.drop, ..Default::default() };
+        let mut scene = Scene::new(&options).map_err(Failure::input)?;
+        if args.steps > 0 {
+            let mut opened = board::open(common, &BuildArgs::default())?;
+            opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
+            for _ in 0..args.steps {
+                scene.detect();
+                let (bodies, collisions) = scene.parts_mut();
+                opened
+                    .accelerator
+                    .step(bodies, collisions, &StepParameters::default())
+                    .map_err(|error| opened.failure(error))?;
+            }
+        }
+        scene.detect();
+        let name =
+            format!("{} cubes dropped from {} m, step {}", args.grid, args.drop, args.steps + 1);
+        Ok(Self::new(name, scene.bodies(), scene.collisions(), scene.shapes(), None))
+    }
+
+    pub(super) fn input(&self) -> OrderInput<'_> {
+        self.buffers.input()
+    }
+
+    /// Number of moving bodies.
+    pub(super) fn moving(&self) -> usize {
+        self.input().moving.iter().filter(|moving| **moving).count()
+    }
+
+    /// Collisions that a moving body takes part in, on average.
+    pub(super) fn touches(&self) -> f64 {
+        let input = self.input();
+        let uses = input.pairs.iter().flatten().filter(|body| {
+            let body = usize::try_from(**body).ok();
+            body.and_then(|body| input.moving.get(body)).is_some_and(|moving| *moving)
+        });
+        uses.count() as f64 / (self.moving() as f64).max(1.0)
+    }
+}
+
+/// A permutation of `count` collisions, if there is such a file.
+fn gpu_order(path: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let shape = Dimensions(vec![Some(count)]);
+    let (_, order) = npy::read::<u32>(path, &shape).map_err(Failure::input)?;
+    let mut seen = vec![false; count];
+    for (place, index) in order.iter().enumerate() {
+        let first = usize::try_from(*index).ok().and_then(|index| seen.get_mut(index));
+        if first.is_none_or(|seen| std::mem::replace(seen, true)) {
+            let path = path.display();
+            return Err(Failure::input(format!(
+                "{path}: expected each index below {count} once, found {index} at {place}"
+            )));
+        }
+    }
+    Ok(Some(order))
+}

@@ -1,0 +1,292 @@
+//! This file builds a pile of several shapes and masses.
+
+use zynq_pgs::{Body, Shape};
+
+use crate::build::{at_rest, check_drop};
+use crate::{Geometry, Grid, Scene, SceneError};
+
+/// The kinds of bodies: outline, and mass in kg. Boxes and capsules have other inertias about other
+/// axes.
+const KINDS: [(Geometry, f32); 8] = [
+    (Geometry::Box { half_extents: [0.6; 3] }, 1.0),
+    (Geometry::Box { half_extents: [0.6; 3] }, 3.0),
+    (Geometry::Sphere { radius: 0.6 }, 0.5),
+    (Geometry::Sphere { radius: 0.6 }, 2.0),
+    (Geometry::Box { half_extents: [0.5, 0.25, 1.0] }, 1.0),
+    (Geometry::Box { half_extents: [0.5, 0.25, 1.0] }, 2.0),
+    (Geometry::Capsule { half_height: 0.6, radius: 0.4 }, 1.0),
+    (Geometry::Capsule { half_height: 0.6, radius: 0.4 }, 4.0),
+];
+
+/// Distance between the centres of neighbours, m: no two bodies touch, however they are turned.
+const SPACING: f32 = 2.4;
+
+/// What a pile of several shapes is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapesOptions {
+    /// Number of bodies along each axis.
+    pub grid: Grid,
+    /// Height of the lowest layer above the ground at the start, m: of what the largest body could
+    /// reach.
+    pub drop: f32,
+    /// Decides which body has which shape, mass and orientation.
+    pub seed: u64,
+}
+
+impl Default for ShapesOptions {
+    fn default() -> Self {
+        Self { grid: Grid::default(), drop: 5.0, seed: 1 }
+    }
+}
+
+impl Scene {
+    /// Builds a pile of cubes, spheres, boxes and capsules of several masses, at rest: on a lattice
+    /// about the origin, each layer half a distance beside the one below, shapes and orientations
+    /// at random. The same seed gives the same bits everywhere.
+    ///
+    /// Boxes of 1 x 0.5 x 2 m and capsules have no isotropic inertia: only a bitstream with world
+    /// inertia takes them.
+    ///
+    /// # Errors
+    /// [`SceneError::Drop`] if the drop is negative, not a number or above
+    /// [`DROP_MAX`](crate::DROP_MAX).
+    pub fn of_shapes(options: &ShapesOptions) -> Result<Self, SceneError> {
+        let drop = check_drop(options.drop)?;
+        let mut random = SplitMix(options.seed);
+        let (x, y, z) = (options.grid.x(), options.grid.y(), options.grid.z());
+        let centred =
+            |index: u16, count: u16| SPACING * (f32::from(index) - 0.5 * (f32::from(count) - 1.0));
+        let mut bodies: Vec<Body> = Vec::new();
+        for i in 0..x {
+            for j in 0..y {
+                let shift = 0.5 * SPACING * f32::from(j & 1);
+                for k in 0..z {
+                    let position = [
+                        centred(i, x) + shift,
+                        SPACING * (0.5 + f32::from(j)) + drop,
+                        centred(k, z) + shift,
+                    ];
+                    // Shape 0 is the ground's.
+                    let mut body = at_rest(position, 1 + random.below_eight());
+                    body.pose.orientation = random.orientation();
+                    bodies.push(body);
+                }
+            }
+        }
+        let kinds: Vec<(Shape, Geometry)> =
+            KINDS.iter().map(|&(geometry, mass)| (geometry.shape(mass), geometry)).collect();
+        Ok(Self::on_ground(&kinds, bodies))
+    }
+}
+
+/// Numbers at random, from Steele, Lea and Flood's `SplitMix64`.
+struct SplitMix(u64);
+
+impl SplitMix {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// One of the kinds.
+    fn below_eight(&mut self) -> u32 {
+        const { assert!(KINDS.len() == 8) };
+        #[allow(clippy::cast_possible_truncation, reason = "three bits")]
+        let kind = (self.next() >> 61) as u32;
+        kind
+    }
+
+    /// A number from -1 to 1.
+    fn sign(&mut self) -> f32 {
+        #[allow(clippy::cast_possible_truncation, reason = "24 bits, which an f32 carries")]
+        let number = (self.next() >> 40) as u32;
+        number as f32 / 8_388_608.0 - 1.0
+    }
+
+    /// A unit quaternion, every direction as likely as any other.
+    fn orientation(&mut self) -> [f32; 4] {
+        loop {
+            let q = [(); 4].map(|()| self.sign());
+            let squared = ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3];
+            // In the ball, and not so near to its centre that rounding decides the direction. Of
+            // the cube around it three in ten are.
+            if (0.01..=1.0).contains(&squared) {
+                let length = squared.sqrt();
+                return q.map(|value| value / length);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MARGIN;
+
+    fn scene(grid: &str, drop: f32, seed: u64) -> Scene {
+        let grid = grid.parse().expect("a grid");
+        Scene::of_shapes(&ShapesOptions { grid, drop, seed }).expect("a scene")
+    }
+
+    #[test]
+    fn every_kind_is_there_and_half_of_them_are_not_isotropic() {
+        let scene = scene("10x10x10", 0.0, 1);
+        assert_eq!(scene.shapes().len(), 9);
+        assert_eq!(scene.geometries().len(), 9);
+        assert_eq!(scene.bodies().len(), 1001);
+        for kind in 1..9 {
+            let count = scene.bodies().iter().filter(|body| body.shape == kind).count();
+            assert!((80..170).contains(&count), "{count} of kind {kind}");
+        }
+        let turned = |shape: &&Shape| {
+            shape.inverse_inertia.iter().any(|k| k.to_bits() != shape.inverse_inertia[0].to_bits())
+        };
+        assert_eq!(scene.shapes().iter().filter(turned).count(), 4);
+        let names: Vec<_> = scene.geometries().iter().flatten().map(Geometry::name).collect();
+        assert_eq!(
+            names[..],
+            ["cube", "cube", "sphere", "sphere", "box", "box", "capsule", "capsule"]
+        );
+    }
+
+    #[test]
+    fn a_seed_is_a_scene() {
+        let bits = |seed| -> Vec<u32> {
+            scene("3x3x3", 1.0, seed)
+                .bodies()
+                .iter()
+                .flat_map(|b| b.pose.orientation.map(f32::to_bits).into_iter().chain([b.shape]))
+                .collect()
+        };
+        assert_eq!(bits(1), bits(1));
+        assert_ne!(bits(1), bits(2));
+        // The first number of SplitMix64 from 0 is published with it.
+        assert_eq!(SplitMix(0).next(), 0xE220_A839_7B1D_CDAF);
+    }
+
+    #[test]
+    fn orientations_have_length_one() {
+        for body in scene("6x6x6", 1.0, 7).bodies() {
+            let [x, y, z, w] = body.pose.orientation.map(f64::from);
+            let length = (((x * x + y * y) + z * z) + w * w).sqrt();
+            assert!((length - 1.0).abs() < 1e-6, "{body:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_touches_before_it_has_fallen() {
+        assert!(scene("6x4x6", 0.1, 3).detect().is_empty());
+        for (geometry, _) in KINDS {
+            let radius = geometry.bounding_radius();
+            assert!(2.0 * radius + MARGIN < SPACING, "{geometry:?}");
+            // What the cells of the broad phase are made for.
+            assert!(radius <= Geometry::CUBE.bounding_radius(), "{geometry:?}");
+        }
+    }
+
+    #[test]
+    fn a_drop_that_no_scene_starts_from_is_refused() {
+        let options = ShapesOptions { drop: -1.0, ..ShapesOptions::default() };
+        assert!(matches!(Scene::of_shapes(&options), Err(SceneError::Drop { .. })));
+    }
+
+    /// Signed distance of a point from the surface of a body, m.
+    fn outside(scene: &Scene, body: u32, point: [f32; 3]) -> f32 {
+        let body = scene.bodies()[usize::try_from(body).expect("small")];
+        let shape = usize::try_from(body.shape).expect("small");
+        let geometry = scene.geometries()[shape].expect("not the ground");
+        let rows = crate::rotation::matrix(body.pose.orientation);
+        let arm = [0, 1, 2].map(|k| point[k] - body.pose.position[k]);
+        let [x, y, z] =
+            [0, 1, 2].map(|k| rows[0][k] * arm[0] + rows[1][k] * arm[1] + rows[2][k] * arm[2]);
+        let length = |x: f32, y: f32, z: f32| (x * x + y * y + z * z).sqrt();
+        match geometry {
+            Geometry::Sphere { radius } => length(x, y, z) - radius,
+            Geometry::Capsule { half_height, radius } => {
+                length(x, y - y.clamp(-half_height, half_height), z) - radius
+            }
+            Geometry::Box { half_extents: [hx, hy, hz] } => {
+                let [dx, dy, dz] = [x.abs() - hx, y.abs() - hy, z.abs() - hz];
+                let inside = dx.max(dy).max(dz).min(0.0);
+                length(dx.max(0.0), dy.max(0.0), dz.max(0.0)) + inside
+            }
+        }
+    }
+
+    /// The scene pushed together until everything touches: as a pile is, or deeper.
+    fn pressed(seed: u64) -> Scene {
+        let mut scene = scene("7x7x7", 0.0, seed);
+        for body in &mut scene.bodies_mut()[1..] {
+            body.pose.position = body.pose.position.map(|value| value * 0.495);
+        }
+        scene
+    }
+
+    /// How far parry's points may be inside a slanted capsule or edge, m.
+    const NEAR: f32 = 0.05;
+
+    #[test]
+    fn contact_points_lie_on_body_b_and_steps_take_them() {
+        let mut scene = pressed(5);
+        let collisions = scene.detect().to_vec();
+        let grounded = crate::ground_pairs(&collisions);
+        assert!(grounded > 20 && collisions.len() > 300, "{grounded} of {}", collisions.len());
+        assert!(collisions.is_sorted_by_key(|c| (c.body_a, c.body_b)));
+        let mut shallow = 0;
+        let mut kinds = std::collections::BTreeSet::new();
+        for c in &collisions {
+            assert!((1..=4).contains(&c.count), "{c:?}");
+            let [x, y, z] = c.normal;
+            assert!(((x * x + y * y + z * z).sqrt() - 1.0).abs() < 1e-3, "{c:?}");
+            let shape = |body| scene.bodies()[usize::try_from(body).expect("small")].shape;
+            kinds.insert((shape(c.body_a).div_ceil(2), shape(c.body_b).div_ceil(2)));
+            for contact in &c.contacts[..usize::try_from(c.count).expect("small")] {
+                assert!(contact.distance.is_finite() && contact.distance <= MARGIN, "{c:?}");
+                // Deep inside each other the nearest sides are not opposite ones.
+                if c.contacts.iter().any(|contact| contact.distance < -0.1) {
+                    continue;
+                }
+                let off = outside(&scene, c.body_b, contact.point);
+                assert!(off.abs() < NEAR, "{off} m off the surface of B: {c:?}");
+                shallow += 1;
+                if c.body_a != crate::GROUND {
+                    let [x, y, z] =
+                        [0, 1, 2].map(|k| contact.point[k] + contact.distance * c.normal[k]);
+                    let off = outside(&scene, c.body_a, [x, y, z]);
+                    assert!(off.abs() < NEAR, "{off} m off the surface of A: {c:?}");
+                }
+            }
+        }
+        assert!(shallow > 100, "{shallow}");
+        // Ground and four kinds of bodies, with each of the four.
+        assert_eq!(kinds.len(), 20, "{kinds:?}");
+    }
+
+    #[test]
+    fn the_bits_are_the_same_in_every_build_and_on_every_architecture() {
+        let mut scene = pressed(5);
+        // The second time with used buffers.
+        scene.detect();
+        let mut digest = 0xCBF2_9CE4_8422_2325_u64;
+        let mut take = |words: &[u32]| {
+            for word in words {
+                digest = (digest ^ u64::from(*word)).wrapping_mul(0x0100_0000_01B3);
+            }
+        };
+        for shape in scene.shapes() {
+            take(&shape.inverse_inertia.map(f32::to_bits));
+        }
+        for c in scene.detect() {
+            take(&[c.body_a, c.body_b, c.count]);
+            take(&c.normal.map(f32::to_bits));
+            for contact in c.contacts {
+                take(&contact.point.map(f32::to_bits));
+                take(&[contact.distance.to_bits()]);
+            }
+        }
+        // FNV-1a, 64 bits, over the words.
+        assert_eq!(format!("{digest:016x}"), "446de8c232ad26bb");
+    }
+}
