@@ -11,6 +11,7 @@ use bitstream_model::interface::profile::{
 };
 use bitstream_model::interface::record::Beat;
 use bitstream_model::interface::stripe::Stripe;
+use bitstream_model::timing::{Records, StepCycles};
 use bitstream_model::{Bandwidth, BoardConfig, EmulatedBoard, Hazards};
 
 use common::packing::{Row, beats, result_beats};
@@ -134,6 +135,8 @@ fn cycles_are_the_formula_and_stalls_and_waits_exactly() {
                 let config = BoardConfig { bandwidth, ..config(variant.profile) };
                 let outcome = built(&variant, config).step(&scene).expect("the step completes");
                 let formula = scene.cycles(&variant);
+                let modelled = StepCycles::new(&variant, Records::Streamed, &scene.shape());
+                assert_eq!(modelled.total, formula);
                 let name = variant.profile.name;
                 assert_eq!(
                     outcome.cycles,
