@@ -215,12 +215,12 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     assert!(
         refused(thesis, &mut bodies, &collisions).contains("bodies in thesis16, which ends at")
     );
-    // Its body A, the ground, is at the origin.
+    // Its body A, the ground, does not count, but its contact points are where they were.
     let text = refused(of(&MIXED), &mut bodies, &collisions);
     assert_eq!(
         text,
-        "collision 1: offset of body B from body A[0] is 70000, but this bitstream holds \
-         collisions in binary16, which ends at 65504: bring it into range, or load another \
+        "collision 1, contact point 0: lever arm of the point[0] is -70000.5, but this bitstream \
+         holds collisions in binary16, which ends at 65504: bring it into range, or load another \
          (profiles that could: naive, float)"
     );
 }

@@ -121,7 +121,7 @@ fn refused(
     let limit = format.largest();
     let point = match geometry {
         Geometry::Absolute => "point",
-        Geometry::Relative => "offset of the point from body A",
+        Geometry::Relative => "lever arm of the point",
     };
     let used = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS).min(CONTACT_POINTS);
     let of_contacts = collision.contacts[..used].iter().enumerate().flat_map(|(at, contact)| {
@@ -259,9 +259,7 @@ mod tests {
         assert!(text.ends_with("(profiles that could: naive, float)"), "{text}");
         let text = check(&MIXED, &collision, [[0.0; 3]; 2]).expect_err("a far point").to_string();
         assert!(
-            text.starts_with(
-                "collision 7, contact point 0: offset of the point from body A[0] is 1000001"
-            ),
+            text.starts_with("collision 7, contact point 0: lever arm of the point[0] is 1000001"),
             "{text}"
         );
     }
