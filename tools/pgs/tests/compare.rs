@@ -241,6 +241,12 @@ fn the_full_step_shows_what_half_precision_costs() {
     near(&half["b"]["unmoved_share"], 0.62, 0.01);
     near(&half["a"]["unmoved_share"], 0.0004, 0.0002);
 
+    // What mixed must keep: 97 % within 1 %, and positions that move as float's do.
+    let mixed = difference("mixed");
+    let kept = number(&mixed["difference"]["linear_velocity"]["within_1_percent_share"]);
+    assert!(kept >= 0.97, "{kept}");
+    near(&mixed["difference"]["unmoved_share"], 0.0, 0.01);
+
     // The same with 64 issue slots that read stale velocities: 0.035 % and 99.6 %.
     let stale = difference("float,unchecked,window=64");
     near(&stale["difference"]["position"]["relative_mean_percent"], 0.035, 0.001);

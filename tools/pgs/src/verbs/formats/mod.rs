@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::{Value, json};
-use zynq_pgs::{Body, Collision, StepParameters};
+use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use self::numbers::{AS_STREAMED, EACH_ONCE, Numbers, SUMS, numbers};
 use self::tally::{Loss, Sizes};
@@ -31,8 +31,8 @@ Examples:
 
 The numbers are those that a step streams to the board; contact points that are not used, indices and
 counts are left out. \"as streamed\" has the positions of both bodies with every collision, \"each once\"
-only with the bodies. What is relative is less the position of body A, as the profile mixed streams
-it, and in neither sum.
+only with the bodies. What is relative is less the position of body A, a static body standing where
+the other one is, as the profile mixed streams it, and in neither sum.
 
 Relative errors are |read back - number| / |number|; zeros are left out of them, and of the share
 below 3e-5. The driver refuses a number that a format cannot carry.";
@@ -58,6 +58,7 @@ pub(crate) struct FormatsArgs {
 /// What a step is given.
 struct Step {
     bodies: Vec<Body>,
+    shapes: Vec<Shape>,
     collisions: Vec<Collision>,
 }
 
@@ -67,19 +68,20 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let Step { bodies, collisions } = match &args.input {
+    let Step { bodies, shapes, collisions } = match &args.input {
         Some(path) => {
             let folder = Folder::load(path).map_err(|error| {
                 Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
             })?;
-            Step { bodies: folder.bodies, collisions: folder.collisions }
+            let Folder { bodies, shapes, collisions, .. } = folder;
+            Step { bodies, shapes, collisions }
         }
         None => match stepped(args, common)? {
             Some(found) => found,
             None => return Ok(Verdict::Interrupted),
         },
     };
-    let kinds = numbers(&bodies, &collisions);
+    let kinds = numbers(&bodies, &shapes, &collisions);
     if common.json {
         let config = match &args.input {
             Some(path) => json!({ "input": path.display().to_string() }),
@@ -146,8 +148,11 @@ fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Fail
     }
     progress.finish_and_clear();
     scene.detect();
-    let (bodies, collisions) = (scene.bodies().to_vec(), scene.collisions().to_vec());
-    Ok(Some(Step { bodies, collisions }))
+    Ok(Some(Step {
+        bodies: scene.bodies().to_vec(),
+        shapes: scene.shapes().to_vec(),
+        collisions: scene.collisions().to_vec(),
+    }))
 }
 
 fn described<'a>(values: impl Iterator<Item = &'a f32> + Clone) -> Value {

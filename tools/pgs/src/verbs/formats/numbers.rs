@@ -1,6 +1,6 @@
 //! This file gathers the numbers of a step, kind by kind.
 
-use zynq_pgs::{Body, CONTACT_POINTS, Collision};
+use zynq_pgs::{Body, CONTACT_POINTS, Collision, Shape};
 
 /// Of which sums numbers are a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ pub(super) struct Numbers {
 }
 
 /// The numbers of a step, kind by kind.
-pub(super) fn numbers(bodies: &[Body], collisions: &[Collision]) -> Vec<Numbers> {
+pub(super) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision]) -> Vec<Numbers> {
     let of_bodies = |name, field: fn(&Body) -> &[f32]| Numbers {
         name,
         part: Part::Given,
@@ -53,6 +53,13 @@ pub(super) fn numbers(bodies: &[Body], collisions: &[Collision]) -> Vec<Numbers>
         let body = usize::try_from(body).ok().and_then(|index| bodies.get(index));
         body.map_or([f32::NAN; 3], |body| body.pose.position)
     };
+    let is_static = |body: u32| {
+        let body = usize::try_from(body).ok().and_then(|index| bodies.get(index));
+        let shape = body.and_then(|body| shapes.get(usize::try_from(body.shape).ok()?));
+        shape.is_some_and(|shape| shape.inverse_mass == 0.0)
+    };
+    // A static body stands where the other one is.
+    let seen_from = |body, other| position(if is_static(body) { other } else { body });
     let used = |collision: &Collision| {
         let count = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS);
         count.min(CONTACT_POINTS)
@@ -79,10 +86,10 @@ pub(super) fn numbers(bodies: &[Body], collisions: &[Collision]) -> Vec<Numbers>
         of_bodies("position", |body| &body.pose.position),
         of_bodies("orientation", |body| &body.pose.orientation),
         of_pairs("relative: B - A", Part::Relative, &|c| {
-            less(position(c.body_b), position(c.body_a)).to_vec()
+            less(seen_from(c.body_b, c.body_a), seen_from(c.body_a, c.body_b)).to_vec()
         }),
         of_pairs("relative: points - A", Part::Relative, &|c| {
-            points(c, &|point| less(point, position(c.body_a)))
+            points(c, &|point| less(point, seen_from(c.body_a, c.body_b)))
         }),
     ]
 }
@@ -107,7 +114,8 @@ mod tests {
         let contacts = [Contact { point: [1.5, 0.5, 0.0], distance: -0.25 }; CONTACT_POINTS];
         let collision =
             Collision { body_a: 0, body_b: 1, normal: [-1.0, 0.0, 0.0], count: 2, contacts };
-        let kinds = numbers(&[body(1.0), body(3.0)], &[collision]);
+        let bodies = [body(1.0), body(3.0)];
+        let kinds = numbers(&bodies, &[Shape::isotropic(1.0, 1.0)], &[collision]);
         let of = |name| &kinds.iter().find(|kind| kind.name == name).expect(name).values[..];
         assert_eq!(of("distances"), [-0.25, -0.25]);
         assert_eq!(of("contact points").len(), 6);
@@ -117,5 +125,14 @@ mod tests {
         // 13 a body, 3 + 6 + 2 x 4 the collision.
         assert_eq!(AS_STREAMED.of(&kinds).count(), 2 * 13 + 17);
         assert_eq!(EACH_ONCE.of(&kinds).count(), 2 * 13 + 11);
+
+        // A static A stands where B is.
+        let mut bodies = bodies;
+        bodies[1].shape = 1;
+        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 1.0)];
+        let kinds = numbers(&bodies, &shapes, &[collision]);
+        let of = |name| &kinds.iter().find(|kind| kind.name == name).expect(name).values[..];
+        assert_eq!(of("relative: B - A"), [0.0; 3]);
+        assert_eq!(of("relative: points - A")[..3], [-1.5, 0.5, 0.0]);
     }
 }
