@@ -149,6 +149,12 @@ pub enum ConfigError {
          point with; expected f32 or binary16"
     )]
     NoInfinity,
+    /// World inertia in a format without zero, which static bodies need.
+    #[error(
+        "world inertia in thesis16, which has no zero for the inverse inertia of a static body; \
+         expected f32 or binary16"
+    )]
+    NoZero,
     /// Rows of more precision than what is computed with them.
     #[error(
         "constraint rows in f32 and updates in binary16, which cannot take them; expected updates \
@@ -249,6 +255,9 @@ impl BoardConfig {
         let relative = self.profile.geometry == Geometry::Relative;
         if relative && asked.collisions == StreamFormat::Thesis16 {
             return Err(ConfigError::NoInfinity);
+        }
+        if self.inertia == Inertia::World && asked.bodies == StreamFormat::Thesis16 {
+            return Err(ConfigError::NoZero);
         }
         if (asked.rows, asked.updates) == (Precision::F32, Precision::Binary16) {
             return Err(ConfigError::RowsBeyondUpdates);

@@ -406,6 +406,9 @@ fn formats_that_cannot_be_built_are_refused_with_what_is_expected() {
     let thesis = StreamFormat::Thesis16;
     let text = with(&MIXED, Numbers { collisions: thesis, ..MIXED.numbers });
     assert!(text.contains("thesis16") && text.contains("expected f32 or binary16"), "{text}");
+    let numbers = Some(Numbers { bodies: thesis, ..HALF.numbers });
+    let text = refusal(BoardConfig { numbers, inertia: Inertia::World, ..config(&HALF) });
+    assert!(text.contains("thesis16, which has no zero"), "{text}");
     let text = with(&FLOAT, Numbers { bodies: thesis, ..Numbers::F32 });
     assert!(text.contains("body records of 16 bits a number, expected 32"), "{text}");
     let text = with(&HALF, Numbers::F32);
