@@ -238,9 +238,11 @@ impl BoardConfig {
 
     fn check_numbers(&self) -> Result<(), ConfigError> {
         let (asked, own) = (self.variant().numbers, self.profile.numbers);
-        for (stream, asked, own) in
-            [("collision", asked.collisions, own.collisions), ("body", asked.bodies, own.bodies)]
-        {
+        for (stream, asked, own) in [
+            ("collision", asked.collisions, own.collisions),
+            ("velocity", asked.bodies, own.bodies),
+            ("pose", asked.poses, own.poses),
+        ] {
             let (found, expected) = (asked.bits(), own.bits());
             if found != expected {
                 return Err(ConfigError::StreamFormat { stream, found, expected });
@@ -275,8 +277,10 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
             "streams of 32, 64 or 128 bits are expected",
         ),
         (
-            !stripe(&stripes.collisions, profile.mm2s_widths)
-                || streams.iter().any(|widths| !stripe(&stripes.bodies, widths)),
+            ![stripes.collisions, stripes.velocities, stripes.poses]
+                .iter()
+                .all(|of| stripe(of, profile.mm2s_widths))
+                || !stripe(&stripes.results, profile.s2mm_widths),
             "stripes of 1 to 16 beats on streams that exist are expected",
         ),
         (

@@ -29,7 +29,8 @@ fn variants() -> Vec<Variant> {
         }
     }
     let thesis = StreamFormat::Thesis16;
-    let numbers = Numbers { collisions: thesis, bodies: thesis, ..Numbers::BINARY16 };
+    let numbers =
+        Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
     variants.push(Variant { profile: &HALF, numbers, inertia: Inertia::Isotropic });
     let numbers = Numbers { collisions: StreamFormat::Binary16, ..Numbers::F32 };
     let numbers = Numbers { bodies: StreamFormat::Binary16, ..numbers };
@@ -418,7 +419,7 @@ fn a_profile_that_contradicts_itself_is_refused_with_what_is_expected() {
     static NO_CLOCK: Profile = Profile { clock_khz: 0, ..FLOAT };
     static BEYOND: Profile = {
         let mut profile = FLOAT;
-        profile.stripes.bodies = Stripe { streams: &[0, 4], padded: false };
+        profile.stripes.poses = Stripe { streams: &[0, 4], padded: false };
         profile
     };
     for (profile, expected) in [

@@ -219,6 +219,7 @@ fn numbers_of(window: &Window, profile: &Profile) -> Result<Numbers, IdentityErr
     let numbers = Numbers {
         collisions: format(numbers::COLLISIONS)?,
         bodies: format(numbers::BODIES)?,
+        poses: format(numbers::POSES)?,
         rows: precision(numbers::ROWS)?,
         updates: precision(numbers::UPDATES)?,
         velocities: precision(numbers::VELOCITIES)?,
@@ -227,6 +228,7 @@ fn numbers_of(window: &Window, profile: &Profile) -> Result<Numbers, IdentityErr
     let own = profile.numbers;
     if numbers.collisions.bits() != own.collisions.bits()
         || numbers.bodies.bits() != own.bodies.bits()
+        || numbers.poses.bits() != own.poses.bits()
     {
         return Err(refused("words as wide on the streams as the profile has them"));
     }
@@ -400,6 +402,7 @@ mod tests {
         let expected = Numbers {
             collisions: StreamFormat::Thesis16,
             bodies: StreamFormat::Thesis16,
+            poses: StreamFormat::Thesis16,
             rows: Precision::Binary16,
             updates: Precision::F32,
             velocities: Precision::F32,

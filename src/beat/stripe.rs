@@ -66,10 +66,10 @@ impl Segment {
     pub(crate) const fn layout(self, variant: &Variant) -> Layout {
         let (stripes, numbers) = (&variant.profile.stripes, &variant.numbers);
         let (rows, format, stripe) = match self {
-            Self::Velocities => (variant.velocity_rows(), numbers.bodies, stripes.bodies),
+            Self::Velocities => (variant.velocity_rows(), numbers.bodies, stripes.velocities),
             Self::Collisions => (variant.collision_rows(), numbers.collisions, stripes.collisions),
-            Self::Poses => (pose::ROWS, numbers.bodies, stripes.bodies),
-            Self::Results => (result::ROWS, numbers.bodies, stripes.bodies),
+            Self::Poses => (pose::ROWS, numbers.poses, stripes.poses),
+            Self::Results => (result::ROWS, numbers.poses, stripes.results),
         };
         Layout { rows, format, stripe }
     }

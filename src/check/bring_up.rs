@@ -140,13 +140,14 @@ fn described(variant: &Variant) -> String {
         Inertia::World => ", world inertia",
     };
     format!(
-        "{}, {} + {} streams of {} bits, collisions in {} and bodies in {}{inertia}",
+        "{}, {} + {} streams of {} bits, collisions in {}, velocities in {} and poses in {}{inertia}",
         profile.name,
         profile.mm2s_widths.len(),
         profile.s2mm_widths.len(),
         widths(profile.mm2s_widths),
         numbers.collisions.name(),
         numbers.bodies.name(),
+        numbers.poses.name(),
     )
 }
 

@@ -26,6 +26,7 @@ fn formats(of: &Numbers) -> u32 {
     let word = numbers::ROWS.put(word, of.rows as u32);
     let word = numbers::UPDATES.put(word, of.updates as u32);
     let word = numbers::VELOCITIES.put(word, of.velocities as u32);
+    let word = numbers::POSES.put(word, of.poses as u32);
     numbers::IMPULSES.put(word, of.impulses as u32)
 }
 

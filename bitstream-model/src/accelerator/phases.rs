@@ -15,7 +15,7 @@ use crate::cast::register;
 use crate::config::{Hazards, Subnormals};
 use crate::interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
 use crate::interface::number::{Precision, StreamFormat};
-use crate::interface::profile::{Depth, Geometry, Inertia};
+use crate::interface::profile::{Depth, Geometry, Inertia, Variant};
 use crate::interface::record::{CONTACT_POINTS, pose, result, velocity};
 use crate::stream::Stream;
 
@@ -26,24 +26,21 @@ fn to_fixed(value: f64) -> u64 {
 }
 
 impl Accelerator {
-    /// An array of body records that comes in.
-    fn bodies_in(&self, rows: usize) -> Segment {
-        let profile = self.variant.profile;
-        let striping = Striping::new(&profile.stripes.bodies, profile.mm2s_widths);
-        Segment::new(Array::new(striping, self.body_records(rows)))
-    }
-
-    fn body_records(&self, rows: usize) -> Records {
-        Records {
-            format: self.variant.numbers.bodies,
-            rows,
-            count: self.arguments.bodies as usize,
-            together: 1,
-        }
+    fn body_records(&self, format: StreamFormat, rows: usize) -> Records {
+        Records { format, rows, count: self.arguments.bodies as usize, together: 1 }
     }
 
     pub(super) fn velocities_in(&self) -> Segment {
-        self.bodies_in(self.variant.velocity_rows())
+        let Variant { profile, numbers, .. } = self.variant;
+        let striping = Striping::new(&profile.stripes.velocities, profile.mm2s_widths);
+        let records = self.body_records(numbers.bodies, self.variant.velocity_rows());
+        Segment::new(Array::new(striping, records))
+    }
+
+    fn poses_in(&self) -> Segment {
+        let Variant { profile, numbers, .. } = self.variant;
+        let striping = Striping::new(&profile.stripes.poses, profile.mm2s_widths);
+        Segment::new(Array::new(striping, self.body_records(numbers.poses, pose::ROWS)))
     }
 
     fn collisions_in(&self) -> Segment {
@@ -59,9 +56,9 @@ impl Accelerator {
     }
 
     fn results_out(&self) -> Results {
-        let profile = self.variant.profile;
-        let striping = Striping::new(&profile.stripes.bodies, profile.s2mm_widths);
-        Results::new(Array::new(striping, self.body_records(result::ROWS)))
+        let Variant { profile, numbers, .. } = self.variant;
+        let striping = Striping::new(&profile.stripes.results, profile.s2mm_widths);
+        Results::new(Array::new(striping, self.body_records(numbers.poses, result::ROWS)))
     }
 
     fn injected(&mut self) -> Result<(), PacketError> {
@@ -163,7 +160,7 @@ impl Accelerator {
 
     fn start_pass(&mut self, number: u32) {
         if number == self.passes() {
-            let (poses, results) = (self.bodies_in(pose::ROWS), self.results_out());
+            let (poses, results) = (self.poses_in(), self.results_out());
             self.phase = Phase::Integrate { poses, results };
             return;
         }
@@ -415,7 +412,7 @@ impl Accelerator {
         }
         self.injected()?;
         poses.check(records, inputs)?;
-        let format = self.variant.numbers.bodies;
+        let format = self.variant.numbers.poses;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
         let shapes = self.registers.shapes();

@@ -76,8 +76,8 @@ mod tests {
     /// Three results of `half`: six beats on three streams, padded to ten.
     #[test]
     fn sixteen_bit_results_go_out_two_rows_a_beat_and_end_with_padding() {
-        let striping = Striping::new(&HALF.stripes.bodies, HALF.s2mm_widths);
-        let format = HALF.numbers.bodies;
+        let striping = Striping::new(&HALF.stripes.results, HALF.s2mm_widths);
+        let format = HALF.numbers.poses;
         let records = Records { format, rows: result::ROWS, count: 3, together: 1 };
         let mut results = Results::new(Array::new(striping, records));
         let mut narrow: Vec<Stream> = [8, 8, 1].map(Stream::new).into();

@@ -156,7 +156,7 @@ mod tests {
 
     fn velocities(profile: &'static Profile, count: usize) -> Segment {
         let variant = profile.default_variant();
-        let striping = Striping::new(&profile.stripes.bodies, profile.mm2s_widths);
+        let striping = Striping::new(&profile.stripes.velocities, profile.mm2s_widths);
         let format = variant.numbers.bodies;
         let rows = variant.velocity_rows();
         Segment::new(Array::new(striping, Records { format, rows, count, together: 1 }))

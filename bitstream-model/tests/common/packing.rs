@@ -148,13 +148,13 @@ impl Step {
         let issue = profile.collisions_per_issue as usize * variant.collision_rows();
         collisions.resize(collisions.len().next_multiple_of(issue), [0; 4]);
         let poses: Vec<Row> =
-            self.bodies.iter().flat_map(|body| pose_rows(numbers.bodies, body)).collect();
+            self.bodies.iter().flat_map(|body| pose_rows(numbers.poses, body)).collect();
         let passes = (self.iterations[0] + self.iterations[1]) as usize;
         let stripes = &profile.stripes;
         let segments = [
-            deal(&stripes.bodies, streams, beats(numbers.bodies, &velocities)),
+            deal(&stripes.velocities, streams, beats(numbers.bodies, &velocities)),
             deal(&stripes.collisions, streams, beats(numbers.collisions, &collisions)),
-            deal(&stripes.bodies, streams, beats(numbers.bodies, &poses)),
+            deal(&stripes.poses, streams, beats(numbers.poses, &poses)),
         ];
         (0..streams)
             .map(|stream| {
@@ -200,20 +200,20 @@ fn slowest(beats: &[usize], widths: &[u32]) -> u64 {
 
 /// Result beats on each stream.
 pub(crate) fn result_beats(variant: &Variant, bodies: usize) -> Vec<usize> {
-    let bits = variant.numbers.bodies.bits() as usize;
+    let bits = variant.numbers.poses.bits() as usize;
     let all = vec![Beat::default(); bodies * 4 * 4 * bits / (8 * BEAT_BYTES)];
     let profile = variant.profile;
-    let dealt = deal(&profile.stripes.bodies, profile.s2mm_widths.len(), all);
+    let dealt = deal(&profile.stripes.results, profile.s2mm_widths.len(), all);
     dealt.iter().map(Vec::len).collect()
 }
 
 /// The bodies out of the result beats of all streams; shapes are not part of a result and read 0.
 /// What is left over is padding and must be zeros.
 pub(crate) fn unpack(variant: &Variant, streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
-    let format = variant.numbers.bodies;
+    let format = variant.numbers.poses;
     let mut next: Vec<_> = streams.iter().map(|stream| stream.iter()).collect();
     let mut rows = Vec::new();
-    for stream in variant.profile.stripes.bodies.streams.iter().cycle() {
+    for stream in variant.profile.stripes.results.streams.iter().cycle() {
         let Some(Beat(words)) = next[usize::from(*stream)].next() else { break };
         if format.bits() == 32 {
             rows.push(*words);

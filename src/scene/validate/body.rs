@@ -1,5 +1,6 @@
 //! This file refuses bodies that cannot be solved.
 
+use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::Variant;
 
 use super::{Scene, all_within, first};
@@ -11,10 +12,9 @@ const ANGULAR: &str = "angular velocity";
 /// What of one body a step refuses.
 #[inline]
 pub(super) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result<(), InputError> {
-    let limit = scene.variant.numbers.bodies.largest();
-    for (field, values) in fields(body) {
-        if !all_within(values, limit) {
-            return Err(number_refused(index, body, field, values, scene));
+    for (field, values, format) in fields(body, &scene.variant.numbers) {
+        if !all_within(values, format.largest()) {
+            return Err(number_refused(index, body, field, values, format, scene));
         }
     }
     let [x, y, z, w] = body.pose.orientation;
@@ -37,13 +37,14 @@ pub(super) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result
     Ok(())
 }
 
-/// The numbers of a body that are streamed.
-fn fields(body: &Body) -> [(&'static str, &[f32]); 4] {
+/// The numbers of a body that are streamed, and in which formats.
+fn fields<'a>(body: &'a Body, numbers: &Numbers) -> [(&'static str, &'a [f32], StreamFormat); 4] {
+    let Numbers { bodies, poses, .. } = *numbers;
     [
-        ("position", &body.pose.position),
-        ("orientation", &body.pose.orientation),
-        (LINEAR, &body.velocity.linear),
-        (ANGULAR, &body.velocity.angular),
+        ("position", &body.pose.position, poses),
+        ("orientation", &body.pose.orientation, poses),
+        (LINEAR, &body.velocity.linear, bodies),
+        (ANGULAR, &body.velocity.angular, bodies),
     ]
 }
 
@@ -54,18 +55,18 @@ fn number_refused(
     body: &Body,
     field: &'static str,
     values: &[f32],
+    format: StreamFormat,
     scene: &Scene<'_>,
 ) -> InputError {
     if !all_within(values, f32::MAX) {
         let (component, found) = first(values, |value| !value.is_finite());
         return InputError::BodyNotFinite { body: index, field, component, found };
     }
-    let format = scene.variant.numbers.bodies;
     let limit = format.largest();
     let (component, found) = first(values, |value| value.abs() > limit);
     let carriers = scene.demand.carriers(|variant: &Variant| {
-        let limit = variant.numbers.bodies.largest();
-        fields(body).iter().all(|(_, values)| all_within(values, limit))
+        let fields = fields(body, &variant.numbers);
+        fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
     });
     InputError::BodyOutOfRange { body: index, field, component, found, format, limit, carriers }
 }
