@@ -4,6 +4,8 @@
 //! what moves are read into memory that is kept, ordered, and proved free of hazards if that was
 //! asked for.
 
+use bitstream_model::interface::profile::Flow;
+
 use crate::accelerator::Capabilities;
 use crate::order::{
     Checker, InputBuffers, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer,
@@ -112,6 +114,11 @@ fn too_long(
         let Ok(window) = IssueWindow::of_profile(variant.profile, parameters) else { return false };
         let apart = window.depth() as usize * window.per_issue() as usize;
         let of_body = uses.saturating_sub(1).saturating_mul(apart).saturating_add(1);
+        if let Flow::Window(window) = variant.profile.flow
+            && of_body > window.lag as usize
+        {
+            return false;
+        }
         // What took more than the limit here takes no less at a greater depth.
         let as_here = if window.depth() >= depth { limit.saturating_add(1) } else { 0 };
         let entries = collisions.max(of_body).max(as_here);
