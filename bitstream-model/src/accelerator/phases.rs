@@ -355,8 +355,10 @@ impl Accelerator {
             let stale = self.pipeline.issue(&entry, velocities);
             self.counters.hazards += u64::from(stale);
         } else {
-            for (body, velocity) in sides.into_iter().zip(velocities) {
-                self.velocities[body] = velocity;
+            for side in 0..2 {
+                if moving[side] {
+                    self.velocities[sides[side]] = velocities[side];
+                }
             }
             self.pipeline.entered(now + stall, &entry);
             self.counters.hazards += u64::from(stall > 0);

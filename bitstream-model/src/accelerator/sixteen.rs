@@ -13,25 +13,30 @@ const LARGEST_EXPONENT: u32 = 31;
 
 /// 2^-14, binary16's smallest normal number, as the bits of an f32.
 pub(super) const SMALLEST_NORMAL: u32 = (REBIAS + 1) << 23;
-/// 65504, binary16's largest number, as the bits of an f32.
-const LARGEST: u32 = ((REBIAS + 30) << 23) | (MANTISSA << EXTRA_BITS);
+/// 65520, half a step beyond binary16's largest number, as the bits of an f32.
+const TOO_LARGE: u32 = ((REBIAS + 30) << 23) | (MANTISSA << EXTRA_BITS) | (1 << (EXTRA_BITS - 1));
 
 /// The binary16 number nearest to `value`, of two the even one, as the f32 of the same value. What
 /// lies beyond 65504 by half a step or more is infinite; a NaN has no payload.
+///
+/// Every operation in binary16 ends here. Zeros and normal numbers take integer operations alone;
+/// the two branches are rarely taken.
 #[inline]
 pub(super) fn round(value: f32) -> f32 {
     let bits = value.to_bits();
     let sign = bits & SIGN;
     let magnitude = bits ^ sign;
-    let odd = (magnitude >> EXTRA_BITS) & 1;
-    let normal = (magnitude + ((1 << (EXTRA_BITS - 1)) - 1) + odd) & !((1 << EXTRA_BITS) - 1);
-    // From one half to one f32 has the steps that binary16 has below 2^-14.
-    let subnormal = ((f32::from_bits(magnitude) + 0.5) - 0.5).to_bits();
-    let rounded = if magnitude < SMALLEST_NORMAL { subnormal } else { normal };
-    if rounded > LARGEST {
+    if magnitude.wrapping_sub(1) < SMALLEST_NORMAL - 1 {
+        // From one half to one f32 has the steps that binary16 has below 2^-14.
+        let subnormal = (f32::from_bits(magnitude) + 0.5) - 0.5;
+        return f32::from_bits(sign | subnormal.to_bits());
+    }
+    if magnitude >= TOO_LARGE {
         return if magnitude > INFINITY { f32::NAN } else { f32::from_bits(sign | INFINITY) };
     }
-    f32::from_bits(sign | rounded)
+    let odd = (bits >> EXTRA_BITS) & 1;
+    let half = (1 << (EXTRA_BITS - 1)) - 1;
+    f32::from_bits((bits + half + odd) & !((1 << EXTRA_BITS) - 1))
 }
 
 /// A binary16 word as a number.

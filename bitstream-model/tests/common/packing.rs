@@ -24,7 +24,7 @@ pub(crate) fn encode(format: StreamFormat, value: f32) -> u32 {
             if magnitude < 2.0_f32.powi(-15) {
                 return sign;
             }
-            if magnitude >= 65_536.0 || magnitude.is_nan() {
+            if magnitude >= 131_072.0 || magnitude.is_nan() {
                 return sign | 0x7FFF;
             }
             // The top bit of the exponent, its four low bits, the ten top bits of the mantissa.

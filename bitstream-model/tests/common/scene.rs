@@ -186,6 +186,46 @@ pub(crate) struct Lane {
     pub(crate) packets: Vec<usize>,
 }
 
+fn vec3(bits: [u32; 3]) -> [f32; 3] {
+    bits.map(f32::from_bits)
+}
+
+/// Bullet's own cube that rests on the ground, as bits (see the golden vectors, `one_cube`).
+pub(crate) fn one_cube() -> Step {
+    let ground = Body { shape: STATIC, position: [0.0, -400.0, 0.0], ..AT_REST };
+    let cube = Body {
+        shape: MOVING,
+        position: vec3([0x3E7F_E7F0, 0x3F7E_B861, 0xBF00_0431]),
+        orientation: [0xB6DB_A5C8, 0x398F_D07F, 0xB6CD_DEFE, 0x3F80_0000].map(f32::from_bits),
+        linear: vec3([0xB940_21DF, 0xBE27_42B5, 0x3947_72CA]),
+        angular: vec3([0x3945_746A, 0x3746_D8B6, 0x393E_3619]),
+    };
+    let contacts = [
+        [0x3F9F_FCA5, 0xBBA3_CE42, 0xBF00_F4DA, 0xBBA4_3737],
+        [0xBF3F_E2DD, 0xBBA2_FB00, 0x3F00_209D, 0xBBA2_FB00],
+        [0xBF40_2AC4, 0xBBA3_D680, 0xBFBF_EFB0, 0xBBA3_D680],
+        [0x3FA0_0E91, 0xBBA3_C900, 0x3EFF_B16C, 0xBBA3_C900],
+    ]
+    .map(|contact| contact.map(f32::from_bits));
+    let collision = Collision {
+        bodies: [0, 1],
+        count: 4,
+        normal: [0.0, -1.0, 0.0],
+        positions: [ground.position, cube.position],
+        contacts,
+    };
+    Step {
+        shapes: vec![[0.0, 0.0], [1.0, f32::from_bits(0x3EBC_3782)]],
+        time_step: f32::from_bits(0x3C88_8889),
+        drift: f32::from_bits(0x3BA3_D70A),
+        coefficient: f32::from_bits(0x3E4C_CCCD),
+        friction: f32::from_bits(0x3F33_3333),
+        damping: f32::from_bits(0x3F7D_70A4),
+        gravity: vec3([0, 0xC11C_CCCD, 0]),
+        ..Step::new(vec![ground, cube], vec![collision])
+    }
+}
+
 /// A contact of static body 0 with body `k`, at the middle of both, pushing along -`normal`.
 pub(crate) fn ground_contact(k: u16, normal: [f32; 3]) -> Collision {
     Collision {
