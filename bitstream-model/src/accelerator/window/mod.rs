@@ -37,7 +37,7 @@ pub(super) fn units(flow: &Flow) -> u32 {
     }
 }
 
-/// The WINDOW_CAPACITY register.
+/// The `WINDOW_CAPACITY` register.
 pub(super) fn capacity(flow: &Flow) -> u32 {
     match flow {
         Flow::Passes => 0,
