@@ -3,6 +3,8 @@
 
 #![cfg(feature = "emulation")]
 
+use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
+use bitstream_model::interface::profile::{HALF, Inertia, MIXED, PROFILES};
 use bitstream_model::{
     BoardConfig, Coherency, Direction, EmulatedBoard, InterruptWiring, Quirks, Resettable,
 };
@@ -74,7 +76,9 @@ fn a_board_as_it_should_be_passes_every_line() {
     assert!(report.passed());
     assert_eq!(detail(&report, "identification"), "0x50475331 (\"PGS1\")");
     assert_eq!(detail(&report, "interface version"), "1.1");
-    assert!(detail(&report, "capabilities").starts_with("profile float, 4 + 4 streams"));
+    assert!(detail(&report, "capabilities").starts_with(
+        "profile float, 4 + 4 streams of 128 bits, collisions in f32 and bodies in f32, 275000 kHz"
+    ));
     assert!(detail(&report, "length register").starts_with("26 bits on 8 channels"));
     assert!(detail(&report, "echo").contains("1, 7, 101, 4099 bodies"));
     assert!(detail(&report, "sums").contains("4 steps"));
@@ -108,6 +112,57 @@ fn boards_of_other_builds_pass_too() {
         assert!(length.starts_with(&format!("{} bits", config.length_width)), "{length}");
         // The driver copes with a narrow register, and says what it costs.
         assert_eq!(length.contains("fewer descriptors"), config.length_width < 26, "{length}");
+    }
+}
+
+#[test]
+fn boards_of_every_profile_pass_every_line() {
+    let thesis16 = Numbers {
+        collisions: StreamFormat::Thesis16,
+        bodies: StreamFormat::Thesis16,
+        ..Numbers::BINARY16
+    };
+    // Arrays of sixteen bits behind streams of thirty-two.
+    let short = Numbers { velocities: Precision::Binary16, ..MIXED.numbers };
+    let mut configs = Vec::new();
+    for profile in PROFILES {
+        for inertia in [Inertia::Isotropic, Inertia::World] {
+            configs.push(BoardConfig { profile, inertia, ..BoardConfig::default() });
+        }
+    }
+    configs.extend([
+        BoardConfig { profile: &HALF, numbers: Some(thesis16), ..BoardConfig::default() },
+        BoardConfig { profile: &MIXED, numbers: Some(short), ..BoardConfig::default() },
+        BoardConfig {
+            profile: &HALF,
+            subnormals: bitstream_model::Subnormals::Flush,
+            ..BoardConfig::default()
+        },
+    ]);
+    for config in configs {
+        let (report, _) = checked(config);
+        assert!(report.passed(), "{report:#?}");
+        let lines = detail(&report, "capabilities");
+        assert!(lines.starts_with(&format!("profile {}, ", config.profile.name)), "{lines}");
+        assert_eq!(lines.contains("world inertia"), config.inertia == Inertia::World, "{lines}");
+    }
+}
+
+/// Data that is not the newest is named on a board whose results carry padding, too.
+#[test]
+fn stale_data_is_named_on_a_board_of_sixteen_bits() {
+    for (coherency, side) in [
+        (Coherency::StaleReads { from_byte: 0 }, "MM2S"),
+        (Coherency::StaleWrites { from_byte: 0 }, "S2MM"),
+    ] {
+        let quirks = Quirks { coherency, ..Quirks::default() };
+        let (report, _) = checked(BoardConfig { profile: &HALF, quirks, ..BoardConfig::default() });
+        let line = report.lines.iter().find(|line| line.name == "coherency").expect("a line");
+        assert!(
+            matches!(&line.outcome, Outcome::Failed { found, .. }
+                if found.starts_with("stale data") && found.contains(side)),
+            "{line:?}"
+        );
     }
 }
 

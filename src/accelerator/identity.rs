@@ -152,7 +152,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let world = features::WORLD_INERTIA.is_set(able);
     let variant = Variant {
         profile,
-        numbers: numbers_of(window, profile)?,
+        numbers: numbers_of(window, profile, world)?,
         inertia: if world { Inertia::World } else { Inertia::Isotropic },
     };
     let shape_capacity = checked(
@@ -205,7 +205,7 @@ const fn coded(width: u32) -> u32 {
 
 /// The formats, which must be known, of the widths that the profile's stripes are made for, and fit
 /// its records.
-fn numbers_of(window: &Window, profile: &Profile) -> Result<Numbers, IdentityError> {
+fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers, IdentityError> {
     let found = window.read32(NUMBERS.offset);
     let refused = |expected| IdentityError::Capability { register: NUMBERS.name, found, expected };
     let format = |field: Field| {
@@ -234,6 +234,9 @@ fn numbers_of(window: &Window, profile: &Profile) -> Result<Numbers, IdentityErr
     }
     if profile.geometry == Geometry::Relative && numbers.collisions == StreamFormat::Thesis16 {
         return Err(refused("a format with an infinity, which marks an absent contact point"));
+    }
+    if world && numbers.bodies == StreamFormat::Thesis16 {
+        return Err(refused("a format with a zero, which is the inverse inertia of a static body"));
     }
     Ok(numbers)
 }
@@ -411,6 +414,9 @@ mod tests {
         assert_eq!(found.variant.numbers, expected);
         let found = with(&[], &[(0x10C, 0x1B)]).expect("with world inertia");
         assert_eq!(found.variant.inertia, Inertia::World);
+        let error = with(&HALF_REGISTERS, &[(0x144, 0x22), (0x10C, 0x1B)]);
+        let error = error.expect_err("no zero").to_string();
+        assert!(error.starts_with("NUMBERS is 0x00000022") && error.contains("zero"), "{error}");
         // An absent point cannot be written in thesis16.
         let error = with(&MIXED_REGISTERS, &[(0x144, 2)]).expect_err("no infinity").to_string();
         assert!(

@@ -100,8 +100,8 @@ mod tests {
             words in prop::collection::vec(any::<[u32; 16]>(), 0..30),
             profile in prop::sample::select(PROFILES.to_vec()),
         ) {
-            prop_assume!(profile.numbers.bodies == StreamFormat::F32);
-            let group = profile.stripes.bodies.streams;
+            prop_assume!(profile.numbers.poses == StreamFormat::F32);
+            let group = profile.stripes.results.streams;
             let mut segments = vec![Vec::new(); profile.s2mm_widths.len()];
             for (index, lanes) in words.iter().flat_map(|record| record.chunks(4)).enumerate() {
                 let stream = usize::from(group[index % group.len()]);

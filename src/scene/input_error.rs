@@ -83,9 +83,9 @@ pub enum InputError {
         found: f32,
     },
 
-    /// A number of a body is beyond what the bitstream's streams carry.
+    /// A number of a body is beyond what the bitstream's streams, arithmetic or arrays hold.
     #[error(
-        "body {body}: {field}[{component}] is {found}, but this bitstream streams bodies in {}, \
+        "body {body}: {field}[{component}] is {found}, but this bitstream holds bodies in {}, \
          which ends at {limit}: bring it into range, or load another ({carriers})", format.name()
     )]
     BodyOutOfRange {
@@ -97,7 +97,7 @@ pub enum InputError {
         component: usize,
         /// Its value.
         found: f32,
-        /// Format of the stream.
+        /// The narrowest format on its way.
         format: StreamFormat,
         /// Its largest number.
         limit: f32,
@@ -244,9 +244,9 @@ pub enum InputError {
         found: f32,
     },
 
-    /// A number of a collision is beyond what the bitstream's streams carry.
+    /// A number of a collision is beyond what the bitstream's streams or arithmetic hold.
     #[error(
-        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream streams \
+        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream holds \
          collisions in {}, which ends at {limit}: bring it into range, or load another ({carriers})",
         contact.map_or_else(String::new, |contact| format!(", contact point {contact}")),
         format.name()
@@ -262,7 +262,7 @@ pub enum InputError {
         component: usize,
         /// Its value as it would be streamed.
         found: f32,
-        /// Format of the stream.
+        /// The narrowest format on its way.
         format: StreamFormat,
         /// Its largest number.
         limit: f32,
@@ -279,6 +279,24 @@ pub enum InputError {
         found: f32,
         /// Its range.
         expected: &'static str,
+    },
+
+    /// A parameter is beyond what the bitstream's arithmetic holds.
+    #[error(
+        "the {parameter} is {found:e}, but this bitstream computes in binary16, which takes \
+         {smallest:e} to {largest}: correct the step parameters, or load another ({carriers})"
+    )]
+    ParameterOutOfRange {
+        /// The parameter; a gravity component with its axis.
+        parameter: &'static str,
+        /// Its value.
+        found: f32,
+        /// The smallest magnitude.
+        smallest: f32,
+        /// The largest magnitude.
+        largest: f32,
+        /// Who computes with it.
+        carriers: Carriers,
     },
 
     /// More passes than a step takes.
@@ -341,23 +359,27 @@ pub enum InputError {
         carriers: Carriers,
     },
 
-    /// An inverse inertia that is streamed is beyond what the bitstream's streams carry.
+    /// An inverse mass or inertia is beyond what the bitstream's arithmetic or streams hold.
     #[error(
-        "shape {shape}: its inverse inertia[{component}] is {found}, but this bitstream streams it \
-         in {}, which ends at {limit}: give a heavier or larger shape, or load another ({carriers})",
+        "shape {shape}: its {field}[{component}] is {found:e}, but this bitstream holds it in {}, \
+         from {smallest:e} to {largest}: give another shape, or load another bitstream ({carriers})",
         format.name()
     )]
-    InertiaOutOfRange {
+    ShapeOutOfRange {
         /// The shape.
         shape: usize,
-        /// Component, 0 for x.
+        /// Inverse mass or inverse inertia.
+        field: &'static str,
+        /// Component of the field, 0 for x; 0 for the mass.
         component: usize,
-        /// Its value, 1/(kg m²).
+        /// Its value, 1/kg or 1/(kg m²).
         found: f32,
-        /// Format of the stream.
+        /// The narrowest format on its way.
         format: StreamFormat,
-        /// Its largest number.
-        limit: f32,
+        /// The smallest number above 0 that does not become 0.
+        smallest: f32,
+        /// The largest number.
+        largest: f32,
         /// Who carries it.
         carriers: Carriers,
     },

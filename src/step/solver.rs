@@ -75,6 +75,7 @@ impl Accelerator {
         );
         let limits = Limits {
             variant,
+            flush_subnormals: device.capabilities.flush_subnormals,
             // An index has to name every body, whatever the bitstream says.
             body_capacity: device.capabilities.body_capacity.min(variant.body_capacity()),
             collision_capacity: device.capabilities.collision_capacity,

@@ -1,8 +1,9 @@
 //! This file refuses bodies that cannot be solved.
 
-use bitstream_model::interface::number::{Numbers, StreamFormat};
+use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::profile::Variant;
 
+use super::range::Held;
 use super::{Scene, all_within, first};
 use crate::scene::{Body, InputError};
 
@@ -12,9 +13,9 @@ const ANGULAR: &str = "angular velocity";
 /// What of one body a step refuses.
 #[inline]
 pub(super) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result<(), InputError> {
-    for (field, values, format) in fields(body, &scene.variant.numbers) {
+    for (field, values, format) in fields(body, &scene.held) {
         if !all_within(values, format.largest()) {
-            return Err(number_refused(index, body, field, values, format, scene));
+            return Err(number_refused(index, body, (field, values, format), scene));
         }
     }
     let [x, y, z, w] = body.pose.orientation;
@@ -37,14 +38,17 @@ pub(super) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result
     Ok(())
 }
 
-/// The numbers of a body that are streamed, and in which formats.
-fn fields<'a>(body: &'a Body, numbers: &Numbers) -> [(&'static str, &'a [f32], StreamFormat); 4] {
-    let Numbers { bodies, poses, .. } = *numbers;
+/// Numbers of a body: name, values, format.
+type Field<'a> = (&'static str, &'a [f32], StreamFormat);
+
+/// The numbers of a body that are streamed.
+#[inline]
+fn fields<'a>(body: &'a Body, held: &Held) -> [Field<'a>; 4] {
     [
-        ("position", &body.pose.position, poses),
-        ("orientation", &body.pose.orientation, poses),
-        (LINEAR, &body.velocity.linear, bodies),
-        (ANGULAR, &body.velocity.angular, bodies),
+        ("position", &body.pose.position, held.poses),
+        ("orientation", &body.pose.orientation, held.poses),
+        (LINEAR, &body.velocity.linear, held.velocities),
+        (ANGULAR, &body.velocity.angular, held.velocities),
     ]
 }
 
@@ -53,9 +57,7 @@ fn fields<'a>(body: &'a Body, numbers: &Numbers) -> [(&'static str, &'a [f32], S
 fn number_refused(
     index: usize,
     body: &Body,
-    field: &'static str,
-    values: &[f32],
-    format: StreamFormat,
+    (field, values, format): Field<'_>,
     scene: &Scene<'_>,
 ) -> InputError {
     if !all_within(values, f32::MAX) {
@@ -65,7 +67,7 @@ fn number_refused(
     let limit = format.largest();
     let (component, found) = first(values, |value| value.abs() > limit);
     let carriers = scene.demand.carriers(|variant: &Variant| {
-        let fields = fields(body, &variant.numbers);
+        let fields = fields(body, &Held::by(&variant.numbers));
         fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
     });
     InputError::BodyOutOfRange { body: index, field, component, found, format, limit, carriers }
@@ -79,7 +81,6 @@ pub(super) fn shape_of(body: &Body) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::number::StreamFormat;
     use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
     use crate::scene::{Demand, Pose, Shape, Velocity};
 
@@ -93,7 +94,8 @@ mod tests {
     fn check_on(profile: &'static Profile, body: &Body) -> Result<(), InputError> {
         let demand = Demand { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
         let variant = &profile.default_variant();
-        check_body(7, body, &Scene { shapes: &SHAPES, demand, variant })
+        let held = Held::by(&variant.numbers);
+        check_body(7, body, &Scene { shapes: &SHAPES, demand, variant, held })
     }
 
     fn check(body: &Body) -> Result<(), InputError> {
@@ -128,7 +130,7 @@ mod tests {
         );
         assert_eq!(
             refused.to_string(),
-            "body 7: angular velocity[1] is -65504.004, but this bitstream streams bodies in \
+            "body 7: angular velocity[1] is -65504.004, but this bitstream holds bodies in \
              binary16, which ends at 65504: bring it into range, or load another (profiles that \
              could: naive, float, mixed)"
         );

@@ -14,7 +14,7 @@ pub(crate) use shape::validate_shapes;
 use self::body::{check_body, shape_of};
 use self::collision::check_collision;
 use self::parameters::check_parameters;
-use self::range::check_range;
+use self::range::{Held, check_range};
 use self::shape::needed;
 use super::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
 use bitstream_model::interface::number::StreamFormat;
@@ -25,6 +25,8 @@ use bitstream_model::interface::profile::{Geometry, Variant};
 pub(crate) struct Limits {
     /// Its profile, formats and inertia.
     pub(crate) variant: Variant,
+    /// Whether subnormal numbers count as zero.
+    pub(crate) flush_subnormals: bool,
     /// Largest number of bodies, whatever the memory.
     pub(crate) body_capacity: u32,
     /// Largest number of collisions, whatever the memory.
@@ -58,19 +60,20 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         }
     }
     let body_count = bodies.len();
-    check_parameters(parameters)?;
     let demand =
         Demand { bodies: body_count, collisions: collisions.len(), inertia: needed(shapes) };
+    check_parameters(parameters, &demand, limits)?;
     check_room(&demand, limits)?;
     validate_shapes(shapes, limits)?;
-    let scene = Scene { shapes, demand, variant: &limits.variant };
+    let held = Held::by(&limits.variant.numbers);
+    let scene = Scene { shapes, demand, variant: &limits.variant, held };
     for index in 0..body_count {
         check_body(index, &bodies.body(index), &scene)?;
     }
     let is_static =
         |index: usize| shapes.get(shape_of(&bodies.body(index))).is_some_and(Shape::is_static);
     // What is finite in world coordinates is in the range of f32 as it is.
-    let in_range = limits.variant.numbers.collisions == StreamFormat::F32
+    let in_range = held.collisions == StreamFormat::F32
         && limits.variant.profile.geometry == Geometry::Absolute;
     for index in 0..collisions.len() {
         let collision = collisions.collision(index);
@@ -96,6 +99,7 @@ struct Scene<'a> {
     shapes: &'a [Shape],
     demand: Demand,
     variant: &'a Variant,
+    held: Held,
 }
 
 fn check_room(demand: &Demand, limits: &Limits) -> Result<(), InputError> {
@@ -174,6 +178,7 @@ pub(super) mod tests {
     };
     pub(in crate::scene::validate) const FLOAT: Limits = Limits {
         variant: profile::FLOAT.default_variant(),
+        flush_subnormals: false,
         body_capacity: 131_072,
         collision_capacity: 262_144,
         shape_capacity: 64,

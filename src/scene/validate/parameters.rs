@@ -1,9 +1,19 @@
 //! This file refuses step parameters outside their range.
 
-use crate::scene::{InputError, StepParameters};
+use bitstream_model::interface::number::StreamFormat;
+
+use super::Limits;
+use super::range::{computes_short, smallest_short};
+use crate::scene::{Demand, InputError, StepParameters};
+
+const TIME_STEP: &str = "time step";
 
 /// What of the parameters themselves a step refuses.
-pub(super) fn check_parameters(parameters: &StepParameters) -> Result<(), InputError> {
+pub(super) fn check_parameters(
+    parameters: &StepParameters,
+    demand: &Demand,
+    limits: &Limits,
+) -> Result<(), InputError> {
     let finite = |value: f32| value.is_finite();
     let not_negative = |value: f32| value.is_finite() && value >= 0.0;
     // Its reciprocal is computed, and that of a subnormal is infinite.
@@ -13,7 +23,7 @@ pub(super) fn check_parameters(parameters: &StepParameters) -> Result<(), InputE
     let StepParameters { friction, angular_damping, .. } = *parameters;
     let share = (0.0..=1.0).contains(&angular_damping);
     let checks = [
-        ("time step", time_step, positive(time_step), "a finite number of seconds above 0"),
+        (TIME_STEP, time_step, positive(time_step), "a finite number of seconds above 0"),
         ("position drift", position_drift, finite(position_drift), "a finite number of metres"),
         (
             "position coefficient",
@@ -32,6 +42,26 @@ pub(super) fn check_parameters(parameters: &StepParameters) -> Result<(), InputE
             return Err(InputError::Parameter { parameter, found, expected });
         }
     }
+    if computes_short(&limits.variant.numbers) {
+        let largest = StreamFormat::Binary16.largest();
+        for (parameter, found, ..) in checks {
+            let smallest = match parameter {
+                // Its reciprocal is computed.
+                TIME_STEP => smallest_short(limits.flush_subnormals).max(1.0 / largest),
+                _ => 0.0,
+            };
+            if !(smallest..=largest).contains(&found.abs()) {
+                let carriers = demand.carriers(|variant| !computes_short(&variant.numbers));
+                return Err(InputError::ParameterOutOfRange {
+                    parameter,
+                    found,
+                    smallest,
+                    largest,
+                    carriers,
+                });
+            }
+        }
+    }
     for (solver, found) in
         [("contact", parameters.contact_iterations), ("friction", parameters.friction_iterations)]
     {
@@ -44,7 +74,15 @@ pub(super) fn check_parameters(parameters: &StepParameters) -> Result<(), InputE
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{FLOAT, HALF};
     use super::*;
+    use crate::interface::profile::Inertia;
+
+    const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+
+    fn checked(parameters: &StepParameters) -> Result<(), InputError> {
+        check_parameters(parameters, &DEMAND, &FLOAT)
+    }
 
     const NOT_FINITE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
@@ -54,7 +92,7 @@ mod tests {
             set(&mut parameters, *value);
             assert!(
                 matches!(
-                    check_parameters(&parameters),
+                    checked(&parameters),
                     Err(InputError::Parameter { parameter, found, .. })
                         if parameter == name && found.to_bits() == value.to_bits()
                 ),
@@ -67,13 +105,13 @@ mod tests {
         for value in values {
             let mut parameters = StepParameters::default();
             set(&mut parameters, *value);
-            assert_eq!(check_parameters(&parameters), Ok(()), "{value}");
+            assert_eq!(checked(&parameters), Ok(()), "{value}");
         }
     }
 
     #[test]
     fn the_defaults_are_accepted() {
-        assert_eq!(check_parameters(&StepParameters::default()), Ok(()));
+        assert_eq!(checked(&StepParameters::default()), Ok(()));
     }
 
     #[test]
@@ -119,11 +157,36 @@ mod tests {
     fn more_than_255_iterations_are_refused() {
         let mut parameters = StepParameters::default();
         (parameters.contact_iterations, parameters.friction_iterations) = (0, 255);
-        assert_eq!(check_parameters(&parameters), Ok(()));
+        assert_eq!(checked(&parameters), Ok(()));
         parameters.friction_iterations = 256;
         let too_many = |solver, found| Err(InputError::TooManyIterations { solver, found });
-        assert_eq!(check_parameters(&parameters), too_many("friction", 256));
+        assert_eq!(checked(&parameters), too_many("friction", 256));
         parameters.contact_iterations = u32::MAX;
-        assert_eq!(check_parameters(&parameters), too_many("contact", u32::MAX));
+        assert_eq!(checked(&parameters), too_many("contact", u32::MAX));
+    }
+    #[test]
+    fn what_binary16_does_not_hold_is_refused_where_it_computes() {
+        let mut parameters = StepParameters::default();
+        let check = |parameters: &StepParameters, limits: &Limits| {
+            check_parameters(parameters, &DEMAND, limits).map_err(|error| error.to_string())
+        };
+        assert_eq!(check(&parameters, &HALF), Ok(()));
+        parameters.gravity[2] = -7e4;
+        assert_eq!(check(&parameters, &FLOAT), Ok(()));
+        assert_eq!(
+            check(&parameters, &HALF),
+            Err("the gravity in z is -7e4, but this bitstream computes in binary16, which takes 0e0 \
+                 to 65504: correct the step parameters, or load another (profiles that could: naive, \
+                 float, mixed)"
+                .to_owned())
+        );
+        // The reciprocal of 10 us is 100,000.
+        let time = |time_step| StepParameters { time_step, ..StepParameters::default() };
+        let text = check(&time(1e-5), &HALF).expect_err("its reciprocal overflows");
+        assert!(text.contains("time step is 1e-5") && text.contains("takes 1.5266"), "{text}");
+        let flush = Limits { flush_subnormals: true, ..HALF };
+        assert_eq!(check(&time(5e-5), &HALF), Ok(()));
+        assert!(check(&time(5e-5), &flush).is_err(), "subnormal in binary16");
+        assert_eq!(check(&time(1e-5), &Limits { flush_subnormals: true, ..FLOAT }), Ok(()));
     }
 }

@@ -1,10 +1,54 @@
-//! This file refuses collisions with numbers that the collision stream cannot carry.
+//! This file says which numbers a bitstream holds on their whole way, and refuses collisions with
+//! others.
 
+use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{Geometry, Variant};
 
 use super::Scene;
 use crate::record::relative::difference;
 use crate::scene::{CONTACT_POINTS, Collision, InputError};
+
+/// Formats of what a step is given, each the narrowest on its way: stream, arithmetic, array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Held {
+    /// Positions and orientations.
+    pub(super) poses: StreamFormat,
+    /// Linear and angular velocities.
+    pub(super) velocities: StreamFormat,
+    /// Everything of a collision.
+    pub(super) collisions: StreamFormat,
+}
+
+impl Held {
+    /// What a bitstream of these formats holds.
+    pub(super) const fn by(numbers: &Numbers) -> Self {
+        Self {
+            // Streamed in f32 they are integrated in f32.
+            poses: numbers.poses,
+            velocities: narrower(narrower(numbers.bodies, numbers.updates), numbers.velocities),
+            collisions: narrower(numbers.collisions, numbers.rows),
+        }
+    }
+}
+
+/// The format in which a number survives a stream and what lies behind it.
+const fn narrower(stream: StreamFormat, behind: Precision) -> StreamFormat {
+    match (stream, behind) {
+        (StreamFormat::F32, Precision::Binary16) => StreamFormat::Binary16,
+        (stream, _) => stream,
+    }
+}
+
+/// Whether constants of the arithmetic, masses and step parameters, meet sixteen bits.
+pub(super) const fn computes_short(numbers: &Numbers) -> bool {
+    !matches!((numbers.rows, numbers.updates), (Precision::F32, Precision::F32))
+}
+
+/// The smallest magnitude that binary16 does not take for 0.
+pub(super) const fn smallest_short(flush_subnormals: bool) -> f32 {
+    // 2^-14, or the subnormal 2^-24.
+    if flush_subnormals { 1.0 / 16_384.0 } else { 1.0 / 16_777_216.0 }
+}
 
 /// What of a collision a bitstream streams, by geometry: name and value.
 const VECTORS: usize = 3;
@@ -12,6 +56,8 @@ const VECTORS: usize = 3;
 /// Checks every number of a collision that is otherwise right, as it would be streamed.
 ///
 /// `positions` are those of bodies A and B.
+// Out of the loop, which most streams leave without it.
+#[inline(never)]
 pub(super) fn check_range(
     index: usize,
     collision: &Collision,
@@ -26,7 +72,7 @@ pub(super) fn check_range(
 
 /// Whether a bitstream carries every number of a collision.
 fn fits(variant: &Variant, collision: &Collision, positions: [[f32; 3]; 2]) -> bool {
-    let limit = variant.numbers.collisions.largest();
+    let limit = Held::by(&variant.numbers).collisions.largest();
     let within = |vector: [f32; 3]| {
         (vector[0].abs() <= limit) & (vector[1].abs() <= limit) & (vector[2].abs() <= limit)
     };
@@ -72,7 +118,7 @@ fn refused(
     scene: &Scene<'_>,
 ) -> InputError {
     let geometry = scene.variant.profile.geometry;
-    let format = scene.variant.numbers.collisions;
+    let format = scene.held.collisions;
     let limit = format.largest();
     let point = match geometry {
         Geometry::Absolute => "point",
@@ -129,12 +175,9 @@ mod tests {
         positions: [[f32; 3]; 2],
     ) -> Result<(), InputError> {
         let variant = profile.default_variant();
-        check_range(
-            7,
-            collision,
-            positions,
-            &Scene { shapes: &[], demand: DEMAND, variant: &variant },
-        )
+        let held = Held::by(&variant.numbers);
+        let scene = Scene { shapes: &[], demand: DEMAND, variant: &variant, held };
+        check_range(7, collision, positions, &scene)
     }
 
     fn far(contact: Contact) -> Collision {
@@ -204,7 +247,7 @@ mod tests {
         let text = check(&HALF, &collision, [there, there]).expect_err("absolute").to_string();
         assert_eq!(
             text,
-            "collision 7: position of body A[0] is 1000000, but this bitstream streams collisions \
+            "collision 7: position of body A[0] is 1000000, but this bitstream holds collisions \
              in binary16, which ends at 65504: bring it into range, or load another (profiles that \
              could: naive, float, mixed)"
         );
@@ -222,5 +265,27 @@ mod tests {
             ),
             "{text}"
         );
+    }
+    #[test]
+    fn the_narrowest_place_on_the_way_decides() {
+        use StreamFormat::{Binary16, F32, Thesis16};
+        let held = |numbers: &Numbers| {
+            let Held { poses, velocities, collisions } = Held::by(numbers);
+            (poses, velocities, collisions)
+        };
+        assert_eq!(held(&FLOAT.numbers), (F32, F32, F32));
+        assert_eq!(held(&HALF.numbers), (Binary16, Binary16, Binary16));
+        assert_eq!(held(&MIXED.numbers), (F32, F32, Binary16));
+        let short = Precision::Binary16;
+        let with = |numbers| held(&numbers);
+        let velocities = short;
+        assert_eq!(with(Numbers { velocities, ..Numbers::F32 }), (F32, Binary16, F32));
+        assert_eq!(with(Numbers { updates: short, ..Numbers::F32 }), (F32, Binary16, F32));
+        assert_eq!(with(Numbers { rows: short, ..Numbers::F32 }), (F32, F32, Binary16));
+        assert_eq!(with(Numbers { impulses: short, ..Numbers::F32 }), (F32, F32, F32));
+        let thesis =
+            Numbers { collisions: Thesis16, bodies: Thesis16, poses: Thesis16, ..HALF.numbers };
+        assert_eq!(held(&thesis), (Thesis16, Thesis16, Thesis16));
+        assert_eq!(held(&WINDOWED16.numbers), (F32, Binary16, Binary16));
     }
 }

@@ -1,9 +1,14 @@
 //! This file refuses shape tables that the accelerator cannot hold.
 
-use bitstream_model::interface::profile::Inertia;
+use bitstream_model::interface::number::{Precision, StreamFormat};
+use bitstream_model::interface::profile::{Inertia, Variant};
 
+use super::range::{computes_short, smallest_short};
 use super::{Limits, exceeds};
 use crate::scene::{Demand, InputError, Shape};
+
+const MASS: &str = "inverse mass";
+const INERTIA: &str = "inverse inertia";
 
 /// What the shape table refuses.
 ///
@@ -19,17 +24,12 @@ pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), I
         });
     }
     let demand = Demand { bodies: 0, collisions: 0, inertia: needed(shapes) };
-    let format = limits.variant.numbers.bodies;
     // A subnormal would be 0 to a bitstream that flushes them: static there, moving here.
     let usable = |value: f32| value == 0.0 || (value > 0.0 && value.is_normal());
     for (index, shape) in shapes.iter().enumerate() {
         let [x, y, z] = shape.inverse_inertia;
-        let fields = [
-            ("inverse mass", 0, shape.inverse_mass),
-            ("inverse inertia", 0, x),
-            ("inverse inertia", 1, y),
-            ("inverse inertia", 2, z),
-        ];
+        let fields =
+            [(MASS, 0, shape.inverse_mass), (INERTIA, 0, x), (INERTIA, 1, y), (INERTIA, 2, z)];
         for (field, component, found) in fields {
             if !usable(found) {
                 return Err(InputError::ShapeValue { shape: index, field, component, found });
@@ -39,35 +39,48 @@ pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), I
         {
             return Err(InputError::StaticShapeRotates { shape: index, found });
         }
-        match limits.variant.inertia {
-            Inertia::Isotropic if !shape.is_isotropic() => {
-                let carriers = demand.carriers(|_| true);
-                let found = shape.inverse_inertia;
-                return Err(InputError::Anisotropic { shape: index, found, carriers });
-            }
-            // It stays in the shape table, in f32.
-            Inertia::Isotropic => {}
-            Inertia::World => {
-                let limit = format.largest();
-                let beyond = (0..).zip([x, y, z]).find(|(_, found)| *found > limit);
-                if let Some((component, found)) = beyond {
-                    let carriers = demand.carriers(|variant| {
-                        let streamed = variant.inertia == Inertia::World;
-                        !streamed || found <= variant.numbers.bodies.largest()
-                    });
-                    return Err(InputError::InertiaOutOfRange {
-                        shape: index,
-                        component,
-                        found,
-                        format,
-                        limit,
-                        carriers,
-                    });
-                }
+        if limits.variant.inertia == Inertia::Isotropic && !shape.is_isotropic() {
+            let (found, carriers) = (shape.inverse_inertia, demand.carriers(|_| true));
+            return Err(InputError::Anisotropic { shape: index, found, carriers });
+        }
+        let smallest = smallest_short(limits.flush_subnormals);
+        let beyond = |field: &'static str, found: f32, variant: &Variant| {
+            let format = held(field, variant);
+            let fits = match format {
+                StreamFormat::F32 => true,
+                short => found == 0.0 || (smallest..=short.largest()).contains(&found),
+            };
+            (!fits).then_some(format)
+        };
+        for (field, component, found) in fields {
+            if let Some(format) = beyond(field, found, &limits.variant) {
+                return Err(InputError::ShapeOutOfRange {
+                    shape: index,
+                    field,
+                    component,
+                    found,
+                    format,
+                    smallest,
+                    largest: format.largest(),
+                    carriers: demand.carriers(|variant| beyond(field, found, variant).is_none()),
+                });
             }
         }
     }
     Ok(())
+}
+
+/// The narrowest format of an inverse mass or inertia on its way: the shape table has f32, the
+/// inertia about world axes comes with the velocities and stays beside them.
+fn held(field: &'static str, variant: &Variant) -> StreamFormat {
+    let numbers = &variant.numbers;
+    let streamed = field == INERTIA && variant.inertia == Inertia::World;
+    match numbers.bodies {
+        short @ (StreamFormat::Binary16 | StreamFormat::Thesis16) if streamed => short,
+        _ if computes_short(numbers) => StreamFormat::Binary16,
+        _ if streamed && numbers.velocities == Precision::Binary16 => StreamFormat::Binary16,
+        _ => StreamFormat::F32,
+    }
 }
 
 /// The least that shapes need to be told of their bodies' inertia.
@@ -164,20 +177,47 @@ mod tests {
         }
     }
 
+    fn out_of_range(shape: Shape, limits: &Limits) -> String {
+        let error = validate_shapes(&[Shape::STATIC, shape], limits).expect_err("out of range");
+        assert!(matches!(error, InputError::ShapeOutOfRange { shape: 1, .. }), "{error}");
+        error.to_string()
+    }
+
     #[test]
-    fn an_inertia_that_is_streamed_must_fit_the_stream() {
-        let shape = Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 7e4, 1.0] };
-        let error = validate_shapes(&[shape], &on(HALF.variant.profile, Inertia::World));
-        let error = error.expect_err("beyond binary16");
-        assert!(
-            matches!(error, InputError::InertiaOutOfRange { shape: 0, component: 1, .. }),
-            "{error}"
+    fn what_binary16_does_not_hold_is_refused_where_it_computes() {
+        assert_eq!(
+            out_of_range(Shape::isotropic(1.0, 7e4), &HALF),
+            "shape 1: its inverse inertia[0] is 7e4, but this bitstream holds it in binary16, from \
+             5.9604645e-8 to 65504: give another shape, or load another bitstream (profiles that \
+             could: naive, float, mixed)"
         );
-        let text = error.to_string();
-        assert!(text.contains("70000") && text.contains("65504"), "{text}");
+        // 20 t: binary16 holds it as a subnormal number, unless these count as 0.
+        let heavy = Shape::isotropic(5e-5, 0.1);
+        assert_eq!(validate_shapes(&[heavy], &HALF), Ok(()));
+        let flush = Limits { flush_subnormals: true, ..HALF };
+        let text = out_of_range(heavy, &flush);
+        assert!(text.contains("inverse mass[0] is 5e-5") && text.contains("from 6.1035"), "{text}");
+        assert!(
+            out_of_range(Shape::isotropic(1e-8, 0.1), &HALF).contains("inverse mass[0] is 1e-8")
+        );
+        let flush = Limits { flush_subnormals: true, ..FLOAT };
+        assert_eq!(validate_shapes(&[heavy, Shape::isotropic(1e-30, 1e30)], &flush), Ok(()));
+    }
+
+    #[test]
+    fn an_inertia_that_is_streamed_must_fit_stream_and_array() {
+        let shape = Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 7e4, 1.0] };
+        let text = out_of_range(shape, &on(HALF.variant.profile, Inertia::World));
+        assert!(text.contains("inverse inertia[1] is 7e4") && text.contains("65504"), "{text}");
         assert!(text.ends_with("could, built with world inertia: naive, float, mixed)"), "{text}");
+        let mut world = on(FLOAT.variant.profile, Inertia::World);
+        assert_eq!(validate_shapes(&[shape], &world), Ok(()));
+        world.variant.numbers.velocities = Precision::Binary16;
+        out_of_range(shape, &world);
         // In the shape table it stays f32.
-        assert_eq!(validate_shapes(&[Shape::isotropic(1.0, 7e4)], &HALF), Ok(()));
+        let mut table = FLOAT;
+        table.variant.numbers.velocities = Precision::Binary16;
+        assert_eq!(validate_shapes(&[Shape::isotropic(1.0, 7e4)], &table), Ok(()));
     }
 
     #[test]

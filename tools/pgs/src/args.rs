@@ -8,6 +8,8 @@ use zynq_pgs::MemoryChoice;
 
 use crate::memory::memory;
 use crate::verbs::check::CheckArgs;
+use crate::verbs::compare::CompareArgs;
+use crate::verbs::formats::FormatsArgs;
 use crate::verbs::list::ListArgs;
 use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
@@ -20,6 +22,8 @@ Examples:
   pgs                                  step the thesis' scene of 38,880 cubes
   pgs --grid 10x10x10 --steps 60       a smaller one; the same as `pgs run --grid ...`
   pgs solve vectors/one_cube --compare
+  pgs compare float half               how far two builds of the board come apart
+  pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
   pgs order --input vectors/full_step186
   pgs list --json
@@ -50,6 +54,8 @@ struct Cli {
 pub(crate) enum Verb {
     Run(RunArgs),
     Solve(SolveArgs),
+    Compare(CompareArgs),
+    Formats(FormatsArgs),
     Model(ModelArgs),
     Order(OrderArgs),
     List(ListArgs),

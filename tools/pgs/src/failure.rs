@@ -13,6 +13,8 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use thiserror::Error;
+
 /// A command that ran.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
@@ -71,6 +73,12 @@ impl Failure {
         self
     }
 
+    /// Says what it was about: which of two boards.
+    pub(crate) fn about(mut self, about: impl Into<String>) -> Self {
+        self.error = Box::new(About { about: about.into(), source: self.error });
+        self
+    }
+
     fn is_closed_pipe(&self) -> bool {
         let io = self.error.downcast_ref::<io::Error>();
         self.cause == Cause::Output && io.is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)
@@ -105,6 +113,14 @@ impl Failure {
     }
 }
 
+/// What a failure was about, before what it was.
+#[derive(Debug, Error)]
+#[error("{about}")]
+struct About {
+    about: String,
+    source: Box<dyn Error + Send + Sync>,
+}
+
 /// Verbs write to stdout only; files have errors of their own.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
@@ -131,6 +147,12 @@ mod tests {
             text,
             "error: x/params.npy\n  because: cannot be read\n  because: no such file\n  next: look"
         );
+    }
+
+    #[test]
+    fn what_a_failure_is_about_comes_first() {
+        let text = Failure::input("too many").about("board half").next("less").chain();
+        assert_eq!(text, "error: board half\n  because: too many\n  next: less");
     }
 
     #[test]

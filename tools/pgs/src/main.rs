@@ -9,6 +9,7 @@ mod args;
 mod board;
 mod build;
 mod compare;
+mod deviation;
 mod digest;
 mod failure;
 mod folder;
@@ -19,6 +20,7 @@ mod npy;
 mod options;
 mod origin;
 mod scenes;
+mod sixteen;
 mod verbs;
 
 use std::io::{self, Write};

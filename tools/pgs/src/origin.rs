@@ -34,7 +34,7 @@ fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
     let shape = match error {
         InputError::ShapeValue { shape, .. }
         | InputError::Anisotropic { shape, .. }
-        | InputError::InertiaOutOfRange { shape, .. }
+        | InputError::ShapeOutOfRange { shape, .. }
         | InputError::StaticShapeRotates { shape, .. } => Some(*shape),
         _ => None,
     };
@@ -59,10 +59,11 @@ fn file_of(error: &InputError) -> &'static str {
         InputError::ShapeIndex { .. }
         | InputError::NoShapes
         | InputError::TooManyShapes { .. }
+        | InputError::ShapeOutOfRange { field: "inverse mass", .. }
         | InputError::ShapeValue { field: "inverse mass", .. } => BODY_INVERSE_MASS,
         InputError::ShapeValue { .. }
         | InputError::Anisotropic { .. }
-        | InputError::InertiaOutOfRange { .. }
+        | InputError::ShapeOutOfRange { .. }
         | InputError::StaticShapeRotates { .. } => BODY_INVERSE_INERTIA,
         InputError::TooManyCollisions { .. }
         | InputError::MemoryExceeded { .. }
@@ -75,7 +76,7 @@ fn file_of(error: &InputError) -> &'static str {
         | InputError::CollisionOutOfRange { contact: Some(_), .. } => COLLISION_POINTS,
         // Positions of its bodies; a normal of unit length is in range.
         InputError::CollisionOutOfRange { contact: None, .. } => BODY_POSITION,
-        InputError::Parameter { .. } => PARAMS,
+        InputError::Parameter { .. } | InputError::ParameterOutOfRange { .. } => PARAMS,
         InputError::TooManyIterations { .. } => ITERATIONS,
         // No bodies, too many bodies, and what later versions of the driver add.
         _ => BODY_POSITION,

@@ -22,9 +22,18 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 
 #[test]
 fn every_help_has_an_example() {
-    for verb in
-        [&[][..], &["run"], &["solve"], &["model"], &["order"], &["list"], &["load"], &["check"]]
-    {
+    for verb in [
+        &[][..],
+        &["run"],
+        &["solve"],
+        &["model"],
+        &["compare"],
+        &["formats"],
+        &["order"],
+        &["list"],
+        &["load"],
+        &["check"],
+    ] {
         let ran = run(verb.iter().copied().chain(["--help"]));
         assert_eq!(ran.code, Some(0), "{verb:?}");
         let example = format!("  pgs{}", verb.iter().map(|v| format!(" {v}")).collect::<String>());

@@ -1,6 +1,8 @@
 //! The verbs, one file each.
 
 pub(crate) mod check;
+pub(crate) mod compare;
+pub(crate) mod formats;
 pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
@@ -24,6 +26,8 @@ pub(crate) const SCHEMA: u32 = 1;
 pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Failure> {
     match &command.verb {
         Verb::Run(args) => run::run(args, &command.common, out),
+        Verb::Compare(args) => compare::run(args, &command.common, out),
+        Verb::Formats(args) => formats::run(args, &command.common, out),
         Verb::Solve(args) => solve::run(args, &command.common, out),
         Verb::Model(args) => model::run(args, &command.common, out),
         Verb::Order(args) => order::run(args, &command.common, out),

@@ -43,6 +43,24 @@ pub(crate) fn grouped(number: u64) -> String {
     text
 }
 
+/// Five digits, with an exponent where they would not fit into seven places.
+pub(super) fn number(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        "0".to_owned()
+    } else if (1e-3..1e6).contains(&size) {
+        let whole = format!("{:.0}", size.trunc()).len();
+        format!("{value:.*}", 5_usize.saturating_sub(whole))
+    } else {
+        format!("{value:.2e}")
+    }
+}
+
+/// A number with its sign.
+pub(super) fn signed(value: f64) -> String {
+    if value > 0.0 { format!("+{}", number(value)) } else { number(value) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -53,5 +71,24 @@ mod tests {
         assert_eq!(grouped(999), "999");
         assert_eq!(grouped(1000), "1,000");
         assert_eq!(grouped(2_066_270), "2,066,270");
+    }
+
+    #[test]
+    fn numbers_have_five_digits_and_never_lose_their_size() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-0.0, "0"),
+            (1.0, "1.0000"),
+            (0.017_6, "0.0176"),
+            (99.98, "99.980"),
+            (100.0, "100.00"),
+            (-123.456, "-123.46"),
+            (123_456.7, "123457"),
+            (1e6, "1.00e6"),
+            (3.05e-5, "3.05e-5"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+        assert_eq!([signed(2.0), signed(-2.0), signed(0.0)], ["+2.0000", "-2.0000", "0"]);
     }
 }

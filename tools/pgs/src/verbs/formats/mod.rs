@@ -1,0 +1,232 @@
+//! The verb `formats`: how large the numbers of a step are, and what sixteen bits leave of them.
+
+mod numbers;
+mod tally;
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+use zynq_pgs::{Body, Collision, StepParameters};
+
+use self::numbers::{AS_STREAMED, EACH_ONCE, Numbers, SUMS, numbers};
+use self::tally::{Loss, Sizes};
+use super::SCHEMA;
+use super::run::progress_bar;
+use super::table::{Column, grouped, heading, line, number};
+use crate::args::CommonArgs;
+use crate::board;
+use crate::failure::{Failure, Verdict};
+use crate::folder::Folder;
+use crate::interrupt::Interrupt;
+use crate::options::{BuildArgs, DeadlineArgs};
+use crate::scenes::SceneArgs;
+use crate::sixteen::Sixteen;
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs formats --input vectors/full_step186
+  pgs formats --grid 10x10x10 --step 70 --json
+
+The numbers are those that a step streams to the board; contact points that are not used, indices and
+counts are left out. \"as streamed\" has the positions of both bodies with every collision, \"each once\"
+only with the bodies. What is relative is less the position of body A, as the profile mixed streams
+it, and in neither sum.
+
+Relative errors are |read back - number| / |number|; zeros are left out of them, and of the share
+below 3e-5. The driver refuses a number that a format cannot carry.";
+
+/// Show how large the numbers of a step are, and the errors of 16-bit formats on them.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct FormatsArgs {
+    /// The step in this folder of .npy arrays instead of one of a scene.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "BuildArgs", "step"])]
+    input: Option<PathBuf>,
+    /// Which step of the scene; those before it are taken first.
+    #[arg(long, value_name = "N", default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..))]
+    step: u32,
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    deadline: DeadlineArgs,
+    #[command(flatten)]
+    build: BuildArgs,
+}
+
+/// What a step is given.
+struct Step {
+    bodies: Vec<Body>,
+    collisions: Vec<Collision>,
+}
+
+/// Shows the numbers.
+pub(crate) fn run(
+    args: &FormatsArgs,
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    let Step { bodies, collisions } = match &args.input {
+        Some(path) => {
+            let folder = Folder::load(path).map_err(|error| {
+                Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
+            })?;
+            Step { bodies: folder.bodies, collisions: folder.collisions }
+        }
+        None => match stepped(args, common)? {
+            Some(found) => found,
+            None => return Ok(Verdict::Interrupted),
+        },
+    };
+    let kinds = numbers(&bodies, &collisions);
+    if common.json {
+        let config = match &args.input {
+            Some(path) => json!({ "input": path.display().to_string() }),
+            None => {
+                let mut config = args.scene.to_json();
+                config["step"] = args.step.into();
+                config
+            }
+        };
+        let document = json!({
+            "schema": SCHEMA,
+            "verb": "formats",
+            "config": config,
+            "bodies": bodies.len(),
+            "collisions": collisions.len(),
+            "as_streamed": described(AS_STREAMED.of(&kinds)),
+            "each_once": described(EACH_ONCE.of(&kinds)),
+            "kinds": kinds
+                .iter()
+                .map(|kind| {
+                    let mut value = described(kind.values.iter());
+                    value["name"] = kind.name.into();
+                    value["in_sums"] = SUMS
+                        .iter()
+                        .filter(|sum| (sum.has)(kind.part))
+                        .map(|sum| sum.name)
+                        .collect();
+                    value
+                })
+                .collect::<Vec<_>>(),
+        });
+        writeln!(out, "{document:#}")?;
+    } else {
+        match &args.input {
+            Some(path) => writeln!(out, "input      {}", path.display())?,
+            None => writeln!(out, "scene      {}, step {}", args.scene.text(), args.step)?,
+        }
+        print(&kinds, bodies.len(), collisions.len(), out)?;
+    }
+    Ok(Verdict::Done)
+}
+
+/// The scene's step; nothing if Ctrl-C came before it.
+fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Failure> {
+    let mut opened = board::open(common, &args.build)?;
+    args.scene.check_size(&opened)?;
+    let mut scene = args.scene.build()?;
+    opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
+    let parameters = args.deadline.apply(StepParameters::default());
+    let interrupt = Interrupt::install();
+    let progress = progress_bar(args.step);
+    for _ in 1..args.step {
+        if interrupt.is_set() {
+            progress.finish_and_clear();
+            return Ok(None);
+        }
+        scene.detect();
+        let (bodies, collisions) = scene.parts_mut();
+        opened
+            .accelerator
+            .step(bodies, collisions, &parameters)
+            .map_err(|error| opened.failure(error))?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    scene.detect();
+    let (bodies, collisions) = (scene.bodies().to_vec(), scene.collisions().to_vec());
+    Ok(Some(Step { bodies, collisions }))
+}
+
+fn described<'a>(values: impl Iterator<Item = &'a f32> + Clone) -> Value {
+    let mut value = Sizes::of(values.clone()).to_json();
+    for format in Sixteen::ALL {
+        value["formats"][format.name()] = Loss::of(format, values.clone()).to_json();
+    }
+    value
+}
+
+const COLUMNS: [Column; 14] = [
+    Column { name: "", unit: "", width: 20 },
+    Column { name: "numbers", unit: "", width: 10 },
+    Column { name: "smallest", unit: "not 0", width: 9 },
+    Column { name: "largest", unit: "", width: 9 },
+    Column { name: "< 3e-5", unit: "%", width: 8 },
+    Column { name: "binary16", unit: "mean %", width: 9 },
+    Column { name: "binary16", unit: "% < 1 %", width: 8 },
+    Column { name: "binary16", unit: "most", width: 9 },
+    Column { name: "thesis16", unit: "mean %", width: 9 },
+    Column { name: "thesis16", unit: "% < 1 %", width: 8 },
+    Column { name: "thesis16", unit: "most", width: 9 },
+    Column { name: "literal", unit: "mean %", width: 9 },
+    Column { name: "literal", unit: "% < 1 %", width: 8 },
+    Column { name: "literal", unit: "most", width: 9 },
+];
+
+fn print(
+    kinds: &[Numbers],
+    bodies: usize,
+    collisions: usize,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let (bodies, collisions) = (grouped(bodies as u64), grouped(collisions as u64));
+    writeln!(out, "step       {bodies} bodies, {collisions} collisions")?;
+    writeln!(out)?;
+    heading(out, &COLUMNS)?;
+    for kind in kinds {
+        line(out, &COLUMNS, cells(kind.name, kind.values.iter()))?;
+    }
+    for sum in SUMS {
+        line(out, &COLUMNS, cells(sum.name, sum.of(kinds)))?;
+    }
+
+    let streamed = || AS_STREAMED.of(kinds);
+    let sizes = Sizes::of(streamed());
+    writeln!(out)?;
+    writeln!(out, "{} by size", AS_STREAMED.name)?;
+    let percent = |part: u64| 100.0 * part as f64 / sizes.numbers.max(1) as f64;
+    writeln!(out, "  {:<14} {:>11} {:>9.4} %", "0", grouped(sizes.zeros), percent(sizes.zeros))?;
+    for (exponent, &count) in &sizes.decades {
+        let range = format!("1e{exponent} .. 1e{}", exponent + 1);
+        writeln!(out, "  {range:<14} {:>11} {:>9.4} %", grouped(count), percent(count))?;
+    }
+    for format in Sixteen::ALL {
+        let refused = Loss::of(format, streamed()).refused;
+        if refused > 0 {
+            let name = format.name();
+            writeln!(out, "{} of them are beyond what {name} carries", grouped(refused))?;
+        }
+    }
+    Ok(())
+}
+
+fn cells<'a>(name: &str, values: impl Iterator<Item = &'a f32> + Clone) -> Vec<String> {
+    let sizes = Sizes::of(values.clone());
+    let size = |size: Option<f32>| size.map_or_else(|| "-".to_owned(), |size| number(size.into()));
+    let mut cells = vec![
+        format!("{name:<20}"),
+        grouped(sizes.numbers),
+        size(sizes.smallest),
+        size(sizes.largest),
+        number(sizes.small_share() * 100.0),
+    ];
+    for format in Sixteen::ALL {
+        let loss = Loss::of(format, values.clone());
+        cells.push(number(loss.mean() * 100.0));
+        cells.push(number(loss.under_share() * 100.0));
+        cells.push(number(loss.largest_absolute));
+    }
+    cells
+}
