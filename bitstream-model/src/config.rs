@@ -2,9 +2,10 @@
 //! and a device tree fix on a real one.
 
 use crate::accelerator::striping::{GROUP_MAX, STREAMS_MAX};
+use crate::accelerator::window;
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use crate::interface::number::{Numbers, Precision, StreamFormat};
-use crate::interface::profile::{Depth, FLOAT, Geometry, Inertia, Profile, Variant};
+use crate::interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
 use crate::interface::stripe::Stripe;
 use crate::quirks::Quirks;
 
@@ -155,6 +156,15 @@ pub enum ConfigError {
          in f32, or both in binary16"
     )]
     RowsBeyondUpdates,
+    /// A design that streams the collisions once, without its scoreboard.
+    #[error(
+        "profile {name:?} built `unchecked`: its passes run side by side and always wait for their \
+         bodies; expected `interlocked`"
+    )]
+    UncheckedWindow {
+        /// The profile.
+        name: &'static str,
+    },
     /// A profile that is not one of the table's and contradicts itself.
     #[error("profile {name:?}: {what}")]
     Profile {
@@ -213,6 +223,15 @@ impl BoardConfig {
             LENGTH_WIDTH_MAX.into(),
         )?;
         check_profile(self.profile)?;
+        let name = self.profile.name;
+        if let Flow::Window(design) = &self.profile.flow {
+            if self.hazards == Hazards::Unchecked {
+                return Err(ConfigError::UncheckedWindow { name });
+            }
+            if let Some(what) = window::contradiction(self.profile, design) {
+                return Err(ConfigError::Profile { name, what });
+            }
+        }
         self.check_numbers()?;
         range("address width", self.address_width.into(), 32, 64)?;
         // The capability register carries the window in cycles in 16 bits.

@@ -3,27 +3,20 @@
 use super::array::{Array, Records};
 use super::decode::{self, Collision};
 use super::inertia::{self, Isotropic, World};
-use super::integrate::integrate;
-use super::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
+use super::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
 use super::pipeline::Entry;
 use super::results::Results;
 use super::segment::{PacketError, Segment};
-use super::solver::{self, Mass, Velocity};
+use super::solver::Mass;
 use super::striping::Striping;
 use super::{Accelerator, Phase};
 use crate::cast::register;
 use crate::config::{Hazards, Subnormals};
-use crate::interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
+use crate::interface::control::ErrorCode;
 use crate::interface::number::{Precision, StreamFormat};
 use crate::interface::profile::{Depth, Geometry, Inertia, Variant};
-use crate::interface::record::{CONTACT_POINTS, pose, result, velocity};
+use crate::interface::record::{CONTACT_POINTS, pose, result};
 use crate::stream::Stream;
-
-/// The integer part, toward zero and stopped at the ends, as the accumulator takes it.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-fn to_fixed(value: f64) -> u64 {
-    value as u64
-}
 
 impl Accelerator {
     fn body_records(&self, format: StreamFormat, rows: usize) -> Records {
@@ -37,13 +30,13 @@ impl Accelerator {
         Segment::new(Array::new(striping, records))
     }
 
-    fn poses_in(&self) -> Segment {
+    pub(super) fn poses_in(&self) -> Segment {
         let Variant { profile, numbers, .. } = self.variant;
         let striping = Striping::new(&profile.stripes.poses, profile.mm2s_widths);
         Segment::new(Array::new(striping, self.body_records(numbers.poses, pose::ROWS)))
     }
 
-    fn collisions_in(&self) -> Segment {
+    pub(super) fn collisions_in(&self) -> Segment {
         let profile = self.variant.profile;
         let striping = Striping::new(&profile.stripes.collisions, profile.mm2s_widths);
         let records = Records {
@@ -55,44 +48,21 @@ impl Accelerator {
         Segment::new(Array::new(striping, records))
     }
 
-    fn results_out(&self) -> Results {
+    pub(super) fn results_out(&self) -> Results {
         let Variant { profile, numbers, .. } = self.variant;
         let striping = Striping::new(&profile.stripes.results, profile.s2mm_widths);
         Results::new(Array::new(striping, self.body_records(numbers.poses, result::ROWS)))
     }
 
-    fn injected(&mut self) -> Result<(), PacketError> {
+    pub(super) fn injected(&mut self) -> Result<(), PacketError> {
         match self.fault.take() {
             Some(code) => Err(PacketError { code, channel: 0, beat: 0 }),
             None => Ok(()),
         }
     }
 
-    fn received(&mut self, sum: u32) {
+    pub(super) fn received(&mut self, sum: u32) {
         self.counters.sum_received = self.counters.sum_received.wrapping_add(sum);
-    }
-
-    /// Numbers as an on-chip array of that precision holds them.
-    #[inline]
-    fn stored<const N: usize>(&self, precision: Precision, numbers: [f32; N]) -> [f32; N] {
-        fn rounded<F: Format, const N: usize>(numbers: [f32; N]) -> [f32; N] {
-            numbers.map(|number| Number::<F>::new(number).value())
-        }
-        match (precision, self.config.subnormals) {
-            // What the arithmetic left, as it is.
-            (Precision::F32, _) => numbers,
-            (Precision::Binary16, Subnormals::Keep) => rounded::<Half, N>(numbers),
-            (Precision::Binary16, Subnormals::Flush) => rounded::<HalfFlushed, N>(numbers),
-        }
-    }
-
-    #[inline]
-    fn stored_velocity(&self, velocity: Velocity) -> Velocity {
-        let precision = self.variant.numbers.velocities;
-        Velocity {
-            linear: self.stored(precision, velocity.linear),
-            angular: self.stored(precision, velocity.angular),
-        }
     }
 
     /// Loads the velocities that have arrived, a beat a cycle from each stream of 128 bits.
@@ -107,30 +77,14 @@ impl Accelerator {
         }
         self.injected()?;
         segment.check(records, inputs)?;
-        let format = self.variant.numbers.bodies;
         for ahead in 0..records {
             let body = segment.done + ahead;
-            let (velocity, shape) = match self.variant.inertia {
-                Inertia::Isotropic => {
-                    decode::velocity(format, &segment.record::<{ velocity::ROWS }>(ahead, inputs))
-                }
-                Inertia::World => {
-                    let rows = segment.record::<{ velocity::WORLD_ROWS }>(ahead, inputs);
-                    let inertia = decode::world_inertia(format, &rows);
-                    self.inertias[body] = self.stored(self.variant.numbers.velocities, inertia);
-                    decode::velocity(format, &[rows[velocity::LINEAR], rows[velocity::ANGULAR]])
-                }
-            };
-            let known = (shape as usize) < self.registers.shapes().len();
-            let Some(shape) = u8::try_from(shape).ok().filter(|_| known) else {
-                return Err(PacketError {
-                    code: ErrorCode::ShapeIndex,
-                    channel: 0,
-                    beat: register(body),
-                });
-            };
-            self.velocities[body] = self.stored_velocity(velocity);
-            self.shape_of[body] = shape;
+            let arrival = self.arrival(&segment, ahead, inputs)?;
+            if self.variant.inertia == Inertia::World {
+                self.inertias[body] = arrival.inertia;
+            }
+            self.velocities[body] = arrival.velocity;
+            self.shape_of[body] = arrival.shape;
         }
         let before = segment.cycles();
         let sum = segment.advance(records, inputs);
@@ -144,7 +98,7 @@ impl Accelerator {
     }
 
     /// Passes of the step; without collisions there is none.
-    fn passes(&self) -> u32 {
+    pub(super) fn passes(&self) -> u32 {
         match self.arguments.collisions {
             0 => 0,
             _ => self.arguments.contact_iterations + self.arguments.friction_iterations,
@@ -152,7 +106,7 @@ impl Accelerator {
     }
 
     /// Depth of the pipeline that a pass goes through.
-    fn depth(&self, pass: u32) -> Depth {
+    pub(super) fn depth(&self, pass: u32) -> Depth {
         let profile = self.variant.profile;
         let contact = pass < self.arguments.contact_iterations;
         self.config.depth(if contact { profile.contact } else { profile.friction })
@@ -270,7 +224,12 @@ impl Accelerator {
 
     /// The collision `ahead` places after the next one.
     #[inline]
-    fn collision(&self, segment: &Segment, ahead: usize, inputs: &[Stream]) -> Collision {
+    pub(super) fn collision(
+        &self,
+        segment: &Segment,
+        ahead: usize,
+        inputs: &[Stream],
+    ) -> Collision {
         use StreamFormat::{Binary16, F32, Thesis16};
         match (self.variant.profile.geometry, self.variant.numbers.collisions) {
             (Geometry::Absolute, F32) => Collision::absolute(F32, &segment.record(ahead, inputs)),
@@ -316,40 +275,8 @@ impl Accelerator {
 
         let mut velocities = sides.map(|body| self.velocities[body]);
         let mut impulses = self.impulses[index];
-        let parameters = &self.arguments.solver;
-        let contacts = self.arguments.contact_iterations;
-        let precision = self.variant.numbers.impulses;
-        if pass < contacts {
-            solver::contact::<R, U, I>(
-                collision,
-                parameters,
-                &masses,
-                &mut velocities,
-                &mut impulses,
-            );
-            impulses = self.stored(precision, impulses);
-            if pass + 1 == contacts {
-                let sum = f64::from(solver::normal_sum::<U>(&impulses));
-                let unit = f64::from(1_u32 << IMPULSE_SUM_FRACTION_BITS);
-                self.counters.impulse_sum =
-                    self.counters.impulse_sum.saturating_add(to_fixed(sum * unit));
-            }
-        } else {
-            if pass == contacts {
-                let sum = solver::normal_sum::<U>(&impulses);
-                impulses = self.stored(precision, [sum, 0.0, 0.0, 0.0]);
-            }
-            solver::friction::<R, U, I>(
-                collision,
-                parameters,
-                &masses,
-                &mut velocities,
-                &mut impulses,
-            );
-            impulses = self.stored(precision, impulses);
-        }
+        self.compute::<R, U, I>(pass, collision, &masses, &mut velocities, &mut impulses);
         self.impulses[index] = impulses;
-        let velocities = velocities.map(|velocity| self.stored_velocity(velocity));
 
         if unchecked {
             let stale = self.pipeline.issue(&entry, velocities);
@@ -384,14 +311,9 @@ impl Accelerator {
         if sides[0] == sides[1] {
             return Err(error(ErrorCode::SelfCollision));
         }
-        let shapes = self.registers.shapes();
         let masses = sides.map(|body| {
-            let shape = shapes[usize::from(self.shape_of[body])];
-            let inverse_inertia = match self.variant.inertia {
-                Inertia::Isotropic => [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
-                Inertia::World => self.inertias[body],
-            };
-            Mass { inverse_mass: shape.inverse_mass, inverse_inertia }
+            let inertia = self.inertias.get(body).copied().unwrap_or_default();
+            self.mass(self.shape_of[body], inertia)
         });
         if masses.iter().all(|mass| mass.inverse_mass == 0.0) {
             return Err(error(ErrorCode::StaticPair));
@@ -417,23 +339,12 @@ impl Accelerator {
         let format = self.variant.numbers.poses;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
-        let shapes = self.registers.shapes();
-        let step = match (self.variant.numbers.updates, self.config.subnormals) {
-            (Precision::F32, Subnormals::Keep) => integrate::<Single>,
-            (Precision::F32, Subnormals::Flush) => integrate::<SingleFlushed>,
-            (Precision::Binary16, Subnormals::Keep) => integrate::<Half>,
-            (Precision::Binary16, Subnormals::Flush) => integrate::<HalfFlushed>,
-        };
         for ahead in 0..records {
             let body = poses.done + ahead;
             let pose = decode::pose(format, &poses.record(ahead, inputs));
             let velocity = self.velocities[body];
-            let moves = shapes[usize::from(self.shape_of[body])].inverse_mass != 0.0;
-            let (pose, velocity) = if moves && self.arguments.integrate {
-                step(&self.arguments.integration, &pose, &velocity)
-            } else {
-                (pose, velocity)
-            };
+            let moves = self.mass(self.shape_of[body], [0.0; 6]).inverse_mass != 0.0;
+            let (pose, velocity) = self.integrated(moves, pose, velocity);
             let sum = results.send(&decode::result(format, &pose, &velocity), outputs);
             self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sum);
         }

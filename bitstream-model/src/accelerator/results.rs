@@ -29,6 +29,11 @@ impl Results {
         self.array.cycles(self.done)
     }
 
+    /// Clock cycles that the streams take for one record alone.
+    pub(super) fn cycles_of_one(&self) -> u64 {
+        self.array.cycles(1)
+    }
+
     /// Records that the streams have space for, the last one with the padding behind it.
     pub(super) fn room(&self, streams: &[Stream]) -> usize {
         let room = self.array.striping.contiguous(|k| self.sent[k] + streams[k].space());

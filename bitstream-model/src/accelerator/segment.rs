@@ -37,6 +37,11 @@ impl Segment {
         self.array.cycles(self.done)
     }
 
+    /// Clock cycles that the streams take for one record alone.
+    pub(super) fn cycles_of_one(&self) -> u64 {
+        self.array.cycles(1)
+    }
+
     /// Whole records that have arrived and were not read.
     pub(super) fn available(&self, streams: &[Stream]) -> usize {
         let arrived = self.array.striping.contiguous(|k| self.taken[k] + streams[k].len());

@@ -107,7 +107,7 @@ pub mod window {
     pub const FRICTION_UNITS: Field = Field::bits("friction_units", 8, 8, Access::ReadOnly);
 }
 
-/// Fields of WINDOW_CAPACITY.
+/// Fields of `WINDOW_CAPACITY`.
 pub mod window_capacity {
     use super::{Access, Field};
 

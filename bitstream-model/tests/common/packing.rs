@@ -73,7 +73,7 @@ pub(crate) fn beats(format: StreamFormat, rows: &[Row]) -> Vec<Beat> {
 }
 
 /// Beats on each of `streams` streams.
-fn deal(stripe: &Stripe, streams: usize, mut beats: Vec<Beat>) -> Vec<Vec<Beat>> {
+pub(crate) fn deal(stripe: &Stripe, streams: usize, mut beats: Vec<Beat>) -> Vec<Vec<Beat>> {
     while stripe.padded && !beats.len().is_multiple_of(stripe.streams.len()) {
         beats.push(Beat::default());
     }
@@ -84,7 +84,7 @@ fn deal(stripe: &Stripe, streams: usize, mut beats: Vec<Beat>) -> Vec<Vec<Beat>>
     dealt
 }
 
-fn velocity_rows(variant: &Variant, step: &Step, body: &Body, k: usize) -> Vec<Row> {
+pub(crate) fn velocity_rows(variant: &Variant, step: &Step, body: &Body, k: usize) -> Vec<Row> {
     let format = variant.numbers.bodies;
     let mut rows = vec![row(format, body.linear, body.shape), row(format, body.angular, 0)];
     if variant.inertia == Inertia::World {
@@ -95,7 +95,7 @@ fn velocity_rows(variant: &Variant, step: &Step, body: &Body, k: usize) -> Vec<R
     rows
 }
 
-fn collision_rows(variant: &Variant, collision: &Collision) -> Vec<Row> {
+pub(crate) fn collision_rows(variant: &Variant, collision: &Collision) -> Vec<Row> {
     let format = variant.numbers.collisions;
     let [a, b] = collision.bodies;
     let [at_a, at_b] = collision.positions;
@@ -126,7 +126,7 @@ fn collision_rows(variant: &Variant, collision: &Collision) -> Vec<Row> {
     }
 }
 
-fn pose_rows(format: StreamFormat, body: &Body) -> [Row; 2] {
+pub(crate) fn pose_rows(format: StreamFormat, body: &Body) -> [Row; 2] {
     [row(format, body.position, 0), body.orientation.map(|value| encode(format, value))]
 }
 
