@@ -61,19 +61,25 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
 
 /// Writes the records of `count` collisions; otherwise as [`pack_velocities`].
 ///
-/// A body that does not exist has its position written as zeros. Validation has refused it; should
+/// A body that does not exist has its position written as zeros, and one without a shape is static. Validation has refused it; should
 /// a caller's [`Collisions`] answer differently the second time, the accelerator refuses the index.
 pub(crate) fn pack_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     variant: &Variant,
     bodies: &B,
     collisions: &C,
     count: usize,
+    shapes: &[Shape],
     channels: &mut [&mut [Beat]],
 ) -> u32 {
     let body_count = bodies.len();
-    let position = |index: u32| match usize::try_from(index) {
-        Ok(index) if index < body_count => bodies.body(index).pose.position,
-        _ => [0.0; 3],
+    let body = |index: u32| match usize::try_from(index) {
+        Ok(index) if index < body_count => Some(bodies.body(index)),
+        _ => None,
+    };
+    let position = |index| body(index).map_or([0.0; 3], |body| body.pose.position);
+    let end = |index| {
+        let Some(body) = body(index) else { return ([0.0; 3], false) };
+        (body.pose.position, !shape_of(&body, shapes).is_static())
     };
     let layout = Segment::Collisions.layout(variant);
     match variant.profile.geometry {
@@ -89,17 +95,23 @@ pub(crate) fn pack_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
             let integers = &record::relative::INTEGERS;
             pack_dealt(&layout, count, integers, channels, |index| {
                 let collision = collisions.collision(index);
-                let (a, b) = (position(collision.body_a), position(collision.body_b));
+                let ((a, a_moves), (b, b_moves)) = (end(collision.body_a), end(collision.body_b));
+                let [a, b] = record::relative::anchors([a, b], [a_moves, b_moves]);
                 record::relative::encode(&collision, a, b)
             })
         }
     }
 }
 
-/// The velocity record of a body with its inertia; zeros for a shape that is not in the table.
-fn world_velocity(body: &Body, shapes: &[Shape]) -> [Beat; velocity::WORLD_ROWS] {
+/// The shape of a body; a static one for a shape that is not in the table.
+fn shape_of<'a>(body: &Body, shapes: &'a [Shape]) -> &'a Shape {
     let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
-    let shape = shape.unwrap_or(&Shape::STATIC);
+    shape.unwrap_or(&Shape::STATIC)
+}
+
+/// The velocity record of a body with its inertia.
+fn world_velocity(body: &Body, shapes: &[Shape]) -> [Beat; velocity::WORLD_ROWS] {
+    let shape = shape_of(body, shapes);
     let inertia = record::inertia::about_world_axes(shape, body.pose.orientation);
     record::velocity::encode_world(body, &inertia)
 }

@@ -275,7 +275,8 @@ impl Accelerator {
             poses_of[place] = poses;
         }
         let views = &mut channels[active];
-        let collisions = pack_collisions(variant, bodies, collisions, plan.collisions, views);
+        let collisions =
+            pack_collisions(variant, bodies, collisions, plan.collisions, &self.shapes, views);
         let poses = pack_poses(variant, bodies, count, &mut poses_of[active]);
         Sent { velocities, collisions, poses }
     }

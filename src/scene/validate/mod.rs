@@ -16,6 +16,7 @@ use self::collision::check_collision;
 use self::parameters::check_parameters;
 use self::range::{Held, check_range};
 use super::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
+use crate::record::relative::anchors;
 use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::profile::{Geometry, Variant};
 
@@ -88,7 +89,8 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     for index in 0..collisions.len() {
         let collision = collisions.collision(index);
         let (body_a, body_b) = check_collision(index, &collision, body_count)?;
-        if is_static(body_a) && is_static(body_b) {
+        let moves = [!is_static(body_a), !is_static(body_b)];
+        if moves == [false, false] {
             return Err(InputError::BothStatic {
                 collision: index,
                 body_a: collision.body_a,
@@ -96,7 +98,10 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
             });
         }
         if !in_range {
-            let positions = [body_a, body_b].map(|body| bodies.body(body).pose.position);
+            let mut positions = [body_a, body_b].map(|body| bodies.body(body).pose.position);
+            if limits.variant.profile.geometry == Geometry::Relative {
+                positions = anchors(positions, moves);
+            }
             check_range(index, &collision, positions, &scene)?;
         }
     }
