@@ -142,6 +142,8 @@ fn control_registers_stand_at_their_published_offsets() {
             ("MEMORY_PER_RECORD", 0x13C),
             ("DMA", 0x140),
             ("NUMBERS", 0x144),
+            ("WINDOW", 0x148),
+            ("WINDOW_CAPACITY", 0x14C),
             ("ERROR", 0x180),
             ("ERROR_DETAIL", 0x184),
             ("CYCLES_LO", 0x188),
@@ -188,10 +190,11 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
         control::numbers::UPDATES,
         control::numbers::VELOCITIES,
         control::numbers::IMPULSES,
+        control::numbers::POSES,
     ];
     assert_eq!(
         formats.map(|field| field.mask()),
-        [0xF, 0xF0, 0xF00, 0xF000, 0x000F_0000, 0x00F0_0000]
+        [0xF, 0xF0, 0xF00, 0xF000, 0x000F_0000, 0x00F0_0000, 0x0F00_0000]
     );
     assert_eq!(
         (control::channels::MM2S.mask(), control::channels::S2MM.mask()),
@@ -234,6 +237,8 @@ fn error_codes_keep_their_numbers() {
             (8, ErrorCode::SelfCollision),
             (9, ErrorCode::Argument),
             (10, ErrorCode::PartialBeat),
+            (11, ErrorCode::EmptyPlace),
+            (12, ErrorCode::Deadlock),
         ]
     );
     for (code, known) in codes {
@@ -312,8 +317,16 @@ fn the_other_profiles_are_those_of_the_specification() {
     };
     assert_eq!([naive, half, mixed].map(words), [[8, 28, 8, 16], [4, 14, 4, 8], [8, 12, 8, 16]]);
     assert_eq!(half.stripes.collisions.streams, [0, 0, 0, 1, 1, 1, 2]);
-    assert_eq!(half.stripes.bodies.streams, [0, 0, 1, 1, 2]);
-    assert!(half.stripes.collisions.padded && half.stripes.bodies.padded);
+    assert_eq!(half.stripes.results.streams, [0, 0, 1, 1, 2]);
+    assert!(half.stripes.collisions.padded && half.stripes.results.padded);
+    let windowed = profile::Profile::by_id(5).expect("the profile exists");
+    let profile::Flow::Window(window) = windowed.flow else { panic!("collisions stream once") };
+    assert_eq!((windowed.name, window.slots, window.lag), ("windowed", 8192, 2816));
+    assert_eq!((window.contact_units, window.friction_units), (2, 2));
+    assert_eq!(profile::WINDOWED16.id, 6);
+    assert_eq!((window.slot_cycles(4, 4, 2, 1), window.slot_cycles(4, 4, 3, 2)), (4, 3));
+    let live = [record::live::PLACE, record::live::FIRST, record::live::LAST];
+    assert_eq!(live, [0x1FFF, 0x2000, 0x4000]);
     let mut world = profile::FLOAT.default_variant();
     world.inertia = profile::Inertia::World;
     assert_eq!((world.words().velocity, world.bytes_per_body()), (16, 48));

@@ -12,8 +12,12 @@ use zynq_pgs::{
 };
 
 /// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
-const THESIS16: Numbers =
-    Numbers { collisions: StreamFormat::Thesis16, bodies: StreamFormat::Thesis16, ..Numbers::F32 };
+const THESIS16: Numbers = Numbers {
+    collisions: StreamFormat::Thesis16,
+    bodies: StreamFormat::Thesis16,
+    poses: StreamFormat::Thesis16,
+    ..Numbers::F32
+};
 
 fn of(profile: &'static Profile) -> BoardConfig {
     BoardConfig { profile, ..BoardConfig::default() }
@@ -209,7 +213,8 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     assert_eq!(
         refused(of(&HALF), &mut bodies, &collisions),
         "body 2: position[0] is 70000, but this bitstream holds bodies in binary16, which ends at \
-         65504: bring it into range, or load another (profiles that could: naive, float, mixed)"
+         65504: bring it into range, or load another (profiles that could: naive, float, mixed, \
+         windowed, windowed16)"
     );
     let thesis = BoardConfig { numbers: Some(THESIS16), ..of(&HALF) };
     assert!(
@@ -221,7 +226,7 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
         text,
         "collision 1, contact point 0: lever arm of the point[0] is -70000.5, but this bitstream \
          holds collisions in binary16, which ends at 65504: bring it into range, or load another \
-         (profiles that could: naive, float)"
+         (profiles that could: naive, float, windowed)"
     );
 }
 
@@ -233,7 +238,7 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
     assert_eq!(
         refused(of(&HALF), &mut bodies, &collisions),
         "found 65537 bodies, the bitstream takes at most 65536: give fewer, or load another \
-         (profiles that could: naive, float)"
+         (profiles that could: naive, float, windowed, windowed16)"
     );
     // 2 x 24 + 300,000 x 16 = 4,800,048 bytes; (4,194,304 - 48) / 16 = 262,141. The collisions alone
     // are beyond float's 262,144.
@@ -243,11 +248,11 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
         text.starts_with("found 300000 collisions, the bitstream takes at most 262144"),
         "{text}"
     );
-    assert!(text.ends_with("(profiles that could: half)"), "{text}");
+    assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
     let text = refused(of(&MIXED), &mut bodies, &vec![collisions[0]; 262_142]);
     assert!(text.contains("need 4194320 bytes") && text.contains("there are 4194304"), "{text}");
     assert!(text.contains("at most 262141 collisions fit"), "{text}");
-    assert!(text.ends_with("(profiles that could: half)"), "{text}");
+    assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
 }
 
 /// What a step computes beyond 65,504 comes back as infinity (binary16) or F = 31 (thesis16).

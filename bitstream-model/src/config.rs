@@ -2,9 +2,10 @@
 //! and a device tree fix on a real one.
 
 use crate::accelerator::striping::{GROUP_MAX, STREAMS_MAX};
+use crate::accelerator::window;
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use crate::interface::number::{Numbers, Precision, StreamFormat};
-use crate::interface::profile::{Depth, FLOAT, Geometry, Inertia, Profile, Variant};
+use crate::interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
 use crate::interface::stripe::Stripe;
 use crate::quirks::Quirks;
 
@@ -161,6 +162,15 @@ pub enum ConfigError {
          in f32, or both in binary16"
     )]
     RowsBeyondUpdates,
+    /// A design that streams the collisions once, without its scoreboard.
+    #[error(
+        "profile {name:?} built `unchecked`: its passes run side by side and always wait for their \
+         bodies; expected `interlocked`"
+    )]
+    UncheckedWindow {
+        /// The profile.
+        name: &'static str,
+    },
     /// A profile that is not one of the table's and contradicts itself.
     #[error("profile {name:?}: {what}")]
     Profile {
@@ -219,6 +229,15 @@ impl BoardConfig {
             LENGTH_WIDTH_MAX.into(),
         )?;
         check_profile(self.profile)?;
+        let name = self.profile.name;
+        if let Flow::Window(design) = &self.profile.flow {
+            if self.hazards == Hazards::Unchecked {
+                return Err(ConfigError::UncheckedWindow { name });
+            }
+            if let Some(what) = window::contradiction(self.profile, design) {
+                return Err(ConfigError::Profile { name, what });
+            }
+        }
         self.check_numbers()?;
         range("address width", self.address_width.into(), 32, 64)?;
         // The capability register carries the window in cycles in 16 bits.
@@ -244,9 +263,11 @@ impl BoardConfig {
 
     fn check_numbers(&self) -> Result<(), ConfigError> {
         let (asked, own) = (self.variant().numbers, self.profile.numbers);
-        for (stream, asked, own) in
-            [("collision", asked.collisions, own.collisions), ("body", asked.bodies, own.bodies)]
-        {
+        for (stream, asked, own) in [
+            ("collision", asked.collisions, own.collisions),
+            ("velocity", asked.bodies, own.bodies),
+            ("pose", asked.poses, own.poses),
+        ] {
             let (found, expected) = (asked.bits(), own.bits());
             if found != expected {
                 return Err(ConfigError::StreamFormat { stream, found, expected });
@@ -284,8 +305,10 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
             "streams of 32, 64 or 128 bits are expected",
         ),
         (
-            !stripe(&stripes.collisions, profile.mm2s_widths)
-                || streams.iter().any(|widths| !stripe(&stripes.bodies, widths)),
+            ![stripes.collisions, stripes.velocities, stripes.poses]
+                .iter()
+                .all(|of| stripe(of, profile.mm2s_widths))
+                || !stripe(&stripes.results, profile.s2mm_widths),
             "stripes of 1 to 8 beats on streams that exist are expected",
         ),
         (

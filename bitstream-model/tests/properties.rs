@@ -8,7 +8,7 @@ use bitstream_model::interface::axi_dma::{ADDRESS, ADDRESS_MSB, CHANNEL_REGISTER
 use bitstream_model::interface::control::{self, ap_ctrl};
 use bitstream_model::interface::descriptor::WORDS;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{HALF, Inertia, PROFILES, Profile, Variant};
+use bitstream_model::interface::profile::{Flow, HALF, Inertia, PROFILES, Profile, Variant};
 use bitstream_model::{
     Bandwidth, BoardConfig, Delays, Direction, EmulatedBoard, Hazards, Subnormals,
 };
@@ -114,7 +114,7 @@ fn variants() -> Vec<Variant> {
         move |profile: &&'static Profile| Variant { inertia, ..profile.default_variant() }
     };
     let thesis = StreamFormat::Thesis16;
-    let thesis = Numbers { collisions: thesis, bodies: thesis, ..Numbers::BINARY16 };
+    let thesis = Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
     PROFILES
         .iter()
         .map(own(Inertia::Isotropic))
@@ -142,11 +142,16 @@ fn config() -> impl Strategy<Value = BoardConfig> {
             |(variant, switches, length_width, address_width, bandwidth, window_slots)| {
                 let [direct, unchecked, flush, strict] = switches;
                 let Variant { profile, numbers, inertia } = variant;
+                let unchecked_window = unchecked && profile.flow != Flow::Passes;
                 BoardConfig {
                     profile,
                     numbers: Some(numbers),
                     inertia,
-                    hazards: if unchecked { Hazards::Unchecked } else { Hazards::Interlocked },
+                    hazards: if unchecked && !unchecked_window {
+                        Hazards::Unchecked
+                    } else {
+                        Hazards::Interlocked
+                    },
                     window_slots,
                     subnormals: if flush { Subnormals::Flush } else { Subnormals::Keep },
                     bandwidth,
@@ -244,6 +249,7 @@ impl Playground {
                 host.set_control(control::RESET, 1);
                 host.pause(1);
                 let scene = Step { iterations: [1, 1], ..Step::on_ground(bodies, collisions) };
+                let (scene, lanes) = scene.on(&host.variant());
                 scene.write_arguments(host);
                 host.set_control(control::IER, 0b111);
                 host.set_control(control::GIE, 1);
@@ -253,7 +259,7 @@ impl Playground {
                     self.packet(host, ring(core, Direction::S2mm), 0, address, room);
                 }
                 host.set_control(control::AP_CTRL, ap_ctrl::START.mask());
-                for (core, lane) in scene.packed(&host.variant()).iter().enumerate() {
+                for (core, lane) in lanes.iter().enumerate() {
                     for (slot, segment) in lane.packets.iter().enumerate() {
                         let beats = &lane.segments[*segment];
                         let length = u32::try_from(beats.len()).expect("few");
@@ -334,12 +340,11 @@ proptest! {
     ) {
         let config = BoardConfig { scatter_gather: true, length_width: 26, ..config };
         let mut machine = Machine::new(config);
-        let scene = Step::on_ground(bodies, collisions);
+        let (scene, mut lanes) = Step::on_ground(bodies, collisions).on(&machine.host.variant());
         scene.write_arguments(&machine.host);
         for (register, word) in [control::TIME_STEP, control::FRICTION, control::GRAVITY_Y].into_iter().zip(&words) {
             machine.host.set_control(register, *word);
         }
-        let mut lanes = scene.packed(&machine.host.variant());
         for (channel, segment, beat, lane, word) in spoilt {
             let streams = lanes.len();
             let beats = &mut lanes[channel % streams].segments[segment];

@@ -219,6 +219,7 @@ fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers
     let numbers = Numbers {
         collisions: format(numbers::COLLISIONS)?,
         bodies: format(numbers::BODIES)?,
+        poses: format(numbers::POSES)?,
         rows: precision(numbers::ROWS)?,
         updates: precision(numbers::UPDATES)?,
         velocities: precision(numbers::VELOCITIES)?,
@@ -227,6 +228,7 @@ fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers
     let own = profile.numbers;
     if numbers.collisions.bits() != own.collisions.bits()
         || numbers.bodies.bits() != own.bodies.bits()
+        || numbers.poses.bits() != own.poses.bits()
     {
         return Err(refused("words as wide on the streams as the profile has them"));
     }
@@ -367,7 +369,7 @@ mod tests {
         (0x114, 0x344),
         (0x118, 0x344),
         (0x11C, 0x0002_0003),
-        (0x144, 0x0011_1111),
+        (0x144, 0x0111_1111),
     ];
     const MIXED_REGISTERS: [(u32, u32); 6] = [
         (0x108, 4),
@@ -399,10 +401,11 @@ mod tests {
             identify_with(&[registers, more].concat())
         };
         // thesis16 on both streams, arithmetic and arrays of mixed kinds.
-        let found = with(&HALF_REGISTERS, &[(0x144, 0x0010_0122)]).expect("known formats");
+        let found = with(&HALF_REGISTERS, &[(0x144, 0x0210_0122)]).expect("known formats");
         let expected = Numbers {
             collisions: StreamFormat::Thesis16,
             bodies: StreamFormat::Thesis16,
+            poses: StreamFormat::Thesis16,
             rows: Precision::Binary16,
             updates: Precision::F32,
             velocities: Precision::F32,
@@ -411,9 +414,9 @@ mod tests {
         assert_eq!(found.variant.numbers, expected);
         let found = with(&[], &[(0x10C, 0x1B)]).expect("with world inertia");
         assert_eq!(found.variant.inertia, Inertia::World);
-        let error = with(&HALF_REGISTERS, &[(0x144, 0x22), (0x10C, 0x1B)]);
+        let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x1B)]);
         let error = error.expect_err("no zero").to_string();
-        assert!(error.starts_with("NUMBERS is 0x00000022") && error.contains("zero"), "{error}");
+        assert!(error.starts_with("NUMBERS is 0x02000022") && error.contains("zero"), "{error}");
         // An absent point cannot be written in thesis16.
         let error = with(&MIXED_REGISTERS, &[(0x144, 2)]).expect_err("no infinity").to_string();
         assert!(

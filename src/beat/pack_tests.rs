@@ -71,6 +71,7 @@ const THESIS_SPEC: Spec = Spec {
         numbers: Numbers {
             collisions: StreamFormat::Thesis16,
             bodies: StreamFormat::Thesis16,
+            poses: StreamFormat::Thesis16,
             ..HALF.numbers
         },
         ..HALF.default_variant()

@@ -100,8 +100,8 @@ mod tests {
             words in prop::collection::vec(any::<[u32; 16]>(), 0..30),
             profile in prop::sample::select(PROFILES.to_vec()),
         ) {
-            prop_assume!(profile.numbers.bodies == StreamFormat::F32);
-            let group = profile.stripes.bodies.streams;
+            prop_assume!(profile.numbers.poses == StreamFormat::F32);
+            let group = profile.stripes.results.streams;
             let mut segments = vec![Vec::new(); profile.s2mm_widths.len()];
             for (index, lanes) in words.iter().flat_map(|record| record.chunks(4)).enumerate() {
                 let stream = usize::from(group[index % group.len()]);
@@ -128,8 +128,8 @@ mod tests {
                 segments[index % 5 / 2].push(Beat([0, 1, 2, 3].map(lane)));
             }
             let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
-            let bodies = if thesis { StreamFormat::Thesis16 } else { StreamFormat::Binary16 };
-            let numbers_of = Numbers { bodies, ..HALF.numbers };
+            let poses = if thesis { StreamFormat::Thesis16 } else { StreamFormat::Binary16 };
+            let numbers_of = Numbers { poses, ..HALF.numbers };
             let layout =
                 Segment::Results.layout(&Variant { numbers: numbers_of, ..HALF.default_variant() });
             let mut results = Results::new(&layout, &views);

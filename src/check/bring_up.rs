@@ -136,11 +136,12 @@ fn described(variant: &Variant) -> String {
         [first, rest @ ..] if rest.iter().all(|width| width == first) => first.to_string(),
         mixed => mixed.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
     };
-    let formats = match (numbers.collisions, numbers.bodies) {
-        (StreamFormat::F32, StreamFormat::F32) => String::new(),
-        (collisions, bodies) => {
-            format!(", collisions in {} and bodies in {}", collisions.name(), bodies.name())
-        }
+    let streams = [numbers.collisions, numbers.bodies, numbers.poses];
+    let formats = if streams == [StreamFormat::F32; 3] {
+        String::new()
+    } else {
+        let [collisions, velocities, poses] = streams.map(StreamFormat::name);
+        format!(", collisions in {collisions}, velocities in {velocities} and poses in {poses}")
     };
     let inertia = match inertia {
         Inertia::Isotropic => "",
@@ -321,8 +322,8 @@ mod tests {
         let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
         assert_eq!(
             described(&world),
-            "half, 3 + 3 streams of 128, 128, 64 bits, collisions in binary16 and bodies in \
-             binary16, world inertia"
+            "half, 3 + 3 streams of 128, 128, 64 bits, collisions in binary16, velocities in \
+             binary16 and poses in binary16, world inertia"
         );
     }
 

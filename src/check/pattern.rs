@@ -32,8 +32,8 @@ pub(super) struct Pattern {
 impl Pattern {
     /// The pattern for a bitstream.
     pub(super) fn of(variant: &Variant) -> Self {
-        let Numbers { bodies, updates, velocities, .. } = variant.numbers;
-        let short = bodies != StreamFormat::F32
+        let Numbers { bodies, poses, updates, velocities, .. } = variant.numbers;
+        let short = [bodies, poses] != [StreamFormat::F32; 2]
             || updates != Precision::F32
             || velocities != Precision::F32;
         Self { results: Segment::Results.layout(variant), short }

@@ -1,6 +1,6 @@
 //! This file is the accelerator as a caller sees it, and one step from end to end.
 //!
-//! Validate, reserve, pack, hand over, start, wait, take back, unpack, check, commit: nothing of
+//! Validate, order, reserve, pack, hand over, start, wait, take back, unpack, check, commit: nothing of
 //! the caller's changes before the last.
 
 use std::time::{Duration, Instant};
@@ -11,6 +11,7 @@ use bitstream_model::interface::record::Beat;
 use super::board::{self, BoardDescription, Found, OpenOptions};
 use super::device::Device;
 use super::fault::Fault;
+use super::ordering::{Arranged, Hardware, Ordering};
 use super::plan::Plan;
 use super::report::{HostTimes, StepCycles, StepReport};
 use crate::accelerator::{Capabilities, Counters};
@@ -18,6 +19,7 @@ use crate::beat::pack::{pack_collisions, pack_poses, pack_velocities};
 use crate::beat::stripe::Segment;
 use crate::beat::unpack::{Results, sum_of_words};
 use crate::error::{Error, OpenError};
+use crate::order::{Order, Ordered};
 use crate::platform::{Deadline, System};
 use crate::scene::validate::{Limits, validate, validate_shapes};
 use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
@@ -36,6 +38,7 @@ pub struct Accelerator {
     pub(super) device: Device,
     limits: Limits,
     pub(super) shapes: Vec<Shape>,
+    ordering: Ordering,
     /// Results of a step until all are checked. Kept, so that a step allocates nothing.
     spare: Vec<(Pose, Velocity)>,
 }
@@ -84,7 +87,8 @@ impl Accelerator {
             bytes_per_body: device.capabilities.bytes_per_body,
             bytes_per_collision: device.capabilities.bytes_per_collision,
         };
-        Self { board, device, limits, shapes: Vec::new(), spare: Vec::new() }
+        let ordering = Ordering::default();
+        Self { board, device, limits, shapes: Vec::new(), ordering, spare: Vec::new() }
     }
 
     /// Which board was opened, and why.
@@ -117,8 +121,9 @@ impl Accelerator {
 
     /// Solves the contacts of one time step and integrates it.
     ///
-    /// Collisions are taken in the order of their index. Static bodies are left as they are. The
-    /// bodies change only if the step succeeds, and then all at once.
+    /// Collisions are taken in the [order](StepParameters::order) that the parameters ask for.
+    /// Static bodies are left as they are. The bodies change only if the step succeeds, and then all
+    /// at once.
     ///
     /// Units: metres, kilograms, seconds, radians, world frame.
     ///
@@ -139,17 +144,28 @@ impl Accelerator {
         let mut host = HostTimes::default();
         validate(bodies, collisions, &self.shapes, parameters, &self.limits)?;
         host.validate = watch.lap();
-        let plan = Plan {
-            bodies: bodies.len(),
-            collisions: collisions.len(),
-            passes: u64::from(parameters.contact_iterations)
-                + u64::from(parameters.friction_iterations),
-            variant: self.limits.variant,
-        };
+        let Self { ordering, device, limits, shapes, .. } = self;
+        let on = Hardware { capabilities: &device.capabilities, limits, shapes };
+        let Arranged { order, scheduled, verified } =
+            ordering.arrange(bodies, collisions, parameters, on)?;
+        host.order = watch.lap();
         let counts = &self.device.counts;
         let before = (counts.reads(), counts.writes());
-        let ended = self.run(&plan, bodies, collisions, parameters, &mut host, &mut watch);
+        let ended = if scheduled {
+            // Lent to the step.
+            let ordering = std::mem::take(&mut self.ordering);
+            let ordered = Ordered { collisions, schedule: ordering.schedule() };
+            let ended = self.run(bodies, &ordered, parameters, &mut host, &mut watch);
+            self.ordering = ordering;
+            ended
+        } else {
+            self.run(bodies, collisions, parameters, &mut host, &mut watch)
+        };
         let mut report = ended.map_err(|fault| self.device.fail(fault, &self.shapes))?;
+        // What was sent is more by the empty entries.
+        report.empty = report.collisions.saturating_sub(collisions.len() as u64);
+        report.collisions -= report.empty;
+        (report.order, report.verified) = (order, verified);
         for (index, (pose, velocity)) in self.spare.drain(..).enumerate() {
             bodies.commit(index, pose, velocity);
         }
@@ -158,9 +174,12 @@ impl Accelerator {
         report.register_reads = self.device.counts.reads() - before.0;
         report.register_writes = self.device.counts.writes() - before.1;
         log::debug!(
-            "step: {} bodies, {} collisions, {} passes, {} cycles ({} stalled, {} waiting), {} hazards",
+            "step: {} bodies, {} collisions and {} empty entries ({:?}), {} passes, {} cycles ({} \
+             stalled, {} waiting), {} hazards",
             report.bodies,
             report.collisions,
+            report.empty,
+            report.order,
             report.passes,
             report.cycles.total,
             report.cycles.stalls,
@@ -171,15 +190,23 @@ impl Accelerator {
     }
 
     /// Everything between validation and commitment; the results are in `spare` afterwards.
+    ///
+    /// Collisions are sent in the order of their index.
     fn run<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
-        plan: &Plan,
         bodies: &B,
         collisions: &C,
         parameters: &StepParameters,
         host: &mut HostTimes,
         watch: &mut Stopwatch,
     ) -> Result<StepReport, Fault> {
+        let plan = &Plan {
+            bodies: bodies.len(),
+            collisions: collisions.len(),
+            passes: u64::from(parameters.contact_iterations)
+                + u64::from(parameters.friction_iterations),
+            variant: self.limits.variant,
+        };
         self.device.reserve_or_reset(plan, &self.shapes)?;
         let sent = self.pack(plan, bodies, collisions);
         host.pack = watch.lap();
@@ -200,6 +227,9 @@ impl Accelerator {
         Ok(StepReport {
             bodies: plan.bodies as u64,
             collisions: plan.collisions as u64,
+            order: Order::AsGiven,
+            empty: 0,
+            verified: None,
             passes: u32::try_from(plan.passes).unwrap_or(u32::MAX),
             cycles: StepCycles { total: counters.cycles, work, stalls, waits },
             clock_khz: self.device.capabilities.clock_khz,

@@ -9,15 +9,16 @@ use crate::interface::control::{
     GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO, ISR, ISSUE,
     MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS, POSITION_COEFFICIENT, POSITION_DRIFT,
     PROFILE, RESET, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS,
-    SHAPE_STRIDE, SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES,
-    WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq, issue,
-    memory_per_record, numbers,
+    SHAPE_STRIDE, SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WINDOW,
+    WINDOW_CAPACITY, WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq,
+    issue, memory_per_record, numbers,
 };
 use crate::interface::number::Numbers;
 use crate::interface::profile::{Depth, Inertia};
 
 use super::integrate::Integration;
 use super::solver::SolverParameters;
+use super::window;
 
 /// The NUMBERS register.
 fn formats(of: &Numbers) -> u32 {
@@ -26,6 +27,7 @@ fn formats(of: &Numbers) -> u32 {
     let word = numbers::ROWS.put(word, of.rows as u32);
     let word = numbers::UPDATES.put(word, of.updates as u32);
     let word = numbers::VELOCITIES.put(word, of.velocities as u32);
+    let word = numbers::POSES.put(word, of.poses as u32);
     numbers::IMPULSES.put(word, of.impulses as u32)
 }
 
@@ -267,9 +269,10 @@ impl Registers {
             _ if offset == FRICTION_DEPTH.offset => pipeline(profile.friction),
             _ if offset == CLOCK_KHZ.offset => profile.clock_khz,
             _ if offset == BODY_CAPACITY.offset => variant.body_capacity(),
-            _ if offset == COLLISION_CAPACITY.offset => {
-                memory.bytes / variant.bytes_per_collision()
-            }
+            _ if offset == COLLISION_CAPACITY.offset => memory
+                .bytes
+                .checked_div(variant.bytes_per_collision())
+                .unwrap_or(window::COLLISIONS_MAX),
             _ if offset == SHAPE_CAPACITY.offset => profile.shape_capacity,
             _ if offset == MEMORY_BYTES.offset => memory.bytes,
             _ if offset == MEMORY_PER_RECORD.offset => memory_per_record::COLLISION.put(
@@ -279,6 +282,8 @@ impl Registers {
             _ if offset == DMA.offset => dma::ADDRESS_WIDTH
                 .put(dma::LENGTH_WIDTH.put(0, config.length_width), config.address_width),
             _ if offset == NUMBERS.offset => formats(&variant.numbers),
+            _ if offset == WINDOW.offset => window::units(&profile.flow),
+            _ if offset == WINDOW_CAPACITY.offset => window::capacity(&profile.flow),
             _ if offset == ERROR.offset => self.error,
             _ if offset == ERROR_DETAIL.offset => self.error_detail,
             _ if offset == CYCLES_LO.offset => low(counters.cycles),

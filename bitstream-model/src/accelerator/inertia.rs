@@ -11,9 +11,6 @@ pub(super) type Stored = [f32; 6];
 pub(super) trait Inertia: Copy {
     /// The inverse inertia in numbers of a format.
     type In<F: Format>: Times<F>;
-
-    /// That of a body: its shape's, or its own out of on-chip memory.
-    fn stored(of_shape: f32, of_bodies: &[Stored], body: usize) -> Stored;
 }
 
 /// An inverse inertia in numbers of the format `F`.
@@ -34,20 +31,10 @@ pub(super) struct World;
 
 impl Inertia for Isotropic {
     type In<F: Format> = Number<F>;
-
-    #[inline]
-    fn stored(of_shape: f32, _: &[Stored], _: usize) -> Stored {
-        [of_shape, 0.0, 0.0, 0.0, 0.0, 0.0]
-    }
 }
 
 impl Inertia for World {
     type In<F: Format> = Matrix<F>;
-
-    #[inline]
-    fn stored(_: f32, of_bodies: &[Stored], body: usize) -> Stored {
-        of_bodies[body]
-    }
 }
 
 impl<F: Format> Times<F> for Number<F> {

@@ -8,6 +8,8 @@
 //! `array.rs` and `striping.rs` say where rows lie in beats and beats on streams, `sixteen.rs` what
 //! their words mean; `number.rs`, `vector.rs` and `inertia.rs` are the arithmetic.
 //!
+//! `turn.rs` is what happens to one record. `window` is the design that streams the collisions once.
+//!
 //! `control.rs` is its register file, `phases.rs` goes through load, passes and integration. It takes
 //! what has arrived on the streams, keeps account of the clock cycles that this costs, and knows
 //! nothing of who sent it.
@@ -25,14 +27,16 @@ mod segment;
 mod sixteen;
 mod solver;
 pub(crate) mod striping;
+mod turn;
 mod vector;
+pub(crate) mod window;
 
 use crate::cast::register;
 use crate::config::BoardConfig;
 use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
-use crate::interface::profile::{Inertia, Variant};
+use crate::interface::profile::{Flow, Inertia, Variant};
 use crate::interface::record::CONTACT_POINTS;
 use crate::quirks::Resettable;
 use crate::stream::Stream;
@@ -58,6 +62,8 @@ enum Phase {
         poses: Segment,
         results: Results,
     },
+    /// All of it at once, in a design that streams the collisions once.
+    Window,
     /// The last results are on their way out.
     Ending,
     Failed,
@@ -94,6 +100,7 @@ pub(crate) struct Accelerator {
     /// With world inertia, that of each body.
     inertias: Vec<inertia::Stored>,
     impulses: Vec<Impulses>,
+    window: Option<Box<window::Windowed>>,
 }
 
 impl Accelerator {
@@ -121,6 +128,7 @@ impl Accelerator {
             shape_of: Vec::new(),
             inertias: Vec::new(),
             impulses: Vec::new(),
+            window: None,
         }
     }
 
@@ -232,6 +240,9 @@ impl Accelerator {
                 Phase::Integrate { poses, results } => {
                     self.integrate(poses, results, inputs, outputs)
                 }
+                // It has worked on what has arrived.
+                Phase::Window if ran.cycles > 0 => break,
+                Phase::Window => self.windowed(left, inputs, outputs),
                 Phase::Ending => {
                     self.phase = Phase::Idle;
                     self.end_step();
@@ -286,6 +297,10 @@ impl Accelerator {
         }
         if needed > u64::from(profile.memory.bytes) {
             self.fail(ErrorCode::Capacity, 0, register(needed));
+            return;
+        }
+        if let Flow::Window(window) = &profile.flow {
+            self.start_window(window);
             return;
         }
         let bodies = arguments.bodies as usize;

@@ -3,50 +3,40 @@
 use super::array::{Array, Records};
 use super::decode::{self, Collision};
 use super::inertia::{self, Isotropic, World};
-use super::integrate::integrate;
-use super::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
+use super::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
 use super::pipeline::Entry;
 use super::results::Results;
 use super::segment::{PacketError, Reader, Segment};
-use super::solver::{self, Mass, Velocity};
+use super::solver::Mass;
 use super::striping::Striping;
 use super::{Accelerator, Phase};
 use crate::cast::register;
 use crate::config::{Hazards, Subnormals};
-use crate::interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
+use crate::interface::control::ErrorCode;
 use crate::interface::number::{Precision, StreamFormat};
-use crate::interface::profile::{Depth, Geometry, Inertia};
-use crate::interface::record::{CONTACT_POINTS, pose, result, velocity};
+use crate::interface::profile::{Depth, Geometry, Inertia, Variant};
+use crate::interface::record::{CONTACT_POINTS, pose, result};
 use crate::stream::Stream;
 
-/// The integer part, toward zero and stopped at the ends, as the accumulator takes it.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-fn to_fixed(value: f64) -> u64 {
-    value as u64
-}
-
 impl Accelerator {
-    /// An array of body records that comes in.
-    fn bodies_in(&self, rows: usize) -> Segment {
-        let profile = self.variant.profile;
-        let striping = Striping::new(&profile.stripes.bodies, profile.mm2s_widths);
-        Segment::new(Array::new(striping, self.body_records(rows)))
-    }
-
-    fn body_records(&self, rows: usize) -> Records {
-        Records {
-            format: self.variant.numbers.bodies,
-            rows,
-            count: self.arguments.bodies as usize,
-            together: 1,
-        }
+    fn body_records(&self, format: StreamFormat, rows: usize) -> Records {
+        Records { format, rows, count: self.arguments.bodies as usize, together: 1 }
     }
 
     pub(super) fn velocities_in(&self) -> Segment {
-        self.bodies_in(self.variant.velocity_rows())
+        let Variant { profile, numbers, .. } = self.variant;
+        let striping = Striping::new(&profile.stripes.velocities, profile.mm2s_widths);
+        let records = self.body_records(numbers.bodies, self.variant.velocity_rows());
+        Segment::new(Array::new(striping, records))
     }
 
-    fn collisions_in(&self) -> Segment {
+    pub(super) fn poses_in(&self) -> Segment {
+        let Variant { profile, numbers, .. } = self.variant;
+        let striping = Striping::new(&profile.stripes.poses, profile.mm2s_widths);
+        Segment::new(Array::new(striping, self.body_records(numbers.poses, pose::ROWS)))
+    }
+
+    pub(super) fn collisions_in(&self) -> Segment {
         let profile = self.variant.profile;
         let striping = Striping::new(&profile.stripes.collisions, profile.mm2s_widths);
         let records = Records {
@@ -58,44 +48,21 @@ impl Accelerator {
         Segment::new(Array::new(striping, records))
     }
 
-    fn results_out(&self) -> Results {
-        let profile = self.variant.profile;
-        let striping = Striping::new(&profile.stripes.bodies, profile.s2mm_widths);
-        Results::new(Array::new(striping, self.body_records(result::ROWS)))
+    pub(super) fn results_out(&self) -> Results {
+        let Variant { profile, numbers, .. } = self.variant;
+        let striping = Striping::new(&profile.stripes.results, profile.s2mm_widths);
+        Results::new(Array::new(striping, self.body_records(numbers.poses, result::ROWS)))
     }
 
-    fn injected(&mut self) -> Result<(), PacketError> {
+    pub(super) fn injected(&mut self) -> Result<(), PacketError> {
         match self.fault.take() {
             Some(code) => Err(PacketError { code, channel: 0, beat: 0 }),
             None => Ok(()),
         }
     }
 
-    fn received(&mut self, sum: u32) {
+    pub(super) fn received(&mut self, sum: u32) {
         self.counters.sum_received = self.counters.sum_received.wrapping_add(sum);
-    }
-
-    /// Numbers as an on-chip array of that precision holds them.
-    #[inline]
-    fn stored<const N: usize>(&self, precision: Precision, numbers: [f32; N]) -> [f32; N] {
-        fn rounded<F: Format, const N: usize>(numbers: [f32; N]) -> [f32; N] {
-            numbers.map(|number| Number::<F>::new(number).value())
-        }
-        match (precision, self.config.subnormals) {
-            // What the arithmetic left, as it is.
-            (Precision::F32, _) => numbers,
-            (Precision::Binary16, Subnormals::Keep) => rounded::<Half, N>(numbers),
-            (Precision::Binary16, Subnormals::Flush) => rounded::<HalfFlushed, N>(numbers),
-        }
-    }
-
-    #[inline]
-    fn stored_velocity(&self, velocity: Velocity) -> Velocity {
-        let precision = self.variant.numbers.velocities;
-        Velocity {
-            linear: self.stored(precision, velocity.linear),
-            angular: self.stored(precision, velocity.angular),
-        }
     }
 
     /// Loads the velocities that have arrived, a beat a cycle from each stream of 128 bits.
@@ -110,28 +77,14 @@ impl Accelerator {
         }
         self.injected()?;
         segment.check(records, inputs)?;
-        let format = self.variant.numbers.bodies;
-        let mut reader = segment.reader(inputs);
+        let mut reader = segment.reader(0, inputs);
         for body in segment.done..segment.done + records {
-            let (velocity, shape) = match self.variant.inertia {
-                Inertia::Isotropic => decode::velocity(format, &reader.record()),
-                Inertia::World => {
-                    let rows = reader.record::<{ velocity::WORLD_ROWS }>();
-                    let inertia = decode::world_inertia(format, &rows);
-                    self.inertias[body] = self.stored(self.variant.numbers.velocities, inertia);
-                    decode::velocity(format, &[rows[velocity::LINEAR], rows[velocity::ANGULAR]])
-                }
-            };
-            let known = (shape as usize) < self.registers.shapes().len();
-            let Some(shape) = u8::try_from(shape).ok().filter(|_| known) else {
-                return Err(PacketError {
-                    code: ErrorCode::ShapeIndex,
-                    channel: 0,
-                    beat: register(body),
-                });
-            };
-            self.velocities[body] = self.stored_velocity(velocity);
-            self.shape_of[body] = shape;
+            let arrival = self.arrival(body, &mut reader)?;
+            if self.variant.inertia == Inertia::World {
+                self.inertias[body] = arrival.inertia;
+            }
+            self.velocities[body] = arrival.velocity;
+            self.shape_of[body] = arrival.shape;
         }
         let before = segment.cycles();
         let sum = segment.advance(records, inputs);
@@ -145,7 +98,7 @@ impl Accelerator {
     }
 
     /// Passes of the step; without collisions there is none.
-    fn passes(&self) -> u32 {
+    pub(super) fn passes(&self) -> u32 {
         match self.arguments.collisions {
             0 => 0,
             _ => self.arguments.contact_iterations + self.arguments.friction_iterations,
@@ -153,7 +106,7 @@ impl Accelerator {
     }
 
     /// Depth of the pipeline that a pass goes through.
-    fn depth(&self, pass: u32) -> Depth {
+    pub(super) fn depth(&self, pass: u32) -> Depth {
         let profile = self.variant.profile;
         let contact = pass < self.arguments.contact_iterations;
         self.config.depth(if contact { profile.contact } else { profile.friction })
@@ -161,7 +114,7 @@ impl Accelerator {
 
     fn start_pass(&mut self, number: u32) {
         if number == self.passes() {
-            let (poses, results) = (self.bodies_in(pose::ROWS), self.results_out());
+            let (poses, results) = (self.poses_in(), self.results_out());
             self.phase = Phase::Integrate { poses, results };
             return;
         }
@@ -242,7 +195,7 @@ impl Accelerator {
         segment.check(available, inputs)?;
         let mut cycles = 0;
         let mut records = 0;
-        let mut reader = segment.reader(inputs);
+        let mut reader = segment.reader(0, inputs);
         while records < available && cycles <= limit {
             let issue = (available - records).min(per_issue);
             let first = segment.done + records;
@@ -272,7 +225,7 @@ impl Accelerator {
 
     /// The next collision.
     #[inline]
-    fn collision(&self, reader: &mut Reader<'_>) -> Collision {
+    pub(super) fn collision(&self, reader: &mut Reader<'_>) -> Collision {
         use StreamFormat::{Binary16, F32, Thesis16};
         match (self.variant.profile.geometry, self.variant.numbers.collisions) {
             (Geometry::Absolute, F32) => Collision::absolute(F32, &reader.record()),
@@ -310,41 +263,8 @@ impl Accelerator {
 
         let mut velocities = [self.velocities[sides[0]], self.velocities[sides[1]]];
         let mut impulses = self.impulses[index];
-        let parameters = &self.arguments.solver;
-        let contacts = self.arguments.contact_iterations;
-        let precision = self.variant.numbers.impulses;
-        if pass < contacts {
-            solver::contact::<R, U, I>(
-                collision,
-                parameters,
-                &masses,
-                &mut velocities,
-                &mut impulses,
-            );
-            impulses = self.stored(precision, impulses);
-            if pass + 1 == contacts {
-                let sum = f64::from(solver::normal_sum::<U>(&impulses));
-                let unit = f64::from(1_u32 << IMPULSE_SUM_FRACTION_BITS);
-                self.counters.impulse_sum =
-                    self.counters.impulse_sum.saturating_add(to_fixed(sum * unit));
-            }
-        } else {
-            if pass == contacts {
-                let sum = solver::normal_sum::<U>(&impulses);
-                impulses = self.stored(precision, [sum, 0.0, 0.0, 0.0]);
-            }
-            solver::friction::<R, U, I>(
-                collision,
-                parameters,
-                &masses,
-                &mut velocities,
-                &mut impulses,
-            );
-            impulses = self.stored(precision, impulses);
-        }
+        self.compute::<R, U, I>(pass, collision, &masses, &mut velocities, &mut impulses);
         self.impulses[index] = impulses;
-        let [a, b] = velocities;
-        let velocities = [self.stored_velocity(a), self.stored_velocity(b)];
 
         if unchecked {
             let stale = self.pipeline.issue(&entry, velocities);
@@ -379,11 +299,9 @@ impl Accelerator {
         if sides[0] == sides[1] {
             return Err(error(ErrorCode::SelfCollision));
         }
-        let shapes = self.registers.shapes();
         let mass = |body: usize| {
-            let shape = shapes[usize::from(self.shape_of[body])];
-            let inverse_inertia = I::stored(shape.inverse_inertia, &self.inertias, body);
-            Mass { inverse_mass: shape.inverse_mass, inverse_inertia }
+            let inertia = self.inertias.get(body).copied().unwrap_or_default();
+            self.mass(self.shape_of[body], inertia)
         };
         let (a, b) = (mass(sides[0]), mass(sides[1]));
         if a.inverse_mass == 0.0 && b.inverse_mass == 0.0 {
@@ -407,26 +325,15 @@ impl Accelerator {
         }
         self.injected()?;
         poses.check(records, inputs)?;
-        let format = self.variant.numbers.bodies;
+        let format = self.variant.numbers.poses;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
-        let shapes = self.registers.shapes();
-        let step = match (self.variant.numbers.updates, self.config.subnormals) {
-            (Precision::F32, Subnormals::Keep) => integrate::<Single>,
-            (Precision::F32, Subnormals::Flush) => integrate::<SingleFlushed>,
-            (Precision::Binary16, Subnormals::Keep) => integrate::<Half>,
-            (Precision::Binary16, Subnormals::Flush) => integrate::<HalfFlushed>,
-        };
-        let mut reader = poses.reader(inputs);
+        let mut reader = poses.reader(0, inputs);
         for body in poses.done..poses.done + records {
             let pose = decode::pose(format, &reader.record());
             let velocity = self.velocities[body];
-            let moves = shapes[usize::from(self.shape_of[body])].inverse_mass != 0.0;
-            let (pose, velocity) = if moves && self.arguments.integrate {
-                step(&self.arguments.integration, &pose, &velocity)
-            } else {
-                (pose, velocity)
-            };
+            let moves = self.mass(self.shape_of[body], [0.0; 6]).inverse_mass != 0.0;
+            let (pose, velocity) = self.integrated(moves, pose, velocity);
             let sum = results.send(&decode::result(format, &pose, &velocity), outputs);
             self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sum);
         }

@@ -29,6 +29,11 @@ impl Results {
         self.array.cycles(self.done)
     }
 
+    /// Clock cycles that the streams take for one record alone.
+    pub(super) fn cycles_of_one(&self) -> u64 {
+        self.array.cycles(1)
+    }
+
     /// Records that the streams have space for, the last one with the padding behind it.
     pub(super) fn room(&self, streams: &[Stream]) -> usize {
         let room = self.array.striping.contiguous(|k| self.sent[k] + streams[k].space());
@@ -76,8 +81,8 @@ mod tests {
     /// Three results of `half`: six beats on three streams, padded to ten.
     #[test]
     fn sixteen_bit_results_go_out_two_rows_a_beat_and_end_with_padding() {
-        let striping = Striping::new(&HALF.stripes.bodies, HALF.s2mm_widths);
-        let format = HALF.numbers.bodies;
+        let striping = Striping::new(&HALF.stripes.results, HALF.s2mm_widths);
+        let format = HALF.numbers.poses;
         let records = Records { format, rows: result::ROWS, count: 3, together: 1 };
         let mut results = Results::new(Array::new(striping, records));
         let mut narrow: Vec<Stream> = [8, 8, 1].map(Stream::new).into();

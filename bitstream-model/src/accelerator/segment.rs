@@ -37,6 +37,11 @@ impl Segment {
         self.array.cycles(self.done)
     }
 
+    /// Clock cycles that the streams take for one record alone.
+    pub(super) fn cycles_of_one(&self) -> u64 {
+        self.array.cycles(1)
+    }
+
     /// Whole records that have arrived and were not read.
     pub(super) fn available(&self, streams: &[Stream]) -> usize {
         let arrived = self.array.striping.contiguous(|k| self.taken[k] + streams[k].len());
@@ -77,10 +82,10 @@ impl Segment {
         Ok(())
     }
 
-    /// Reads records that have arrived, of which there must be one, one after the other; they stay
-    /// in the streams until [`advance`](Self::advance).
-    pub(super) fn reader<'a>(&'a self, streams: &'a [Stream]) -> Reader<'a> {
-        let first = self.done * self.array.rows;
+    /// Reads records that have arrived, from `ahead` places after the next one on, of which there
+    /// must be one, one after the other; they stay in the streams until [`advance`](Self::advance).
+    pub(super) fn reader<'a>(&'a self, ahead: usize, streams: &'a [Stream]) -> Reader<'a> {
+        let first = (self.done + ahead) * self.array.rows;
         let places = self.array.striping.places(first / self.array.rows_per_beat);
         let mut reader = Reader { segment: self, streams, places, left: None };
         if !first.is_multiple_of(self.array.rows_per_beat) {
@@ -177,7 +182,7 @@ mod tests {
 
     fn velocities(profile: &'static Profile, count: usize) -> Segment {
         let variant = profile.default_variant();
-        let striping = Striping::new(&profile.stripes.bodies, profile.mm2s_widths);
+        let striping = Striping::new(&profile.stripes.velocities, profile.mm2s_widths);
         let format = variant.numbers.bodies;
         let rows = variant.velocity_rows();
         Segment::new(Array::new(striping, Records { format, rows, count, together: 1 }))
@@ -211,11 +216,11 @@ mod tests {
         let mut segment = collisions(&HALF, 4);
         let numbers = |rows: [Row; 7]| rows.map(|[number, ..]| number);
         assert_eq!(segment.available(&all), 2);
-        let mut reader = segment.reader(&all);
+        let mut reader = segment.reader(0, &all);
         assert_eq!(numbers(reader.record()), [0, 1, 2, 3, 4, 5, 6]);
         assert_eq!(numbers(reader.record()), [7, 8, 9, 10, 11, 12, 13]);
         assert_eq!(segment.advance(1, &mut all), 1 + 2 + 3 + 4 + 5);
-        assert_eq!(numbers(segment.reader(&all).record()), [7, 8, 9, 10, 11, 12, 13]);
+        assert_eq!(numbers(segment.reader(0, &all).record()), [7, 8, 9, 10, 11, 12, 13]);
         segment.advance(1, &mut all);
         assert!(all.iter().all(|stream| stream.len() == 0));
     }

@@ -140,7 +140,7 @@ mod tests {
     }
 
     fn bodies(profile: &Profile) -> Striping {
-        Striping::new(&profile.stripes.bodies, profile.mm2s_widths)
+        Striping::new(&profile.stripes.results, profile.mm2s_widths)
     }
 
     #[test]

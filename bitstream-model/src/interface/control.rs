@@ -83,7 +83,7 @@ pub mod numbers {
 
     /// Collision records.
     pub const COLLISIONS: Field = Field::bits("collisions", 0, 4, Access::ReadOnly);
-    /// Velocity, pose and result records.
+    /// Velocity records.
     pub const BODIES: Field = Field::bits("bodies", 4, 4, Access::ReadOnly);
     /// Arithmetic of constraint rows.
     pub const ROWS: Field = Field::bits("rows", 8, 4, Access::ReadOnly);
@@ -93,6 +93,28 @@ pub mod numbers {
     pub const VELOCITIES: Field = Field::bits("velocities", 16, 4, Access::ReadOnly);
     /// Accumulated impulses on chip.
     pub const IMPULSES: Field = Field::bits("impulses", 20, 4, Access::ReadOnly);
+    /// Pose and result records.
+    pub const POSES: Field = Field::bits("poses", 24, 4, Access::ReadOnly);
+}
+
+/// Fields of WINDOW; all 0 in a design whose passes run one after the other.
+pub mod window {
+    use super::{Access, Field};
+
+    /// Units that run contact passes.
+    pub const CONTACT_UNITS: Field = Field::bits("contact_units", 0, 8, Access::ReadOnly);
+    /// Units that run friction passes.
+    pub const FRICTION_UNITS: Field = Field::bits("friction_units", 8, 8, Access::ReadOnly);
+}
+
+/// Fields of `WINDOW_CAPACITY`.
+pub mod window_capacity {
+    use super::{Access, Field};
+
+    /// Places for live bodies.
+    pub const SLOTS: Field = Field::bits("slots", 0, 16, Access::ReadOnly);
+    /// Collisions between one pass and the next.
+    pub const LAG: Field = Field::bits("lag", 16, 16, Access::ReadOnly);
 }
 
 /// Fields of CHANNELS.
@@ -306,8 +328,15 @@ pub const NUMBERS: Register = read_only(
         numbers::UPDATES,
         numbers::VELOCITIES,
         numbers::IMPULSES,
+        numbers::POSES,
     ],
 );
+/// The units of a design that streams the collisions once.
+pub const WINDOW: Register =
+    read_only("WINDOW", 0x148, &[window::CONTACT_UNITS, window::FRICTION_UNITS]);
+/// What such a design has room for.
+pub const WINDOW_CAPACITY: Register =
+    read_only("WINDOW_CAPACITY", 0x14C, &[window_capacity::SLOTS, window_capacity::LAG]);
 
 /// Sticky error; cleared by a reset only.
 pub const ERROR: Register = read_only("ERROR", 0x180, &[error::CODE, error::CHANNEL]);
@@ -390,6 +419,8 @@ pub const REGISTERS: &[Register] = &[
     MEMORY_PER_RECORD,
     DMA,
     NUMBERS,
+    WINDOW,
+    WINDOW_CAPACITY,
     ERROR,
     ERROR_DETAIL,
     CYCLES_LO,
@@ -432,11 +463,16 @@ pub enum ErrorCode {
     Argument = 9,
     /// A beat of which not all bytes were valid (TKEEP); detail: the beat within the packet.
     PartialBeat = 10,
+    /// A collision of a place that holds no body; detail: the collision.
+    EmptyPlace = 11,
+    /// Marks that can never be met: a body's uses lie further apart than the delay lines are long,
+    /// or its place is never freed; detail: the collision that waits for ever.
+    Deadlock = 12,
 }
 
 impl ErrorCode {
     /// All codes.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::BodyIndex,
         Self::ContactCount,
         Self::TlastEarly,
@@ -447,6 +483,8 @@ impl ErrorCode {
         Self::SelfCollision,
         Self::Argument,
         Self::PartialBeat,
+        Self::EmptyPlace,
+        Self::Deadlock,
     ];
 
     /// The code out of the register's field; `None` for 0 and for codes not known here.
@@ -470,6 +508,8 @@ impl ErrorCode {
             Self::SelfCollision => "collision of a body with itself",
             Self::Argument => "argument out of range",
             Self::PartialBeat => "beat with invalid bytes",
+            Self::EmptyPlace => "collision of a place that holds no body",
+            Self::Deadlock => "collision that waits for a body for ever",
         }
     }
 }

@@ -104,11 +104,14 @@ impl Precision {
 pub struct Numbers {
     /// Collision records.
     pub collisions: StreamFormat,
-    /// Velocity, pose and result records.
+    /// Velocity records.
     pub bodies: StreamFormat,
+    /// Pose and result records.
+    pub poses: StreamFormat,
     /// Arithmetic of a constraint row: lever arms, moments, effective mass, bias, tangents.
     pub rows: Precision,
-    /// Arithmetic of what changes: relative speeds, impulses, velocities; and the integration.
+    /// Arithmetic of what changes: relative speeds, impulses, velocities; and the integration, unless
+    /// poses are f32, which are integrated in f32.
     pub updates: Precision,
     /// Velocities on chip.
     pub velocities: Precision,
@@ -121,6 +124,7 @@ impl Numbers {
     pub const F32: Self = Self {
         collisions: StreamFormat::F32,
         bodies: StreamFormat::F32,
+        poses: StreamFormat::F32,
         rows: Precision::F32,
         updates: Precision::F32,
         velocities: Precision::F32,
@@ -130,6 +134,7 @@ impl Numbers {
     pub const BINARY16: Self = Self {
         collisions: StreamFormat::Binary16,
         bodies: StreamFormat::Binary16,
+        poses: StreamFormat::Binary16,
         rows: Precision::Binary16,
         updates: Precision::Binary16,
         velocities: Precision::Binary16,

@@ -96,6 +96,18 @@ pub mod relative {
     pub const CONTACTS: usize = 2;
 }
 
+/// The words beside normal and offset of a relative collision record, in a design that keeps what
+/// is alive: where the body is, and whether this is its first or last use.
+pub mod live {
+    /// The place of the body, in the low bits; 0 is every static body.
+    pub const PLACE: u32 = (1 << 13) - 1;
+    /// The body comes alive: its velocity is the next of the velocity stream.
+    pub const FIRST: u32 = 1 << 13;
+    /// The body's last collision of a pass: after the last pass it is integrated with the next pose
+    /// of the pose stream, A before B.
+    pub const LAST: u32 = 1 << 14;
+}
+
 /// The pose record: rows.
 pub mod pose {
     /// Rows of a record.

@@ -21,11 +21,23 @@ pub struct Stripe {
     pub padded: bool,
 }
 
+impl Stripes {
+    /// One stripe for collisions and one for all records of bodies.
+    #[must_use]
+    pub const fn new(collisions: Stripe, bodies: Stripe) -> Self {
+        Self { collisions, velocities: bodies, poses: bodies, results: bodies }
+    }
+}
+
 /// The stripes of a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Stripes {
     /// Collision records.
     pub collisions: Stripe,
-    /// Velocity, pose and result records.
-    pub bodies: Stripe,
+    /// Velocity records.
+    pub velocities: Stripe,
+    /// Pose records.
+    pub poses: Stripe,
+    /// Result records.
+    pub results: Stripe,
 }

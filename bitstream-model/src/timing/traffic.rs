@@ -148,26 +148,31 @@ impl StepTraffic {
             Records::Packed => {
                 let numbers = packed_numbers(variant);
                 let body =
-                    |numbers, widths| Transfer::packed(bodies, numbers, formats.bodies, widths);
+                    |numbers, format, widths| Transfer::packed(bodies, numbers, format, widths);
                 Self {
-                    velocities: body(numbers.velocity, to),
+                    velocities: body(numbers.velocity, formats.bodies, to),
                     collisions: Transfer::packed(
                         collisions,
                         numbers.collision,
                         formats.collisions,
                         to,
                     ),
-                    poses: body(numbers.pose, to),
-                    results: body(numbers.result, from),
+                    poses: body(numbers.pose, formats.poses, to),
+                    results: body(numbers.result, formats.poses, from),
                 }
             }
             Records::Streamed => {
-                let body = |rows, widths| {
-                    let stripe = &profile.stripes.bodies;
-                    Transfer::streamed(bodies, 1, rows, formats.bodies, stripe, widths)
+                let stripes = &profile.stripes;
+                let body = |rows, format, stripe, widths| {
+                    Transfer::streamed(bodies, 1, rows, format, stripe, widths)
                 };
                 Self {
-                    velocities: body(variant.velocity_rows(), to),
+                    velocities: body(
+                        variant.velocity_rows(),
+                        formats.bodies,
+                        &stripes.velocities,
+                        to,
+                    ),
                     collisions: Transfer::streamed(
                         collisions,
                         profile.collisions_per_issue,
@@ -176,8 +181,8 @@ impl StepTraffic {
                         &profile.stripes.collisions,
                         to,
                     ),
-                    poses: body(pose::ROWS, to),
-                    results: body(result::ROWS, from),
+                    poses: body(pose::ROWS, formats.poses, &stripes.poses, to),
+                    results: body(result::ROWS, formats.poses, &stripes.results, from),
                 }
             }
         }

@@ -5,10 +5,12 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub(crate) mod clock;
 pub(crate) mod packing;
 pub(crate) mod ring;
 pub(crate) mod scene;
 pub(crate) mod sg;
+pub(crate) mod windowed;
 
 use std::time::Duration;
 

@@ -73,7 +73,7 @@ pub(crate) fn beats(format: StreamFormat, rows: &[Row]) -> Vec<Beat> {
 }
 
 /// Beats on each of `streams` streams.
-fn deal(stripe: &Stripe, streams: usize, mut beats: Vec<Beat>) -> Vec<Vec<Beat>> {
+pub(crate) fn deal(stripe: &Stripe, streams: usize, mut beats: Vec<Beat>) -> Vec<Vec<Beat>> {
     while stripe.padded && !beats.len().is_multiple_of(stripe.streams.len()) {
         beats.push(Beat::default());
     }
@@ -84,7 +84,7 @@ fn deal(stripe: &Stripe, streams: usize, mut beats: Vec<Beat>) -> Vec<Vec<Beat>>
     dealt
 }
 
-fn velocity_rows(variant: &Variant, step: &Step, body: &Body, k: usize) -> Vec<Row> {
+pub(crate) fn velocity_rows(variant: &Variant, step: &Step, body: &Body, k: usize) -> Vec<Row> {
     let format = variant.numbers.bodies;
     let mut rows = vec![row(format, body.linear, body.shape), row(format, body.angular, 0)];
     if variant.inertia == Inertia::World {
@@ -95,7 +95,7 @@ fn velocity_rows(variant: &Variant, step: &Step, body: &Body, k: usize) -> Vec<R
     rows
 }
 
-fn collision_rows(variant: &Variant, collision: &Collision) -> Vec<Row> {
+pub(crate) fn collision_rows(variant: &Variant, collision: &Collision) -> Vec<Row> {
     let format = variant.numbers.collisions;
     let [a, b] = collision.bodies;
     let [at_a, at_b] = collision.positions;
@@ -126,7 +126,7 @@ fn collision_rows(variant: &Variant, collision: &Collision) -> Vec<Row> {
     }
 }
 
-fn pose_rows(format: StreamFormat, body: &Body) -> [Row; 2] {
+pub(crate) fn pose_rows(format: StreamFormat, body: &Body) -> [Row; 2] {
     [row(format, body.position, 0), body.orientation.map(|value| encode(format, value))]
 }
 
@@ -148,13 +148,13 @@ impl Step {
         let issue = profile.collisions_per_issue as usize * variant.collision_rows();
         collisions.resize(collisions.len().next_multiple_of(issue), [0; 4]);
         let poses: Vec<Row> =
-            self.bodies.iter().flat_map(|body| pose_rows(numbers.bodies, body)).collect();
+            self.bodies.iter().flat_map(|body| pose_rows(numbers.poses, body)).collect();
         let passes = (self.iterations[0] + self.iterations[1]) as usize;
         let stripes = &profile.stripes;
         let segments = [
-            deal(&stripes.bodies, streams, beats(numbers.bodies, &velocities)),
+            deal(&stripes.velocities, streams, beats(numbers.bodies, &velocities)),
             deal(&stripes.collisions, streams, beats(numbers.collisions, &collisions)),
-            deal(&stripes.bodies, streams, beats(numbers.bodies, &poses)),
+            deal(&stripes.poses, streams, beats(numbers.poses, &poses)),
         ];
         (0..streams)
             .map(|stream| {
@@ -200,20 +200,20 @@ fn slowest(beats: &[usize], widths: &[u32]) -> u64 {
 
 /// Result beats on each stream.
 pub(crate) fn result_beats(variant: &Variant, bodies: usize) -> Vec<usize> {
-    let bits = variant.numbers.bodies.bits() as usize;
+    let bits = variant.numbers.poses.bits() as usize;
     let all = vec![Beat::default(); bodies * 4 * 4 * bits / (8 * BEAT_BYTES)];
     let profile = variant.profile;
-    let dealt = deal(&profile.stripes.bodies, profile.s2mm_widths.len(), all);
+    let dealt = deal(&profile.stripes.results, profile.s2mm_widths.len(), all);
     dealt.iter().map(Vec::len).collect()
 }
 
 /// The bodies out of the result beats of all streams; shapes are not part of a result and read 0.
 /// What is left over is padding and must be zeros.
 pub(crate) fn unpack(variant: &Variant, streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
-    let format = variant.numbers.bodies;
+    let format = variant.numbers.poses;
     let mut next: Vec<_> = streams.iter().map(|stream| stream.iter()).collect();
     let mut rows = Vec::new();
-    for stream in variant.profile.stripes.bodies.streams.iter().cycle() {
+    for stream in variant.profile.stripes.results.streams.iter().cycle() {
         let Some(Beat(words)) = next[usize::from(*stream)].next() else { break };
         if format.bits() == 32 {
             rows.push(*words);

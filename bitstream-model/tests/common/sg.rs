@@ -11,6 +11,7 @@ use bitstream_model::{BoardConfig, Direction};
 use super::packing::{result_beats, unpack};
 use super::ring::{EOF, Ring, SOF};
 use super::scene::{Body, Lane, Step};
+use super::windowed::design;
 use super::{BOTH, Host, microseconds};
 
 /// Longer than any step of the tests takes.
@@ -52,6 +53,17 @@ pub(crate) struct Flight {
     outputs: Vec<u64>,
     /// The last result descriptor of each channel.
     last: Vec<usize>,
+}
+
+impl Flight {
+    /// Notes a buffer with input.
+    pub(crate) fn input(&mut self, address: u64) {
+        self.inputs.push(address);
+    }
+
+    pub(crate) fn is_without_results(&self) -> bool {
+        self.outputs.is_empty()
+    }
 }
 
 #[derive(Debug)]
@@ -230,8 +242,13 @@ impl Machine {
     }
 
     pub(crate) fn step(&mut self, step: &Step) -> Result<Outcome, Failure> {
-        let lanes = step.packed(&self.host.variant());
-        self.step_with(step, &lanes)
+        let variant = self.host.variant();
+        if design(&variant).is_none() {
+            return self.step_with(step, &step.packed(&variant));
+        }
+        let packed = step.packed_once(&variant);
+        let outcome = self.step_with(&step.told(&packed.leave), &packed.lanes)?;
+        Ok(Outcome { bodies: step.restored(&packed.leave, &outcome.bodies), ..outcome })
     }
 }
 

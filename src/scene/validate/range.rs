@@ -23,7 +23,8 @@ impl Held {
     /// What a bitstream of these formats holds.
     pub(super) const fn by(numbers: &Numbers) -> Self {
         Self {
-            poses: narrower(numbers.bodies, numbers.updates),
+            // Streamed in f32 they are integrated in f32.
+            poses: numbers.poses,
             velocities: narrower(narrower(numbers.bodies, numbers.updates), numbers.velocities),
             collisions: narrower(numbers.collisions, numbers.rows),
         }
@@ -154,7 +155,7 @@ fn refused(
 mod tests {
     use super::*;
     use crate::interface::number::StreamFormat;
-    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
+    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile, WINDOWED16};
     use crate::scene::{Contact, Demand};
 
     const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
@@ -248,7 +249,7 @@ mod tests {
             text,
             "collision 7: position of body A[0] is 1000000, but this bitstream holds collisions \
              in binary16, which ends at 65504: bring it into range, or load another (profiles that \
-             could: naive, float, mixed)"
+             could: naive, float, mixed, windowed, windowed16)"
         );
         // Body B is far from A.
         let text = check(&MIXED, &collision, [there, [0.0; 3]]).expect_err("apart").to_string();
@@ -256,7 +257,7 @@ mod tests {
             text.starts_with("collision 7: offset of body B from body A[0] is -1000000"),
             "{text}"
         );
-        assert!(text.ends_with("(profiles that could: naive, float)"), "{text}");
+        assert!(text.ends_with("(profiles that could: naive, float, windowed)"), "{text}");
         let text = check(&MIXED, &collision, [[0.0; 3]; 2]).expect_err("a far point").to_string();
         assert!(
             text.starts_with("collision 7, contact point 0: lever arm of the point[0] is 1000001"),
@@ -277,10 +278,12 @@ mod tests {
         let with = |numbers| held(&numbers);
         let velocities = short;
         assert_eq!(with(Numbers { velocities, ..Numbers::F32 }), (F32, Binary16, F32));
-        assert_eq!(with(Numbers { updates: short, ..Numbers::F32 }), (Binary16, Binary16, F32));
+        assert_eq!(with(Numbers { updates: short, ..Numbers::F32 }), (F32, Binary16, F32));
         assert_eq!(with(Numbers { rows: short, ..Numbers::F32 }), (F32, F32, Binary16));
         assert_eq!(with(Numbers { impulses: short, ..Numbers::F32 }), (F32, F32, F32));
-        let thesis = Numbers { collisions: Thesis16, bodies: Thesis16, ..HALF.numbers };
+        let thesis =
+            Numbers { collisions: Thesis16, bodies: Thesis16, poses: Thesis16, ..HALF.numbers };
         assert_eq!(held(&thesis), (Thesis16, Thesis16, Thesis16));
+        assert_eq!(held(&WINDOWED16.numbers), (F32, Binary16, Binary16));
     }
 }

@@ -108,7 +108,9 @@ pub(crate) fn find(
 /// There is no such emulated board.
 fn not_built(error: ConfigError) -> Failure {
     let narrow = |numbers: &Numbers| {
-        [numbers.collisions, numbers.bodies].iter().any(|stream| stream.bits() < u32::BITS)
+        [numbers.collisions, numbers.bodies, numbers.poses]
+            .iter()
+            .any(|stream| stream.bits() < u32::BITS)
     };
     let narrow: Vec<&str> =
         PROFILES.iter().filter(|p| narrow(&p.numbers)).map(|profile| profile.name).collect();

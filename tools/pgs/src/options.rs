@@ -166,8 +166,8 @@ impl BuildArgs {
         if let Some(format) = self.format.map(|name| name.meaning()) {
             let narrow = |stream: StreamFormat| stream.bits() == format.bits();
             // Where no stream has 16 bits the board says which widths do not fit.
-            let none = !narrow(own.collisions) && !narrow(own.bodies);
-            for stream in [&mut numbers.collisions, &mut numbers.bodies] {
+            let none = ![own.collisions, own.bodies, own.poses].into_iter().any(narrow);
+            for stream in [&mut numbers.collisions, &mut numbers.bodies, &mut numbers.poses] {
                 if none || narrow(*stream) {
                     *stream = format;
                 }
@@ -187,7 +187,8 @@ impl BuildArgs {
         let default = BoardConfig::default();
         let (own, numbers) = (config.profile.numbers, config.variant().numbers);
         let format = unlike(numbers.collisions, own.collisions)
-            .or_else(|| unlike(numbers.bodies, own.bodies));
+            .or_else(|| unlike(numbers.bodies, own.bodies))
+            .or_else(|| unlike(numbers.poses, own.poses));
         let arithmetic =
             unlike(numbers.updates, own.updates).or_else(|| unlike(numbers.rows, own.rows));
         Self {

@@ -7,7 +7,7 @@
 pub mod solver;
 pub mod table;
 
-pub use table::{FLOAT, HALF, MIXED, NAIVE, PROFILES};
+pub use table::{FLOAT, HALF, MIXED, NAIVE, PROFILES, WINDOWED, WINDOWED16};
 
 use super::number::{Numbers, StreamFormat};
 use super::record::collision as absolute;
@@ -61,6 +61,54 @@ pub enum Inertia {
     World,
 }
 
+/// How the passes over the collisions run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Flow {
+    /// One after the other: each streams all collisions, and the velocities of all bodies are on
+    /// chip.
+    Passes,
+    /// One behind the other while the collisions stream once. Velocities stream in as bodies come
+    /// alive, poses as they are done, and only what is alive is on chip.
+    Window(Window),
+}
+
+/// What a design that streams the collisions once is made of.
+///
+/// With P passes, entry n of pass k may issue when its predecessor in that pass has, when pass
+/// k - 1 has written back the last use of both its bodies, when both are written back by the entry
+/// before it in its own pass, and when there is room for it in the delay line behind pass k. A
+/// unit takes its passes in turn: every pass gets one entry in [`slot_cycles`](Self::slot_cycles).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Window {
+    /// Units that run contact passes.
+    pub contact_units: u32,
+    /// Units that run friction passes.
+    pub friction_units: u32,
+    /// Places for live bodies over all units; place 0 stands for every static body. Each unit
+    /// keeps those in its passes in a memory of its share, at the place modulo its size.
+    pub slots: u32,
+    /// Collisions that wait between one pass and the next, at most: a body's first and last use
+    /// must be less than that apart.
+    pub lag: u32,
+}
+
+impl Window {
+    /// Cycles in which every pass issues one entry.
+    #[must_use]
+    pub const fn slot_cycles(
+        &self,
+        contact_passes: u32,
+        friction_passes: u32,
+        initiation_interval: u32,
+        collisions_per_issue: u32,
+    ) -> u32 {
+        let contact = contact_passes.div_ceil(self.contact_units);
+        let friction = friction_passes.div_ceil(self.friction_units);
+        let most = if contact > friction { contact } else { friction };
+        (most * initiation_interval).div_ceil(collisions_per_issue)
+    }
+}
+
 /// On-chip memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OnChipMemory {
@@ -98,6 +146,8 @@ pub struct Profile {
     /// Collisions that enter the pipeline together. A last issue that is not full is filled up with
     /// padding collisions.
     pub collisions_per_issue: u32,
+    /// How the passes run.
+    pub flow: Flow,
     /// Contact pipeline.
     pub contact: Depth,
     /// Friction pipeline.
@@ -177,18 +227,22 @@ impl Variant {
             let numbers = (rows * LANES) as u32;
             numbers * format.bits() / u32::BITS
         }
-        let bodies = self.numbers.bodies;
+        let (bodies, poses) = (self.numbers.bodies, self.numbers.poses);
         RecordWords {
             velocity: words(self.velocity_rows(), bodies),
             collision: words(self.collision_rows(), self.numbers.collisions),
-            pose: words(pose::ROWS, bodies),
-            result: words(result::ROWS, bodies),
+            pose: words(pose::ROWS, poses),
+            result: words(result::ROWS, poses),
         }
     }
 
-    /// On-chip bytes that a body takes: all copies of its velocity, and its inertia.
+    /// On-chip bytes that a body takes: all copies of its velocity, and its inertia. None in a design
+    /// that keeps what is alive: its memory is there whatever the scene.
     #[must_use]
     pub const fn bytes_per_body(&self) -> u32 {
+        if let Flow::Window(_) = self.profile.flow {
+            return 0;
+        }
         let velocities =
             SIX * self.numbers.velocities.bytes() * self.profile.memory.velocity_copies;
         let inertia = match self.inertia {
@@ -198,15 +252,22 @@ impl Variant {
         velocities + inertia
     }
 
-    /// On-chip bytes that a collision takes: its accumulated impulses.
+    /// On-chip bytes that a collision takes: its accumulated impulses. None as
+    /// [above](Self::bytes_per_body).
     #[must_use]
     pub const fn bytes_per_collision(&self) -> u32 {
+        if let Flow::Window(_) = self.profile.flow {
+            return 0;
+        }
         FOUR * self.numbers.impulses.bytes()
     }
 
     /// Largest number of bodies: what the profile says, and what an index can name.
     #[must_use]
     pub fn body_capacity(&self) -> u32 {
+        if let Flow::Window(_) = self.profile.flow {
+            return self.profile.body_capacity;
+        }
         let by_index = self.numbers.collisions.largest_index().saturating_add(1);
         self.profile.body_capacity.min(by_index)
     }

@@ -3,7 +3,7 @@
 //! The depths of every profile are those of a pipeline generated for this purpose at two cycles a
 //! collision and bit-exact with the vectors, until a better source exists; the thesis gives none.
 
-use super::{Depth, Geometry, OnChipMemory, Profile};
+use super::{Depth, Flow, Geometry, OnChipMemory, Profile, Window};
 use crate::interface::number::{Numbers, StreamFormat};
 use crate::interface::stripe::{Stripe, Stripes};
 
@@ -30,12 +30,13 @@ pub const NAIVE: Profile = Profile {
     numbers: Numbers::F32,
     mm2s_widths: &[32],
     s2mm_widths: &[32],
-    stripes: Stripes {
-        collisions: Stripe { streams: &[0], padded: false },
-        bodies: Stripe { streams: &[0], padded: false },
-    },
+    stripes: Stripes::new(
+        Stripe { streams: &[0], padded: false },
+        Stripe { streams: &[0], padded: false },
+    ),
     initiation_interval: 28,
     collisions_per_issue: 1,
+    flow: Flow::Passes,
     contact: CONTACT,
     friction: FRICTION,
     clock_khz: 275_000,
@@ -53,12 +54,13 @@ pub const FLOAT: Profile = Profile {
     numbers: Numbers::F32,
     mm2s_widths: &[128; 4],
     s2mm_widths: &[128; 4],
-    stripes: Stripes {
-        collisions: Stripe { streams: &[0, 1, 2, 3, 0, 1, 2], padded: false },
-        bodies: Stripe { streams: &[0, 1, 2, 3], padded: false },
-    },
+    stripes: Stripes::new(
+        Stripe { streams: &[0, 1, 2, 3, 0, 1, 2], padded: false },
+        Stripe { streams: &[0, 1, 2, 3], padded: false },
+    ),
     initiation_interval: 2,
     collisions_per_issue: 1,
+    flow: Flow::Passes,
     contact: CONTACT,
     friction: FRICTION,
     clock_khz: 275_000,
@@ -77,12 +79,13 @@ pub const HALF: Profile = Profile {
     numbers: Numbers::BINARY16,
     mm2s_widths: &[128, 128, 64],
     s2mm_widths: &[128, 128, 64],
-    stripes: Stripes {
-        collisions: Stripe { streams: &[0, 0, 0, 1, 1, 1, 2], padded: true },
-        bodies: Stripe { streams: &[0, 0, 1, 1, 2], padded: true },
-    },
+    stripes: Stripes::new(
+        Stripe { streams: &[0, 0, 0, 1, 1, 1, 2], padded: true },
+        Stripe { streams: &[0, 0, 1, 1, 2], padded: true },
+    ),
     initiation_interval: 3,
     collisions_per_issue: 2,
+    flow: Flow::Passes,
     contact: CONTACT,
     friction: FRICTION,
     clock_khz: 250_000,
@@ -101,12 +104,13 @@ pub const MIXED: Profile = Profile {
     numbers: Numbers { collisions: StreamFormat::Binary16, ..Numbers::F32 },
     mm2s_widths: &[128; 3],
     s2mm_widths: &[128; 3],
-    stripes: Stripes {
-        collisions: Stripe { streams: &[0, 1, 2], padded: false },
-        bodies: Stripe { streams: &[0, 1, 2], padded: false },
-    },
+    stripes: Stripes::new(
+        Stripe { streams: &[0, 1, 2], padded: false },
+        Stripe { streams: &[0, 1, 2], padded: false },
+    ),
     initiation_interval: 1,
     collisions_per_issue: 1,
+    flow: Flow::Passes,
     contact: CONTACT,
     friction: FRICTION,
     clock_khz: 250_000,
@@ -116,5 +120,50 @@ pub const MIXED: Profile = Profile {
     source: "this project",
 };
 
+/// Collisions on two streams, velocities and poses on one each, results on all four: what is
+/// needed at different times cannot wait for each other.
+const WINDOWED_STRIPES: Stripes = Stripes {
+    collisions: Stripe { streams: &[0, 1], padded: false },
+    velocities: Stripe { streams: &[2], padded: false },
+    poses: Stripe { streams: &[3], padded: false },
+    results: Stripe { streams: &[0, 1, 2, 3], padded: false },
+};
+
+/// Two contact and two friction units, each with half of the passes.
+const WINDOW: Window = Window { contact_units: 2, friction_units: 2, slots: 8192, lag: 2816 };
+
+/// Collisions stream once while eight passes run one behind the other, f32, relative coordinates
+/// (thesis §4.7 and §7.3 propose it). This project's.
+pub const WINDOWED: Profile = Profile {
+    id: 5,
+    name: "windowed",
+    geometry: Geometry::Relative,
+    numbers: Numbers::F32,
+    mm2s_widths: &[128; 4],
+    s2mm_widths: &[128; 4],
+    stripes: WINDOWED_STRIPES,
+    initiation_interval: 2,
+    collisions_per_issue: 1,
+    flow: Flow::Window(WINDOW),
+    contact: CONTACT,
+    friction: FRICTION,
+    clock_khz: 275_000,
+    memory: OnChipMemory { pump: 2, ..ONE_COPY },
+    body_capacity: 1 << 20,
+    shape_capacity: 64,
+    source: "this project, after thesis §4.7",
+};
+
+/// As `windowed`, with sixteen-bit arithmetic, collisions and velocities in binary16, poses in f32.
+/// This project's.
+pub const WINDOWED16: Profile = Profile {
+    id: 6,
+    name: "windowed16",
+    numbers: Numbers { poses: StreamFormat::F32, ..Numbers::BINARY16 },
+    initiation_interval: 3,
+    collisions_per_issue: 2,
+    ..WINDOWED
+};
+
 /// Every profile.
-pub const PROFILES: &[&Profile] = &[&NAIVE, &FLOAT, &HALF, &MIXED];
+pub const PROFILES: &[&Profile] = &[&NAIVE, &FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16];

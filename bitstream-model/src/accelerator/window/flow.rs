@@ -1,0 +1,185 @@
+//! This file says which pass may issue its next entry when.
+//!
+//! With T the cycles of a slot and w(k) the window of pass k, entry n issues to pass k at the first
+//! cycle that is
+//!
+//! - T or more after entry n - 1 in the same pass,
+//! - w(k-1) or more after its own issue to pass k - 1, and after that of its bodies' last uses there,
+//! - w(k) or more after its bodies' previous uses in pass k (waiting for this is a hazard),
+//! - not before entry n - lag has issued to pass k + 1, when there is room behind pass k.
+//!
+//! Pass 0 also needs the record, the velocities that come with it, and free places for them.
+
+use std::collections::VecDeque;
+
+use super::entry::{Entry, Use};
+use super::place::{Leaving, Place};
+
+/// A cycle that never comes.
+pub(super) const NEVER: u64 = u64::MAX;
+
+/// What stays the same throughout a step.
+#[derive(Debug, Clone)]
+pub(super) struct Shape {
+    /// Cycles in which every pass issues one entry.
+    pub(super) slot: u64,
+    /// Entries between one pass and the next, at most.
+    pub(super) lag: usize,
+    pub(super) places: usize,
+    pub(super) collisions: usize,
+    /// Window of each pass.
+    pub(super) windows: Vec<u64>,
+}
+
+/// What decides when an entry can issue.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Next {
+    pub(super) uses: [Use; 2],
+    pub(super) written: u64,
+}
+
+/// One pass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pass {
+    /// Its next entry.
+    pub(super) next: usize,
+    /// A slot after its previous one.
+    pub(super) due: u64,
+    window: u64,
+    /// When the next entry issues, as far as is known.
+    pub(super) ready: u64,
+    /// Whether the next entry has waited for a previous use in the same pass.
+    pub(super) waited: bool,
+}
+
+/// Delay lines, places and the schedule of all passes.
+#[derive(Debug)]
+pub(super) struct Flow {
+    pub(super) shape: Shape,
+    pub(super) passes: Vec<Pass>,
+    /// What has issued to the first pass and not to the last, the oldest first.
+    entries: VecDeque<Entry>,
+    pub(super) places: Vec<Place>,
+    pub(super) leaving: VecDeque<Leaving>,
+}
+
+impl Flow {
+    pub(super) fn new(shape: Shape) -> Self {
+        let pass =
+            |window: &u64| Pass { next: 0, due: 0, window: *window, ready: NEVER, waited: false };
+        Self {
+            passes: shape.windows.iter().map(pass).collect(),
+            entries: VecDeque::new(),
+            places: vec![Place::default(); shape.places],
+            leaving: VecDeque::new(),
+            shape,
+        }
+    }
+
+    /// Whether every entry has issued to every pass.
+    pub(super) fn issued_all(&self) -> bool {
+        self.passes.last().is_none_or(|pass| pass.next == self.shape.collisions)
+    }
+
+    /// Whether there is room for the next entry of a pass behind it.
+    pub(super) fn has_room(&self, pass: usize) -> bool {
+        let behind = self.passes.get(pass + 1);
+        behind.is_none_or(|behind| self.passes[pass].next - behind.next < self.shape.lag)
+    }
+
+    /// The cycle from which an entry of which everything has come can issue to a pass.
+    pub(super) fn when(&mut self, pass: usize, entry: Next, now: u64) -> u64 {
+        let mut at = self.passes[pass].due.max(entry.written).max(now);
+        let mut written = 0;
+        let born = |of: &Use| pass == 0 && of.first;
+        for of in entry.uses.iter().filter(|of| of.moves() && !born(of)) {
+            let place = &self.places[of.place];
+            if place.pass != pass {
+                return NEVER;
+            }
+            if place.used {
+                written = written.max(place.ready);
+            } else {
+                at = at.max(place.ready);
+            }
+        }
+        self.passes[pass].waited |= written > at;
+        at.max(written)
+    }
+
+    /// Looks again at a pass behind the first one; something that it needs has changed.
+    pub(super) fn look(&mut self, pass: usize, now: u64) {
+        if pass == 0 || pass >= self.passes.len() {
+            return;
+        }
+        let next = self.passes[pass].next;
+        self.passes[pass].ready = if next == self.passes[pass - 1].next || !self.has_room(pass) {
+            NEVER
+        } else {
+            let Entry { uses, written, .. } = self.entries[self.at(next)];
+            self.when(pass, Next { uses, written }, now)
+        };
+    }
+
+    /// The pass that issues first, and when. Of two at the same cycle the later pass, which makes
+    /// room.
+    pub(super) fn earliest(&self) -> (u64, usize) {
+        let mut earliest = (NEVER, 0);
+        for (number, pass) in self.passes.iter().enumerate() {
+            if pass.ready <= earliest.0 {
+                earliest = (pass.ready, number);
+            }
+        }
+        earliest
+    }
+
+    /// Where an entry is in the delay lines.
+    fn at(&self, number: usize) -> usize {
+        number - self.passes.last().map_or(0, |last| last.next)
+    }
+
+    /// An entry has issued to the first pass.
+    pub(super) fn push(&mut self, entry: Entry) {
+        self.entries.push_back(entry);
+    }
+
+    /// The next entry of a pass, which has issued to the first one, and the places.
+    pub(super) fn parts(&mut self, pass: usize) -> Option<(&mut Entry, &mut [Place])> {
+        let at = self.at(self.passes[pass].next);
+        Some((self.entries.get_mut(at)?, &mut self.places))
+    }
+
+    /// The next entry of a pass issues at cycle `now`. Returns whether it had waited for a previous
+    /// use of a body in the same pass.
+    pub(super) fn issue(&mut self, pass: usize, now: u64) -> bool {
+        let written = now + self.passes[pass].window;
+        let last_pass = pass + 1 == self.passes.len();
+        let Some((entry, _)) = self.parts(pass) else { return false };
+        entry.written = written;
+        let uses = entry.uses;
+        for of in uses.into_iter().filter(Use::moves) {
+            self.places[of.place].issued(pass, of.last, written);
+            if of.last && last_pass {
+                self.leaving.push_back(Leaving { place: of.place, ready: written });
+            }
+        }
+        if last_pass {
+            self.entries.pop_front();
+        }
+        let this = &mut self.passes[pass];
+        this.next += 1;
+        this.due = now + self.shape.slot;
+        std::mem::take(&mut this.waited)
+    }
+
+    /// The collision that waits for ever, when nothing can issue any more.
+    pub(super) fn stuck(&self) -> usize {
+        match self.passes.as_slice() {
+            [first, second, ..] if first.next == self.shape.collisions || !self.has_room(0) => {
+                second.next
+            }
+            [first, ..] => first.next.min(self.shape.collisions.saturating_sub(1)),
+            [] => 0,
+        }
+    }
+}

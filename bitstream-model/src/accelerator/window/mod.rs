@@ -1,0 +1,84 @@
+//! The design that streams the collisions once: all passes run at the same time, each behind the one
+//! before it, and only the bodies that are alive are on chip.
+//!
+//! ```text
+//! collisions -> pass 0 -> delay line -> pass 1 -> delay line -> ... -> pass P-1
+//! velocities ----^  first use                                            | last use
+//!                   places (velocity, mass, scoreboard) <-----------------+-> integration -> results
+//!                                                                    poses ------^
+//! ```
+//!
+//! `entry.rs` reads the marks of a record, `place.rs` is the table of live bodies with its scoreboard,
+//! `flow.rs` says which pass may issue when, `session.rs` works through what has arrived. `check.rs`
+//! says what cannot be built. What happens to one collision in one pass is that of every other design.
+
+mod check;
+mod entry;
+mod flow;
+mod place;
+mod session;
+
+pub(crate) use check::contradiction;
+pub(super) use session::Windowed;
+
+use super::{Accelerator, Phase};
+use crate::interface::control::{COLLISIONS, ErrorCode, window, window_capacity};
+use crate::interface::profile::{Flow, Window};
+
+/// Most collisions of a step: what the counters of the passes hold.
+pub(super) const COLLISIONS_MAX: u32 = 1 << 20;
+
+/// The WINDOW register.
+pub(super) fn units(flow: &Flow) -> u32 {
+    match flow {
+        Flow::Passes => 0,
+        Flow::Window(of) => window::FRICTION_UNITS
+            .put(window::CONTACT_UNITS.put(0, of.contact_units), of.friction_units),
+    }
+}
+
+/// The `WINDOW_CAPACITY` register.
+pub(super) fn capacity(flow: &Flow) -> u32 {
+    match flow {
+        Flow::Passes => 0,
+        Flow::Window(of) => {
+            window_capacity::LAG.put(window_capacity::SLOTS.put(0, of.slots), of.lag)
+        }
+    }
+}
+
+impl Accelerator {
+    /// Begins a step whose arguments are in range.
+    pub(super) fn start_window(&mut self, design: &Window) {
+        if self.arguments.collisions > COLLISIONS_MAX {
+            self.fail(ErrorCode::Argument, 0, COLLISIONS.offset);
+            return;
+        }
+        let profile = self.variant.profile;
+        let slot = design.slot_cycles(
+            self.arguments.contact_iterations,
+            self.arguments.friction_iterations,
+            profile.initiation_interval,
+            profile.collisions_per_issue,
+        );
+        let windows: Vec<u64> =
+            (0..self.passes()).map(|pass| self.depth(pass).window.into()).collect();
+        let collisions = if windows.is_empty() { 0 } else { self.arguments.collisions as usize };
+        let flow = flow::Flow::new(flow::Shape {
+            slot: slot.into(),
+            lag: design.lag as usize,
+            places: design.slots as usize,
+            collisions,
+            windows,
+        });
+        let windowed = Windowed::new(
+            flow,
+            self.collisions_in(),
+            self.velocities_in(),
+            self.poses_in(),
+            self.results_out(),
+        );
+        self.window = Some(Box::new(windowed));
+        self.phase = Phase::Window;
+    }
+}
