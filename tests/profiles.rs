@@ -154,7 +154,7 @@ fn any_number_of_bodies_and_collisions_goes_through_every_profile() {
                 accelerator
                     .step(&mut bodies, &collisions, &StepParameters::default())
                     .unwrap_or_else(|error| {
-                        panic!("{} {cubes}: {error}: {:?}", profile.name, board.violations())
+                        panic!("{} {cubes}: {error:?}: {:?}", profile.name, board.violations())
                     });
                 assert_eq!(bits(&bodies[..1]), bits(&row(cubes).0[..1]), "the ground stays");
                 for body in &bodies[1..] {
