@@ -41,12 +41,15 @@ pub(crate) struct Room {
     pub(crate) lag: u32,
     /// Contact and friction passes.
     pub(crate) passes: u32,
+    /// Entries that enter together: there are as many as fill whole issues.
+    pub(crate) per_issue: u32,
 }
 
 impl Room {
     /// What a design has room for in a step of so many passes.
-    pub(crate) fn of(window: &Window, passes: u32) -> Self {
-        Self { places: window.slots.saturating_sub(1).min(PLACE), lag: window.lag, passes }
+    pub(crate) fn of(window: &Window, passes: u32, per_issue: u32) -> Self {
+        let places = window.slots.saturating_sub(1).min(PLACE);
+        Self { places, lag: window.lag, passes, per_issue }
     }
 }
 
@@ -90,7 +93,8 @@ pub(crate) struct Lives {
 }
 
 impl Lives {
-    /// The words beside normal and offset of each entry's record: place and marks.
+    /// The words beside normal and offset of each entry's record: place and marks. Entries behind
+    /// the schedule's are empty.
     pub(crate) fn words(&self) -> &[[u32; 2]] {
         &self.words
     }
@@ -138,6 +142,8 @@ impl Lives {
             return Err(Crowded::Places { held: self.report.most_held });
         }
         self.mark(schedule, input, room.places);
+        let issues = self.words.len().next_multiple_of(room.per_issue.max(1) as usize);
+        self.words.resize(issues, [0; 2]);
         Ok(())
     }
 
@@ -284,7 +290,7 @@ mod tests {
         entries.iter().copied().collect()
     }
 
-    const WIDE: Room = Room { places: 8191, lag: 2816, passes: 8 };
+    const WIDE: Room = Room { places: 8191, lag: 2816, passes: 8, per_issue: 1 };
 
     /// The picture at the head of this file.
     #[test]
@@ -310,11 +316,13 @@ mod tests {
         let report = LiveReport { most_alive: 3, most_held: 4, longest_span: 4 };
         assert_eq!(lives.report(), report);
         // One pass: bodies 1 and 3 are done when 4 comes, before they have left.
-        lives.settle(&order, &input, Room { passes: 1, places: 3, lag: 5 }).expect("just enough");
+        lives
+            .settle(&order, &input, Room { passes: 1, places: 3, lag: 5, ..WIDE })
+            .expect("just enough");
         assert_eq!(lives.words()[4], [2 | LAST, 1 | FIRST | LAST]);
         assert_eq!(lives.report(), LiveReport { most_held: 3, ..report });
         // Two passes: the second issues entry 3 once the first has issued entry 4.
-        let two = Room { passes: 2, places: 3, lag: 5 };
+        let two = Room { passes: 2, places: 3, lag: 5, ..WIDE };
         assert_eq!(lives.settle(&order, &input, two), Err(Crowded::Places { held: 4 }));
         let span = Crowded::Span { body: 2, first: 0, last: 4 };
         assert_eq!(lives.settle(&order, &input, Room { lag: 4, ..WIDE }), Err(span));
@@ -458,26 +466,31 @@ mod tests {
         fn marks_decode_back_and_never_lock_up(
             (moving, pairs, entries) in scene(),
             passes in 1_u32..6,
+            per_issue in 1_u32..3,
             tight in any::<[bool; 2]>(),
         ) {
             let positions = vec![[0.0; 3]; moving.len()];
             let input = OrderInput { pairs: &pairs, moving: &moving, positions: &positions };
             let order = schedule(&entries);
             let mut lives = Lives::default();
-            let wide = Room { places: 40, lag: 100, passes };
+            let wide = Room { places: 40, lag: 100, passes, per_issue };
             lives.settle(&order, &input, wide).expect("40 bodies, 66 entries");
             let needs = lives.report();
             let room = Room {
                 places: if tight[0] { needs.most_held.max(1) } else { wide.places },
                 lag: if tight[1] { needs.longest_span + 1 } else { wide.lag },
                 passes,
+                per_issue,
             };
             lives.settle(&order, &input, room).expect("what it needs is enough");
             prop_assert_eq!(lives.report(), needs);
             let mut accelerator = Accelerator::new(lives.words(), lives.velocities(), room);
             prop_assert!(accelerator.run(), "stuck at {:?}", accelerator.issued);
+            prop_assert_eq!(lives.words().len() as u64 % u64::from(per_issue), 0);
+            prop_assert!(lives.words().len() < entries.len() + per_issue as usize);
             for (entry, found) in accelerator.found.iter().enumerate() {
-                let pair = entries[entry].map(|index| pairs[index as usize]);
+                let index = entries.get(entry).copied().flatten();
+                let pair = index.map(|index| pairs[index as usize]);
                 let expected = pair.map_or([None; 2], |pair| {
                     pair.map(|body| moving[body as usize].then_some(body))
                 });

@@ -86,7 +86,7 @@ impl Ordering {
         };
         let live = match design {
             Some(design) => {
-                let room = Room::of(&design, passes);
+                let room = Room::of(&design, passes, on.capabilities.collisions_per_issue);
                 let settled = self.lives.settle(schedule, &input, room);
                 let report = self.lives.report();
                 settled.map_err(|crowded| refused(crowded, report, room, &input, on.shapes))?;

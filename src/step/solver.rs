@@ -160,7 +160,9 @@ impl Accelerator {
             let ordered = Ordered { collisions, schedule: ordering.schedule() };
             let lives = live.map(|_| ordering.lives());
             let ended = self.run(bodies, &ordered, lives, parameters, &mut host, &mut watch);
-            empty = ordering.schedule().empty();
+            // Those that fill the last issue are of the order's making too.
+            let entries = lives.map_or(ordered.len(), |lives| lives.words().len());
+            empty = entries.saturating_sub(ordering.schedule().collisions());
             self.ordering = ordering;
             ended
         } else {
@@ -206,7 +208,7 @@ impl Accelerator {
     ) -> Result<StepReport, Fault> {
         let plan = &Plan {
             bodies: lives.map_or(bodies.len(), |lives| lives.velocities().len()),
-            collisions: collisions.len(),
+            collisions: lives.map_or(collisions.len(), |lives| lives.words().len()),
             passes: u64::from(parameters.contact_iterations)
                 + u64::from(parameters.friction_iterations),
             variant: self.limits.variant,
