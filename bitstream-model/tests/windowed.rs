@@ -28,6 +28,12 @@ fn config(profile: &'static Profile) -> BoardConfig {
     BoardConfig { profile, bandwidth: Bandwidth::Unlimited, ..BoardConfig::default() }
 }
 
+/// A board whose streams hold a whole step, so that everything is there from the start.
+fn deep(profile: &'static Profile) -> BoardConfig {
+    let delays = Delays { fifo_beats: 1 << 14, ..Delays::default() };
+    BoardConfig { delays, ..config(profile) }
+}
+
 /// A profile with another window.
 fn with(profile: &'static Profile, design: Window) -> &'static Profile {
     Box::leak(Box::new(Profile { flow: Flow::Window(design), ..*profile }))
@@ -184,12 +190,7 @@ proptest! {
         // With places that are only just enough the first pass waits for them.
         design.slots = places.map_or(8192, |places| step.fewest_slots() + places);
         let profile = with(profile, design);
-        let own = BoardConfig {
-            window_slots,
-            // Everything is there from the start.
-            delays: Delays { fifo_beats: 1 << 14, ..Delays::default() },
-            ..config(profile)
-        };
+        let own = BoardConfig { window_slots, ..deep(profile) };
         let found = at_once(own, &step);
         let expected = clock(&own, &step);
         prop_assert_eq!(found.waits, 0);
@@ -221,7 +222,7 @@ fn clock(config: &BoardConfig, step: &Step) -> Option<Counted> {
     let variant = config.variant();
     let profile = variant.profile;
     let design = design(profile);
-    let (words, come, _) = step.marked(design.slots).expect("there are places");
+    let marked = step.marked(design.slots).expect("there are places");
     let [contact, friction] = step.iterations;
     let window = |depth: u32| {
         u64::from(config.window_slots.map_or(depth, |slots| slots * profile.initiation_interval))
@@ -237,10 +238,16 @@ fn clock(config: &BoardConfig, step: &Step) -> Option<Counted> {
             .chain(of(friction, profile.friction.window))
             .collect(),
         design,
+        units: (0..contact)
+            .map(|k| k % design.contact_units)
+            .chain((0..friction).map(|k| design.contact_units + k % design.friction_units))
+            .collect(),
+        interval: profile.initiation_interval.into(),
+        per_issue: profile.collisions_per_issue as usize,
         // Two beats of a pose on its stream.
-        interval: 2,
+        leave_interval: 2,
     };
-    clock.run(step, &words, come.len())
+    clock.run(step, &marked.words, marked.come.len())
 }
 
 /// Sends everything before the start.
@@ -373,7 +380,7 @@ fn with_words(step: &Step, words: &[[u32; 2]]) -> Result<Outcome, Failure> {
 fn marks_that_mean_nothing_are_refused_with_the_collision() {
     let (step, sound) = chain();
     with_words(&step, &sound).expect("it is sound");
-    assert_eq!(step.marked(8192).expect("there are places").0, sound);
+    assert_eq!(step.marked(8192).expect("there are places").words, sound);
     use ErrorCode::{BodyIndex, Deadlock, EmptyPlace, SelfCollision, StaticPair};
     for (entry, words, code, detail) in [
         // Before its first use, after its last, and never.
@@ -558,9 +565,17 @@ fn a_body_that_is_used_twice_waits_a_window() {
 
 #[test]
 fn masses_of_their_own_flow_through_without_a_stall() {
-    // A pass an entry every T = 4, each a window behind the one before.
+    // Every pass has its unit for itself, an entry every two cycles: the third begins when the first
+    // has ended. Each is a window behind the one before.
     let step = Step::on_ground(100, 100);
     let found = at_once(config(&WINDOWED), &step);
     assert_eq!((found.hazards, found.stalls, found.waits), (0, 0, 0));
-    assert_eq!(found.cycles, 99 * 4 + 4 * 316 + 4 * 182 + 2);
+    assert_eq!(found.cycles, 99 * 2 + 4 * 316 + 4 * 182 + 2);
+    // One unit each: four passes share it, two cycles an entry.
+    let one = Window { contact_units: 1, friction_units: 1, ..design(&WINDOWED) };
+    let step = Step { iterations: [2, 0], ..Step::on_ground(1000, 1000) };
+    let found = at_once(deep(with(&WINDOWED, one)), &step);
+    // The first alone for 158 entries, then both in turn, then the second alone.
+    assert_eq!(found.stalls, 0);
+    assert_eq!(found.cycles, 1999 * 2 + 316 + 2);
 }

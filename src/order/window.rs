@@ -53,6 +53,7 @@ impl IssueWindow {
             friction: *friction,
             initiation_interval: capabilities.initiation_interval,
             collisions_per_issue: capabilities.collisions_per_issue,
+            flow: capabilities.window.map_or(Flow::Passes, Flow::Window),
             ..*variant.profile
         };
         Self::of_profile(&reported, parameters)

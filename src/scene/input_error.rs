@@ -300,6 +300,42 @@ pub enum InputError {
         carriers: Carriers,
     },
 
+    /// A body lives longer than the bitstream lets it.
+    #[error(
+        "in this order body {body} is used first in entry {first} and last in entry {last}, and the \
+         bitstream's delay lines take spans of less than {lag}: ask for the hazard-free order, or \
+         load another bitstream ({carriers})"
+    )]
+    SpanTooLong {
+        /// The body with the longest span.
+        body: usize,
+        /// Entry of its first use.
+        first: usize,
+        /// Entry of its last use.
+        last: usize,
+        /// Length of the delay lines.
+        lag: u32,
+        /// Who could take it.
+        carriers: Carriers,
+    },
+
+    /// More bodies are alive than the bitstream has places for.
+    #[error(
+        "in this order {held} moving bodies are on their way through the passes at once ({alive} of \
+         them with collisions to come), the bitstream has places for {places}: ask for the \
+         hazard-free order, or load another bitstream ({carriers})"
+    )]
+    TooManyLive {
+        /// Most bodies that need a place at once.
+        held: u32,
+        /// Most bodies between their first and their last use.
+        alive: u32,
+        /// Places that there are.
+        places: u32,
+        /// Who could take them.
+        carriers: Carriers,
+    },
+
     /// A parameter is outside its range.
     #[error("the {parameter} is {found}, expected {expected}: correct the step parameters")]
     Parameter {

@@ -28,12 +28,14 @@ pub struct StepParameters {
     /// velocities that the solver left (undamped, without gravity).
     pub integrate: bool,
     /// Order in which the collisions are sent. `None` is [`Order::HazardFree`] on a pipeline that
-    /// does not wait for velocities, and [`Order::AsGiven`] on one that does.
+    /// does not wait for velocities and on a design that keeps only live bodies, and
+    /// [`Order::AsGiven`] on one that waits.
     ///
     /// A pipeline that waits gives what solving the collisions one after the other in this order
     /// gives; orders with hazards cost it cycles. One that does not wait reads stale velocities at
     /// every hazard and loses impulses: with any other order than the hazard-free one piles gain
-    /// energy.
+    /// energy. One that keeps only live bodies also refuses an order in which a body lives too long,
+    /// or too many live at once, as they do where collisions are sorted by body.
     pub order: Option<Order>,
     /// Whether to prove, before anything is sent, that no moving body recurs within the hazard
     /// window; the step is refused otherwise. For debugging: it takes host time, and memory anew in

@@ -2,14 +2,14 @@
 //!
 //! In the caller's own order nothing is made: it is packed as it is. Otherwise pairs, positions and
 //! what moves are read into memory that is kept, ordered, and proved free of hazards if that was
-//! asked for.
+//! asked for. Where only live bodies are kept, every body is then given its place.
 
 use bitstream_model::interface::profile::Flow;
 
 use crate::accelerator::Capabilities;
 use crate::order::{
-    Checker, InputBuffers, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer,
-    Schedule,
+    Checker, Crowded, InputBuffers, IssueWindow, LiveReport, Lives, Order, OrderError, OrderInput,
+    OrderReport, Orderer, Room, Schedule,
 };
 use crate::scene::validate::{Limits, needed};
 use crate::scene::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
@@ -20,6 +20,7 @@ pub(super) struct Ordering {
     buffers: InputBuffers,
     orderer: Orderer,
     checker: Checker,
+    lives: Lives,
 }
 
 /// How the collisions of a step were ordered.
@@ -30,6 +31,8 @@ pub(super) struct Arranged {
     pub(super) scheduled: bool,
     /// What the order is like, if it was to be verified.
     pub(super) verified: Option<OrderReport>,
+    /// What it takes of a design that keeps live bodies alone.
+    pub(super) live: Option<LiveReport>,
 }
 
 /// What a step runs on.
@@ -44,7 +47,8 @@ impl Ordering {
     /// Orders the collisions of a step that was validated.
     ///
     /// # Errors
-    /// [`InputError::OrderTooLong`], [`InputError::Order`].
+    /// [`InputError::OrderTooLong`], [`InputError::Order`]; where only live bodies are kept,
+    /// [`InputError::SpanTooLong`] and [`InputError::TooManyLive`].
     pub(super) fn arrange<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
@@ -53,11 +57,17 @@ impl Ordering {
         on: Hardware<'_>,
     ) -> Result<Arranged, InputError> {
         let order = parameters.order.unwrap_or_else(|| automatic(on.capabilities));
-        if order == Order::AsGiven && !parameters.verify_order {
-            return Ok(Arranged { order, scheduled: false, verified: None });
+        let design = on.capabilities.window;
+        if order == Order::AsGiven && !parameters.verify_order && design.is_none() {
+            return Ok(Arranged { order, scheduled: false, verified: None, live: None });
         }
         let window = IssueWindow::of(on.capabilities, parameters)?;
-        let input = self.buffers.gather(bodies, collisions, on.shapes);
+        let mut input = self.buffers.gather(bodies, collisions, on.shapes);
+        let passes = parameters.contact_iterations.saturating_add(parameters.friction_iterations);
+        if design.is_some() && passes == 0 {
+            // Without a pass there is nobody to take them.
+            input.pairs = &[];
+        }
         let room = on.limits.room_for_collisions(bodies.len());
         self.orderer.set_limit(usize::try_from(room).unwrap_or(usize::MAX));
         let schedule = match self.orderer.order(&input, order, window) {
@@ -74,18 +84,34 @@ impl Ordering {
             }
             false => None,
         };
-        Ok(Arranged { order, scheduled: true, verified })
+        let live = match design {
+            Some(design) => {
+                let room = Room::of(&design, passes, on.capabilities.collisions_per_issue);
+                let settled = self.lives.settle(schedule, &input, room);
+                let report = self.lives.report();
+                settled.map_err(|crowded| refused(crowded, report, room, &input, on.shapes))?;
+                Some(report)
+            }
+            None => None,
+        };
+        Ok(Arranged { order, scheduled: true, verified, live })
     }
 
     /// The schedule made last.
     pub(super) fn schedule(&self) -> &Schedule {
         self.orderer.schedule()
     }
+
+    /// Places, marks and orders of the bodies, of the schedule made last.
+    pub(super) fn lives(&self) -> &Lives {
+        &self.lives
+    }
 }
 
 /// The order of a step that asks for none.
 fn automatic(capabilities: &Capabilities) -> Order {
-    if capabilities.interlocked { Order::AsGiven } else { Order::HazardFree }
+    let waits = capabilities.interlocked && capabilities.window.is_none();
+    if waits { Order::AsGiven } else { Order::HazardFree }
 }
 
 /// An order without hazards does not fit. The moving body with the most collisions tells which
@@ -125,4 +151,38 @@ fn too_long(
         Demand { collisions: entries, ..demand }.has_room(variant)
     });
     InputError::OrderTooLong { collisions, bodies, limit, depth, body, uses, carriers }
+}
+
+/// An order in which bodies live too long, or too many at once.
+#[cold]
+fn refused(
+    crowded: Crowded,
+    LiveReport { most_alive: alive, longest_span, .. }: LiveReport,
+    room: Room,
+    input: &OrderInput<'_>,
+    shapes: &[Shape],
+) -> InputError {
+    let (bodies, collisions) = (input.moving.len(), input.pairs.len());
+    let demand = Demand { bodies, collisions, inertia: needed(shapes) };
+    let held = match crowded {
+        Crowded::Span { .. } => 0,
+        Crowded::Places { held } => held,
+    };
+    let carriers = demand.carriers(|variant| match variant.profile.flow {
+        Flow::Passes => true,
+        Flow::Window(window) => window.lag > longest_span && window.slots > held,
+    });
+    let at = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
+    match crowded {
+        Crowded::Span { body, first, last } => InputError::SpanTooLong {
+            body: at(body),
+            first: at(first),
+            last: at(last),
+            lag: room.lag,
+            carriers,
+        },
+        Crowded::Places { held } => {
+            InputError::TooManyLive { held, alive, places: room.places, carriers }
+        }
+    }
 }

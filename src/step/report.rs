@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::order::{Order, OrderReport};
+use crate::order::{LiveReport, Order, OrderReport};
 
 /// Clock cycles of a step on the accelerator, by what they were spent on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,6 +65,8 @@ pub struct StepReport {
     /// What that order was proved to be, if it was to be [verified](crate::StepParameters::verify_order):
     /// no hazards; how many bodies are alive at once, and how long.
     pub verified: Option<OrderReport>,
+    /// What the order takes of a bitstream that keeps only live bodies.
+    pub live: Option<LiveReport>,
     /// Passes over the collisions: contact and friction iterations.
     pub passes: u32,
     /// Clock cycles, as the accelerator counted them.
@@ -139,6 +141,7 @@ mod tests {
             order: Order::AsGiven,
             empty: 0,
             verified: None,
+            live: None,
             passes: 0,
             cycles: StepCycles { total: work + stalls + waits, work, stalls, waits },
             clock_khz: 275_000,

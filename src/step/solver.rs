@@ -15,11 +15,13 @@ use super::ordering::{Arranged, Hardware, Ordering};
 use super::plan::Plan;
 use super::report::{HostTimes, StepCycles, StepReport};
 use crate::accelerator::{Capabilities, Counters};
-use crate::beat::pack::{pack_collisions, pack_poses, pack_velocities};
+use crate::beat::pack::{
+    Chosen, pack_collisions, pack_marked_collisions, pack_poses, pack_velocities,
+};
 use crate::beat::stripe::Segment;
 use crate::beat::unpack::{Results, sum_of_words};
 use crate::error::{Error, OpenError};
-use crate::order::{Order, Ordered};
+use crate::order::{Lives, Order, Ordered};
 use crate::platform::{Deadline, System};
 use crate::scene::validate::{Limits, validate, validate_shapes};
 use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
@@ -146,26 +148,29 @@ impl Accelerator {
         host.validate = watch.lap();
         let Self { ordering, device, limits, shapes, .. } = self;
         let on = Hardware { capabilities: &device.capabilities, limits, shapes };
-        let Arranged { order, scheduled, verified } =
+        let Arranged { order, scheduled, verified, live } =
             ordering.arrange(bodies, collisions, parameters, on)?;
         host.order = watch.lap();
         let counts = &self.device.counts;
         let before = (counts.reads(), counts.writes());
+        let mut empty = 0;
         let ended = if scheduled {
             // Lent to the step.
             let ordering = std::mem::take(&mut self.ordering);
             let ordered = Ordered { collisions, schedule: ordering.schedule() };
-            let ended = self.run(bodies, &ordered, parameters, &mut host, &mut watch);
+            let lives = live.map(|_| ordering.lives());
+            let ended = self.run(bodies, &ordered, lives, parameters, &mut host, &mut watch);
+            // Those that fill the last issue are of the order's making too.
+            let entries = lives.map_or(ordered.len(), |lives| lives.words().len());
+            empty = entries.saturating_sub(ordering.schedule().collisions());
             self.ordering = ordering;
             ended
         } else {
-            self.run(bodies, collisions, parameters, &mut host, &mut watch)
+            self.run(bodies, collisions, None, parameters, &mut host, &mut watch)
         };
         let mut report = ended.map_err(|fault| self.device.fail(fault, &self.shapes))?;
-        // What was sent is more by the empty entries.
-        report.empty = report.collisions.saturating_sub(collisions.len() as u64);
-        report.collisions -= report.empty;
-        (report.order, report.verified) = (order, verified);
+        (report.collisions, report.empty) = (collisions.len() as u64, empty as u64);
+        (report.order, report.verified, report.live) = (order, verified, live);
         for (index, (pose, velocity)) in self.spare.drain(..).enumerate() {
             bodies.commit(index, pose, velocity);
         }
@@ -196,19 +201,27 @@ impl Accelerator {
         &mut self,
         bodies: &B,
         collisions: &C,
+        lives: Option<&Lives>,
         parameters: &StepParameters,
         host: &mut HostTimes,
         watch: &mut Stopwatch,
     ) -> Result<StepReport, Fault> {
         let plan = &Plan {
-            bodies: bodies.len(),
-            collisions: collisions.len(),
+            bodies: lives.map_or(bodies.len(), |lives| lives.velocities().len()),
+            collisions: lives.map_or(collisions.len(), |lives| lives.words().len()),
             passes: u64::from(parameters.contact_iterations)
                 + u64::from(parameters.friction_iterations),
             variant: self.limits.variant,
         };
+        if plan.bodies == 0 {
+            // Nothing moves, and nothing of it is streamed.
+            self.unpack(plan, bodies, lives)?;
+            let impulse_sum = self.device.capabilities.impulse_sum.then_some(0.0);
+            let counters = Counters { impulse_sum, ..Counters::default() };
+            return Ok(self.report(plan, bodies.len(), &counters));
+        }
         self.device.reserve_or_reset(plan, &self.shapes)?;
-        let sent = self.pack(plan, bodies, collisions);
+        let sent = self.pack(plan, bodies, collisions, lives);
         host.pack = watch.lap();
         let limit = plan.deadline(parameters, &self.device.capabilities);
         let deadline = Deadline::after(&*self.device.platform, limit);
@@ -219,17 +232,26 @@ impl Accelerator {
         self.device.take_back()?;
         host.wait = watch.lap();
         self.check_sums(plan, sent, &counters)?;
-        self.unpack(plan, bodies)?;
+        self.unpack(plan, bodies, lives)?;
         host.unpack = watch.lap();
 
+        let mut report = self.report(plan, bodies.len(), &counters);
+        (report.doorbells, report.interrupts) = (doorbells, interrupts);
+        report.descriptors = self.device.descriptors();
+        Ok(report)
+    }
+
+    /// What a step of so many bodies streamed and counted.
+    fn report(&self, plan: &Plan, bodies: usize, counters: &Counters) -> StepReport {
         let (work, waits) = (u64::from(counters.work), u64::from(counters.waits));
         let stalls = counters.cycles.saturating_sub(work).saturating_sub(waits);
-        Ok(StepReport {
-            bodies: plan.bodies as u64,
+        StepReport {
+            bodies: bodies as u64,
             collisions: plan.collisions as u64,
             order: Order::AsGiven,
             empty: 0,
             verified: None,
+            live: None,
             passes: u32::try_from(plan.passes).unwrap_or(u32::MAX),
             cycles: StepCycles { total: counters.cycles, work, stalls, waits },
             clock_khz: self.device.capabilities.clock_khz,
@@ -239,11 +261,11 @@ impl Accelerator {
             impulse_sum: counters.impulse_sum,
             register_reads: 0,
             register_writes: 0,
-            doorbells,
-            interrupts,
-            descriptors: self.device.descriptors(),
+            doorbells: 0,
+            interrupts: 0,
+            descriptors: 0,
             host: HostTimes::default(),
-        })
+        }
     }
 
     /// Writes the records of a step into the buffers.
@@ -252,6 +274,7 @@ impl Accelerator {
         plan: &Plan,
         bodies: &B,
         collisions: &C,
+        lives: Option<&Lives>,
     ) -> Sent {
         let mut channels: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
         let lanes = &mut self.device.mm2s;
@@ -268,16 +291,31 @@ impl Accelerator {
         let (variant, count) = (&plan.variant, plan.bodies);
         let active = ..plan.channels();
         let views = &mut channels[active];
-        let velocities = pack_velocities(variant, bodies, count, &self.shapes, views);
+        let shapes = &self.shapes;
+        let velocities = match lives.map(Lives::velocities) {
+            Some(order) => {
+                let chosen = Chosen { bodies, order };
+                pack_velocities(variant, &chosen, count, shapes, views)
+            }
+            None => pack_velocities(variant, bodies, count, shapes, views),
+        };
         let mut poses_of: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
         for (place, (collisions, poses)) in later.into_iter().enumerate() {
             channels[place] = collisions;
             poses_of[place] = poses;
         }
         let views = &mut channels[active];
-        let collisions =
-            pack_collisions(variant, bodies, collisions, plan.collisions, &self.shapes, views);
-        let poses = pack_poses(variant, bodies, count, &mut poses_of[active]);
+        let collisions = match lives.map(Lives::words) {
+            Some(words) => {
+                pack_marked_collisions(variant, bodies, collisions, words, shapes, views)
+            }
+            None => pack_collisions(variant, bodies, collisions, plan.collisions, shapes, views),
+        };
+        let views = &mut poses_of[active];
+        let poses = match lives.map(Lives::results) {
+            Some(order) => pack_poses(variant, &Chosen { bodies, order }, count, views),
+            None => pack_poses(variant, bodies, count, views),
+        };
         Sent { velocities, collisions, poses }
     }
 
@@ -292,10 +330,10 @@ impl Accelerator {
     fn check_sums(&self, plan: &Plan, sent: Sent, counters: &Counters) -> Result<(), Fault> {
         let Some((received, answered)) = counters.sums else { return Ok(()) };
         #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
-        let passes = plan.passes as u32;
+        let rounds = plan.rounds() as u32;
         let expected = sent
             .velocities
-            .wrapping_add(sent.collisions.wrapping_mul(passes))
+            .wrapping_add(sent.collisions.wrapping_mul(rounds))
             .wrapping_add(sent.poses);
         if received != expected {
             let direction = "to the accelerator";
@@ -312,16 +350,39 @@ impl Accelerator {
     }
 
     /// Reads the results into the spare.
-    fn unpack<B: Bodies + ?Sized>(&mut self, plan: &Plan, bodies: &B) -> Result<(), Fault> {
+    fn unpack<B: Bodies + ?Sized>(
+        &mut self,
+        plan: &Plan,
+        bodies: &B,
+        lives: Option<&Lives>,
+    ) -> Result<(), Fault> {
         let mut spare = std::mem::take(&mut self.spare);
         spare.clear();
-        spare.reserve(plan.bodies);
         let mut channels = Default::default();
         self.results(plan, &mut channels);
         let layout = Segment::Results.layout(&plan.variant);
         let mut results = Results::new(&layout, &channels[..plan.channels()]);
-        let mut broken = None;
-        for index in 0..plan.bodies {
+        let broken = match lives {
+            Some(lives) => scatter(&mut results, lives.results(), bodies, &mut spare),
+            None => self.in_turn(&mut results, plan.bodies, bodies, &mut spare),
+        };
+        self.spare = spare;
+        match broken {
+            Some(body) => Err(Fault::NotFinite { body }),
+            None => Ok(()),
+        }
+    }
+
+    /// Reads the results of all bodies in their order; the first that is not finite.
+    fn in_turn<B: Bodies + ?Sized>(
+        &self,
+        results: &mut Results<'_>,
+        count: usize,
+        bodies: &B,
+        spare: &mut Vec<(Pose, Velocity)>,
+    ) -> Option<usize> {
+        spare.reserve(count);
+        for index in 0..count {
             let (pose, velocity) = results.next();
             let own = bodies.body(index);
             let shape = usize::try_from(own.shape).ok().and_then(|shape| self.shapes.get(shape));
@@ -331,17 +392,39 @@ impl Accelerator {
                 continue;
             }
             if !finite(&pose, &velocity) {
-                broken = Some(index);
-                break;
+                return Some(index);
             }
             spare.push((pose, velocity));
         }
-        self.spare = spare;
-        match broken {
-            Some(body) => Err(Fault::NotFinite { body }),
-            None => Ok(()),
+        None
+    }
+}
+
+/// Reads results in the order of these bodies, and leaves all others as they are; the first body
+/// that is not finite.
+fn scatter<B: Bodies + ?Sized>(
+    results: &mut Results<'_>,
+    order: &[u32],
+    bodies: &B,
+    spare: &mut Vec<(Pose, Velocity)>,
+) -> Option<usize> {
+    spare.extend((0..bodies.len()).map(|index| {
+        let own = bodies.body(index);
+        (own.pose, own.velocity)
+    }));
+    let mut broken = None;
+    for body in order {
+        let (pose, velocity) = results.next();
+        let index = *body as usize;
+        if !finite(&pose, &velocity) {
+            broken = Some(broken.map_or(index, |lowest: usize| lowest.min(index)));
+        }
+        // Should a caller's bodies have become fewer, there is nothing to be told of the others.
+        if let Some(state) = spare.get_mut(index) {
+            *state = (pose, velocity);
         }
     }
+    broken
 }
 
 fn finite(pose: &Pose, velocity: &Velocity) -> bool {

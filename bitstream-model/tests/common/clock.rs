@@ -10,11 +10,16 @@ use bitstream_model::interface::record::live;
 #[derive(Debug, Clone)]
 pub(crate) struct Clock {
     pub(crate) slot: u64,
+    /// Cycles in which a unit takes `per_issue` entries.
+    pub(crate) interval: u64,
+    pub(crate) per_issue: usize,
+    /// Unit of each pass.
+    pub(crate) units: Vec<u32>,
     /// Window of each pass.
     pub(crate) windows: Vec<u64>,
     pub(crate) design: Window,
     /// Cycles between two bodies that leave.
-    pub(crate) interval: u64,
+    pub(crate) leave_interval: u64,
 }
 
 /// What came of it.
@@ -52,51 +57,38 @@ impl Clock {
             if now > idle_since + 10_000 {
                 return None;
             }
-            if now >= leave_due {
-                if let Some((place, ready)) = leaving.first().copied() {
-                    if now >= ready {
-                        leaving.remove(0);
-                        held[place].taken = false;
-                        left += 1;
-                        leave_due = now + self.interval;
-                        idle_since = now;
-                    }
-                }
+            let first = leaving.first().filter(|(_, ready)| now >= leave_due.max(*ready));
+            if let Some((place, _)) = first.copied() {
+                leaving.remove(0);
+                held[place].taken = false;
+                left += 1;
+                leave_due = now + self.leave_interval;
+                idle_since = now;
             }
-            for pass in (0..passes).rev() {
-                let n = issued[pass].len();
-                let due = issued[pass].last().map_or(0, |last| last + self.slot);
-                if n == entries || now < due {
-                    continue;
-                }
-                let bubble = step.collisions[n].count == 0;
-                let uses: Vec<u32> =
-                    words[n].into_iter().filter(|w| !bubble && w & live::PLACE != 0).collect();
-                let place = |word: u32| (word & live::PLACE) as usize;
-                // Its own record.
-                let mut ready = pass == 0
-                    || issued[pass - 1].get(n).is_some_and(|at| now >= at + self.windows[pass - 1]);
-                // Room behind.
-                ready &=
-                    pass + 1 == passes || n - issued[pass + 1].len() < self.design.lag as usize;
-                let mut conflict = false;
-                for word in &uses {
-                    let of = &held[place(*word)];
-                    if pass == 0 && word & live::FIRST != 0 {
-                        ready &= !of.taken;
+            // Passes issue until none can in this cycle.
+            loop {
+                let mut next: Option<usize> = None;
+                for pass in 0..passes {
+                    let n = issued[pass].len();
+                    if n == entries {
                         continue;
                     }
-                    ready &= of.over == pass && (pass == 0 || now >= of.over_at);
-                    conflict |= of.previous.is_some_and(|at| now < at + self.windows[pass])
-                        && of.over == pass;
+                    let uses = uses(step, words, n);
+                    let (ready, conflict) = self.ready(pass, n, now, &uses, &issued, &held);
+                    waited[pass] |= ready && conflict;
+                    let last = |pass: usize| issued[pass].last().copied();
+                    if ready
+                        && !conflict
+                        && self.unit_is_free(pass, now, &issued)
+                        && next.is_none_or(|other| last(pass) < last(other))
+                    {
+                        next = Some(pass);
+                    }
                 }
-                waited[pass] |= ready && conflict;
-                if !ready || conflict {
-                    stalls += u64::from(pass == 0);
-                    continue;
-                }
-                for word in &uses {
-                    let of = &mut held[place(*word)];
+                let Some(pass) = next else { break };
+                let n = issued[pass].len();
+                for word in uses(step, words, n) {
+                    let of = &mut held[(word & live::PLACE) as usize];
                     if pass == 0 && word & live::FIRST != 0 {
                         *of = Held { taken: true, ..Held::default() };
                         came += 1;
@@ -107,7 +99,7 @@ impl Clock {
                         of.over_at = now + self.windows[pass];
                         of.previous = None;
                         if pass + 1 == passes {
-                            leaving.push((place(*word), now + self.windows[pass]));
+                            leaving.push(((word & live::PLACE) as usize, of.over_at));
                         }
                     }
                 }
@@ -115,12 +107,17 @@ impl Clock {
                 issued[pass].push(now);
                 idle_since = now;
             }
+            if let Some(first) = issued.first() {
+                let late = first.last().is_none_or(|last| now >= last + self.slot);
+                let idle = first.len() < entries && self.unit_is_free(0, now, &issued);
+                stalls += u64::from(late && idle);
+            }
             let all_issued = issued.last().is_none_or(|last| last.len() == entries);
             // What is left was in no collision.
             if all_issued && came == left && left < moving && now >= leave_due {
                 came += 1;
                 left += 1;
-                leave_due = now + self.interval;
+                leave_due = now + self.leave_interval;
                 idle_since = now;
             }
             if left == moving && all_issued {
@@ -128,5 +125,52 @@ impl Clock {
             }
         }
         None
+    }
+
+    /// Whether everything but the unit is there for an entry, and whether a previous use of one of its
+    /// bodies in the same pass is under way.
+    fn ready(
+        &self,
+        pass: usize,
+        n: usize,
+        now: u64,
+        uses: &[u32],
+        issued: &[Vec<u64>],
+        held: &[Held],
+    ) -> (bool, bool) {
+        // Its own record, and room behind.
+        let mut ready = pass == 0
+            || issued[pass - 1].get(n).is_some_and(|at| now >= at + self.windows[pass - 1]);
+        ready &= pass + 1 == issued.len() || n - issued[pass + 1].len() < self.design.lag as usize;
+        let mut conflict = false;
+        for word in uses {
+            let of = &held[(word & live::PLACE) as usize];
+            if pass == 0 && word & live::FIRST != 0 {
+                ready &= !of.taken;
+                continue;
+            }
+            ready &= of.over == pass && (pass == 0 || now >= of.over_at);
+            let previous = of.previous.filter(|_| of.over == pass);
+            conflict |= previous.is_some_and(|at| now < at + self.windows[pass]);
+        }
+        (ready, conflict)
+    }
+
+    /// Whether a unit has taken less than it can in an interval.
+    fn unit_is_free(&self, pass: usize, now: u64, issued: &[Vec<u64>]) -> bool {
+        let of_unit = issued.iter().zip(&self.units).filter(|(_, unit)| **unit == self.units[pass]);
+        let recent = |issues: &Vec<u64>| {
+            issues.iter().rev().take_while(|at| **at + self.interval > now).count()
+        };
+        of_unit.map(|(issues, _)| recent(issues)).sum::<usize>() < self.per_issue
+    }
+}
+
+/// The index words of an entry that name a moving body.
+fn uses(step: &Step, words: &[[u32; 2]], n: usize) -> Vec<u32> {
+    let moving = |word: &u32| word & live::PLACE != 0;
+    match step.collisions[n].count {
+        0 => Vec::new(),
+        _ => words[n].into_iter().filter(moving).collect(),
     }
 }

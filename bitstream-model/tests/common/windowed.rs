@@ -13,8 +13,17 @@ pub(crate) struct Packed {
     pub(crate) lanes: Vec<Lane>,
     /// The bodies in the order in which they leave; static ones are not among them.
     pub(crate) leave: Vec<usize>,
-    /// The index words of every entry.
+}
+
+/// The order of a step's bodies, and what the collisions say of them.
+#[derive(Debug, Clone)]
+pub(crate) struct Marked {
+    /// Index words of every entry.
     pub(crate) words: Vec<[u32; 2]>,
+    /// Moving bodies as they come alive.
+    pub(crate) come: Vec<usize>,
+    /// Moving bodies as they leave.
+    pub(crate) leave: Vec<usize>,
 }
 
 /// Segments of a lane: velocities, collisions, poses.
@@ -66,14 +75,22 @@ impl Step {
         };
         let lasts: Vec<usize> =
             self.collisions.iter().enumerate().map(|(n, c)| last(c, n)).collect();
-        let held = |n: usize| (0..n).find(|m| lasts[*m] >= n).unwrap_or(n);
-        (0..self.collisions.len()).map(|n| (1..passes).fold(n, |n, _| held(n))).collect()
+        let mut at = 0;
+        let held: Vec<usize> = (0..lasts.len())
+            .map(|n| {
+                while at < n && lasts[at] < n {
+                    at += 1;
+                }
+                at
+            })
+            .collect();
+        (0..lasts.len()).map(|n| (1..passes).fold(n, |n, _| held[n])).collect()
     }
 
     /// Index words of every entry, and the bodies as they come and as they go.
     ///
     /// `None` where there are too few places for what is alive and for what has not left.
-    pub(crate) fn marked(&self, slots: u32) -> Option<(Vec<[u32; 2]>, Vec<usize>, Vec<usize>)> {
+    pub(crate) fn marked(&self, slots: u32) -> Option<Marked> {
         let spans = self.spans();
         let holds_up = self.holds_up(&spans);
         let (mut come, mut leave) = (Vec::new(), Vec::new());
@@ -110,7 +127,7 @@ impl Step {
         let rest: Vec<usize> = rest.collect();
         come.extend(&rest);
         leave.extend(&rest);
-        Some((words, come, leave))
+        Some(Marked { words, come, leave })
     }
 
     /// The fewest places with which the step ends.
@@ -126,9 +143,9 @@ impl Step {
     /// What goes out on each stream.
     pub(crate) fn packed_once(&self, variant: &Variant) -> Packed {
         let slots = design(variant).expect("it has a window").slots;
-        let (words, come, leave) = self.marked(slots).expect("there are places");
+        let Marked { words, come, leave } = self.marked(slots).expect("there are places");
         let lanes = self.lanes_of(variant, &words, &come, &leave);
-        Packed { lanes, leave, words }
+        Packed { lanes, leave }
     }
 
     /// The streams for those index words and orders.

@@ -1,12 +1,15 @@
 //! This file says which pass may issue its next entry when.
 //!
-//! With T the cycles of a slot and w(k) the window of pass k, entry n issues to pass k at the first
-//! cycle that is
+//! With w(k) the window of pass k, entry n can issue to pass k at the first cycle that is
 //!
-//! - T or more after entry n - 1 in the same pass,
+//! - not before entry n - 1 in the same pass,
 //! - w(k-1) or more after its own issue to pass k - 1, and after that of its bodies' last uses there,
 //! - w(k) or more after its bodies' previous uses in pass k (waiting for this is a hazard),
-//! - not before entry n - lag has issued to pass k + 1, when there is room behind pass k.
+//! - not before entry n - lag has issued to pass k + 1, when there is room behind pass k,
+//!
+//! and in which its unit is free: a unit takes as many entries in an initiation interval as enter
+//! together. Of two passes that can issue it takes the one that has waited longer since it last did.
+//! When all of them can, each issues an entry in every slot of T cycles.
 //!
 //! Pass 0 also needs the record, the velocities that come with it, and free places for them.
 
@@ -23,12 +26,24 @@ pub(super) const NEVER: u64 = u64::MAX;
 pub(super) struct Shape {
     /// Cycles in which every pass issues one entry.
     pub(super) slot: u64,
+    /// Cycles in which a unit takes `per_issue` entries.
+    pub(super) interval: u64,
+    pub(super) per_issue: usize,
     /// Entries between one pass and the next, at most.
     pub(super) lag: usize,
     pub(super) places: usize,
     pub(super) collisions: usize,
     /// Window of each pass.
     pub(super) windows: Vec<u64>,
+    /// Unit of each pass.
+    pub(super) units: Vec<usize>,
+}
+
+/// One unit.
+#[derive(Debug, Clone)]
+struct Unit {
+    /// From when on it takes each of the next entries, the very next one first.
+    free: VecDeque<u64>,
 }
 
 /// What decides when an entry can issue.
@@ -46,7 +61,8 @@ pub(super) struct Pass {
     /// A slot after its previous one.
     pub(super) due: u64,
     window: u64,
-    /// When the next entry issues, as far as is known.
+    unit: usize,
+    /// When the next entry can issue, as far as is known, if its unit is free.
     pub(super) ready: u64,
     /// Whether the next entry has waited for a previous use in the same pass.
     pub(super) waited: bool,
@@ -57,6 +73,7 @@ pub(super) struct Pass {
 pub(super) struct Flow {
     pub(super) shape: Shape,
     pub(super) passes: Vec<Pass>,
+    units: Vec<Unit>,
     /// What has issued to the first pass and not to the last, the oldest first.
     entries: VecDeque<Entry>,
     pub(super) places: Vec<Place>,
@@ -65,10 +82,19 @@ pub(super) struct Flow {
 
 impl Flow {
     pub(super) fn new(shape: Shape) -> Self {
-        let pass =
-            |window: &u64| Pass { next: 0, due: 0, window: *window, ready: NEVER, waited: false };
+        let pass = |(window, unit): (&u64, &usize)| Pass {
+            next: 0,
+            due: 0,
+            window: *window,
+            unit: *unit,
+            ready: NEVER,
+            waited: false,
+        };
+        let units = shape.units.iter().max().map_or(0, |last| last + 1);
+        let unit = Unit { free: std::iter::repeat_n(0, shape.per_issue.max(1)).collect() };
         Self {
-            passes: shape.windows.iter().map(pass).collect(),
+            passes: shape.windows.iter().zip(&shape.units).map(pass).collect(),
+            units: vec![unit; units],
             entries: VecDeque::new(),
             places: vec![Place::default(); shape.places],
             leaving: VecDeque::new(),
@@ -87,9 +113,10 @@ impl Flow {
         behind.is_none_or(|behind| self.passes[pass].next - behind.next < self.shape.lag)
     }
 
-    /// The cycle from which an entry of which everything has come can issue to a pass.
+    /// The cycle from which an entry of which everything has come can issue to a pass, if its unit is
+    /// free.
     pub(super) fn when(&mut self, pass: usize, entry: Next, now: u64) -> u64 {
-        let mut at = self.passes[pass].due.max(entry.written).max(now);
+        let mut at = entry.written.max(now);
         let mut written = 0;
         let born = |of: &Use| pass == 0 && of.first;
         for of in entry.uses.iter().filter(|of| of.moves() && !born(of)) {
@@ -121,16 +148,23 @@ impl Flow {
         };
     }
 
-    /// The pass that issues first, and when. Of two at the same cycle the later pass, which makes
-    /// room.
+    /// When the unit of a pass takes its next entry.
+    pub(super) fn free(&self, pass: &Pass) -> u64 {
+        self.units[pass.unit].free.front().copied().unwrap_or(0)
+    }
+
+    /// The pass that issues first, and when.
     pub(super) fn earliest(&self) -> (u64, usize) {
-        let mut earliest = (NEVER, 0);
+        let mut earliest = ((NEVER, NEVER), 0);
         for (number, pass) in self.passes.iter().enumerate() {
-            if pass.ready <= earliest.0 {
-                earliest = (pass.ready, number);
+            if pass.ready != NEVER {
+                let at = (pass.ready.max(self.free(pass)), pass.due);
+                if at < earliest.0 {
+                    earliest = (at, number);
+                }
             }
         }
-        earliest
+        (earliest.0.0, earliest.1)
     }
 
     /// Where an entry is in the delay lines.
@@ -169,6 +203,9 @@ impl Flow {
         let this = &mut self.passes[pass];
         this.next += 1;
         this.due = now + self.shape.slot;
+        let free = &mut self.units[this.unit].free;
+        free.pop_front();
+        free.push_back(now + self.shape.interval);
         std::mem::take(&mut this.waited)
     }
 

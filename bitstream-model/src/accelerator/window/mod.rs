@@ -63,13 +63,21 @@ impl Accelerator {
         );
         let windows: Vec<u64> =
             (0..self.passes()).map(|pass| self.depth(pass).window.into()).collect();
+        // The passes of a kind go round its units.
+        let contact = (0..self.arguments.contact_iterations).map(|k| k % design.contact_units);
+        let friction = (0..self.arguments.friction_iterations)
+            .map(|k| design.contact_units + k % design.friction_units);
+        let units = contact.chain(friction).map(|unit| unit as usize).collect();
         let collisions = if windows.is_empty() { 0 } else { self.arguments.collisions as usize };
         let flow = flow::Flow::new(flow::Shape {
             slot: slot.into(),
+            interval: profile.initiation_interval.into(),
+            per_issue: profile.collisions_per_issue as usize,
             lag: design.lag as usize,
             places: design.slots as usize,
             collisions,
             windows,
+            units,
         });
         let windowed = Windowed::new(
             flow,

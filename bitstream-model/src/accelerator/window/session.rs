@@ -146,6 +146,12 @@ impl Windowed {
         }
     }
 
+    /// Since when the first pass lacks something on a stream, if it does.
+    fn first_lacks(&self) -> Option<u64> {
+        let first = self.flow.passes.first().filter(|_| self.first == First::Stream)?;
+        Some(self.flow.free(first))
+    }
+
     /// Whether everything is there for the next body that leaves.
     fn may_leave(&self, there: &Arrived) -> bool {
         there.pose() && (!self.flow.leaving.is_empty() || there.velocities(1))
@@ -221,7 +227,7 @@ impl Accelerator {
             let leaves = window.leaves();
             let leaving = leaves.filter(|at| window.may_leave(&there) && *at <= issues);
             // When a stream begins to lack something.
-            let by_first = (window.first == First::Stream).then(|| window.flow.passes[0].due);
+            let by_first = window.first_lacks();
             let by_leaving = leaves.filter(|_| !window.may_leave(&there));
             let lacking = by_first.into_iter().chain(by_leaving).min();
             let next = leaving.unwrap_or(issues).max(now);
@@ -261,12 +267,14 @@ impl Accelerator {
         self.debt += now - start;
         Ok(progressed || now > start)
     }
-    /// Keeps account of the time in which the first pass could not issue.
+    /// Keeps account of the time in which the first pass had not issued for a slot, although its unit
+    /// was free.
     fn account(&mut self, window: &Windowed, there: &Arrived, from: u64, to: u64) {
         let starved = window.leaves().is_some_and(|at| at <= from) && !window.may_leave(there);
         let (blocked, first) = match window.flow.passes.first() {
             Some(first) if first.next < window.flow.shape.collisions => {
-                (to.saturating_sub(first.due.max(from)), window.first)
+                let since = first.due.max(window.flow.free(first)).max(from);
+                (to.saturating_sub(since), window.first)
             }
             _ if window.flow.issued_all() && starved => (to - from, First::Stream),
             _ => return,

@@ -77,7 +77,9 @@ pub enum Flow {
 /// With P passes, entry n of pass k may issue when its predecessor in that pass has, when pass
 /// k - 1 has written back the last use of both its bodies, when both are written back by the entry
 /// before it in its own pass, and when there is room for it in the delay line behind pass k. A
-/// unit takes its passes in turn: every pass gets one entry in [`slot_cycles`](Self::slot_cycles).
+/// unit takes an issue every initiation interval, from its passes in turn, passing over one that
+/// cannot: when all of them can, every pass gets one entry in [`slot_cycles`](Self::slot_cycles).
+/// Pass k of a kind runs on unit k modulo their number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Window {
     /// Units that run contact passes.
