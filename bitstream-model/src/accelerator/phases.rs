@@ -112,6 +112,7 @@ impl Accelerator {
         segment.check(records, inputs)?;
         let format = self.variant.numbers.bodies;
         let mut reader = segment.reader(inputs);
+        let shapes = self.registers.shapes();
         for body in segment.done..segment.done + records {
             let (velocity, shape) = match self.variant.inertia {
                 Inertia::Isotropic => decode::velocity(format, &reader.record()),
@@ -122,7 +123,7 @@ impl Accelerator {
                     decode::velocity(format, &[rows[velocity::LINEAR], rows[velocity::ANGULAR]])
                 }
             };
-            let known = (shape as usize) < self.registers.shapes().len();
+            let known = (shape as usize) < shapes.len();
             let Some(shape) = u8::try_from(shape).ok().filter(|_| known) else {
                 return Err(PacketError {
                     code: ErrorCode::ShapeIndex,
@@ -130,6 +131,9 @@ impl Accelerator {
                     beat: register(body),
                 });
             };
+            // A static body's words are not looked at: thesis16 has none for 0.
+            let moves = shapes[usize::from(shape)].inverse_mass != 0.0;
+            let velocity = if moves { velocity } else { Velocity::default() };
             self.velocities[body] = self.stored_velocity(velocity);
             self.shape_of[body] = shape;
         }
