@@ -311,14 +311,17 @@ pub enum InputError {
     /// A parameter is beyond what the bitstream's arithmetic holds.
     #[error(
         "the {parameter} is {found:e}, but this bitstream computes in binary16, which takes \
-         {smallest:e} to {largest}: correct the step parameters, or load another ({carriers})"
+         {}{smallest:e} to {largest}: correct the step parameters, or load another ({carriers})",
+        if *zero { "0, or " } else { "" }
     )]
     ParameterOutOfRange {
         /// The parameter; a gravity component with its axis.
         parameter: &'static str,
         /// Its value.
         found: f32,
-        /// The smallest magnitude.
+        /// Whether 0 is taken as well.
+        zero: bool,
+        /// The smallest magnitude, 0 aside.
         smallest: f32,
         /// The largest magnitude.
         largest: f32,
