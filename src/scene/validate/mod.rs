@@ -17,7 +17,7 @@ use self::collision::check_collision;
 use self::parameters::check_parameters;
 use self::range::{Held, check_range};
 use self::rows::Rows;
-use self::shape::needed;
+use self::shape::{check_shapes, needed};
 use super::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
 use crate::record::relative::anchors;
 use bitstream_model::interface::number::{Precision, StreamFormat};
@@ -67,7 +67,7 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         Demand { bodies: body_count, collisions: collisions.len(), inertia: needed(shapes) };
     check_parameters(parameters, &demand, limits)?;
     check_room(&demand, limits)?;
-    validate_shapes(shapes, limits)?;
+    check_shapes(shapes, &demand, limits)?;
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
     let scene = Scene { shapes, demand, variant: &limits.variant, held, flush_subnormals };
@@ -387,6 +387,19 @@ pub(super) mod tests {
             matches!(refused, InputError::CollisionOutOfRange { collision: 0, component: 2, .. }),
             "{refused}"
         );
+    }
+
+    /// 300,000 collisions and shapes with axes: `half` alone has room for the first.
+    #[test]
+    fn shapes_are_refused_with_the_profiles_that_have_room_for_the_scene() {
+        let shapes = [Shape::STATIC, Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 2.0, 3.0] }];
+        let collisions = vec![collision(0, 1); 300_000];
+        let limits = Limits { memory_bytes: 8 << 20, collision_capacity: 524_288, ..FLOAT };
+        let parameters = StepParameters::default();
+        let bodies = [body(0), body(1)];
+        let refused = validate(&bodies[..], &collisions[..], &shapes, &parameters, &limits);
+        let text = refused.expect_err("world inertia is needed").to_string();
+        assert!(text.ends_with("(profiles that could, built with world inertia: half)"), "{text}");
     }
 
     /// Each number of it has its place in binary16, and what is made of them has none.
