@@ -61,8 +61,9 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
 
 /// Writes the records of `count` collisions; otherwise as [`pack_velocities`].
 ///
-/// A body that does not exist has its position written as zeros, and one without a shape is static. Validation has refused it; should
-/// a caller's [`Collisions`] answer differently the second time, the accelerator refuses the index.
+/// A body that does not exist has its position written as zeros, and one without a shape is static.
+/// Validation has refused it; should a caller's [`Collisions`] answer differently the second time,
+/// the accelerator refuses the index.
 pub(crate) fn pack_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     variant: &Variant,
     bodies: &B,
@@ -251,5 +252,18 @@ impl<'a, 'b> Writer<'a, 'b> {
             self.push(Beat::default());
         }
         total(self.lanes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interface::profile::FLOAT;
+
+    /// Or `float` takes the slow path.
+    #[test]
+    fn the_stripes_with_a_path_of_their_own_are_those_of_float() {
+        assert_eq!(FLOAT_BODIES, FLOAT.stripes.bodies);
+        assert_eq!(FLOAT_COLLISIONS, FLOAT.stripes.collisions);
     }
 }
