@@ -245,6 +245,36 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     );
 }
 
+/// A contact far out on a body: 1 + 0.4 x 380^2 = 57,761, and with 410 m 67,241.
+#[test]
+fn a_contact_is_solved_or_refused_and_never_left_out() {
+    let (bodies, collisions) = row(1);
+    let there = |arm: f32| {
+        let (mut bodies, mut collision) = (bodies.clone(), collisions[0]);
+        bodies[1].pose.position = [0.0; 3];
+        bodies[1].velocity.linear = [0.0, -4.0, 0.0];
+        collision.count = 1;
+        collision.contacts[0] = Contact { point: [arm, 0.0, 0.0], distance: 0.0 };
+        (bodies, [collision])
+    };
+    for config in [of(&HALF), of(&FLOAT)] {
+        let (board, mut accelerator) = open(config);
+        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        let (mut bodies, collisions) = there(380.0);
+        let parameters = StepParameters::default();
+        accelerator.step(&mut bodies[..], &collisions[..], &parameters).expect("within range");
+        // 4 m/s over an arm of 380 m.
+        let spin = bodies[1].velocity.angular[2];
+        assert!((spin - 4.0 / 380.0).abs() < 1e-3, "{spin}");
+        assert_eq!(board.violations(), []);
+    }
+    let (mut bodies, collisions) = there(410.0);
+    let text = refused(of(&HALF), &mut bodies, &collisions);
+    assert!(text.starts_with("collision 0, contact point 0: inverse effective mass[0]"), "{text}");
+    assert!(text.ends_with("(profiles that could: naive, float, mixed)"), "{text}");
+}
+
 #[test]
 fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
     let (few, collisions) = row(1);

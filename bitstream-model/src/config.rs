@@ -3,7 +3,9 @@
 
 use crate::accelerator::striping::{GROUP_MAX, STREAMS_MAX};
 use crate::accelerator::window;
+use crate::interface::address_map::CONTROL_BYTES;
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+use crate::interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
 use crate::interface::number::{Numbers, Precision, StreamFormat};
 use crate::interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
 use crate::interface::stripe::Stripe;
@@ -74,6 +76,13 @@ impl Default for Delays {
         }
     }
 }
+
+/// Copies, clocks and collisions of an issue that a profile may have.
+const SIZE_MAX: u32 = 16;
+/// Shapes that the control block has room for.
+const SHAPES_MAX: u32 = (CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE;
+/// 32-bit words of a beat.
+const BEAT_WORDS: u32 = 4;
 
 /// How to build an emulated board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -228,6 +237,7 @@ impl BoardConfig {
             LENGTH_WIDTH_MIN.into(),
             LENGTH_WIDTH_MAX.into(),
         )?;
+        range("FIFO depth in beats", self.delays.fifo_beats as u64, 16, 1 << 20)?;
         check_profile(self.profile)?;
         let name = self.profile.name;
         if let Flow::Window(design) = &self.profile.flow {
@@ -239,11 +249,11 @@ impl BoardConfig {
             }
         }
         self.check_numbers()?;
+        self.check_sizes(range)?;
         range("address width", self.address_width.into(), 32, 64)?;
         // The capability register carries the window in cycles in 16 bits.
         let slots_max = u64::from(u16::MAX) / u64::from(self.profile.initiation_interval);
         range("hazard window in slots", self.window_slots.unwrap_or(1).into(), 1, slots_max)?;
-        range("FIFO depth in beats", self.delays.fifo_beats as u64, 16, 1 << 20)?;
         for (what, cycles) in [
             ("halt delay in cycles", self.delays.halt),
             ("reset delay in cycles", self.delays.reset),
@@ -259,6 +269,26 @@ impl BoardConfig {
             range("memory bandwidth in bytes per second", bytes, 1_000_000, 1_000_000_000_000)?;
         }
         Ok(())
+    }
+
+    /// What registers, tables and FIFOs have room for.
+    fn check_sizes(
+        &self,
+        range: impl Fn(&'static str, u64, u64, u64) -> Result<(), ConfigError>,
+    ) -> Result<(), ConfigError> {
+        let (profile, memory) = (self.profile, self.profile.memory);
+        for (what, found, high) in [
+            ("copies of the velocities", memory.velocity_copies, SIZE_MAX),
+            ("clock of the block RAM in clocks of the accelerator", memory.pump, SIZE_MAX),
+            ("collisions of an issue", profile.collisions_per_issue, SIZE_MAX),
+            ("shape table in entries", profile.shape_capacity, SHAPES_MAX),
+        ] {
+            range(what, found.into(), 1, high.into())?;
+        }
+        // An issue enters the pipeline when all of it is there.
+        let words = self.variant().words().collision * profile.collisions_per_issue;
+        let beats = words.div_ceil(BEAT_WORDS);
+        range("beats of an issue", beats.into(), 1, self.delays.fifo_beats as u64)
     }
 
     fn check_numbers(&self) -> Result<(), ConfigError> {
@@ -311,10 +341,7 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
                 || !stripe(&stripes.results, profile.s2mm_widths),
             "stripes of 1 to 8 beats on streams that exist are expected",
         ),
-        (
-            profile.initiation_interval == 0 || profile.collisions_per_issue == 0,
-            "an issue of at least one collision and one cycle is expected",
-        ),
+        (profile.initiation_interval == 0, "an issue of at least one cycle is expected"),
         (profile.clock_khz == 0, "a clock of at least 1 kHz is expected"),
     ];
     match wrong.into_iter().find(|(wrong, _)| *wrong) {

@@ -7,12 +7,12 @@ mod common;
 use bitstream_model::interface::control::{self, ErrorCode};
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{
-    FLOAT, Flow, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile, Variant,
+    FLOAT, Flow, HALF, Inertia, MIXED, NAIVE, OnChipMemory, PROFILES, Profile, Variant,
 };
 use bitstream_model::interface::record::Beat;
 use bitstream_model::interface::stripe::Stripe;
 use bitstream_model::timing::{Records, StepCycles};
-use bitstream_model::{Bandwidth, BoardConfig, EmulatedBoard, Hazards};
+use bitstream_model::{Bandwidth, BoardConfig, Delays, EmulatedBoard, Hazards};
 
 use common::packing::{Row, beats, result_beats};
 use common::scene::{AT_REST, Body, Collision, STATIC, Step, bits, ground_contact};
@@ -436,7 +436,7 @@ fn formats_that_cannot_be_built_are_refused_with_what_is_expected() {
 fn a_profile_that_contradicts_itself_is_refused_with_what_is_expected() {
     static NO_STREAM: Profile = Profile { mm2s_widths: &[], ..FLOAT };
     static ODD_WIDTH: Profile = Profile { s2mm_widths: &[128, 128, 128, 96], ..FLOAT };
-    static NO_ISSUE: Profile = Profile { collisions_per_issue: 0, ..FLOAT };
+    static NO_ISSUE: Profile = Profile { initiation_interval: 0, ..FLOAT };
     static NO_CLOCK: Profile = Profile { clock_khz: 0, ..FLOAT };
     static BEYOND: Profile = {
         let mut profile = FLOAT;
@@ -446,13 +446,52 @@ fn a_profile_that_contradicts_itself_is_refused_with_what_is_expected() {
     for (profile, expected) in [
         (&NO_STREAM, "1 to 4 streams"),
         (&ODD_WIDTH, "32, 64 or 128 bits"),
-        (&NO_ISSUE, "at least one collision"),
+        (&NO_ISSUE, "at least one cycle"),
         (&NO_CLOCK, "at least 1 kHz"),
         (&BEYOND, "streams that exist"),
     ] {
         let text = refusal(config(profile));
         assert!(text.contains("profile \"float\"") && text.contains(expected), "{text}");
     }
+}
+
+#[test]
+fn a_profile_larger_than_registers_tables_and_fifos_is_refused() {
+    const fn with(memory: OnChipMemory) -> Profile {
+        Profile { memory, ..FLOAT }
+    }
+    const MEMORY: OnChipMemory = FLOAT.memory;
+    static NO_COPY: Profile = with(OnChipMemory { velocity_copies: 0, ..MEMORY });
+    static COPIES: Profile = with(OnChipMemory { velocity_copies: 17, ..MEMORY });
+    static NO_PUMP: Profile = with(OnChipMemory { pump: 0, ..MEMORY });
+    static NO_SHAPE: Profile = Profile { shape_capacity: 0, ..FLOAT };
+    static SHAPES: Profile = Profile { shape_capacity: 193, ..FLOAT };
+    static NO_COLLISION: Profile = Profile { collisions_per_issue: 0, ..FLOAT };
+    static COLLISIONS: Profile = Profile { collisions_per_issue: u32::MAX, ..FLOAT };
+    for (profile, expected) in [
+        (&NO_COPY, "copies of the velocities is 0, expected 1 to 16"),
+        (&COPIES, "copies of the velocities is 17, expected 1 to 16"),
+        (&NO_PUMP, "clocks of the accelerator is 0, expected 1 to 16"),
+        (&NO_SHAPE, "shape table in entries is 0, expected 1 to 192"),
+        (&SHAPES, "shape table in entries is 193, expected 1 to 192"),
+        (&NO_COLLISION, "collisions of an issue is 0, expected 1 to 16"),
+        (&COLLISIONS, "collisions of an issue is 4294967295, expected 1 to 16"),
+    ] {
+        let text = refusal(config(profile));
+        assert!(text.contains(expected), "{text}");
+    }
+    // Sixteen collisions of seven beats need a FIFO of 112.
+    static SIXTEEN: Profile = Profile { collisions_per_issue: 16, shape_capacity: 192, ..FLOAT };
+    let with = |fifo_beats| {
+        let delays = Delays { fifo_beats, ..Delays::default() };
+        BoardConfig { delays, ..config(&SIXTEEN) }
+    };
+    let text = refusal(with(111));
+    assert!(text.contains("beats of an issue is 112, expected 1 to 111"), "{text}");
+    let mut machine = Machine::new(with(112));
+    let outcome = machine.step(&Step::on_ground(3, 17)).expect("the step completes");
+    let reference = unlimited(&FLOAT.default_variant()).step(&Step::on_ground(3, 17));
+    assert_eq!(states(&outcome), states(&reference.expect("the step completes")));
 }
 
 #[test]

@@ -273,6 +273,9 @@ fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers
     if world && numbers.bodies == StreamFormat::Thesis16 {
         return Err(refused("a format with a zero, which is the inverse inertia of a static body"));
     }
+    if (numbers.rows, numbers.updates) == (Precision::F32, Precision::Binary16) {
+        return Err(refused("rows of no more precision than the updates that take them"));
+    }
     Ok(numbers)
 }
 
@@ -385,6 +388,8 @@ mod tests {
             // Sixteen bits on streams that are striped for thirty-two.
             (0x144, 0x0000_0001, "NUMBERS"),
             (0x144, 0x0000_0020, "NUMBERS"),
+            // Rows in f32 for updates in binary16.
+            (0x144, 0x0000_1000, "NUMBERS"),
             (0x128, 0, "CLOCK_KHZ"),
             (0x134, 0, "SHAPE_CAPACITY"),
             (0x134, 193, "SHAPE_CAPACITY"),

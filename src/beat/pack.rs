@@ -310,3 +310,16 @@ impl<'a, 'b> Writer<'a, 'b> {
         total(self.lanes)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interface::profile::FLOAT;
+    use crate::interface::stripe::Stripes;
+
+    /// Or `float` takes the slow path.
+    #[test]
+    fn the_stripes_with_a_path_of_their_own_are_those_of_float() {
+        assert_eq!(FLOAT.stripes, Stripes::new(FLOAT_COLLISIONS, FLOAT_BODIES));
+    }
+}

@@ -197,22 +197,24 @@ fn refused(error: &IdentityError) -> (Line, Outcome) {
 fn contradiction(capabilities: &Capabilities) -> Option<(String, String)> {
     let memory = u64::from(capabilities.memory_bytes);
     let records = [
-        ("bodies", capabilities.body_capacity, 1, capabilities.bytes_per_body),
+        ("body", "bodies", capabilities.body_capacity, 1, capabilities.bytes_per_body),
         (
+            "collision",
             "collisions",
             capabilities.collision_capacity,
             capabilities.collision_capacity,
             capabilities.bytes_per_collision,
         ),
     ];
-    records.into_iter().find_map(|(what, capacity, least, bytes)| {
+    records.into_iter().find_map(|(one, what, capacity, least, bytes)| {
         if capacity == 0 {
             return Some((format!("room for no {what}"), format!("room for {what}")));
         }
         let needed = u64::from(least) * u64::from(bytes);
         (needed > memory).then(|| {
+            let (what, take) = if least == 1 { (one, "takes") } else { (what, "take") };
             (
-                format!("{least} {what} of {bytes} bytes, which take {needed} bytes"),
+                format!("{least} {what} of {bytes} bytes, which {take} {needed} bytes"),
                 format!("no more than the {memory} bytes of on-chip memory"),
             )
         })
@@ -304,7 +306,7 @@ mod tests {
         assert_eq!(contradiction(&good), None);
         // 4 MiB hold 262,144 collisions of 16 bytes.
         let cases = [
-            (Capabilities { memory_bytes: 23, ..good }, "1 bodies of 24 bytes"),
+            (Capabilities { memory_bytes: 23, ..good }, "1 body of 24 bytes, which takes 24"),
             (Capabilities { collision_capacity: 262_145, ..good }, "262145 collisions"),
             (Capabilities { body_capacity: 0, ..good }, "room for no bodies"),
         ];

@@ -336,6 +336,33 @@ pub enum InputError {
         carriers: Carriers,
     },
 
+    /// The constraint rows of a collision leave what the bitstream's arithmetic holds.
+    #[error(
+        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream computes \
+         constraint rows in binary16, which takes {smallest:e} to {largest}: bring it into range, \
+         or load another ({carriers})",
+        contact.map_or_else(String::new, |contact| format!(", contact point {contact}"))
+    )]
+    RowOutOfRange {
+        /// The collision.
+        collision: usize,
+        /// The contact point, if it is a number of one.
+        contact: Option<usize>,
+        /// Lever arm about a body, inverse effective mass, sum of the inverse masses or of the
+        /// contact points.
+        field: &'static str,
+        /// Component of the field, 0 for x; 0 for a mass.
+        component: usize,
+        /// Its magnitude, or the most that rounding can make of it; m or 1/kg.
+        found: f32,
+        /// The smallest magnitude.
+        smallest: f32,
+        /// The largest magnitude that leaves room for the roundings.
+        largest: f32,
+        /// Who computes the rows.
+        carriers: Carriers,
+    },
+
     /// A parameter is outside its range.
     #[error("the {parameter} is {found}, expected {expected}: correct the step parameters")]
     Parameter {
@@ -350,14 +377,17 @@ pub enum InputError {
     /// A parameter is beyond what the bitstream's arithmetic holds.
     #[error(
         "the {parameter} is {found:e}, but this bitstream computes in binary16, which takes \
-         {smallest:e} to {largest}: correct the step parameters, or load another ({carriers})"
+         {}{smallest:e} to {largest}: correct the step parameters, or load another ({carriers})",
+        if *zero { "0, or " } else { "" }
     )]
     ParameterOutOfRange {
         /// The parameter; a gravity component with its axis.
         parameter: &'static str,
         /// Its value.
         found: f32,
-        /// The smallest magnitude.
+        /// Whether 0 is taken as well.
+        zero: bool,
+        /// The smallest magnitude, 0 aside.
         smallest: f32,
         /// The largest magnitude.
         largest: f32,

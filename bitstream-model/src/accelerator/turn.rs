@@ -82,6 +82,9 @@ impl Accelerator {
                 beat: register(body),
             });
         };
+        // A static body's words are not looked at: thesis16 has none for 0.
+        let moves = self.registers.shapes()[usize::from(shape)].inverse_mass != 0.0;
+        let velocity = if moves { velocity } else { Velocity::default() };
         Ok(Arrival { velocity: self.stored_velocity(velocity), shape, inertia })
     }
 

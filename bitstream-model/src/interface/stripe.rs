@@ -16,8 +16,8 @@
 pub struct Stripe {
     /// Stream of each beat of a group.
     pub streams: &'static [u8],
-    /// Whether the last group is always whole: what is missing is filled with beats of zeros, which
-    /// are padding records. Without it the last group ends with the array.
+    /// Whether the last group is always whole: what is missing is filled with zeros that nobody
+    /// decodes. Without it the last group ends with the array.
     pub padded: bool,
 }
 

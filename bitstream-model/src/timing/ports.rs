@@ -107,6 +107,13 @@ impl PortUse {
         self.accesses().div_ceil(PORTS * self.pump.max(1)).max(1)
     }
 
+    /// Whether an issue reads no more than one row and writes no more than one: a port for each is
+    /// then enough, and the block takes its wide shape.
+    #[must_use]
+    pub const fn simple(&self) -> bool {
+        self.reads * self.collisions <= 1 && self.writes * self.collisions <= 1
+    }
+
     /// The same array with other copies and another pump.
     #[must_use]
     pub const fn with(self, copies: u32, pump: u32) -> Self {

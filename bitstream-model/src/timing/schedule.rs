@@ -124,6 +124,31 @@ mod tests {
         }
     }
 
+    /// Or the wide shape of a block, one port each way, could not serve it.
+    #[test]
+    fn a_simple_array_never_has_two_accesses_of_a_kind_at_once() {
+        let mut simple = 0;
+        for profile in PROFILES {
+            for inertia in [Inertia::Isotropic, Inertia::World] {
+                let account = PortAccount::new(&Variant { inertia, ..profile.default_variant() });
+                for ports in account.arrays.into_iter().filter(PortUse::simple) {
+                    simple += 1;
+                    let schedule = ports.schedule();
+                    for kind in [AccessKind::Read, AccessKind::Write] {
+                        let of_kind = |slot: &&Slot| slot.access.is_some_and(|a| a.kind == kind);
+                        let moment = |slot: &Slot| (slot.cycle, slot.phase, slot.copy);
+                        let mut moments: Vec<_> =
+                            schedule.slots.iter().filter(of_kind).map(moment).collect();
+                        let accesses = moments.len();
+                        moments.dedup();
+                        assert_eq!(moments.len(), accesses, "{} {ports:?}", profile.name);
+                    }
+                }
+            }
+        }
+        assert!(simple > 0, "some array is simple");
+    }
+
     /// Thesis §5.5.3: body A from the first copy, body B from the second, both to both.
     #[test]
     fn half_reads_body_a_from_one_copy_and_body_b_from_the_other() {

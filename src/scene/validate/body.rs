@@ -95,7 +95,8 @@ mod tests {
         let demand = Demand { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
         let variant = &profile.default_variant();
         let held = Held::by(&variant.numbers);
-        check_body(7, body, &Scene { shapes: &SHAPES, demand, variant, held })
+        let scene = Scene { shapes: &SHAPES, demand, variant, held, flush_subnormals: false };
+        check_body(7, body, &scene)
     }
 
     fn check(body: &Body) -> Result<(), InputError> {

@@ -7,6 +7,7 @@ mod body;
 mod collision;
 mod parameters;
 mod range;
+mod rows;
 mod shape;
 
 pub(crate) use shape::{needed, validate_shapes};
@@ -15,9 +16,11 @@ use self::body::{check_body, shape_of};
 use self::collision::check_collision;
 use self::parameters::check_parameters;
 use self::range::{Held, check_range};
+use self::rows::Rows;
+use self::shape::check_shapes;
 use super::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
 use crate::record::relative::anchors;
-use bitstream_model::interface::number::StreamFormat;
+use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::{Geometry, Variant};
 
 /// What a bitstream carries.
@@ -75,21 +78,24 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         Demand { bodies: body_count, collisions: collisions.len(), inertia: needed(shapes) };
     check_parameters(parameters, &demand, limits)?;
     check_room(&demand, limits)?;
-    validate_shapes(shapes, limits)?;
+    check_shapes(shapes, &demand, limits)?;
     let held = Held::by(&limits.variant.numbers);
-    let scene = Scene { shapes, demand, variant: &limits.variant, held };
+    let flush_subnormals = limits.flush_subnormals;
+    let scene = Scene { shapes, demand, variant: &limits.variant, held, flush_subnormals };
     for index in 0..body_count {
         check_body(index, &bodies.body(index), &scene)?;
     }
-    let is_static =
-        |index: usize| shapes.get(shape_of(&bodies.body(index))).is_some_and(Shape::is_static);
+    // A body without a shape was refused above.
+    let shape = |index: usize| shapes.get(shape_of(&bodies.body(index))).unwrap_or(&Shape::STATIC);
+    let short_rows = limits.variant.numbers.rows == Precision::Binary16;
     // What is finite in world coordinates is in the range of f32 as it is.
     let in_range = held.collisions == StreamFormat::F32
         && limits.variant.profile.geometry == Geometry::Absolute;
     for index in 0..collisions.len() {
         let collision = collisions.collision(index);
         let (body_a, body_b) = check_collision(index, &collision, body_count)?;
-        let moves = [!is_static(body_a), !is_static(body_b)];
+        let shapes = [shape(body_a), shape(body_b)];
+        let moves = shapes.map(|shape| !shape.is_static());
         if moves == [false, false] {
             return Err(InputError::BothStatic {
                 collision: index,
@@ -103,6 +109,9 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
                 positions = anchors(positions, moves);
             }
             check_range(index, &collision, positions, &scene)?;
+            if short_rows {
+                Rows { index, collision: &collision, positions, shapes }.check(&scene)?;
+            }
         }
     }
     Ok(())
@@ -115,6 +124,7 @@ struct Scene<'a> {
     demand: Demand,
     variant: &'a Variant,
     held: Held,
+    flush_subnormals: bool,
 }
 
 fn check_room(demand: &Demand, limits: &Limits) -> Result<(), InputError> {
@@ -389,6 +399,40 @@ pub(super) mod tests {
             matches!(refused, InputError::CollisionOutOfRange { collision: 0, component: 2, .. }),
             "{refused}"
         );
+    }
+
+    /// 300,000 collisions and shapes with axes: `half` alone has room for the first.
+    #[test]
+    fn shapes_are_refused_with_the_profiles_that_have_room_for_the_scene() {
+        let shapes = [Shape::STATIC, Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 2.0, 3.0] }];
+        let collisions = vec![collision(0, 1); 300_000];
+        let limits = Limits { memory_bytes: 8 << 20, collision_capacity: 524_288, ..FLOAT };
+        let parameters = StepParameters::default();
+        let bodies = [body(0), body(1)];
+        let refused = validate(&bodies[..], &collisions[..], &shapes, &parameters, &limits);
+        let text = refused.expect_err("world inertia is needed").to_string();
+        assert!(text.ends_with("(profiles that could, built with world inertia: half)"), "{text}");
+    }
+
+    /// Each number of it has its place in binary16, and what is made of them has none.
+    #[test]
+    fn rows_are_checked_where_they_are_computed_in_sixteen_bits() {
+        let mut bodies = [body(0), body(1)];
+        bodies[1].pose.position[2] = 300.0;
+        let check = |limits| {
+            let parameters = StepParameters::default();
+            validate(&bodies[..], [collision(1, 0)].as_slice(), &SHAPES, &parameters, limits)
+        };
+        assert_eq!(check(&FLOAT), Ok(()));
+        let refused = check(&HALF).expect_err("1 + 1.5 x 300^2");
+        assert!(
+            matches!(
+                refused,
+                InputError::RowOutOfRange { collision: 0, field: "inverse effective mass", .. }
+            ),
+            "{refused}"
+        );
+        assert_eq!(check(&on(&profile::MIXED, Inertia::Isotropic)), Ok(()));
     }
 
     #[test]

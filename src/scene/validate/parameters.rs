@@ -45,16 +45,19 @@ pub(super) fn check_parameters(
     if computes_short(&limits.variant.numbers) {
         let largest = StreamFormat::Binary16.largest();
         for (parameter, found, ..) in checks {
-            let smallest = match parameter {
+            let nonzero = smallest_short(limits.flush_subnormals);
+            let (zero, smallest) = match parameter {
                 // Its reciprocal is computed.
-                TIME_STEP => smallest_short(limits.flush_subnormals).max(1.0 / largest),
-                _ => 0.0,
+                TIME_STEP => (false, nonzero.max(1.0 / largest)),
+                _ => (true, nonzero),
             };
-            if !(smallest..=largest).contains(&found.abs()) {
+            let fits = (smallest..=largest).contains(&found.abs()) || (zero && found == 0.0);
+            if !fits {
                 let carriers = demand.carriers(|variant| !computes_short(&variant.numbers));
                 return Err(InputError::ParameterOutOfRange {
                     parameter,
                     found,
+                    zero,
                     smallest,
                     largest,
                     carriers,
@@ -175,9 +178,9 @@ mod tests {
         assert_eq!(check(&parameters, &FLOAT), Ok(()));
         assert_eq!(
             check(&parameters, &HALF),
-            Err("the gravity in z is -7e4, but this bitstream computes in binary16, which takes 0e0 \
-                 to 65504: correct the step parameters, or load another (profiles that could: naive, \
-                 float, mixed, windowed)"
+            Err("the gravity in z is -7e4, but this bitstream computes in binary16, which takes 0, or \
+                 5.9604645e-8 to 65504: correct the step parameters, or load another (profiles that \
+                 could: naive, float, mixed, windowed)"
                 .to_owned())
         );
         // The reciprocal of 10 us is 100,000.
@@ -188,5 +191,35 @@ mod tests {
         assert_eq!(check(&time(5e-5), &HALF), Ok(()));
         assert!(check(&time(5e-5), &flush).is_err(), "subnormal in binary16");
         assert_eq!(check(&time(1e-5), &Limits { flush_subnormals: true, ..FLOAT }), Ok(()));
+    }
+
+    #[test]
+    fn what_binary16_would_take_for_zero_is_refused_where_it_computes() {
+        type Set = fn(&mut StepParameters, f32);
+        let sets: [(&str, Set); 5] = [
+            ("position drift", |parameters, value| parameters.position_drift = -value),
+            ("position coefficient", |parameters, value| parameters.position_coefficient = value),
+            ("friction", |parameters, value| parameters.friction = value),
+            ("angular damping", |parameters, value| parameters.angular_damping = value),
+            ("gravity in y", |parameters, value| parameters.gravity[1] = -value),
+        ];
+        let flush = Limits { flush_subnormals: true, ..HALF };
+        let (normal, subnormal) = (2.0_f32.powi(-14), 2.0_f32.powi(-24));
+        for (name, set) in sets {
+            let check = |value, limits| {
+                let mut parameters = StepParameters::default();
+                set(&mut parameters, value);
+                check_parameters(&parameters, &DEMAND, limits).map_err(|error| error.to_string())
+            };
+            for (limits, smallest) in [(&HALF, subnormal), (&flush, normal)] {
+                assert_eq!(check(0.0, limits), Ok(()), "{name}");
+                assert_eq!(check(smallest, limits), Ok(()), "{name}");
+                let text = check(smallest.next_down(), limits).expect_err(name);
+                assert!(text.contains(name), "{text}");
+                assert!(text.contains(&format!("takes 0, or {smallest:e} to 65504")), "{text}");
+            }
+            let f32 = Limits { flush_subnormals: true, ..FLOAT };
+            assert_eq!(check(1e-30, &f32), Ok(()), "{name}");
+        }
     }
 }

@@ -6,7 +6,7 @@ use bitstream_model::interface::profile::{Geometry, Variant};
 
 use super::Scene;
 use crate::record::relative::difference;
-use crate::scene::{CONTACT_POINTS, Collision, InputError};
+use crate::scene::{CONTACT_POINTS, Collision, Contact, InputError};
 
 /// Formats of what a step is given, each the narrowest on its way: stream, arithmetic, array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +71,7 @@ pub(super) fn check_range(
 }
 
 /// Whether a bitstream carries every number of a collision.
-fn fits(variant: &Variant, collision: &Collision, positions: [[f32; 3]; 2]) -> bool {
+pub(super) fn fits(variant: &Variant, collision: &Collision, positions: [[f32; 3]; 2]) -> bool {
     let limit = Held::by(&variant.numbers).collisions.largest();
     let within = |vector: [f32; 3]| {
         (vector[0].abs() <= limit) & (vector[1].abs() <= limit) & (vector[2].abs() <= limit)
@@ -102,11 +102,17 @@ fn vectors(
 }
 
 /// What contact points are streamed relative to.
-fn origin(geometry: Geometry, [a, _]: [[f32; 3]; 2]) -> [f32; 3] {
+pub(super) fn origin(geometry: Geometry, [a, _]: [[f32; 3]; 2]) -> [f32; 3] {
     match geometry {
         Geometry::Absolute => [0.0; 3],
         Geometry::Relative => a,
     }
+}
+
+/// The contact points in use.
+pub(super) fn used(collision: &Collision) -> &[Contact] {
+    let used = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS).min(CONTACT_POINTS);
+    &collision.contacts[..used]
 }
 
 /// Names the number that is known to be out of range.
@@ -124,8 +130,7 @@ fn refused(
         Geometry::Absolute => "point",
         Geometry::Relative => "lever arm of the point",
     };
-    let used = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS).min(CONTACT_POINTS);
-    let of_contacts = collision.contacts[..used].iter().enumerate().flat_map(|(at, contact)| {
+    let of_contacts = used(collision).iter().enumerate().flat_map(|(at, contact)| {
         let [x, y, z] = difference(contact.point, origin(geometry, positions));
         [(point, 0, x), (point, 1, y), (point, 2, z), ("distance", 0, contact.distance)]
             .map(|(field, component, found)| (Some(at), field, component, found))
@@ -156,7 +161,7 @@ mod tests {
     use super::*;
     use crate::interface::number::StreamFormat;
     use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile, WINDOWED16};
-    use crate::scene::{Contact, Demand};
+    use crate::scene::Demand;
 
     const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
     const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
@@ -176,7 +181,8 @@ mod tests {
     ) -> Result<(), InputError> {
         let variant = profile.default_variant();
         let held = Held::by(&variant.numbers);
-        let scene = Scene { shapes: &[], demand: DEMAND, variant: &variant, held };
+        let scene =
+            Scene { shapes: &[], demand: DEMAND, variant: &variant, held, flush_subnormals: false };
         check_range(7, collision, positions, &scene)
     }
 

@@ -10,10 +10,20 @@ use crate::scene::{Demand, InputError, Shape};
 const MASS: &str = "inverse mass";
 const INERTIA: &str = "inverse inertia";
 
-/// What the shape table refuses.
+/// What the shape table refuses, whatever scene it is for.
+pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), InputError> {
+    let demand = Demand { bodies: 0, collisions: 0, inertia: needed(shapes) };
+    check_shapes(shapes, &demand, limits)
+}
+
+/// What the shape table of a scene refuses.
 ///
 /// A moving shape of inverse inertia 0 is legal: it does not rotate.
-pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), InputError> {
+pub(super) fn check_shapes(
+    shapes: &[Shape],
+    demand: &Demand,
+    limits: &Limits,
+) -> Result<(), InputError> {
     if shapes.is_empty() {
         return Err(InputError::NoShapes);
     }
@@ -23,7 +33,6 @@ pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), I
             limit: limits.shape_capacity,
         });
     }
-    let demand = Demand { bodies: 0, collisions: 0, inertia: needed(shapes) };
     // A subnormal would be 0 to a bitstream that flushes them: static there, moving here.
     let usable = |value: f32| value == 0.0 || (value > 0.0 && value.is_normal());
     for (index, shape) in shapes.iter().enumerate() {
