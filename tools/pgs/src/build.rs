@@ -234,6 +234,7 @@ fn part_of(word: &str) -> Option<(&'static Part, &str)> {
 
 #[cfg(test)]
 mod tests {
+    use bitstream_model::EmulatedBoard;
     use bitstream_model::interface::number::{Precision, StreamFormat};
     use clap::ValueEnum;
     use proptest::prelude::*;
@@ -252,12 +253,15 @@ mod tests {
             "half",
             "mixed",
             "float,interlocked",
-            "half,thesis16,f32,unchecked,world",
+            "half,thesis16,f32,unchecked",
+            "half,f32,unchecked,world",
             "half,binary16,arithmetic=binary16,interlocked,window=64,flush,isotropic",
             "float,bandwidth=unlimited,length-width=14,address-width=32",
             "mixed,bandwidth=17.07",
         ] {
-            assert_eq!(build(text).expect(text).to_string(), text);
+            let build = build(text).expect(text);
+            assert_eq!(build.to_string(), text);
+            EmulatedBoard::new(build.config()).expect(text);
         }
     }
 
@@ -290,16 +294,16 @@ mod tests {
 
     #[test]
     fn words_may_stand_in_any_order() {
-        let expected = build("half,thesis16,f32,unchecked,world");
-        assert_eq!(build("half,world,unchecked,arithmetic=f32,format=thesis16"), expected);
+        let expected = build("half,thesis16,f32,unchecked,flush");
+        assert_eq!(build("half,flush,unchecked,arithmetic=f32,format=thesis16"), expected);
     }
 
     #[test]
     fn a_word_means_what_the_option_means() {
-        let config = build("half,thesis16,f32,unchecked,window=9,flush,world").expect("a build");
+        let config = build("half,binary16,f32,unchecked,window=9,flush,world").expect("a build");
         let options = BuildArgs {
             profile: Profile::by_name("half"),
-            format: Some(FormatName::Thesis16),
+            format: Some(FormatName::Binary16),
             arithmetic: Some(ArithmeticName::F32),
             inertia: Some(InertiaName::World),
             hazards: Some(HazardsName::Unchecked),

@@ -76,10 +76,8 @@ pub(crate) struct CompareArgs {
     deadline: DeadlineArgs,
 }
 
-/// What one side of a comparison is: today how its board is built.
-///
-/// What else may differ between two sides without being a part of the board, such as the order in
-/// which the driver sends the collisions, is a word of this text as well, read and written here.
+/// What one side of a comparison is: how its board is built, and nothing else. Start, parameters
+/// and the order in which the driver sends the collisions are those of both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Side {
     pub(super) build: BuildArgs,
@@ -293,7 +291,7 @@ mod tests {
 
     #[test]
     fn a_side_is_written_as_it_is_read() {
-        for text in ["float", "half,thesis16,f32,unchecked,world"] {
+        for text in ["float", "half,thesis16,f32,unchecked", "mixed,flush,world"] {
             assert_eq!(text.parse::<Side>().expect(text).to_string(), text);
         }
         "float,sorted".parse::<Side>().expect_err("no such word");
