@@ -49,7 +49,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Drop`] if the drop is negative, not a number or above
-    /// [`DROP_MAX`](crate::DROP_MAX).
+    /// [`DROP_MAX`](crate::DROP_MAX). [`SceneError::Shape`] does not happen with the kinds above.
     pub fn of_shapes(options: &ShapesOptions) -> Result<Self, SceneError> {
         let drop = check_drop(options.drop)?;
         let mut random = SplitMix(options.seed);
@@ -73,8 +73,8 @@ impl Scene {
                 }
             }
         }
-        let kinds: Vec<(Shape, Geometry)> =
-            KINDS.iter().map(|&(geometry, mass)| (geometry.shape(mass), geometry)).collect();
+        let kinds = KINDS.iter().map(|&(geometry, mass)| Ok((geometry.shape(mass)?, geometry)));
+        let kinds = kinds.collect::<Result<Vec<(Shape, Geometry)>, SceneError>>()?;
         Ok(Self::on_ground(&kinds, bodies))
     }
 }
