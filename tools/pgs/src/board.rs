@@ -14,6 +14,7 @@ use zynq_pgs::{
 };
 
 use crate::args::{BoardName, CommonArgs};
+use crate::build::described;
 use crate::failure::{Cause, Failure};
 use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
 
@@ -181,10 +182,10 @@ impl Opened {
     }
 
     /// The profile with its formats and inertia, as the bitstream says.
-    fn design(&self) -> BuildArgs {
+    fn design(&self) -> String {
         let Variant { profile, numbers, inertia } = self.accelerator.capabilities().variant;
         let numbers = Some(numbers);
-        BuildArgs::of(&BoardConfig { profile, numbers, inertia, ..BoardConfig::default() })
+        described(&BoardConfig { profile, numbers, inertia, ..BoardConfig::default() })
     }
 
     /// Two lines: which board and why, which bitstream.
@@ -227,7 +228,7 @@ impl Opened {
             "kind": self.kind(),
             "reason": self.reason,
             "profile": self.profile(),
-            "design": self.design().to_string(),
+            "design": self.design(),
             "interface_version": [can.version.0, can.version.1],
             "clock_khz": can.clock_khz,
             "interlocked": can.interlocked,
@@ -245,7 +246,7 @@ impl Opened {
             "length_width": can.length_width,
             "address_width": can.address_width,
             "emulation": self.config().map(|config| json!({
-                "build": BuildArgs::of(&config).to_string(),
+                "build": described(&config),
                 "hazards": hazards_text(config.hazards == Hazards::Interlocked),
                 "window_slots": config.window_slots,
                 "subnormals": subnormals_text(config.subnormals == Subnormals::Flush),

@@ -13,8 +13,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use bitstream_model::Bandwidth;
+use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{FLOAT, PROFILES, Profile};
+use bitstream_model::{Bandwidth, BoardConfig};
 use thiserror::Error;
 
 use crate::options::{
@@ -161,6 +162,26 @@ impl BuildArgs {
     }
 }
 
+/// A board as its text, and behind it every format in words where no text says them all, as of a
+/// bitstream that this command cannot build.
+pub(crate) fn described(config: &BoardConfig) -> String {
+    let (build, variant) = (BuildArgs::of(config), config.variant());
+    if build.config().variant() == variant {
+        return build.to_string();
+    }
+    let Numbers { collisions, bodies, rows, updates, velocities, impulses } = variant.numbers;
+    format!(
+        "{build} (streams: collisions {}, bodies {}; arithmetic: rows {}, updates {}; on chip: \
+         velocities {}, impulses {})",
+        collisions.name(),
+        bodies.name(),
+        rows.name(),
+        updates.name(),
+        velocities.name(),
+        impulses.name(),
+    )
+}
+
 impl fmt::Display for BuildArgs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.profile.unwrap_or(&FLOAT).name)?;
@@ -213,6 +234,8 @@ fn part_of(word: &str) -> Option<(&'static Part, &str)> {
 
 #[cfg(test)]
 mod tests {
+    use bitstream_model::EmulatedBoard;
+    use bitstream_model::interface::number::{Precision, StreamFormat};
     use clap::ValueEnum;
     use proptest::prelude::*;
 
@@ -230,27 +253,57 @@ mod tests {
             "half",
             "mixed",
             "float,interlocked",
-            "half,thesis16,f32,unchecked,world",
+            "half,thesis16,f32,unchecked",
+            "half,f32,unchecked,world",
             "half,binary16,arithmetic=binary16,interlocked,window=64,flush,isotropic",
             "float,bandwidth=unlimited,length-width=14,address-width=32",
             "mixed,bandwidth=17.07",
         ] {
-            assert_eq!(build(text).expect(text).to_string(), text);
+            let build = build(text).expect(text);
+            assert_eq!(build.to_string(), text);
+            EmulatedBoard::new(build.config()).expect(text);
+        }
+    }
+
+    #[test]
+    fn formats_that_no_text_says_are_said_in_words() {
+        let of = |name: &str, change: fn(&mut Numbers)| {
+            let profile = Profile::by_name(name).expect(name);
+            let mut numbers = profile.numbers;
+            change(&mut numbers);
+            described(&BoardConfig { profile, numbers: Some(numbers), ..BoardConfig::default() })
+        };
+        assert_eq!(
+            of("half", |numbers| numbers.velocities = Precision::F32),
+            "half (streams: collisions binary16, bodies binary16; arithmetic: rows binary16, updates \
+             binary16; on chip: velocities f32, impulses binary16)"
+        );
+        assert_eq!(
+            of("half", |numbers| numbers.updates = Precision::F32),
+            "half,f32 (streams: collisions binary16, bodies binary16; arithmetic: rows binary16, \
+             updates f32; on chip: velocities binary16, impulses binary16)"
+        );
+        assert_eq!(
+            of("half", |numbers| numbers.bodies = StreamFormat::Thesis16).find('('),
+            Some(14)
+        );
+        for text in ["float", "mixed,flush,world", "half,thesis16,f32", "half,f32,world"] {
+            assert_eq!(described(&build(text).expect(text).config()), text);
         }
     }
 
     #[test]
     fn words_may_stand_in_any_order() {
-        let expected = build("half,thesis16,f32,unchecked,world");
-        assert_eq!(build("half,world,unchecked,arithmetic=f32,format=thesis16"), expected);
+        let expected = build("half,thesis16,f32,unchecked,flush");
+        assert_eq!(build("half,flush,unchecked,arithmetic=f32,format=thesis16"), expected);
     }
 
     #[test]
     fn a_word_means_what_the_option_means() {
-        let config = build("half,thesis16,f32,unchecked,window=9,flush,world").expect("a build");
+        let config = build("half,binary16,f32,unchecked,window=9,flush,world").expect("a build");
         let options = BuildArgs {
             profile: Profile::by_name("half"),
-            format: Some(FormatName::Thesis16),
+            format: Some(FormatName::Binary16),
             arithmetic: Some(ArithmeticName::F32),
             inertia: Some(InertiaName::World),
             hazards: Some(HazardsName::Unchecked),

@@ -147,6 +147,71 @@ fn a_pile_of_shapes_takes_world_inertia_and_loses_its_energy() {
     assert!(number(&last["a"]["penetration"]["mean_m"]) < 0.05, "{last}");
 }
 
+/// How far a board's energy may be off float's in any row, of the start's. Seen: 0.004 % of it.
+const ENERGY: f64 = 0.000_5;
+/// How far any energy may lie above the start's, of it: explicit integration gives a fall of t
+/// seconds g² dt t / 2 J/kg, 0.8 % here.
+const GAIN: f64 = 0.01;
+/// How far the share of position components that stand still may be off float's.
+const UNMOVED: f64 = 0.01;
+/// Length of the difference of momenta, of float's length. Seen: 5 %.
+const MOMENTUM: f64 = 0.1;
+
+/// J, of a state: kinetic and potential.
+fn energy(state: &Value) -> f64 {
+    number(&state["kinetic_energy_j"]) + number(&state["potential_energy_j"])
+}
+
+/// Length of a vector.
+fn length(vector: &Value) -> f64 {
+    let squares = vector.as_array().expect("a vector").iter().map(|value| number(value).powi(2));
+    squares.sum::<f64>().sqrt()
+}
+
+/// What a row shows of B that A does not have: the first of it in words.
+fn strays(row: &Value, start: f64) -> Option<String> {
+    let (a, b) = (&row["a"], &row["b"]);
+    let off = (energy(b) - energy(a)).abs();
+    if off > ENERGY * start {
+        return Some(format!("energy by {off} J"));
+    }
+    if energy(b) > (1.0 + GAIN) * start {
+        return Some(format!("energy above the start's: {} J", energy(b)));
+    }
+    let unmoved = row["difference"]["unmoved_share"].as_f64().unwrap_or_default();
+    if unmoved.abs() >= UNMOVED {
+        return Some(format!("unmoved share by {unmoved}"));
+    }
+    ["linear_momentum_n_s", "angular_momentum_n_m_s"].into_iter().find_map(|name| {
+        let (off, whole) = (length(&row["difference"][name]), length(&a[name]));
+        (off > MOMENTUM * whole).then(|| format!("{name} by {off} of {whole}"))
+    })
+}
+
+#[test]
+fn over_many_steps_mixed_stays_with_float_and_half_freezes() {
+    let scene = ["--grid", "6x6x6", "--steps", "300"];
+    let against_float = |build| compare(&[&["float", build], &scene[..]].concat());
+    let rows = |document: &Value| document["rows"].as_array().expect("rows").clone();
+
+    let mixed = rows(&against_float("mixed"));
+    let start = energy(&mixed[0]["a"]);
+    assert_eq!(mixed.len(), 12);
+    for row in &mixed[1..] {
+        assert_eq!(strays(row, start), None, "step {}", row["step"]);
+        assert!(energy(&row["a"]) <= (1.0 + GAIN) * start, "step {}", row["step"]);
+    }
+    let fell = energy(&mixed[11]["a"]);
+    assert!(fell < 0.6 * start, "a pile that lies has lost its fall: {fell} of {start} J");
+
+    // The same measures see what sixteen bits throughout do to the pile.
+    let half = rows(&against_float("half"));
+    let straying = half[1..].iter().filter(|row| strays(row, start).is_some()).count();
+    assert!(straying >= 8, "{straying}");
+    let frozen = number(&half[11]["difference"]["unmoved_share"]);
+    assert!(frozen > 0.5, "{frozen}");
+}
+
 #[test]
 fn a_board_that_fails_stops_and_the_other_goes_on() {
     let arguments = ["compare", "float,bandwidth=0.1", "float,unchecked", "--deadline", "1"];

@@ -66,10 +66,22 @@ fn the_totals_of_tables_4_1_to_4_6_are_exact() {
             assert_eq!(row["beats"], row["thesis_beats"], "{id}");
             near(&row["mib"], *mib, 0.005);
             near(&row["difference_percent"], 0.0, 0.0);
+            near(&row["beats_difference_percent"], 0.0, 0.0);
+            // The thesis cuts two of its footprints off where it rounds all others.
+            let printed = match (id, row["state"].as_str()) {
+                ("T4.3", Some("after")) => 1.03,
+                ("T4.5", Some("after")) => 15.00,
+                _ => *mib,
+            };
+            near(&row["thesis_mib"], printed, 1e-9);
+            near(&row["mib_difference_percent"], (mib / printed - 1.0) * 100.0, 1e-9);
             assert_eq!(row["kind"], "exact");
         }
     }
     let before = row(&document, "T4.1", &[("state", "before")]);
+    let streamed = row(&document, "records", &[("profile", "float")]);
+    // A result has 16 words with its padding where the thesis counts 6.
+    near(&streamed["output_difference_percent"], (16.0 / 6.0 - 1.0) * 100.0, 1e-9);
     let each = [&before["each"], &before["each_bytes"], &before["each_beats"]];
     assert_eq!(each, [&json!(56), &json!(224), &json!(14.0)]);
 }
@@ -126,7 +138,16 @@ fn on_chip_memory_is_that_of_section_4_4_2() {
     let [dsp, lut, ff] = ["dsp", "lut", "ff"].map(|key| logic("half")[key].clone());
     assert_eq!([dsp, lut, ff], [42.0, 49.0, 29.0]);
     assert_eq!(logic("float")["kind"], "recorded");
-    assert_eq!(logic("mixed")["dsp"], Value::Null);
+    assert_eq!((&logic("mixed")["dsp"], &logic("mixed")["kind"]), (&Value::Null, &json!("open")));
+    // By bits, of what the thesis' synthesis reported.
+    near(&blocks("float")["ideal_difference_percent"], 70.56 / 70.0 * 100.0 - 100.0, 0.01);
+    near(&blocks("half")["ideal_difference_percent"], 46.38 / 48.0 * 100.0 - 100.0, 0.01);
+    for profile in ["float", "half"] {
+        let shares = ["shaped_percent", "thesis_percent"].map(|key| blocks(profile)[key].as_f64());
+        let [shaped, thesis] = shares.map(|share| share.expect("a share"));
+        near(&blocks(profile)["shaped_difference_percent"], (shaped / thesis - 1.0) * 100.0, 1e-9);
+    }
+    assert_eq!(blocks("mixed")["shaped_difference_percent"], Value::Null);
 }
 
 #[test]
@@ -288,8 +309,9 @@ fn the_json_keys_are_stable() {
         for row in table["rows"].as_array().expect("rows") {
             assert_eq!(keys(row), columns, "{}", table["id"]);
             let kind = &row["kind"];
-            let known = ["exact", "modelled", "recorded"].iter().any(|known| kind == *known);
-            assert!(known || kind.is_null() && table["id"] == "logic", "{row}");
+            let known =
+                ["exact", "modelled", "recorded", "open"].iter().any(|known| kind == *known);
+            assert!(known, "{row}");
         }
     }
 }
@@ -303,7 +325,9 @@ fn another_step_is_not_held_against_the_thesis() {
     );
     let after = row(&document, "T4.1", &[("state", "after")]);
     assert_eq!(after["words"], 27 * 3001 + 6 * 1000);
-    assert_eq!(after["difference_percent"], Value::Null);
+    for of in ["difference_percent", "mib_difference_percent", "beats_difference_percent"] {
+        assert_eq!(after[of], Value::Null);
+    }
     let half = row(&document, "cycles", &[("profile", "half"), ("records", "streamed")]);
     assert_eq!((&half["pass"], &half["difference_percent"]), (&json!(1501 * 3), &Value::Null));
 }
@@ -330,7 +354,7 @@ fn the_text_is_aligned_and_fits_a_wide_terminal() {
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     assert!(ran.stdout.contains("float    packed     14,580    254,000  2,680"), "{}", ran.stdout);
     for line in ran.stdout.lines() {
-        assert!(line.chars().count() <= 132, "{line}");
+        assert!(line.chars().count() <= 140, "{line}");
         assert_eq!(line, line.trim_end());
     }
 }

@@ -1,5 +1,7 @@
 //! This file holds what can be wrong with a request for a scene.
 
+use zynq_pgs::InputError;
+
 /// Why a scene could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -40,4 +42,7 @@ pub enum SceneError {
         /// Most spheres.
         most: u32,
     },
+    /// A body has sizes or a mass that no shape has.
+    #[error(transparent)]
+    Shape(#[from] InputError),
 }

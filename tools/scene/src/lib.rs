@@ -31,6 +31,7 @@ mod error;
 mod geometry;
 mod grid;
 mod measure;
+mod random;
 mod rotation;
 mod several;
 mod spheres;

@@ -3,6 +3,7 @@
 use zynq_pgs::{Body, Shape};
 
 use crate::build::{at_rest, check_drop};
+use crate::random::SplitMix64;
 use crate::{Geometry, Grid, Scene, SceneError};
 
 /// The kinds of bodies: outline, and mass in kg. Boxes and capsules have other inertias about other
@@ -49,10 +50,10 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Drop`] if the drop is negative, not a number or above
-    /// [`DROP_MAX`](crate::DROP_MAX).
+    /// [`DROP_MAX`](crate::DROP_MAX). [`SceneError::Shape`] does not happen with the kinds above.
     pub fn of_shapes(options: &ShapesOptions) -> Result<Self, SceneError> {
         let drop = check_drop(options.drop)?;
-        let mut random = SplitMix(options.seed);
+        let mut random = SplitMix64::new(options.seed);
         let (x, y, z) = (options.grid.x(), options.grid.y(), options.grid.z());
         let centred =
             |index: u16, count: u16| SPACING * (f32::from(index) - 0.5 * (f32::from(count) - 1.0));
@@ -66,56 +67,30 @@ impl Scene {
                         SPACING * (0.5 + f32::from(j)) + drop,
                         centred(k, z) + shift,
                     ];
+                    const { assert!(KINDS.len() == 8) };
                     // Shape 0 is the ground's.
                     let mut body = at_rest(position, 1 + random.below_eight());
-                    body.pose.orientation = random.orientation();
+                    body.pose.orientation = orientation(&mut random);
                     bodies.push(body);
                 }
             }
         }
-        let kinds: Vec<(Shape, Geometry)> =
-            KINDS.iter().map(|&(geometry, mass)| (geometry.shape(mass), geometry)).collect();
+        let kinds = KINDS.iter().map(|&(geometry, mass)| Ok((geometry.shape(mass)?, geometry)));
+        let kinds = kinds.collect::<Result<Vec<(Shape, Geometry)>, SceneError>>()?;
         Ok(Self::on_ground(&kinds, bodies))
     }
 }
 
-/// Numbers at random, from Steele, Lea and Flood's `SplitMix64`.
-struct SplitMix(u64);
-
-impl SplitMix {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// One of the kinds.
-    fn below_eight(&mut self) -> u32 {
-        const { assert!(KINDS.len() == 8) };
-        #[allow(clippy::cast_possible_truncation, reason = "three bits")]
-        let kind = (self.next() >> 61) as u32;
-        kind
-    }
-
-    /// A number from -1 to 1.
-    fn sign(&mut self) -> f32 {
-        #[allow(clippy::cast_possible_truncation, reason = "24 bits, which an f32 carries")]
-        let number = (self.next() >> 40) as u32;
-        number as f32 / 8_388_608.0 - 1.0
-    }
-
-    /// A unit quaternion, every direction as likely as any other.
-    fn orientation(&mut self) -> [f32; 4] {
-        loop {
-            let q = [(); 4].map(|()| self.sign());
-            let squared = ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3];
-            // In the ball, and not so near to its centre that rounding decides the direction. Of
-            // the cube around it three in ten are.
-            if (0.01..=1.0).contains(&squared) {
-                let length = squared.sqrt();
-                return q.map(|value| value / length);
-            }
+/// A unit quaternion, every direction as likely as any other.
+fn orientation(random: &mut SplitMix64) -> [f32; 4] {
+    loop {
+        let q = [(); 4].map(|()| random.sign());
+        let squared = ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3];
+        // In the ball, and not so near to its centre that rounding decides the direction. Of the
+        // cube around it three in ten are.
+        if (0.01..=1.0).contains(&squared) {
+            let length = squared.sqrt();
+            return q.map(|value| value / length);
         }
     }
 }
@@ -162,8 +137,6 @@ mod tests {
         };
         assert_eq!(bits(1), bits(1));
         assert_ne!(bits(1), bits(2));
-        // The first number of SplitMix64 from 0 is published with it.
-        assert_eq!(SplitMix(0).next(), 0xE220_A839_7B1D_CDAF);
     }
 
     #[test]

@@ -10,6 +10,7 @@
 use zynq_pgs::{Body, Collision, Contact, Shape};
 
 use crate::build::at_rest;
+use crate::random::SplitMix64;
 use crate::{GROUND, GROUND_HALF_EXTENT, MARGIN, SceneError};
 
 /// Radii, m; every third sphere has the same one.
@@ -93,7 +94,7 @@ fn radius(index: usize) -> f32 {
 impl Pile {
     /// Spheres at random places, so thinly that they hardly overlap.
     fn new(count: u32, seed: u64) -> Self {
-        let mut random = SplitMix64(seed);
+        let mut random = SplitMix64::new(seed);
         let count = count as usize;
         // Wide as twice its height when it has settled, and half as dense before.
         let volume: f32 = (0..count).map(|k| 7.0 * radius(k) * radius(k) * radius(k)).sum();
@@ -273,35 +274,9 @@ impl Cells {
     }
 }
 
-/// Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
-struct SplitMix64(u64);
-
-impl SplitMix64 {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// From 0 up to, and without, 1.
-    fn unit(&mut self) -> f32 {
-        // 24 bits are exact in an f32.
-        (self.next() >> 40) as f32 / 16_777_216.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_are_those_of_splitmix64() {
-        let mut random = SplitMix64(1_234_567);
-        assert_eq!(random.next(), 6_457_827_717_110_365_317);
-        assert_eq!(random.next(), 3_203_168_211_198_807_973);
-    }
 
     #[test]
     fn a_cube_root_is_one() {

@@ -2,7 +2,7 @@
 
 use zynq_pgs::{Body, Shape};
 
-use super::{dot, inverted, is_isotropic, moving, rotation, to_body};
+use super::{dot, inverted, moving, rotation, to_body};
 
 /// Kinetic energy of the moving bodies, J.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -32,7 +32,7 @@ pub fn kinetic_energy_parts(bodies: &[Body], shapes: &[Shape]) -> KineticEnergy 
         energy.translational += dot(v, v) * inverted(shape.inverse_mass) / 2.0;
         let w = body.velocity.angular.map(f64::from);
         let inertia = shape.inverse_inertia.map(inverted);
-        energy.rotational += if is_isotropic(shape) {
+        energy.rotational += if shape.is_isotropic() {
             dot(w, w) * inertia[0] / 2.0
         } else {
             let [x, y, z] = to_body(&rotation(body.pose.orientation), w);

@@ -37,13 +37,6 @@ fn inverted(inverse: f32) -> f64 {
     if inverse == 0.0 { 0.0 } else { 1.0 / f64::from(inverse) }
 }
 
-/// Whether a shape has the same inertia about every axis, so that no axes need to be turned.
-#[allow(clippy::float_cmp, reason = "the driver tells them apart by their bits as well")]
-fn is_isotropic(shape: &Shape) -> bool {
-    let [x, y, z] = shape.inverse_inertia;
-    x == y && x == z
-}
-
 /// Rows of the rotation matrix of a quaternion x, y, z, w, which need not be of length 1: world =
 /// matrix * body.
 fn rotation([x, y, z, w]: [f32; 4]) -> [[f64; 3]; 3] {

@@ -2,7 +2,7 @@
 
 use zynq_pgs::{Body, Shape};
 
-use super::{cross, inverted, is_isotropic, moving, rotation, to_body, to_world};
+use super::{cross, inverted, moving, rotation, to_body, to_world};
 
 /// Total momentum of the moving bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -23,7 +23,7 @@ pub fn momentum(bodies: &[Body], shapes: &[Shape]) -> Momentum {
         let orbital = cross(body.pose.position.map(f64::from), linear);
         let w = body.velocity.angular.map(f64::from);
         let inertia = shape.inverse_inertia.map(inverted);
-        let spin = if is_isotropic(shape) {
+        let spin = if shape.is_isotropic() {
             w.map(|w| w * inertia[0])
         } else {
             let rows = rotation(body.pose.orientation);

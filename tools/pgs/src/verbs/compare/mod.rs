@@ -319,7 +319,7 @@ mod tests {
     fn a_side_is_written_as_it_is_read() {
         for text in [
             "float",
-            "half,thesis16,f32,unchecked,world",
+            "half,thesis16,f32,unchecked",
             "float,unchecked,hazard-free",
             "mixed,body-by-body-oldest",
             "float,auto",

@@ -4,7 +4,7 @@ use bitstream_model::timing::thesis::data::{DataTable, TABLES};
 use bitstream_model::timing::{Records, StepTraffic};
 
 use super::report::{Cell, Kind, Table, text};
-use super::scene::{Scene, mib};
+use super::scene::{Scene, mib, printed_mib};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     let mut tables: Vec<Table> = TABLES.iter().map(|table| accounted(scene, table)).collect();
@@ -36,14 +36,18 @@ fn accounted(scene: &Scene, data: &DataTable) -> Table {
             ("difference_percent", "diff."),
             ("mib", "MiB"),
             ("thesis_mib", "thesis"),
+            ("mib_difference_percent", "diff."),
             ("beats", "beats"),
             ("thesis_beats", "thesis"),
+            ("beats_difference_percent", "diff."),
             ("kind", "kind"),
         ],
     );
     let (bodies, collisions) = (scene.step.bodies, scene.step.collisions);
     for row in data.rows {
         let (words, printed) = (row.words(bodies, collisions), row.printed);
+        let (bytes, beats) = (row.bytes(bodies, collisions), row.beats(bodies, collisions));
+        let thesis_mib = printed.centi_mebibytes as f64 / 100.0;
         table.row([
             text(row.name),
             Cell::Whole(printed.each.into()),
@@ -53,10 +57,12 @@ fn accounted(scene: &Scene, data: &DataTable) -> Table {
             Cell::Whole(words),
             Cell::Whole(printed.words),
             scene.difference(words as f64, printed.words as f64),
-            Cell::Number(mib(row.bytes(bodies, collisions)), 2),
-            Cell::Number(printed.centi_mebibytes as f64 / 100.0, 2),
-            Cell::Whole(row.beats(bodies, collisions)),
+            Cell::Number(mib(bytes), 2),
+            Cell::Number(thesis_mib, 2),
+            scene.difference(printed_mib(bytes), thesis_mib),
+            Cell::Whole(beats),
             Cell::Whole(printed.beats),
+            scene.difference(beats as f64, printed.beats as f64),
             Kind::Exact.cell(),
         ]);
     }
@@ -81,6 +87,7 @@ fn streamed(scene: &Scene) -> Table {
             ("input_difference_percent", "difference"),
             ("output", "words out"),
             ("thesis_output", "thesis"),
+            ("output_difference_percent", "difference"),
             ("kind", "kind"),
         ],
     );
@@ -90,7 +97,7 @@ fn streamed(scene: &Scene) -> Table {
         let traffic = StepTraffic::new(variant, Records::Streamed, &scene.step);
         let arrays = [traffic.velocities, traffic.collisions, traffic.poses];
         let bytes = arrays.iter().fold(0_u64, |sum, array| sum.saturating_add(array.bytes));
-        let ours = bytes / 4;
+        let (ours, results) = (bytes / 4, traffic.results.bytes / 4);
         table.row([
             text(variant.profile.name),
             Cell::Whole(words.velocity.into()),
@@ -100,8 +107,9 @@ fn streamed(scene: &Scene) -> Table {
             Cell::Whole(ours),
             Cell::Whole(input),
             scene.difference(ours as f64, input as f64),
-            Cell::Whole(traffic.results.bytes / 4),
+            Cell::Whole(results),
             Cell::Whole(output),
+            scene.difference(results as f64, output as f64),
             Kind::Exact.cell(),
         ]);
     }

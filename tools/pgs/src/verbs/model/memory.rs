@@ -5,7 +5,7 @@ use bitstream_model::timing::thesis::recorded::Design;
 use bitstream_model::timing::{BLOCKS, HP_PORTS, MemoryUse, StreamDemand};
 
 use super::report::{Cell, Kind, Table, text};
-use super::scene::{Scene, mib, yes_or_no};
+use super::scene::{Scene, mib, printed_mib, yes_or_no};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     vec![footprint(scene), arrays(scene), blocks(scene), logic(scene)]
@@ -39,12 +39,11 @@ fn footprint(scene: &Scene) -> Table {
     );
     for (variant, memory) in uses(scene) {
         let design = Design::of(variant.profile);
-        // The thesis prints two digits: what rounds to them is the same figure.
-        let rounded = |bytes: u64| (mib(bytes) * 100.0).round() / 100.0;
         let beside = |bytes: u64, theirs: fn(&Design) -> f64| {
             let thesis = design.map_or(Cell::Missing, |design| Cell::Number(theirs(design), 2));
-            let off = design
-                .map_or(Cell::Missing, |design| scene.difference(rounded(bytes), theirs(design)));
+            let off = design.map_or(Cell::Missing, |design| {
+                scene.difference(printed_mib(bytes), theirs(design))
+            });
             [Cell::Number(mib(bytes), 2), thesis, off]
         };
         let [ours, thesis, off] = beside(memory.block_ram(), |design| design.mebibytes);
@@ -128,12 +127,19 @@ fn blocks(scene: &Scene) -> Table {
             ("shaped_blocks", "by shape"),
             ("shaped_percent", "share"),
             ("thesis_percent", "thesis"),
+            ("ideal_difference_percent", "by bits off"),
+            ("shaped_difference_percent", "by shape off"),
             ("shaped_fit", "fits by shape"),
             ("kind", "kind"),
         ],
     );
-    let share = |blocks: u64| Cell::Share(blocks as f64 / BLOCKS as f64 * 100.0);
+    let percent = |blocks: u64| blocks as f64 / BLOCKS as f64 * 100.0;
+    let share = |blocks: u64| Cell::Share(percent(blocks));
     for (variant, memory) in uses(scene) {
+        let thesis = Design::of(variant.profile).map(|design| f64::from(design.block_ram));
+        let off = |blocks: u64| {
+            thesis.map_or(Cell::Missing, |thesis| scene.difference(percent(blocks), thesis))
+        };
         let (ideal, shaped) = (memory.ideal_blocks(), memory.shaped_blocks());
         table.row([
             text(variant.profile.name),
@@ -141,8 +147,9 @@ fn blocks(scene: &Scene) -> Table {
             share(ideal),
             Cell::Whole(shaped),
             share(shaped),
-            Design::of(variant.profile)
-                .map_or(Cell::Missing, |design| Cell::Share(design.block_ram.into())),
+            thesis.map_or(Cell::Missing, Cell::Share),
+            off(ideal),
+            off(shaped),
             text(yes_or_no(shaped <= BLOCKS)),
             Kind::Modelled.cell(),
         ]);
@@ -183,7 +190,7 @@ fn logic(scene: &Scene) -> Table {
                 Cell::Missing,
                 Cell::Missing,
                 text("not known: nothing was synthesised"),
-                Cell::Missing,
+                Kind::Open.cell(),
             ]),
         }
     }

@@ -37,7 +37,7 @@ Examples:
   pgs model --markdown > tables.md
 
 Every row says what it is: exact (counted), modelled (by formula: a step that stalls on hazards
-takes longer) or recorded (a figure of the thesis). Nothing here was measured.";
+takes longer), recorded (a figure of the thesis) or open (nobody knows). Nothing here was measured.";
 
 /// Number of this verb's JSON layout: 2 since it holds several profiles and the tables.
 const SCHEMA: u32 = 2;
@@ -228,7 +228,7 @@ fn head(args: &ModelArgs, scene: &Scene) -> Vec<String> {
     }
     lines.push(
         "Exact: counted. Modelled: by formula, without stalls on hazards. Recorded: the thesis'. \
-         Nothing was measured."
+         Open: not known. Nothing was measured."
             .to_owned(),
     );
     lines

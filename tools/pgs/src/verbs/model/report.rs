@@ -11,6 +11,8 @@ pub(super) enum Kind {
     Modelled,
     /// Taken from the thesis.
     Recorded,
+    /// Not known.
+    Open,
 }
 
 impl Kind {
@@ -19,6 +21,7 @@ impl Kind {
             Self::Exact => "exact",
             Self::Modelled => "modelled",
             Self::Recorded => "recorded",
+            Self::Open => "open",
         })
     }
 }

@@ -35,6 +35,11 @@ pub(super) fn mib(bytes: u64) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 
+/// MiB with the two digits that the thesis prints: what rounds to them is the same figure.
+pub(super) fn printed_mib(bytes: u64) -> f64 {
+    (mib(bytes) * 100.0).round() / 100.0
+}
+
 pub(super) fn yes_or_no(yes: bool) -> &'static str {
     if yes { "yes" } else { "no" }
 }

@@ -1,0 +1,64 @@
+//! This file draws numbers at random, the same for a seed on every machine.
+
+/// Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
+#[derive(Debug)]
+pub(crate) struct SplitMix64(u64);
+
+impl SplitMix64 {
+    pub(crate) const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// One of eight.
+    pub(crate) fn below_eight(&mut self) -> u32 {
+        #[allow(clippy::cast_possible_truncation, reason = "three bits")]
+        let number = (self.next() >> 61) as u32;
+        number
+    }
+
+    /// From 0 up to, and without, 1.
+    pub(crate) fn unit(&mut self) -> f32 {
+        // 24 bits are exact in an f32.
+        (self.next() >> 40) as f32 / 16_777_216.0
+    }
+
+    /// From -1 up to, and without, 1.
+    pub(crate) fn sign(&mut self) -> f32 {
+        // Exact, as above.
+        (self.next() >> 40) as f32 / 8_388_608.0 - 1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_those_that_were_published() {
+        assert_eq!(SplitMix64::new(0).next(), 0xE220_A839_7B1D_CDAF);
+        let mut random = SplitMix64::new(1_234_567);
+        assert_eq!(random.next(), 6_457_827_717_110_365_317);
+        assert_eq!(random.next(), 3_203_168_211_198_807_973);
+    }
+
+    #[test]
+    fn every_kind_of_number_fills_its_range() {
+        let mut random = SplitMix64::new(3);
+        let (mut eight, mut least, mut most) = ([false; 8], 1.0_f32, -1.0_f32);
+        for _ in 0..1000 {
+            eight[usize::try_from(random.below_eight()).expect("small")] = true;
+            let (unit, sign) = (random.unit(), random.sign());
+            assert!((0.0..1.0).contains(&unit) && (-1.0..1.0).contains(&sign), "{unit} {sign}");
+            (least, most) = (least.min(sign), most.max(sign));
+        }
+        assert_eq!(eight, [true; 8]);
+        assert!(least < -0.99 && most > 0.99, "{least} to {most}");
+    }
+}
