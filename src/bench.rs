@@ -6,7 +6,7 @@ use bitstream_model::interface::record::Beat;
 
 use crate::beat::pack::pack_collisions;
 use crate::beat::stripe::Segment;
-use crate::scene::{Bodies, Collisions};
+use crate::scene::{Bodies, Collisions, Shape};
 
 /// Packs collisions as a step does, into memory of its own instead of a board's.
 #[derive(Debug)]
@@ -28,16 +28,18 @@ impl CollisionPacker {
         &mut self,
         bodies: &B,
         collisions: &C,
+        shapes: &[Shape],
     ) -> u32 {
+        let count = collisions.len();
         let layout = Segment::Collisions.layout(&self.variant);
         let streams = self.variant.profile.mm2s_widths.len();
         let used = &mut self.channels[..streams];
         for (place, channel) in used.iter_mut().enumerate() {
-            channel.resize(layout.beats_on_channel(collisions.len(), place), Beat::default());
+            channel.resize(layout.beats_on_channel(count, place), Beat::default());
         }
         let mut channels = self.channels.each_mut().map(Vec::as_mut_slice);
         let channels = &mut channels[..streams];
-        pack_collisions(&self.variant, bodies, collisions, collisions.len(), channels)
+        pack_collisions(&self.variant, bodies, collisions, count, shapes, channels)
     }
 }
 
@@ -60,7 +62,7 @@ mod tests {
         };
         // All other words are zero.
         assert_eq!(
-            CollisionPacker::new(FLOAT.default_variant()).pack(&bodies, &vec![collision; 7]),
+            CollisionPacker::new(FLOAT.default_variant()).pack(&bodies, &vec![collision; 7], &[]),
             7 * (4 + 1)
         );
     }

@@ -8,8 +8,11 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use bitstream_model::{BoardConfig, EmulatedBoard, Hazards};
+use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Accelerator, Body, Collision, Contact, OpenOptions, Pose, Shape, StepParameters, Velocity,
+    Accelerator, BoardChoice, Body, Collision, Contact, OpenOptions, Pose, Shape, StepParameters,
+    Velocity,
 };
 
 thread_local! {
@@ -48,9 +51,13 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-#[test]
-fn steps_two_to_ten_allocate_nothing() {
-    let mut accelerator = Accelerator::open(OpenOptions::default()).expect("the emulated board");
+/// Ten steps of a row of cubes on the ground, each also in contact with the next; the allocations of
+/// each.
+fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
+    let board = EmulatedBoard::new(config).expect("a board that can be built");
+    let options =
+        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
+    let mut accelerator = Accelerator::open(options).expect("the emulated board");
     accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("they fit");
     let body = |y, shape| Body {
         pose: Pose { position: [0.0, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
@@ -63,23 +70,40 @@ fn steps_two_to_ten_allocate_nothing() {
         bodies.push(body(0.99, 1));
         let contact = Contact { point: [0.5, -0.01, 0.25], distance: -0.01 };
         collisions.push(Collision {
-            body_a: 0,
+            body_a: cube - 1,
             body_b: cube,
             normal: [0.0, -1.0, 0.0],
             count: 1,
             contacts: [contact; 4],
         });
     }
+    let mut parameters = StepParameters::default();
+    parameters.order = order;
     let mut counted = Vec::with_capacity(10);
     for step in 0..10 {
         // The number of collisions changes, as it does in a scene that moves.
         let of_step = &collisions[step % 3..];
         let before = COUNTED.get();
-        accelerator
-            .step(&mut bodies, of_step, &StepParameters::default())
-            .expect("nothing disturbs it");
+        accelerator.step(&mut bodies, of_step, &parameters).expect("nothing disturbs it");
         counted.push(COUNTED.get() - before);
     }
+    counted
+}
+
+#[test]
+fn steps_two_to_ten_allocate_nothing() {
+    let counted = allocations(BoardConfig::default(), None);
     assert!(counted[0] > 0, "the first step makes buffers: does the allocator count?");
     assert_eq!(counted[1..], [0; 9], "{counted:?}");
+}
+
+/// How many entries stay empty depends on which collisions there are: each of the three sizes comes
+/// once before nothing may be allocated.
+#[test]
+fn an_order_allocates_nothing_once_it_has_seen_a_step_of_that_size() {
+    let unchecked = BoardConfig { hazards: Hazards::Unchecked, ..BoardConfig::default() };
+    for (config, order) in [(BoardConfig::default(), Some(Order::HazardFree)), (unchecked, None)] {
+        let counted = allocations(config, order);
+        assert_eq!(counted[3..], [0; 7], "{:?} {order:?}: {counted:?}", config.hazards);
+    }
 }

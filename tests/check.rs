@@ -77,7 +77,8 @@ fn a_board_as_it_should_be_passes_every_line() {
     assert_eq!(detail(&report, "identification"), "0x50475331 (\"PGS1\")");
     assert_eq!(detail(&report, "interface version"), "1.1");
     assert!(detail(&report, "capabilities").starts_with(
-        "profile float, 4 + 4 streams of 128 bits, collisions in f32 and bodies in f32, 275000 kHz"
+        "profile float, 4 + 4 streams of 128 bits, collisions in f32, velocities in \
+         f32 and poses in f32, 275000 kHz"
     ));
     assert!(detail(&report, "length register").starts_with("26 bits on 8 channels"));
     assert!(detail(&report, "echo").contains("1, 7, 101, 4099 bodies"));

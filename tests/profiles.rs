@@ -12,8 +12,12 @@ use zynq_pgs::{
 };
 
 /// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
-const THESIS16: Numbers =
-    Numbers { collisions: StreamFormat::Thesis16, bodies: StreamFormat::Thesis16, ..Numbers::F32 };
+const THESIS16: Numbers = Numbers {
+    collisions: StreamFormat::Thesis16,
+    bodies: StreamFormat::Thesis16,
+    poses: StreamFormat::Thesis16,
+    ..Numbers::F32
+};
 
 fn of(profile: &'static Profile) -> BoardConfig {
     BoardConfig { profile, ..BoardConfig::default() }
@@ -39,11 +43,12 @@ fn step(config: BoardConfig) -> Stepped {
     let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
     let mut scene = Scene::new(&options).expect("a small scene");
     // Off the grid, so that coordinates have more digits than sixteen bits hold.
-    for (index, body) in (0_u16..).zip(scene.bodies_mut()).skip(1) {
-        let off = f32::from(index * 7919 % 101) / 10_007.0;
+    for (index, body) in (0_u32..).zip(scene.bodies_mut()).skip(1) {
+        let digit = u16::try_from(index * 7919 % 101).expect("below 101");
+        let off = f32::from(digit) / 10_007.0;
         body.pose.position[0] += off;
         body.pose.position[2] -= 1.7 * off;
-        body.velocity = Velocity { linear: [off, -off, 3.3 * off], angular: [0.0, off, 0.0] };
+        body.velocity = Velocity { linear: [off, -1.0 - off, 3.3 * off], angular: [0.0, off, 0.0] };
     }
     scene.detect();
     accelerator.set_shapes(scene.shapes()).expect("they fit");
@@ -114,7 +119,13 @@ fn sixteen_bits_stay_near_float() {
 fn a_step_costs_the_bytes_and_doorbells_of_its_profile() {
     for profile in PROFILES {
         let StepReport {
-            bodies, collisions, bytes_to_device, bytes_from_device, doorbells, ..
+            bodies,
+            collisions,
+            empty,
+            bytes_to_device,
+            bytes_from_device,
+            doorbells,
+            ..
         } = step(of(profile)).report;
         assert!(collisions % 2 == 1 || bodies % 5 != 0, "the pile needs padding");
         let five = |beats: u64| beats.next_multiple_of(5);
@@ -126,6 +137,15 @@ fn a_step_costs_the_bytes_and_doorbells_of_its_profile() {
                 (2 * five(bodies) + 8 * 7 * pairs, five(2 * bodies), 3)
             }
             "mixed" => (4 * bodies + 8 * 3 * collisions, 4 * bodies, 3),
+            // All but the ground, and every collision once.
+            "windowed" => {
+                let moving = bodies - 1;
+                (4 * moving + 6 * (collisions + empty), 4 * moving, 4)
+            }
+            "windowed16" => {
+                let moving = bodies - 1;
+                (3 * moving + 3 * (collisions + empty), 4 * moving, 4)
+            }
             other => panic!("{other}: its bytes are not written down here"),
         };
         assert_eq!((bytes_to_device, bytes_from_device), (16 * beats_in, 16 * beats_out));
@@ -149,7 +169,7 @@ fn any_number_of_bodies_and_collisions_goes_through_every_profile() {
                 accelerator
                     .step(&mut bodies, &collisions, &StepParameters::default())
                     .unwrap_or_else(|error| {
-                        panic!("{} {cubes}: {error}: {:?}", profile.name, board.violations())
+                        panic!("{} {cubes}: {error:?}: {:?}", profile.name, board.violations())
                     });
                 assert_eq!(bits(&bodies[..1]), bits(&row(cubes).0[..1]), "the ground stays");
                 for body in &bodies[1..] {
@@ -208,7 +228,8 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     assert_eq!(
         refused(of(&HALF), &mut bodies, &collisions),
         "body 2: position[0] is 70000, but this bitstream holds bodies in binary16, which ends at \
-         65504: bring it into range, or load another (profiles that could: naive, float, mixed)"
+         65504: bring it into range, or load another (profiles that could: naive, float, mixed, \
+         windowed, windowed16)"
     );
     let thesis = BoardConfig { numbers: Some(THESIS16), ..of(&HALF) };
     assert!(
@@ -218,9 +239,9 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     let text = refused(of(&MIXED), &mut bodies, &collisions);
     assert_eq!(
         text,
-        "collision 1: offset of body B from body A[0] is 70000, but this bitstream holds \
-         collisions in binary16, which ends at 65504: bring it into range, or load another \
-         (profiles that could: naive, float)"
+        "collision 1, contact point 0: offset of the point from body A[0] is -70000.5, but this \
+         bitstream holds collisions in binary16, which ends at 65504: bring it into range, or load \
+         another (profiles that could: naive, float, windowed)"
     );
 }
 
@@ -232,7 +253,7 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
     assert_eq!(
         refused(of(&HALF), &mut bodies, &collisions),
         "found 65537 bodies, the bitstream takes at most 65536: give fewer, or load another \
-         (profiles that could: naive, float)"
+         (profiles that could: naive, float, windowed, windowed16)"
     );
     // 2 x 24 + 300,000 x 16 = 4,800,048 bytes; (4,194,304 - 48) / 16 = 262,141. The collisions alone
     // are beyond float's 262,144.
@@ -242,11 +263,11 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
         text.starts_with("found 300000 collisions, the bitstream takes at most 262144"),
         "{text}"
     );
-    assert!(text.ends_with("(profiles that could: half)"), "{text}");
+    assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
     let text = refused(of(&MIXED), &mut bodies, &vec![collisions[0]; 262_142]);
     assert!(text.contains("need 4194320 bytes") && text.contains("there are 4194304"), "{text}");
     assert!(text.contains("at most 262141 collisions fit"), "{text}");
-    assert!(text.ends_with("(profiles that could: half)"), "{text}");
+    assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
 }
 
 /// What a step computes beyond 65,504 comes back as infinity (binary16) or F = 31 (thesis16).

@@ -30,7 +30,7 @@ impl fmt::Display for StickyError {
 }
 
 /// What was counted in the last step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Counters {
     /// From start to done.
     pub(crate) cycles: u64,

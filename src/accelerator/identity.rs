@@ -6,10 +6,14 @@ use bitstream_model::interface::control::{
     BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY, CONTACT_DEPTH, DMA, FEATURES,
     FRICTION_DEPTH, IDENTIFICATION, IDENTIFICATION_VALUE, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD,
     MM2S_WIDTHS, NUMBERS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_STRIDE, SHAPE_TABLE, VERSION,
-    VERSION_MAJOR, channels, depth, dma, features, issue, memory_per_record, numbers, version,
+    VERSION_MAJOR, WINDOW, WINDOW_CAPACITY, channels, depth, dma, features, issue,
+    memory_per_record, numbers, version, window as window_units, window_capacity,
 };
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
-use bitstream_model::interface::profile::{Depth, Geometry, Inertia, Profile, Variant};
+use bitstream_model::interface::profile::{
+    Depth, Flow, Geometry, Inertia, Profile, Variant, Window as Live,
+};
+use bitstream_model::interface::record::live;
 use bitstream_model::interface::register::{Field, Register};
 use thiserror::Error;
 
@@ -43,6 +47,8 @@ pub struct Capabilities {
     pub contact: Depth,
     /// Depth of the friction pipeline, cycles.
     pub friction: Depth,
+    /// Units, places and delay lines of a design that streams the collisions once.
+    pub window: Option<Live>,
     /// Clock of the accelerator and its streams, kHz.
     pub clock_khz: u32,
     /// Largest number of bodies.
@@ -166,8 +172,14 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
             && (32..=64).contains(&dma::ADDRESS_WIDTH.of(word))
     })?;
     let clock_khz = checked(window, &CLOCK_KHZ, "a clock above 0", |word| word > 0)?;
+    let live = match profile.flow {
+        Flow::Passes => None,
+        Flow::Window(_) => Some(live_of(window)?),
+    };
     let memory = checked(window, &MEMORY_PER_RECORD, "bytes above 0", |word| {
-        memory_per_record::BODY.of(word) > 0 && memory_per_record::COLLISION.of(word) > 0
+        // What keeps live bodies alone has its memory whatever the scene.
+        live.is_some()
+            || (memory_per_record::BODY.of(word) > 0 && memory_per_record::COLLISION.of(word) > 0)
     })?;
     let depth_of = |register: &Register| {
         let word = read(register);
@@ -186,6 +198,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         collisions_per_issue: issue::COLLISIONS.of(interval),
         contact: depth_of(&CONTACT_DEPTH),
         friction: depth_of(&FRICTION_DEPTH),
+        window: live,
         clock_khz,
         body_capacity: read(&BODY_CAPACITY),
         collision_capacity: read(&COLLISION_CAPACITY),
@@ -195,6 +208,28 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         bytes_per_collision: memory_per_record::COLLISION.of(memory),
         length_width: dma::LENGTH_WIDTH.of(widths),
         address_width: dma::ADDRESS_WIDTH.of(widths),
+    })
+}
+
+/// Units and room of a design that keeps live bodies alone.
+fn live_of(window: &Window) -> Result<Live, IdentityError> {
+    let units = checked(window, &WINDOW, "at least one unit of each kind", |word| {
+        window_units::CONTACT_UNITS.of(word) > 0 && window_units::FRICTION_UNITS.of(word) > 0
+    })?;
+    let room = checked(
+        window,
+        &WINDOW_CAPACITY,
+        "2 places to as many as a record can name, and delay lines",
+        |word| {
+            (2..=live::PLACE + 1).contains(&window_capacity::SLOTS.of(word))
+                && window_capacity::LAG.of(word) > 0
+        },
+    )?;
+    Ok(Live {
+        contact_units: window_units::CONTACT_UNITS.of(units),
+        friction_units: window_units::FRICTION_UNITS.of(units),
+        slots: window_capacity::SLOTS.of(room),
+        lag: window_capacity::LAG.of(room),
     })
 }
 
@@ -369,7 +404,7 @@ mod tests {
         (0x114, 0x344),
         (0x118, 0x344),
         (0x11C, 0x0002_0003),
-        (0x144, 0x0011_1111),
+        (0x144, 0x0111_1111),
     ];
     const MIXED_REGISTERS: [(u32, u32); 6] = [
         (0x108, 4),
@@ -401,7 +436,7 @@ mod tests {
             identify_with(&[registers, more].concat())
         };
         // thesis16 on both streams, arithmetic and arrays of mixed kinds.
-        let found = with(&HALF_REGISTERS, &[(0x144, 0x0010_0122)]).expect("known formats");
+        let found = with(&HALF_REGISTERS, &[(0x144, 0x0210_0122)]).expect("known formats");
         let expected = Numbers {
             collisions: StreamFormat::Thesis16,
             bodies: StreamFormat::Thesis16,
@@ -414,9 +449,9 @@ mod tests {
         assert_eq!(found.variant.numbers, expected);
         let found = with(&[], &[(0x10C, 0x1B)]).expect("with world inertia");
         assert_eq!(found.variant.inertia, Inertia::World);
-        let error = with(&HALF_REGISTERS, &[(0x144, 0x22), (0x10C, 0x1B)]);
+        let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x1B)]);
         let error = error.expect_err("no zero").to_string();
-        assert!(error.starts_with("NUMBERS is 0x00000022") && error.contains("zero"), "{error}");
+        assert!(error.starts_with("NUMBERS is 0x02000022") && error.contains("zero"), "{error}");
         // An absent point cannot be written in thesis16.
         let error = with(&MIXED_REGISTERS, &[(0x144, 2)]).expect_err("no infinity").to_string();
         assert!(

@@ -15,7 +15,7 @@ use super::stripe::{Deal, Layout, Place, Segment};
 use super::unpack::{add, total};
 use crate::record;
 use crate::record::sixteen::{Row, Sixteen};
-use crate::scene::{Bodies, Body, Collisions, Shape};
+use crate::scene::{Bodies, Body, Collision, Collisions, Pose, Shape, Velocity};
 
 /// Stripes with a path of their own.
 const FLOAT_BODIES: Stripe = Stripe { streams: &[0, 1, 2, 3], padded: false };
@@ -61,20 +61,19 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
 
 /// Writes the records of `count` collisions; otherwise as [`pack_velocities`].
 ///
-/// A body that does not exist has its position written as zeros. Validation has refused it; should
-/// a caller's [`Collisions`] answer differently the second time, the accelerator refuses the index.
+/// A body that does not exist has its position written as zeros, and one without a shape is static.
+/// Validation has refused it; should a caller's [`Collisions`] answer differently the second time,
+/// the accelerator refuses the index.
 pub(crate) fn pack_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     variant: &Variant,
     bodies: &B,
     collisions: &C,
     count: usize,
+    shapes: &[Shape],
     channels: &mut [&mut [Beat]],
 ) -> u32 {
     let body_count = bodies.len();
-    let position = |index: u32| match usize::try_from(index) {
-        Ok(index) if index < body_count => bodies.body(index).pose.position,
-        _ => [0.0; 3],
-    };
+    let position = |index| body(bodies, body_count, index).map_or([0.0; 3], |b| b.pose.position);
     let layout = Segment::Collisions.layout(variant);
     match variant.profile.geometry {
         Geometry::Absolute => {
@@ -89,17 +88,87 @@ pub(crate) fn pack_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
             let integers = &record::relative::INTEGERS;
             pack_dealt(&layout, count, integers, channels, |index| {
                 let collision = collisions.collision(index);
-                let (a, b) = (position(collision.body_a), position(collision.body_b));
+                let [a, b] = anchors(bodies, body_count, &collision, shapes);
                 record::relative::encode(&collision, a, b)
             })
         }
     }
 }
 
-/// The velocity record of a body with its inertia; zeros for a shape that is not in the table.
-fn world_velocity(body: &Body, shapes: &[Shape]) -> [Beat; velocity::WORLD_ROWS] {
+/// Writes the records of collisions with these words in place of the bodies' indices; otherwise as
+/// [`pack_collisions`]. Only for [`Geometry::Relative`].
+pub(crate) fn pack_marked_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+    variant: &Variant,
+    bodies: &B,
+    collisions: &C,
+    words: &[[u32; 2]],
+    shapes: &[Shape],
+    channels: &mut [&mut [Beat]],
+) -> u32 {
+    let body_count = bodies.len();
+    let layout = Segment::Collisions.layout(variant);
+    pack_dealt(&layout, words.len(), &record::relative::INTEGERS, channels, |index| {
+        let mut collision = collisions.collision(index);
+        let [a, b] = anchors(bodies, body_count, &collision, shapes);
+        [collision.body_a, collision.body_b] = words[index];
+        record::relative::encode(&collision, a, b)
+    })
+}
+
+/// The body of that index, if there is one.
+fn body<B: Bodies + ?Sized>(bodies: &B, count: usize, index: u32) -> Option<Body> {
+    match usize::try_from(index) {
+        Ok(index) if index < count => Some(bodies.body(index)),
+        _ => None,
+    }
+}
+
+/// The positions that the relative record of a collision is made from.
+#[inline]
+fn anchors<B: Bodies + ?Sized>(
+    bodies: &B,
+    count: usize,
+    collision: &Collision,
+    shapes: &[Shape],
+) -> [[f32; 3]; 2] {
+    let end = |index| {
+        let Some(body) = body(bodies, count, index) else { return ([0.0; 3], false) };
+        (body.pose.position, !shape_of(&body, shapes).is_static())
+    };
+    let ((a, a_moves), (b, b_moves)) = (end(collision.body_a), end(collision.body_b));
+    record::relative::anchors([a, b], [a_moves, b_moves])
+}
+
+/// Some of the bodies, in an order of their own: a view of what is packed.
+#[derive(Debug)]
+pub(crate) struct Chosen<'a, B: ?Sized> {
+    pub(crate) bodies: &'a B,
+    /// Their indices.
+    pub(crate) order: &'a [u32],
+}
+
+impl<B: Bodies + ?Sized> Bodies for Chosen<'_, B> {
+    fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    fn body(&self, index: usize) -> Body {
+        self.bodies.body(self.order[index] as usize)
+    }
+
+    /// Nothing is stored through a view.
+    fn commit(&mut self, _: usize, _: Pose, _: Velocity) {}
+}
+
+/// The shape of a body; a static one for a shape that is not in the table.
+fn shape_of<'a>(body: &Body, shapes: &'a [Shape]) -> &'a Shape {
     let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
-    let shape = shape.unwrap_or(&Shape::STATIC);
+    shape.unwrap_or(&Shape::STATIC)
+}
+
+/// The velocity record of a body with its inertia.
+fn world_velocity(body: &Body, shapes: &[Shape]) -> [Beat; velocity::WORLD_ROWS] {
+    let shape = shape_of(body, shapes);
     let inertia = record::inertia::about_world_axes(shape, body.pose.orientation);
     record::velocity::encode_world(body, &inertia)
 }

@@ -229,7 +229,7 @@ fn collisions(
 ) -> Vec<Vec<Beat>> {
     let count = collisions.len();
     packed(spec, Segment::Collisions, count, |views| {
-        pack_collisions(&spec.variant, bodies, collisions, count, views)
+        pack_collisions(&spec.variant, bodies, collisions, count, &SHAPES, views)
     })
 }
 
@@ -341,8 +341,15 @@ proptest! {
         let mut reader =
             Reader::new(&spec, spec.collision_group, spec.collisions, &buffers, needed);
         for collision in &list {
-            let [a, b] = [collision.body_a, collision.body_b]
-                .map(|index| bodies[index as usize].pose.position);
+            let ends = [collision.body_a, collision.body_b].map(|index| bodies[index as usize]);
+            let [mut a, mut b] = ends.map(|body| body.pose.position);
+            if spec.relative {
+                // What does not move is where the other body is.
+                let [a_moves, b_moves] =
+                    ends.map(|body| SHAPES[body.shape as usize].inverse_mass != 0.0);
+                a = if a_moves { a } else { b };
+                b = if b_moves { b } else { a };
+            }
             if spec.relative {
                 reader.vector(collision.normal, collision.body_a);
                 reader.vector(minus(b, a), collision.body_b);

@@ -128,8 +128,8 @@ mod tests {
                 segments[index % 5 / 2].push(Beat([0, 1, 2, 3].map(lane)));
             }
             let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
-            let bodies = if thesis { StreamFormat::Thesis16 } else { StreamFormat::Binary16 };
-            let numbers_of = Numbers { bodies, ..HALF.numbers };
+            let poses = if thesis { StreamFormat::Thesis16 } else { StreamFormat::Binary16 };
+            let numbers_of = Numbers { poses, ..HALF.numbers };
             let layout =
                 Segment::Results.layout(&Variant { numbers: numbers_of, ..HALF.default_variant() });
             let mut results = Results::new(&layout, &views);

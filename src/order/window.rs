@@ -1,7 +1,10 @@
 //! This file says how far apart the uses of a body must be, counted in issue slots.
 
+use bitstream_model::interface::profile::{Flow, Profile};
+
 use super::OrderError;
 use crate::accelerator::Capabilities;
+use crate::scene::StepParameters;
 
 /// Hazard window of a pipeline in issue slots, and how many collisions enter in one of them.
 ///
@@ -33,14 +36,48 @@ impl IssueWindow {
         Ok(Self { depth, per_issue })
     }
 
-    /// The window of a bitstream: the deeper of its two pipelines, since one order serves both.
+    /// The window of a step on a bitstream: the deeper of its two pipelines, since one order serves
+    /// both. Where all passes run side by side, an issue slot is the time in which every pass issues
+    /// one collision, which depends on how many passes there are.
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn of(capabilities: &Capabilities) -> Result<Self, OrderError> {
-        let cycles = capabilities.contact.window.max(capabilities.friction.window);
-        let depth = cycles.div_ceil(capabilities.initiation_interval.max(1)).max(1);
-        Self::new(depth, capabilities.collisions_per_issue)
+    pub fn of(
+        capabilities: &Capabilities,
+        parameters: &StepParameters,
+    ) -> Result<Self, OrderError> {
+        let Capabilities { variant, contact, friction, .. } = capabilities;
+        // What the bitstream says of itself instead of what its profile has.
+        let reported = Profile {
+            contact: *contact,
+            friction: *friction,
+            initiation_interval: capabilities.initiation_interval,
+            collisions_per_issue: capabilities.collisions_per_issue,
+            flow: capabilities.window.map_or(Flow::Passes, Flow::Window),
+            ..*variant.profile
+        };
+        Self::of_profile(&reported, parameters)
+    }
+
+    /// The window of a step on a design as its profile has it; errors as [`new`](Self::new).
+    pub(crate) fn of_profile(
+        profile: &Profile,
+        parameters: &StepParameters,
+    ) -> Result<Self, OrderError> {
+        let cycles = profile.contact.window.max(profile.friction.window);
+        let (slot, per_issue) = match profile.flow {
+            Flow::Passes => (profile.initiation_interval, profile.collisions_per_issue),
+            Flow::Window(window) => {
+                let slot = window.slot_cycles(
+                    parameters.contact_iterations,
+                    parameters.friction_iterations,
+                    profile.initiation_interval,
+                    profile.collisions_per_issue,
+                );
+                (slot, 1)
+            }
+        };
+        Self::new(cycles.div_ceil(slot.max(1)).max(1), per_issue)
     }
 
     /// Issue slots from a use of a body to the first that sees what it wrote.
@@ -65,6 +102,7 @@ impl IssueWindow {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interface::profile;
 
     #[test]
     fn a_window_without_slots_is_refused() {
@@ -73,5 +111,23 @@ mod tests {
         assert!(IssueWindow::new(16_385, 1).is_err() && IssueWindow::new(1, 17).is_err());
         let window = IssueWindow::new(158, 2).expect("a window");
         assert_eq!((window.depth(), window.per_issue(), window.entries()), (158, 2, 316));
+    }
+
+    /// 316 cycles by the interval of each: 28, 2, 3, 1; two passes a unit: 4 and 3 cycles.
+    #[test]
+    fn the_window_of_a_profile_is_that_of_its_deeper_pipeline() {
+        let of = |profile: &Profile, parameters: &StepParameters| {
+            let window = IssueWindow::of_profile(profile, parameters).expect("a window");
+            (window.depth(), window.per_issue())
+        };
+        let bullet = StepParameters::default();
+        let windows: Vec<_> = profile::PROFILES.iter().map(|each| of(each, &bullet)).collect();
+        assert_eq!(windows, [(12, 1), (158, 1), (106, 2), (316, 1), (79, 1), (106, 1)]);
+        // Twice as many contact passes take turns on their units.
+        let twice = StepParameters { contact_iterations: 8, ..bullet };
+        assert_eq!(of(&profile::WINDOWED, &twice), (40, 1));
+        assert_eq!(of(&profile::FLOAT, &twice), (158, 1));
+        let none = StepParameters { contact_iterations: 0, friction_iterations: 0, ..bullet };
+        assert_eq!(of(&profile::WINDOWED, &none), (316, 1));
     }
 }

@@ -44,6 +44,19 @@ pub(crate) fn encode(
     beats
 }
 
+/// The positions of bodies A and B that a record is made from.
+///
+/// A static body has no lever arm that anything comes of, and its centre may be far away, which
+/// sixteen bits pay for with every contact point on it: the other body's position stands in for its.
+#[inline]
+pub(crate) fn anchors([a, b]: [[f32; 3]; 2], moves: [bool; 2]) -> [[f32; 3]; 2] {
+    match moves {
+        [false, _] => [b, b],
+        [true, false] => [a, a],
+        [true, true] => [a, b],
+    }
+}
+
 /// `to` as seen from `from`.
 #[inline]
 pub(crate) fn difference(to: [f32; 3], from: [f32; 3]) -> [f32; 3] {
@@ -56,6 +69,14 @@ const _: () = assert!(relative::CONTACTS + CONTACT_POINTS == relative::ROWS);
 mod tests {
     use super::*;
     use crate::scene::Contact;
+
+    #[test]
+    fn a_static_body_stands_where_the_other_one_is() {
+        let (a, b) = ([0.0, -400.0, 0.0], [60.0, 1.0, 50.0]);
+        assert_eq!(anchors([a, b], [true, true]), [a, b]);
+        assert_eq!(anchors([a, b], [false, true]), [b, b]);
+        assert_eq!(anchors([a, b], [true, false]), [a, a]);
+    }
 
     #[test]
     fn a_relative_collision_record_is_these_words() {

@@ -70,7 +70,8 @@ impl Demand {
         Carriers { profiles, inertia: self.inertia }
     }
 
-    fn has_room(&self, variant: &Variant) -> bool {
+    /// Whether the on-chip memory of a bitstream takes the scene.
+    pub(crate) fn has_room(&self, variant: &Variant) -> bool {
         let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
         let needed = bytes(self.bodies, variant.bytes_per_body())
             .saturating_add(bytes(self.collisions, variant.bytes_per_collision()));
@@ -91,9 +92,10 @@ mod tests {
 
     #[test]
     fn profiles_are_named_in_the_order_of_the_table() {
-        assert_eq!(names(SMALL, |_| true), ["naive", "float", "half", "mixed"]);
+        let all = ["naive", "float", "half", "mixed", "windowed", "windowed16"];
+        assert_eq!(names(SMALL, |_| true), all);
         let text = SMALL.carriers(|variant| variant.profile.name != "half").to_string();
-        assert_eq!(text, "profiles that could: naive, float, mixed");
+        assert_eq!(text, "profiles that could: naive, float, mixed, windowed, windowed16");
         assert_eq!(SMALL.carriers(|_| false).to_string(), "no profile could");
         let world = Demand { inertia: Inertia::World, ..SMALL };
         let text = world.carriers(|variant| variant.profile.id == 1).to_string();
@@ -106,16 +108,19 @@ mod tests {
 
     #[test]
     fn a_profile_without_room_for_the_scene_is_left_out() {
-        // 16-bit indices end at 65,535.
+        // 16-bit indices end at 65,535. What keeps no more than is alive has room for any number.
         let bodies = |bodies| Demand { bodies, ..SMALL };
-        assert_eq!(names(bodies(65_536), |_| true).len(), 4);
-        assert_eq!(names(bodies(65_537), |_| true), ["naive", "float"]);
-        assert_eq!(names(bodies(131_073), |_| true), [""; 0]);
+        assert_eq!(names(bodies(65_536), |_| true).len(), 6);
+        let windowed = ["windowed", "windowed16"];
+        assert_eq!(names(bodies(65_537), |_| true), [["naive", "float"], windowed].concat());
+        assert_eq!(names(bodies(131_073), |_| true), windowed);
+        assert_eq!(names(bodies(1_048_577), |_| true), [""; 0]);
         // 4 MiB: 16 bytes a collision in f32, 8 in half.
         let collisions = |collisions| Demand { collisions, ..SMALL };
-        assert_eq!(names(collisions(300_000), |_| true), ["half"]);
+        let and_half = ["half", "windowed", "windowed16"];
+        assert_eq!(names(collisions(300_000), |_| true), and_half);
         // 48 bytes a body with world inertia in f32, 36 in half.
         let world = Demand { bodies: 60_000, collisions: 100_000, inertia: Inertia::World };
-        assert_eq!(names(world, |_| true), ["half"]);
+        assert_eq!(names(world, |_| true), and_half);
     }
 }

@@ -3,6 +3,7 @@
 use super::Carriers;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::CONTACT_POINTS;
+use crate::order::OrderError;
 
 /// Why input was refused. Nothing was sent, and nothing of the caller's was changed.
 ///
@@ -267,6 +268,71 @@ pub enum InputError {
         /// Its largest number.
         limit: f32,
         /// Who carries the collision.
+        carriers: Carriers,
+    },
+
+    /// The collisions cannot be ordered, or have hazards although the order was to be verified.
+    #[error(
+        "the collisions cannot be sent in this order: ask for another, or do not have it verified"
+    )]
+    Order(#[from] OrderError),
+
+    /// An order without hazards has so many empty entries that the bitstream has no room for it.
+    #[error(
+        "{collisions} collisions without a hazard, at a depth of {depth} issue slots, take more \
+         than the {limit} entries that fit beside {bodies} bodies (body {body} alone has {uses} of \
+         the collisions): give fewer, ask for another order, or load another bitstream ({carriers})"
+    )]
+    OrderTooLong {
+        /// Collisions given.
+        collisions: usize,
+        /// Bodies given.
+        bodies: usize,
+        /// Entries that fit beside the bodies.
+        limit: usize,
+        /// Hazard window, issue slots.
+        depth: u32,
+        /// The moving body with the most collisions.
+        body: usize,
+        /// Its collisions.
+        uses: usize,
+        /// Who could have room for it.
+        carriers: Carriers,
+    },
+
+    /// A body lives longer than the bitstream lets it.
+    #[error(
+        "in this order body {body} is used first in entry {first} and last in entry {last}, and the \
+         bitstream's delay lines take spans of less than {lag}: ask for the hazard-free order, or \
+         load another bitstream ({carriers})"
+    )]
+    SpanTooLong {
+        /// The body with the longest span.
+        body: usize,
+        /// Entry of its first use.
+        first: usize,
+        /// Entry of its last use.
+        last: usize,
+        /// Length of the delay lines.
+        lag: u32,
+        /// Who could take it.
+        carriers: Carriers,
+    },
+
+    /// More bodies are alive than the bitstream has places for.
+    #[error(
+        "in this order {held} moving bodies are on their way through the passes at once ({alive} of \
+         them with collisions to come), the bitstream has places for {places}: ask for the \
+         hazard-free order, or load another bitstream ({carriers})"
+    )]
+    TooManyLive {
+        /// Most bodies that need a place at once.
+        held: u32,
+        /// Most bodies between their first and their last use.
+        alive: u32,
+        /// Places that there are.
+        places: u32,
+        /// Who could take them.
         carriers: Carriers,
     },
 

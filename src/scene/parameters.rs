@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::order::Order;
+
 /// Parameters of a step. The default is Bullet's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -25,6 +27,20 @@ pub struct StepParameters {
     /// Whether to integrate after the solver. Without it the poses come back unchanged, with the
     /// velocities that the solver left (undamped, without gravity).
     pub integrate: bool,
+    /// Order in which the collisions are sent. `None` is [`Order::HazardFree`] on a pipeline that
+    /// does not wait for velocities and on a design that keeps only live bodies, and
+    /// [`Order::AsGiven`] on one that waits.
+    ///
+    /// A pipeline that waits gives what solving the collisions one after the other in this order
+    /// gives; orders with hazards cost it cycles. One that does not wait reads stale velocities at
+    /// every hazard and loses impulses: with any other order than the hazard-free one piles gain
+    /// energy. One that keeps only live bodies also refuses an order in which a body lives too long,
+    /// or too many live at once, as they do where collisions are sorted by body.
+    pub order: Option<Order>,
+    /// Whether to prove, before anything is sent, that no moving body recurs within the hazard
+    /// window; the step is refused otherwise. For debugging: it takes host time, and memory anew in
+    /// every step.
+    pub verify_order: bool,
     /// How long a step may take on the accelerator; `None` follows from the work: four times what
     /// it takes if every collision waits for the one before it, what its bytes take at 100 MB/s,
     /// and 10 ms.
@@ -43,6 +59,8 @@ impl Default for StepParameters {
             contact_iterations: 4,
             friction_iterations: 4,
             integrate: true,
+            order: None,
+            verify_order: false,
             deadline: None,
         }
     }

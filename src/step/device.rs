@@ -134,7 +134,7 @@ impl Device {
             };
             queue(&segments.velocities)?;
             if !segments.collisions.is_empty() {
-                for _ in 0..plan.passes {
+                for _ in 0..plan.rounds() {
                     queue(&segments.collisions)?;
                 }
             }

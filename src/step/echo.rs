@@ -85,7 +85,7 @@ impl Accelerator {
             }
         }
         let none: &[Collision] = &[];
-        let sent = self.pack(&plan, echo.bodies, none);
+        let sent = self.pack(&plan, echo.bodies, none, None);
         let parameters = StepParameters {
             contact_iterations: 0,
             friction_iterations: 0,

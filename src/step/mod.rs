@@ -9,6 +9,7 @@ mod fault;
 mod lane;
 #[cfg(all(test, feature = "emulation"))]
 mod memory_tests;
+mod ordering;
 mod plan;
 mod recovery;
 mod report;

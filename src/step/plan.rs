@@ -8,7 +8,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use bitstream_model::interface::profile::Variant;
+use bitstream_model::interface::profile::{Flow, Variant};
 use bitstream_model::interface::record::BEAT_BYTES;
 
 use super::report::time_of;
@@ -25,7 +25,9 @@ const ALIGNMENT: usize = 64 / BEAT_BYTES;
 /// What a step streams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Plan {
+    /// Bodies of which there are records: where only live bodies are kept, those that move.
     pub(super) bodies: usize,
+    /// Records of collisions, padding included.
     pub(super) collisions: usize,
     pub(super) passes: u64,
     /// How records lie on the channels.
@@ -51,6 +53,14 @@ impl Plan {
         self.variant.profile.mm2s_widths.len()
     }
 
+    /// How often the collisions are streamed.
+    pub(super) fn rounds(&self) -> u64 {
+        match self.variant.profile.flow {
+            Flow::Passes => self.passes,
+            Flow::Window(_) => self.passes.min(1),
+        }
+    }
+
     /// The segments of one MM2S channel.
     pub(super) fn segments(&self, channel: usize) -> Segments {
         let place = |segment: Segment, records, start: usize| {
@@ -72,8 +82,8 @@ impl Plan {
     pub(super) fn descriptors(&self, channel: usize, largest: u32) -> usize {
         let count = |range: Range<usize>| pieces(bytes(range.len()), largest).count();
         let Segments { velocities, collisions, poses } = self.segments(channel);
-        let passes = usize::try_from(self.passes).unwrap_or(usize::MAX);
-        (count(velocities) + count(poses)).saturating_add(count(collisions).saturating_mul(passes))
+        let rounds = usize::try_from(self.rounds()).unwrap_or(usize::MAX);
+        (count(velocities) + count(poses)).saturating_add(count(collisions).saturating_mul(rounds))
     }
 
     /// Bytes streamed to the accelerator, all channels.
@@ -82,7 +92,7 @@ impl Plan {
             .map(|channel| {
                 let Segments { velocities, collisions, poses } = self.segments(channel);
                 bytes(velocities.len() + poses.len())
-                    .saturating_add(bytes(collisions.len()).saturating_mul(self.passes))
+                    .saturating_add(bytes(collisions.len()).saturating_mul(self.rounds()))
             })
             .fold(0, u64::saturating_add)
     }

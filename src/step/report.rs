@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::order::{LiveReport, Order, OrderReport};
+
 /// Clock cycles of a step on the accelerator, by what they were spent on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StepCycles {
@@ -22,6 +24,8 @@ pub struct StepCycles {
 pub struct HostTimes {
     /// Checking the input.
     pub validate: Duration,
+    /// Putting the collisions in order.
+    pub order: Duration,
     /// Making buffers large enough and writing the records into them.
     pub pack: Duration,
     /// Handing over, descriptors, arguments, doorbells.
@@ -54,6 +58,15 @@ pub struct StepReport {
     pub bodies: u64,
     /// Number of collisions.
     pub collisions: u64,
+    /// The order in which they were sent.
+    pub order: Order,
+    /// Entries left empty between them, sent as collisions without contact points.
+    pub empty: u64,
+    /// What that order was proved to be, if it was to be [verified](crate::StepParameters::verify_order):
+    /// no hazards; how many bodies are alive at once, and how long.
+    pub verified: Option<OrderReport>,
+    /// What the order takes of a bitstream that keeps only live bodies.
+    pub live: Option<LiveReport>,
     /// Passes over the collisions: contact and friction iterations.
     pub passes: u32,
     /// Clock cycles, as the accelerator counted them.
@@ -125,6 +138,10 @@ mod tests {
         StepReport {
             bodies: 0,
             collisions: 0,
+            order: Order::AsGiven,
+            empty: 0,
+            verified: None,
+            live: None,
             passes: 0,
             cycles: StepCycles { total: work + stalls + waits, work, stalls, waits },
             clock_khz: 275_000,

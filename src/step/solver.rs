@@ -1,6 +1,6 @@
 //! This file is the accelerator as a caller sees it, and one step from end to end.
 //!
-//! Validate, reserve, pack, hand over, start, wait, take back, unpack, check, commit: nothing of
+//! Validate, order, reserve, pack, hand over, start, wait, take back, unpack, check, commit: nothing of
 //! the caller's changes before the last.
 
 use std::time::{Duration, Instant};
@@ -11,13 +11,17 @@ use bitstream_model::interface::record::Beat;
 use super::board::{self, BoardDescription, Found, OpenOptions};
 use super::device::Device;
 use super::fault::Fault;
+use super::ordering::{Arranged, Hardware, Ordering};
 use super::plan::Plan;
 use super::report::{HostTimes, StepCycles, StepReport};
 use crate::accelerator::{Capabilities, Counters};
-use crate::beat::pack::{pack_collisions, pack_poses, pack_velocities};
+use crate::beat::pack::{
+    Chosen, pack_collisions, pack_marked_collisions, pack_poses, pack_velocities,
+};
 use crate::beat::stripe::Segment;
 use crate::beat::unpack::{Results, sum_of_words};
 use crate::error::{Error, OpenError};
+use crate::order::{Lives, Order, Ordered};
 use crate::platform::{Deadline, System};
 use crate::scene::validate::{Limits, validate, validate_shapes};
 use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
@@ -36,6 +40,7 @@ pub struct Accelerator {
     pub(super) device: Device,
     limits: Limits,
     pub(super) shapes: Vec<Shape>,
+    ordering: Ordering,
     /// Results of a step until all are checked. Kept, so that a step allocates nothing.
     spare: Vec<(Pose, Velocity)>,
 }
@@ -84,7 +89,8 @@ impl Accelerator {
             bytes_per_body: device.capabilities.bytes_per_body,
             bytes_per_collision: device.capabilities.bytes_per_collision,
         };
-        Self { board, device, limits, shapes: Vec::new(), spare: Vec::new() }
+        let ordering = Ordering::default();
+        Self { board, device, limits, shapes: Vec::new(), ordering, spare: Vec::new() }
     }
 
     /// Which board was opened, and why.
@@ -117,8 +123,9 @@ impl Accelerator {
 
     /// Solves the contacts of one time step and integrates it.
     ///
-    /// Collisions are taken in the order of their index. Static bodies are left as they are. The
-    /// bodies change only if the step succeeds, and then all at once.
+    /// Collisions are taken in the [order](StepParameters::order) that the parameters ask for.
+    /// Static bodies are left as they are. The bodies change only if the step succeeds, and then all
+    /// at once.
     ///
     /// Units: metres, kilograms, seconds, radians, world frame.
     ///
@@ -139,17 +146,31 @@ impl Accelerator {
         let mut host = HostTimes::default();
         validate(bodies, collisions, &self.shapes, parameters, &self.limits)?;
         host.validate = watch.lap();
-        let plan = Plan {
-            bodies: bodies.len(),
-            collisions: collisions.len(),
-            passes: u64::from(parameters.contact_iterations)
-                + u64::from(parameters.friction_iterations),
-            variant: self.limits.variant,
-        };
+        let Self { ordering, device, limits, shapes, .. } = self;
+        let on = Hardware { capabilities: &device.capabilities, limits, shapes };
+        let Arranged { order, scheduled, verified, live } =
+            ordering.arrange(bodies, collisions, parameters, on)?;
+        host.order = watch.lap();
         let counts = &self.device.counts;
         let before = (counts.reads(), counts.writes());
-        let ended = self.run(&plan, bodies, collisions, parameters, &mut host, &mut watch);
+        let mut empty = 0;
+        let ended = if scheduled {
+            // Lent to the step.
+            let ordering = std::mem::take(&mut self.ordering);
+            let ordered = Ordered { collisions, schedule: ordering.schedule() };
+            let lives = live.map(|_| ordering.lives());
+            let ended = self.run(bodies, &ordered, lives, parameters, &mut host, &mut watch);
+            // Those that fill the last issue are of the order's making too.
+            let entries = lives.map_or(ordered.len(), |lives| lives.words().len());
+            empty = entries.saturating_sub(ordering.schedule().collisions());
+            self.ordering = ordering;
+            ended
+        } else {
+            self.run(bodies, collisions, None, parameters, &mut host, &mut watch)
+        };
         let mut report = ended.map_err(|fault| self.device.fail(fault, &self.shapes))?;
+        (report.collisions, report.empty) = (collisions.len() as u64, empty as u64);
+        (report.order, report.verified, report.live) = (order, verified, live);
         for (index, (pose, velocity)) in self.spare.drain(..).enumerate() {
             bodies.commit(index, pose, velocity);
         }
@@ -158,9 +179,12 @@ impl Accelerator {
         report.register_reads = self.device.counts.reads() - before.0;
         report.register_writes = self.device.counts.writes() - before.1;
         log::debug!(
-            "step: {} bodies, {} collisions, {} passes, {} cycles ({} stalled, {} waiting), {} hazards",
+            "step: {} bodies, {} collisions and {} empty entries ({:?}), {} passes, {} cycles ({} \
+             stalled, {} waiting), {} hazards",
             report.bodies,
             report.collisions,
+            report.empty,
+            report.order,
             report.passes,
             report.cycles.total,
             report.cycles.stalls,
@@ -171,17 +195,33 @@ impl Accelerator {
     }
 
     /// Everything between validation and commitment; the results are in `spare` afterwards.
+    ///
+    /// Collisions are sent in the order of their index.
     fn run<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
-        plan: &Plan,
         bodies: &B,
         collisions: &C,
+        lives: Option<&Lives>,
         parameters: &StepParameters,
         host: &mut HostTimes,
         watch: &mut Stopwatch,
     ) -> Result<StepReport, Fault> {
+        let plan = &Plan {
+            bodies: lives.map_or(bodies.len(), |lives| lives.velocities().len()),
+            collisions: lives.map_or(collisions.len(), |lives| lives.words().len()),
+            passes: u64::from(parameters.contact_iterations)
+                + u64::from(parameters.friction_iterations),
+            variant: self.limits.variant,
+        };
+        if plan.bodies == 0 {
+            // Nothing moves, and nothing of it is streamed.
+            self.unpack(plan, bodies, lives)?;
+            let impulse_sum = self.device.capabilities.impulse_sum.then_some(0.0);
+            let counters = Counters { impulse_sum, ..Counters::default() };
+            return Ok(self.report(plan, bodies.len(), &counters));
+        }
         self.device.reserve_or_reset(plan, &self.shapes)?;
-        let sent = self.pack(plan, bodies, collisions);
+        let sent = self.pack(plan, bodies, collisions, lives);
         host.pack = watch.lap();
         let limit = plan.deadline(parameters, &self.device.capabilities);
         let deadline = Deadline::after(&*self.device.platform, limit);
@@ -192,14 +232,26 @@ impl Accelerator {
         self.device.take_back()?;
         host.wait = watch.lap();
         self.check_sums(plan, sent, &counters)?;
-        self.unpack(plan, bodies)?;
+        self.unpack(plan, bodies, lives)?;
         host.unpack = watch.lap();
 
+        let mut report = self.report(plan, bodies.len(), &counters);
+        (report.doorbells, report.interrupts) = (doorbells, interrupts);
+        report.descriptors = self.device.descriptors();
+        Ok(report)
+    }
+
+    /// What a step of so many bodies streamed and counted.
+    fn report(&self, plan: &Plan, bodies: usize, counters: &Counters) -> StepReport {
         let (work, waits) = (u64::from(counters.work), u64::from(counters.waits));
         let stalls = counters.cycles.saturating_sub(work).saturating_sub(waits);
-        Ok(StepReport {
-            bodies: plan.bodies as u64,
+        StepReport {
+            bodies: bodies as u64,
             collisions: plan.collisions as u64,
+            order: Order::AsGiven,
+            empty: 0,
+            verified: None,
+            live: None,
             passes: u32::try_from(plan.passes).unwrap_or(u32::MAX),
             cycles: StepCycles { total: counters.cycles, work, stalls, waits },
             clock_khz: self.device.capabilities.clock_khz,
@@ -209,11 +261,11 @@ impl Accelerator {
             impulse_sum: counters.impulse_sum,
             register_reads: 0,
             register_writes: 0,
-            doorbells,
-            interrupts,
-            descriptors: self.device.descriptors(),
+            doorbells: 0,
+            interrupts: 0,
+            descriptors: 0,
             host: HostTimes::default(),
-        })
+        }
     }
 
     /// Writes the records of a step into the buffers.
@@ -222,6 +274,7 @@ impl Accelerator {
         plan: &Plan,
         bodies: &B,
         collisions: &C,
+        lives: Option<&Lives>,
     ) -> Sent {
         let mut channels: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
         let lanes = &mut self.device.mm2s;
@@ -238,15 +291,31 @@ impl Accelerator {
         let (variant, count) = (&plan.variant, plan.bodies);
         let active = ..plan.channels();
         let views = &mut channels[active];
-        let velocities = pack_velocities(variant, bodies, count, &self.shapes, views);
+        let shapes = &self.shapes;
+        let velocities = match lives.map(Lives::velocities) {
+            Some(order) => {
+                let chosen = Chosen { bodies, order };
+                pack_velocities(variant, &chosen, count, shapes, views)
+            }
+            None => pack_velocities(variant, bodies, count, shapes, views),
+        };
         let mut poses_of: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
         for (place, (collisions, poses)) in later.into_iter().enumerate() {
             channels[place] = collisions;
             poses_of[place] = poses;
         }
         let views = &mut channels[active];
-        let collisions = pack_collisions(variant, bodies, collisions, plan.collisions, views);
-        let poses = pack_poses(variant, bodies, count, &mut poses_of[active]);
+        let collisions = match lives.map(Lives::words) {
+            Some(words) => {
+                pack_marked_collisions(variant, bodies, collisions, words, shapes, views)
+            }
+            None => pack_collisions(variant, bodies, collisions, plan.collisions, shapes, views),
+        };
+        let views = &mut poses_of[active];
+        let poses = match lives.map(Lives::results) {
+            Some(order) => pack_poses(variant, &Chosen { bodies, order }, count, views),
+            None => pack_poses(variant, bodies, count, views),
+        };
         Sent { velocities, collisions, poses }
     }
 
@@ -261,10 +330,10 @@ impl Accelerator {
     fn check_sums(&self, plan: &Plan, sent: Sent, counters: &Counters) -> Result<(), Fault> {
         let Some((received, answered)) = counters.sums else { return Ok(()) };
         #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
-        let passes = plan.passes as u32;
+        let rounds = plan.rounds() as u32;
         let expected = sent
             .velocities
-            .wrapping_add(sent.collisions.wrapping_mul(passes))
+            .wrapping_add(sent.collisions.wrapping_mul(rounds))
             .wrapping_add(sent.poses);
         if received != expected {
             let direction = "to the accelerator";
@@ -281,16 +350,39 @@ impl Accelerator {
     }
 
     /// Reads the results into the spare.
-    fn unpack<B: Bodies + ?Sized>(&mut self, plan: &Plan, bodies: &B) -> Result<(), Fault> {
+    fn unpack<B: Bodies + ?Sized>(
+        &mut self,
+        plan: &Plan,
+        bodies: &B,
+        lives: Option<&Lives>,
+    ) -> Result<(), Fault> {
         let mut spare = std::mem::take(&mut self.spare);
         spare.clear();
-        spare.reserve(plan.bodies);
         let mut channels = Default::default();
         self.results(plan, &mut channels);
         let layout = Segment::Results.layout(&plan.variant);
         let mut results = Results::new(&layout, &channels[..plan.channels()]);
-        let mut broken = None;
-        for index in 0..plan.bodies {
+        let broken = match lives {
+            Some(lives) => scatter(&mut results, lives.results(), bodies, &mut spare),
+            None => self.in_turn(&mut results, plan.bodies, bodies, &mut spare),
+        };
+        self.spare = spare;
+        match broken {
+            Some(body) => Err(Fault::NotFinite { body }),
+            None => Ok(()),
+        }
+    }
+
+    /// Reads the results of all bodies in their order; the first that is not finite.
+    fn in_turn<B: Bodies + ?Sized>(
+        &self,
+        results: &mut Results<'_>,
+        count: usize,
+        bodies: &B,
+        spare: &mut Vec<(Pose, Velocity)>,
+    ) -> Option<usize> {
+        spare.reserve(count);
+        for index in 0..count {
             let (pose, velocity) = results.next();
             let own = bodies.body(index);
             let shape = usize::try_from(own.shape).ok().and_then(|shape| self.shapes.get(shape));
@@ -300,17 +392,39 @@ impl Accelerator {
                 continue;
             }
             if !finite(&pose, &velocity) {
-                broken = Some(index);
-                break;
+                return Some(index);
             }
             spare.push((pose, velocity));
         }
-        self.spare = spare;
-        match broken {
-            Some(body) => Err(Fault::NotFinite { body }),
-            None => Ok(()),
+        None
+    }
+}
+
+/// Reads results in the order of these bodies, and leaves all others as they are; the first body
+/// that is not finite.
+fn scatter<B: Bodies + ?Sized>(
+    results: &mut Results<'_>,
+    order: &[u32],
+    bodies: &B,
+    spare: &mut Vec<(Pose, Velocity)>,
+) -> Option<usize> {
+    spare.extend((0..bodies.len()).map(|index| {
+        let own = bodies.body(index);
+        (own.pose, own.velocity)
+    }));
+    let mut broken = None;
+    for body in order {
+        let (pose, velocity) = results.next();
+        let index = *body as usize;
+        if !finite(&pose, &velocity) {
+            broken = Some(broken.map_or(index, |lowest: usize| lowest.min(index)));
+        }
+        // Should a caller's bodies have become fewer, there is nothing to be told of the others.
+        if let Some(state) = spare.get_mut(index) {
+            *state = (pose, velocity);
         }
     }
+    broken
 }
 
 fn finite(pose: &Pose, velocity: &Velocity) -> bool {

@@ -132,7 +132,7 @@ mod tests {
             refused.to_string(),
             "body 7: angular velocity[1] is -65504.004, but this bitstream holds bodies in \
              binary16, which ends at 65504: bring it into range, or load another (profiles that \
-             could: naive, float, mixed)"
+             could: naive, float, mixed, windowed)"
         );
         body.velocity.angular[1] = f32::NAN;
         let refused = check_on(&HALF, &body).expect_err("no number");

@@ -9,14 +9,14 @@ mod parameters;
 mod range;
 mod shape;
 
-pub(crate) use shape::validate_shapes;
+pub(crate) use shape::{needed, validate_shapes};
 
 use self::body::{check_body, shape_of};
 use self::collision::check_collision;
 use self::parameters::check_parameters;
 use self::range::{Held, check_range};
-use self::shape::needed;
 use super::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
+use crate::record::relative::anchors;
 use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::profile::{Geometry, Variant};
 
@@ -39,6 +39,17 @@ pub(crate) struct Limits {
     pub(crate) bytes_per_body: u32,
     /// What a collision takes of it, bytes.
     pub(crate) bytes_per_collision: u32,
+}
+
+impl Limits {
+    /// Collisions that fit beside so many bodies.
+    pub(crate) fn room_for_collisions(&self, bodies: usize) -> u32 {
+        let for_bodies = (bodies as u64).saturating_mul(u64::from(self.bytes_per_body));
+        let Some(free) = u64::from(self.memory_bytes).checked_sub(for_bodies) else { return 0 };
+        // Where they take nothing there is room for all that can be counted.
+        let fitting = free.checked_div(u64::from(self.bytes_per_collision)).unwrap_or(u64::MAX);
+        u32::try_from(fitting).unwrap_or(u32::MAX).min(self.collision_capacity)
+    }
 }
 
 /// Everything a step refuses before anything is sent.
@@ -78,7 +89,8 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     for index in 0..collisions.len() {
         let collision = collisions.collision(index);
         let (body_a, body_b) = check_collision(index, &collision, body_count)?;
-        if is_static(body_a) && is_static(body_b) {
+        let moves = [!is_static(body_a), !is_static(body_b)];
+        if moves == [false, false] {
             return Err(InputError::BothStatic {
                 collision: index,
                 body_a: collision.body_a,
@@ -86,7 +98,10 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
             });
         }
         if !in_range {
-            let positions = [body_a, body_b].map(|body| bodies.body(body).pose.position);
+            let mut positions = [body_a, body_b].map(|body| bodies.body(body).pose.position);
+            if limits.variant.profile.geometry == Geometry::Relative {
+                positions = anchors(positions, moves);
+            }
             check_range(index, &collision, positions, &scene)?;
         }
     }
@@ -122,9 +137,7 @@ fn check_room(demand: &Demand, limits: &Limits) -> Result<(), InputError> {
     let needed = for_bodies.saturating_add(bytes(collisions, limits.bytes_per_collision));
     let available = limits.memory_bytes;
     if needed > u64::from(available) {
-        let free = u64::from(available).saturating_sub(for_bodies);
-        let fitting = free.checked_div(u64::from(limits.bytes_per_collision)).unwrap_or(0);
-        let fitting = u32::try_from(fitting).unwrap_or(u32::MAX);
+        let fitting = limits.room_for_collisions(bodies);
         let carriers = carriers();
         return Err(InputError::MemoryExceeded {
             bodies,
@@ -264,13 +277,16 @@ pub(super) mod tests {
         assert_eq!(
             text,
             "found 131073 bodies, the bitstream takes at most 131072: give fewer, or load another \
-             (no profile could)"
+             (profiles that could: windowed, windowed16)"
         );
         // Indices of sixteen bits name fewer.
         assert_eq!(room(65_536, 0, &HALF), Ok(()));
         let text = room(65_537, 0, &HALF).expect_err("one too many").to_string();
         assert!(text.contains("found 65537 bodies") && text.contains("at most 65536"), "{text}");
-        assert!(text.ends_with("(profiles that could: naive, float)"), "{text}");
+        assert!(
+            text.ends_with("(profiles that could: naive, float, windowed, windowed16)"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -296,7 +312,7 @@ pub(super) mod tests {
         for number in ["38881", "203823", "4194312", "4194304", "203822"] {
             assert!(text.contains(number), "{text}");
         }
-        assert!(text.ends_with("(profiles that could: half)"), "{text}");
+        assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
     }
 
     #[test]

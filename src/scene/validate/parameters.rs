@@ -177,7 +177,7 @@ mod tests {
             check(&parameters, &HALF),
             Err("the gravity in z is -7e4, but this bitstream computes in binary16, which takes 0e0 \
                  to 65504: correct the step parameters, or load another (profiles that could: naive, \
-                 float, mixed)"
+                 float, mixed, windowed)"
                 .to_owned())
         );
         // The reciprocal of 10 us is 100,000.

@@ -155,7 +155,7 @@ fn refused(
 mod tests {
     use super::*;
     use crate::interface::number::StreamFormat;
-    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
+    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile, WINDOWED16};
     use crate::scene::{Contact, Demand};
 
     const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
@@ -249,7 +249,7 @@ mod tests {
             text,
             "collision 7: position of body A[0] is 1000000, but this bitstream holds collisions \
              in binary16, which ends at 65504: bring it into range, or load another (profiles that \
-             could: naive, float, mixed)"
+             could: naive, float, mixed, windowed, windowed16)"
         );
         // Body B is far from A.
         let text = check(&MIXED, &collision, [there, [0.0; 3]]).expect_err("apart").to_string();
@@ -257,7 +257,7 @@ mod tests {
             text.starts_with("collision 7: offset of body B from body A[0] is -1000000"),
             "{text}"
         );
-        assert!(text.ends_with("(profiles that could: naive, float)"), "{text}");
+        assert!(text.ends_with("(profiles that could: naive, float, windowed)"), "{text}");
         let text = check(&MIXED, &collision, [[0.0; 3]; 2]).expect_err("a far point").to_string();
         assert!(
             text.starts_with(

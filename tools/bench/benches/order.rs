@@ -147,7 +147,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let board = BoardChoice::Emulated(emulated.cpu_port());
     let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
     accelerator.set_shapes(scene.shapes())?;
-    let window = IssueWindow::of(accelerator.capabilities())?;
+    let window = IssueWindow::of(accelerator.capabilities(), &StepParameters::default())?;
     if !options.json {
         println!(
             "{} cubes dropped from {} m, depth {} issue slots, medians of {} runs in turn\n",
@@ -218,10 +218,10 @@ fn measure(
             let _ = black_box(checker.verify(&schedule, &input, window));
         }),
         Box::new(|| {
-            black_box(packer.pack(bodies, &ordered));
+            black_box(packer.pack(bodies, &ordered, &shapes));
         }),
         Box::new(|| {
-            black_box(as_given.pack(bodies, collisions));
+            black_box(as_given.pack(bodies, collisions, &shapes));
         }),
     ];
     // Once without looking, so that all memory is there.

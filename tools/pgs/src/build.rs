@@ -265,7 +265,10 @@ mod tests {
         for text in ["", ",float", "Float", "unchecked", "float half"] {
             let error = build(text).expect_err(text);
             assert!(matches!(error, BuildError::Profile { .. }), "{error}");
-            assert!(error.to_string().contains("(naive, float, half, mixed)"), "{error}");
+            assert!(
+                error.to_string().contains("(naive, float, half, mixed, windowed, windowed16)"),
+                "{error}"
+            );
         }
         for text in ["float,", "float,double", "float,window", "float,colour=red", "float, world"] {
             let error = build(text).expect_err(text);

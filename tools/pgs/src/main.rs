@@ -18,6 +18,7 @@ mod loading;
 mod memory;
 mod npy;
 mod options;
+mod ordering;
 mod origin;
 mod scenes;
 mod sixteen;

@@ -43,6 +43,7 @@ fn report_json(report: &StepReport) -> Value {
     json!({
         "bodies": report.bodies,
         "collisions": report.collisions,
+        "order": crate::ordering::to_json(report),
         "passes": report.passes,
         "impulse_sum_n_s": report.impulse_sum,
         "cycles": {
@@ -63,6 +64,7 @@ fn report_json(report: &StepReport) -> Value {
         "descriptors": report.descriptors,
         "host_ms": {
             "validate": run::milliseconds(host.validate),
+            "order": run::milliseconds(host.order),
             "pack": run::milliseconds(host.pack),
             "start": run::milliseconds(host.start),
             "wait": run::milliseconds(host.wait),

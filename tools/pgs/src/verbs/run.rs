@@ -17,6 +17,7 @@ use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
 use crate::options::{BuildArgs, DeadlineArgs};
+use crate::ordering::{self, OrderingArgs};
 use crate::scenes::SceneArgs;
 
 const EXAMPLES: &str = "\
@@ -24,6 +25,8 @@ Examples:
   pgs run                                        the thesis' scene
   pgs run --grid 10x10x10 --steps 60 --report-every 10
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
+  pgs run --hazards unchecked --order as-given   the same, the way the thesis orders: piles gain energy
+  pgs run --order hazard-free --verify
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes --inertia world --grid 8x8x8
   pgs run --bandwidth unlimited --json > run.json";
@@ -44,6 +47,8 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     report_every: Option<u32>,
     #[command(flatten)]
+    ordering: OrderingArgs,
+    #[command(flatten)]
     deadline: DeadlineArgs,
     #[command(flatten)]
     build: BuildArgs,
@@ -58,10 +63,11 @@ struct Row {
     report: StepReport,
 }
 
-const COLUMNS: [Column; 16] = [
+const COLUMNS: [Column; 18] = [
     Column { name: "step", unit: "", width: 5 },
     Column { name: "pairs", unit: "", width: 8 },
     Column { name: "ground", unit: "pairs", width: 6 },
+    Column { name: "empty", unit: "entries", width: 7 },
     Column { name: "impulses", unit: "N s", width: 10 },
     Column { name: "energy", unit: "kJ", width: 9 },
     Column { name: "formula", unit: "cycles", width: 10 },
@@ -72,6 +78,7 @@ const COLUMNS: [Column; 16] = [
     Column { name: "limit", unit: "", width: 8 },
     Column { name: "hazards", unit: "", width: 9 },
     Column { name: "detect", unit: "host ms", width: 7 },
+    Column { name: "order", unit: "host ms", width: 7 },
     Column { name: "pack", unit: "host ms", width: 7 },
     Column { name: "device", unit: "host ms", width: 7 },
     Column { name: "unpack", unit: "host ms", width: 7 },
@@ -82,13 +89,14 @@ impl Row {
         self.report.bytes_to_device + self.report.bytes_from_device
     }
 
-    fn cells(&self) -> [String; 16] {
+    fn cells(&self) -> [String; 18] {
         let StepReport { cycles, host, .. } = &self.report;
         let impulses = self.report.impulse_sum;
         [
             self.step.to_string(),
             grouped(self.report.collisions),
             grouped(self.ground_pairs as u64),
+            grouped(self.report.empty),
             impulses.map_or_else(|| "-".to_owned(), |sum| format!("{sum:.1}")),
             format!("{:.3}", self.kinetic_energy / 1e3),
             grouped(cycles.work),
@@ -99,6 +107,7 @@ impl Row {
             limit_text(self.report.limit()).to_owned(),
             grouped(self.report.hazards),
             format!("{:.1}", milliseconds(self.detect)),
+            format!("{:.1}", milliseconds(host.order)),
             format!("{:.1}", milliseconds(host.validate + host.pack)),
             format!("{:.1}", milliseconds(host.start + host.wait)),
             format!("{:.1}", milliseconds(host.unpack + host.commit)),
@@ -142,7 +151,7 @@ pub(crate) fn run(
     let interrupt = Interrupt::install();
     let every = args.report_every.unwrap_or(args.steps.div_ceil(ROWS));
     let progress = progress_bar(args.steps);
-    let parameters = args.deadline.apply(StepParameters::default());
+    let parameters = args.ordering.apply(args.deadline.apply(StepParameters::default()));
     let mut documents = Vec::new();
     let mut done = 0;
     while done < args.steps && !interrupt.is_set() {
@@ -150,7 +159,7 @@ pub(crate) fn run(
         let row = step(done, &parameters, &mut opened, &mut scene)?;
         if done == 1 && !common.json {
             // Only now: a scene that is refused prints nothing but the refusal.
-            progress.suspend(|| print_heading(args, &opened, out))?;
+            progress.suspend(|| print_heading(args, &opened, &row.report, out))?;
         }
         progress.inc(1);
         if common.json {
@@ -188,9 +197,15 @@ pub(crate) fn run(
 }
 
 /// Which board, which scene, and the names of the columns.
-fn print_heading(args: &RunArgs, opened: &Opened, out: &mut dyn Write) -> io::Result<()> {
+fn print_heading(
+    args: &RunArgs,
+    opened: &Opened,
+    first: &StepReport,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     opened.print(out)?;
     writeln!(out, "scene      {}, {} steps", args.scene.text(), args.steps)?;
+    writeln!(out, "order      {}", ordering::name(first.order))?;
     writeln!(out)?;
     heading(out, &COLUMNS)?;
     out.flush()

@@ -20,6 +20,7 @@ use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use crate::interrupt::Interrupt;
 use crate::npy::{self, Dimensions};
 use crate::options::{BuildArgs, DeadlineArgs};
+use crate::ordering::{self, OrderingArgs};
 use crate::origin;
 
 const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
@@ -29,6 +30,7 @@ const EXAMPLES: &str = "\
 Examples:
   pgs solve vectors/one_cube --compare
   pgs solve vectors/pile10_step90 --out result --digest
+  pgs solve vectors/pile10_step90 --hazards unchecked --verify
   pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
   pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
 
@@ -64,6 +66,8 @@ pub(crate) struct SolveArgs {
     #[arg(long)]
     no_integrate: bool,
     #[command(flatten)]
+    ordering: OrderingArgs,
+    #[command(flatten)]
     deadline: DeadlineArgs,
     #[command(flatten)]
     build: BuildArgs,
@@ -80,7 +84,7 @@ impl SolveArgs {
         if let Some(iterations) = self.friction_iterations {
             parameters.friction_iterations = iterations;
         }
-        self.deadline.apply(parameters)
+        self.ordering.apply(self.deadline.apply(parameters))
     }
 }
 
@@ -265,6 +269,7 @@ impl Solved {
             self.parameters.friction_iterations,
             if self.parameters.integrate { "integrated" } else { "not integrated" },
         )?;
+        writeln!(out, "order      {}", ordering::text(report))?;
         writeln!(
             out,
             "cycles     {} = {} by formula + {} stalls + {} waits; {:.3} ms modelled, limit: {}",

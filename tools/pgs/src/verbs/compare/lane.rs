@@ -152,6 +152,7 @@ impl<'a> Lane<'a> {
         if self.failed.is_some() {
             return None;
         }
+        let parameters = &self.side.ordering.apply(*parameters);
         let before = self.world.bodies().to_vec();
         let accelerator = &mut self.opened.accelerator;
         let stepped = match &mut self.world {
@@ -201,7 +202,7 @@ impl<'a> Lane<'a> {
 
     /// A number as the streams of the bodies carry it.
     fn carried(&self, value: f32) -> f32 {
-        let format = self.side.build.config().variant().numbers.bodies;
+        let format = self.side.build.config().variant().numbers.poses;
         Sixteen::of(format).and_then(|format| format.round_trip(value)).unwrap_or(value)
     }
 

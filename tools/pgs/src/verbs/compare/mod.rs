@@ -17,17 +17,18 @@ use self::lane::{Lane, Measured, World};
 use super::SCHEMA;
 use super::run::progress_bar;
 use crate::args::{BoardName, CommonArgs};
-use crate::build::BuildError;
 use crate::deviation::StateDeviation;
 use crate::failure::{Failure, Verdict};
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::{BuildArgs, DeadlineArgs};
+use crate::ordering::{OrderName, OrderingArgs};
 use crate::scenes::SceneArgs;
 
 const EXAMPLES: &str = "\
 Examples:
   pgs compare float float,unchecked --grid 10x10x10 --steps 200
+  pgs compare float,hazard-free float,unchecked,as-given --input vectors/full_step186
   pgs compare float half --input vectors/full_step186
   pgs compare half,thesis16 half,binary16 --steps 300 --every 10 --json
   pgs compare float,world mixed,world --scene shapes --grid 8x8x8
@@ -35,7 +36,9 @@ Examples:
 A and B are builds of the emulated board: a profile, and what is not as usual, after commas. Words
 are binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocked, unchecked, keep,
 flush, isotropic, world; the rest is window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
-length-width=BITS and address-width=BITS. Each board finds its own collisions.
+length-width=BITS and address-width=BITS. The order in which a board is sent the collisions is one of
+auto, as-given, hazard-free, body-by-body, body-by-body-oldest, body-by-body-newest, colours. Each
+board finds its own collisions.
 
 Only moving bodies are compared; A is the original. Relative deviations are |B - A| / |A| of each
 component (thesis eq. 4.1); where A's component is 0 they leave it out. A velocity is within 1 % if it
@@ -72,30 +75,50 @@ pub(crate) struct CompareArgs {
     every: Option<u32>,
     #[command(flatten)]
     scene: SceneArgs,
+    /// Prove before each step on either board that no moving body recurs within the hazard window;
+    /// the board fails otherwise
+    #[arg(long)]
+    verify: bool,
     #[command(flatten)]
     deadline: DeadlineArgs,
 }
 
-/// What one side of a comparison is: today how its board is built.
-///
-/// What else may differ between two sides without being a part of the board, such as the order in
-/// which the driver sends the collisions, is a word of this text as well, read and written here.
+/// What one side of a comparison is: how its board is built, and in which order it is sent the
+/// collisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Side {
     pub(super) build: BuildArgs,
+    pub(super) ordering: OrderingArgs,
 }
 
 impl FromStr for Side {
-    type Err = BuildError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, BuildError> {
-        Ok(Self { build: text.parse()? })
+    /// A word of the order may stand anywhere behind the profile.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut order = None;
+        let mut rest = Vec::new();
+        for (place, word) in text.split(',').enumerate() {
+            match OrderName::of_word(word) {
+                Some(_) if order.is_some() => return Err("order is given twice".to_owned()),
+                Some(name) if place > 0 => order = Some(name),
+                _ => rest.push(word),
+            }
+        }
+        let build = rest.join(",").parse().map_err(|error| {
+            format!("{error}; orders of the collisions are {}", OrderName::all())
+        })?;
+        Ok(Self { build, ordering: OrderingArgs { order, verify: false } })
     }
 }
 
 impl fmt::Display for Side {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.build)
+        write!(f, "{}", self.build)?;
+        match self.ordering.order {
+            Some(order) => write!(f, ",{}", order.text()),
+            None => Ok(()),
+        }
     }
 }
 
@@ -168,7 +191,8 @@ pub(crate) fn run(
         Some(folder) => folder.parameters,
         None => StepParameters::default(),
     };
-    let parameters = args.deadline.apply(parameters);
+    let mut parameters = args.deadline.apply(parameters);
+    parameters.verify_order |= args.verify;
     let open = |name, side| {
         let world = |opened: &_| match &folder {
             Some(folder) => {
@@ -293,9 +317,21 @@ mod tests {
 
     #[test]
     fn a_side_is_written_as_it_is_read() {
-        for text in ["float", "half,thesis16,f32,unchecked,world"] {
+        for text in [
+            "float",
+            "half,thesis16,f32,unchecked,world",
+            "float,unchecked,hazard-free",
+            "mixed,body-by-body-oldest",
+            "float,auto",
+        ] {
             assert_eq!(text.parse::<Side>().expect(text).to_string(), text);
         }
-        "float,sorted".parse::<Side>().expect_err("no such word");
+        let side: Side = "float,order=as-given,unchecked".parse().expect("the same");
+        assert_eq!(side.to_string(), "float,unchecked,as-given");
+        let error = "float,sorted".parse::<Side>().expect_err("no such word");
+        assert!(error.contains("sorted") && error.contains("colours"), "{error}");
+        let error = "float,colours,as-given".parse::<Side>().expect_err("two orders");
+        assert_eq!(error, "order is given twice");
+        "hazard-free".parse::<Side>().expect_err("no profile");
     }
 }

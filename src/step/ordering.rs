@@ -1,0 +1,188 @@
+//! This file puts the collisions of a step in the order in which they are sent.
+//!
+//! In the caller's own order nothing is made: it is packed as it is. Otherwise pairs, positions and
+//! what moves are read into memory that is kept, ordered, and proved free of hazards if that was
+//! asked for. Where only live bodies are kept, every body is then given its place.
+
+use bitstream_model::interface::profile::Flow;
+
+use crate::accelerator::Capabilities;
+use crate::order::{
+    Checker, Crowded, InputBuffers, IssueWindow, LiveReport, Lives, Order, OrderError, OrderInput,
+    OrderReport, Orderer, Room, Schedule,
+};
+use crate::scene::validate::{Limits, needed};
+use crate::scene::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
+
+/// Orders the collisions of steps, keeping its memory from one to the next.
+#[derive(Debug, Default)]
+pub(super) struct Ordering {
+    buffers: InputBuffers,
+    orderer: Orderer,
+    checker: Checker,
+    lives: Lives,
+}
+
+/// How the collisions of a step were ordered.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arranged {
+    pub(super) order: Order,
+    /// Whether there is a schedule; without one they are as given.
+    pub(super) scheduled: bool,
+    /// What the order is like, if it was to be verified.
+    pub(super) verified: Option<OrderReport>,
+    /// What it takes of a design that keeps live bodies alone.
+    pub(super) live: Option<LiveReport>,
+}
+
+/// What a step runs on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hardware<'a> {
+    pub(super) capabilities: &'a Capabilities,
+    pub(super) limits: &'a Limits,
+    pub(super) shapes: &'a [Shape],
+}
+
+impl Ordering {
+    /// Orders the collisions of a step that was validated.
+    ///
+    /// # Errors
+    /// [`InputError::OrderTooLong`], [`InputError::Order`]; where only live bodies are kept,
+    /// [`InputError::SpanTooLong`] and [`InputError::TooManyLive`].
+    pub(super) fn arrange<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &B,
+        collisions: &C,
+        parameters: &StepParameters,
+        on: Hardware<'_>,
+    ) -> Result<Arranged, InputError> {
+        let order = parameters.order.unwrap_or_else(|| automatic(on.capabilities));
+        let design = on.capabilities.window;
+        if order == Order::AsGiven && !parameters.verify_order && design.is_none() {
+            return Ok(Arranged { order, scheduled: false, verified: None, live: None });
+        }
+        let window = IssueWindow::of(on.capabilities, parameters)?;
+        let mut input = self.buffers.gather(bodies, collisions, on.shapes);
+        let passes = parameters.contact_iterations.saturating_add(parameters.friction_iterations);
+        if design.is_some() && passes == 0 {
+            // Without a pass there is nobody to take them.
+            input.pairs = &[];
+        }
+        let room = on.limits.room_for_collisions(bodies.len());
+        self.orderer.set_limit(usize::try_from(room).unwrap_or(usize::MAX));
+        let schedule = match self.orderer.order(&input, order, window) {
+            Ok(schedule) => schedule,
+            Err(OrderError::TooLong { depth, limit, .. }) => {
+                return Err(too_long(&input, depth, limit, parameters, on.shapes));
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let verified = match parameters.verify_order {
+            true => {
+                self.checker.verify(schedule, &input, window)?;
+                Some(OrderReport::measure(schedule, &input, window)?)
+            }
+            false => None,
+        };
+        let live = match design {
+            Some(design) => {
+                let room = Room::of(&design, passes, on.capabilities.collisions_per_issue);
+                let settled = self.lives.settle(schedule, &input, room);
+                let report = self.lives.report();
+                settled.map_err(|crowded| refused(crowded, report, room, &input, on.shapes))?;
+                Some(report)
+            }
+            None => None,
+        };
+        Ok(Arranged { order, scheduled: true, verified, live })
+    }
+
+    /// The schedule made last.
+    pub(super) fn schedule(&self) -> &Schedule {
+        self.orderer.schedule()
+    }
+
+    /// Places, marks and orders of the bodies, of the schedule made last.
+    pub(super) fn lives(&self) -> &Lives {
+        &self.lives
+    }
+}
+
+/// The order of a step that asks for none.
+fn automatic(capabilities: &Capabilities) -> Order {
+    let waits = capabilities.interlocked && capabilities.window.is_none();
+    if waits { Order::AsGiven } else { Order::HazardFree }
+}
+
+/// An order without hazards does not fit. The moving body with the most collisions tells which
+/// profiles could have room for it: its uses must lie a depth apart there too.
+#[cold]
+fn too_long(
+    input: &OrderInput<'_>,
+    depth: u32,
+    limit: usize,
+    parameters: &StepParameters,
+    shapes: &[Shape],
+) -> InputError {
+    let (bodies, collisions) = (input.moving.len(), input.pairs.len());
+    let mut uses = vec![0_usize; bodies];
+    for body in input.pairs.as_flattened() {
+        let body = usize::try_from(*body).unwrap_or(usize::MAX);
+        if input.moving.get(body) == Some(&true) {
+            uses[body] += 1;
+        }
+    }
+    // Of several the first.
+    let most = uses.iter().copied().enumerate().rev().max_by_key(|(_, uses)| *uses);
+    let (body, uses) = most.unwrap_or_default();
+    let demand = Demand { bodies, collisions, inertia: needed(shapes) };
+    let carriers = demand.carriers(|variant| {
+        let Ok(window) = IssueWindow::of_profile(variant.profile, parameters) else { return false };
+        let apart = window.depth() as usize * window.per_issue() as usize;
+        let of_body = uses.saturating_sub(1).saturating_mul(apart).saturating_add(1);
+        if let Flow::Window(window) = variant.profile.flow
+            && of_body > window.lag as usize
+        {
+            return false;
+        }
+        // What took more than the limit here takes no less at a greater depth.
+        let as_here = if window.depth() >= depth { limit.saturating_add(1) } else { 0 };
+        let entries = collisions.max(of_body).max(as_here);
+        Demand { collisions: entries, ..demand }.has_room(variant)
+    });
+    InputError::OrderTooLong { collisions, bodies, limit, depth, body, uses, carriers }
+}
+
+/// An order in which bodies live too long, or too many at once.
+#[cold]
+fn refused(
+    crowded: Crowded,
+    LiveReport { most_alive: alive, longest_span, .. }: LiveReport,
+    room: Room,
+    input: &OrderInput<'_>,
+    shapes: &[Shape],
+) -> InputError {
+    let (bodies, collisions) = (input.moving.len(), input.pairs.len());
+    let demand = Demand { bodies, collisions, inertia: needed(shapes) };
+    let held = match crowded {
+        Crowded::Span { .. } => 0,
+        Crowded::Places { held } => held,
+    };
+    let carriers = demand.carriers(|variant| match variant.profile.flow {
+        Flow::Passes => true,
+        Flow::Window(window) => window.lag > longest_span && window.slots > held,
+    });
+    let at = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
+    match crowded {
+        Crowded::Span { body, first, last } => InputError::SpanTooLong {
+            body: at(body),
+            first: at(first),
+            last: at(last),
+            lag: room.lag,
+            carriers,
+        },
+        Crowded::Places { held } => {
+            InputError::TooManyLive { held, alive, places: room.places, carriers }
+        }
+    }
+}

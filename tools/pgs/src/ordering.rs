@@ -1,0 +1,148 @@
+//! This file holds the order of the collisions of a step: how it is asked for on the command line
+//! and in the texts of `pgs compare`, and how a step's report tells it.
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use zynq_pgs::order::{Order, Ties};
+use zynq_pgs::{StepParameters, StepReport};
+
+use crate::verbs::table::grouped;
+
+/// How the collisions of a step are ordered.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
+pub(crate) struct OrderingArgs {
+    /// Order in which the collisions are sent [default: auto]
+    #[arg(long, value_enum)]
+    pub(crate) order: Option<OrderName>,
+    /// Prove before each step that no moving body recurs within the hazard window; refuse the step
+    /// otherwise
+    #[arg(long)]
+    pub(crate) verify: bool,
+}
+
+/// An order of the collisions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OrderName {
+    /// hazard-free where the pipeline does not wait on hazards, as-given where it does
+    Auto,
+    /// As detected, which is how Bullet sorts them: hazards abound
+    AsGiven,
+    /// No hazards, few bodies alive, few empty entries
+    HazardFree,
+    /// The thesis' Algorithm 3, ties by the lowest index: few bodies alive, nearly all hazardous
+    BodyByBody,
+    /// The same, ties by the body that became active first
+    BodyByBodyOldest,
+    /// The same, ties by the body that became active last
+    BodyByBodyNewest,
+    /// By greedy colouring: no hazards if colours are large, nearly all bodies alive
+    Colours,
+}
+
+impl OrderName {
+    /// What the driver is asked for.
+    fn order(self) -> Option<Order> {
+        match self {
+            Self::Auto => None,
+            Self::AsGiven => Some(Order::AsGiven),
+            Self::HazardFree => Some(Order::HazardFree),
+            Self::BodyByBody => Some(Order::BodyByBody(Ties::LowestIndex)),
+            Self::BodyByBodyOldest => Some(Order::BodyByBody(Ties::Oldest)),
+            Self::BodyByBodyNewest => Some(Order::BodyByBody(Ties::Newest)),
+            Self::Colours => Some(Order::Colours),
+        }
+    }
+
+    /// As it is written.
+    pub(crate) fn text(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+    }
+
+    /// The order that a word of a text names: its name, or its name behind `order=`.
+    pub(crate) fn of_word(word: &str) -> Option<Self> {
+        Self::from_str(word.strip_prefix("order=").unwrap_or(word), false).ok()
+    }
+
+    /// All names, for people.
+    pub(crate) fn all() -> String {
+        let names: Vec<String> = Self::value_variants().iter().map(|name| name.text()).collect();
+        names.join(", ")
+    }
+}
+
+impl OrderingArgs {
+    /// The same parameters with this order.
+    pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
+        if let Some(name) = self.order {
+            parameters.order = name.order();
+        }
+        parameters.verify_order |= self.verify;
+        parameters
+    }
+}
+
+/// The name of an order that was sent.
+pub(crate) fn name(order: Order) -> String {
+    let found = OrderName::value_variants().iter().find(|name| name.order() == Some(order));
+    found.map_or_else(|| "another".to_owned(), |name| name.text())
+}
+
+/// In which order a step was sent, in words.
+pub(crate) fn text(report: &StepReport) -> String {
+    let mut text = name(report.order);
+    if report.empty > 0 {
+        let share = report.empty as f64 / (report.collisions as f64).max(1.0);
+        text += &format!(", {} empty entries ({:.2} %)", grouped(report.empty), share * 100.0);
+    }
+    if let Some(verified) = &report.verified {
+        text += &format!(
+            ", verified: {} hazards, {} bodies alive at most, longest span {} slots",
+            verified.hazards,
+            grouped(verified.most_alive as u64),
+            grouped(verified.longest_span as u64),
+        );
+    }
+    text
+}
+
+/// The same for programs.
+pub(crate) fn to_json(report: &StepReport) -> Value {
+    json!({
+        "name": name(report.order),
+        "empty": report.empty,
+        "verified": report.verified.map(|verified| json!({
+            "hazards": verified.hazards,
+            "lost_updates": verified.lost_updates,
+            "most_alive": verified.most_alive,
+            "longest_span": verified.longest_span,
+            "mean_span": verified.mean_span,
+        })),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_told_as_it_is_asked_for() {
+        for order in OrderName::value_variants() {
+            assert_eq!(OrderName::of_word(&order.text()), Some(*order));
+            assert_eq!(OrderName::of_word(&format!("order={}", order.text())), Some(*order));
+            if let Some(asked) = order.order() {
+                assert_eq!(name(asked), order.text());
+            }
+            assert!(OrderName::all().contains(&order.text()));
+        }
+        assert_eq!(OrderName::of_word("sorted"), None);
+    }
+
+    #[test]
+    fn nothing_asked_for_changes_nothing() {
+        let parameters = StepParameters::default();
+        assert_eq!(OrderingArgs::default().apply(parameters), parameters);
+        let asked = OrderingArgs { order: Some(OrderName::Colours), verify: true };
+        let asked = asked.apply(parameters);
+        assert_eq!((asked.order, asked.verify_order), (Some(Order::Colours), true));
+    }
+}
