@@ -14,7 +14,7 @@ use crate::interface::control::{
     issue, memory_per_record, numbers,
 };
 use crate::interface::number::Numbers;
-use crate::interface::profile::{Depth, Inertia};
+use crate::interface::profile::{Depth, Inertia, Window};
 
 use super::integrate::Integration;
 use super::solver::SolverParameters;
@@ -272,7 +272,7 @@ impl Registers {
             _ if offset == COLLISION_CAPACITY.offset => memory
                 .bytes
                 .checked_div(variant.bytes_per_collision())
-                .unwrap_or(window::COLLISIONS_MAX),
+                .unwrap_or(Window::COLLISIONS_MAX),
             _ if offset == SHAPE_CAPACITY.offset => profile.shape_capacity,
             _ if offset == MEMORY_BYTES.offset => memory.bytes,
             _ if offset == MEMORY_PER_RECORD.offset => memory_per_record::COLLISION.put(

@@ -2,11 +2,14 @@
 //!
 //! `cycles = load + passes x (ceil(C / collisions per issue) x II + fill) + max(pose in, result out)`
 //!
+//! A design that streams the collisions once has a formula of its own ([`window`](super::window)).
+//!
 //! Source: thesis Tables 6.4 and 6.8 (which the formula meets within 0.6 %); fill is this
 //! project's.
 
 use super::traffic::{Records, StepTraffic};
-use crate::interface::profile::{Profile, Variant};
+use super::window::{WindowCycles, WindowStep};
+use crate::interface::profile::{Flow, Profile, Variant};
 
 /// How large a step is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,15 +45,16 @@ impl StepShape {
 /// Clock cycles of a step by the formula, part by part. Counts beyond 64 bits saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepCycles {
-    /// Velocities in.
+    /// Velocities in; 0 where they come beside the passes.
     pub load: u64,
-    /// One pass over the collisions, without fill.
+    /// One pass over the collisions, without fill; all of them where they run side by side.
     pub pass: u64,
-    /// Fill of all passes together.
+    /// Fill of all passes together; where they run side by side, by how much the last is behind the
+    /// first if the order needs all of the delay lines, and its fill.
     pub fill: u64,
-    /// Poses in.
+    /// Poses in; 0 where they come beside the passes.
     pub pose_in: u64,
-    /// Results out.
+    /// Results out; likewise.
     pub result_out: u64,
     /// All together.
     pub total: u64,
@@ -61,6 +65,18 @@ impl StepCycles {
     #[must_use]
     pub fn new(variant: &Variant, records: Records, step: &StepShape) -> Self {
         let profile = variant.profile;
+        if let Flow::Window(design) = &profile.flow
+            && let Some(window) = WindowCycles::new(variant, &WindowStep::longest(design, *step))
+        {
+            return Self {
+                load: 0,
+                pass: window.stream,
+                fill: window.behind.saturating_add(window.fill),
+                pose_in: 0,
+                result_out: 0,
+                total: window.passes,
+            };
+        }
         let traffic = StepTraffic::new(variant, records, step);
         let issues = step.collisions.div_ceil(u64::from(profile.collisions_per_issue).max(1));
         let pass = issues.saturating_mul(profile.initiation_interval.into());

@@ -13,6 +13,7 @@ mod schedule;
 pub mod thesis;
 mod time;
 mod traffic;
+mod window;
 
 pub use blocks::{BLOCK_BITS, BLOCKS, BlockShape, ShapedBlocks};
 pub use cycles::{StepCycles, StepShape};
@@ -21,3 +22,4 @@ pub use resources::{ArrayUse, MemoryUse};
 pub use schedule::{Access, AccessKind, Schedule, Slot};
 pub use time::{PartLimit, PartTime, StepTime};
 pub use traffic::{HP_PORT_BITS, HP_PORTS, Records, StepTraffic, StreamDemand, Transfer};
+pub use window::{WindowCycles, WindowLogic, WindowStep};

@@ -15,6 +15,13 @@
 //! stays above 1 (thesis §5.5.3). The pump is a design assumption of this project that no synthesis
 //! has confirmed.
 //!
+//! Where the passes run side by side every unit has a memory of its own, in which it reads and writes
+//! the bodies of an entry, and into which the last uses of the pass before are written:
+//!
+//! ```text
+//!   windowed  (2 + 2 + 2) x 1 / 4 = 2     windowed16  (2 + 2 + 2) x 2 / 4 = 3
+//! ```
+//!
 //! Considered instead: banks by body colour, so that the two bodies of a collision never share one;
 //! a bank then takes one read and one write a cycle and needs neither copy nor pump. It binds the
 //! colours to the order of the collisions, which the driver would have to find (2 banks are enough
@@ -23,7 +30,8 @@
 use super::cycles::StepShape;
 use super::schedule::Schedule;
 use super::traffic::{Records, StepTraffic};
-use crate::interface::profile::{Inertia, Variant};
+use super::window;
+use crate::interface::profile::{Flow, Inertia, Variant};
 
 /// Ports of a block RAM, and of a distributed RAM in its dual-port form.
 pub const PORTS: u32 = 2;
@@ -39,9 +47,19 @@ pub enum OnChipArray {
     Impulses,
     /// Shape index of each body.
     ShapeIndices,
+    /// Records with their impulses on the way to a contact pass.
+    ContactLines,
+    /// Records without distances, with their impulses, on the way to a friction pass.
+    FrictionLines,
 }
 
 impl OnChipArray {
+    /// Whether it has a row a body, and not a row a collision.
+    #[must_use]
+    pub const fn is_of_bodies(self) -> bool {
+        matches!(self, Self::Velocities | Self::Inertia | Self::ShapeIndices)
+    }
+
     /// Name in reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -50,6 +68,8 @@ impl OnChipArray {
             Self::Inertia => "world inertia",
             Self::Impulses => "impulses",
             Self::ShapeIndices => "shape indices",
+            Self::ContactLines => "contact lines",
+            Self::FrictionLines => "friction lines",
         }
     }
 }
@@ -173,10 +193,15 @@ impl PortAccount {
         };
         // Nothing else needs copies or a pump.
         let plain = velocities.with(1, 1);
-        let mut arrays = vec![
-            velocities,
-            PortUse { array: OnChipArray::Impulses, reads: 1, writes: 1, ..plain },
-        ];
+        let once = |array| PortUse { array, reads: 1, writes: 1, ..plain };
+        let mut arrays = match profile.flow {
+            Flow::Passes => vec![velocities, once(OnChipArray::Impulses)],
+            Flow::Window(_) => vec![
+                PortUse { writes: 4, ..velocities },
+                once(OnChipArray::ContactLines),
+                once(OnChipArray::FrictionLines),
+            ],
+        };
         if variant.inertia == Inertia::World {
             arrays.push(PortUse { array: OnChipArray::Inertia, writes: 0, ..plain });
         }
@@ -212,7 +237,7 @@ impl PortAccount {
         let step = StepShape::new(bodies, 0);
         let traffic = StepTraffic::new(variant, Records::Streamed, &step);
         let by_streams = traffic.velocities.cycles;
-        let of_bodies = self.arrays.iter().filter(|ports| ports.array != OnChipArray::Impulses);
+        let of_bodies = self.arrays.iter().filter(|ports| ports.array.is_of_bodies());
         of_bodies
             .map(|ports| {
                 let writers = match ports.memory {
@@ -227,13 +252,18 @@ impl PortAccount {
     }
 }
 
-/// Cycles of the busiest stream for one issue, over as many issues as make whole groups.
+/// Cycles of the busiest stream for one issue, over as many issues as make whole groups. Where the
+/// passes run side by side an entry that is streamed once is issued several times.
 fn stream_interval(variant: &Variant) -> u32 {
     let profile = variant.profile;
     let issues = u32::try_from(profile.stripes.collisions.streams.len()).unwrap_or(1).max(1);
     let step = StepShape::new(0, u64::from(issues) * u64::from(profile.collisions_per_issue));
     let traffic = StepTraffic::new(variant, Records::Streamed, &step);
-    let interval = traffic.collisions.cycles.div_ceil(issues.into());
+    let mut entries = u64::from(issues);
+    if let Flow::Window(design) = &profile.flow {
+        entries *= u64::from(window::issues_per_entry(design));
+    }
+    let interval = traffic.collisions.cycles.div_ceil(entries);
     u32::try_from(interval).unwrap_or(u32::MAX)
 }
 

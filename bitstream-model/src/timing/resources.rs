@@ -4,7 +4,8 @@
 
 use super::blocks::{BLOCK_BITS, ShapedBlocks};
 use super::ports::{MemoryKind, OnChipArray, PortAccount};
-use crate::interface::profile::Variant;
+use super::window;
+use crate::interface::profile::{Flow, Variant, Window};
 
 /// Numbers of a velocity, and of a world inverse inertia.
 const SIX: u32 = 6;
@@ -25,7 +26,7 @@ pub struct ArrayUse {
     pub rows: u64,
     /// Bytes of a row.
     pub row_bytes: u32,
-    /// Copies.
+    /// Copies; of a design whose passes run side by side, memories of as many units or passes.
     pub copies: u32,
     /// Whether one port to read and one to write are enough for every issue.
     pub simple: bool,
@@ -80,12 +81,24 @@ impl MemoryUse {
                     OnChipArray::Velocities | OnChipArray::Inertia => (bodies, SIX * number),
                     OnChipArray::Impulses => (collisions, FOUR * variant.numbers.impulses.bytes()),
                     OnChipArray::ShapeIndices => (bodies, memory.shape_index_bytes),
+                    OnChipArray::ContactLines | OnChipArray::FrictionLines => (0, 0),
                 };
                 let (array, copies, simple) = (ports.array, ports.copies, ports.simple());
+                if let Flow::Window(design) = &variant.profile.flow
+                    && let Some(of) = window::array(variant, design, array)
+                {
+                    let (rows, row_bytes, copies) = (of.rows, of.row_bytes, of.memories);
+                    let memory = ports.memory;
+                    return ArrayUse { array, memory, rows, row_bytes, copies, simple };
+                }
                 ArrayUse { array, memory: ports.memory, rows, row_bytes, copies, simple }
             })
             .collect();
         let position = THREE * number * memory.velocity_copies;
+        let bodies = match &variant.profile.flow {
+            Flow::Passes => bodies,
+            Flow::Window(design) => design.slots.into(),
+        };
         Self {
             arrays,
             capacity: memory.bytes.into(),
@@ -137,12 +150,15 @@ impl MemoryUse {
         self.block_ram() <= self.capacity
     }
 
-    /// Collisions that fit beside that many bodies.
+    /// Collisions that fit beside that many bodies; what the counters hold, where none of them is kept.
     #[must_use]
     pub fn collisions_beside(variant: &Variant, bodies: u64) -> u64 {
         let memory = variant.profile.memory;
         let taken = bodies.saturating_mul(variant.bytes_per_body().into());
-        u64::from(memory.bytes).saturating_sub(taken) / u64::from(variant.bytes_per_collision())
+        u64::from(memory.bytes)
+            .saturating_sub(taken)
+            .checked_div(u64::from(variant.bytes_per_collision()))
+            .unwrap_or(Window::COLLISIONS_MAX.into())
     }
 }
 
@@ -193,7 +209,7 @@ mod tests {
 
     #[test]
     fn the_arrays_are_what_the_interface_counts_for_each_record() {
-        for profile in PROFILES {
+        for profile in PROFILES.iter().filter(|profile| profile.flow == Flow::Passes) {
             for inertia in [Inertia::Isotropic, Inertia::World] {
                 let variant = Variant { inertia, ..profile.default_variant() };
                 let memory = MemoryUse::new(&variant, 7, 5);

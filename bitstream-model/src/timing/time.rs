@@ -1,13 +1,14 @@
 //! This file is the time of a step under a memory bandwidth.
 //!
 //! Each part of a step takes the longer of computing and moving: the velocities in, each pass, and
-//! the poses in with the results out. Fill is added, because nothing streams meanwhile.
+//! the poses in with the results out. Fill is added, because nothing streams meanwhile. Where the
+//! passes run side by side everything streams beside them, and is in their part.
 
 use super::cycles::{StepCycles, StepShape};
 use super::ports::PortAccount;
 use super::traffic::{Records, StepTraffic};
 use crate::config::Bandwidth;
-use crate::interface::profile::Variant;
+use crate::interface::profile::{Flow, Variant};
 
 /// What limits a part of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,14 +85,20 @@ impl StepTime {
                 PartTime { seconds: compute, bytes, limit: own }
             }
         };
-        let load = part(cycles.load, traffic.velocities.bytes, PartLimit::Streams);
-        let pass = part(cycles.pass, traffic.collisions.bytes, interval_limit(variant));
         let last = traffic.poses.bytes.saturating_add(traffic.results.bytes);
+        let beside = variant.profile.flow != Flow::Passes;
+        let (first, each, last) = if beside {
+            (0, traffic.bytes(), 0)
+        } else {
+            (traffic.velocities.bytes, traffic.collisions.bytes, last)
+        };
+        let load = part(cycles.load, first, PartLimit::Streams);
+        let pass = part(cycles.pass, each, interval_limit(variant));
         let integration = part(cycles.integration(), last, PartLimit::Streams);
         let fill_seconds = cycles.fill as f64 / clock_hz;
-        let passes = step.passes() as f64 * pass.seconds;
+        let passes = traffic.collision_streams as f64 * pass.seconds;
         let seconds = load.seconds + passes + fill_seconds + integration.seconds;
-        Self { load, pass, fill_seconds, integration, seconds, bytes: traffic.bytes(step) }
+        Self { load, pass, fill_seconds, integration, seconds, bytes: traffic.bytes() }
     }
 
     /// The step in clock cycles of the accelerator, waits for the memory included.

@@ -25,9 +25,6 @@ use super::{Accelerator, Phase};
 use crate::interface::control::{COLLISIONS, ErrorCode, window, window_capacity};
 use crate::interface::profile::{Flow, Window};
 
-/// Most collisions of a step: what the counters of the passes hold.
-pub(super) const COLLISIONS_MAX: u32 = 1 << 20;
-
 /// The WINDOW register.
 pub(super) fn units(flow: &Flow) -> u32 {
     match flow {
@@ -50,7 +47,7 @@ pub(super) fn capacity(flow: &Flow) -> u32 {
 impl Accelerator {
     /// Begins a step whose arguments are in range.
     pub(super) fn start_window(&mut self, design: &Window) {
-        if self.arguments.collisions > COLLISIONS_MAX {
+        if self.arguments.collisions > Window::COLLISIONS_MAX {
             self.fail(ErrorCode::Argument, 0, COLLISIONS.offset);
             return;
         }

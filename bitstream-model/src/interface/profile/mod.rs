@@ -95,6 +95,9 @@ pub struct Window {
 }
 
 impl Window {
+    /// Most collisions of a step, empty entries included: what the counters of the passes hold.
+    pub const COLLISIONS_MAX: u32 = 1 << 20;
+
     /// Cycles in which every pass issues one entry.
     #[must_use]
     pub const fn slot_cycles(

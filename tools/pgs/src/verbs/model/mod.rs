@@ -12,6 +12,7 @@ mod render;
 mod report;
 mod scene;
 mod step;
+mod window;
 
 use std::io::Write;
 
@@ -80,6 +81,8 @@ enum Section {
     Step,
     /// mixed against float
     Mixed,
+    /// windowed and windowed16 against float
+    Windowed,
     /// Words in and out (T4.1 to T4.6)
     Data,
     /// On-chip memory and logic (§4.4.2, T6.4, T6.8)
@@ -99,6 +102,7 @@ impl Section {
         match self {
             Self::Step => step::tables(scene),
             Self::Mixed => beyond::tables(scene),
+            Self::Windowed => window::tables(scene),
             Self::Data => data::tables(scene),
             Self::Memory => memory::tables(scene),
             Self::Streams => memory::streams(scene),
@@ -131,7 +135,7 @@ impl ModelArgs {
         }
     }
 
-    /// The section `mixed` is about a profile that must have been asked for.
+    /// The sections `mixed` and `windowed` are about profiles that must have been asked for.
     fn check(&self, json: bool) -> Result<(), Failure> {
         if json && self.markdown {
             return Err(Failure::input("--json and --markdown exclude each other")
@@ -140,6 +144,17 @@ impl ModelArgs {
         if self.section.contains(&Section::Mixed) && ![ALL, MIXED.name].contains(&&*self.profile) {
             let message = format!("the section mixed has nothing about profile {}", self.profile);
             return Err(Failure::input(message).next("ask for --profile mixed, or for all"));
+        }
+        let windowed = |profile: &&'static Profile| {
+            window::has_window(&profile.flow) && [ALL, profile.name].contains(&&*self.profile)
+        };
+        if self.section.contains(&Section::Windowed)
+            && !PROFILES.iter().copied().any(|profile| windowed(&profile))
+        {
+            let message =
+                format!("the section windowed has nothing about profile {}", self.profile);
+            return Err(Failure::input(message)
+                .next("ask for --profile windowed or windowed16, or for all"));
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! This file has the tables of the block RAM ports: which initiation interval they allow, and who
 //! has which port when.
 
-use bitstream_model::timing::{Access, AccessKind, OnChipArray, PortAccount, PortUse, Slot};
+use bitstream_model::timing::{Access, AccessKind, PortAccount, PortUse, Slot};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, yes_or_no};
@@ -87,12 +87,14 @@ fn intervals(scene: &Scene) -> Table {
 
 /// An access, as `read A`, with the number of its collision where several are issued together.
 fn access(ports: &PortUse, access: &Access) -> String {
-    let verb = match access.kind {
-        AccessKind::Read => "read",
-        AccessKind::Write => "write",
+    let verb = match (access.kind, access.row) {
+        (AccessKind::Read, _) => "read",
+        (AccessKind::Write, 0 | 1) => "write",
+        // From the unit before.
+        (AccessKind::Write, _) => "take",
     };
-    let body = match (ports.array, access.row) {
-        (OnChipArray::Impulses, _) => "",
+    let body = match (ports.array, access.row % 2) {
+        (array, _) if !array.is_of_bodies() => "",
         (_, 0) => " A",
         (_, _) => " B",
     };
@@ -144,7 +146,8 @@ fn schedule(scene: &Scene) -> Table {
     }
     table.note(
         "Clock counts the block RAM's clocks within a cycle. Writes are those of an issue that \
-         entered the pipeline earlier.",
+         entered the pipeline earlier. Take: the last use of a body in the pass before, written into \
+         the memory of the unit that has the next one; two of them at once are the most.",
     );
     table
 }
