@@ -169,12 +169,14 @@ pub(crate) fn described(config: &BoardConfig) -> String {
     if build.config().variant() == variant {
         return build.to_string();
     }
-    let Numbers { collisions, bodies, rows, updates, velocities, impulses } = variant.numbers;
+    let Numbers { collisions, bodies, poses, rows, updates, velocities, impulses } =
+        variant.numbers;
     format!(
-        "{build} (streams: collisions {}, bodies {}; arithmetic: rows {}, updates {}; on chip: \
+        "{build} (streams: collisions {}, velocities {}, poses {}; arithmetic: rows {}, updates {}; on chip: \
          velocities {}, impulses {})",
         collisions.name(),
         bodies.name(),
+        poses.name(),
         rows.name(),
         updates.name(),
         velocities.name(),
@@ -275,12 +277,12 @@ mod tests {
         };
         assert_eq!(
             of("half", |numbers| numbers.velocities = Precision::F32),
-            "half (streams: collisions binary16, bodies binary16; arithmetic: rows binary16, updates \
+            "half (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: rows binary16, updates \
              binary16; on chip: velocities f32, impulses binary16)"
         );
         assert_eq!(
             of("half", |numbers| numbers.updates = Precision::F32),
-            "half,f32 (streams: collisions binary16, bodies binary16; arithmetic: rows binary16, \
+            "half,f32 (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: rows binary16, \
              updates f32; on chip: velocities binary16, impulses binary16)"
         );
         assert_eq!(
