@@ -218,10 +218,10 @@ fn measure(
             let _ = black_box(checker.verify(&schedule, &input, window));
         }),
         Box::new(|| {
-            black_box(packer.pack(bodies, &ordered, &shapes));
+            black_box(packer.pack(bodies, &ordered, shapes));
         }),
         Box::new(|| {
-            black_box(as_given.pack(bodies, collisions, &shapes));
+            black_box(as_given.pack(bodies, collisions, shapes));
         }),
     ];
     // Once without looking, so that all memory is there.
