@@ -329,7 +329,7 @@ pub(crate) mod fake {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile::{FLOAT, HALF, MIXED, NAIVE};
+    use crate::interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
     use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
 
@@ -432,6 +432,36 @@ mod tests {
             let found = identify_with(registers).expect(profile.name);
             assert_eq!(found.variant, profile.default_variant());
             assert_eq!((found.mm2s_channels, found.s2mm_channels), (channels, channels));
+        }
+    }
+
+    /// Two units of each kind, 8,191 places and that of static bodies, delay lines of 2,816 entries.
+    const WINDOWED_REGISTERS: [(u32, u32); 5] = [
+        (0x108, 5),
+        (0x11C, 0x0001_0002),
+        (0x13C, 0),
+        (0x148, 0x0202),
+        (0x14C, (2_816 << 16) | 8_192),
+    ];
+
+    #[test]
+    fn a_design_that_keeps_live_bodies_says_how_many_and_how_long() {
+        let found = identify_with(&WINDOWED_REGISTERS).expect("well formed");
+        assert_eq!(found.variant, WINDOWED.default_variant());
+        let window = Live { contact_units: 2, friction_units: 2, slots: 8_192, lag: 2_816 };
+        assert_eq!(found.window, Some(window));
+        assert_eq!((found.bytes_per_body, found.bytes_per_collision), (0, 0));
+        assert_eq!(identify_with(&[]).expect("well formed").window, None);
+        for (at, value, named) in [
+            (0x148, 0x0002, "WINDOW is"),
+            (0x148, 0x0200, "WINDOW is"),
+            (0x14C, (2_816 << 16) | 1, "WINDOW_CAPACITY"),
+            (0x14C, (2_816 << 16) | 8_193, "WINDOW_CAPACITY"),
+            (0x14C, 8_192, "WINDOW_CAPACITY"),
+        ] {
+            let registers = [&WINDOWED_REGISTERS[..], &[(at, value)]].concat();
+            let error = identify_with(&registers).expect_err(named).to_string();
+            assert!(error.starts_with(named), "{error}");
         }
     }
 

@@ -3,10 +3,12 @@
 
 use proptest::prelude::*;
 
-use super::pack::{pack_collisions, pack_poses, pack_velocities};
+use super::pack::{Chosen, pack_collisions, pack_marked_collisions, pack_poses, pack_velocities};
 use super::stripe::Segment;
 use crate::interface::number::{Numbers, StreamFormat};
-use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, Variant};
+use crate::interface::profile::{
+    FLOAT, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,
+};
 use crate::interface::record::Beat;
 use crate::scene::{
     Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
@@ -88,6 +90,20 @@ const MIXED_SPEC: Spec = Spec {
     collisions: Words::Binary16,
     relative: true,
     ..NAIVE_SPEC
+};
+
+const WINDOWED_SPEC: Spec = Spec {
+    variant: WINDOWED.default_variant(),
+    channels: 4,
+    collision_group: &[0, 1],
+    relative: true,
+    ..NAIVE_SPEC
+};
+const WINDOWED16_SPEC: Spec = Spec {
+    variant: WINDOWED16.default_variant(),
+    collisions: Words::Binary16,
+    bodies: Words::Binary16,
+    ..WINDOWED_SPEC
 };
 
 fn any_spec() -> impl Strategy<Value = Spec> {
@@ -370,6 +386,53 @@ proptest! {
             }
         }
         reader.end();
+    }
+
+    /// Places and marks stand where the indices do elsewhere; the rest is as it is without them.
+    #[test]
+    fn marks_arrive_in_place_of_indices(
+        short in any::<bool>(),
+        bodies in prop::collection::vec(any_body(), 12..14),
+        list in prop::collection::vec(any_collision(), 0..40),
+        seed in 0_u32..0x8000,
+    ) {
+        let spec = if short { WINDOWED16_SPEC } else { WINDOWED_SPEC };
+        let words: Vec<[u32; 2]> =
+            (0..).zip(&list).map(|(at, _)| [seed, (seed + 77 * at) % 0x8000]).collect();
+        let count = list.len();
+        let marked = packed(&spec, Segment::Collisions, count, |views| {
+            pack_marked_collisions(&spec.variant, &bodies, &list, &words, &SHAPES, views)
+        });
+        let plain = collisions(&spec, &bodies, &list);
+        let needed = 6 * count;
+        let mut reader = Reader::new(&spec, spec.collision_group, spec.collisions, &marked, needed);
+        let mut other = Reader::new(&spec, spec.collision_group, spec.collisions, &plain, needed);
+        let row = |reader: &mut Reader| reader.rows.next().expect("as many as are needed");
+        for words in words {
+            for (at, word) in words.into_iter().enumerate() {
+                let (found, expected) = (row(&mut reader), row(&mut other));
+                prop_assert_eq!(&found[..3], &expected[..3]);
+                prop_assert_eq!(found[3], word, "row {}", at);
+            }
+            for _ in 0..4 {
+                prop_assert_eq!(row(&mut reader), row(&mut other));
+            }
+        }
+        reader.end();
+    }
+
+    #[test]
+    fn chosen_bodies_arrive_in_their_own_order(
+        spec in any_spec(),
+        bodies in prop::collection::vec(any_body(), 1..20),
+        picks in prop::collection::vec(any::<prop::sample::Index>(), 0..30),
+    ) {
+        let order: Vec<u32> =
+            picks.iter().map(|pick| u32::try_from(pick.index(bodies.len())).expect("few")).collect();
+        let chosen = Chosen { bodies: &bodies, order: &order };
+        let copied: Vec<Body> = order.iter().map(|index| bodies[*index as usize]).collect();
+        prop_assert_eq!(velocities(&spec, &chosen), velocities(&spec, &copied));
+        prop_assert_eq!(poses(&spec, &chosen), poses(&spec, &copied));
     }
 
     #[test]

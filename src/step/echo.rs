@@ -1,10 +1,10 @@
-//! This file runs a step that changes nothing: no collisions, no integration, so that every
+//! This file runs a step that changes nothing: no contact points, no integration, so that every
 //! bitstream returns poses and velocities bit for bit. The self-test looks at what came back.
 
 use std::time::Duration;
 
 use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MIN;
-use bitstream_model::interface::profile::Variant;
+use bitstream_model::interface::profile::{Flow, Variant};
 use bitstream_model::interface::record::Beat;
 
 use super::fault::Fault;
@@ -13,6 +13,7 @@ use super::solver::Accelerator;
 use crate::axi_dma::{Direction, largest_piece};
 use crate::beat::stripe::{Place, Segment};
 use crate::error::Error;
+use crate::order::{Ordered, Schedule};
 use crate::platform::{Deadline, PlatformError};
 use crate::scene::{Body, Collision, StepParameters};
 
@@ -85,9 +86,11 @@ impl Accelerator {
             }
         }
         let none: &[Collision] = &[];
-        let sent = self.pack(&plan, echo.bodies, none, None);
+        let empty: Schedule = (0..plan.collisions).map(|_| None).collect();
+        let padding = Ordered { collisions: none, schedule: &empty };
+        let sent = self.pack(&plan, echo.bodies, &padding, None);
         let parameters = StepParameters {
-            contact_iterations: 0,
+            contact_iterations: u32::from(plan.passes > 0),
             friction_iterations: 0,
             integrate: false,
             deadline: Some(ECHO_LIMIT),
@@ -102,7 +105,7 @@ impl Accelerator {
         self.results(&plan, &mut channels);
         Ok(Echoed {
             results: channels[..plan.channels()].iter().map(|beats| beats.to_vec()).collect(),
-            sent: sent.velocities.wrapping_add(sent.poses),
+            sent: sent.velocities.wrapping_add(sent.collisions).wrapping_add(sent.poses),
             sums: counters.sums,
             interrupts,
             descriptors: self.device.descriptors(),
@@ -119,8 +122,15 @@ impl Accelerator {
     }
 }
 
+/// Bodies alone; where collisions have streams of their own, as many of them that are padding, so
+/// that these streams carry something.
 fn plan(bodies: usize, variant: Variant) -> Plan {
-    Plan { bodies, collisions: 0, passes: 0, variant }
+    let profile = variant.profile;
+    let (collisions, passes) = match profile.flow {
+        Flow::Passes => (0, 0),
+        Flow::Window(_) => (bodies.next_multiple_of(profile.collisions_per_issue as usize), 1),
+    };
+    Plan { bodies, collisions, passes, variant }
 }
 
 /// The MM2S channel on which a beat of the results was sent, and its offset in that channel's

@@ -128,7 +128,7 @@ impl Plan {
 mod tests {
     use super::*;
     use crate::accelerator::{fake, identify};
-    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE};
+    use crate::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
     use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
 
@@ -185,6 +185,19 @@ mod tests {
             bytes(world(HALF.default_variant())),
             (77_765 + 38_885 + 8 * 7 * (collisions / 2), 77_765)
         );
+    }
+
+    /// Once, however many passes there are: velocities on channel 2, poses on channel 3.
+    #[test]
+    fn a_design_that_streams_the_collisions_once_does() {
+        let variant = WINDOWED.default_variant();
+        let plan = Plan { bodies: 38_880, variant, ..FOUR };
+        assert_eq!(plan.bytes_to_device(), 16 * (4 * 38_880 + 6 * 127_746));
+        assert_eq!(plan.bytes_from_device(), 16 * 4 * 38_880);
+        let counts: Vec<_> = (0..4).map(|channel| plan.descriptors(channel, 67_108_800)).collect();
+        assert_eq!(counts, [1, 1, 1, 1]);
+        let none = Plan { passes: 0, ..plan };
+        assert_eq!(none.bytes_to_device(), 16 * 4 * 38_880);
     }
 
     #[test]

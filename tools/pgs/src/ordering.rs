@@ -23,7 +23,8 @@ pub(crate) struct OrderingArgs {
 /// An order of the collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OrderName {
-    /// hazard-free where the pipeline does not wait on hazards, as-given where it does
+    /// hazard-free where the pipeline does not wait on hazards or keeps only live bodies, as-given
+    /// where it waits
     Auto,
     /// As detected, which is how Bullet sorts them: hazards abound
     AsGiven,
@@ -94,6 +95,14 @@ pub(crate) fn text(report: &StepReport) -> String {
         let share = report.empty as f64 / (report.collisions as f64).max(1.0);
         text += &format!(", {} empty entries ({:.2} %)", grouped(report.empty), share * 100.0);
     }
+    if let Some(live) = &report.live {
+        text += &format!(
+            ", {} bodies alive and {} in places at most, longest span {} entries",
+            grouped(live.most_alive.into()),
+            grouped(live.most_held.into()),
+            grouped(live.longest_span.into()),
+        );
+    }
     if let Some(verified) = &report.verified {
         text += &format!(
             ", verified: {} hazards, {} bodies alive at most, longest span {} slots",
@@ -110,6 +119,11 @@ pub(crate) fn to_json(report: &StepReport) -> Value {
     json!({
         "name": name(report.order),
         "empty": report.empty,
+        "live": report.live.map(|live| json!({
+            "most_alive": live.most_alive,
+            "most_held": live.most_held,
+            "longest_span": live.longest_span,
+        })),
         "verified": report.verified.map(|verified| json!({
             "hazards": verified.hazards,
             "lost_updates": verified.lost_updates,

@@ -69,7 +69,11 @@ fn file_of(error: &InputError) -> &'static str {
         | InputError::MemoryExceeded { .. }
         | InputError::BodyIndex { .. }
         | InputError::SelfCollision { .. }
-        | InputError::BothStatic { .. } => COLLISION_BODIES,
+        | InputError::BothStatic { .. }
+        | InputError::Order(_)
+        | InputError::OrderTooLong { .. }
+        | InputError::SpanTooLong { .. }
+        | InputError::TooManyLive { .. } => COLLISION_BODIES,
         InputError::ContactCount { .. } => COLLISION_COUNT,
         InputError::NormalNotFinite { .. } | InputError::NormalLength { .. } => COLLISION_NORMAL,
         InputError::ContactNotFinite { .. }
