@@ -314,7 +314,7 @@ fn the_doorbell_is_taildesc_with_32_bit_addresses_and_taildesc_msb_with_wider_on
 #[test]
 fn reserved_offsets_read_0_ignore_writes_and_are_violations() {
     let dma = [0x20, 0x24, 0x2C, 0x50, 0x54, 0x5C, 0x60, 0xFFFC].map(|at| dma_base(1) + at);
-    let control = [0x14, 0x78, 0x148, 0x1AC, 0x1C4, 0x800, 0xFFC].map(|at| CONTROL_BASE + at);
+    let control = [0x14, 0x78, 0x150, 0x1AC, 0x1C4, 0x800, 0xFFC].map(|at| CONTROL_BASE + at);
     for address in dma.into_iter().chain(control) {
         let host = Host::lenient(BoardConfig::default());
         host.port.write32(address, u32::MAX);

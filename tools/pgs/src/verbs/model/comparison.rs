@@ -166,7 +166,7 @@ fn against(scene: &Scene) -> Table {
             ("thesis", "thesis"),
             ("recomputed", "recomputed"),
             ("packed_unlimited", "ours"),
-            ("difference_percent", "difference"),
+            ("difference_percent", "diff."),
             ("streamed_unlimited", "streamed"),
             ("streamed_peak", "17.07 GB/s"),
             ("streamed_sustained", "12.8 GB/s"),

@@ -77,11 +77,11 @@ fn arrays(scene: &Scene) -> Table {
             ("profile", "profile"),
             ("array", "array"),
             ("memory", "in"),
-            ("row_bytes", "bytes a row"),
+            ("row_bytes", "row"),
             ("rows", "rows"),
             ("copies", "copies"),
             ("bytes", "bytes"),
-            ("ideal_blocks", "blocks by bits"),
+            ("ideal_blocks", "by bits"),
             ("shaped_blocks", "by shape"),
             ("shape", "shape"),
             ("kind", "kind"),
@@ -108,7 +108,7 @@ fn arrays(scene: &Scene) -> Table {
         }
     }
     table.note(
-        "A block is a BRAM_18K of 18,432 bits. By bits: none lost. By shape: the fewest blocks of one \
+        "Row: bytes. A block is a BRAM_18K of 18,432 bits. By bits: none lost. By shape: the fewest blocks of one \
          shape side by side and one after the other; 1024 x 18 and narrower have two ports that read \
          and write, 512 x 36 one to read and one to write (UG573). The thesis has one shape of body \
          and no shape indices.",

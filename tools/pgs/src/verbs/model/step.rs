@@ -7,6 +7,7 @@ use bitstream_model::timing::{MemoryUse, Records, StepCycles, StepTime};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, difference, mib, yes_or_no};
+use super::window::has_window;
 use crate::options::bandwidth_text;
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
@@ -51,10 +52,16 @@ fn cycles(scene: &Scene) -> Table {
         }
     }
     table.note(format!(
-        "One formula for every profile: load + {} passes + fill + integration, the longer of poses in \
+        "One formula for every profile that runs one pass after the other: load + {} passes + fill + integration, the longer of poses in \
          and results out. A step that stalls on hazards takes longer.",
         scene.step.passes()
     ));
+    if scene.variants.iter().any(|variant| has_window(&variant.profile.flow)) {
+        table.note(
+            "Where the collisions stream once all passes run side by side: one pass is all of them, fill \
+             is by how much the last is behind the first. Load and integration run beside them.",
+        );
+    }
     table.note(
         "Packed: numbers without padding, as the thesis counts them. Streamed: beats and padding as \
          they travel; a result has position, orientation and both velocities, 13 numbers where the \
