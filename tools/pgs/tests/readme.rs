@@ -1,10 +1,19 @@
-//! The README's commands print what the README shows.
+//! The README's commands print what the README shows, and its figures are theirs.
 
 mod common;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use common::pgs;
+use common::{pgs, run};
+use serde_json::Value;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn readme() -> String {
+    std::fs::read_to_string(root().join("README.md")).expect("the README")
+}
 
 /// Commands of the README's `console` blocks, and the lines shown for each.
 fn transcripts(readme: &str) -> Vec<(Vec<String>, String)> {
@@ -29,13 +38,11 @@ fn transcripts(readme: &str) -> Vec<(Vec<String>, String)> {
 
 #[test]
 fn the_readmes_commands_print_what_it_shows() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let readme = std::fs::read_to_string(root.join("README.md")).expect("the README");
-    let transcripts = transcripts(&readme);
+    let transcripts = transcripts(&readme());
     assert_eq!(transcripts.len(), 3, "solve, model and check");
     for (arguments, shown) in transcripts {
         let ran = pgs()
-            .current_dir(&root)
+            .current_dir(root())
             .env("PGS_BOARD", "auto")
             .args(&arguments)
             .output()
@@ -43,5 +50,47 @@ fn the_readmes_commands_print_what_it_shows() {
         let printed = String::from_utf8(ran.stdout).expect("text");
         assert_eq!(printed, shown, "{arguments:?}");
         assert!(ran.status.success(), "{arguments:?}");
+    }
+}
+
+/// The cells of the row of that profile in the table of the bitstreams.
+fn bitstream<'a>(readme: &'a str, profile: &str) -> Vec<&'a str> {
+    let (_, section) = readme.split_once("\n## Which bitstream\n").expect("the section");
+    let begins = format!("| `{profile}` (");
+    let row = section.lines().find(|line| line.starts_with(&begins)).expect("a row");
+    row.trim_matches('|').split('|').map(str::trim).collect()
+}
+
+/// A share, as the table has it.
+fn percent(share: &Value) -> String {
+    format!("{:.1} %", 100.0 * share.as_f64().expect("a share"))
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "240 steps of 1,440 cubes, for a release build")]
+fn the_readmes_table_of_bitstreams_holds_what_its_commands_measure() {
+    let readme = readme();
+    let words = readme.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("`pgs compare float half --grid 12x10x12 --steps 120`"), "the command");
+    assert!(words.contains("pile ends with seven times the kinetic energy"), "what it ends with");
+    let last = |profile: &str| {
+        let command = format!("compare float {profile} --grid 12x10x12 --steps 120");
+        let ran = run(command.split(' ').chain(["--json"]));
+        assert_eq!(ran.code, Some(0), "{command}: {}", ran.stderr);
+        let document: Value = serde_json::from_str(&ran.stdout).expect("one JSON document");
+        document["rows"].as_array().and_then(|rows| rows.last()).expect("rows").clone()
+    };
+    for profile in ["half", "mixed"] {
+        let row = last(profile);
+        let velocities = percent(&row["difference"]["linear_velocity"]["within_1_percent_share"]);
+        let still = percent(&row["b"]["unmoved_share"]);
+        assert_eq!(bitstream(&readme, profile)[5..], [velocities, still], "{profile}");
+        let still = percent(&row["a"]["unmoved_share"]);
+        assert_eq!(bitstream(&readme, "float")[5..], [String::new(), still], "float");
+        if profile == "half" {
+            let [a, b] = ["a", "b"].map(|lane| row[lane]["kinetic_energy_j"].as_f64());
+            let times = b.expect("J") / a.expect("J");
+            assert!((6.5..7.5).contains(&times), "{times}");
+        }
     }
 }
