@@ -272,7 +272,7 @@ fn a_contact_is_solved_or_refused_and_never_left_out() {
     let (mut bodies, collisions) = there(410.0);
     let text = refused(of(&HALF), &mut bodies, &collisions);
     assert!(text.starts_with("collision 0, contact point 0: inverse effective mass[0]"), "{text}");
-    assert!(text.ends_with("(profiles that could: naive, float, mixed)"), "{text}");
+    assert!(text.ends_with("(profiles that could: naive, float, mixed, windowed)"), "{text}");
 }
 
 #[test]

@@ -411,7 +411,13 @@ pub(super) mod tests {
         let bodies = [body(0), body(1)];
         let refused = validate(&bodies[..], &collisions[..], &shapes, &parameters, &limits);
         let text = refused.expect_err("world inertia is needed").to_string();
-        assert!(text.ends_with("(profiles that could, built with world inertia: half)"), "{text}");
+        assert!(
+            text.ends_with(
+                "(profiles that could, built with world inertia: half, \
+             windowed, windowed16)"
+            ),
+            "{text}"
+        );
     }
 
     /// Each number of it has its place in binary16, and what is made of them has none.

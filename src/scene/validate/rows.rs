@@ -208,7 +208,7 @@ mod tests {
         let expected = "collision 7, contact point 1: inverse effective mass[0] is 66280.";
         assert!(text.starts_with(expected), "{text}");
         assert!(text.contains("in binary16, which takes 1.5625e-5 to 64000"), "{text}");
-        assert!(text.ends_with("(profiles that could: naive, float, mixed)"), "{text}");
+        assert!(text.ends_with("(profiles that could: naive, float, mixed, windowed)"), "{text}");
         // Of both bodies together, by the largest of their inertias.
         assert_eq!(check([&GROUND, &CUBE], [150.0, 0.0, 0.0]), Ok(()));
         assert!(check([&CUBE, &CUBE], [150.0, 0.0, 0.0]).is_err());
