@@ -174,7 +174,12 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let clock_khz = checked(window, &CLOCK_KHZ, "a clock above 0", |word| word > 0)?;
     let live = match profile.flow {
         Flow::Passes => None,
-        Flow::Window(_) => Some(live_of(window)?),
+        Flow::Window(_) => {
+            checked(window, &FEATURES, "a design that streams once to be interlocked", |word| {
+                features::INTERLOCKED.is_set(word)
+            })?;
+            Some(live_of(window)?)
+        }
     };
     let memory = checked(window, &MEMORY_PER_RECORD, "bytes above 0", |word| {
         // What keeps live bodies alone has its memory whatever the scene.
@@ -453,6 +458,7 @@ mod tests {
         assert_eq!((found.bytes_per_body, found.bytes_per_collision), (0, 0));
         assert_eq!(identify_with(&[]).expect("well formed").window, None);
         for (at, value, named) in [
+            (0x10C, 0x9, "FEATURES"),
             (0x148, 0x0002, "WINDOW is"),
             (0x148, 0x0200, "WINDOW is"),
             (0x14C, (2_816 << 16) | 1, "WINDOW_CAPACITY"),

@@ -95,8 +95,14 @@ pub(crate) fn pack_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     }
 }
 
+/// What no record of a live body holds; the accelerator refuses a collision of it with itself.
+const REFUSED: [u32; 2] = [u32::MAX; 2];
+
 /// Writes the records of collisions with these words in place of the bodies' indices; otherwise as
 /// [`pack_collisions`]. Only for [`Geometry::Relative`].
+///
+/// Nobody reads the marks of padding, so that a collision which had contact points when the marks
+/// were made and has none now would shift all bodies behind it: it is sent as one to be refused.
 pub(crate) fn pack_marked_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     variant: &Variant,
     bodies: &B,
@@ -110,7 +116,11 @@ pub(crate) fn pack_marked_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>
     pack_dealt(&layout, words.len(), &record::relative::INTEGERS, channels, |index| {
         let mut collision = collisions.collision(index);
         let [a, b] = anchors(bodies, body_count, &collision, shapes);
-        [collision.body_a, collision.body_b] = words[index];
+        let mut words = words[index];
+        if collision.count == 0 && words != [0; 2] {
+            (collision.count, words) = (1, REFUSED);
+        }
+        [collision.body_a, collision.body_b] = words;
         record::relative::encode(&collision, a, b)
     })
 }

@@ -30,7 +30,8 @@ pub struct Collision {
 /// The collisions of a step, in whatever layout the caller keeps them.
 ///
 /// `[Collision]` and `Vec<Collision>` implement it, [`CollisionArrays`] implements it over separate
-/// arrays. The solver takes the collisions in the order of their index.
+/// arrays. The solver takes the collisions in the order that
+/// [`StepParameters::order`](crate::StepParameters::order) says.
 pub trait Collisions {
     /// Number of collisions.
     fn len(&self) -> usize;

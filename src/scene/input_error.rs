@@ -303,8 +303,9 @@ pub enum InputError {
     /// A body lives longer than the bitstream lets it.
     #[error(
         "in this order body {body} is used first in entry {first} and last in entry {last}, and the \
-         bitstream's delay lines take spans of less than {lag}: ask for the hazard-free order, or \
-         load another bitstream ({carriers})"
+         bitstream's delay lines take spans of less than {lag}: ask for another order (the hazard-free \
+         one keeps spans short unless a body has dozens of collisions), or load another bitstream \
+         ({carriers})"
     )]
     SpanTooLong {
         /// The body with the longest span.
@@ -322,8 +323,8 @@ pub enum InputError {
     /// More bodies are alive than the bitstream has places for.
     #[error(
         "in this order {held} moving bodies are on their way through the passes at once ({alive} of \
-         them with collisions to come), the bitstream has places for {places}: ask for the \
-         hazard-free order, or load another bitstream ({carriers})"
+         them with collisions to come), the bitstream has places for {places}: ask for \
+         another order, or load another bitstream ({carriers})"
     )]
     TooManyLive {
         /// Most bodies that need a place at once.
