@@ -7,7 +7,7 @@ use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, yes_or_no};
 
 /// What a pump asks of the device, and what of it is known.
-pub(super) const PUMP: &str = "The pump, block RAM at 500 MHz beside an accelerator at 250 MHz, is \
+pub(super) const PUMP: &str = "The pump, block RAM at twice the accelerator's clock (500 or 550 MHz), is \
     a design assumption and was not synthesised. A global clock tree may run at 775 MHz (DS925 1.29, \
     clock buffers, speed grade -2, 0.85 V); the limit of the block RAM itself in DS925 was not \
     verified.";
