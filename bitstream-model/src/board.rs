@@ -136,6 +136,7 @@ impl Board {
             Some(FaultKind::PowerLost) => self.powerless = true,
             Some(FaultKind::OtherBitstream { identification }) => {
                 self.other_design = Some(identification);
+                self.log.pardon();
                 for (number, core) in self.cores.iter_mut().enumerate() {
                     *core = Core::new(number, &self.config);
                 }

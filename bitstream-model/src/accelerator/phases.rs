@@ -66,7 +66,7 @@ impl Accelerator {
     ) -> Result<bool, PacketError> {
         let records = segment.available(inputs);
         if records == 0 {
-            return Ok(false);
+            return segment.check_waiting(inputs).map(|()| false);
         }
         segment.check(records, inputs)?;
         let mut reader = segment.reader(0, inputs);
@@ -181,7 +181,7 @@ impl Accelerator {
             available -= available % per_issue;
         }
         if available == 0 {
-            return Ok(false);
+            return segment.check_waiting(inputs).map(|()| false);
         }
         segment.check(available, inputs)?;
         let mut cycles = 0;
@@ -310,7 +310,11 @@ impl Accelerator {
         inputs: &mut [Stream],
         outputs: &mut [Stream],
     ) -> Result<bool, PacketError> {
-        let records = poses.available(inputs).min(results.room(outputs));
+        let arrived = poses.available(inputs);
+        let records = arrived.min(results.room(outputs));
+        if arrived == 0 {
+            poses.check_waiting(inputs)?;
+        }
         if records == 0 {
             return Ok(false);
         }

@@ -87,6 +87,22 @@ impl Segment {
         Ok(())
     }
 
+    /// Checks that no packet has ended in the middle of the next record, of which the rest would
+    /// never come.
+    pub(super) fn check_waiting(&self, streams: &[Stream]) -> Result<(), PacketError> {
+        for (k, stream) in streams.iter().enumerate() {
+            // What comes behind the end of this packet is the next one.
+            let left = self.beats_on(k) - self.taken[k];
+            if let Some(last) = stream.next_last()
+                && last + 1 < left
+            {
+                let beat = register(self.taken[k] + last);
+                return Err(PacketError { code: ErrorCode::TlastEarly, channel: k, beat });
+            }
+        }
+        Ok(())
+    }
+
     /// Reads records that have arrived, from `ahead` places after the next one on, of which there
     /// must be one, one after the other; they stay in the streams until [`advance`](Self::advance).
     pub(super) fn reader<'a>(&'a self, ahead: usize, streams: &'a [Stream]) -> Reader<'a> {
@@ -257,8 +273,15 @@ mod tests {
             stream.mark_last();
         }
         assert_eq!(segment.check(1, &all), Ok(()));
+        assert_eq!(segment.check_waiting(&all), Ok(()));
         let longer = collisions(&FLOAT, 2);
         let early = PacketError { code: ErrorCode::TlastEarly, channel: 0, beat: 1 };
         assert_eq!(longer.check(1, &all), Err(early));
+        // Half a record, and none that could be checked.
+        let mut cut = streams([1, 0, 0, 0]);
+        cut[0].mark_last();
+        assert_eq!(longer.available(&cut), 0);
+        let early = PacketError { beat: 0, ..early };
+        assert_eq!(longer.check_waiting(&cut), Err(early));
     }
 }

@@ -39,6 +39,14 @@ pub(super) struct Descriptor {
     pub(super) rxsof: bool,
 }
 
+impl Faulty {
+    /// Whether what a fault has begun comes before all else: a beat that is still to follow a packet
+    /// before the next packet, and so the end of one that is dropped.
+    pub(super) fn holds(&self, direction: Direction) -> bool {
+        self.discards || self.extra && direction == Direction::Mm2s
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 enum Transition {
     Run,

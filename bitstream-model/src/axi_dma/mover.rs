@@ -61,8 +61,7 @@ impl Channel {
         self.time = self.time.max(start);
         let mut moved = 0;
         let mut changed = self.settle(build, end, stream, with);
-        // A beat that is still to follow a packet goes before the next packet.
-        while !(self.faulty.extra && self.direction == Direction::Mm2s) {
+        while !self.faulty.holds(self.direction) {
             match self.work {
                 Work::None => {
                     if self.overrun(stream) {

@@ -9,6 +9,7 @@ use zynq_pgs::MemoryChoice;
 use crate::memory::memory;
 use crate::verbs::check::CheckArgs;
 use crate::verbs::compare::CompareArgs;
+use crate::verbs::faults::FaultsArgs;
 use crate::verbs::formats::FormatsArgs;
 use crate::verbs::list::ListArgs;
 use crate::verbs::load::LoadArgs;
@@ -29,6 +30,7 @@ Examples:
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check
+  pgs faults                           every fault at every place, and what the driver makes of it
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 
@@ -61,6 +63,7 @@ pub(crate) enum Verb {
     List(ListArgs),
     Load(LoadArgs),
     Check(CheckArgs),
+    Faults(FaultsArgs),
 }
 
 /// What holds for every verb.

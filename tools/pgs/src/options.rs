@@ -113,7 +113,7 @@ choice!(SubnormalsName means Subnormals:
 );
 
 /// Reads the name of a profile.
-fn profile() -> impl TypedValueParser<Value = &'static Profile> {
+pub(crate) fn profile() -> impl TypedValueParser<Value = &'static Profile> {
     PossibleValuesParser::new(PROFILES.iter().map(|profile| profile.name))
         .try_map(|name| Profile::by_name(&name).ok_or("there is no such profile"))
 }

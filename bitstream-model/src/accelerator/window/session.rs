@@ -106,6 +106,8 @@ impl Windowed {
         ] {
             if records > 0 {
                 segment.check(records, inputs)?;
+            } else {
+                segment.check_waiting(inputs)?;
             }
         }
         Ok(())

@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 pub(crate) mod compare;
+pub(crate) mod faults;
 pub(crate) mod formats;
 pub(crate) mod list;
 pub(crate) mod load;
@@ -33,6 +34,7 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
         Verb::Order(args) => order::run(args, &command.common, out),
         Verb::List(args) => list::run(args, &command.common, out),
         Verb::Load(args) => load::run(args, &command.common, out),
+        Verb::Faults(args) => faults::run(args, &command.common, out),
         Verb::Check(args) => check::run(args, &command.common, out),
     }
 }

@@ -1,0 +1,260 @@
+//! This file lists the cells: each kind of fault at each place where it can be.
+
+use bitstream_model::{
+    Direction, Fault, FaultKind, FaultPlan, PacketCount, Place, StepPhase, When,
+};
+
+use super::expected::{Expected, expected};
+use super::trial::Bench;
+
+/// One fault at one place.
+#[derive(Debug, Clone)]
+pub(super) struct Cell {
+    pub(super) kind: FaultKind,
+    /// The phase that it happens in; none if it does not depend on one.
+    pub(super) phase: Option<StepPhase>,
+    pub(super) plan: FaultPlan,
+    pub(super) expected: Expected,
+    /// Whether the step with the fault is of the larger scene, for which channels must be stopped.
+    pub(super) larger: bool,
+}
+
+impl Cell {
+    pub(super) fn phase_text(&self) -> String {
+        self.phase.map_or_else(|| "any".to_owned(), |phase| phase.to_string())
+    }
+
+    fn new(fault: Fault, larger: bool) -> Self {
+        let channel = match fault.place {
+            Some(Place::Channel(core, direction)) => Some((core, direction)),
+            _ => None,
+        };
+        Self {
+            kind: fault.kind,
+            phase: fault.phase,
+            plan: fault.into(),
+            expected: expected(fault.kind, channel),
+            larger,
+        }
+    }
+}
+
+/// Combinations that there are not, and how many cells they would be.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Impossible {
+    pub(super) what: &'static str,
+    pub(super) cells: usize,
+}
+
+/// First, middle and last of so many, each once.
+fn positions(count: u64) -> Vec<u64> {
+    let last = count.saturating_sub(1);
+    let mut all = vec![0, last / 2, last];
+    all.dedup();
+    all
+}
+
+/// Phases that stand for all of their kind: of the passes the first, one in the middle and the last
+/// contact pass, the first and the last friction pass.
+fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
+    match phase {
+        StepPhase::Load | StepPhase::Poses | StepPhase::Results => true,
+        StepPhase::Contact(pass) => [1, contact.div_ceil(2), contact].contains(&pass),
+        StepPhase::Friction(pass) => [1, friction].contains(&pass),
+    }
+}
+
+/// Where a kind of fault can be.
+enum Where {
+    /// At each beat of a packet.
+    Beats,
+    /// At each descriptor of a packet.
+    Descriptors,
+    /// At the end of a packet.
+    Ends,
+    /// As each channel is stopped.
+    Stops,
+    /// As each core, and the accelerator, is reset after a fault.
+    Resets,
+    /// In each phase of the accelerator.
+    Accelerator,
+    /// Once.
+    Once,
+}
+
+fn place_of(kind: FaultKind) -> Where {
+    use FaultKind as K;
+    match kind {
+        K::DmaIntErr
+        | K::DmaSlvErr
+        | K::DmaDecErr
+        | K::Stall
+        | K::Slow { .. }
+        | K::ShortPacket
+        | K::Corrupt { .. }
+        | K::OtherBitstream { .. }
+        | K::PowerLost
+        | K::IrqSpurious
+        | K::IrqStorm { .. } => Where::Beats,
+        K::SgIntErr
+        | K::SgSlvErr
+        | K::SgDecErr
+        | K::SgDecErrWrite
+        | K::BdIntErr
+        | K::BdSlvErr
+        | K::BdDecErr
+        | K::LateCmplted { .. } => Where::Descriptors,
+        K::LongPacket | K::NoTlast => Where::Ends,
+        K::HaltDelay { .. } | K::HaltNever => Where::Stops,
+        K::ResetSlow { .. } | K::ResetNever => Where::Resets,
+        K::AcceleratorError { .. } | K::AcceleratorHang => Where::Accelerator,
+        _ => Where::Once,
+    }
+}
+
+/// All cells of a board, and what there cannot be.
+pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
+    let packets: Vec<_> = bench
+        .packets
+        .iter()
+        .filter(|packet| packet.phase.is_some_and(|phase| shown(phase, bench.iterations())))
+        .collect();
+    let mut cells = Vec::new();
+    let mut short_last = 0;
+    let mut kinds = 0;
+    for kind in FaultKind::all() {
+        match place_of(kind) {
+            Where::Beats => {
+                kinds += 3;
+                for packet in &packets {
+                    let mut beats = positions(packet.beats);
+                    if kind == FaultKind::ShortPacket {
+                        short_last += 1;
+                        beats.retain(|beat| beat + 1 < packet.beats);
+                    }
+                    cells.extend(beats.into_iter().map(|beat| at(kind, packet, When::Beat(beat))));
+                }
+            }
+            Where::Descriptors => {
+                kinds += 3;
+                for packet in &packets {
+                    let numbers = positions(packet.descriptors.into());
+                    let number = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
+                    cells.extend(
+                        numbers.into_iter().map(|n| at(kind, packet, When::Descriptor(number(n)))),
+                    );
+                }
+            }
+            Where::Ends => {
+                kinds += 1;
+                cells.extend(packets.iter().map(|packet| Cell::new(on(kind, packet), false)));
+            }
+            Where::Stops => {
+                for (core, direction) in channels(&bench.packets) {
+                    cells.push(Cell::new(Fault::new(kind).on(core, direction), true));
+                }
+            }
+            Where::Resets => cells.extend(resets(kind, bench)),
+            Where::Accelerator => cells.extend(in_accelerator(kind, bench)),
+            Where::Once => cells.push(Cell::new(Fault::new(kind), false)),
+        }
+    }
+    let senders = channels(&bench.packets).filter(|(_, way)| *way == Direction::Mm2s).count();
+    let receivers = channels(&bench.packets).count() - senders;
+    let of_sending = packets.iter().filter_map(|p| p.phase).filter(|p| *p != StepPhase::Results);
+    let mut phases: Vec<_> = of_sending.collect();
+    phases.sort_by_key(|phase| format!("{phase}"));
+    phases.dedup();
+    let impossible = vec![
+        Impossible {
+            what: "S2MM outside the results: it moves nothing then",
+            cells: kinds * phases.len() * receivers,
+        },
+        Impossible {
+            what: "MM2S in the results: all of its packets have ended",
+            cells: kinds * senders,
+        },
+        Impossible {
+            what: "a packet cut short at its last beat: that is whole",
+            cells: short_last,
+        },
+    ];
+    (cells, impossible)
+}
+
+fn on(kind: FaultKind, packet: &PacketCount) -> Fault {
+    let fault = Fault::new(kind).on(packet.core, packet.direction);
+    packet.phase.map_or(fault, |phase| fault.in_phase(phase))
+}
+
+fn at(kind: FaultKind, packet: &PacketCount, when: When) -> Cell {
+    Cell::new(on(kind, packet).when(when), false)
+}
+
+/// Every channel that has packets, once.
+fn channels(packets: &[PacketCount]) -> impl Iterator<Item = (usize, Direction)> {
+    let mut all: Vec<_> = packets.iter().map(|packet| (packet.core, packet.direction)).collect();
+    all.sort_by_key(|(core, direction)| (*core, *direction == Direction::S2mm));
+    all.dedup();
+    all.into_iter()
+}
+
+/// A reset follows a fault: a stall, here.
+fn resets(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
+    let stall = Fault::new(FaultKind::Stall).on(0, Direction::S2mm);
+    let cores = (0..bench.config.profile.mm2s_widths.len()).map(Place::Core);
+    cores
+        .chain([Place::Accelerator])
+        .map(|place| {
+            let cell = Cell::new(Fault::new(kind).at(place), false);
+            let plan = FaultPlan { faults: vec![stall, Fault::new(kind).at(place)] };
+            Cell { plan, ..cell }
+        })
+        .collect()
+}
+
+fn in_accelerator(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
+    let mut phases: Vec<StepPhase> = Vec::new();
+    for phase in bench.packets.iter().filter_map(|packet| packet.phase) {
+        let shown = phase != StepPhase::Results && shown(phase, bench.iterations());
+        if shown && !phases.contains(&phase) {
+            phases.push(phase);
+        }
+    }
+    if bench.streams_once() {
+        // It is in all of its phases at once.
+        return vec![Cell::new(Fault::new(kind), false)];
+    }
+    phases
+        .into_iter()
+        .map(|phase| {
+            let fault = Fault::new(kind).at(Place::Accelerator).in_phase(phase);
+            Cell::new(fault, false)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn first_middle_and_last_are_told_apart_where_they_are() {
+        assert_eq!(positions(9), [0, 4, 8]);
+        assert_eq!(positions(2), [0, 1]);
+        assert_eq!(positions(1), [0]);
+    }
+
+    #[test]
+    fn passes_stand_for_those_between_them() {
+        let shown = |phase| shown(phase, [4, 4]);
+        assert_eq!(
+            [1, 2, 3, 4].map(|pass| shown(StepPhase::Contact(pass))),
+            [true, true, false, true]
+        );
+        assert_eq!(
+            [1, 2, 3, 4].map(|pass| shown(StepPhase::Friction(pass))),
+            [true, false, false, true]
+        );
+    }
+}

@@ -1,0 +1,143 @@
+//! This file prints what came of the cells: a row a kind of fault.
+
+use std::io::{self, Write};
+
+use serde_json::{Value, json};
+
+use super::Tried;
+use super::cells::Cell;
+use super::expected::Expected;
+use super::trial::Verified;
+use crate::verbs::table::{Column, grouped, heading, line};
+
+const COLUMNS: [Column; 9] = [
+    Column { name: "fault", unit: "", width: 18 },
+    Column { name: "must", unit: "", width: 8 },
+    Column { name: "tried", unit: "cells", width: 6 },
+    Column { name: "happened", unit: "", width: 8 },
+    Column { name: "cause", unit: "named", width: 6 },
+    Column { name: "bodies", unit: "right", width: 6 },
+    Column { name: "in time", unit: "", width: 7 },
+    Column { name: "next", unit: "step", width: 6 },
+    Column { name: "slowest", unit: "ms", width: 8 },
+];
+
+/// How many cells came out right, by what was looked at.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Tally {
+    tried: u64,
+    happened: u64,
+    named: u64,
+    bodies: u64,
+    in_time: u64,
+    next: u64,
+    passed: u64,
+    slowest_ms: f64,
+}
+
+impl Tally {
+    pub(super) fn of<'a>(cells: impl Iterator<Item = &'a (Cell, Verified)>) -> Self {
+        let mut all = Self::default();
+        for (_, found) in cells {
+            all.tried += 1;
+            all.happened += u64::from(found.happened);
+            all.named += u64::from(found.named);
+            all.bodies += u64::from(found.bodies);
+            all.in_time += u64::from(found.in_time);
+            all.next += u64::from(found.next);
+            all.passed += u64::from(found.passed());
+            all.slowest_ms = all.slowest_ms.max(found.elapsed.as_secs_f64() * 1e3);
+        }
+        all
+    }
+
+    fn cells(&self, name: &str, must: &str) -> [String; 9] {
+        [
+            name.to_owned(),
+            must.to_owned(),
+            grouped(self.tried),
+            grouped(self.happened),
+            grouped(self.named),
+            grouped(self.bodies),
+            grouped(self.in_time),
+            grouped(self.next),
+            format!("{:.3}", self.slowest_ms),
+        ]
+    }
+
+    pub(super) fn to_json(self) -> Value {
+        json!({
+            "tried": self.tried,
+            "happened": self.happened,
+            "named": self.named,
+            "bodies": self.bodies,
+            "in_time": self.in_time,
+            "next": self.next,
+            "passed": self.passed,
+            "slowest_ms": self.slowest_ms,
+        })
+    }
+}
+
+/// A row a kind, all profiles together; then profiles, phases, what there cannot be, and what failed.
+pub(super) fn print(all: &[Tried], out: &mut dyn Write) -> io::Result<()> {
+    let cells = || all.iter().flat_map(|tried| &tried.cells);
+    heading(out, &COLUMNS)?;
+    let mut kinds: Vec<&str> = Vec::new();
+    for (cell, _) in cells() {
+        if !kinds.contains(&cell.kind.name()) {
+            kinds.push(cell.kind.name());
+        }
+    }
+    for kind in kinds {
+        let of_kind = || cells().filter(|(cell, _)| cell.kind.name() == kind);
+        let survive = of_kind().all(|(cell, _)| cell.expected == Expected::SameBits);
+        let must = if survive { "survive" } else { "fail" };
+        line(out, &COLUMNS, Tally::of(of_kind()).cells(kind, must))?;
+    }
+    line(out, &COLUMNS, Tally::of(cells()).cells("all", ""))?;
+
+    writeln!(out)?;
+    for Tried { profile, cells, .. } in all {
+        let Tally { tried, passed, .. } = Tally::of(cells.iter());
+        writeln!(
+            out,
+            "profile {:10} {} of {} passed",
+            profile.name,
+            grouped(passed),
+            grouped(tried)
+        )?;
+    }
+    let mut phases: Vec<String> = Vec::new();
+    for (cell, _) in cells() {
+        if !phases.contains(&cell.phase_text()) {
+            phases.push(cell.phase_text());
+        }
+    }
+    for phase in phases {
+        let Tally { tried, passed, .. } =
+            Tally::of(cells().filter(|(cell, _)| cell.phase_text() == phase));
+        writeln!(out, "phase   {phase:10} {} of {} passed", grouped(passed), grouped(tried))?;
+    }
+    writeln!(out)?;
+    for place in 0..all.first().map_or(0, |tried| tried.impossible.len()) {
+        let these = all.iter().filter_map(|tried| tried.impossible.get(place));
+        let count: usize = these.clone().map(|impossible| impossible.cells).sum();
+        let what = these.map(|impossible| impossible.what).next().unwrap_or_default();
+        writeln!(out, "not tried: {what} ({} cells)", grouped(count as u64))?;
+    }
+    for Tried { profile, cells, .. } in all {
+        for (cell, found) in cells.iter().filter(|(_, found)| !found.passed()) {
+            writeln!(
+                out,
+                "FAILED {} '{}': {}; cause {}, expected {:?}",
+                profile.name,
+                cell.plan,
+                found.wrong().join(", "),
+                found.cause.unwrap_or("none"),
+                cell.expected,
+            )?;
+        }
+    }
+    Ok(())
+}

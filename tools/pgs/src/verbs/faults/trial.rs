@@ -1,0 +1,235 @@
+//! This file tries one cell: an undisturbed step, a step with the fault, and the next one.
+
+use std::time::Duration;
+
+use bitstream_model::interface::profile::{Flow, Profile};
+use bitstream_model::{BoardConfig, Direction, EmulatedBoard, PacketCount};
+use scene::{Grid, Scene, SceneOptions};
+use zynq_pgs::{
+    Accelerator, Aftermath, BoardChoice, Body, Collision, Error, OpenOptions, Shape, StepParameters,
+};
+
+use super::cells::Cell;
+use super::expected::Expected;
+use crate::board;
+use crate::failure::Failure;
+
+/// Time on the board's clock that a step has, what it takes to look at all registers when that is
+/// over, and what the reset of all parts may take on top.
+const DEADLINE: Duration = Duration::from_millis(100);
+const LOOKING: Duration = Duration::from_micros(100);
+const RECOVERY: Duration = Duration::from_millis(60);
+/// Length registers so narrow that packets take several descriptors.
+const LENGTH_WIDTH: u32 = 8;
+/// Steps until cubes that fall from 0.05 m lie on each other.
+const SETTLING: u32 = 12;
+
+/// A state to step from.
+#[derive(Debug)]
+struct State {
+    shapes: Vec<Shape>,
+    bodies: Vec<Body>,
+    collisions: Vec<Collision>,
+    /// The bits after an undisturbed step.
+    after: Vec<[u32; 13]>,
+}
+
+/// What all cells of a profile have in common.
+#[derive(Debug)]
+pub(super) struct Bench {
+    pub(super) config: BoardConfig,
+    /// The packets of the smaller step.
+    pub(super) packets: Vec<PacketCount>,
+    small: State,
+    large: State,
+    parameters: StepParameters,
+}
+
+/// What came of a cell.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Verified {
+    /// The cause that was named; none if the step succeeded.
+    pub(super) cause: Option<&'static str>,
+    /// Whether the fault happened, and nothing else that is wrong.
+    pub(super) happened: bool,
+    /// Whether the right cause was named, or rightly none.
+    pub(super) named: bool,
+    /// Whether the bodies are as before, or as after an undisturbed step.
+    pub(super) bodies: bool,
+    /// Whether the error came in time.
+    pub(super) in_time: bool,
+    /// Whether the next step is as if nothing had been, or every call says that the board is lost.
+    pub(super) next: bool,
+    /// Time on the board's clock from the start to the end of the step.
+    pub(super) elapsed: Duration,
+}
+
+impl Verified {
+    pub(super) fn passed(&self) -> bool {
+        self.wrong().is_empty()
+    }
+
+    /// What did not come out right.
+    pub(super) fn wrong(&self) -> Vec<&'static str> {
+        let all = [
+            (self.happened, "happened"),
+            (self.named, "named"),
+            (self.bodies, "bodies"),
+            (self.in_time, "in time"),
+            (self.next, "next step"),
+        ];
+        all.into_iter().filter(|(right, _)| !right).map(|(_, what)| what).collect()
+    }
+}
+
+fn bits(bodies: &[Body]) -> Vec<[u32; 13]> {
+    bodies
+        .iter()
+        .map(|body| {
+            let mut all = [0; 13];
+            let numbers = body.pose.position.iter().chain(&body.pose.orientation);
+            let numbers = numbers.chain(&body.velocity.linear).chain(&body.velocity.angular);
+            for (bits, number) in all.iter_mut().zip(numbers) {
+                *bits = number.to_bits();
+            }
+            all
+        })
+        .collect()
+}
+
+/// A board, and the driver on it.
+fn open(config: BoardConfig, shapes: &[Shape]) -> Result<(EmulatedBoard, Accelerator), Failure> {
+    let emulated = EmulatedBoard::new(config).map_err(Failure::input)?;
+    let accelerator = reopen(&emulated).map_err(board::unusable);
+    let mut accelerator = accelerator?;
+    accelerator.set_shapes(shapes).map_err(Failure::input)?;
+    Ok((emulated, accelerator))
+}
+
+fn reopen(board: &EmulatedBoard) -> Result<Accelerator, Error> {
+    let board = BoardChoice::Emulated(board.cpu_port());
+    Accelerator::open(OpenOptions { board, ..OpenOptions::default() })
+}
+
+impl State {
+    /// A pile of cubes, some steps after it was dropped, on a board without faults.
+    fn settled(side: u16, config: BoardConfig) -> Result<Self, Failure> {
+        let grid = Grid::new(side, side, side).map_err(Failure::input)?;
+        let options = SceneOptions { grid, drop: 0.05, ..SceneOptions::default() };
+        let mut scene = Scene::new(&options).map_err(Failure::input)?;
+        let (_, mut accelerator) = open(config, scene.shapes())?;
+        let parameters = StepParameters::default();
+        for _ in 0..SETTLING {
+            scene.detect();
+            let (bodies, collisions) = scene.parts_mut();
+            accelerator.step(bodies, collisions, &parameters).map_err(Failure::input)?;
+        }
+        scene.detect();
+        let mut after = scene.bodies().to_vec();
+        let collisions = scene.collisions().to_vec();
+        accelerator.step(&mut after, &collisions, &parameters).map_err(Failure::input)?;
+        Ok(Self {
+            shapes: scene.shapes().to_vec(),
+            bodies: scene.bodies().to_vec(),
+            collisions,
+            after: bits(&after),
+        })
+    }
+}
+
+impl Bench {
+    /// A board of a profile, with a pile of 27 and one of 64 cubes.
+    pub(super) fn new(profile: &'static Profile) -> Result<Self, Failure> {
+        let config = BoardConfig { profile, length_width: LENGTH_WIDTH, ..BoardConfig::default() };
+        let (small, large) = (State::settled(3, config)?, State::settled(4, config)?);
+        let mut parameters = StepParameters::default();
+        parameters.deadline = Some(DEADLINE);
+        let (board, mut accelerator) = open(config, &small.shapes)?;
+        let mut bodies = small.bodies.clone();
+        accelerator.step(&mut bodies, &small.collisions, &parameters).map_err(Failure::input)?;
+        Ok(Self { config, packets: board.packets(), small, large, parameters })
+    }
+
+    /// Contact and friction passes.
+    pub(super) fn iterations(&self) -> [u32; 2] {
+        [self.parameters.contact_iterations, self.parameters.friction_iterations]
+    }
+
+    pub(super) fn streams_once(&self) -> bool {
+        matches!(self.config.profile.flow, Flow::Window(_))
+    }
+}
+
+/// Tries a cell.
+pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
+    let mut found = Verified::default();
+    let Ok((board, mut accelerator)) = open(bench.config, &bench.small.shapes) else {
+        return found;
+    };
+    let mut step = |accelerator: &mut Accelerator, state: &State| {
+        let mut bodies = state.bodies.clone();
+        let result = accelerator.step(&mut bodies, &state.collisions, &bench.parameters);
+        (result, bits(&bodies))
+    };
+    let (small, port) = (&bench.small, board.cpu_port());
+    let undisturbed =
+        matches!(step(&mut accelerator, small), (Ok(_), ref bodies) if *bodies == small.after);
+    board.inject(cell.plan.clone());
+    let begin = port.now();
+    let state = if cell.larger { &bench.large } else { small };
+    let (result, bodies) = step(&mut accelerator, state);
+    found.elapsed = port.now().saturating_sub(begin);
+    found.happened = undisturbed
+        && board.faults() == cell.plan.faults.len() as u64
+        && board.violations().is_empty();
+    found.cause = result.as_ref().err().and_then(Error::fault).map(zynq_pgs::Fault::name);
+    // The step itself ends by its deadline; what follows is the reset.
+    let until_error = result.as_ref().err().and_then(Error::diagnosis).map(|seen| seen.elapsed);
+    found.in_time = until_error.is_none_or(|time| time <= DEADLINE + LOOKING)
+        && found.elapsed <= DEADLINE + RECOVERY;
+    let mut lost = false;
+    match (&result, cell.expected) {
+        (Ok(_), Expected::SameBits) => {
+            found.named = true;
+            found.bodies = bodies == state.after;
+        }
+        (Err(error), Expected::Fails { cause, channel, aftermath }) => {
+            lost = aftermath == Aftermath::MustReopen;
+            let named = error.fault().and_then(zynq_pgs::Fault::channel).map(|name| {
+                let direction = match name.direction {
+                    zynq_pgs::Direction::Mm2s => Direction::Mm2s,
+                    zynq_pgs::Direction::S2mm => Direction::S2mm,
+                };
+                (name.core, direction)
+            });
+            found.named = found.cause == Some(cause)
+                && (channel.is_none() || channel == named)
+                && error.must_reopen() == lost
+                && error.may_retry() != lost;
+            found.bodies = bodies == bits(&state.bodies);
+        }
+        (Ok(_) | Err(_), _) => {}
+    }
+    found.next = if lost {
+        says_lost(&mut accelerator, small, &mut step)
+    } else {
+        matches!(step(&mut accelerator, small), (Ok(_), bodies) if bodies == small.after)
+            && board.violations().is_empty()
+    };
+    found
+}
+
+/// Whether every call says that the board must be opened again.
+fn says_lost(
+    accelerator: &mut Accelerator,
+    state: &State,
+    step: &mut impl FnMut(
+        &mut Accelerator,
+        &State,
+    ) -> (Result<zynq_pgs::StepReport, Error>, Vec<[u32; 13]>),
+) -> bool {
+    let (result, bodies) = step(accelerator, state);
+    matches!(result, Err(Error::MustReopen))
+        && bodies == bits(&state.bodies)
+        && matches!(accelerator.set_shapes(&state.shapes), Err(Error::MustReopen))
+}
