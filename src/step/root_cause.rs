@@ -137,7 +137,8 @@ fn accelerator(diagnosis: &Diagnosis, seen: Option<StickyError>) -> Option<Fault
     Some(Fault::Accelerator(Box::new(decoded(error, diagnosis.phase))))
 }
 
-fn decoded(StickyError { raw, detail }: StickyError, phase: Phase) -> AcceleratorError {
+/// The registers of the sticky error; collisions and bodies as if they were sent in the given order.
+pub(super) fn decoded(StickyError { raw, detail }: StickyError, phase: Phase) -> AcceleratorError {
     let code = ErrorCode::from_register(raw);
     let stream = error::CHANNEL.of(raw) as usize;
     let (on_stream, subject) = match code {
