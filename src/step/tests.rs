@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bitstream_model::interface::control::ErrorCode;
-use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected};
+use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, FaultKind};
 
 use super::board::{BoardDescription, BoardKind, Found};
 use crate::Direction as Way;
@@ -219,7 +219,7 @@ const BOTH: [Direction; 2] = [Direction::Mm2s, Direction::S2mm];
 fn a_decode_error_on_any_channel_is_told_by_name_and_survived() {
     for core in 0..4 {
         for direction in BOTH {
-            survives(Injected::DecodeError { core, direction }, |fault| {
+            survives(Injected::new(FaultKind::DmaDecErr).on(core, direction), |fault| {
                 let Fault::DmaDecode(at) = fault else { return false };
                 (at.channel.core, at.channel.direction) == (core, way_of(direction))
                     && at.descriptor.is_some_and(|descriptor| descriptor.status.failed())
@@ -232,7 +232,7 @@ fn a_decode_error_on_any_channel_is_told_by_name_and_survived() {
 fn a_channel_that_stalls_for_ever_ends_at_the_deadline() {
     for core in 0..4 {
         for direction in BOTH {
-            survives(Injected::Stall { core, direction }, |fault| {
+            survives(Injected::new(FaultKind::Stall).on(core, direction), |fault| {
                 matches!(fault, Fault::Deadline { awaited: Awaited::Results, .. })
             });
         }
@@ -243,7 +243,7 @@ fn a_channel_that_stalls_for_ever_ends_at_the_deadline() {
 fn every_sticky_error_of_the_accelerator_is_decoded_and_survived() {
     for code in ErrorCode::ALL {
         survives(
-            Injected::AcceleratorError { code },
+            Injected::new(FaultKind::AcceleratorError { code }),
             |fault| matches!(fault, Fault::Accelerator(error) if error.code == Some(code)),
         );
     }
