@@ -106,7 +106,9 @@
 //! # When something fails
 //!
 //! Every error says what was expected, what was found and what to do; the bodies are as they were.
-//! [`Error::is_input`], [`Error::may_retry`] and [`Error::must_reopen`] say how to go on.
+//! [`Error::is_input`], [`Error::may_retry`] and [`Error::must_reopen`] say how to go on;
+//! [`StepParameters::retries`] goes on by itself. [`Error::fault`] is the cause, and
+//! [`Error::diagnosis`] how every channel stood before the board was reset.
 
 mod accelerator;
 mod axi_dma;

@@ -99,7 +99,7 @@ pub enum Fault {
     /// Nothing happened in time.
     #[error(
         "{awaited} did not come within {limit:?}, in {phase}{}: give the step a longer deadline, or \
-         look what this stream waits for", behind_text(*behind)
+         look at what the streams wait for", behind_text(*behind)
     )]
     Deadline {
         /// What was awaited.
@@ -359,7 +359,7 @@ impl fmt::Display for AcceleratorError {
                 write!(f, ", body {given} (sent as record {sent})")?;
             }
             Subject::Body { sent, given: None } => {
-                write!(f, ", record {sent}, which is no body's")?
+                write!(f, ", record {sent}, which is no body's")?;
             }
             Subject::Beat(beat) => write!(f, ", beat {beat} of the packet")?,
             Subject::Bytes(bytes) => write!(f, ", {bytes} bytes needed")?,

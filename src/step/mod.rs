@@ -7,6 +7,8 @@ mod device;
 mod diagnosis;
 mod echo;
 mod fault;
+#[cfg(all(test, feature = "emulation"))]
+mod fault_tests;
 mod lane;
 mod locate;
 #[cfg(all(test, feature = "emulation"))]
@@ -21,6 +23,8 @@ mod retry;
 mod root_cause;
 mod solver;
 mod symptom;
+#[cfg(all(test, feature = "emulation"))]
+mod tampered;
 #[cfg(all(test, feature = "emulation"))]
 mod tests;
 

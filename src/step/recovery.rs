@@ -77,7 +77,7 @@ impl Device {
 
     /// Touches nothing any more. All memory stays with the engines, which may still reach it.
     fn give_up(&mut self, error: &Fault) -> Aftermath {
-        log::error!("the board could not be reset: {error}");
+        log::error!("the board is given up: {error}");
         self.dead = true;
         for lane in self.lanes_mut() {
             lane.leave_to_device();

@@ -85,13 +85,16 @@ pub(super) fn other_bitstream(Changed { register, expected, found }: Changed) ->
     Fault::OtherBitstream { register, expected, found }
 }
 
+/// A fault of a channel that stopped.
+type Stopped = fn(Box<ChannelState>) -> Fault;
+
 /// The channel that stopped with an error; of several the one that was at the earliest phase.
 fn stopped(diagnosis: &Diagnosis) -> Option<Fault> {
     let with_errors = diagnosis.channels.iter().filter(|state| state.status.errors() != 0);
     let state = with_errors.min_by_key(|state| state.phase)?;
     let at = Box::new(*state);
     let shows = |bit: u32| state.status.errors() & bit != 0;
-    let kinds: [(u32, fn(Box<ChannelState>) -> Fault); 5] = [
+    let kinds: [(u32, Stopped); 5] = [
         (dmasr::DMA_DEC_ERR.mask(), Fault::DmaDecode),
         (dmasr::DMA_SLV_ERR.mask(), Fault::DmaSlave),
         (dmasr::SG_DEC_ERR.mask(), Fault::SgDecode),
@@ -137,7 +140,8 @@ fn accelerator(diagnosis: &Diagnosis, seen: Option<StickyError>) -> Option<Fault
     Some(Fault::Accelerator(Box::new(decoded(error, diagnosis.phase))))
 }
 
-fn decoded(StickyError { raw, detail }: StickyError, phase: Phase) -> AcceleratorError {
+/// The registers of the sticky error; collisions and bodies as if they were sent in the given order.
+pub(super) fn decoded(StickyError { raw, detail }: StickyError, phase: Phase) -> AcceleratorError {
     let code = ErrorCode::from_register(raw);
     let stream = error::CHANNEL.of(raw) as usize;
     let (on_stream, subject) = match code {

@@ -17,7 +17,7 @@ use crate::{
     OpenError, OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
 };
 
-fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
+pub(super) fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
     let board = EmulatedBoard::new(config).expect("a board that can be built");
     let mut accelerator = Accelerator::open(options(&board)).expect("a board that opens");
     accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
@@ -63,7 +63,10 @@ pub(super) fn bits(bodies: &[Body]) -> Vec<u32> {
 }
 
 /// One step of a fresh scene.
-fn step(accelerator: &mut Accelerator, cubes: u32) -> (Result<StepReport, Error>, Vec<Body>) {
+pub(super) fn step(
+    accelerator: &mut Accelerator,
+    cubes: u32,
+) -> (Result<StepReport, Error>, Vec<Body>) {
     let (mut bodies, collisions) = scene(cubes);
     let result = accelerator.step(&mut bodies, &collisions, &StepParameters::default());
     (result, bodies)

@@ -15,6 +15,7 @@ use zynq_pgs::{
 
 use crate::args::{BoardName, CommonArgs};
 use crate::build::described;
+use crate::diagnosis;
 use crate::failure::{Cause, Failure};
 use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
 
@@ -170,7 +171,7 @@ impl Opened {
             true => next.to_owned(),
             false => format!("{next}; the emulated board saw this misuse:{seen}"),
         };
-        Failure::new(Cause::Hardware, error).next(next)
+        diagnosis::hardware(error).next(next)
     }
 
     fn kind(&self) -> &'static str {

@@ -13,7 +13,10 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use serde_json::{Value, json};
 use thiserror::Error;
+
+use crate::verbs::SCHEMA;
 
 /// A command that ran.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,11 +58,15 @@ pub(crate) struct Failure {
     error: Box<dyn Error + Send + Sync>,
     /// Where the innermost message does not say what to do.
     next: Option<String>,
+    /// More of it, in lines.
+    details: String,
+    /// What programs are told of it.
+    document: Option<Value>,
 }
 
 impl Failure {
     pub(crate) fn new(cause: Cause, error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
-        Self { cause, error: error.into(), next: None }
+        Self { cause, error: error.into(), next: None, details: String::new(), document: None }
     }
 
     /// Wrong usage or unreadable input.
@@ -70,6 +77,22 @@ impl Failure {
     /// Says what to do next.
     pub(crate) fn next(mut self, next: impl Into<String>) -> Self {
         self.next = Some(next.into());
+        self
+    }
+
+    /// Says something more about what to do next.
+    pub(crate) fn hint(self, hint: &str) -> Self {
+        let next = match &self.next {
+            Some(next) => format!("{next}; {hint}"),
+            None => hint.to_owned(),
+        };
+        self.next(next)
+    }
+
+    /// Says more: in lines, and for programs.
+    pub(crate) fn details(mut self, lines: String, document: Value) -> Self {
+        self.details = lines;
+        self.document = (!document.is_null()).then_some(document);
         self
     }
 
@@ -98,6 +121,15 @@ impl Failure {
         text
     }
 
+    /// Writes what programs are told, if there is anything.
+    pub(crate) fn write_document(&self, out: &mut dyn Write) {
+        if let Some(error) = &self.document {
+            let document = json!({ "schema": SCHEMA, "error": error });
+            // If nobody can be told, the code still says it.
+            let _ = writeln!(out, "{document:#}").and_then(|()| out.flush());
+        }
+    }
+
     /// Says on `stderr` what went wrong.
     pub(crate) fn report(&self, stderr: &mut impl Write) -> ExitCode {
         if self.is_closed_pipe() {
@@ -105,6 +137,7 @@ impl Failure {
         }
         // If nobody can be told, the code still says it.
         let _ = writeln!(stderr, "{}", self.chain());
+        let _ = write!(stderr, "{}", self.details);
         ExitCode::from(match self.cause {
             Cause::Input | Cause::Output => 2,
             Cause::NoBoard => 3,
@@ -147,6 +180,28 @@ mod tests {
             text,
             "error: x/params.npy\n  because: cannot be read\n  because: no such file\n  next: look"
         );
+    }
+
+    #[test]
+    fn hints_stand_behind_the_next_step() {
+        let text = Failure::input("no").next("look").hint("see there").chain();
+        assert_eq!(text, "error: no\n  next: look; see there");
+        assert_eq!(Failure::input("no").hint("see there").chain(), "error: no\n  next: see there");
+    }
+
+    #[test]
+    fn only_what_has_a_document_writes_one() {
+        let written = |failure: Failure| {
+            let mut out = Vec::new();
+            failure.write_document(&mut out);
+            String::from_utf8(out).expect("text")
+        };
+        assert_eq!(written(Failure::input("no")), "");
+        assert_eq!(written(Failure::input("no").details(String::new(), Value::Null)), "");
+        let text = written(Failure::input("no").details(String::new(), json!({ "fault": "gone" })));
+        let document: Value = serde_json::from_str(&text).expect("a document");
+        assert_eq!(document["error"]["fault"], "gone");
+        assert_eq!(document["schema"], SCHEMA);
     }
 
     #[test]

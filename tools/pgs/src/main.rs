@@ -1,7 +1,7 @@
 //! Command line tool of the zynq-pgs driver: steps scenes and folders of arrays on a board, real
 //! or emulated.
 //!
-//! Results go to stdout, everything else to stderr. The exit codes are those of [`failure`].
+//! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to both. The exit codes are those of [`failure`].
 
 #![forbid(unsafe_code)]
 
@@ -10,6 +10,7 @@ mod board;
 mod build;
 mod compare;
 mod deviation;
+mod diagnosis;
 mod digest;
 mod failure;
 mod folder;
@@ -43,6 +44,11 @@ fn main() -> ExitCode {
         .and_then(|verdict| out.flush().map(|()| verdict).map_err(failure::Failure::from));
     match done {
         Ok(verdict) => verdict.code(),
-        Err(failure) => failure.report(&mut io::stderr().lock()),
+        Err(failure) => {
+            if command.common.json {
+                failure.write_document(&mut out);
+            }
+            failure.report(&mut io::stderr().lock())
+        }
     }
 }

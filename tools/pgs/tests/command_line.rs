@@ -224,6 +224,54 @@ fn a_step_takes_as_long_as_the_deadline_says_and_no_longer() {
     assert_eq!(with(&["--deadline", "0"]).code, Some(2));
 }
 
+/// What a step that takes too long says: in lines, as a document, in a report.
+#[test]
+fn a_step_that_fails_is_told_with_every_channel_for_people_programs_and_bug_reports() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let report = folder.path().join("fault.json");
+    let path = report.to_str().expect("text");
+    let slow = ["--grid", "6x6x6", "--steps", "1", "--bandwidth", "0.1", "--retries", "2"];
+    let late = ["--deadline", "1", "--report", path];
+
+    let ran = run(["run"].iter().chain(&slow).chain(&late));
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(4), ""), "{}", ran.stderr);
+    assert!(ran.stderr.contains("\ndiagnosis  deadline in contact pass 2, "), "{}", ran.stderr);
+    assert!(ran.stderr.contains("\n  dma2 MM2S         2/10  "), "{}", ran.stderr);
+    assert!(ran.stderr.contains(&format!("for a bug report, see {path}")), "{}", ran.stderr);
+
+    let text = std::fs::read_to_string(&report).expect("it was written");
+    let bundle: serde_json::Value = serde_json::from_str(&text).expect("one document");
+    assert_keys(&bundle, &["version", "host", "arguments", "registers", "error"]);
+    assert_eq!(bundle["board"]["profile"], "float");
+    assert_eq!(bundle["parameters"]["deadline_ms"], 1.0);
+    assert_eq!(bundle["parameters"]["retries"], 2);
+    assert_eq!(bundle["accesses"].as_array().map(Vec::len), Some(64));
+    let registers = bundle["registers"].to_string();
+    assert!(registers.contains("dma3 S2MM DMASR = 0x00010008 SGIncld"), "{registers}");
+
+    std::fs::remove_file(&report).expect("it is there");
+    let ran = run(["run", "--json"].iter().chain(&slow).chain(&late));
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+    let error = &json(&ran)["error"];
+    assert_eq!((&error["fault"], &error["aftermath"]), (&"deadline".into(), &"ready".into()));
+    let channels = error["diagnosis"]["channels"].as_array().expect("channels");
+    assert_eq!(channels.len(), 8);
+    assert_eq!(channels[6]["channel"], "dma2 MM2S");
+    assert_eq!(channels[6]["descriptors_complete"], 2);
+
+    // Nothing failed: nothing is written.
+    std::fs::remove_file(&report).expect("it is there");
+    let ran = run(["run"].iter().chain(&slow).chain(&["--report", path]));
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(!report.exists() && !ran.stdout.contains("retries"), "{}", ran.stdout);
+
+    // Where the report cannot be written the fault is told all the same.
+    let nowhere = ["--deadline", "1", "--report", "/nonexistent/fault.json"];
+    let ran = run(["run"].iter().chain(&slow).chain(&nowhere));
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+    assert!(ran.stderr.contains("/nonexistent/fault.json cannot be written"), "{}", ran.stderr);
+}
+
 #[test]
 fn the_pile_has_impulses_after_landing_and_none_before() {
     let ran = run(["--json", "--grid", "3x2x3", "--steps", "70"]);

@@ -53,6 +53,20 @@ fn the_readmes_commands_print_what_it_shows() {
     }
 }
 
+#[test]
+fn a_step_that_fails_prints_what_the_readme_shows() {
+    let readme = readme();
+    let (_, section) = readme.split_once("\n## When something fails\n").expect("the section");
+    let (_, block) = section.split_once("\n```text\n$ cargo run --release -- ").expect("a block");
+    let (block, _) = block.split_once("```").expect("its end");
+    let (command, shown) = block.split_once('\n').expect("a command");
+    let mut pgs = pgs();
+    let ran = pgs.current_dir(root()).args(command.split_whitespace()).output();
+    let ran = ran.expect("the command starts");
+    assert_eq!(String::from_utf8(ran.stderr).expect("text"), shown);
+    assert_eq!((ran.status.code(), ran.stdout.len()), (Some(4), 0));
+}
+
 /// The cells of the row of that profile in the table of the bitstreams.
 fn bitstream<'a>(readme: &'a str, profile: &str) -> Vec<&'a str> {
     let (_, section) = readme.split_once("\n## Which bitstream\n").expect("the section");

@@ -64,6 +64,7 @@ fn report_json(report: &StepReport) -> Value {
         "doorbells": report.doorbells,
         "interrupts": report.interrupts,
         "descriptors": report.descriptors,
+        "retries": report.retries,
         "host_ms": {
             "validate": run::milliseconds(host.validate),
             "order": run::milliseconds(host.order),

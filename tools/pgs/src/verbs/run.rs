@@ -13,6 +13,7 @@ use super::SCHEMA;
 use super::table::{Column, grouped, heading, line};
 use crate::args::CommonArgs;
 use crate::board::{self, Opened};
+use crate::diagnosis::FaultArgs;
 use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
@@ -29,7 +30,8 @@ Examples:
   pgs run --order hazard-free --verify
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes --inertia world --grid 8x8x8
-  pgs run --bandwidth unlimited --json > run.json";
+  pgs run --bandwidth unlimited --json > run.json
+  pgs run --retries 2 --report fault.json        faults of the board: try again, then keep all about them";
 
 /// Rows of the table, if not said otherwise.
 const ROWS: u32 = 15;
@@ -50,6 +52,8 @@ pub(crate) struct RunArgs {
     ordering: OrderingArgs,
     #[command(flatten)]
     deadline: DeadlineArgs,
+    #[command(flatten)]
+    faults: FaultArgs,
     #[command(flatten)]
     build: BuildArgs,
 }
@@ -152,11 +156,15 @@ pub(crate) fn run(
     let every = args.report_every.unwrap_or(args.steps.div_ceil(ROWS));
     let progress = progress_bar(args.steps);
     let parameters = args.ordering.apply(args.deadline.apply(StepParameters::default()));
+    let parameters = args.faults.apply(parameters);
     let mut documents = Vec::new();
     let mut done = 0;
+    let mut retries = 0;
     while done < args.steps && !interrupt.is_set() {
         done += 1;
-        let row = step(done, &parameters, &mut opened, &mut scene)?;
+        let row = step(done, &parameters, &mut opened, &mut scene)
+            .map_err(|error| args.faults.failure(&opened, &parameters, error))?;
+        retries += u64::from(row.report.retries);
         if done == 1 && !common.json {
             // Only now: a scene that is refused prints nothing but the refusal.
             progress.suspend(|| print_heading(args, &opened, &row.report, out))?;
@@ -188,6 +196,9 @@ pub(crate) fn run(
         writeln!(out, "{document:#}")?;
     } else {
         writeln!(out)?;
+        if retries > 0 {
+            writeln!(out, "retries    {} of {done} steps", grouped(retries))?;
+        }
         if !complete {
             writeln!(out, "interrupted after {done} of {} steps", args.steps)?;
         }
@@ -217,15 +228,12 @@ fn step(
     parameters: &StepParameters,
     opened: &mut Opened,
     scene: &mut Scene,
-) -> Result<Row, Failure> {
+) -> Result<Row, zynq_pgs::Error> {
     let begin = Instant::now();
     let ground_pairs = ground_pairs(scene.detect());
     let detect = begin.elapsed();
     let (bodies, collisions) = scene.parts_mut();
-    let report = opened
-        .accelerator
-        .step(bodies, collisions, parameters)
-        .map_err(|error| opened.failure(error))?;
+    let report = opened.accelerator.step(bodies, collisions, parameters)?;
     let kinetic_energy = kinetic_energy(scene.bodies(), scene.shapes());
     Ok(Row { step: number, ground_pairs, kinetic_energy, detect, report })
 }

@@ -14,6 +14,7 @@ use super::table::grouped;
 use crate::args::CommonArgs;
 use crate::board;
 use crate::compare::{self, Difference};
+use crate::diagnosis::FaultArgs;
 use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
@@ -70,6 +71,8 @@ pub(crate) struct SolveArgs {
     #[command(flatten)]
     deadline: DeadlineArgs,
     #[command(flatten)]
+    faults: FaultArgs,
+    #[command(flatten)]
     build: BuildArgs,
 }
 
@@ -84,7 +87,7 @@ impl SolveArgs {
         if let Some(iterations) = self.friction_iterations {
             parameters.friction_iterations = iterations;
         }
-        self.ordering.apply(self.deadline.apply(parameters))
+        self.faults.apply(self.ordering.apply(self.deadline.apply(parameters)))
     }
 }
 
@@ -130,7 +133,7 @@ pub(crate) fn run(
         .and_then(|()| opened.accelerator.step(&mut bodies, &folder.collisions, &parameters))
         .map_err(|error| match error.is_input() {
             true => Failure::input(origin::locate(error, &folder)),
-            false => opened.failure(error),
+            false => args.faults.failure(&opened, &parameters, error),
         })?;
     if interrupt.is_set() {
         return Ok(Verdict::Interrupted);
@@ -295,6 +298,9 @@ impl Solved {
         )?;
         if let Some(sum) = report.impulse_sum {
             writeln!(out, "impulses   {sum:.3} N s")?;
+        }
+        if report.retries > 0 {
+            writeln!(out, "retries    {}", report.retries)?;
         }
         let [before, after] = self.energy;
         writeln!(out, "energy     {before:.3} J before, {after:.3} J after (kinetic)")?;
