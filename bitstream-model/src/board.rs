@@ -4,11 +4,12 @@
 //! inside a register write. The clock is the accelerator's; the DMAs run on it too.
 
 use crate::accelerator::Accelerator;
-use crate::axi_dma::{Core, Direction, Moved, Surroundings};
+use crate::axi_dma::{Core, Direction, Moved, PacketCount, Surroundings};
 use crate::bus::{self, Target};
 use crate::cast::index;
 use crate::config::{Bandwidth, BoardConfig};
-use crate::fault::Fault;
+use crate::fault::{Fault, FaultKind, Faults};
+use crate::interface::control::IDENTIFICATION;
 use crate::interface::record::BEAT_BYTES;
 use crate::interrupt::InterruptLine;
 use crate::memory::Memory;
@@ -58,6 +59,11 @@ pub(crate) struct Board {
     inputs: Vec<Stream>,
     outputs: Vec<Stream>,
     moved: Moved,
+    faults: Faults,
+    /// The programmable logic has lost its power.
+    powerless: bool,
+    /// Another design was loaded; what its IDENTIFICATION reads.
+    other_design: Option<u32>,
     counts: Counts,
     /// What the memory can still deliver at once, in bytes times the clock in kHz.
     credit: u64,
@@ -85,6 +91,9 @@ impl Board {
             inputs,
             outputs,
             moved: Moved::default(),
+            faults: Faults::default(),
+            powerless: false,
+            other_design: None,
             counts: Counts::default(),
             credit: 0,
             turn: 0,
@@ -104,24 +113,44 @@ impl Board {
     }
 
     pub(crate) fn inject(&mut self, fault: Fault) {
-        match fault {
-            Fault::DecodeError { core, direction } => {
-                if let Some(core) = self.cores.get_mut(core) {
-                    core.channel(direction).inject_decode_error();
+        self.faults.inject(fault);
+    }
+
+    pub(crate) fn clear_faults(&mut self) {
+        self.faults.clear();
+    }
+
+    /// Faults that have happened.
+    pub(crate) fn faults(&self) -> u64 {
+        self.faults.happened()
+    }
+
+    /// The packets that ended since the last step began.
+    pub(crate) fn packets(&self) -> &[PacketCount] {
+        &self.moved.packets
+    }
+
+    /// Lets what concerns the whole board happen, at a register access if there is one now.
+    fn meet(&mut self, access: bool) {
+        match self.faults.of_board(access) {
+            Some(FaultKind::PowerLost) => self.powerless = true,
+            Some(FaultKind::OtherBitstream { identification }) => {
+                self.other_design = Some(identification);
+                for (number, core) in self.cores.iter_mut().enumerate() {
+                    *core = Core::new(number, &self.config);
                 }
+                self.accelerator = Accelerator::new(&self.config);
+                self.inputs.iter_mut().chain(&mut self.outputs).for_each(Stream::clear);
             }
-            Fault::Stall { core, direction } => {
-                if let Some(core) = self.cores.get_mut(core) {
-                    core.channel(direction).inject_stall();
-                }
-            }
-            Fault::AcceleratorError { code } => self.accelerator.inject(code),
+            Some(FaultKind::IrqSpurious) => self.interrupt.disturb(1),
+            Some(FaultKind::IrqStorm { count }) => self.interrupt.disturb(count),
+            _ => {}
         }
     }
 
-    /// A strict board is dead after its first violation.
+    /// A strict board is dead after its first violation, and any without power.
     fn dead(&self) -> bool {
-        self.config.strict && self.log.count > 0
+        self.powerless || self.config.strict && self.log.count > 0
     }
 
     fn access_cycles(&self) -> u64 {
@@ -137,6 +166,7 @@ impl Board {
     pub(crate) fn read32(&mut self, address: u64) -> u32 {
         self.counts.register_reads += 1;
         self.advance(self.now + self.access_cycles(), false);
+        self.meet(true);
         if self.dead() {
             self.record(address, false, u32::MAX);
             return u32::MAX;
@@ -144,6 +174,10 @@ impl Board {
         let found = match bus::decode(address, self.cores.len()) {
             Target::Dma { core, offset } => {
                 self.cores[core].read(offset).ok_or(ViolationKind::ReservedRegister { address })
+            }
+            Target::Control { offset } if self.other_design.is_some() => {
+                let identification = self.other_design.filter(|_| offset == IDENTIFICATION.offset);
+                Ok(identification.unwrap_or(0))
             }
             Target::Control { offset } => {
                 self.accelerator.read(offset).ok_or(ViolationKind::ReservedRegister { address })
@@ -163,18 +197,20 @@ impl Board {
     pub(crate) fn write32(&mut self, address: u64, value: u32) {
         self.counts.register_writes += 1;
         self.advance(self.now + self.access_cycles(), false);
+        self.meet(true);
         self.record(address, true, value);
         if self.dead() {
             return;
         }
-        let (now, log) = (self.now, &mut self.log);
+        let (now, log, faults) = (self.now, &mut self.log, &mut self.faults);
         let done = match bus::decode(address, self.cores.len()) {
             Target::Dma { core, offset } => self.cores[core]
-                .write(now, offset, value, log)
+                .write(now, offset, value, log, faults)
                 .ok_or(ViolationKind::ReservedRegister { address }),
+            Target::Control { .. } if self.other_design.is_some() => Ok(false),
             Target::Control { offset } => self
                 .accelerator
-                .write(now, offset, value, log)
+                .write(now, offset, value, log, faults)
                 .ok_or(ViolationKind::ReservedRegister { address }),
             Target::Nothing => Err(ViolationKind::UnmappedRegister { address }),
             Target::Unaligned => Err(ViolationKind::UnalignedRegister { address }),
@@ -193,7 +229,18 @@ impl Board {
             InterruptWiring::Disconnected => false,
             InterruptWiring::StuckHigh => true,
         };
-        self.interrupt.set(level && !self.dead());
+        let level = level && !self.dead();
+        if self.interrupt.rises(level) {
+            match self.faults.at_edge() {
+                Some(FaultKind::IrqDelay { ns }) => {
+                    let until = self.now.saturating_add(self.config.cycles(ns));
+                    self.interrupt.withhold(until);
+                }
+                Some(_) => self.interrupt.withhold(u64::MAX),
+                None => {}
+            }
+        }
+        self.interrupt.set(level, self.now);
     }
 
     /// Lets time pass until `until`, or until the interrupt wants attention if `watch` says so.
@@ -207,7 +254,11 @@ impl Board {
             self.tick();
             let event = self.next_event().map_or(until, |event| event.min(until));
             let limit = event - self.now;
-            let ran = self.accelerator.run(limit, &mut self.inputs, &mut self.outputs);
+            if self.accelerator.starts() {
+                self.moved.packets.clear();
+            }
+            let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
+            let ran = self.accelerator.run(limit, inputs, outputs, &mut self.faults);
             let waits = ran.cycles == 0;
             let mut slice = if waits { limit.min(STARVED_CYCLES) } else { ran.cycles };
             if waits && ran.progressed {
@@ -222,6 +273,7 @@ impl Board {
                 self.accelerator.starve(slice);
             }
             self.now += slice;
+            self.meet(false);
             self.tick();
             self.update_interrupt();
         }
@@ -242,7 +294,7 @@ impl Board {
         self.cores
             .iter()
             .map(Core::next_event)
-            .chain([self.accelerator.next_event()])
+            .chain([self.accelerator.next_event(), self.interrupt.next_event()])
             .flatten()
             .filter(|event| *event > self.now)
             .min()
@@ -297,8 +349,12 @@ impl Board {
         if self.config.quirks.unconnected == Some((number, direction)) {
             return (0, false);
         }
-        let mut with =
-            Surroundings { memory: &mut self.memory, log: &mut self.log, moved: &mut self.moved };
+        let mut with = Surroundings {
+            memory: &mut self.memory,
+            log: &mut self.log,
+            moved: &mut self.moved,
+            faults: &mut self.faults,
+        };
         self.cores[number].run(direction, start, end, limit, stream, &mut with)
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::accelerator::striping::{GROUP_MAX, STREAMS_MAX};
 use crate::accelerator::window;
+use crate::fault::FaultKind;
 use crate::interface::address_map::CONTROL_BYTES;
 use crate::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use crate::interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
@@ -75,6 +76,12 @@ impl Default for Delays {
             fifo_beats: 512,
         }
     }
+}
+
+/// Clocks of that many kHz that pass in a time.
+pub(crate) fn cycles_of(ns: u64, clock_khz: u32) -> u64 {
+    let cycles = u128::from(ns) * u128::from(clock_khz) / 1_000_000;
+    u64::try_from(cycles).unwrap_or(u64::MAX)
 }
 
 /// Copies, clocks and collisions of an issue that a profile may have.
@@ -221,6 +228,21 @@ impl BoardConfig {
             None => profile.window,
         };
         Depth { fill: profile.fill.max(window), window }
+    }
+
+    /// Clocks that pass in a time.
+    pub(crate) fn cycles(&self, ns: u64) -> u64 {
+        cycles_of(ns, self.profile.clock_khz)
+    }
+
+    /// When a reset ends that is asked for now.
+    pub(crate) fn end_of_reset(&self, now: u64, fault: Option<FaultKind>) -> u64 {
+        let end = now + self.delays.reset;
+        match fault {
+            Some(FaultKind::ResetNever) => u64::MAX,
+            Some(FaultKind::ResetSlow { ns }) => end.saturating_add(self.cycles(ns)),
+            _ => end,
+        }
     }
 
     pub(crate) fn check(&self) -> Result<(), ConfigError> {

@@ -5,9 +5,10 @@ use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use crate::axi_dma::PacketCount;
 use crate::board::{Board, Counts};
 use crate::config::{BoardConfig, ConfigError};
-use crate::fault::Fault;
+use crate::fault::FaultPlan;
 use crate::interface::record::Beat;
 use crate::memory::{DeviceAccess, Memory, MemoryError};
 use crate::outside::DeviceMemory;
@@ -84,9 +85,30 @@ impl EmulatedBoard {
         lock(&self.0).interrupt.level()
     }
 
-    /// Makes the board fail once. A fault of a DMA that does not exist never happens.
-    pub fn inject(&self, fault: Fault) {
-        lock(&self.0).inject(fault);
+    /// Makes the board fail as planned, from now on. A fault of a part that does not exist never
+    /// happens.
+    pub fn inject(&self, plan: impl Into<FaultPlan>) {
+        let mut board = lock(&self.0);
+        for fault in plan.into().faults {
+            board.inject(fault);
+        }
+    }
+
+    /// Forgets the faults that have not happened.
+    pub fn clear_faults(&self) {
+        lock(&self.0).clear_faults();
+    }
+
+    /// How many faults have happened.
+    #[must_use]
+    pub fn faults(&self) -> u64 {
+        lock(&self.0).faults()
+    }
+
+    /// The packets that have ended since the last step began, in that order.
+    #[must_use]
+    pub fn packets(&self) -> Vec<PacketCount> {
+        lock(&self.0).packets().to_vec()
     }
 }
 

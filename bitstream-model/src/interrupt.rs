@@ -3,7 +3,13 @@
 /// The interrupt line and the kernel's view of it.
 #[derive(Debug, Default)]
 pub(crate) struct InterruptLine {
+    /// What the sources give, and what of it arrives.
+    source: bool,
     level: bool,
+    /// Until when a rising edge is withheld by a fault; forever means until the line falls.
+    withheld: Option<u64>,
+    /// Interrupts without a source that are still to come.
+    spurious: u32,
     /// The kernel masks the line with each event; user space unmasks it.
     masked: bool,
     events: u32,
@@ -12,25 +18,51 @@ pub(crate) struct InterruptLine {
 }
 
 impl InterruptLine {
+    /// Whether that level of the sources is a rising edge.
+    pub(crate) fn rises(&self, source: bool) -> bool {
+        source && !self.source
+    }
+
+    /// Keeps the edge that comes next back until then.
+    pub(crate) fn withhold(&mut self, until: u64) {
+        self.withheld = Some(until);
+    }
+
+    /// Adds interrupts without a source.
+    pub(crate) fn disturb(&mut self, times: u32) {
+        self.spurious = self.spurious.saturating_add(times);
+    }
+
     /// Sets the level that the sources give.
-    pub(crate) fn set(&mut self, level: bool) {
+    pub(crate) fn set(&mut self, source: bool, now: u64) {
+        self.source = source;
+        if !source || self.withheld.is_some_and(|until| until <= now) {
+            self.withheld = None;
+        }
+        let level = source && self.withheld.is_none();
         self.rising_edges += u64::from(level && !self.level);
         self.level = level;
     }
 
-    /// The level that the sources give.
+    /// When a level that is withheld arrives.
+    pub(crate) fn next_event(&self) -> Option<u64> {
+        self.withheld
+    }
+
+    /// The level that arrives.
     pub(crate) fn level(&self) -> bool {
         self.level
     }
 
     /// Whether an event would be delivered.
     pub(crate) fn pending(&self) -> bool {
-        self.level && !self.masked
+        (self.level || self.spurious > 0) && !self.masked
     }
 
     /// Delivers an event if one is pending: counts it and masks the line.
     pub(crate) fn take(&mut self) -> Option<u32> {
         self.pending().then(|| {
+            self.spurious = self.spurious.saturating_sub(1);
             self.masked = true;
             self.events = self.events.wrapping_add(1);
             self.events
@@ -50,14 +82,43 @@ mod tests {
     fn an_event_masks_the_line_and_a_level_that_stands_comes_again() {
         let mut line = InterruptLine::default();
         assert_eq!(line.take(), None);
-        line.set(true);
+        line.set(true, 0);
         assert_eq!(line.take(), Some(1));
         assert_eq!(line.take(), None, "masked");
         line.unmask();
         assert_eq!(line.take(), Some(2), "enabled before it was acknowledged");
-        line.set(false);
+        line.set(false, 0);
         line.unmask();
         assert_eq!(line.take(), None);
         assert_eq!(line.rising_edges, 1);
+    }
+
+    #[test]
+    fn an_edge_that_is_withheld_comes_late_or_not_at_all() {
+        let mut line = InterruptLine::default();
+        line.withhold(10);
+        line.set(true, 3);
+        assert_eq!((line.pending(), line.next_event()), (false, Some(10)));
+        line.set(true, 10);
+        assert!(line.pending());
+        line.set(false, 11);
+        line.withhold(u64::MAX);
+        line.set(true, 12);
+        line.set(true, 1000);
+        assert!(!line.pending(), "lost");
+        line.set(false, 1001);
+        line.set(true, 1002);
+        assert!(line.pending(), "the next one arrives");
+    }
+
+    #[test]
+    fn interrupts_without_a_source_end() {
+        let mut line = InterruptLine::default();
+        line.disturb(2);
+        for _ in 0..2 {
+            assert!(line.take().is_some());
+            line.unmask();
+        }
+        assert_eq!((line.take(), line.rising_edges), (None, 0));
     }
 }

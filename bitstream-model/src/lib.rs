@@ -39,10 +39,10 @@ mod violation;
 
 #[cfg(feature = "emulation")]
 pub use {
-    axi_dma::Direction,
+    axi_dma::{Direction, PacketCount},
     board::Counts,
     config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, Subnormals},
-    fault::Fault,
+    fault::{Consequence, Fault, FaultError, FaultKind, FaultPlan, Place, StepPhase, When},
     handle::{CpuPort, EmulatedBoard},
     memory::{Denied, DeviceAccess, MemoryError},
     outside::DeviceMemory,

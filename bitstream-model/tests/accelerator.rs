@@ -2,22 +2,20 @@
 
 mod common;
 
-use bitstream_model::interface::axi_dma::{DMASR, dmasr};
+use bitstream_model::interface::axi_dma::dmasr;
 use bitstream_model::interface::control::{self, ErrorCode, ap_ctrl, irq};
 use bitstream_model::interface::profile::FLOAT;
 use bitstream_model::interface::record::Beat;
 use bitstream_model::interface::register::Register;
 use bitstream_model::timing::{Records, StepCycles, StepTime};
-use bitstream_model::{
-    Bandwidth, BoardConfig, Direction, Fault, Hazards, Subnormals, ViolationKind,
-};
+use bitstream_model::{Bandwidth, BoardConfig, Direction, Hazards, Subnormals, ViolationKind};
 
 use common::ring::{EOF, SOF};
 use common::scene::{
     AT_REST, Body, Collision, Lane, STATIC, Step, bits, ground_contact, one_cube, result_beats,
 };
 use common::sg::{Failure, Flight, LONG, Machine, Outcome};
-use common::{BOTH, CORES, microseconds, numbered};
+use common::{CORES, microseconds, numbered};
 
 const UNLIMITED: Bandwidth = Bandwidth::Unlimited;
 
@@ -598,56 +596,6 @@ fn flushed_subnormals_change_a_step_and_the_capability_says_so() {
         let flush = control::features::FLUSH_SUBNORMALS.is_set(features);
         assert_eq!(flush, subnormals == Subnormals::Flush);
     }
-}
-
-#[test]
-fn an_injected_decode_error_fails_one_step_and_no_more() {
-    for direction in BOTH {
-        let mut machine = machine();
-        machine.host.board.inject(Fault::DecodeError { core: 1, direction });
-        let failure = machine.step(&Step::falling(9)).expect_err("the fault");
-        let errors = dmasr::DMA_DEC_ERR.mask();
-        assert_eq!(failure, Failure::Dma { core: 1, direction, errors });
-        machine.host.assert_no_violation();
-        machine.recover();
-        machine.step(&Step::falling(9)).expect("once only");
-    }
-}
-
-#[test]
-fn an_injected_stall_lasts_until_the_reset() {
-    for direction in BOTH {
-        let mut machine = machine();
-        machine.host.board.inject(Fault::Stall { core: 3, direction });
-        let failure = machine.step(&Step::falling(9)).expect_err("the fault");
-        assert_eq!(failure, Failure::Deadline);
-        assert!(!dmasr::HALTED.is_set(machine.host.read(3, direction, DMASR)));
-        machine.recover();
-        machine.step(&Step::falling(9)).expect("once only");
-        machine.host.assert_no_violation();
-    }
-}
-
-#[test]
-fn an_injected_error_code_is_what_the_sticky_error_says() {
-    for code in ErrorCode::ALL {
-        let mut machine = machine();
-        machine.host.board.inject(Fault::AcceleratorError { code });
-        let failure = machine.step(&Step::falling(9)).expect_err("the fault");
-        assert_eq!(failure, Failure::Accelerator(code as u32, 0, 0));
-        machine.recover();
-        machine.step(&Step::falling(9)).expect("once only");
-    }
-}
-
-#[test]
-fn a_fault_of_a_dma_that_does_not_exist_never_happens() {
-    let mut machine = machine();
-    for direction in BOTH {
-        machine.host.board.inject(Fault::DecodeError { core: 4, direction });
-        machine.host.board.inject(Fault::Stall { core: usize::MAX, direction });
-    }
-    machine.step(&Step::falling(9)).expect("the step completes");
 }
 
 #[test]

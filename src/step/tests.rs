@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bitstream_model::interface::control::ErrorCode;
-use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected};
+use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, FaultKind};
 
 use super::board::{BoardDescription, BoardKind, Found};
 use crate::platform::{
@@ -207,7 +207,7 @@ const BOTH: [Direction; 2] = [Direction::Mm2s, Direction::S2mm];
 fn a_decode_error_on_any_channel_is_told_by_name_and_survived() {
     for core in 0..4 {
         for direction in BOTH {
-            survives(Injected::DecodeError { core, direction }, |fault| {
+            survives(Injected::new(FaultKind::DmaDecErr).on(core, direction), |fault| {
                 let Fault::Dma { channel, status, .. } = fault else { return false };
                 channel.starts_with(&format!("dma{core} ")) && status.contains("DMADecErr")
             });
@@ -220,7 +220,7 @@ fn a_channel_that_stalls_for_ever_ends_at_the_deadline() {
     for core in 0..4 {
         for direction in BOTH {
             survives(
-                Injected::Stall { core, direction },
+                Injected::new(FaultKind::Stall).on(core, direction),
                 |fault| matches!(fault, Fault::Deadline { registers, .. } if registers.0.len() == 8),
             );
         }
@@ -231,7 +231,7 @@ fn a_channel_that_stalls_for_ever_ends_at_the_deadline() {
 fn every_sticky_error_of_the_accelerator_is_decoded_and_survived() {
     for code in ErrorCode::ALL {
         survives(
-            Injected::AcceleratorError { code },
+            Injected::new(FaultKind::AcceleratorError { code }),
             |fault| matches!(fault, Fault::Accelerator { error, .. } if error.contains(code.describe())),
         );
     }

@@ -33,6 +33,7 @@ pub(crate) mod window;
 
 use crate::cast::register;
 use crate::config::BoardConfig;
+use crate::fault::{FaultKind, Faults, Place, StepPhase, StepShape};
 use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
@@ -88,7 +89,8 @@ pub(crate) struct Accelerator {
     phase: Phase,
     start_due: bool,
     reset_until: Option<u64>,
-    fault: Option<ErrorCode>,
+    /// Takes and sends nothing until it is reset.
+    hung: bool,
     /// Cycles since the start of the step.
     clock: u64,
     /// Cycles that the last action still takes.
@@ -115,7 +117,7 @@ impl Accelerator {
             phase: Phase::Idle,
             start_due: false,
             reset_until: held.then_some(u64::MAX),
-            fault: None,
+            hung: false,
             clock: 0,
             debt: 0,
             counters: Counters::default(),
@@ -130,10 +132,6 @@ impl Accelerator {
             impulses: Vec::new(),
             window: None,
         }
-    }
-
-    pub(crate) fn inject(&mut self, code: ErrorCode) {
-        self.fault = Some(code);
     }
 
     fn busy(&self) -> bool {
@@ -153,6 +151,7 @@ impl Accelerator {
         offset: u32,
         value: u32,
         log: &mut Log,
+        faults: &mut Faults,
     ) -> Option<bool> {
         if self.reset_until.is_some() {
             // Deaf until the reset has ended.
@@ -173,12 +172,13 @@ impl Accelerator {
                 Some(true)
             }
             Request::Reset => {
-                self.reset_until = Some(now + self.config.delays.reset);
+                let fault = faults.at_reset(Place::Accelerator);
+                self.reset_until = Some(self.config.end_of_reset(now, fault));
                 self.registers.reset();
                 self.phase = Phase::Idle;
                 self.start_due = false;
                 self.debt = 0;
-                self.fault = None;
+                self.hung = false;
                 Some(false)
             }
         }
@@ -206,6 +206,11 @@ impl Accelerator {
         self.reset_until.is_none() && self.busy()
     }
 
+    /// Whether a step begins with the next run.
+    pub(crate) fn starts(&self) -> bool {
+        self.reset_until.is_none() && self.start_due
+    }
+
     /// Lets `cycles` pass in which nothing could be done for want of beats or space.
     pub(crate) fn starve(&mut self, cycles: u64) {
         self.clock += cycles;
@@ -214,7 +219,13 @@ impl Accelerator {
 
     /// Works for up to `limit` cycles on what has arrived, then returns; it returns early when
     /// there is nothing to do.
-    pub(crate) fn run(&mut self, limit: u64, inputs: &mut [Stream], outputs: &mut [Stream]) -> Ran {
+    pub(crate) fn run(
+        &mut self,
+        limit: u64,
+        inputs: &mut [Stream],
+        outputs: &mut [Stream],
+        faults: &mut Faults,
+    ) -> Ran {
         let mut ran = Ran::default();
         if !self.running() {
             return ran;
@@ -222,6 +233,7 @@ impl Accelerator {
         if std::mem::take(&mut self.start_due) {
             ran.progressed = true;
             self.start();
+            faults.step_begins(self.step_shape());
         }
         loop {
             let paid = self.debt.min(limit - ran.cycles);
@@ -230,6 +242,12 @@ impl Accelerator {
             ran.cycles += paid;
             ran.progressed |= paid > 0;
             if self.debt > 0 {
+                break;
+            }
+            if !faults.none() {
+                ran.progressed |= self.meet(faults, inputs);
+            }
+            if self.hung {
                 break;
             }
             let left = limit - ran.cycles;
@@ -259,6 +277,56 @@ impl Accelerator {
             }
         }
         ran
+    }
+
+    /// The packets of the step.
+    fn step_shape(&self) -> StepShape {
+        let segments = [self.velocities_in(), self.collisions_in(), self.poses_in()];
+        let once = matches!(self.variant.profile.flow, Flow::Window(_));
+        StepShape {
+            segments: std::array::from_fn(|core| {
+                segments.each_ref().map(|segment| segment.beats_on(core) > 0)
+            }),
+            contact: self.arguments.contact_iterations,
+            rounds: if once { self.passes().min(1) } else { self.passes() },
+        }
+    }
+
+    /// Lets a fault happen whose time has come; whether one did.
+    fn meet(&mut self, faults: &mut Faults, inputs: &[Stream]) -> bool {
+        let (phase, segment) = match &self.phase {
+            Phase::Idle | Phase::Failed => return false,
+            Phase::Ending => {
+                self.hung |= faults.keeps_done();
+                return self.hung;
+            }
+            Phase::Window => (None, None),
+            Phase::Load(segment) => (Some(StepPhase::Load), Some(segment)),
+            Phase::Pass { number, segment } => {
+                let contact = self.arguments.contact_iterations;
+                let phase = match number.checked_sub(contact) {
+                    None => StepPhase::Contact(number + 1),
+                    Some(number) => StepPhase::Friction(number + 1),
+                };
+                (Some(phase), Some(segment))
+            }
+            Phase::Integrate { poses, .. } => (Some(StepPhase::Poses), Some(poses)),
+        };
+        let (done, arrived) = match segment {
+            Some(segment) => (segment.done, segment.done + segment.available(inputs)),
+            // All phases at once: it is at every record.
+            None => (0, usize::MAX),
+        };
+        if arrived == done {
+            return false;
+        }
+        let fault = faults.in_accelerator(phase, arrived as u64);
+        match fault {
+            Some(FaultKind::AcceleratorError { code }) => self.fail(code, 0, register(done)),
+            Some(_) => self.hung = true,
+            None => {}
+        }
+        fault.is_some()
     }
 
     fn fail(&mut self, code: ErrorCode, channel: usize, detail: u32) {

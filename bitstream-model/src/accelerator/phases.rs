@@ -54,13 +54,6 @@ impl Accelerator {
         Results::new(Array::new(striping, self.body_records(numbers.poses, result::ROWS)))
     }
 
-    pub(super) fn injected(&mut self) -> Result<(), PacketError> {
-        match self.fault.take() {
-            Some(code) => Err(PacketError { code, channel: 0, beat: 0 }),
-            None => Ok(()),
-        }
-    }
-
     pub(super) fn received(&mut self, sum: u32) {
         self.counters.sum_received = self.counters.sum_received.wrapping_add(sum);
     }
@@ -75,7 +68,6 @@ impl Accelerator {
         if records == 0 {
             return Ok(false);
         }
-        self.injected()?;
         segment.check(records, inputs)?;
         let mut reader = segment.reader(0, inputs);
         for body in segment.done..segment.done + records {
@@ -191,7 +183,6 @@ impl Accelerator {
         if available == 0 {
             return Ok(false);
         }
-        self.injected()?;
         segment.check(available, inputs)?;
         let mut cycles = 0;
         let mut records = 0;
@@ -323,7 +314,6 @@ impl Accelerator {
         if records == 0 {
             return Ok(false);
         }
-        self.injected()?;
         poses.check(records, inputs)?;
         let format = self.variant.numbers.poses;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());

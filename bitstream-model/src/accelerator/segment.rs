@@ -49,6 +49,11 @@ impl Segment {
         self.array.records_in(arrived).saturating_sub(self.done)
     }
 
+    /// Beats of the segment on one stream.
+    pub(super) fn beats_on(&self, stream: usize) -> usize {
+        self.array.packets.get(stream).copied().unwrap_or(0)
+    }
+
     /// Records that were not read, arrived or not.
     pub(super) fn left(&self) -> usize {
         self.array.records - self.done

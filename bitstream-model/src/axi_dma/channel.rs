@@ -69,9 +69,27 @@ pub(crate) struct Channel {
     pub(super) in_packet: bool,
     /// The engine's clock; it may run a little behind the board's.
     pub(super) time: u64,
-    stalled: bool,
-    pub(super) decode_error_due: bool,
-    stall_due: bool,
+    /// Beats of the packet that were moved, and descriptors that were completed.
+    pub(super) beats: u64,
+    pub(super) descriptors: u32,
+    pub(super) faulty: Faulty,
+}
+
+/// What faults have done to a channel, until its packet ends or its core is reset.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Faulty {
+    /// It moves nothing.
+    pub(super) stalled: bool,
+    /// Clocks more for each beat.
+    pub(super) slow: u32,
+    /// MM2S: the packet has ended on the stream, what is left of it is dropped.
+    pub(super) cut: bool,
+    /// S2MM: the packet has ended in memory, what is left of it is dropped.
+    pub(super) discards: bool,
+    /// A beat with TLAST is still to follow the packet.
+    pub(super) extra: bool,
+    /// A status that is still on its way to memory: when it arrives, where, and what.
+    pub(super) late: Option<(u64, u64, u32)>,
 }
 
 impl Channel {
@@ -93,28 +111,29 @@ impl Channel {
             resume: None,
             in_packet: false,
             time: 0,
-            stalled: false,
-            decode_error_due: false,
-            stall_due: false,
+            beats: 0,
+            descriptors: 0,
+            faulty: Faulty::default(),
         }
     }
 
-    pub(crate) fn inject_decode_error(&mut self) {
-        self.decode_error_due = true;
-    }
-
-    pub(crate) fn inject_stall(&mut self) {
-        self.stall_due = true;
-    }
-
-    /// Whether an injected stall holds the engine; it begins with the first beat to be moved.
-    pub(super) fn stalls(&mut self) -> bool {
-        self.stalled |= std::mem::take(&mut self.stall_due);
-        self.stalled
-    }
-
-    pub(super) fn stop(&mut self) {
+    /// Drops what it is doing; whether a packet was cut off.
+    pub(super) fn stop(&mut self) -> bool {
+        let busy = self.in_packet || !matches!(self.work, Work::None);
         self.work = Work::None;
+        busy
+    }
+
+    /// Whether it was told to stop and has not halted yet.
+    pub(super) fn stopping(&self) -> bool {
+        matches!(self.transition, Some((_, Transition::Halt)))
+    }
+
+    /// Puts off what it is about to show.
+    pub(super) fn halt_later(&mut self, cycles: u64) {
+        if let Some((at, _)) = &mut self.transition {
+            *at = at.saturating_add(cycles);
+        }
     }
 
     pub(super) fn has(&self, at: u32) -> bool {
@@ -309,6 +328,7 @@ impl Channel {
                     self.work = Work::None;
                     self.resume = None;
                     self.in_packet = false;
+                    (self.beats, self.descriptors) = (0, 0);
                 }
             }
         }
@@ -324,7 +344,12 @@ impl Channel {
             Work::Fetch { ready_at, .. } => Some(ready_at),
             _ => None,
         };
-        [self.transition.map(|(at, _)| at), self.delay_until, fetch].into_iter().flatten().min()
+        let late = self.faulty.late.map(|(at, ..)| at);
+        let halt = self.transition.map(|(at, _)| at);
+        // A slow port moves its next beat only then.
+        let busy = matches!(self.work, Work::Descriptor(_) | Work::Direct { .. });
+        let slow = (busy && self.faulty.slow > 0).then_some(self.time);
+        [halt, self.delay_until, fetch, late, slow].into_iter().flatten().min()
     }
 
     pub(super) fn interrupt(&self) -> bool {

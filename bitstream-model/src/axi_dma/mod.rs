@@ -1,17 +1,19 @@
 //! The emulated AXI DMA core: two channels, one reset.
 //!
 //! `channel.rs` holds the registers of one channel and their side effects, `mover.rs` the engine
-//! that fetches descriptors and moves beats. Both directions are one piece of code.
+//! that fetches descriptors and moves beats, `faulty.rs` what faults do to both. Both directions are one piece of code.
 //!
 //! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
 
 mod channel;
+mod faulty;
 mod mover;
 
 use std::fmt;
 
 use crate::accelerator::striping::beat_cycles;
-use crate::config::{BoardConfig, Delays};
+use crate::config::{BoardConfig, Delays, cycles_of};
+use crate::fault::{FaultKind, Faults, Place};
 use crate::interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 use crate::memory::Memory;
 use crate::quirks::Resettable;
@@ -49,11 +51,34 @@ struct Build {
     mm2s_beat_shift: u32,
     s2mm_beat_shift: u32,
     delays: Delays,
+    clock_khz: u32,
 }
 
-/// What the core's engines have done, for the observer.
-#[derive(Debug, Clone, Copy, Default)]
+impl Build {
+    /// Clocks that pass in a time.
+    fn cycles(&self, ns: u64) -> u64 {
+        cycles_of(ns, self.clock_khz)
+    }
+}
+
+/// A packet that has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PacketCount {
+    /// Which DMA.
+    pub core: usize,
+    /// Which channel.
+    pub direction: Direction,
+    /// Its beats.
+    pub beats: u64,
+    /// Descriptors that carried it.
+    pub descriptors: u32,
+}
+
+/// What the cores' engines have done, for the observer.
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Moved {
+    /// The packets of this step.
+    pub(crate) packets: Vec<PacketCount>,
     pub(crate) beats_read: u64,
     pub(crate) beats_written: u64,
     pub(crate) descriptors: u64,
@@ -64,12 +89,14 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) memory: &'a mut Memory,
     pub(crate) log: &'a mut Log,
     pub(crate) moved: &'a mut Moved,
+    pub(crate) faults: &'a mut Faults,
 }
 
 /// One AXI DMA.
 #[derive(Debug)]
 pub(crate) struct Core {
     build: Build,
+    config: BoardConfig,
     mm2s: Channel,
     s2mm: Channel,
     reset_until: Option<u64>,
@@ -89,10 +116,12 @@ impl Core {
             mm2s_beat_shift: shift(profile.mm2s_widths),
             s2mm_beat_shift: shift(profile.s2mm_widths),
             delays: config.delays,
+            clock_khz: profile.clock_khz,
         };
         let held = config.quirks.held_reset == Some(Resettable::Dma(core));
         Self {
             build,
+            config: *config,
             mm2s: Channel::new(Direction::Mm2s),
             s2mm: Channel::new(Direction::S2mm),
             reset_until: held.then_some(u64::MAX),
@@ -131,6 +160,7 @@ impl Core {
         offset: u32,
         value: u32,
         log: &mut Log,
+        faults: &mut Faults,
     ) -> Option<bool> {
         let (direction, at) = Self::decode(offset);
         if self.reset_until.is_some() {
@@ -138,13 +168,27 @@ impl Core {
             return self.channel(direction).has(at).then_some(false);
         }
         if at == DMACR.offset && dmacr::RESET.is_set(value) {
-            self.reset_until = Some(now + self.build.delays.reset);
-            self.mm2s.stop();
-            self.s2mm.stop();
+            let core = self.build.core;
+            let fault = faults.at_reset(Place::Core(core));
+            self.reset_until = Some(self.config.end_of_reset(now, fault));
+            for channel in [&mut self.mm2s, &mut self.s2mm] {
+                if channel.stop() {
+                    faults.packet_ends(core, channel.direction);
+                }
+            }
             return Some(false);
         }
         let build = self.build;
-        self.channel(direction).write(&build, now, at, value, log)
+        let channel = self.channel(direction);
+        let doorbell = channel.write(&build, now, at, value, log)?;
+        if at == DMACR.offset && channel.stopping() {
+            match faults.at_halt(build.core, direction) {
+                Some(FaultKind::HaltDelay { ns }) => channel.halt_later(build.cycles(ns)),
+                Some(_) => channel.halt_later(u64::MAX),
+                None => {}
+            }
+        }
+        Some(doorbell)
     }
 
     /// Lets the states change that change by time alone.

@@ -5,20 +5,46 @@
 //! of many clocks is moved in a few block copies.
 
 use super::channel::{Channel, Descriptor, Work};
-use super::{Build, Direction, Surroundings};
+use super::faulty::Next;
+use super::{Build, Direction, PacketCount, Surroundings};
 use crate::cast::register;
+use crate::fault::FaultKind;
 use crate::interface::axi_dma::{dmacr, dmasr};
 use crate::interface::descriptor::{
     self, BUFFER, BUFFER_MSB, BYTES, CONTROL, FETCHED_WORDS, NXTDESC, NXTDESC_MSB, STATUS, status,
 };
-use crate::interface::record::BEAT_BYTES;
-use crate::memory::Denied;
+use crate::interface::record::{BEAT_BYTES, Beat};
+use crate::interface::register::Field;
 use crate::stream::Stream;
 use crate::violation::ViolationKind;
 
 #[expect(clippy::cast_possible_truncation, reason = "it is 16")]
 const BEAT: u32 = BEAT_BYTES as u32;
 const KEYHOLE_BEATS: usize = 1;
+
+/// What a descriptor or transfer still has.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    /// Where it goes on.
+    at: u64,
+    /// Bytes.
+    left: u32,
+    /// Whether its end is the packet's.
+    last: bool,
+}
+
+/// What became of beats that were to be moved.
+#[derive(Debug, Clone, Copy)]
+enum Transferred {
+    Nothing,
+    /// None, and something has happened.
+    Stopped,
+    /// So many were moved; whether the packet ended with them.
+    Beats {
+        n: usize,
+        ended: bool,
+    },
+}
 
 impl Channel {
     /// Moves up to `limit` beats between the clocks `start` and `end`. Returns how many, and
@@ -34,8 +60,9 @@ impl Channel {
     ) -> (usize, bool) {
         self.time = self.time.max(start);
         let mut moved = 0;
-        let mut changed = false;
-        loop {
+        let mut changed = self.settle(build, end, stream, with);
+        // A beat that is still to follow a packet goes before the next packet.
+        while !(self.faulty.extra && self.direction == Direction::Mm2s) {
             match self.work {
                 Work::None => {
                     if self.overrun(stream) {
@@ -55,17 +82,17 @@ impl Channel {
                 Work::Descriptor(mut bd) => {
                     let left = bd.length - bd.moved;
                     let n = self.portion(build, left, end, limit - moved, stream);
-                    if n == 0 || self.stalls() {
-                        break;
-                    }
                     let at = bd.buffer + u64::from(bd.moved);
-                    let Some(ended) = self.transfer(build, at, left, n, bd.eof, stream, with)
-                    else {
-                        changed = true;
-                        break;
+                    let part = Part { at, left, last: bd.eof };
+                    let (n, ended) = match self.beats(build, n, &part, stream, with) {
+                        Transferred::Nothing => break,
+                        Transferred::Stopped => {
+                            changed = true;
+                            break;
+                        }
+                        Transferred::Beats { n, ended } => (n, ended),
                     };
                     moved += n;
-                    self.time += (n as u64) << self.beat_shift(build);
                     bd.rxsof |= !self.in_packet;
                     self.in_packet = true;
                     bd.moved += left.min(register(n * BEAT_BYTES));
@@ -88,22 +115,23 @@ impl Channel {
                         }
                         break;
                     }
-                    if self.stalls() {
-                        break;
-                    }
-                    let at = self.address + u64::from(done);
-                    let Some(ended) = self.transfer(build, at, left, n, true, stream, with) else {
-                        changed = true;
-                        break;
+                    let part = Part { at: self.address + u64::from(done), left, last: true };
+                    let (n, ended) = match self.beats(build, n, &part, stream, with) {
+                        Transferred::Nothing => break,
+                        Transferred::Stopped => {
+                            changed = true;
+                            break;
+                        }
+                        Transferred::Beats { n, ended } => (n, ended),
                     };
                     moved += n;
-                    self.time += (n as u64) << self.beat_shift(build);
                     let done = done + left.min(register(n * BEAT_BYTES));
                     self.work = Work::Direct { moved: done };
                     if ended {
                         if self.direction == Direction::S2mm {
                             self.length = done;
                         }
+                        self.packet_ended(build, with);
                         self.direct_done();
                         changed = true;
                     }
@@ -134,6 +162,8 @@ impl Channel {
         let last = (1 << shift) - 1;
         let clocks = end.saturating_sub(self.time).saturating_add(last) >> shift;
         let clocks = usize::try_from(clocks).unwrap_or(usize::MAX);
+        // A slow port takes its time after each beat.
+        let clocks = if self.faulty.slow > 0 { clocks.min(1) } else { clocks };
         let stream_beats = match self.direction {
             Direction::Mm2s => stream.space(),
             Direction::S2mm => match stream.next_last() {
@@ -145,56 +175,115 @@ impl Channel {
         (left.div_ceil(BEAT) as usize).min(clocks).min(stream_beats).min(limit).min(keyhole)
     }
 
-    /// Moves `n` beats. `left` counts the bytes that the descriptor or transfer still has; `last`
-    /// says whether its end is the packet's. Returns whether the packet ended, or `None` on an
-    /// error, which has been dealt with.
-    #[expect(clippy::too_many_arguments, reason = "the state of one transfer, used here alone")]
+    /// Moves up to `n` beats of a descriptor or transfer, as far as no fault comes up.
+    fn beats(
+        &mut self,
+        build: &Build,
+        n: usize,
+        part: &Part,
+        stream: &mut Stream,
+        with: &mut Surroundings<'_>,
+    ) -> Transferred {
+        if n == 0 {
+            return Transferred::Nothing;
+        }
+        let (n, mask, cut) = match self.next_beats(build, n, with) {
+            Next::Move(n) => (n, 0, false),
+            Next::Corrupt(mask) => (1, mask, false),
+            Next::Cut => (1, 0, true),
+            Next::Rest => return Transferred::Nothing,
+            Next::Board => return Transferred::Stopped,
+            Next::Fail(dmasr, status) => {
+                self.data_error(build, dmasr, status, with);
+                return Transferred::Stopped;
+            }
+        };
+        let Some(mut ended) = self.transfer(build, n, mask, part, stream, with) else {
+            return Transferred::Stopped;
+        };
+        let clocks = (n as u64) << self.beat_shift(build);
+        self.time += clocks + n as u64 * u64::from(self.faulty.slow);
+        self.beats += n as u64;
+        if cut && !ended {
+            match self.direction {
+                Direction::Mm2s => {
+                    stream.mark_last();
+                    self.faulty.cut = true;
+                }
+                Direction::S2mm => {
+                    self.faulty.discards = true;
+                    ended = true;
+                }
+            }
+        }
+        Transferred::Beats { n, ended }
+    }
+
+    /// Moves `n` beats, of which the first word has the bits of `mask` inverted. Returns whether the
+    /// packet ended, or `None` on an error, which has been dealt with.
     fn transfer(
         &mut self,
         build: &Build,
-        at: u64,
-        left: u32,
         n: usize,
-        last: bool,
+        mask: u32,
+        part: &Part,
         stream: &mut Stream,
         with: &mut Surroundings<'_>,
     ) -> Option<bool> {
+        let Part { at, left, last } = *part;
         let at = if dmacr::KEYHOLE.is_set(self.control) { self.keyhole_address(at) } else { at };
         // Without a realignment engine the low address bits do not exist: the data is wrong, and
         // the violation was recorded when the descriptor was fetched.
         let at = at & !(u64::from(BEAT) - 1);
-        let injected = std::mem::take(&mut self.decode_error_due);
         let denied = match self.direction {
             Direction::Mm2s => match with.memory.beats(at, n) {
-                Ok(beats) if !injected => {
-                    stream.push(beats);
+                Ok(_) if self.faulty.cut => None,
+                Ok(beats) => {
+                    match (beats, mask) {
+                        ([Beat([first, rest @ ..])], 1..) => {
+                            let [b, c, d] = *rest;
+                            stream.push(&[Beat([first ^ mask, b, c, d])]);
+                        }
+                        _ => stream.push(beats),
+                    }
                     with.moved.beats_read += n as u64;
                     None
                 }
-                Ok(_) => Some(None),
-                Err(denied) => Some(Some(denied)),
+                Err(denied) => Some(denied),
             },
-            Direction::S2mm if injected => Some(with.memory.check_write(at, n).err()),
             Direction::S2mm => {
                 let ends = stream.next_last() == Some(n - 1);
-                match with.memory.write(at, n, |beats| stream.pop_into(beats)) {
+                let fill = |beats: &mut [Beat]| {
+                    stream.pop_into(beats);
+                    if let Some(first) = beats.first_mut() {
+                        first.0[0] ^= mask;
+                    }
+                };
+                match with.memory.write(at, n, fill) {
                     Ok(()) => {
                         with.moved.beats_written += n as u64;
-                        return Some(ends);
+                        return Some(ends && self.ends_packet(build, with));
                     }
-                    Err(denied) => Some(Some(denied)),
+                    Err(denied) => Some(denied),
                 }
             }
         };
         if let Some(denied) = denied {
-            self.denied(build, at, n, denied, with);
+            with.log.violation(ViolationKind::OutsideGrant {
+                core: build.core,
+                direction: self.direction,
+                address: at,
+                bytes: (n * BEAT_BYTES) as u64,
+                denied,
+            });
+            self.data_error(build, dmasr::DMA_DEC_ERR, status::DMA_DEC_ERR, with);
             return None;
         }
         let whole = left as usize <= n * BEAT_BYTES;
-        if whole && last {
+        if whole && last && !self.faulty.cut && self.ends_packet(build, with) {
             stream.mark_last();
         }
-        if whole && !left.is_multiple_of(BEAT) {
+        if whole && !left.is_multiple_of(BEAT) && !self.faulty.cut {
             stream.mark_partial();
         }
         Some(whole && last)
@@ -208,29 +297,20 @@ impl Channel {
         }
     }
 
-    fn denied(
+    /// An access to data has failed: the descriptor says so, if it can, and the channel.
+    fn data_error(
         &mut self,
         build: &Build,
-        at: u64,
-        n: usize,
-        denied: Option<Denied>,
+        dmasr: Field,
+        status: Field,
         with: &mut Surroundings<'_>,
     ) {
-        if let Some(denied) = denied {
-            with.log.violation(ViolationKind::OutsideGrant {
-                core: build.core,
-                direction: self.direction,
-                address: at,
-                bytes: (n * BEAT_BYTES) as u64,
-                denied,
-            });
-        }
         if let Work::Descriptor(bd) = self.work {
-            let word = status::DMA_DEC_ERR.put(bd.moved, 1);
+            let word = status.put(bd.moved, 1);
             // The channel fails anyway; whether the descriptor can tell is of no matter.
             let _ = with.memory.write_word(bd.address + 4 * STATUS as u64, word);
         }
-        self.fail(build, dmasr::DMA_DEC_ERR.mask());
+        self.fail(build, dmasr.mask());
     }
 
     fn fetch(&mut self, build: &Build, address: u64, with: &mut Surroundings<'_>) {
@@ -240,6 +320,10 @@ impl Channel {
             with.log.violation(ViolationKind::MisalignedDescriptor { core, direction, address });
         }
         let address = address & !(BYTES as u64 - 1);
+        if let Some(error) = self.fetch_fault(build, with) {
+            self.fail(build, error.mask());
+            return;
+        }
         let mut words = [0_u32; FETCHED_WORDS];
         if let Err(denied) = with.memory.read_words(address, &mut words) {
             let bytes = (FETCHED_WORDS * 4) as u64;
@@ -312,16 +396,28 @@ impl Channel {
             word = status::RXEOF.put(word, u32::from(ended));
         }
         let address = bd.address + 4 * STATUS as u64;
-        if let Err(denied) = with.memory.write_word(address, word) {
-            let (core, direction) = (build.core, self.direction);
-            let kind = ViolationKind::OutsideGrant { core, direction, address, bytes: 4, denied };
-            with.log.violation(kind);
-            self.fail(build, dmasr::SG_DEC_ERR.mask());
+        let fault = self.status_fault(build, with);
+        match fault {
+            Some(FaultKind::SgDecErrWrite) => {
+                self.fail(build, dmasr::SG_DEC_ERR.mask());
+                return;
+            }
+            Some(FaultKind::BdIntErr) => word = status::DMA_INT_ERR.put(word, 1),
+            Some(FaultKind::BdSlvErr) => word = status::DMA_SLV_ERR.put(word, 1),
+            Some(FaultKind::BdDecErr) => word = status::DMA_DEC_ERR.put(word, 1),
+            _ => {}
+        }
+        if let Some(FaultKind::LateCmplted { ns }) = fault {
+            let at = self.time.saturating_add(build.cycles(ns));
+            self.faulty.late = Some((at, address, word));
+        } else if !self.put_status(build, address, word, with) {
             return;
         }
         with.moved.descriptors += 1;
+        self.descriptors += 1;
         if ended {
             self.in_packet = false;
+            self.packet_ended(build, with);
             self.packet_done();
         }
         self.resume = Some(bd.next);
@@ -332,5 +428,32 @@ impl Channel {
             // Fetched ahead while the data of this one moved.
             self.work = Work::Fetch { address: bd.next, ready_at: self.time };
         }
+    }
+
+    /// Writes the status of a descriptor; whether it could.
+    pub(super) fn put_status(
+        &mut self,
+        build: &Build,
+        address: u64,
+        word: u32,
+        with: &mut Surroundings<'_>,
+    ) -> bool {
+        let Err(denied) = with.memory.write_word(address, word) else { return true };
+        let (core, direction) = (build.core, self.direction);
+        let kind = ViolationKind::OutsideGrant { core, direction, address, bytes: 4, denied };
+        with.log.violation(kind);
+        self.fail(build, dmasr::SG_DEC_ERR.mask());
+        false
+    }
+
+    /// Takes account of a packet that has ended.
+    fn packet_ended(&mut self, build: &Build, with: &mut Surroundings<'_>) {
+        let (core, direction) = (build.core, self.direction);
+        let (beats, descriptors) = (self.beats, self.descriptors);
+        with.moved.packets.push(PacketCount { core, direction, beats, descriptors });
+        with.faults.packet_ends(core, direction);
+        (self.beats, self.descriptors) = (0, 0);
+        self.faulty.slow = 0;
+        self.faulty.cut = false;
     }
 }

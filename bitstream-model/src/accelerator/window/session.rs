@@ -172,10 +172,6 @@ struct Arrived {
 }
 
 impl Arrived {
-    fn anything(&self) -> bool {
-        self.collisions + self.velocities + self.poses > 0
-    }
-
     fn collision(&self) -> bool {
         self.collisions_taken < self.collisions
     }
@@ -212,9 +208,6 @@ impl Accelerator {
         outputs: &mut [Stream],
     ) -> Result<bool, PacketError> {
         let mut there = window.arrived(inputs, outputs);
-        if there.anything() {
-            self.injected()?;
-        }
         window.check(&there, inputs)?;
         let turn = self.turn();
         let start = self.clock;
