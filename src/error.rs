@@ -6,7 +6,7 @@ use crate::accelerator::{ControlError, IdentityError};
 use crate::axi_dma::DmaError;
 use crate::platform::PlatformError;
 use crate::scene::InputError;
-use crate::step::Fault;
+use crate::step::{Diagnosis, Fault};
 
 /// Why a call failed. The cause is the [`source`](std::error::Error::source).
 #[derive(Debug, Error)]
@@ -30,6 +30,8 @@ pub enum Error {
         fault: Box<Fault>,
         /// How the board stands now.
         aftermath: Aftermath,
+        /// How everything stood before the reset; `None` if the board had no part in it.
+        diagnosis: Option<Box<Diagnosis>>,
     },
     /// An earlier fault could not be cleared.
     #[error("the board was given up after an earlier fault: open it again")]
@@ -49,6 +51,24 @@ pub enum Aftermath {
 }
 
 impl Error {
+    /// What went wrong in a step, if it was a step that failed.
+    #[must_use]
+    pub fn fault(&self) -> Option<&Fault> {
+        match self {
+            Self::Step { fault, .. } => Some(fault),
+            _ => None,
+        }
+    }
+
+    /// How everything stood when a step had failed, before anything was reset.
+    #[must_use]
+    pub fn diagnosis(&self) -> Option<&Diagnosis> {
+        match self {
+            Self::Step { diagnosis, .. } => diagnosis.as_deref(),
+            _ => None,
+        }
+    }
+
     /// Whether the input was refused; nothing was sent to the board.
     #[must_use]
     pub fn is_input(&self) -> bool {
@@ -117,7 +137,7 @@ mod tests {
     use super::*;
 
     fn step(aftermath: Aftermath) -> Error {
-        Error::Step { fault: Box::new(Fault::NotFinite { body: 3 }), aftermath }
+        Error::Step { fault: Box::new(Fault::NotFinite { body: 3 }), aftermath, diagnosis: None }
     }
 
     #[test]

@@ -122,20 +122,24 @@ pub mod scene;
 mod step;
 
 pub use accelerator::{Capabilities, ControlError, IdentityError};
-pub use axi_dma::DmaError;
+pub use axi_dma::{
+    ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
+};
 pub use bitstream_model::interface;
 pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use error::{Aftermath, Error, OpenError};
 pub use platform::{
-    Caching, DevMemWindows, MemoryChoice, PlatformError, UIO_CLASS, UioMap, UioNode, uio_nodes,
+    AccessKind, Caching, DevMemWindows, MemoryChoice, PlatformError, RegisterAccess, UIO_CLASS,
+    UioMap, UioNode, uio_nodes,
 };
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Carriers, Collision, CollisionArrays, Collisions,
     Contact, InputError, Pose, Shape, StepParameters, Velocity,
 };
 pub use step::{
-    Accelerator, BoardChoice, BoardDescription, BoardKind, Fault, HostTimes, Limit, OpenOptions,
-    RegisterDump, StepCycles, StepReport,
+    Accelerator, AcceleratorError, Awaited, BoardChoice, BoardDescription, BoardKind, ChannelState,
+    ControlState, Diagnosis, Fault, HostTimes, Limit, OpenOptions, Phase, StepCycles, StepReport,
+    Subject,
 };
 
 /// The README's library example is a test.

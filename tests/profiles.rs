@@ -318,7 +318,7 @@ fn results_that_sixteen_bits_cannot_hold_are_a_fault_and_change_nothing() {
         let mut hard = parameters;
         hard.gravity = [60_000.0, 0.0, 0.0];
         let error = accelerator.step(&mut bodies, none, &hard).expect_err("66,400 m/s");
-        let Error::Step { fault, aftermath: Aftermath::Untouched } = &error else {
+        let Error::Step { fault, aftermath: Aftermath::Untouched, .. } = &error else {
             panic!("{error}")
         };
         assert!(matches!(**fault, Fault::NotFinite { body: 2 }), "{fault}");

@@ -2,6 +2,7 @@
 
 mod control;
 mod counters;
+mod fingerprint;
 mod identity;
 mod shapes;
 
@@ -10,7 +11,8 @@ use thiserror::Error;
 use crate::platform::PlatformError;
 
 pub(crate) use control::Control;
-pub(crate) use counters::Counters;
+pub(crate) use counters::{Counters, StickyError};
+pub(crate) use fingerprint::{Changed, Fingerprint};
 #[cfg(test)]
 pub(crate) use identity::fake;
 pub(crate) use identity::identify;

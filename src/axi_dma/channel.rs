@@ -13,7 +13,7 @@ use crate::platform::{BusAddress, Deadline, Platform, Window, poll_until};
 
 /// Which way data goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Direction {
+pub enum Direction {
     /// Memory to stream.
     Mm2s,
     /// Stream to memory.
@@ -104,6 +104,12 @@ impl Channel {
     pub(crate) fn current_descriptor(&self) -> u64 {
         let high = if self.address_width > 32 { self.read(&CURDESC_MSB) } else { 0 };
         (u64::from(high) << 32) | u64::from(self.read(&CURDESC))
+    }
+
+    /// The descriptor up to which the engine runs.
+    pub(crate) fn tail_descriptor(&self) -> u64 {
+        let high = if self.address_width > 32 { self.read(&TAILDESC_MSB) } else { 0 };
+        (u64::from(high) << 32) | u64::from(self.read(&TAILDESC))
     }
 
     /// Starts a halted channel at a descriptor, and waits until it runs.

@@ -51,28 +51,44 @@ impl Descriptor {
     }
 }
 
-/// A value of the STATUS word.
+/// A descriptor's STATUS word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct DescriptorStatus(pub(crate) u32);
+pub struct DescriptorStatus(pub(crate) u32);
 
 impl DescriptorStatus {
+    /// The word as it was read.
+    #[must_use]
+    pub fn raw(self) -> u32 {
+        self.0
+    }
+
     /// Whether the engine is done with the descriptor.
-    pub(crate) fn complete(self) -> bool {
+    #[must_use]
+    pub fn complete(self) -> bool {
         status::CMPLTED.is_set(self.0)
     }
 
     /// Whether it failed.
-    pub(crate) fn failed(self) -> bool {
-        self.0 & status::ERRORS != 0
+    #[must_use]
+    pub fn failed(self) -> bool {
+        self.errors() != 0
+    }
+
+    /// The error bits that are set, in place.
+    #[must_use]
+    pub fn errors(self) -> u32 {
+        self.0 & status::ERRORS
     }
 
     /// Whether a received packet ended here.
-    pub(crate) fn packet_ended(self) -> bool {
+    #[must_use]
+    pub fn packet_ended(self) -> bool {
         status::RXEOF.is_set(self.0)
     }
 
     /// Bytes moved.
-    pub(crate) fn transferred(self) -> u32 {
+    #[must_use]
+    pub fn transferred(self) -> u32 {
         status::TRANSFERRED.of(self.0)
     }
 }

@@ -14,22 +14,28 @@ use std::time::Duration;
 
 use thiserror::Error;
 
-pub(crate) use channel::{Channel, Direction, detect_length_width};
+pub use channel::Direction;
+pub(crate) use channel::{Channel, detect_length_width};
+pub use descriptor::DescriptorStatus;
 pub(crate) use descriptor::{Descriptor, largest_piece, pieces};
-pub(crate) use registers::{Dmacr, Dmasr};
+pub use registers::{Dmacr, Dmasr};
 pub(crate) use reset::reset_core;
-pub(crate) use ring::{Progress, Ring};
+pub use ring::DescriptorState;
+pub(crate) use ring::{ChainState, Progress, Ring};
 
 use crate::platform::PlatformError;
 
 /// How long a DMA core may take to reset, to start or to stop.
 pub(crate) const STATE_CHANGE: Duration = Duration::from_millis(10);
 
-/// One direction of one DMA core, for people.
+/// One direction of one DMA core: `dma2 MM2S`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ChannelName {
-    pub(crate) core: usize,
-    pub(crate) direction: Direction,
+#[non_exhaustive]
+pub struct ChannelName {
+    /// Which DMA core.
+    pub core: usize,
+    /// Which direction of it.
+    pub direction: Direction,
 }
 
 impl fmt::Display for ChannelName {

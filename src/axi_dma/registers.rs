@@ -8,12 +8,25 @@ use crate::platform::fields;
 
 /// A value of the status register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Dmasr(pub(crate) u32);
+pub struct Dmasr(pub(crate) u32);
 
 impl Dmasr {
+    /// The register as it was read.
+    #[must_use]
+    pub fn raw(self) -> u32 {
+        self.0
+    }
+
     /// Whether the channel is stopped.
-    pub(crate) fn halted(self) -> bool {
+    #[must_use]
+    pub fn halted(self) -> bool {
         dmasr::HALTED.is_set(self.0)
+    }
+
+    /// Whether the tail was reached and every descriptor done.
+    #[must_use]
+    pub fn idle(self) -> bool {
+        dmasr::IDLE.is_set(self.0)
     }
 
     /// Whether the core was built with scatter-gather.
@@ -22,7 +35,8 @@ impl Dmasr {
     }
 
     /// The error bits that are set, in place.
-    pub(crate) fn errors(self) -> u32 {
+    #[must_use]
+    pub fn errors(self) -> u32 {
         self.0 & dmasr::ERRORS
     }
 
@@ -51,9 +65,15 @@ impl fmt::Display for Dmasr {
 
 /// A value of the control register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Dmacr(pub(crate) u32);
+pub struct Dmacr(pub(crate) u32);
 
 impl Dmacr {
+    /// The register as it was read.
+    #[must_use]
+    pub fn raw(self) -> u32 {
+        self.0
+    }
+
     /// Stopped, no interrupts.
     pub(crate) const STOPPED: Self = Self(DMACR.reset);
     /// Resets the core.

@@ -12,7 +12,9 @@
 
 use std::sync::Arc;
 
-use bitstream_model::interface::descriptor::{NXTDESC, NXTDESC_MSB, STATUS, WORDS};
+use bitstream_model::interface::descriptor::{
+    CONTROL, NXTDESC, NXTDESC_MSB, STATUS, WORDS, control,
+};
 
 use super::descriptor::{Descriptor, DescriptorStatus};
 use crate::platform::{BusAddress, Platform, PlatformError, SharedWords};
@@ -41,6 +43,41 @@ pub(crate) enum Progress {
         /// Its status.
         status: DescriptorStatus,
     },
+}
+
+/// One descriptor of a step's chain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct DescriptorState {
+    /// Its place in the chain, from 0.
+    pub index: usize,
+    /// Where it lies, on the bus.
+    pub address: u64,
+    /// Bytes that it asks for.
+    pub bytes: u32,
+    /// Its status word.
+    pub status: DescriptorStatus,
+}
+
+/// How a whole chain stands, for a diagnosis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct ChainState {
+    /// Descriptors in the chain.
+    pub(crate) descriptors: usize,
+    /// Descriptors complete from its head on.
+    pub(crate) complete: usize,
+    /// Bytes that they, and the one after them, have moved.
+    pub(crate) bytes_moved: u64,
+    /// Bytes that the chain asks for.
+    pub(crate) bytes_expected: u64,
+    /// Where a received packet ended, if it did.
+    pub(crate) packet_end: Option<usize>,
+    /// The first that failed.
+    pub(crate) failed: Option<DescriptorState>,
+    /// The first that is not complete.
+    pub(crate) in_work: Option<DescriptorState>,
+    /// The one at the address asked for.
+    pub(crate) at_address: Option<DescriptorState>,
 }
 
 /// A ring of descriptors, and the chain of the current step in it.
@@ -155,6 +192,45 @@ impl Ring {
         Progress::Complete { bytes, packet_ended }
     }
 
+    /// A descriptor of the chain, as it stands in memory.
+    fn state(&self, place: usize) -> DescriptorState {
+        let index = (self.first + place) % self.count;
+        DescriptorState {
+            index: place,
+            address: self.words.address(index * WORDS),
+            bytes: control::LENGTH.of(self.words.read(index * WORDS + CONTROL)),
+            status: DescriptorStatus(self.words.read(index * WORDS + STATUS)),
+        }
+    }
+
+    /// Looks at every descriptor of the chain, and for the one at `address`.
+    pub(crate) fn survey(&self, address: u64) -> ChainState {
+        let mut chain = ChainState { descriptors: self.used, ..ChainState::default() };
+        for place in 0..self.used {
+            let state = self.state(place);
+            chain.bytes_expected += u64::from(state.bytes);
+            if state.address == address {
+                chain.at_address = Some(state);
+            }
+            if chain.in_work.is_some() {
+                continue;
+            }
+            chain.bytes_moved += u64::from(state.status.transferred());
+            if state.status.failed() {
+                chain.failed.get_or_insert(state);
+            }
+            if state.status.packet_ended() {
+                chain.packet_end.get_or_insert(place);
+            }
+            if state.status.complete() {
+                chain.complete = place + 1;
+            } else {
+                chain.in_work = Some(state);
+            }
+        }
+        chain
+    }
+
     /// Leaves the memory to an engine that could not be stopped.
     pub(crate) fn leave_to_device(&mut self) {
         self.words.leave_to_device();
@@ -255,6 +331,32 @@ mod tests {
         ring.complete(1, COMPLETE | RXEOF | 32);
         let whole = Progress::Complete { bytes: 96, packet_ended: true };
         assert_eq!([ring.progress(), ring.progress()], [whole, whole]);
+    }
+
+    #[test]
+    fn a_survey_counts_bytes_and_finds_what_failed_and_what_is_in_work() {
+        let (mut ring, address) = ring(4);
+        // Not at the ring's start: the chain wraps.
+        for _ in 0..3 {
+            ring.push(&descriptor(address));
+        }
+        ring.begin();
+        for _ in 0..4 {
+            ring.push(&descriptor(address));
+        }
+        ring.complete(0, COMPLETE | 64);
+        ring.complete(1, COMPLETE | (1 << 28) | RXEOF | 48);
+        ring.complete(2, 16);
+        let third = ring.state(2);
+        // Five descriptors: the chain's third is the ring's first.
+        assert_eq!((third.index, third.address, third.bytes), (2, 0x8_0000_0000, 64));
+        let chain = ring.survey(third.address);
+        assert_eq!((chain.descriptors, chain.complete), (4, 2));
+        assert_eq!((chain.bytes_moved, chain.bytes_expected), (64 + 48 + 16, 4 * 64));
+        assert_eq!(chain.failed.map(|state| state.index), Some(1));
+        assert_eq!(chain.packet_end, Some(1));
+        assert_eq!((chain.in_work, chain.at_address), (Some(third), Some(third)));
+        assert_eq!(ring.survey(0x1234).at_address, None);
     }
 
     #[test]

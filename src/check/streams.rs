@@ -8,9 +8,10 @@ use super::bring_up::chain;
 use super::judge::{Difference, Origin, Run, judge};
 use super::pattern::{Pattern, SHAPES};
 use super::report::{Line, Lines, Outcome};
+use crate::axi_dma::Direction;
 use crate::beat::unpack::sum_of_words;
 use crate::error::Error;
-use crate::step::{Accelerator, BoardKind, ECHO_LIMIT, Echo, Echoed, Fault, RegisterDump};
+use crate::step::{Accelerator, BoardKind, ChannelState, ECHO_LIMIT, Echo, Echoed, Fault};
 
 /// Bodies of the echoes: the least, odd numbers that leave channels of different lengths, and one
 /// that fills a length register of 14 bits more than once.
@@ -55,9 +56,12 @@ fn fitting(accelerator: &Accelerator, bodies: u32) -> u32 {
 /// A step that did not end as it should.
 fn step_failed(error: &Error) -> Outcome {
     let (found, next) = match error {
-        Error::Step { fault, .. } => match &**fault {
-            Fault::Deadline { registers, .. } => (
-                format!("no end after {ECHO_LIMIT:?}: {}", still_moving(registers)),
+        Error::Step { fault, diagnosis, .. } => match &**fault {
+            Fault::Deadline { .. } => (
+                format!(
+                    "no end after {ECHO_LIMIT:?}: {}",
+                    still_moving(diagnosis.as_ref().map_or(&[], |found| &found.channels))
+                ),
                 "look whether the stream of the named channel is connected to the accelerator and \
                  its memory port is enabled",
             ),
@@ -78,14 +82,17 @@ fn step_failed(error: &Error) -> Outcome {
 }
 
 /// The channels that hold a step up: senders that have data left, or else receivers that wait.
-fn still_moving(registers: &RegisterDump) -> String {
-    let busy = |side: &str| -> Vec<_> {
-        let lines = registers.0.iter().map(String::as_str);
-        // A channel that is halted had nothing to do in this step.
-        let moving = |line: &str| !line.contains(" Idle") && !line.contains(" Halted");
-        lines.filter(|line| line.contains(side) && moving(line)).collect()
+fn still_moving(channels: &[ChannelState]) -> String {
+    let busy = |direction: Direction| -> Vec<_> {
+        channels
+            .iter()
+            // A channel that is halted had nothing to do in this step.
+            .filter(|state| !state.status.idle() && !state.status.halted())
+            .filter(|state| state.channel.direction == direction)
+            .map(|state| format!("{} {}", state.channel, state.status))
+            .collect()
     };
-    let (senders, receivers) = (busy(" MM2S "), busy(" S2MM "));
+    let (senders, receivers) = (busy(Direction::Mm2s), busy(Direction::S2mm));
     match (senders.is_empty(), receivers.is_empty()) {
         (false, _) => format!("{} has data left to send", senders.join(", ")),
         (true, false) => format!("{} waits for results", receivers.join(", ")),

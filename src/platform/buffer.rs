@@ -125,6 +125,11 @@ impl CpuBuffer {
         self.memory.beats_mut()
     }
 
+    /// Leaves the buffer to the device for good: an engine could not be stopped.
+    pub(crate) fn leave_to_device(mut self) {
+        self.allocation.owner = Owner::Device;
+    }
+
     /// Gives the buffer to the device, which will touch its first `used` beats.
     pub(crate) fn into_device(
         self,
@@ -201,6 +206,11 @@ impl SharedWords {
         self.allocation.range(index as u64 * 4, count as u64 * 4)
     }
 
+    /// Where a word lies on the bus, to compare with what an engine says.
+    pub(crate) fn address(&self, index: usize) -> u64 {
+        self.allocation.address.saturating_add(index as u64 * 4)
+    }
+
     /// Leaves the words to the device for good: an engine could not be stopped.
     pub(crate) fn leave_to_device(&mut self) {
         self.allocation.owner = Owner::Device;
@@ -235,6 +245,16 @@ mod tests {
         let (fake, platform) = platform();
         let buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
         drop(buffer.into_device(4, Access::Write).expect("handed over"));
+        assert!(fake.released.lock().expect("unpoisoned").is_empty());
+    }
+
+    #[test]
+    fn a_buffer_that_is_left_to_the_device_is_not_freed() {
+        let (fake, platform) = platform();
+        CpuBuffer::allocate(&platform, 4, 40).expect("in reach").leave_to_device();
+        let mut words = SharedWords::allocate(&platform, 16, 40).expect("in reach");
+        words.leave_to_device();
+        drop(words);
         assert!(fake.released.lock().expect("unpoisoned").is_empty());
     }
 

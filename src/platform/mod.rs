@@ -31,6 +31,7 @@
 //! # }
 //! ```
 
+mod access_log;
 mod buffer;
 mod copy;
 mod dev_mem;
@@ -59,6 +60,7 @@ mod window;
 use std::fmt;
 use std::time::Duration;
 
+pub use access_log::{AccessKind, RegisterAccess};
 pub(crate) use buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
 pub use dev_mem::DevMemWindows;
 #[cfg(feature = "emulation")]
@@ -76,7 +78,7 @@ pub use uio::{UioMap, UioNode, uio_nodes};
 pub use uio_device::UioDevice;
 pub use uio_window::UioWindow;
 pub(crate) use wait::{Deadline, poll_until};
-pub(crate) use window::{AccessCounts, RegisterMap, RegisterWindow, Window, fields};
+pub(crate) use window::{AccessCounts, Decoded, RegisterMap, RegisterWindow, Window, fields};
 #[cfg(test)]
 pub(crate) use {uio::fake as uio_fake, window::fake};
 

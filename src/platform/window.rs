@@ -8,6 +8,7 @@ use bitstream_model::interface::register::Register;
 use bitstream_model::interface::{axi_dma, control};
 
 use super::PlatformError;
+use super::access_log::{AccessKind, AccessLog, RegisterAccess};
 
 /// One register region of a board: aligned 32-bit accesses inside `bytes`.
 pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
@@ -19,11 +20,12 @@ pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
     fn write32(&self, at: u32, value: u32);
 }
 
-/// Register accesses of a board, all regions together.
+/// Register accesses of a board, all regions together: how many, and the last ones.
 #[derive(Debug, Default)]
 pub(crate) struct AccessCounts {
     reads: AtomicU64,
     writes: AtomicU64,
+    last: AccessLog,
 }
 
 impl AccessCounts {
@@ -35,6 +37,11 @@ impl AccessCounts {
     /// Writes so far.
     pub(crate) fn writes(&self) -> u64 {
         self.writes.load(Ordering::Relaxed)
+    }
+
+    /// The last accesses, oldest first.
+    pub(crate) fn recent(&self) -> Vec<RegisterAccess> {
+        self.last.recent()
     }
 }
 
@@ -79,11 +86,11 @@ impl RegisterMap {
 }
 
 /// An access as the trace log shows it: `dma2 S2MM DMASR -> 0x00011002 Idle IOC_Irq ...`.
-struct Decoded {
-    map: RegisterMap,
-    at: u32,
-    arrow: &'static str,
-    value: u32,
+pub(crate) struct Decoded {
+    pub(crate) map: RegisterMap,
+    pub(crate) at: u32,
+    pub(crate) arrow: &'static str,
+    pub(crate) value: u32,
 }
 
 impl fmt::Display for Decoded {
@@ -146,6 +153,7 @@ impl Window {
         self.check(at);
         let value = self.registers.read32(at);
         self.counts.reads.fetch_add(1, Ordering::Relaxed);
+        self.counts.last.note(self.map, AccessKind::Read, at, value);
         log::trace!("{}", Decoded { map: self.map, at, arrow: "->", value });
         value
     }
@@ -155,6 +163,7 @@ impl Window {
         self.check(at);
         log::trace!("{}", Decoded { map: self.map, at, arrow: "<-", value });
         self.counts.writes.fetch_add(1, Ordering::Relaxed);
+        self.counts.last.note(self.map, AccessKind::Write, at, value);
         self.registers.write32(at, value);
     }
 }

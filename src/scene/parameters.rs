@@ -45,6 +45,10 @@ pub struct StepParameters {
     /// it takes if every collision waits for the one before it, what its bytes take at 100 MB/s,
     /// and 10 ms.
     pub deadline: Option<Duration>,
+    /// How often a step that failed is taken again, after a reset that made the board ready. Each
+    /// attempt may take as long as the deadline says. What the board cannot be blamed for is not
+    /// tried again: refused input, results that are not finite, too little memory.
+    pub retries: u32,
 }
 
 impl Default for StepParameters {
@@ -62,6 +66,7 @@ impl Default for StepParameters {
             order: None,
             verify_order: false,
             deadline: None,
+            retries: 0,
         }
     }
 }

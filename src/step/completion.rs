@@ -6,24 +6,32 @@
 use std::time::Duration;
 
 use super::device::{Device, Statuses};
-use super::fault::Fault;
+use super::fault::{Awaited, Fault};
+use super::oddities::Oddity;
 use super::plan::{Plan, bytes};
+use super::symptom::Symptom;
 use crate::accelerator::Counters;
 use crate::axi_dma::Progress;
 use crate::platform::{Deadline, acquire_from_device, poll_until};
 
-/// How long a descriptor's status may take to reach memory after the interrupt.
+/// How long the status of descriptors is polled for after the interrupt, before registers are looked
+/// at again.
 const GRACE: Duration = Duration::from_millis(1);
+/// Longer than a status ever takes to reach memory after the interrupt.
+const NOTICEABLE: Duration = Duration::from_micros(10);
 /// Shortest time to wait for an interrupt before looking by oneself.
 const SHORTEST_SLICE: Duration = Duration::from_millis(10);
 /// After so many missing interrupts in a row the driver no longer relies on them.
 const MISSED_LIMIT: u32 = 2;
+/// After so many interrupts without a reason in one step the line stays masked until its end.
+const STORM: u32 = 16;
 
 impl Device {
     /// Waits until every chain of the step is complete; the number of interrupts that woke.
-    pub(super) fn wait(&mut self, plan: &Plan, deadline: &Deadline) -> Result<u64, Fault> {
+    pub(super) fn wait(&mut self, plan: &Plan, deadline: &Deadline) -> Result<u64, Symptom> {
         let completion = self.s2mm.len() - 1;
         let mut interrupts = 0;
+        let mut spurious = 0;
         let mut slice = self.first_slice(deadline.limit());
         loop {
             // Asked before looking, so that there is one look after the deadline.
@@ -31,15 +39,20 @@ impl Device {
             let woke = self.platform.wait_interrupt(slice.min(remaining))?.is_some();
             let statuses = self.statuses();
             self.check(&statuses)?;
+            let mut pending = false;
             for (lane, status) in self.lanes_mut().zip(statuses) {
                 if lane.channel.pending(status) != 0 {
+                    pending = true;
                     lane.channel.acknowledge(status);
                 }
             }
             let mut packet = statuses[completion].complete();
             if woke {
                 interrupts += 1;
-                self.platform.unmask_interrupt()?;
+                spurious += u32::from(!pending);
+                if spurious < STORM {
+                    self.platform.unmask_interrupt()?;
+                }
                 // What came between reading and unmasking raised no interrupt.
                 let channel = &mut self.s2mm[completion].channel;
                 let again = channel.status();
@@ -48,26 +61,46 @@ impl Device {
                 }
                 packet |= again.complete();
             }
+            let looked = self.platform.now();
             let grace = if packet { GRACE.min(remaining) } else { Duration::ZERO };
-            if self.complete_within(plan, grace)? {
-                self.note_interrupt(woke || interrupts > 0);
+            let complete = self.complete_within(plan, grace)?;
+            if packet && self.platform.now().saturating_sub(looked) > NOTICEABLE {
+                self.oddities.tell(Oddity::LateStatus);
+            }
+            if complete {
+                self.note_interrupt(interrupts > u64::from(spurious));
+                if spurious >= STORM {
+                    // The storm may be over, and the next step relies on interrupts.
+                    self.platform.unmask_interrupt()?;
+                }
                 acquire_from_device();
                 return Ok(interrupts);
             }
             if let Some(error) = self.control.sticky_error() {
-                let registers = self.dump(&statuses);
-                return Err(Fault::Accelerator { error: error.to_string(), registers });
+                return Err(Symptom::Sticky(error));
+            }
+            if woke && !pending {
+                // Neither a channel nor the accelerator.
+                self.oddities.tell(Oddity::SpuriousInterrupt);
+            }
+            if spurious >= STORM {
+                self.oddities.tell(Oddity::InterruptStorm);
             }
             if remaining.is_zero() {
-                return Err(self.late("the end of the results", deadline));
+                return Err(Symptom::Late { awaited: Awaited::Results, limit: deadline.limit() });
             }
-            slice = if packet { GRACE } else { (slice * 2).min(self.longest_slice(deadline)) };
+            slice = match packet || spurious >= STORM {
+                true => GRACE,
+                // An interrupt that was none says nothing of how long it still takes.
+                false if woke && !pending => slice,
+                false => (slice * 2).min(self.longest_slice(deadline)),
+            };
         }
     }
 
     /// Waits for the accelerator to say that it is done, then reads its counters.
-    pub(super) fn collect(&mut self, deadline: &Deadline) -> Result<Counters, Fault> {
-        let gone = || Fault::Gone { region: "the control block".to_owned() };
+    pub(super) fn collect(&mut self, deadline: &Deadline) -> Result<Counters, Symptom> {
+        let gone = || Symptom::Known(Fault::Gone { region: "the control block".to_owned() });
         let control = &mut self.control;
         let done = poll_until(&*self.platform, deadline, || match control.take_done() {
             Some(false) => None,
@@ -76,13 +109,16 @@ impl Device {
         match done {
             Some(Some(_)) => {}
             Some(None) => return Err(gone()),
-            None => return Err(self.late("ap_done", deadline)),
+            None => {
+                return Err(Symptom::Late { awaited: Awaited::Done, limit: deadline.limit() });
+            }
         }
         if let Some(error) = self.control.sticky_error() {
-            let registers = self.dump(&self.statuses());
-            return Err(Fault::Accelerator { error: error.to_string(), registers });
+            return Err(Symptom::Sticky(error));
         }
-        Ok(self.control.counters(&self.capabilities))
+        let counters = self.control.counters(&self.capabilities);
+        // No step takes two thousand years.
+        if counters.cycles == u64::MAX { Err(gone()) } else { Ok(counters) }
     }
 
     /// How long to wait for the first interrupt before looking.
@@ -105,33 +141,25 @@ impl Device {
         }
         self.missed_interrupts = self.missed_interrupts.saturating_add(1);
         if self.missed_interrupts == 1 {
-            log::warn!("a step ended without an interrupt; found by looking");
+            self.oddities.tell(Oddity::MissedInterrupt);
         } else if self.missed_interrupts == MISSED_LIMIT {
-            log::warn!("no interrupts come: polling until one does; is the interrupt connected?");
+            self.oddities.tell(Oddity::NoInterrupts);
         }
     }
 
     /// Errors that the status registers show.
-    fn check(&self, statuses: &Statuses) -> Result<(), Fault> {
-        for (lane, status) in self.lanes().zip(statuses) {
-            let name = lane.channel.name();
-            if status.gone() {
-                return Err(Fault::Gone { region: name.to_string() });
-            }
-            if status.errors() != 0 {
-                return Err(Fault::Dma {
-                    channel: name.to_string(),
-                    status: status.to_string(),
-                    descriptor: lane.channel.current_descriptor(),
-                    registers: self.dump(statuses),
-                });
+    fn check(&self, statuses: &Statuses) -> Result<(), Symptom> {
+        let statuses = statuses.iter().take(self.lanes().count()).enumerate();
+        for (place, status) in statuses {
+            if status.gone() || status.errors() != 0 {
+                return Err(Symptom::Status { place, status: *status });
             }
         }
         Ok(())
     }
 
     /// Whether all chains are complete, or become so within `grace`.
-    fn complete_within(&mut self, plan: &Plan, grace: Duration) -> Result<bool, Fault> {
+    fn complete_within(&mut self, plan: &Plan, grace: Duration) -> Result<bool, Symptom> {
         let Self { s2mm, mm2s, platform, .. } = self;
         let grace = Deadline::after(&**platform, grace);
         let mut next = 0;
@@ -151,7 +179,7 @@ impl Device {
                     {
                         None
                     }
-                    (ended, _) => Some((place, ended)),
+                    _ => Some(place),
                 };
                 if ended.is_some() {
                     return Some(ended);
@@ -163,38 +191,7 @@ impl Device {
         match ended {
             None => Ok(false),
             Some(None) => Ok(true),
-            Some(Some((place, progress))) => Err(self.broken_chain(plan, place, progress)),
+            Some(Some(place)) => Err(Symptom::Chain { place }),
         }
-    }
-
-    /// What a chain says that ended in another way than it should.
-    fn broken_chain(&mut self, plan: &Plan, place: usize, progress: Progress) -> Fault {
-        let statuses = self.statuses();
-        // The channel's own status says more, if it has anything to say.
-        if let Err(fault) = self.check(&statuses) {
-            return fault;
-        }
-        let name = self.lanes().nth(place).map(|lane| lane.channel.name().to_string());
-        let channel = name.unwrap_or_default();
-        match progress {
-            Progress::Failed { index, status } => Fault::Descriptor {
-                channel,
-                index,
-                status: status.to_string(),
-                registers: self.dump(&statuses),
-            },
-            Progress::Short { bytes: found } | Progress::Complete { bytes: found, .. } => {
-                Fault::PacketLength { channel, expected: bytes(plan.results(place)), found }
-            }
-            Progress::Running => self.late_with("a descriptor", GRACE, &statuses),
-        }
-    }
-
-    fn late(&self, awaited: &'static str, deadline: &Deadline) -> Fault {
-        self.late_with(awaited, deadline.limit(), &self.statuses())
-    }
-
-    fn late_with(&self, awaited: &'static str, limit: Duration, statuses: &Statuses) -> Fault {
-        Fault::Deadline { awaited, limit, registers: self.dump(statuses) }
     }
 }

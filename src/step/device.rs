@@ -1,14 +1,18 @@
 //! This file holds an open board: its lanes and its control block, from opening to closing.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 
 use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
-use super::fault::{Fault, RegisterDump};
+use super::fault::Fault;
 use super::lane::Lane;
+use super::oddities::Oddities;
+use super::phase::Outline;
 use super::plan::{Plan, bytes};
-use crate::accelerator::{Capabilities, Control, identify};
+use super::symptom::Symptom;
+use crate::accelerator::{Capabilities, Control, Fingerprint, identify};
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
 use crate::error::OpenError;
 use crate::platform::{Access, AccessCounts, Platform, RegisterMap, Window, release_to_device};
@@ -16,6 +20,14 @@ use crate::scene::StepParameters;
 
 /// Status registers of all channels: S2MM first, then MM2S.
 pub(super) type Statuses = [Dmasr; 2 * DMA_COUNT_MAX];
+
+/// The step that was started last.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Started {
+    pub(super) outline: Outline,
+    /// When, on the board's clock.
+    pub(super) at: Duration,
+}
 
 /// An open board.
 #[derive(Debug)]
@@ -26,8 +38,14 @@ pub(crate) struct Device {
     pub(super) capabilities: Capabilities,
     pub(super) counts: Arc<AccessCounts>,
     pub(super) platform: Arc<dyn Platform>,
+    /// What the bitstream said of itself when it was opened.
+    pub(super) fingerprint: Fingerprint,
+    /// The step that was started last.
+    pub(super) started: Option<Started>,
     /// Interrupts that did not come although the work was done, in a row.
     pub(super) missed_interrupts: u32,
+    /// What was told already.
+    pub(super) oddities: Oddities,
     /// Whether a reset failed: nothing may be touched any more.
     pub(super) dead: bool,
     /// The longest piece that a descriptor carries, bytes.
@@ -66,6 +84,7 @@ impl Device {
         counts: Arc<AccessCounts>,
         cores: Vec<Core>,
     ) -> Self {
+        let fingerprint = control.fingerprint();
         let (mut mm2s, mut s2mm) = (Vec::new(), Vec::new());
         let last = cores.len().saturating_sub(1);
         for (place, Core { sender, receiver }) in cores.into_iter().enumerate() {
@@ -83,14 +102,18 @@ impl Device {
             capabilities,
             counts,
             platform,
+            fingerprint,
+            started: None,
             missed_interrupts: 0,
+            oddities: Oddities::default(),
             dead: false,
             largest: largest_piece(capabilities.length_width),
         }
     }
 
     /// Makes buffers and rings large enough for a step.
-    pub(super) fn reserve(&mut self, plan: &Plan) -> Result<(), Fault> {
+    pub(super) fn reserve(&mut self, plan: &Plan) -> Result<(), Symptom> {
+        self.started = None;
         let width = self.capabilities.address_width;
         for (channel, lane) in self.mm2s.iter_mut().enumerate() {
             let beats = plan.segments(channel).poses.end;
@@ -116,8 +139,14 @@ impl Device {
     }
 
     /// Hands the buffers over, queues all descriptors, and starts; the number of doorbells.
-    pub(super) fn start(&mut self, plan: &Plan, parameters: &StepParameters) -> Result<u64, Fault> {
+    pub(super) fn start(
+        &mut self,
+        plan: &Plan,
+        parameters: &StepParameters,
+    ) -> Result<u64, Symptom> {
         let largest = self.largest;
+        let outline = Outline::new(plan, parameters, largest);
+        self.started = Some(Started { outline, at: self.platform.now() });
         for (channel, lane) in self.s2mm.iter_mut().enumerate() {
             let results = plan.results(channel);
             lane.hand_over(results)?;
@@ -158,7 +187,7 @@ impl Device {
     }
 
     /// Takes all buffers back after a step whose chains are complete.
-    pub(super) fn take_back(&mut self) -> Result<(), Fault> {
+    pub(super) fn take_back(&mut self) -> Result<(), Symptom> {
         for lane in self.lanes_mut() {
             lane.take_back()?;
         }
@@ -189,22 +218,17 @@ impl Device {
         statuses
     }
 
-    /// The statuses for people.
-    pub(super) fn dump(&self, statuses: &Statuses) -> RegisterDump {
-        let line = |(status, lane): (&Dmasr, &Lane)| format!("{} {status}", lane.channel.name());
-        RegisterDump(statuses.iter().zip(self.lanes()).map(line).collect())
-    }
-
-    /// Resets all DMA cores and the accelerator.
+    /// Resets all DMA cores, then the accelerator: a core that still runs would fill the streams of
+    /// an accelerator that was reset before it with the rest of a packet.
     pub(super) fn reset(&mut self) -> Result<(), Fault> {
-        // Every core is tried, even if one does not come back: the others stop moving data.
+        // Everything is tried, even if one part does not come back: the others stop moving data.
         let mut result = Ok(());
         for (sender, receiver) in self.mm2s.iter_mut().zip(&mut self.s2mm) {
             let reset = reset_core(&*self.platform, &mut sender.channel, &mut receiver.channel);
-            result = result.and(reset);
+            result = result.and(reset.map_err(Fault::from));
         }
+        result = result.and(self.control.reset(&*self.platform).map_err(Fault::from));
         result?;
-        self.control.reset(&*self.platform)?;
         drain_interrupt(&*self.platform)?;
         Ok(())
     }

@@ -7,9 +7,9 @@ use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MIN;
 use bitstream_model::interface::profile::{Flow, Variant};
 use bitstream_model::interface::record::Beat;
 
-use super::fault::Fault;
 use super::plan::{Plan, bytes};
 use super::solver::Accelerator;
+use super::symptom::Symptom;
 use crate::axi_dma::{Direction, largest_piece};
 use crate::beat::stripe::{Place, Segment};
 use crate::error::Error;
@@ -66,7 +66,7 @@ impl Accelerator {
         echoed.map_err(|fault| self.device.fail(fault, &self.shapes))
     }
 
-    fn run_echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Fault> {
+    fn run_echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Symptom> {
         let plan = plan(echo.bodies.len(), self.device.capabilities.variant);
         if echo.fresh_buffers {
             self.device.lanes_mut().for_each(super::lane::Lane::drop_buffer);

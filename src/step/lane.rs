@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::axi_dma::{Channel, Descriptor, DmaError, Dmacr, Ring, pieces};
+use crate::axi_dma::{ChainState, Channel, Descriptor, DmaError, Dmacr, Ring, pieces};
 use crate::platform::{Access, CpuBuffer, DeviceBuffer, Platform, PlatformError};
 
 use bitstream_model::interface::record::Beat;
@@ -178,6 +178,11 @@ impl Lane {
         self.ring.as_mut().expect("every step reserves the rings first")
     }
 
+    /// How the chain of the step stands, and which of its descriptors lies at `address`.
+    pub(super) fn survey(&self, address: u64) -> ChainState {
+        self.ring.as_ref().map(|ring| ring.survey(address)).unwrap_or_default()
+    }
+
     /// Takes note that the core was reset, and takes the buffer back.
     pub(super) fn was_reset(&mut self) -> Result<(), PlatformError> {
         self.running = false;
@@ -188,10 +193,16 @@ impl Lane {
         self.take_back()
     }
 
-    /// Gives up: an engine that could not be stopped may still reach ring and buffer.
+    /// Gives up: an engine that could not be stopped may still reach ring and buffer. Neither is
+    /// used or freed any more, whoever holds the buffer.
     pub(super) fn leave_to_device(&mut self) {
         if let Some(ring) = &mut self.ring {
             ring.leave_to_device();
+        }
+        match std::mem::take(&mut self.held) {
+            Held::Cpu(buffer) => buffer.leave_to_device(),
+            // Not freed when dropped.
+            held @ (Held::Device(_) | Held::Nobody) => self.held = held,
         }
     }
 }

@@ -256,7 +256,9 @@ fn memory_that_is_too_small_is_an_error_and_a_smaller_step_still_works() {
     };
     let (result, after) = step(500);
     let error = result.expect_err("no room");
-    let Error::Step { fault, aftermath: Aftermath::Untouched } = &error else { panic!("{error}") };
+    let Error::Step { fault, aftermath: Aftermath::Untouched, .. } = &error else {
+        panic!("{error}")
+    };
     assert!(
         matches!(**fault, Fault::NoMemory(PlatformError::Exhausted { total: BYTES, .. })),
         "{fault}"

@@ -4,21 +4,30 @@ mod board;
 mod bring_up;
 mod completion;
 mod device;
+mod diagnosis;
 mod echo;
 mod fault;
 mod lane;
+mod locate;
 #[cfg(all(test, feature = "emulation"))]
 mod memory_tests;
+mod oddities;
 mod ordering;
+mod phase;
 mod plan;
 mod recovery;
 mod report;
+mod retry;
+mod root_cause;
 mod solver;
+mod symptom;
 #[cfg(all(test, feature = "emulation"))]
 mod tests;
 
 pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
-pub use fault::{Fault, RegisterDump};
+pub use diagnosis::{ChannelState, ControlState, Diagnosis};
+pub use fault::{AcceleratorError, Awaited, Fault, Subject};
+pub use phase::Phase;
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
 pub use solver::Accelerator;
 pub(crate) use {

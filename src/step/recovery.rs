@@ -3,43 +3,52 @@
 use super::device::Device;
 use super::fault::Fault;
 use super::plan::Plan;
+use super::root_cause::other_bitstream;
+use super::symptom::Symptom;
 use crate::error::{Aftermath, Error};
 use crate::scene::Shape;
 
 impl Device {
-    /// Brings the board back after `fault`; the error to return.
-    pub(super) fn fail(&mut self, fault: Fault, shapes: &[Shape]) -> Error {
+    /// Finds out why a step failed and brings the board back; the error to return.
+    pub(super) fn fail(&mut self, symptom: Symptom, shapes: &[Shape]) -> Error {
+        let (mut fault, mut diagnosis) = self.diagnose(symptom);
         log::debug!("step failed: {fault}");
-        let aftermath = match fault {
+        let aftermath = match &fault {
             // The board did its part: everything is complete and back. Or it was not asked yet.
             Fault::NotFinite { .. } | Fault::NoMemory(_) => Aftermath::Untouched,
+            // What answers now is not to be written to: its registers may mean anything.
+            Fault::OtherBitstream { .. } => self.give_up(&fault),
             _ => match self.recover(shapes) {
                 Ok(()) => Aftermath::Ready,
                 Err(error) => {
-                    log::error!("the board could not be reset: {error}");
-                    self.dead = true;
-                    // The memory stays with the engines: they may still reach it.
-                    for lane in self.lanes_mut() {
-                        lane.leave_to_device();
+                    let aftermath = self.give_up(&error);
+                    if matches!(error, Fault::OtherBitstream { .. }) {
+                        fault = error;
+                    } else if let Some(diagnosis) = &mut diagnosis {
+                        diagnosis.reset = Some(Box::new(error));
                     }
-                    Aftermath::MustReopen
+                    aftermath
                 }
             },
         };
-        Error::Step { fault: Box::new(fault), aftermath }
+        Error::Step { fault: Box::new(fault), aftermath, diagnosis }
     }
 
     /// Makes buffers and rings large enough for a step. A channel that does not stop for its new
     /// ring is reset, with everything else.
-    pub(super) fn reserve_or_reset(&mut self, plan: &Plan, shapes: &[Shape]) -> Result<(), Fault> {
+    pub(super) fn reserve_or_reset(
+        &mut self,
+        plan: &Plan,
+        shapes: &[Shape],
+    ) -> Result<(), Symptom> {
         let mut reserved = self.reserve(plan);
-        if let Err(Fault::Core(error)) = &reserved {
+        if let Err(Symptom::Known(Fault::Core(error))) = &reserved {
             log::warn!("a channel did not stop, resetting the board: {error}");
             self.recover(shapes)?;
             reserved = self.reserve(plan);
         }
-        reserved.map_err(|fault| match fault {
-            Fault::Platform(error) => Fault::NoMemory(error),
+        reserved.map_err(|symptom| match symptom {
+            Symptom::Known(Fault::Platform(error)) => Fault::NoMemory(error).into(),
             other => other,
         })
     }
@@ -47,6 +56,14 @@ impl Device {
     /// Resets everything and restores what a step relies on.
     fn recover(&mut self, shapes: &[Shape]) -> Result<(), Fault> {
         self.reset()?;
+        // Before the shapes are written, and anything is said of being ready.
+        let found = self.control.fingerprint();
+        if found.identification() == u32::MAX {
+            return Err(Fault::Gone { region: "the control block".to_owned() });
+        }
+        if let Some(changed) = self.fingerprint.difference(&found) {
+            return Err(other_bitstream(changed));
+        }
         for lane in self.lanes_mut() {
             // A buffer that does not come back is replaced by the next step.
             if let Err(error) = lane.was_reset() {
@@ -56,5 +73,15 @@ impl Device {
         self.control.load_shapes(shapes, self.capabilities.variant.inertia);
         log::info!("the board was reset after a fault");
         Ok(())
+    }
+
+    /// Touches nothing any more. All memory stays with the engines, which may still reach it.
+    fn give_up(&mut self, error: &Fault) -> Aftermath {
+        log::error!("the board could not be reset: {error}");
+        self.dead = true;
+        for lane in self.lanes_mut() {
+            lane.leave_to_device();
+        }
+        Aftermath::MustReopen
     }
 }

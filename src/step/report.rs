@@ -92,6 +92,9 @@ pub struct StepReport {
     pub interrupts: u64,
     /// Scatter-gather descriptors.
     pub descriptors: u64,
+    /// How often the step was taken again after a fault, as far as it was
+    /// [allowed](crate::StepParameters::retries). The register accesses are those of all attempts.
+    pub retries: u32,
     /// Where the host's time went.
     pub host: HostTimes,
 }
@@ -154,6 +157,7 @@ mod tests {
             doorbells: 0,
             interrupts: 0,
             descriptors: 0,
+            retries: 0,
             host: HostTimes::default(),
         }
     }

@@ -11,10 +11,14 @@ use bitstream_model::interface::record::Beat;
 use super::board::{self, BoardDescription, Found, OpenOptions};
 use super::device::Device;
 use super::fault::Fault;
+use super::locate::locate;
 use super::ordering::{Arranged, Hardware, Ordering};
 use super::plan::Plan;
 use super::report::{HostTimes, StepCycles, StepReport};
+use super::retry::with_retries;
+use super::symptom::Symptom;
 use crate::accelerator::{Capabilities, Counters};
+use crate::axi_dma::Direction;
 use crate::beat::pack::{
     Chosen, pack_collisions, pack_marked_collisions, pack_poses, pack_velocities,
 };
@@ -148,28 +152,15 @@ impl Accelerator {
         host.validate = watch.lap();
         let Self { ordering, device, limits, shapes, .. } = self;
         let on = Hardware { capabilities: &device.capabilities, limits, shapes };
-        let Arranged { order, scheduled, verified, live } =
-            ordering.arrange(bodies, collisions, parameters, on)?;
+        let arranged = ordering.arrange(bodies, collisions, parameters, on)?;
         host.order = watch.lap();
         let counts = &self.device.counts;
         let before = (counts.reads(), counts.writes());
-        let mut empty = 0;
-        let ended = if scheduled {
-            // Lent to the step.
-            let ordering = std::mem::take(&mut self.ordering);
-            let ordered = Ordered { collisions, schedule: ordering.schedule() };
-            let lives = live.map(|_| ordering.lives());
-            let ended = self.run(bodies, &ordered, lives, parameters, &mut host, &mut watch);
-            // Those that fill the last issue are of the order's making too.
-            let entries = lives.map_or(ordered.len(), |lives| lives.words().len());
-            empty = entries.saturating_sub(ordering.schedule().collisions());
-            self.ordering = ordering;
-            ended
-        } else {
-            self.run(bodies, collisions, None, parameters, &mut host, &mut watch)
-        };
-        let mut report = ended.map_err(|fault| self.device.fail(fault, &self.shapes))?;
-        (report.collisions, report.empty) = (collisions.len() as u64, empty as u64);
+        let (mut report, retries) = with_retries(parameters.retries, || {
+            self.attempt(bodies, collisions, &arranged, parameters, &mut host, &mut watch)
+        })?;
+        let Arranged { order, verified, live, .. } = arranged;
+        (report.collisions, report.retries) = (collisions.len() as u64, retries);
         (report.order, report.verified, report.live) = (order, verified, live);
         for (index, (pose, velocity)) in self.spare.drain(..).enumerate() {
             bodies.commit(index, pose, velocity);
@@ -194,6 +185,37 @@ impl Accelerator {
         Ok(report)
     }
 
+    /// One attempt at a step whose collisions were put in order.
+    fn attempt<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &B,
+        collisions: &C,
+        arranged: &Arranged,
+        parameters: &StepParameters,
+        host: &mut HostTimes,
+        watch: &mut Stopwatch,
+    ) -> Result<StepReport, Error> {
+        if !arranged.scheduled {
+            let ended = self.run(bodies, collisions, None, parameters, host, watch);
+            return ended.map_err(|symptom| self.device.fail(symptom, &self.shapes));
+        }
+        // Lent to the step.
+        let ordering = std::mem::take(&mut self.ordering);
+        let ordered = Ordered { collisions, schedule: ordering.schedule() };
+        let lives = arranged.live.map(|_| ordering.lives());
+        let ended = self.run(bodies, &ordered, lives, parameters, host, watch);
+        // Those that fill the last issue are of the order's making too.
+        let entries = lives.map_or(ordered.len(), |lives| lives.words().len());
+        let empty = entries.saturating_sub(ordering.schedule().collisions());
+        let ended = ended.map_err(|symptom| {
+            let mut error = self.device.fail(symptom, &self.shapes);
+            locate(&mut error, ordering.schedule(), lives);
+            error
+        });
+        self.ordering = ordering;
+        ended.map(|report| StepReport { empty: empty as u64, ..report })
+    }
+
     /// Everything between validation and commitment; the results are in `spare` afterwards.
     ///
     /// Collisions are sent in the order of their index.
@@ -205,7 +227,7 @@ impl Accelerator {
         parameters: &StepParameters,
         host: &mut HostTimes,
         watch: &mut Stopwatch,
-    ) -> Result<StepReport, Fault> {
+    ) -> Result<StepReport, Symptom> {
         let plan = &Plan {
             bodies: lives.map_or(bodies.len(), |lives| lives.velocities().len()),
             collisions: lives.map_or(collisions.len(), |lives| lives.words().len()),
@@ -264,6 +286,7 @@ impl Accelerator {
             doorbells: 0,
             interrupts: 0,
             descriptors: 0,
+            retries: 0,
             host: HostTimes::default(),
         }
     }
@@ -336,14 +359,14 @@ impl Accelerator {
             .wrapping_add(sent.collisions.wrapping_mul(rounds))
             .wrapping_add(sent.poses);
         if received != expected {
-            let direction = "to the accelerator";
+            let direction = Direction::Mm2s;
             return Err(Fault::Checksum { direction, expected, found: received });
         }
         let mut channels = Default::default();
         self.results(plan, &mut channels);
         let found = channels.iter().fold(0u32, |sum, beats| sum.wrapping_add(sum_of_words(beats)));
         if found != answered {
-            let direction = "from the accelerator";
+            let direction = Direction::S2mm;
             return Err(Fault::Checksum { direction, expected: answered, found });
         }
         Ok(())
