@@ -48,6 +48,12 @@ fn confinement() {
 }
 
 #[test]
+fn faults() {
+    let tally = short("faults", 300).tally;
+    assert!(tally.steps > 500 && tally.refused > 50 && tally.faults > 100, "{tally:?}");
+}
+
+#[test]
 fn the_shortest_inputs_are_taken_too() {
     for target in targets::ALL {
         for input in [&[][..], &[0], &[255], &[0; 64], &[255; 64]] {

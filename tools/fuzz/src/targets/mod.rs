@@ -2,6 +2,7 @@
 
 mod chains;
 mod confinement;
+mod faults;
 mod folders;
 mod layout;
 mod packets;
@@ -66,6 +67,14 @@ pub const ALL: &[Target] = &[
                 step, bodies untouched where it is refused, the same bits in every layout",
         run: confinement::run,
         longest: 768,
+        share: 1,
+    },
+    Target {
+        name: "faults",
+        about: "faults of the board under the driver's steps: each ends in time with the bits of an \
+                undisturbed one or an error that changed nothing, and the next one works",
+        run: faults::run,
+        longest: 320,
         share: 1,
     },
 ];
