@@ -6,7 +6,7 @@ mod common;
 use bitstream_model::interface::axi_dma::{DMACR, dmacr, dmasr};
 use bitstream_model::interface::control::{self, ErrorCode};
 use bitstream_model::interface::profile::WINDOWED;
-use bitstream_model::{BoardConfig, Direction, Fault, FaultKind, FaultPlan, When};
+use bitstream_model::{BoardConfig, Direction, Fault, FaultKind, FaultPlan, StepPhase, When};
 
 use common::scene::{Step, bits};
 use common::sg::{Failure, Machine};
@@ -283,6 +283,7 @@ fn the_packets_of_a_step_are_told() {
             let beats = if core == 3 { 200 } else { 400 };
             let pass = of(Direction::Mm2s, core).nth(1).expect("the first pass");
             assert_eq!((pass.beats, pass.descriptors), (beats, 1));
+            assert_eq!(pass.phase, Some(StepPhase::Contact(1)));
         }
     }
 }

@@ -13,7 +13,7 @@ use std::fmt;
 
 use crate::accelerator::striping::beat_cycles;
 use crate::config::{BoardConfig, Delays, cycles_of};
-use crate::fault::{FaultKind, Faults, Place};
+use crate::fault::{FaultKind, Faults, Place, StepPhase};
 use crate::interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 use crate::memory::Memory;
 use crate::quirks::Resettable;
@@ -68,6 +68,8 @@ pub struct PacketCount {
     pub core: usize,
     /// Which channel.
     pub direction: Direction,
+    /// What it carried; the first contact pass, where the collisions are streamed once for all.
+    pub phase: Option<StepPhase>,
     /// Its beats.
     pub beats: u64,
     /// Descriptors that carried it.

@@ -450,7 +450,8 @@ impl Channel {
     fn packet_ended(&mut self, build: &Build, with: &mut Surroundings<'_>) {
         let (core, direction) = (build.core, self.direction);
         let (beats, descriptors) = (self.beats, self.descriptors);
-        with.moved.packets.push(PacketCount { core, direction, beats, descriptors });
+        let phase = with.faults.phase(core, direction);
+        with.moved.packets.push(PacketCount { core, direction, phase, beats, descriptors });
         with.faults.packet_ends(core, direction);
         (self.beats, self.descriptors) = (0, 0);
         self.faulty.slow = 0;

@@ -40,6 +40,18 @@ pub(crate) struct StepShape {
 }
 
 impl StepShape {
+    /// What a packet of a channel carries.
+    fn phase(&self, core: usize, packet: u32) -> Option<StepPhase> {
+        let passes = (0..self.rounds).map(|pass| match pass.checked_sub(self.contact) {
+            None => StepPhase::Contact(pass + 1),
+            // A step without contact passes, streamed once.
+            Some(_) if self.rounds == 1 => StepPhase::Contact(1),
+            Some(pass) => StepPhase::Friction(pass + 1),
+        });
+        let mut all = std::iter::once(StepPhase::Load).chain(passes).chain([StepPhase::Poses]);
+        all.find(|phase| self.packet(core, *phase) == Some(packet))
+    }
+
     /// Which packet of a channel carries a phase, from 0.
     fn packet(&self, core: usize, phase: StepPhase) -> Option<u32> {
         let [load, collisions, poses] = *self.segments.get(core)?;
@@ -128,6 +140,14 @@ impl Faults {
         match direction {
             Direction::Mm2s => self.sent[core] += 1,
             Direction::S2mm => self.received[core] += 1,
+        }
+    }
+
+    /// What the packet carries that a channel is at.
+    pub(crate) fn phase(&self, core: usize, direction: Direction) -> Option<StepPhase> {
+        match direction {
+            Direction::Mm2s => self.shape.phase(core, self.sent[core]),
+            Direction::S2mm => Some(StepPhase::Results),
         }
     }
 
@@ -371,9 +391,15 @@ mod tests {
         assert_eq!(packet(StepPhase::Friction(4)), Some(8));
         assert_eq!(packet(StepPhase::Friction(5)), None);
         assert_eq!(packet(StepPhase::Poses), Some(9));
+        for number in 0..10 {
+            let phase = shape.phase(1, number).expect("there are ten");
+            assert_eq!(packet(phase), Some(number));
+        }
+        assert_eq!(shape.phase(1, 10), None);
         let once = StepShape { segments: [[false, true, false]; 4], contact: 4, rounds: 1 };
         assert_eq!(once.packet(0, StepPhase::Friction(3)), Some(0));
         assert_eq!(once.packet(0, StepPhase::Poses), None);
+        assert_eq!(once.phase(0, 0), Some(StepPhase::Contact(1)));
     }
 
     #[test]
