@@ -162,6 +162,9 @@ fn arguments_out_of_range_are_refused_at_the_start() {
     assert_eq!(error_of(&[(control::BODIES, 131_073)]), (argument, 0, 0x10));
     assert_eq!(error_of(&[(control::CONTACT_ITERATIONS, 256)]), (argument, 0, 0x20));
     assert_eq!(error_of(&[(control::FRICTION_ITERATIONS, u32::MAX)]), (argument, 0, 0x28));
+    // Together they are more than a register holds.
+    let many = [control::COLLISIONS, control::CONTACT_ITERATIONS, control::FRICTION_ITERATIONS];
+    assert_eq!(error_of(&many.map(|register| (register, u32::MAX))), (argument, 0, 0x20));
 }
 
 #[test]

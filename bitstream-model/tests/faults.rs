@@ -90,6 +90,16 @@ fn a_channel_that_stalls_or_a_part_that_hangs_is_a_deadline() {
 }
 
 #[test]
+fn what_hangs_lets_time_pass_while_another_fault_is_due() {
+    for text in ["no-done; dma-dec-err,step=9", "accelerator-hang; accelerator-error=3,step=9"] {
+        let mut machine = machine();
+        machine.host.board.inject(plan(text));
+        machine.step(&scene()).map(|_| ()).expect_err(text);
+        assert_eq!(machine.host.board.faults(), 1, "{text}");
+    }
+}
+
+#[test]
 fn packets_of_another_length_are_noticed_by_who_receives_them() {
     let code = |failure| match failure {
         Failure::Accelerator(code, stream, _) => (code, stream),

@@ -244,7 +244,8 @@ impl Accelerator {
             if self.debt > 0 {
                 break;
             }
-            if !faults.none() {
+            // What hangs meets nothing more.
+            if !self.hung && !faults.none() {
                 ran.progressed |= self.meet(faults, inputs);
             }
             if self.hung {

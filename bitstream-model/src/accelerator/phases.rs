@@ -1,6 +1,7 @@
 //! This file works through the phases of a step on what has arrived: load, passes, integration.
 
 use super::array::{Array, Records};
+use super::control::Arguments;
 use super::decode::{self, Collision};
 use super::inertia::{self, Isotropic, World};
 use super::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
@@ -89,12 +90,10 @@ impl Accelerator {
         Ok(true)
     }
 
-    /// Passes of the step; without collisions there is none.
+    /// Passes of the step; without collisions there is none. Arguments that were refused may be any.
     pub(super) fn passes(&self) -> u32 {
-        match self.arguments.collisions {
-            0 => 0,
-            _ => self.arguments.contact_iterations + self.arguments.friction_iterations,
-        }
+        let Arguments { collisions, contact_iterations, friction_iterations, .. } = self.arguments;
+        if collisions == 0 { 0 } else { contact_iterations.saturating_add(friction_iterations) }
     }
 
     /// Depth of the pipeline that a pass goes through.

@@ -13,11 +13,9 @@ mod deviation;
 mod diagnosis;
 mod digest;
 mod failure;
-mod folder;
 mod interrupt;
 mod loading;
 mod memory;
-mod npy;
 mod options;
 mod ordering;
 mod origin;
@@ -27,6 +25,8 @@ mod verbs;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
+
+use step_folder::{folder, npy};
 
 fn main() -> ExitCode {
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();

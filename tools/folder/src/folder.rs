@@ -9,25 +9,38 @@
 //! Only the files' form is checked here; the driver judges their values.
 
 use std::collections::HashMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 
-use crate::npy::{self, Dimensions, Element, NpyError};
+use crate::npy::{self, Dimensions, Element, NpyError, Problem};
 
-pub(crate) const PARAMS: &str = "params.npy";
-pub(crate) const ITERATIONS: &str = "iterations.npy";
-pub(crate) const BODY_POSITION: &str = "body_pos.npy";
-pub(crate) const BODY_ORIENTATION: &str = "body_quat.npy";
-pub(crate) const BODY_LINEAR: &str = "body_linvel.npy";
-pub(crate) const BODY_ANGULAR: &str = "body_angvel.npy";
-pub(crate) const BODY_INVERSE_MASS: &str = "body_inv_mass.npy";
-pub(crate) const BODY_INVERSE_INERTIA: &str = "body_inv_inertia.npy";
-pub(crate) const COLLISION_BODIES: &str = "contact_bodies.npy";
-pub(crate) const COLLISION_COUNT: &str = "contact_npoints.npy";
-pub(crate) const COLLISION_NORMAL: &str = "contact_normal.npy";
-pub(crate) const COLLISION_POINTS: &str = "contact_points.npy";
+/// Parameters of the step but its iterations: (8).
+pub const PARAMS: &str = "params.npy";
+/// Contact and friction iterations: (2).
+pub const ITERATIONS: &str = "iterations.npy";
+/// Centres of mass: (N, 3).
+pub const BODY_POSITION: &str = "body_pos.npy";
+/// Quaternions: (N, 4).
+pub const BODY_ORIENTATION: &str = "body_quat.npy";
+/// Linear velocities: (N, 3).
+pub const BODY_LINEAR: &str = "body_linvel.npy";
+/// Angular velocities: (N, 3).
+pub const BODY_ANGULAR: &str = "body_angvel.npy";
+/// Inverse masses: (N).
+pub const BODY_INVERSE_MASS: &str = "body_inv_mass.npy";
+/// Diagonals of the inverse inertia: (N, 3).
+pub const BODY_INVERSE_INERTIA: &str = "body_inv_inertia.npy";
+/// Indices of bodies A and B: (M, 2).
+pub const COLLISION_BODIES: &str = "contact_bodies.npy";
+/// Numbers of contact points: (M).
+pub const COLLISION_COUNT: &str = "contact_npoints.npy";
+/// Normals: (M, 3).
+pub const COLLISION_NORMAL: &str = "contact_normal.npy";
+/// Contact points: (M, 4, 4).
+pub const COLLISION_POINTS: &str = "contact_points.npy";
 
 /// More shapes than the board's table holds.
 #[derive(Debug, Error)]
@@ -36,7 +49,7 @@ pub(crate) const COLLISION_POINTS: &str = "contact_points.npy";
      takes at most {limit}",
     path.display()
 )]
-pub(crate) struct TooManyShapes {
+pub struct TooManyShapes {
     path: PathBuf,
     body: usize,
     found: usize,
@@ -45,32 +58,41 @@ pub(crate) struct TooManyShapes {
 
 /// What a folder holds.
 #[derive(Debug)]
-pub(crate) struct Folder {
-    pub(crate) path: PathBuf,
-    pub(crate) bodies: Vec<Body>,
+pub struct Folder {
+    /// Where it is.
+    pub path: PathBuf,
+    /// The bodies, with indices into `shapes`.
+    pub bodies: Vec<Body>,
     /// The distinct rows of mass and inertia, in the order of their first body.
-    pub(crate) shapes: Vec<Shape>,
+    pub shapes: Vec<Shape>,
     /// The first body of each shape.
-    pub(crate) shape_bodies: Vec<usize>,
-    pub(crate) collisions: Vec<Collision>,
-    pub(crate) parameters: StepParameters,
+    pub shape_bodies: Vec<usize>,
+    /// The collisions.
+    pub collisions: Vec<Collision>,
+    /// The parameters of the step.
+    pub parameters: StepParameters,
 }
 
 /// A property of a body that a step changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum State {
+pub enum State {
+    /// Centre of mass.
     Position,
+    /// Quaternion.
     Orientation,
+    /// Linear velocity.
     Linear,
+    /// Angular velocity.
     Angular,
 }
 
 impl State {
-    pub(crate) const ALL: [Self; 4] =
-        [Self::Position, Self::Orientation, Self::Linear, Self::Angular];
+    /// All four.
+    pub const ALL: [Self; 4] = [Self::Position, Self::Orientation, Self::Linear, Self::Angular];
 
     /// The array of a folder that holds it after the step.
-    pub(crate) const fn file(self) -> &'static str {
+    #[must_use]
+    pub const fn file(self) -> &'static str {
         match self {
             Self::Position => "out_pos.npy",
             Self::Orientation => "out_quat.npy",
@@ -80,7 +102,8 @@ impl State {
     }
 
     /// Numbers a body.
-    pub(crate) const fn width(self) -> usize {
+    #[must_use]
+    pub const fn width(self) -> usize {
         match self {
             Self::Orientation => 4,
             Self::Position | Self::Linear | Self::Angular => 3,
@@ -88,7 +111,7 @@ impl State {
     }
 
     /// The numbers of all bodies.
-    pub(crate) fn of(self, bodies: &[Body]) -> Box<dyn Iterator<Item = f32> + '_> {
+    pub fn of(self, bodies: &[Body]) -> Box<dyn Iterator<Item = f32> + '_> {
         match self {
             Self::Position => Box::new(bodies.iter().flat_map(|body| body.pose.position)),
             Self::Orientation => Box::new(bodies.iter().flat_map(|body| body.pose.orientation)),
@@ -99,16 +122,17 @@ impl State {
 }
 
 /// Linear and angular velocity of each body in turn, as `out_vel_*` hold them.
-pub(crate) fn velocities(bodies: &[Body]) -> impl Iterator<Item = f32> {
+pub fn velocities(bodies: &[Body]) -> impl Iterator<Item = f32> {
     bodies.iter().flat_map(|body| body.velocity.linear.into_iter().chain(body.velocity.angular))
 }
 
+/// An array of rows: (`first`, N).
 fn rows<T: Element, const N: usize>(
-    path: &Path,
+    read: impl Fn(&str, Dimensions) -> Result<(usize, Vec<T>), NpyError>,
     name: &str,
     first: Option<usize>,
 ) -> Result<Vec<[T; N]>, NpyError> {
-    let (_, elements) = npy::read(&path.join(name), &Dimensions(vec![first, Some(N)]))?;
+    let (_, elements) = read(name, Dimensions(vec![first, Some(N)]))?;
     Ok(as_rows(&elements))
 }
 
@@ -120,18 +144,35 @@ fn as_rows<T: Element, const N: usize>(elements: &[T]) -> Vec<[T; N]> {
 
 impl Folder {
     /// Reads every array of the step.
-    pub(crate) fn load(path: &Path) -> Result<Self, NpyError> {
-        let one = |name: &str, n| npy::read::<f32>(&path.join(name), &Dimensions(vec![n]));
-        let (_, params) = one(PARAMS, Some(8))?;
-        let (_, iterations) = npy::read::<u32>(&path.join(ITERATIONS), &Dimensions(vec![Some(2)]))?;
+    ///
+    /// # Errors
+    /// [`NpyError`] names the first file that is not there or not as expected.
+    pub fn load(path: &Path) -> Result<Self, NpyError> {
+        Self::load_with(path, npy::open)
+    }
 
-        let positions: Vec<[f32; 3]> = rows(path, BODY_POSITION, None)?;
+    /// Reads every array of the step from what `open` finds under the files' names: their content,
+    /// and its length in bytes.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load), and what `open` returns.
+    pub fn load_with<S: Read>(
+        path: &Path,
+        open: impl Fn(&Path) -> Result<(S, u64), Problem>,
+    ) -> Result<Self, NpyError> {
+        let array = |name: &str, shape| npy::read_with::<f32, S>(&path.join(name), &shape, &open);
+        let numbers = |name: &str, shape| npy::read_with::<u32, S>(&path.join(name), &shape, &open);
+        let one = |name: &str, n| array(name, Dimensions(vec![n]));
+        let (_, params) = one(PARAMS, Some(8))?;
+        let (_, iterations) = numbers(ITERATIONS, Dimensions(vec![Some(2)]))?;
+
+        let positions: Vec<[f32; 3]> = rows(array, BODY_POSITION, None)?;
         let n = Some(positions.len());
-        let orientations: Vec<[f32; 4]> = rows(path, BODY_ORIENTATION, n)?;
-        let linear: Vec<[f32; 3]> = rows(path, BODY_LINEAR, n)?;
-        let angular: Vec<[f32; 3]> = rows(path, BODY_ANGULAR, n)?;
+        let orientations: Vec<[f32; 4]> = rows(array, BODY_ORIENTATION, n)?;
+        let linear: Vec<[f32; 3]> = rows(array, BODY_LINEAR, n)?;
+        let angular: Vec<[f32; 3]> = rows(array, BODY_ANGULAR, n)?;
         let (_, inverse_masses) = one(BODY_INVERSE_MASS, n)?;
-        let inverse_inertias: Vec<[f32; 3]> = rows(path, BODY_INVERSE_INERTIA, n)?;
+        let inverse_inertias: Vec<[f32; 3]> = rows(array, BODY_INVERSE_INERTIA, n)?;
         let (shapes, shape_bodies, shape_of) = distinct(&inverse_masses, &inverse_inertias);
         let bodies = (0..positions.len())
             .map(|k| Body {
@@ -141,12 +182,12 @@ impl Folder {
             })
             .collect();
 
-        let pairs: Vec<[u32; 2]> = rows(path, COLLISION_BODIES, None)?;
+        let pairs: Vec<[u32; 2]> = rows(numbers, COLLISION_BODIES, None)?;
         let m = Some(pairs.len());
-        let (_, counts) = npy::read::<u32>(&path.join(COLLISION_COUNT), &Dimensions(vec![m]))?;
-        let normals: Vec<[f32; 3]> = rows(path, COLLISION_NORMAL, m)?;
+        let (_, counts) = numbers(COLLISION_COUNT, Dimensions(vec![m]))?;
+        let normals: Vec<[f32; 3]> = rows(array, COLLISION_NORMAL, m)?;
         let shape = Dimensions(vec![m, Some(CONTACT_POINTS), Some(4)]);
-        let (_, points) = npy::read::<f32>(&path.join(COLLISION_POINTS), &shape)?;
+        let (_, points) = array(COLLISION_POINTS, shape)?;
         let points: Vec<[f32; 4]> = as_rows(&points);
         let contacts = points.as_chunks::<CONTACT_POINTS>().0;
         let collisions = (0..pairs.len())
@@ -174,7 +215,10 @@ impl Folder {
     }
 
     /// Refuses more shapes than a table of `limit` entries holds, naming the body that is too much.
-    pub(crate) fn check_shapes(&self, limit: u32) -> Result<(), TooManyShapes> {
+    ///
+    /// # Errors
+    /// [`TooManyShapes`].
+    pub fn check_shapes(&self, limit: u32) -> Result<(), TooManyShapes> {
         let limit = usize::try_from(limit).unwrap_or(usize::MAX);
         match self.shape_bodies.get(limit) {
             None => Ok(()),
@@ -213,11 +257,12 @@ fn distinct(
 }
 
 /// Writes the state of all bodies as the four arrays of [`State`].
-pub(crate) fn write_results(path: &Path, bodies: &[Body]) -> Result<(), NpyError> {
-    std::fs::create_dir_all(path).map_err(|error| NpyError {
-        path: path.to_path_buf(),
-        problem: npy::Problem::Write(error),
-    })?;
+///
+/// # Errors
+/// [`NpyError`]: a file or the folder cannot be written.
+pub fn write_results(path: &Path, bodies: &[Body]) -> Result<(), NpyError> {
+    std::fs::create_dir_all(path)
+        .map_err(|error| NpyError { path: path.to_path_buf(), problem: Problem::Write(error) })?;
     for state in State::ALL {
         npy::write(&path.join(state.file()), &[bodies.len(), state.width()], state.of(bodies))?;
     }

@@ -31,10 +31,12 @@ const ALIGNMENT: usize = 64;
 const DIMENSIONS_MAX: usize = 8;
 
 /// An element type that a file can hold.
-pub(crate) trait Element: Copy {
+pub trait Element: Copy {
     /// The name in the header.
     const DESCR: &'static str;
+    /// The element of those bytes.
     fn from_le(bytes: [u8; 4]) -> Self;
+    /// The bytes of the element.
     fn to_le(self) -> [u8; 4];
 }
 
@@ -60,7 +62,10 @@ impl Element for u32 {
 
 /// A shape, written as `NumPy` writes it; a dimension that may have any length is `*`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Dimensions(pub(crate) Vec<Option<usize>>);
+pub struct Dimensions(
+    /// The length of each; `None` is any.
+    pub Vec<Option<usize>>,
+);
 
 impl Dimensions {
     fn fit(&self, shape: &[usize]) -> bool {
@@ -96,56 +101,100 @@ fn exactly(shape: &[usize]) -> Dimensions {
 /// What is wrong with a file.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-pub(crate) enum Problem {
+pub enum Problem {
+    /// The system refuses to read it.
     #[error("cannot be read")]
     Read(#[source] io::Error),
+    /// The system refuses to write it.
     #[error("cannot be written")]
     Write(#[source] io::Error),
+    /// A folder, a pipe.
     #[error("expected a regular file")]
     NotAFile,
+    /// Not the format, or another version of it.
     #[error("expected a .npy file of format 1.0, found {0}: write it with numpy.save")]
     NotNpy(&'static str),
+    /// A header that says something else than it should.
     #[error("malformed .npy header, expected {0}: write it with numpy.save")]
     Header(&'static str),
+    /// Elements of another type.
     #[error("expected elements of type {expected}, found {found:?}: convert with numpy's astype")]
-    Type { expected: &'static str, found: String },
+    Type {
+        /// The type, as `NumPy` names it.
+        expected: &'static str,
+        /// What the header names.
+        found: String,
+    },
+    /// Columns one after the other.
     #[error("expected C order, found Fortran order: convert with numpy.ascontiguousarray")]
     FortranOrder,
+    /// Another number of dimensions, or of other lengths.
     #[error("expected shape {expected}, found {found}")]
-    Shape { expected: Dimensions, found: Dimensions },
+    Shape {
+        /// The shape that fits.
+        expected: Dimensions,
+        /// That of the header.
+        found: Dimensions,
+    },
+    /// A file longer or shorter than its shape.
     #[error(
         "expected {expected} bytes of data by its shape {shape}, found {found}: is it cut off?"
     )]
-    Length { shape: Dimensions, expected: u128, found: u64 },
+    Length {
+        /// That of the header.
+        shape: Dimensions,
+        /// Bytes of data of that shape.
+        expected: u128,
+        /// Bytes of data in the file.
+        found: u64,
+    },
 }
 
 /// A file that cannot be taken, and why.
 #[derive(Debug, Error)]
 #[error("{}", path.display())]
-pub(crate) struct NpyError {
-    pub(crate) path: PathBuf,
+pub struct NpyError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
     #[source]
-    pub(crate) problem: Problem,
+    pub problem: Problem,
 }
 
 /// Reads an array whose shape fits `expected`.
 ///
 /// Returns the length of its first dimension and its elements in C order.
-pub(crate) fn read<T: Element>(
+///
+/// # Errors
+/// [`NpyError`]: no such file, not an array, or another one than expected.
+pub fn read<T: Element>(path: &Path, expected: &Dimensions) -> Result<(usize, Vec<T>), NpyError> {
+    read_with(path, expected, open)
+}
+
+/// Reads an array as [`read`] does, from what `open` finds under its name: the content, header
+/// included, and its length in bytes.
+///
+/// # Errors
+/// As for [`read`], and what `open` returns.
+pub fn read_with<T: Element, S: Read>(
     path: &Path,
     expected: &Dimensions,
+    open: impl Fn(&Path) -> Result<(S, u64), Problem>,
 ) -> Result<(usize, Vec<T>), NpyError> {
-    let in_file = |problem| NpyError { path: path.to_path_buf(), problem };
-    let inner = || {
-        // Asked for before opening, because opening a named pipe would wait for a writer.
-        let metadata = std::fs::metadata(path).map_err(Problem::Read)?;
-        if !metadata.is_file() {
-            return Err(Problem::NotAFile);
-        }
-        let file = File::open(path).map_err(Problem::Read)?;
-        decode(file, metadata.len(), expected)
-    };
-    inner().map_err(in_file)
+    open(path)
+        .and_then(|(source, length)| decode(source, length, expected))
+        .map_err(|problem| NpyError { path: path.to_path_buf(), problem })
+}
+
+/// Opens a regular file; with its length in bytes.
+pub(crate) fn open(path: &Path) -> Result<(File, u64), Problem> {
+    // Asked for before opening, because opening a named pipe would wait for a writer.
+    let metadata = std::fs::metadata(path).map_err(Problem::Read)?;
+    if !metadata.is_file() {
+        return Err(Problem::NotAFile);
+    }
+    let file = File::open(path).map_err(Problem::Read)?;
+    Ok((file, metadata.len()))
 }
 
 /// Reads an array of `length` bytes, header included, from `source`.
@@ -303,7 +352,10 @@ impl<'a> Scanner<'a> {
 }
 
 /// Writes `elements` as an array of `shape`, whose product is their number.
-pub(crate) fn write<T: Element>(
+///
+/// # Errors
+/// [`NpyError`]: the file cannot be written.
+pub fn write<T: Element>(
     path: &Path,
     shape: &[usize],
     elements: impl Iterator<Item = T>,
@@ -316,7 +368,11 @@ pub(crate) fn write<T: Element>(
     inner().map_err(|error| NpyError { path: path.to_path_buf(), problem: Problem::Write(error) })
 }
 
-fn encode<T: Element>(
+/// Writes an array into a file that is open.
+///
+/// # Errors
+/// Whatever keeps the file from being written.
+pub fn encode<T: Element>(
     file: &mut impl Write,
     shape: &[usize],
     elements: impl Iterator<Item = T>,

@@ -1,0 +1,8 @@
+//! One step as a folder of `.npy` arrays, as the command line tool reads it.
+//!
+//! A crate of its own, so that the loader can be driven without a process and a disk.
+
+#![forbid(unsafe_code)]
+
+pub mod folder;
+pub mod npy;

@@ -1,0 +1,78 @@
+//! This file chooses how a board is built.
+
+use bitstream_model::interface::number::{Numbers, StreamFormat};
+use bitstream_model::interface::profile::{Flow, HALF, Inertia, PROFILES, Variant};
+use bitstream_model::{Bandwidth, BoardConfig, Delays, Hazards, Subnormals};
+
+use crate::input::Input;
+
+/// Every profile, with everything that can be chosen: formats, inertia, hazards, subnormals,
+/// bandwidth, widths, depths, delays. All of it goes together.
+pub fn any(input: &mut Input<'_>) -> BoardConfig {
+    let Variant { profile, numbers, inertia } = variant(input);
+    let switches = input.byte();
+    let on = |bit: u32| switches >> bit & 1 == 1;
+    let unchecked = on(0) && profile.flow == Flow::Passes;
+    let small = |input: &mut Input<'_>, most: u32| u64::from(input.below(most));
+    BoardConfig {
+        profile,
+        numbers: Some(numbers),
+        inertia,
+        hazards: if unchecked { Hazards::Unchecked } else { Hazards::Interlocked },
+        window_slots: if on(1) { Some(1 + input.below(200)) } else { None },
+        subnormals: if on(2) { Subnormals::Flush } else { Subnormals::Keep },
+        bandwidth: input.pick(&[
+            Bandwidth::Unlimited,
+            Bandwidth::ZCU102_SUSTAINED,
+            Bandwidth::BytesPerSecond(400_000_000),
+        ]),
+        length_width: 8 + input.below(19),
+        address_width: 32 + input.below(33),
+        delays: if on(3) {
+            Delays {
+                register_access_ns: 1 + small(input, 250),
+                halt: small(input, 200),
+                reset: small(input, 250),
+                descriptor_fetch: small(input, 100),
+                fifo_beats: 16 + input.index(64),
+            }
+        } else {
+            Delays::default()
+        },
+        ..BoardConfig::default()
+    }
+}
+
+fn variant(input: &mut Input<'_>) -> Variant {
+    let thesis = StreamFormat::Thesis16;
+    let choice = input.index(2 * PROFILES.len() + 1);
+    match PROFILES.get(choice / 2) {
+        None => {
+            let numbers =
+                Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
+            Variant { numbers, ..HALF.default_variant() }
+        }
+        Some(profile) if choice.is_multiple_of(2) => profile.default_variant(),
+        Some(profile) => Variant { inertia: Inertia::World, ..profile.default_variant() },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bitstream_model::EmulatedBoard;
+
+    use super::*;
+
+    #[test]
+    fn every_choice_is_a_board_that_can_be_built() {
+        let mut bytes = Vec::new();
+        let mut profiles = std::collections::BTreeSet::new();
+        for number in 0..2000 {
+            crate::random::fill(&mut bytes, 1, "boards", number, 32);
+            let config = any(&mut Input::new(&bytes));
+            EmulatedBoard::new(config).expect("it can be built");
+            profiles.insert(config.profile.name);
+        }
+        assert_eq!(profiles.len(), PROFILES.len());
+    }
+}

@@ -1,0 +1,241 @@
+//! This file runs a target many times, on as many threads as wished, under a watchdog.
+//!
+//! An execution that does not end cannot be ended: the campaign stops, and its thread is left behind
+//! until the program ends.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::finding::{self, Ending, Finding};
+use crate::random;
+use crate::tally::Tally;
+use crate::targets::Target;
+
+/// How often to run, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Executions.
+    pub executions: u64,
+    /// Of the inputs.
+    pub seed: u64,
+    /// Threads, at least one.
+    pub threads: usize,
+    /// What an execution may take.
+    pub limit: Duration,
+}
+
+/// What a target did.
+#[derive(Debug)]
+pub struct Summary {
+    /// Its name.
+    pub target: &'static str,
+    /// Executions that ended.
+    pub executions: u64,
+    /// Host time.
+    pub time: Duration,
+    /// What they did.
+    pub tally: Tally,
+    /// The first one that ended badly; none was begun after it.
+    pub finding: Option<Finding>,
+}
+
+/// Executions that a thread takes at once.
+const BLOCK: u64 = 16;
+/// How often the watchdog looks.
+const LOOK: Duration = Duration::from_millis(200);
+/// No execution.
+const NOTHING: u64 = u64::MAX;
+
+/// What a thread is at.
+#[derive(Debug)]
+struct At {
+    /// The execution's number.
+    number: AtomicU64,
+    /// When it began, ms since the campaign's start.
+    since: AtomicU64,
+}
+
+/// What the threads share.
+#[derive(Debug)]
+struct Shared {
+    plan: Plan,
+    target: &'static Target,
+    start: Instant,
+    /// The next execution that nobody has.
+    next: AtomicU64,
+    done: AtomicU64,
+    stop: AtomicBool,
+    at: Vec<At>,
+    tally: Mutex<Tally>,
+    found: Mutex<Vec<Finding>>,
+}
+
+impl Shared {
+    fn milliseconds(&self) -> u64 {
+        u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    /// What a thread does.
+    fn work(&self, thread: usize) {
+        let at = &self.at[thread];
+        let mut input = Vec::new();
+        let mut tally = Tally::default();
+        'all: loop {
+            let first = self.next.fetch_add(BLOCK, Ordering::Relaxed);
+            for number in first..first.saturating_add(BLOCK).min(self.plan.executions) {
+                if self.stop.load(Ordering::Relaxed) {
+                    break 'all;
+                }
+                self.input(&mut input, number);
+                at.since.store(self.milliseconds(), Ordering::Relaxed);
+                at.number.store(number, Ordering::Release);
+                let ended = finding::run(self.target, &input);
+                at.number.store(NOTHING, Ordering::Release);
+                match ended {
+                    Ok(of_one) => tally += of_one,
+                    Err(message) => self.find(number, input.clone(), Ending::Panic(message)),
+                }
+                self.done.fetch_add(1, Ordering::Relaxed);
+            }
+            if first.saturating_add(BLOCK) >= self.plan.executions {
+                break;
+            }
+        }
+        *self.tally.lock().unwrap_or_else(PoisonError::into_inner) += tally;
+    }
+
+    fn input(&self, input: &mut Vec<u8>, number: u64) {
+        random::fill(input, self.plan.seed, self.target.name, number, self.target.longest);
+    }
+
+    fn find(&self, number: u64, input: Vec<u8>, ending: Ending) {
+        let finding = Finding { target: self.target.name, number, input, ending };
+        self.found.lock().unwrap_or_else(PoisonError::into_inner).push(finding);
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// The execution that has taken too long, if there is one.
+    fn overdue(&self) -> Option<u64> {
+        let now = self.milliseconds();
+        let limit = u64::try_from(self.plan.limit.as_millis()).unwrap_or(u64::MAX);
+        self.at
+            .iter()
+            .map(|at| (at.number.load(Ordering::Acquire), at.since.load(Ordering::Relaxed)))
+            .find(|(number, since)| *number != NOTHING && now.saturating_sub(*since) > limit)
+            .map(|(number, _)| number)
+    }
+}
+
+/// Runs a target. `progress` hears from time to time how many executions have ended.
+pub fn run(target: &'static Target, plan: &Plan, mut progress: impl FnMut(u64)) -> Summary {
+    let threads = plan.threads.max(1);
+    let at = || At { number: AtomicU64::new(NOTHING), since: AtomicU64::new(0) };
+    let shared = Arc::new(Shared {
+        plan: *plan,
+        target,
+        start: Instant::now(),
+        next: AtomicU64::new(0),
+        done: AtomicU64::new(0),
+        stop: AtomicBool::new(false),
+        at: (0..threads).map(|_| at()).collect(),
+        tally: Mutex::default(),
+        found: Mutex::default(),
+    });
+    let (ended, end) = mpsc::channel::<()>();
+    for thread in 0..threads {
+        let (shared, ended) = (Arc::clone(&shared), ended.clone());
+        // Nobody listens any more once an execution has hung.
+        thread::spawn(move || {
+            shared.work(thread);
+            drop(ended);
+        });
+    }
+    drop(ended);
+    // The channel closes when the last thread ends.
+    while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+        progress(shared.done.load(Ordering::Relaxed));
+        if let Some(number) = shared.overdue() {
+            let mut input = Vec::new();
+            shared.input(&mut input, number);
+            shared.find(number, input, Ending::Hang(plan.limit));
+            break;
+        }
+    }
+    let mut found = shared.found.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    found.sort_by_key(|finding| finding.number);
+    let tally = *shared.tally.lock().unwrap_or_else(PoisonError::into_inner);
+    Summary {
+        target: target.name,
+        executions: shared.done.load(Ordering::Relaxed),
+        time: shared.start.elapsed(),
+        tally,
+        finding: found.into_iter().next(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(executions: u64, threads: usize) -> Plan {
+        Plan { executions, seed: 3, threads, limit: Duration::from_secs(20) }
+    }
+
+    fn counts(input: &[u8]) -> Tally {
+        Tally { beats: input.iter().map(|byte| u64::from(*byte)).sum(), ..Tally::default() }
+    }
+
+    #[test]
+    fn every_execution_is_run_once_whatever_the_number_of_threads() {
+        static TARGET: Target =
+            Target { name: "counts", about: "", run: counts, longest: 9, share: 1 };
+        let one = run(&TARGET, &plan(1000, 1), |_| ());
+        let four = run(&TARGET, &plan(1000, 4), |_| ());
+        assert_eq!((one.executions, four.executions), (1000, 1000));
+        assert!(one.tally.beats > 0 && one.tally == four.tally);
+        assert!(one.finding.is_none() && four.finding.is_none());
+    }
+
+    fn fails(input: &[u8]) -> Tally {
+        assert!(input.len() < 8, "an input of {} bytes", input.len());
+        Tally::default()
+    }
+
+    #[test]
+    fn a_panic_is_a_finding_whose_input_panics_again() {
+        static TARGET: Target =
+            Target { name: "fails", about: "", run: fails, longest: 9, share: 1 };
+        let summary = run(&TARGET, &plan(1000, 2), |_| ());
+        let finding = summary.finding.expect("one in five inputs is that long");
+        assert!(finding.input.len() >= 8);
+        let Ending::Panic(message) = &finding.ending else { panic!("{:?}", finding.ending) };
+        let what = format!("an input of {} bytes", finding.input.len());
+        assert!(message.contains(&what) && message.contains("campaign.rs"), "{message}");
+        let again = finding::run(&TARGET, &finding.input).expect_err("it panics again");
+        assert_eq!(again, *message);
+        assert!(summary.executions < 1000, "the campaign went on");
+    }
+
+    fn hangs(input: &[u8]) -> Tally {
+        if input.len() == 9 {
+            // The other end lives as long as the wait.
+            let (end, never) = mpsc::channel::<()>();
+            let _ = never.recv();
+            drop(end);
+        }
+        Tally::default()
+    }
+
+    #[test]
+    fn a_hang_is_a_finding_and_ends_the_campaign() {
+        static TARGET: Target =
+            Target { name: "hangs", about: "", run: hangs, longest: 9, share: 1 };
+        let limit = Duration::from_millis(300);
+        let summary = run(&TARGET, &Plan { limit, ..plan(1000, 1) }, |_| ());
+        let finding = summary.finding.expect("an input of nine bytes");
+        assert_eq!((finding.input.len(), finding.ending), (9, Ending::Hang(limit)));
+    }
+}

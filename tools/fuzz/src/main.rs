@@ -1,0 +1,206 @@
+//! Runs fuzz targets on inputs made from a seed. `--help` says how.
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program says what it does")]
+
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use fuzz::campaign::{self, Plan, Summary};
+use fuzz::finding;
+use fuzz::targets::{self, Target};
+use serde_json::json;
+
+/// Runs fuzz targets on inputs that are made from a seed: the same ones on every machine and with
+/// every number of threads.
+///
+/// A target that panics or hangs is a finding: its input is written into a file, and the exit code
+/// is 1.
+#[derive(Debug, Parser)]
+#[command(name = "fuzz", version)]
+struct Args {
+    /// The target, or `all`; `list` says which there are.
+    #[arg(default_value = "all")]
+    target: String,
+    /// Executions; those of `all` are shared out, more to the targets that take less time.
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    executions: u64,
+    /// Of the inputs.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Threads; as many as there are processors unless given.
+    #[arg(long, value_name = "T")]
+    threads: Option<usize>,
+    /// An execution that takes longer hangs, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 20)]
+    limit: u64,
+    /// Where inputs of findings are written.
+    #[arg(long, value_name = "FOLDER", default_value = "target/fuzz")]
+    findings: PathBuf,
+    /// Runs the input of that file once, instead; a panic is not caught.
+    #[arg(long, value_name = "FILE")]
+    replay: Option<PathBuf>,
+    /// Prints one JSON document instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Wrong usage, or a file that cannot be read or written.
+const USAGE: u8 = 2;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    if args.target == "list" {
+        for target in targets::ALL {
+            println!("{:<12} {}", target.name, target.about);
+        }
+        return ExitCode::SUCCESS;
+    }
+    if let Some(path) = &args.replay {
+        return match finding::load(path) {
+            Ok((target, input)) => {
+                println!("{}: {} bytes", target.name, input.len());
+                println!("{:?}", (target.run)(&input));
+                ExitCode::SUCCESS
+            }
+            Err(error) => refuse(&error),
+        };
+    }
+    let chosen: Vec<&'static Target> = match targets::by_name(&args.target) {
+        Some(target) => vec![target],
+        None if args.target == "all" => targets::ALL.iter().collect(),
+        None => {
+            let names: Vec<_> = targets::ALL.iter().map(|target| target.name).collect();
+            eprintln!(
+                "error: no target {:?}, expected all, list or one of {}",
+                args.target,
+                names.join(", ")
+            );
+            return ExitCode::from(USAGE);
+        }
+    };
+    run(&args, &chosen)
+}
+
+fn refuse(error: &dyn std::error::Error) -> ExitCode {
+    eprintln!("error: {error}");
+    if let Some(source) = error.source() {
+        eprintln!("  because: {source}");
+    }
+    ExitCode::from(USAGE)
+}
+
+fn run(args: &Args, chosen: &[&'static Target]) -> ExitCode {
+    let threads = args
+        .threads
+        .unwrap_or_else(|| thread::available_parallelism().map_or(1, std::num::NonZero::get));
+    let shares: u64 = chosen.iter().map(|target| u64::from(target.share)).sum();
+    let start = Instant::now();
+    let mut summaries = Vec::new();
+    if !args.json {
+        println!("seed {}, {threads} threads", args.seed);
+    }
+    for target in chosen {
+        let plan = Plan {
+            executions: (args.executions * u64::from(target.share)).div_ceil(shares),
+            seed: args.seed,
+            threads,
+            limit: Duration::from_secs(args.limit),
+        };
+        let show = std::io::stderr().is_terminal();
+        let summary = campaign::run(target, &plan, |done| {
+            if show {
+                eprint!("\r{}: {done} of {} ", target.name, plan.executions);
+            }
+        });
+        if show {
+            eprint!("\r{:60}\r", "");
+        }
+        if !args.json {
+            print_summary(&summary);
+        }
+        let hung = matches!(
+            summary.finding,
+            Some(finding::Finding { ending: finding::Ending::Hang(_), .. })
+        );
+        summaries.push(summary);
+        if hung {
+            // Its thread still takes a processor's time.
+            break;
+        }
+    }
+    finish(args, &summaries, threads, start.elapsed())
+}
+
+fn print_summary(summary: &Summary) {
+    let Summary { target, executions, time, tally, .. } = summary;
+    let rate = *executions as f64 / time.as_secs_f64().max(1e-9);
+    println!(
+        "{target:<12} {executions:>10} executions in {:>7.1} s, {rate:>8.0} a second",
+        time.as_secs_f64()
+    );
+    let counts: Vec<String> = tally
+        .entries()
+        .iter()
+        .filter(|(_, count)| *count > 0)
+        .map(|(name, count)| format!("{count} {name}"))
+        .collect();
+    println!("{:<12} {}", "", counts.join(", "));
+}
+
+/// Writes the inputs of what was found, and the document or the last lines.
+fn finish(args: &Args, summaries: &[Summary], threads: usize, time: Duration) -> ExitCode {
+    let mut code = ExitCode::SUCCESS;
+    let mut documents = Vec::new();
+    for summary in summaries {
+        let mut document = json!({
+            "target": summary.target,
+            "executions": summary.executions,
+            "seconds": summary.time.as_secs_f64(),
+        });
+        for (name, count) in summary.tally.entries() {
+            document[name] = count.into();
+        }
+        if let Some(finding) = &summary.finding {
+            code = ExitCode::FAILURE;
+            let path = match finding.save(&args.findings) {
+                Ok(path) => path,
+                Err(error) => {
+                    eprintln!("error: cannot write into {}: {error}", args.findings.display());
+                    code = ExitCode::from(USAGE);
+                    PathBuf::new()
+                }
+            };
+            if !args.json {
+                println!(
+                    "FOUND in {}, execution {}: {}",
+                    finding.target, finding.number, finding.ending
+                );
+                println!("  again: fuzz --replay {}", path.display());
+            }
+            document["finding"] = json!({
+                "execution": finding.number,
+                "ending": finding.ending.to_string(),
+                "file": path,
+            });
+        }
+        documents.push(document);
+    }
+    let executions: u64 = summaries.iter().map(|summary| summary.executions).sum();
+    if args.json {
+        let document = json!({
+            "seed": args.seed,
+            "threads": threads,
+            "executions": executions,
+            "seconds": time.as_secs_f64(),
+            "targets": documents,
+        });
+        println!("{document:#}");
+    } else {
+        println!("{executions} executions in {:.1} s", time.as_secs_f64());
+    }
+    code
+}

@@ -1,0 +1,152 @@
+//! This file takes random steps of the driver on a board that checks every access.
+
+use bitstream_model::EmulatedBoard;
+use zynq_pgs::{
+    Accelerator, BoardChoice, Body, BodyArrays, CollisionArrays, Error, Fault, OpenOptions,
+    StepParameters, StepReport,
+};
+
+use super::layout::{SeparateBodies, SeparateCollisions, StridedBodies, StridedCollisions};
+use super::scenes::{Scene, Spoilt, bits, parameters};
+use crate::boards;
+use crate::input::Input;
+use crate::tally::Tally;
+
+/// Steps of one execution, at most.
+const STEPS_MAX: u32 = 24;
+
+/// How bodies and collisions are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    Structures,
+    Separate,
+    /// Records with so many words between them.
+    Strided(usize),
+}
+
+/// One execution.
+pub(super) fn run(bytes: &[u8]) -> Tally {
+    let mut input = Input::new(bytes);
+    let board = EmulatedBoard::new(boards::any(&mut input)).expect("every choice can be built");
+    let options =
+        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
+    let mut accelerator = Accelerator::open(options).expect("nothing is wrong with the board");
+    let mut tally = Tally::default();
+    let mut scene = Scene::default();
+    for number in 0..STEPS_MAX {
+        if input.is_empty() {
+            break;
+        }
+        if number == 0 || input.one_in(4) {
+            let most = if input.one_in(16) { 40 } else { 8 };
+            scene = Scene::any(&mut input, most, most, Spoilt::Seldom);
+            if accelerator.set_shapes(&scene.shapes).is_err() {
+                tally.refused += 1;
+                // Isotropic, whatever the board.
+                for shape in &mut scene.shapes {
+                    shape.inverse_inertia = [shape.inverse_inertia[0]; 3];
+                }
+                accelerator.set_shapes(&scene.shapes).expect("every board takes these");
+            }
+        }
+        step(&mut input, &mut accelerator, &mut scene, &mut tally);
+        assert_eq!(board.violations(), [], "after step {number}");
+    }
+    drop(accelerator);
+    assert_eq!(board.violations(), [], "after closing");
+    tally.add_board(&board.counts());
+    tally
+}
+
+/// A step; now and then the same one in another layout.
+fn step(
+    input: &mut Input<'_>,
+    accelerator: &mut Accelerator,
+    scene: &mut Scene,
+    tally: &mut Tally,
+) {
+    let passes = if input.one_in(16) { 12 } else { 3 };
+    let parameters = parameters(input, passes, Spoilt::Seldom);
+    let first = layout(input);
+    let again = input.one_in(4).then(|| layout(input));
+    let (bodies, ended) = step_in(first, accelerator, scene, &parameters);
+    if let Some(again) = again {
+        let (bodies_again, ended_again) = step_in(again, accelerator, scene, &parameters);
+        assert_eq!(bits(&bodies), bits(&bodies_again), "{first:?} and {again:?}");
+        assert_eq!(ended.is_ok(), ended_again.is_ok(), "{ended:?}, {ended_again:?}");
+        tally.steps += u64::from(ended_again.is_ok());
+        tally.refused += u64::from(ended_again.is_err());
+    }
+    match ended {
+        Ok(report) => {
+            assert_eq!(report.bodies, bodies.len() as u64);
+            assert_eq!(report.collisions, scene.collisions.len() as u64);
+            tally.steps += 1;
+            scene.bodies = bodies;
+        }
+        Err(error) => {
+            check_refusal(&error);
+            assert_eq!(
+                bits(&bodies),
+                bits(&scene.bodies),
+                "touched by a step that failed: {error}"
+            );
+            tally.refused += 1;
+        }
+    }
+}
+
+/// Nothing is wrong with the board: a step fails by its input alone.
+fn check_refusal(error: &Error) {
+    let by_input = match error {
+        Error::Input(_) => true,
+        Error::Step { fault, .. } => matches!(**fault, Fault::NotFinite { .. }),
+        _ => false,
+    };
+    assert!(by_input && !error.must_reopen(), "{error}: {error:?}");
+}
+
+fn layout(input: &mut Input<'_>) -> Layout {
+    match input.below(4) {
+        0 => Layout::Structures,
+        1 => Layout::Separate,
+        _ => Layout::Strided(input.index(12)),
+    }
+}
+
+/// The bodies of a scene in a layout, after a step.
+fn step_in(
+    layout: Layout,
+    accelerator: &mut Accelerator,
+    scene: &Scene,
+    parameters: &StepParameters,
+) -> (Vec<Body>, Result<StepReport, Error>) {
+    match layout {
+        Layout::Structures => {
+            let mut bodies = scene.bodies.clone();
+            let ended = accelerator.step(&mut bodies, &scene.collisions, parameters);
+            (bodies, ended)
+        }
+        Layout::Separate => {
+            let mut separate = SeparateBodies::new(&scene.bodies);
+            let SeparateCollisions { bodies, normals, counts, contacts } =
+                &SeparateCollisions::new(&scene.collisions);
+            let collisions = CollisionArrays { bodies, normals, counts, contacts };
+            let mut bodies = BodyArrays {
+                positions: &mut separate.positions,
+                orientations: &mut separate.orientations,
+                linear_velocities: &mut separate.linear,
+                angular_velocities: &mut separate.angular,
+                shapes: &separate.shapes,
+            };
+            let ended = accelerator.step(&mut bodies, &collisions, parameters);
+            (separate.bodies(), ended)
+        }
+        Layout::Strided(gap) => {
+            let mut bodies = StridedBodies::new(&scene.bodies, gap);
+            let collisions = StridedCollisions::new(&scene.collisions, gap);
+            let ended = accelerator.step(&mut bodies, &collisions, parameters);
+            (bodies.bodies(), ended)
+        }
+    }
+}

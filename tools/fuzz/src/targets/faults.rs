@@ -1,0 +1,249 @@
+//! This file has a board fail while the driver takes steps: every step ends in bounded time, with the
+//! bits of an undisturbed one or with an error that has changed nothing, and the next one works.
+
+use std::time::Duration;
+
+use bitstream_model::{
+    BoardConfig, Consequence, CpuPort, EmulatedBoard, Fault, FaultKind, FaultPlan, ViolationKind,
+};
+use zynq_pgs::{Accelerator, BoardChoice, Body, Error, OpenOptions, StepParameters};
+
+use super::scenes::{Scene, Spoilt, bits, parameters};
+use crate::boards;
+use crate::input::Input;
+use crate::tally::Tally;
+
+/// What a step of these may take on the accelerator.
+const DEADLINE: Duration = Duration::from_millis(5);
+/// What the driver may take beyond it, to stop and reset everything.
+const RECOVERY: Duration = Duration::from_millis(150);
+/// Steps with faults.
+const STEPS: u32 = 3;
+
+/// Pieces of a line that says a plan, in the right and in the wrong place.
+const PIECES: [&str; 24] = [
+    "dma-dec-err",
+    "stall",
+    "corrupt=0xFF",
+    "irq-drop",
+    "slow",
+    "reset-never",
+    "power-lost",
+    "accelerator-error=3",
+    "@",
+    "dma1.s2mm",
+    "dma0.mm2s",
+    "dma2",
+    "accelerator",
+    ",",
+    ";",
+    "=",
+    "phase=contact1",
+    "phase=load",
+    "beat=7",
+    "bd=0",
+    "step=2",
+    "times=3",
+    "18446744073709551616",
+    " ",
+];
+
+#[derive(Debug)]
+struct Run {
+    board: EmulatedBoard,
+    port: CpuPort,
+    accelerator: Accelerator,
+    scene: Scene,
+    parameters: StepParameters,
+    /// What the step gives.
+    expected: Vec<u32>,
+    tally: Tally,
+}
+
+/// One execution.
+pub(super) fn run(bytes: &[u8]) -> Tally {
+    let mut input = Input::new(bytes);
+    if input.one_in(4) {
+        read_line(&mut input);
+    }
+    let config = BoardConfig { strict: false, ..boards::any(&mut input) };
+    let board = EmulatedBoard::new(config).expect("every choice can be built");
+    let port = board.cpu_port();
+    let mut tally = Tally::default();
+    let plan = if input.one_in(8) {
+        open_faulty(&mut input, &board, &config)
+    } else if let Some(mut run) = Run::new(&mut input, &board) {
+        let plan = run.go(&mut input, &config);
+        tally = run.tally;
+        plan
+    } else {
+        tally.refused += 1;
+        FaultPlan::default()
+    };
+    for violation in board.violations() {
+        // A fault may halt a channel behind the driver's back. What must never be is an access
+        // outside what was granted.
+        let behind_its_back = matches!(violation.kind, ViolationKind::DoorbellWhileHalted { .. });
+        assert!(behind_its_back, "{plan}: {violation}");
+    }
+    assert!(port.now() < Duration::from_secs(60), "{:?} have passed", port.now());
+    tally.faults += board.faults();
+    tally.add_board(&board.counts());
+    tally
+}
+
+/// Whatever a line says, it is a plan or refused; a plan is read as it was written.
+fn read_line(input: &mut Input<'_>) {
+    let mut line = String::new();
+    for _ in 0..input.below(12) {
+        match input.below(6) {
+            0 => line.push(char::from(input.byte())),
+            1 => line.push_str(&input.telling_word().to_string()),
+            _ => line.push_str(input.pick(&PIECES)),
+        }
+    }
+    match line.parse::<FaultPlan>() {
+        Ok(plan) => check_line(&plan),
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+fn check_line(plan: &FaultPlan) {
+    let line = plan.to_string();
+    assert_eq!(line.parse().as_ref(), Ok(plan), "{line}");
+}
+
+/// A plan of one to three faults.
+fn plan(input: &mut Input<'_>, config: &BoardConfig) -> FaultPlan {
+    let mut plan = FaultPlan::random(input.long(), config, 3, 3);
+    for fault in &mut plan.faults {
+        if input.one_in(4) {
+            fault.step = Some(1 + input.below(STEPS));
+        }
+        if input.one_in(8) {
+            fault.times = 1 + input.below(3);
+        }
+        if let FaultKind::Corrupt { mask } = &mut fault.kind {
+            // Never none of the bits.
+            *mask = input.word() | 1 << input.below(32);
+        }
+    }
+    check_line(&plan);
+    plan
+}
+
+fn open(port: &CpuPort) -> Result<Accelerator, Error> {
+    let board = BoardChoice::Emulated(port.clone());
+    Accelerator::open(OpenOptions { board, ..OpenOptions::default() })
+}
+
+/// Opens a board that fails meanwhile: it opens or says why not, in bounded time.
+fn open_faulty(input: &mut Input<'_>, board: &EmulatedBoard, config: &BoardConfig) -> FaultPlan {
+    let port = board.cpu_port();
+    let plan = plan(input, config);
+    board.inject(plan.clone());
+    let opened = open(&port).map(drop);
+    assert!(port.now() < Duration::from_secs(1), "it took {:?} to open", port.now());
+    if let Err(error) = opened {
+        assert!(matches!(error, Error::Open(_)), "{plan}: {error:?}");
+    }
+    plan
+}
+
+impl Run {
+    /// A board, and a step on it that nothing disturbs; none if that step fails by its input.
+    fn new(input: &mut Input<'_>, board: &EmulatedBoard) -> Option<Self> {
+        let port = board.cpu_port();
+        let mut accelerator = open(&port).expect("nothing is wrong with the board");
+        let scene = Scene::any(input, 8, 8, Spoilt::Never);
+        accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
+        let mut parameters = parameters(input, 3, Spoilt::Never);
+        // With hazards, what a pipeline that does not wait computes depends on when beats come.
+        parameters.order = None;
+        parameters.deadline = Some(DEADLINE);
+        let mut bodies = scene.bodies.clone();
+        if let Err(error) = accelerator.step(&mut bodies, &scene.collisions, &parameters) {
+            assert!(!error.may_retry() && !error.must_reopen(), "nothing is wrong: {error:?}");
+            return None;
+        }
+        let expected = bits(&bodies);
+        let (board, tally) = (board.clone(), Tally { steps: 1, ..Tally::default() });
+        Some(Self { board, port, accelerator, scene, parameters, expected, tally })
+    }
+
+    /// Steps with faults, and then without.
+    fn go(&mut self, input: &mut Input<'_>, config: &BoardConfig) -> FaultPlan {
+        let plan = plan(input, config);
+        self.under(input, &plan);
+        plan
+    }
+
+    fn under(&mut self, input: &mut Input<'_>, plan: &FaultPlan) {
+        if input.one_in(4) {
+            self.parameters.retries = input.below(3);
+        }
+        self.board.inject(plan.clone());
+        let survivable = |fault: &Fault| fault.kind.consequence() == Consequence::Survivable;
+        let survivable = plan.faults.iter().all(survivable);
+        for _ in 0..STEPS {
+            let ended = self.step(plan);
+            if let Err(error) = ended {
+                assert!(!survivable, "{plan}: {error:?}");
+                if error.must_reopen() {
+                    return self.after_all(plan);
+                }
+            }
+        }
+        self.board.clear_faults();
+        // What had begun and not shown may still end a step, and is reset then.
+        if let Err(error) = self.step(plan) {
+            assert!(!survivable, "{plan}: {error:?}");
+            if error.must_reopen() {
+                return self.after_all(plan);
+            }
+            self.step(plan).unwrap_or_else(|error| panic!("{plan}: no fault is left: {error:?}"));
+        }
+    }
+
+    /// A step that ends in time, with the right bits or with none.
+    fn step(&mut self, plan: &FaultPlan) -> Result<(), Error> {
+        let mut bodies: Vec<Body> = self.scene.bodies.clone();
+        let begin = self.port.now();
+        let ended = self.accelerator.step(&mut bodies, &self.scene.collisions, &self.parameters);
+        let took = self.port.now() - begin;
+        let limit = (DEADLINE + RECOVERY) * (1 + self.parameters.retries);
+        assert!(took <= limit, "{plan}: the step took {took:?}");
+        match ended {
+            Ok(_) => {
+                self.tally.steps += 1;
+                if bits(&bodies) != self.expected {
+                    // Two wrong words may have the right sum.
+                    let corrupt = |fault: &&Fault| matches!(fault.kind, FaultKind::Corrupt { .. });
+                    let corrupt = plan.faults.iter().filter(corrupt).map(|fault| fault.times);
+                    assert!(
+                        corrupt.sum::<u32>() > 1,
+                        "{plan}: not the bits of an undisturbed step"
+                    );
+                }
+                Ok(())
+            }
+            Err(error) => {
+                self.tally.refused += 1;
+                assert_eq!(bits(&bodies), bits(&self.scene.bodies), "{plan}: touched: {error}");
+                assert!(!error.is_input(), "{plan}: {error}");
+                Err(error)
+            }
+        }
+    }
+
+    /// An accelerator that has to be opened again says so to every call, and touches nothing.
+    fn after_all(&mut self, plan: &FaultPlan) {
+        let before = self.board.counts();
+        let again = self.step(plan).expect_err("it was given up");
+        assert!(matches!(again, Error::MustReopen), "{plan}: {again:?}");
+        let shapes = self.accelerator.set_shapes(&self.scene.shapes);
+        assert!(matches!(shapes, Err(Error::MustReopen)), "{plan}: {shapes:?}");
+        let after = self.board.counts();
+        assert_eq!(before.register_writes, after.register_writes, "{plan}: registers written");
+    }
+}

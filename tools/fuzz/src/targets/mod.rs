@@ -1,0 +1,86 @@
+//! The targets: functions of bytes that panic when they find something.
+
+mod chains;
+mod confinement;
+mod faults;
+mod folders;
+mod layout;
+mod packets;
+mod registers;
+mod scenes;
+mod space;
+
+use crate::tally::Tally;
+
+/// A target.
+#[derive(Debug)]
+pub struct Target {
+    /// Its name.
+    pub name: &'static str,
+    /// What it drives, and what it holds against it.
+    pub about: &'static str,
+    /// One execution.
+    pub run: fn(&[u8]) -> Tally,
+    /// Bytes of an input, at most.
+    pub longest: usize,
+    /// How many executions it gets beside the others.
+    pub share: u32,
+}
+
+/// Every target.
+pub const ALL: &[Target] = &[
+    Target {
+        name: "registers",
+        about: "random register accesses, buffers and waits on the emulated board: who owns what is \
+                kept, what the device may only read stays as it is, and time goes on",
+        run: registers::run,
+        longest: 256,
+        share: 4,
+    },
+    Target {
+        name: "chains",
+        about: "random descriptors and direct transfers on memory that watches: no access outside \
+                what was granted, and none that no descriptor asked for",
+        run: chains::run,
+        longest: 512,
+        share: 4,
+    },
+    Target {
+        name: "packets",
+        about: "spoilt steps of every profile: the accelerator is done, says why not, or waits; after \
+                a reset the step that was meant has the bits of a fresh board",
+        run: packets::run,
+        longest: 192,
+        share: 2,
+    },
+    Target {
+        name: "folders",
+        about: "spoilt folders of arrays: the loader takes them or says what is wrong, and what it \
+                takes is what the files say",
+        run: folders::run,
+        longest: 256,
+        share: 9,
+    },
+    Target {
+        name: "confinement",
+        about: "random steps of the driver on every profile: no access outside the buffers of the \
+                step, bodies untouched where it is refused, the same bits in every layout",
+        run: confinement::run,
+        longest: 768,
+        share: 1,
+    },
+    Target {
+        name: "faults",
+        about: "faults of the board under the driver's steps: each ends in time with the bits of an \
+                undisturbed one or an error that changed nothing, and the next one works",
+        run: faults::run,
+        longest: 320,
+        share: 1,
+    },
+];
+
+/// The target of that name.
+#[must_use]
+pub fn by_name(name: &str) -> Option<&'static Target> {
+    ALL.iter().find(|target| target.name == name)
+}
