@@ -9,6 +9,8 @@ mod fault;
 mod lane;
 #[cfg(all(test, feature = "emulation"))]
 mod memory_tests;
+#[cfg(all(test, feature = "emulation"))]
+mod mistakes;
 mod ordering;
 mod plan;
 mod recovery;
