@@ -7,25 +7,19 @@
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
 
+mod common;
 mod vectors;
 
 use std::path::PathBuf;
 
-use bitstream_model::{BoardConfig, EmulatedBoard, Hazards};
+use bitstream_model::{BoardConfig, Hazards};
+use common::{bits, by_hand, open, ordered};
 use scene::{Scene, SceneOptions, kinetic_energy};
 use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
-use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderError, Orderer, Ties};
+use zynq_pgs::order::{Order, OrderError, Ties};
 use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Collision, Error, InputError, OpenOptions, Pose, Shape,
-    StepParameters, StepReport, Velocity,
+    Body, Collision, Error, InputError, Pose, Shape, StepParameters, StepReport, Velocity,
 };
-
-fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
-    let board = EmulatedBoard::new(config).expect("a board that can be built");
-    let options =
-        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
-    (board, Accelerator::open(options).expect("a board that opens"))
-}
 
 fn with(hazards: Hazards) -> BoardConfig {
     BoardConfig { hazards, ..BoardConfig::default() }
@@ -36,25 +30,10 @@ fn sequential() -> BoardConfig {
     BoardConfig { window_slots: Some(1), ..BoardConfig::default() }
 }
 
-fn ordered(order: Order) -> StepParameters {
-    let mut parameters = StepParameters::default();
-    parameters.order = Some(order);
-    parameters
-}
-
 fn verified(order: Order) -> StepParameters {
     let mut parameters = ordered(order);
     parameters.verify_order = true;
     parameters
-}
-
-fn bits(bodies: &[Body]) -> Vec<u32> {
-    let numbers = |body: &Body| {
-        let Pose { position, orientation } = body.pose;
-        let Velocity { linear, angular } = body.velocity;
-        [position.to_vec(), orientation.to_vec(), linear.to_vec(), angular.to_vec()].concat()
-    };
-    bodies.iter().flat_map(numbers).map(f32::to_bits).collect()
 }
 
 fn pile(text: &str, drop: f32) -> Scene {
@@ -82,23 +61,16 @@ fn run(
     (bits(scene.bodies()), reports)
 }
 
-/// The collisions as the hazard-free order for the window of `float` takes them.
-fn by_hand(bodies: &[Body], collisions: &[Collision], shapes: &[Shape]) -> Vec<Collision> {
-    let window = IssueWindow::new(158, 1).expect("a window");
-    let mut buffers = InputBuffers::new();
-    let input = buffers.gather(bodies, collisions, shapes);
-    let mut orderer = Orderer::new();
-    let schedule = orderer.order(&input, Order::HazardFree, window).expect("it can be ordered");
-    schedule.iter().flatten().map(|index| collisions[index as usize]).collect()
-}
+/// Issue slots of the window of `float`.
+const DEPTH: u32 = 158;
 
-/// Steps a scene in that order, one collision after the other.
+/// Steps a scene in the hazard-free order for the window of `float`, one collision after the other.
 fn run_by_hand(mut scene: Scene, steps: usize) -> Vec<u32> {
     let (_, mut accelerator) = open(sequential());
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     for _ in 0..steps {
         scene.detect();
-        let collisions = by_hand(scene.bodies(), scene.collisions(), scene.shapes());
+        let collisions = by_hand(scene.bodies(), scene.collisions(), scene.shapes(), DEPTH);
         let (bodies, _) = scene.parts_mut();
         let report = accelerator.step(bodies, &collisions, &ordered(Order::AsGiven));
         assert_eq!(report.expect("a step").cycles.stalls, 0);
@@ -299,7 +271,7 @@ fn the_full_step_gives_the_same_bits_and_keeps_its_energy() {
         );
         (bits(&bodies), report, energy)
     };
-    let collisions = by_hand(&start.bodies, &start.collisions, &start.shapes);
+    let collisions = by_hand(&start.bodies, &start.collisions, &start.shapes, DEPTH);
     let (expected, _, energy) = step(sequential(), &collisions, Order::AsGiven);
     for hazards in [Hazards::Unchecked, Hazards::Interlocked] {
         let (found, report, _) = step(with(hazards), &start.collisions, Order::HazardFree);

@@ -2,13 +2,16 @@
 //! costs, and what each refuses.
 #![cfg(feature = "emulation")]
 
+mod common;
+
+use bitstream_model::BoardConfig;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile};
-use bitstream_model::{BoardConfig, EmulatedBoard};
+use common::{bits, open};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::{
-    Accelerator, Aftermath, BoardChoice, Body, Collision, Contact, Error, Fault, OpenOptions, Pose,
-    Shape, StepParameters, StepReport, Velocity,
+    Aftermath, Body, Collision, Contact, Error, Fault, Pose, Shape, StepParameters, StepReport,
+    Velocity,
 };
 
 /// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
@@ -21,13 +24,6 @@ const THESIS16: Numbers = Numbers {
 
 fn of(profile: &'static Profile) -> BoardConfig {
     BoardConfig { profile, ..BoardConfig::default() }
-}
-
-fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
-    let board = EmulatedBoard::new(config).expect("a board that can be built");
-    let options =
-        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
-    (board, Accelerator::open(options).expect("a board that opens"))
 }
 
 /// What a step of a small pile, standing on the ground, does on a board.
@@ -59,15 +55,6 @@ fn step(config: BoardConfig) -> Stepped {
     drop(accelerator);
     assert_eq!(board.violations(), [], "{}", config.profile.name);
     Stepped { bodies: scene.bodies().to_vec(), report }
-}
-
-fn bits(bodies: &[Body]) -> Vec<u32> {
-    let numbers = |body: &Body| {
-        let Pose { position, orientation } = body.pose;
-        let Velocity { linear, angular } = body.velocity;
-        [position.to_vec(), orientation.to_vec(), linear.to_vec(), angular.to_vec()].concat()
-    };
-    bodies.iter().flat_map(numbers).map(f32::to_bits).collect()
 }
 
 /// The largest difference of a component of position and of velocity.

@@ -5,32 +5,21 @@
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the counts are printed for whoever wants to see them")]
 
-use bitstream_model::{BoardConfig, EmulatedBoard};
+mod common;
+
+use bitstream_model::BoardConfig;
+use common::{bits, open};
 use scene::{Scene, SceneOptions};
-use zynq_pgs::{
-    Accelerator, BoardChoice, Body, OpenOptions, Pose, StepParameters, StepReport, Velocity,
-};
+use zynq_pgs::{StepParameters, StepReport};
 
 const LENGTH_WIDTHS: [u32; 5] = [8, 14, 16, 23, 26];
 const ADDRESS_WIDTHS: [u32; 2] = [32, 40];
 const STEPS: usize = 2;
 const PASSES: u64 = 8;
 
-fn bits(bodies: &[Body]) -> Vec<u32> {
-    let numbers = |body: &Body| {
-        let Pose { position, orientation } = body.pose;
-        let Velocity { linear, angular } = body.velocity;
-        [position.to_vec(), orientation.to_vec(), linear.to_vec(), angular.to_vec()].concat()
-    };
-    bodies.iter().flat_map(numbers).map(f32::to_bits).collect()
-}
-
 /// The first steps of a pile of 1,000 cubes that stands on the ground.
 fn steps(config: BoardConfig) -> (Vec<StepReport>, Vec<u32>) {
-    let board = EmulatedBoard::new(config).expect("a board that can be built");
-    let options =
-        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
-    let mut accelerator = Accelerator::open(options).expect("the emulated board");
+    let (board, mut accelerator) = open(config);
     let grid = "10x10x10".parse().expect("a grid");
     let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
     let mut scene = Scene::new(&options).expect("a small scene");

@@ -294,6 +294,14 @@ impl Memory {
         }
     }
 
+    /// Whether the device may write those beats.
+    pub(crate) fn check_write(&mut self, address: u64, count: usize) -> Result<(), Denied> {
+        match &self.outside {
+            Some(outside) => outside.check(address, (count * BEAT_BYTES) as u64),
+            None => self.beats_mut(address, count).map(|_| ()),
+        }
+    }
+
     /// Beats that the device writes: `fill` gives them, if the device may. The address is a multiple
     /// of a beat.
     pub(crate) fn write(

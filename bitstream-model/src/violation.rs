@@ -103,7 +103,8 @@ pub enum ViolationKind {
         /// Bus address.
         address: u64,
     },
-    /// An access of the device to memory that it was not granted.
+    /// An access of the device to memory that it was not granted, or a descriptor that would have
+    /// let a longer packet there.
     #[error("dma{core} {direction}: {bytes} bytes at {address:#x}: {denied}")]
     OutsideGrant {
         /// Which DMA.

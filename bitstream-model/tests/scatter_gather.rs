@@ -303,6 +303,27 @@ fn one_beat_past_the_end_of_a_buffer_is_denied() {
 }
 
 #[test]
+fn room_for_a_packet_past_the_end_of_a_buffer_is_told_even_if_the_packet_ends_before() {
+    let mut machine = Machine::new(BoardConfig { strict: false, ..BoardConfig::default() });
+    let buffer = machine.host.writable(4);
+    let step = Step::falling(4);
+    step.write_arguments(&machine.host);
+    let mut flight = Flight::default();
+    // Four beats come.
+    let slot = machine.s2mm[2].push(buffer, 80);
+    machine.s2mm[2].doorbell(&machine.host, slot);
+    machine.start();
+    machine.send(&mut flight, &step.lanes());
+    machine.host.pause(50);
+    assert!(status::CMPLTED.is_set(machine.s2mm[2].status(slot)));
+    assert_eq!(machine.host.status(2, Direction::S2mm) & dmasr::ERRORS, 0);
+    let (core, direction, address) = (2, Direction::S2mm, buffer);
+    let denied = Denied::PastEnd;
+    let kind = ViolationKind::OutsideGrant { core, direction, address, bytes: 80, denied };
+    assert_eq!(machine.host.violations(), [kind]);
+}
+
+#[test]
 fn a_buffer_that_begins_behind_its_end_is_denied() {
     let prepare = |host: &Host| (host.readable(&numbered(4)) + 64, 16);
     assert_denied(Direction::Mm2s, prepare, 0, Denied::Unmapped);

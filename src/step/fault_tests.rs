@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bitstream_model::interface::control::ErrorCode;
-use bitstream_model::{BoardConfig, Direction as Side, EmulatedBoard, Fault as Injected};
+use bitstream_model::{
+    BoardConfig, Direction as Side, EmulatedBoard, Fault as Injected, FaultKind,
+};
 
 use super::oddities::Oddity;
 use super::tampered::{CONTROL, Tamper, Tampered};
@@ -178,7 +180,7 @@ fn a_channel_that_is_behind_the_others_is_named_at_the_deadline() {
         [(1, Side::S2mm, Direction::S2mm), (3, Side::S2mm, Direction::S2mm)]
     {
         let (board, _, mut accelerator) = Tampered::open();
-        board.inject(Injected::Stall { core, direction });
+        board.inject(Injected::new(FaultKind::Stall).on(core, direction));
         let error = step(&mut accelerator, CUBES).0.expect_err("a channel that stalls");
         let fault = fault_of(&error);
         let channel = fault.channel().expect("the one that is behind");
@@ -266,7 +268,7 @@ fn another_bitstream_is_found_at_the_fault_and_after_the_reset() {
     for (at, value) in [(IDENTIFICATION, 0x1234_5678), (NUMBERS, 0x0111_1111)] {
         let (board, tampered, mut accelerator) = Tampered::open();
         step(&mut accelerator, CUBES).0.expect("a good step");
-        board.inject(Injected::Stall { core: 0, direction: Side::Mm2s });
+        board.inject(Injected::new(FaultKind::Stall).on(0, Side::Mm2s));
         tampered.tamper(CONTROL, at, Tamper::Value(value));
         let error = step(&mut accelerator, CUBES).0.expect_err("another bitstream");
         assert!(
@@ -352,7 +354,7 @@ fn a_step_is_taken_again_if_it_may_be_and_gives_the_same_bits() {
         let result = accelerator.step(&mut bodies, &collisions, &parameters);
         (result, bits(&bodies))
     };
-    let fault = Injected::DecodeError { core: 1, direction: Side::Mm2s };
+    let fault = Injected::new(FaultKind::DmaDecErr).on(1, Side::Mm2s);
     assert_eq!(again(&mut accelerator, 3).0.expect("nothing happens").retries, 0);
     board.inject(fault);
     let (result, bodies) = again(&mut accelerator, 1);
@@ -370,7 +372,7 @@ fn a_step_is_taken_again_if_it_may_be_and_gives_the_same_bits() {
 fn a_diagnosis_holds_the_last_accesses_and_every_channel() {
     let (board, mut accelerator) = open(BoardConfig::default());
     step(&mut accelerator, CUBES).0.expect("a good step");
-    board.inject(Injected::DecodeError { core: 2, direction: Side::Mm2s });
+    board.inject(Injected::new(FaultKind::DmaDecErr).on(2, Side::Mm2s));
     let error = step(&mut accelerator, CUBES).0.expect_err("a fault");
     assert!(matches!(&error, Error::Step { aftermath: Aftermath::Ready, .. }));
     let diagnosis = error.diagnosis().expect("taken down");

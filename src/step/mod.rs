@@ -13,6 +13,8 @@ mod lane;
 mod locate;
 #[cfg(all(test, feature = "emulation"))]
 mod memory_tests;
+#[cfg(all(test, feature = "emulation"))]
+mod mistakes;
 mod oddities;
 mod ordering;
 mod phase;

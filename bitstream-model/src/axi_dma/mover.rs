@@ -381,6 +381,24 @@ impl Channel {
         });
     }
 
+    /// A packet may end before its buffer does. What the descriptor would have let the device write
+    /// beyond must be granted all the same: the next packet could be longer.
+    fn check_rest(&self, build: &Build, bd: &Descriptor, with: &mut Surroundings<'_>) {
+        if self.direction == Direction::Mm2s || bd.moved == bd.length {
+            return;
+        }
+        let beats = bd.length.div_ceil(BEAT) as usize;
+        if let Err(denied) = with.memory.check_write(bd.buffer & !(u64::from(BEAT) - 1), beats) {
+            with.log.violation(ViolationKind::OutsideGrant {
+                core: build.core,
+                direction: self.direction,
+                address: bd.buffer,
+                bytes: bd.length.into(),
+                denied,
+            });
+        }
+    }
+
     /// A descriptor is done: writes its status and goes on, or pauses at the tail.
     fn complete(
         &mut self,
@@ -412,6 +430,7 @@ impl Channel {
         } else if !self.put_status(build, address, word, with) {
             return;
         }
+        self.check_rest(build, &bd, with);
         with.moved.descriptors += 1;
         self.descriptors += 1;
         if ended {

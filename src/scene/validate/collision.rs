@@ -44,7 +44,8 @@ pub(super) fn check_collision(
     Ok(pair)
 }
 
-/// Names the number of these contact points that is known not to be finite.
+/// Names the number of these contact points that is known not to be finite. A refusal stands even if
+/// none is found.
 #[cold]
 fn contact_not_finite(collision: usize, contacts: &[Contact]) -> InputError {
     let mut values =
@@ -53,9 +54,8 @@ fn contact_not_finite(collision: usize, contacts: &[Contact]) -> InputError {
             [("point", 0, x), ("point", 1, y), ("point", 2, z), ("distance", 0, *distance)]
                 .map(|(field, component, found)| (contact, field, component, found))
         });
-    let (contact, field, component, found) = values
-        .find(|(.., found)| !found.is_finite())
-        .expect("a number of these contact points was found not to be finite");
+    let (contact, field, component, found) =
+        values.find(|(.., found)| !found.is_finite()).unwrap_or((0, "point", 0, f32::NAN));
     InputError::ContactNotFinite { collision, contact, field, component, found }
 }
 
@@ -75,6 +75,18 @@ mod tests {
 
     fn refused(collision: &Collision) -> InputError {
         check_collision(5, collision, 3).expect_err("a collision to be refused")
+    }
+
+    #[test]
+    fn a_refusal_that_finds_no_culprit_is_a_refusal_still() {
+        let InputError::ContactNotFinite { collision: 5, contact: 0, field, .. } =
+            contact_not_finite(5, &[USED])
+        else {
+            panic!("the contact points were refused")
+        };
+        assert_eq!(field, "point");
+        let (index, found) = first(&[1.0, 2.0], |value| value > 2.0);
+        assert!(index == 0 && found.is_nan());
     }
 
     #[test]

@@ -172,11 +172,12 @@ fn all_within(values: &[f32], limit: f32) -> bool {
     values.iter().fold(true, |within, value| within & (value.abs() <= limit))
 }
 
-/// The first value that is wrong, which the caller has found to exist, and where it stands.
+/// The first value that is wrong, and where it stands. The caller has found one to exist; should
+/// that not be so, the refusal stands, and blames the first.
 #[cold]
 fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
-    let found = values.iter().copied().enumerate().find(|(_, value)| wrong(*value));
-    found.expect("a number was found to be wrong")
+    let mut values = values.iter().copied().enumerate();
+    values.find(|(_, value)| wrong(*value)).unwrap_or((0, f32::NAN))
 }
 
 #[cfg(test)]

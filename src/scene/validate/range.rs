@@ -142,7 +142,7 @@ fn refused(
         })
         .chain(of_contacts)
         .find(|(.., found)| found.is_nan() || found.abs() > limit)
-        .expect("a number of this collision was found to be out of range");
+        .unwrap_or((None, "normal", 0, collision.normal[0]));
     let carriers = scene.demand.carriers(|variant| fits(variant, collision, positions));
     InputError::CollisionOutOfRange {
         collision: index,

@@ -114,11 +114,19 @@ impl Rows<'_> {
     #[cold]
     fn refused(&self, scene: &Scene<'_>) -> InputError {
         let flush = scene.flush_subnormals;
+        let (smallest, largest) = (1.0 / LARGEST, f32::INFINITY);
         let (contact, field, component, found, smallest, largest) = self
             .numbers(scene.variant, flush)
             .into_iter()
             .find(|(.., found, smallest, largest)| !(smallest..=largest).contains(&found))
-            .expect("a number of this collision was found to be out of range");
+            .unwrap_or((
+                None,
+                "sum of the inverse masses",
+                0,
+                self.inverse_mass(),
+                smallest,
+                largest,
+            ));
         let carriers = scene.demand.carriers(|variant| {
             fits(variant, self.collision, self.positions) && self.fit(variant, flush)
         });
