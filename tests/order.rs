@@ -2,8 +2,8 @@
 //! look, hardware that waits and a solver that takes one collision after the other give the same
 //! bits, and the order costs its empty entries and nothing else.
 //!
-//! With `PGS_VECTORS` also the thesis' step; `cargo test --test order -- --nocapture` prints the
-//! figures.
+//! With `PGS_VECTORS` also the thesis' step; `cargo test -p zynq-pgs --test order -- --nocapture`
+//! prints the figures.
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
 

@@ -1,7 +1,7 @@
 //! The widths of length registers and addresses decide how a step is cut into descriptors, and
 //! nothing else.
 //!
-//! `cargo test --test widths -- --nocapture` prints the descriptors of each.
+//! `cargo test -p zynq-pgs --test widths -- --nocapture` prints the descriptors of each.
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the counts are printed for whoever wants to see them")]
 

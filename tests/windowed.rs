@@ -1,8 +1,8 @@
 //! The design that streams the collisions once, through the driver: the same bits as one collision
 //! after the other in the same order, and a refusal of everything that it would wait for for ever.
 //!
-//! With `PGS_VECTORS` also the thesis' step; `cargo test --test windowed -- --nocapture` prints the
-//! figures.
+//! With `PGS_VECTORS` also the thesis' step; `cargo test -p zynq-pgs --test windowed -- --nocapture`
+//! prints the figures.
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
 
