@@ -62,11 +62,11 @@ fn mistake_17_buffer_used_again_after_a_time_out() {
         // No time at all: the engines are in the middle of it.
         let deadline = Some(Duration::from_nanos(1));
         let parameters = StepParameters { deadline, ..StepParameters::default() };
-        let (result, bodies) = bench.step_with(90, &parameters);
+        let (result, bodies) = bench.step_with(900, &parameters);
         let error = result.expect_err("no time");
-        assert_eq!(bits(&bodies), bits(&scene(90).0), "{error}");
+        assert_eq!(bits(&bodies), bits(&scene(900).0), "{error}");
         // The same buffers, then others: those go back.
-        for cubes in [90, 300] {
+        for cubes in [900, 3000] {
             bench.step(cubes)?;
         }
         bench.close()

@@ -106,9 +106,9 @@ impl Windowed {
         ] {
             if records > 0 {
                 segment.check(records, inputs)?;
-            } else {
-                segment.check_waiting(inputs)?;
             }
+            // It may wait for more records than have arrived.
+            segment.check_waiting(inputs)?;
         }
         Ok(())
     }
