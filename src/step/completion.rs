@@ -67,7 +67,11 @@ impl Device {
             if packet && self.platform.now().saturating_sub(looked) > NOTICEABLE {
                 self.oddities.tell(Oddity::LateStatus);
             }
+            let odd = woke && !pending;
             if complete {
+                if odd {
+                    self.oddities.tell(Oddity::SpuriousInterrupt);
+                }
                 self.note_interrupt(interrupts > u64::from(spurious));
                 if spurious >= STORM {
                     // The storm may be over, and the next step relies on interrupts.
@@ -79,7 +83,7 @@ impl Device {
             if let Some(error) = self.control.sticky_error() {
                 return Err(Symptom::Sticky(error));
             }
-            if woke && !pending {
+            if odd {
                 // Neither a channel nor the accelerator.
                 self.oddities.tell(Oddity::SpuriousInterrupt);
             }
@@ -92,7 +96,7 @@ impl Device {
             slice = match packet || spurious >= STORM {
                 true => GRACE,
                 // An interrupt that was none says nothing of how long it still takes.
-                false if woke && !pending => slice,
+                false if odd => slice,
                 false => (slice * 2).min(self.longest_slice(deadline)),
             };
         }

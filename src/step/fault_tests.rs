@@ -17,7 +17,7 @@ use crate::{
 
 const DMASR: u32 = 0x04;
 const S2MM: u32 = 0x30;
-const CUBES: u32 = 20;
+pub(super) const CUBES: u32 = 20;
 
 const RXEOF: u32 = 1 << 26;
 const CMPLTED: u32 = 1 << 31;
@@ -36,14 +36,14 @@ fn failed(tampered: &Arc<Tampered>, accelerator: &mut Accelerator) -> Error {
     error
 }
 
-fn recovered(accelerator: &mut Accelerator, error: &Error) {
+pub(super) fn recovered(accelerator: &mut Accelerator, error: &Error) {
     assert!(error.may_retry(), "{error}");
     let (result, bodies) = step(accelerator, CUBES);
     result.expect("the next step");
     assert_eq!(bits(&bodies), undisturbed(CUBES), "after {error}");
 }
 
-fn fault_of(error: &Error) -> &Fault {
+pub(super) fn fault_of(error: &Error) -> &Fault {
     error.fault().expect("a step that failed")
 }
 
@@ -282,6 +282,21 @@ fn another_bitstream_is_found_at_the_fault_and_after_the_reset() {
         drop(accelerator);
         assert_eq!(board.counts().register_writes, before);
     }
+}
+
+/// Where the channels were, another design has nothing.
+#[test]
+fn another_bitstream_without_these_channels_is_not_a_board_that_is_gone() {
+    let (_, tampered, mut accelerator) = Tampered::open();
+    for core in 0..4 {
+        tampered.tamper(core, DMASR, Tamper::Value(u32::MAX));
+        tampered.tamper(core, S2MM + DMASR, Tamper::Value(u32::MAX));
+    }
+    tampered.tamper(CONTROL, 0x100, Tamper::Value(0x1234_5678));
+    let error = failed(&tampered, &mut accelerator);
+    assert!(error.must_reopen());
+    // The channels did not start: found by looking at them again.
+    assert_eq!(fault_of(&error).name(), "other-bitstream", "{error:?}");
 }
 
 #[test]

@@ -19,6 +19,8 @@ mod oddities;
 mod ordering;
 mod phase;
 mod plan;
+#[cfg(all(test, feature = "emulation"))]
+mod planned_tests;
 mod recovery;
 mod report;
 mod retry;

@@ -11,6 +11,8 @@ pub(super) enum Oddity {
     SpuriousInterrupt,
     /// They come one after the other.
     InterruptStorm,
+    /// A channel did not stop for a new ring.
+    NoHalt,
     /// A packet was complete, and its descriptors did not say so yet.
     LateStatus,
 }
@@ -28,6 +30,7 @@ impl Oddity {
             Self::InterruptStorm => {
                 "interrupts come without end and without a reason: ignored until the step is over"
             }
+            Self::NoHalt => "a channel did not stop in time; the board was reset before the step",
             Self::LateStatus => {
                 "an interrupt came before the status of the descriptors was in memory; waiting for it"
             }

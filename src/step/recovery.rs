@@ -2,6 +2,7 @@
 
 use super::device::Device;
 use super::fault::Fault;
+use super::oddities::Oddity;
 use super::plan::Plan;
 use super::root_cause::other_bitstream;
 use super::symptom::Symptom;
@@ -43,7 +44,8 @@ impl Device {
     ) -> Result<(), Symptom> {
         let mut reserved = self.reserve(plan);
         if let Err(Symptom::Known(Fault::Core(error))) = &reserved {
-            log::warn!("a channel did not stop, resetting the board: {error}");
+            log::debug!("resetting the board: {error}");
+            self.oddities.tell(Oddity::NoHalt);
             self.recover(shapes)?;
             reserved = self.reserve(plan);
         }

@@ -70,14 +70,15 @@ fn root_cause(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
 
 /// Nothing answers any more, or something else.
 fn replaced(diagnosis: &Diagnosis) -> Option<Fault> {
-    if let Some(state) = diagnosis.channels.iter().find(|state| state.status.gone()) {
-        return Some(Fault::Gone { region: state.channel.to_string() });
+    let gone = diagnosis.channels.iter().find(|state| state.status.gone());
+    let gone = gone.map(|state| Fault::Gone { region: state.channel.to_string() });
+    match diagnosis.control {
+        Some(ControlState { identification: u32::MAX, .. }) => {
+            gone.or_else(|| Some(Fault::Gone { region: "the control block".to_owned() }))
+        }
+        Some(ControlState { changed: Some(changed), .. }) => Some(other_bitstream(changed)),
+        _ => gone,
     }
-    let ControlState { identification, changed, .. } = diagnosis.control?;
-    if identification == u32::MAX {
-        return Some(Fault::Gone { region: "the control block".to_owned() });
-    }
-    changed.map(other_bitstream)
 }
 
 /// Another bitstream answers.
