@@ -19,6 +19,7 @@ mod memory;
 mod options;
 mod ordering;
 mod origin;
+mod planned;
 mod scenes;
 mod sixteen;
 mod verbs;

@@ -19,6 +19,7 @@ use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
 use crate::options::{BuildArgs, DeadlineArgs};
 use crate::ordering::{self, OrderingArgs};
+use crate::planned::{self, PlannedArgs};
 use crate::scenes::SceneArgs;
 
 const EXAMPLES: &str = "\
@@ -31,6 +32,7 @@ Examples:
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes --inertia world --grid 8x8x8
   pgs run --bandwidth unlimited --json > run.json
+  pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
   pgs run --retries 2 --report fault.json        faults of the board: try again, then keep all about them";
 
 /// Rows of the table, if not said otherwise.
@@ -56,6 +58,8 @@ pub(crate) struct RunArgs {
     faults: FaultArgs,
     #[command(flatten)]
     build: BuildArgs,
+    #[command(flatten)]
+    planned: PlannedArgs,
 }
 
 /// What one step did.
@@ -157,6 +161,7 @@ pub(crate) fn run(
     let progress = progress_bar(args.steps);
     let parameters = args.ordering.apply(args.deadline.apply(StepParameters::default()));
     let parameters = args.faults.apply(parameters);
+    let plan = args.planned.inject(&opened, &parameters)?;
     let mut documents = Vec::new();
     let mut done = 0;
     let mut retries = 0;
@@ -191,11 +196,15 @@ pub(crate) fn run(
             "board": opened.to_json(),
             "complete": complete,
             "steps": documents,
+            "faults": plan.as_ref().map(|plan| planned::to_json(plan, &opened)),
             "digest": { "algorithm": digest::ALGORITHM, "value": digest },
         });
         writeln!(out, "{document:#}")?;
     } else {
         writeln!(out)?;
+        if let Some(plan) = &plan {
+            writeln!(out, "{}", planned::text(plan, &opened))?;
+        }
         if retries > 0 {
             writeln!(out, "retries    {} of {done} steps", grouped(retries))?;
         }

@@ -23,6 +23,7 @@ use crate::npy::{self, Dimensions};
 use crate::options::{BuildArgs, DeadlineArgs};
 use crate::ordering::{self, OrderingArgs};
 use crate::origin;
+use crate::planned::{self, PlannedArgs};
 
 const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
 const VELOCITIES_FRICTION: &str = "out_vel_friction.npy";
@@ -74,6 +75,8 @@ pub(crate) struct SolveArgs {
     faults: FaultArgs,
     #[command(flatten)]
     build: BuildArgs,
+    #[command(flatten)]
+    planned: PlannedArgs,
 }
 
 impl SolveArgs {
@@ -123,6 +126,7 @@ pub(crate) fn run(
     folder
         .check_shapes(opened.accelerator.capabilities().shape_capacity)
         .map_err(Failure::input)?;
+    let plan = args.planned.inject(&opened, &parameters)?;
     // The step is let finish, so that no channel is left running.
     let interrupt = Interrupt::install();
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
@@ -154,12 +158,16 @@ pub(crate) fn run(
         let mut document = solved.to_json();
         document["folder"] = args.folder.display().to_string().into();
         document["board"] = opened.to_json();
+        document["faults"] = plan.as_ref().map(|plan| planned::to_json(plan, &opened)).into();
         document["equal"] = args.compare.then_some(equal).into();
         writeln!(out, "{document:#}")?;
     } else if args.digest {
         writeln!(out, "{} {}", digest::ALGORITHM, solved.digest)?;
     } else {
         opened.print(out)?;
+        if let Some(plan) = &plan {
+            writeln!(out, "{}", planned::text(plan, &opened))?;
+        }
         solved.print(out)?;
     }
     if args.digest && !equal {
