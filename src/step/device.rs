@@ -17,6 +17,15 @@ use crate::scene::StepParameters;
 /// Status registers of all channels: S2MM first, then MM2S.
 pub(super) type Statuses = [Dmasr; 2 * DMA_COUNT_MAX];
 
+/// What the engines are at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Activity {
+    /// The CPU holds every buffer.
+    Idle,
+    /// A step was begun, and neither taken back nor cleared away.
+    Step,
+}
+
 /// An open board.
 #[derive(Debug)]
 pub(crate) struct Device {
@@ -30,6 +39,7 @@ pub(crate) struct Device {
     pub(super) missed_interrupts: u32,
     /// Whether a reset failed: nothing may be touched any more.
     pub(super) dead: bool,
+    activity: Activity,
     /// The longest piece that a descriptor carries, bytes.
     pub(super) largest: u32,
 }
@@ -85,6 +95,7 @@ impl Device {
             platform,
             missed_interrupts: 0,
             dead: false,
+            activity: Activity::Idle,
             largest: largest_piece(capabilities.length_width),
         }
     }
@@ -118,6 +129,7 @@ impl Device {
     /// Hands the buffers over, queues all descriptors, and starts; the number of doorbells.
     pub(super) fn start(&mut self, plan: &Plan, parameters: &StepParameters) -> Result<u64, Fault> {
         let largest = self.largest;
+        self.activity = Activity::Step;
         for (channel, lane) in self.s2mm.iter_mut().enumerate() {
             let results = plan.results(channel);
             lane.hand_over(results)?;
@@ -162,7 +174,18 @@ impl Device {
         for lane in self.lanes_mut() {
             lane.take_back()?;
         }
+        self.activity = Activity::Idle;
         Ok(())
+    }
+
+    /// Whether a step was begun, and neither taken back nor cleared away.
+    pub(super) fn in_flight(&self) -> bool {
+        self.activity == Activity::Step
+    }
+
+    /// Takes note that everything was reset and the buffers are back.
+    pub(super) fn was_cleared(&mut self) {
+        self.activity = Activity::Idle;
     }
 
     /// Descriptors in the chains of the step.
@@ -215,6 +238,19 @@ impl Drop for Device {
     fn drop(&mut self) {
         if self.dead {
             return;
+        }
+        if self.in_flight() {
+            // A step that was forgotten: the accelerator runs, too. What a reset does not reach
+            // is tried channel by channel.
+            if let Err(error) = self.reset() {
+                log::error!("the board could not be reset: {error}");
+            } else {
+                for lane in self.lanes_mut() {
+                    if let Err(error) = lane.was_reset() {
+                        log::error!("a buffer was lost: {error}");
+                    }
+                }
+            }
         }
         let Self { mm2s, s2mm, platform, .. } = self;
         for (sender, receiver) in mm2s.iter_mut().zip(s2mm) {

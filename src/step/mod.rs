@@ -6,19 +6,25 @@ mod completion;
 mod device;
 mod echo;
 mod fault;
+mod in_flight;
 mod lane;
+#[cfg(all(test, feature = "emulation"))]
+mod life_tests;
 #[cfg(all(test, feature = "emulation"))]
 mod memory_tests;
 mod ordering;
+mod packing;
 mod plan;
 mod recovery;
 mod report;
+mod results;
 mod solver;
 #[cfg(all(test, feature = "emulation"))]
 mod tests;
 
 pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
 pub use fault::{Fault, RegisterDump};
+pub use in_flight::InFlight;
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
 pub use solver::Accelerator;
 pub(crate) use {

@@ -13,20 +13,39 @@ impl Device {
         let aftermath = match fault {
             // The board did its part: everything is complete and back. Or it was not asked yet.
             Fault::NotFinite { .. } | Fault::NoMemory(_) => Aftermath::Untouched,
-            _ => match self.recover(shapes) {
-                Ok(()) => Aftermath::Ready,
-                Err(error) => {
-                    log::error!("the board could not be reset: {error}");
-                    self.dead = true;
-                    // The memory stays with the engines: they may still reach it.
-                    for lane in self.lanes_mut() {
-                        lane.leave_to_device();
-                    }
-                    Aftermath::MustReopen
-                }
-            },
+            _ => self.recover_or_give_up(shapes),
         };
         Error::Step { fault: Box::new(fault), aftermath }
+    }
+
+    /// Brings the board back, or leaves it and its memory alone for good.
+    fn recover_or_give_up(&mut self, shapes: &[Shape]) -> Aftermath {
+        match self.recover(shapes) {
+            Ok(()) => Aftermath::Ready,
+            Err(error) => {
+                log::error!("the board could not be reset: {error}");
+                self.dead = true;
+                // The memory stays with the engines: they may still reach it.
+                for lane in self.lanes_mut() {
+                    lane.leave_to_device();
+                }
+                Aftermath::MustReopen
+            }
+        }
+    }
+
+    /// Stops a step that nobody will wait for; nothing, if there is none.
+    pub(super) fn abandon(&mut self, shapes: &[Shape]) {
+        if self.in_flight() && !self.dead {
+            log::warn!("a step was not waited for: resetting the board");
+            self.recover_or_give_up(shapes);
+        }
+    }
+
+    /// Sees to a board that works on nothing: a step that was forgotten is stopped first.
+    pub(super) fn settle(&mut self, shapes: &[Shape]) -> Result<(), Error> {
+        self.abandon(shapes);
+        if self.dead { Err(Error::MustReopen) } else { Ok(()) }
     }
 
     /// Makes buffers and rings large enough for a step. A channel that does not stop for its new
@@ -53,6 +72,7 @@ impl Device {
                 log::error!("a buffer was lost: {error}");
             }
         }
+        self.was_cleared();
         self.control.load_shapes(shapes, self.capabilities.variant.inertia);
         log::info!("the board was reset after a fault");
         Ok(())

@@ -16,14 +16,14 @@ use crate::{
     OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
 };
 
-fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
+pub(super) fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
     let board = EmulatedBoard::new(config).expect("a board that can be built");
     let mut accelerator = Accelerator::open(options(&board)).expect("a board that opens");
     accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
     (board, accelerator)
 }
 
-fn options(board: &EmulatedBoard) -> OpenOptions {
+pub(super) fn options(board: &EmulatedBoard) -> OpenOptions {
     OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() }
 }
 
