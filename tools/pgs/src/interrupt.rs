@@ -3,6 +3,13 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// Has `act` done, in a thread of its own, when Ctrl-C is pressed or the system asks to end.
+pub(crate) fn take_over(act: impl FnMut() + Send + 'static) {
+    if let Err(error) = ctrlc::set_handler(act) {
+        log::warn!("Ctrl-C will end the program at once: {error}");
+    }
+}
+
 /// Whether Ctrl-C was pressed.
 #[derive(Debug, Clone)]
 pub(crate) struct Interrupt(Arc<AtomicBool>);
@@ -12,9 +19,7 @@ impl Interrupt {
     pub(crate) fn install() -> Self {
         let flag = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&flag);
-        if let Err(error) = ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed)) {
-            log::warn!("Ctrl-C will end the program at once: {error}");
-        }
+        take_over(move || seen.store(true, Ordering::Relaxed));
         Self(flag)
     }
 
