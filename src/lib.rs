@@ -156,8 +156,8 @@ pub use scene::{
     Contact, InputError, Pose, Shape, StepParameters, Velocity,
 };
 pub use step::{
-    Accelerator, BoardChoice, BoardDescription, BoardKind, Fault, HostTimes, InFlight, Limit,
-    OpenOptions, RegisterDump, StepCycles, StepReport,
+    Accelerator, BoardChoice, BoardDescription, BoardKind, Cancellation, Fault, HostTimes,
+    InFlight, Limit, OpenOptions, RegisterDump, StepCycles, StepReport,
 };
 
 /// The README's library example is a test.

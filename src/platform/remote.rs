@@ -133,8 +133,13 @@ impl Line {
         if state.lost.is_none() {
             match exchange(&mut state.stream, request) {
                 Ok(answer) => {
-                    // A clock that runs backwards would make waits longer.
-                    state.now = state.now.max(answer.now);
+                    // A clock that stands still or runs backwards would make waits endless.
+                    let waited = match (request, answer.status) {
+                        (Request::Pause { time }, _)
+                        | (Request::WaitInterrupt { time }, Status::Nothing) => time,
+                        _ => Duration::ZERO,
+                    };
+                    state.now = answer.now.max(state.now.saturating_add(waited));
                     return Ok(answer);
                 }
                 Err(error) => {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 
 use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
+use super::cancellation::Cancellation;
 use super::fault::{Fault, RegisterDump};
 use super::lane::Lane;
 use super::plan::{Plan, bytes};
@@ -40,6 +41,8 @@ pub(crate) struct Device {
     /// Whether a reset failed: nothing may be touched any more.
     pub(super) dead: bool,
     activity: Activity,
+    /// What ends a step early, if the caller gave it.
+    pub(super) cancellation: Option<Cancellation>,
     /// The longest piece that a descriptor carries, bytes.
     pub(super) largest: u32,
 }
@@ -96,6 +99,7 @@ impl Device {
             missed_interrupts: 0,
             dead: false,
             activity: Activity::Idle,
+            cancellation: None,
             largest: largest_piece(capabilities.length_width),
         }
     }
@@ -176,6 +180,14 @@ impl Device {
         }
         self.activity = Activity::Idle;
         Ok(())
+    }
+
+    /// Fails if the caller has cancelled.
+    pub(super) fn check_cancelled(&self) -> Result<(), Fault> {
+        match &self.cancellation {
+            Some(cancellation) if cancellation.is_cancelled() => Err(Fault::Cancelled),
+            _ => Ok(()),
+        }
     }
 
     /// Whether a step was begun, and neither taken back nor cleared away.

@@ -59,6 +59,9 @@ pub enum Fault {
         /// The status registers of all channels.
         registers: RegisterDump,
     },
+    /// The caller ended the step.
+    #[error("the step was cancelled")]
+    Cancelled,
     /// Words were changed on the way.
     #[error(
         "the words {direction} add up to {found:#010x}, expected {expected:#010x}: memory or a stream is corrupt"

@@ -4,15 +4,18 @@
 use std::cell::Cell;
 use std::mem::ManuallyDrop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
 
+use bitstream_model::interface::control;
 use bitstream_model::interface::profile::{FLOAT, Profile};
-use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected};
+use bitstream_model::{Bandwidth, BoardConfig, Direction, EmulatedBoard, Fault as Injected};
 
-use super::tests::{bits, open, options, scene, undisturbed};
+use super::tests::{BadlyWired, MEMORY, bits, open, options, scene, undisturbed};
 use crate::order::Order;
 use crate::{
-    Accelerator, Bodies, Body, Collision, Collisions, Error, InputError, Pose, Shape,
-    StepParameters, Velocity,
+    Accelerator, Aftermath, Bodies, Body, Cancellation, Collision, Collisions, Error, Fault,
+    InputError, Pose, Shape, StepParameters, Velocity,
 };
 
 const CUBES: u32 = 20;
@@ -45,7 +48,7 @@ fn start<'a>(
         .submit(&bodies, &collisions, &StepParameters::default())
         .expect("a step that starts");
     let clock = u64::from(FLOAT.clock_khz);
-    board.cpu_port().pause(std::time::Duration::from_nanos(clocks * 1_000_000 / clock));
+    board.cpu_port().pause(Duration::from_nanos(clocks * 1_000_000 / clock));
     flight
 }
 
@@ -62,7 +65,7 @@ fn the_two_halves_are_a_step() {
             .expect("a step that starts");
         // The caller's own work meanwhile.
         drop(collisions);
-        board.cpu_port().pause(std::time::Duration::from_nanos(clocks * 4));
+        board.cpu_port().pause(Duration::from_nanos(clocks * 4));
         let report = flight.wait(&mut bodies).expect("a good step");
         assert_eq!((report.bodies, report.doorbells), (u64::from(CUBES) + 1, 9));
         assert_eq!(report.cycles.total, 3_491, "as the moments assume");
@@ -127,7 +130,7 @@ fn a_step_that_was_forgotten_is_stopped_by_the_next_call() {
         let _forgotten = ManuallyDrop::new(start(&board, &mut accelerator, clocks));
         drop(accelerator);
         let moved = board.counts().beats_read + board.counts().beats_written;
-        board.cpu_port().pause(std::time::Duration::from_millis(1));
+        board.cpu_port().pause(Duration::from_millis(1));
         assert_eq!(board.counts().beats_read + board.counts().beats_written, moved, "{after}");
         let mut accelerator = Accelerator::open(options(&board)).expect("opened again");
         accelerator.set_shapes(&shapes).expect("shapes that fit");
@@ -245,6 +248,92 @@ fn a_panic_in_any_call_of_the_callers_containers_leaves_a_working_accelerator() 
         assert!(call > 20, "{call} calls");
         assert_eq!(board.violations(), []);
     }
+}
+
+#[test]
+fn whoever_opens_a_board_that_runs_stops_it_before_memory_is_touched() {
+    let (board, mut accelerator) = open(BoardConfig::default());
+    // As after a SIGKILL: nobody waits for it, nobody takes anything back.
+    let _left = ManuallyDrop::new(start(&board, &mut accelerator, 1_000));
+    assert!(board.is_running());
+    let wired = BadlyWired::new(&board);
+    let mut accelerator = wired.open();
+    assert!(!board.is_running(), "opening stops it");
+    assert_works(&board, &mut accelerator, "left by another");
+
+    let writes = wired.writes.lock().expect("unpoisoned");
+    let first = |wanted| writes.iter().position(|write| *write == wanted);
+    let memory = first((MEMORY, 0)).expect("a step allocates");
+    // DMACR of the four cores, then RESET of the control block.
+    let resets = [(0, 0), (1, 0), (2, 0), (3, 0), (4, control::RESET.offset)];
+    let resets = resets.map(|reset| first(reset).expect("every part is reset"));
+    assert!(resets.is_sorted() && resets[4] < memory, "{resets:?}, memory {memory}");
+}
+
+#[test]
+fn a_step_is_cancelled_while_the_board_stalls_and_changes_nothing() {
+    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+    let wired = BadlyWired::new(&board);
+    let mut accelerator = wired.open();
+    accelerator.set_cancellation(wired.cancellation.clone());
+    let hour = Duration::from_secs(3600);
+    let parameters = StepParameters { deadline: Some(hour), ..StepParameters::default() };
+    for waits in [1, 2, 30] {
+        board.inject(Injected::Stall { core: 3, direction: Direction::S2mm });
+        wired.cancel_at.store(waits, Ordering::Relaxed);
+        let before = board.cpu_port().now();
+        let (mut bodies, collisions) = scene(CUBES);
+        let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("stalls");
+        assert_eq!(bits(&bodies), bits(&scene(CUBES).0));
+        let Error::Step { fault, aftermath } = &error else { panic!("{error}") };
+        assert!(matches!(**fault, Fault::Cancelled), "{fault}");
+        assert_eq!(*aftermath, Aftermath::Ready);
+        // At the next look, of an hour.
+        let took = board.cpu_port().now() - before;
+        assert!(took < Duration::from_millis(u64::from(waits) * 10 + 5), "{took:?}");
+        assert!(!board.is_running());
+
+        // It holds for the next step, which is not even begun.
+        let counts = board.counts();
+        let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("still");
+        let Error::Step { fault, aftermath } = &error else { panic!("{error}") };
+        assert!(matches!(**fault, Fault::Cancelled), "{fault}");
+        assert_eq!(*aftermath, Aftermath::Untouched);
+        assert_eq!(board.counts(), counts);
+        wired.cancellation.clear();
+        assert_works(&board, &mut accelerator, "cancelled");
+    }
+}
+
+#[test]
+fn a_step_that_may_be_cancelled_and_is_not_is_the_same_step() {
+    // One that takes more than one look: a slow pipeline.
+    let config = BoardConfig {
+        profile: Profile::by_name("naive").expect("a profile"),
+        bandwidth: Bandwidth::BytesPerSecond(100_000_000),
+        ..BoardConfig::default()
+    };
+    let reports = [false, true].map(|may_be_cancelled| {
+        let (board, mut accelerator) = open(config);
+        let cancellation = Cancellation::new();
+        if may_be_cancelled {
+            accelerator.set_cancellation(cancellation.clone());
+        }
+        let (mut bodies, collisions) = scene(2_000);
+        let report = accelerator
+            .step(&mut bodies, &collisions, &StepParameters::default())
+            .expect("a good step");
+        assert!(!cancellation.is_cancelled());
+        assert_eq!(board.violations(), []);
+        let accesses = report.register_reads + report.register_writes;
+        (report.cycles, (report.cycles.work, report.interrupts, accesses, bits(&bodies)))
+    });
+    let looks = u64::from(config.profile.clock_khz) * 10;
+    assert!(reports[0].0.total > 2 * looks, "{} cycles", reports[0].0.total);
+    assert!(reports[0].1 == reports[1].1);
+    // The emulated board looks at its starving streams when a wait ends, too: a few clocks.
+    let differ = reports[0].0.total.abs_diff(reports[1].0.total);
+    assert!(differ < 100, "{:?} and {:?}", reports[0].0, reports[1].0);
 }
 
 /// Steps of two scenes of its own size on its own board; the bits after each.

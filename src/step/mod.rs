@@ -2,6 +2,7 @@
 
 mod board;
 mod bring_up;
+mod cancellation;
 mod completion;
 mod device;
 mod echo;
@@ -23,6 +24,7 @@ mod solver;
 mod tests;
 
 pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
+pub use cancellation::Cancellation;
 pub use fault::{Fault, RegisterDump};
 pub use in_flight::InFlight;
 pub use report::{HostTimes, Limit, StepCycles, StepReport};

@@ -13,6 +13,7 @@ impl Device {
         let aftermath = match fault {
             // The board did its part: everything is complete and back. Or it was not asked yet.
             Fault::NotFinite { .. } | Fault::NoMemory(_) => Aftermath::Untouched,
+            Fault::Cancelled if !self.in_flight() => Aftermath::Untouched,
             _ => self.recover_or_give_up(shapes),
         };
         Error::Step { fault: Box::new(fault), aftermath }

@@ -4,6 +4,7 @@
 //! unpack, commit: nothing of the caller's changes before the last.
 
 use super::board::{self, BoardDescription, Found, OpenOptions};
+use super::cancellation::Cancellation;
 use super::device::Device;
 use super::fault::Fault;
 use super::in_flight::{Flight, InFlight, Started, Stopwatch};
@@ -113,6 +114,11 @@ impl Accelerator {
         Ok(())
     }
 
+    /// From now on this ends steps early, in place of an earlier one.
+    pub fn set_cancellation(&mut self, cancellation: Cancellation) {
+        self.device.cancellation = Some(cancellation);
+    }
+
     /// Solves the contacts of one time step and integrates it.
     ///
     /// Collisions are taken in the [order](StepParameters::order) that the parameters ask for.
@@ -205,6 +211,7 @@ fn launch<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     if plan.bodies == 0 {
         return Ok((plan, None));
     }
+    device.check_cancelled()?;
     device.reserve_or_reset(&plan, shapes)?;
     let sent = device.pack(&plan, bodies, collisions, lives, shapes);
     host.pack = watch.lap();

@@ -146,6 +146,12 @@ pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
         .next("see what there is with `pgs list`, or use the emulated board with --board emulated")
 }
 
+/// Whether a step ended because Ctrl-C was pressed, and its channels are stopped.
+pub(crate) fn is_cancelled(error: &zynq_pgs::Error) -> bool {
+    matches!(error, zynq_pgs::Error::Step { fault, .. } if matches!(**fault, Fault::Cancelled))
+        && !error.must_reopen()
+}
+
 impl Opened {
     /// The failure that an error of the driver is.
     pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {

@@ -1,7 +1,7 @@
-//! This file lets Ctrl-C end a command between two steps, when no channel is running.
+//! This file lets Ctrl-C end a command: between two steps, or in the middle of one, which the
+//! driver then stops and undoes.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use zynq_pgs::Cancellation;
 
 /// Has `act` done, in a thread of its own, when Ctrl-C is pressed or the system asks to end.
 pub(crate) fn take_over(act: impl FnMut() + Send + 'static) {
@@ -12,18 +12,23 @@ pub(crate) fn take_over(act: impl FnMut() + Send + 'static) {
 
 /// Whether Ctrl-C was pressed.
 #[derive(Debug, Clone)]
-pub(crate) struct Interrupt(Arc<AtomicBool>);
+pub(crate) struct Interrupt(Cancellation);
 
 impl Interrupt {
     /// Takes Ctrl-C over from the system, which would leave the channels running.
     pub(crate) fn install() -> Self {
-        let flag = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&flag);
-        take_over(move || seen.store(true, Ordering::Relaxed));
-        Self(flag)
+        let cancellation = Cancellation::new();
+        let seen = cancellation.clone();
+        take_over(move || seen.cancel());
+        Self(cancellation)
     }
 
     pub(crate) fn is_set(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0.is_cancelled()
+    }
+
+    /// What stops a step in the middle.
+    pub(crate) fn cancellation(&self) -> Cancellation {
+        self.0.clone()
     }
 }
