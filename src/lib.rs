@@ -103,6 +103,28 @@
 //! # }
 //! ```
 //!
+//! # While the board works
+//!
+//! [`Accelerator::submit`] starts a step and returns; [`InFlight::wait`] gives its results. What the
+//! caller does in between costs no time. A step that is dropped, by a panic too, is stopped.
+//!
+//! ```
+//! # use zynq_pgs::{Accelerator, Body, Collision, OpenOptions, Pose, Shape};
+//! # use zynq_pgs::{StepParameters, Velocity};
+//! # fn main() -> Result<(), zynq_pgs::Error> {
+//! # let mut accelerator = Accelerator::open(OpenOptions::default())?;
+//! # accelerator.set_shapes(&[Shape::isotropic(1.0, 1.5)])?;
+//! # let pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+//! # let mut bodies = vec![Body { pose, velocity: Velocity::default(), shape: 0 }];
+//! # let collisions: Vec<Collision> = Vec::new();
+//! let step = accelerator.submit(&bodies, &collisions, &StepParameters::default())?;
+//! // Sound, pictures, input.
+//! step.wait(&mut bodies)?;
+//! # assert!(bodies[0].velocity.linear[1] < 0.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # When something fails
 //!
 //! Every error says what was expected, what was found and what to do; the bodies are as they were.
@@ -139,9 +161,9 @@ pub use scene::{
     Contact, InputError, Pose, Shape, StepParameters, Velocity,
 };
 pub use step::{
-    Accelerator, AcceleratorError, Awaited, BoardChoice, BoardDescription, BoardKind, ChannelState,
-    ControlState, Diagnosis, Fault, HostTimes, Limit, OpenOptions, Phase, StepCycles, StepReport,
-    Subject,
+    Accelerator, AcceleratorError, Awaited, BoardChoice, BoardDescription, BoardKind, Cancellation,
+    ChannelState, ControlState, Diagnosis, Fault, HostTimes, InFlight, Limit, OpenOptions, Phase,
+    StepCycles, StepReport, Subject,
 };
 
 /// The README's library example is a test.

@@ -149,6 +149,11 @@ impl Board {
         }
     }
 
+    /// Whether the accelerator or a DMA engine has work.
+    pub(crate) fn running(&self) -> bool {
+        self.accelerator.running() || self.cores.iter().any(Core::running)
+    }
+
     /// A strict board is dead after its first violation, and any without power.
     fn dead(&self) -> bool {
         self.powerless || self.config.strict && self.log.count > 0

@@ -79,6 +79,12 @@ impl EmulatedBoard {
         lock(&self.0).counts()
     }
 
+    /// Whether the accelerator or a DMA engine has work.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        lock(&self.0).running()
+    }
+
     /// The level of the interrupt line.
     #[must_use]
     pub fn interrupt_level(&self) -> bool {

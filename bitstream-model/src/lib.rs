@@ -30,6 +30,8 @@ mod memory;
 mod outside;
 #[cfg(feature = "emulation")]
 mod quirks;
+#[cfg(all(feature = "emulation", unix))]
+pub mod remote;
 #[cfg(feature = "emulation")]
 mod stream;
 #[cfg(feature = "emulation")]

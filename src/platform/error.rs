@@ -342,4 +342,52 @@ pub enum PlatformError {
         /// What it overlaps.
         ram: String,
     },
+    /// Nobody serves a board at a socket.
+    #[error(
+        "no board is served at {}: start one with `pgs serve --socket {}`",
+        socket.display(),
+        socket.display()
+    )]
+    NoServer {
+        /// The socket.
+        socket: PathBuf,
+        /// What the kernel says.
+        #[source]
+        source: std::io::Error,
+    },
+    /// Whoever serves at a socket says other messages.
+    #[error(
+        "{} serves version {found} of the messages, expected {expected}: serve the board with the \
+         `pgs` of this driver",
+        socket.display()
+    )]
+    OtherServer {
+        /// The socket.
+        socket: PathBuf,
+        /// Version of this driver's messages.
+        expected: u32,
+        /// Version of the other side's.
+        found: u32,
+    },
+    /// A file is not the memory of the served board.
+    #[error(
+        "{} is not the memory of the board served at {}: name the file that its `pgs serve` names",
+        memory.display(),
+        socket.display()
+    )]
+    OtherMemory {
+        /// The socket.
+        socket: PathBuf,
+        /// The file.
+        memory: PathBuf,
+    },
+    /// The process that serves a board is gone, or makes no sense any more.
+    #[error("the board served at {} is lost: serve it again, and open it again", socket.display())]
+    ServerLost {
+        /// The socket.
+        socket: PathBuf,
+        /// How.
+        #[source]
+        source: std::sync::Arc<std::io::Error>,
+    },
 }

@@ -1,6 +1,8 @@
 //! This file is the platform of a real board: its registers, its memory, its interrupt.
 
 use std::ops::Range;
+#[cfg(feature = "emulation")]
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -43,6 +45,12 @@ pub enum MemoryChoice {
     DevMem {
         /// Its physical addresses.
         window: Range<u64>,
+    },
+    /// A file: the memory of a board in another process, if it is not the file beside its socket.
+    #[cfg(feature = "emulation")]
+    File {
+        /// Which.
+        path: PathBuf,
     },
 }
 

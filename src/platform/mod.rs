@@ -46,6 +46,8 @@ mod lock;
 mod mapped;
 mod memory;
 mod pool;
+#[cfg(feature = "emulation")]
+mod remote;
 mod reserved;
 mod sync_mode;
 mod sysfs;
@@ -71,6 +73,8 @@ pub use fpga::require_bitstream;
 pub use hardware::MemoryChoice;
 pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
 pub(crate) use memory::{DmaMemory, SharedMemory};
+#[cfg(feature = "emulation")]
+pub(crate) use remote::{RemotePlatform, memory_beside};
 pub use reserved::ReservedMemory;
 pub use system::{System, UIO_CLASS};
 pub use u_dma_buf::{Caching, u_dma_buf_names};

@@ -43,6 +43,18 @@ pub enum InputError {
         carriers: Carriers,
     },
 
+    /// Other bodies than those that the step was started with.
+    #[error(
+        "the step was started with {expected} bodies, {found} wait for its results: give the same \
+         bodies; the step was stopped"
+    )]
+    OtherBodies {
+        /// Bodies given now.
+        found: usize,
+        /// Bodies given before.
+        expected: usize,
+    },
+
     /// Separate arrays of different lengths.
     #[error("the arrays of the {what} have different lengths: give every array for all {what}")]
     UnequalLengths {

@@ -41,6 +41,14 @@ pub enum BoardChoice {
     /// An emulated board.
     #[cfg(feature = "emulation")]
     Emulated(bitstream_model::CpuPort),
+    /// An emulated board in another process, served at this Unix socket
+    /// ([`bitstream_model::remote`]). Its memory is [`MemoryChoice::File`], or the file beside the
+    /// socket that `pgs serve` makes.
+    #[cfg(feature = "emulation")]
+    Served {
+        /// The socket.
+        socket: std::path::PathBuf,
+    },
 }
 
 /// What kind of board was opened.
@@ -53,6 +61,8 @@ pub enum BoardKind {
     Uio,
     /// A board behind `/dev/mem`.
     DevMem,
+    /// A software-emulated board in another process.
+    Served,
 }
 
 /// Which board was opened, and why.
@@ -61,7 +71,7 @@ pub enum BoardKind {
 pub struct BoardDescription {
     /// What kind.
     pub kind: BoardKind,
-    /// Its name: the UIO node, "/dev/mem", or "emulated".
+    /// Its name: the UIO node, "/dev/mem", "emulated", or the socket.
     pub name: String,
     /// Why this board and no other.
     pub reason: String,
@@ -99,6 +109,11 @@ pub(super) fn find(
     let uio = |node: &str, reason| {
         real(RegisterChoice::Uio(node.to_owned()), BoardKind::Uio, node, reason)
     };
+    #[cfg(feature = "emulation")]
+    if matches!(memory, MemoryChoice::File { .. }) && !matches!(choice, BoardChoice::Served { .. })
+    {
+        return Err(OpenError::ServedMemory);
+    }
     match choice {
         BoardChoice::Automatic if has_nodes(&uio_nodes(&system.uio)?, UIO_NODE) => {
             uio(UIO_NODE, "its UIO node is there")
@@ -116,6 +131,8 @@ pub(super) fn find(
         BoardChoice::Emulated(port) => {
             own_memory(memory).map(|()| emulated(port.clone(), "asked for"))
         }
+        #[cfg(feature = "emulation")]
+        BoardChoice::Served { socket } => served(socket, memory),
     }
 }
 
@@ -149,6 +166,24 @@ fn emulated(port: bitstream_model::CpuPort, reason: &str) -> Found {
             reason: reason.to_owned(),
         },
     }
+}
+
+/// The board of another process.
+#[cfg(feature = "emulation")]
+fn served(socket: &std::path::Path, memory: &MemoryChoice) -> Result<Found, OpenError> {
+    let memory = match memory {
+        MemoryChoice::Automatic => crate::platform::memory_beside(socket),
+        MemoryChoice::File { path } => path.clone(),
+        _ => return Err(OpenError::ServedMemory),
+    };
+    Ok(Found {
+        platform: Arc::new(crate::platform::RemotePlatform::open(socket, &memory)?),
+        description: BoardDescription {
+            kind: BoardKind::Served,
+            name: socket.display().to_string(),
+            reason: "asked for".to_owned(),
+        },
+    })
 }
 
 #[cfg(test)]

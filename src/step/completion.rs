@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use super::cancellation::Cancellation;
 use super::device::{Device, Statuses};
 use super::fault::{Awaited, Fault};
 use super::oddities::Oddity;
@@ -21,6 +22,8 @@ const GRACE: Duration = Duration::from_millis(1);
 const NOTICEABLE: Duration = Duration::from_micros(10);
 /// Shortest time to wait for an interrupt before looking by oneself.
 const SHORTEST_SLICE: Duration = Duration::from_millis(10);
+/// How long a step that may be cancelled waits between two looks whether it was.
+const CANCEL_LOOK: Duration = Duration::from_millis(10);
 /// After so many missing interrupts in a row the driver no longer relies on them.
 const MISSED_LIMIT: u32 = 2;
 /// After so many interrupts without a reason in one step the line stays masked until its end.
@@ -36,7 +39,7 @@ impl Device {
         loop {
             // Asked before looking, so that there is one look after the deadline.
             let remaining = deadline.remaining(&*self.platform);
-            let woke = self.platform.wait_interrupt(slice.min(remaining))?.is_some();
+            let woke = self.wait_interrupt(slice.min(remaining))?.is_some();
             let statuses = self.statuses();
             self.check(&statuses)?;
             let mut pending = false;
@@ -102,17 +105,35 @@ impl Device {
         }
     }
 
+    /// Waits for the interrupt, at most that long, unless the caller cancels.
+    fn wait_interrupt(&self, time: Duration) -> Result<Option<u32>, Fault> {
+        if self.cancellation.is_none() {
+            return Ok(self.platform.wait_interrupt(time)?);
+        }
+        let mut left = time;
+        loop {
+            self.check_cancelled()?;
+            let piece = left.min(CANCEL_LOOK);
+            let came = self.platform.wait_interrupt(piece)?;
+            left -= piece;
+            if came.is_some() || left.is_zero() {
+                return Ok(came);
+            }
+        }
+    }
+
     /// Waits for the accelerator to say that it is done, then reads its counters.
     pub(super) fn collect(&mut self, deadline: &Deadline) -> Result<Counters, Symptom> {
         let gone = || Symptom::Known(Fault::Gone { region: "the control block".to_owned() });
-        let control = &mut self.control;
-        let done = poll_until(&*self.platform, deadline, || match control.take_done() {
-            Some(false) => None,
-            answer => Some(answer),
+        let Self { control, cancellation, platform, .. } = self;
+        let cancelled = || cancellation.as_ref().is_some_and(Cancellation::is_cancelled);
+        let done = poll_until(&**platform, deadline, || match control.take_done() {
+            Some(false) => cancelled().then_some(Err(Fault::Cancelled.into())),
+            Some(true) => Some(Ok(())),
+            None => Some(Err(gone())),
         });
         match done {
-            Some(Some(_)) => {}
-            Some(None) => return Err(gone()),
+            Some(done) => done?,
             None => {
                 return Err(Symptom::Late { awaited: Awaited::Done, limit: deadline.limit() });
             }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 
 use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
+use super::cancellation::Cancellation;
 use super::fault::Fault;
 use super::lane::Lane;
 use super::oddities::Oddities;
@@ -29,6 +30,15 @@ pub(super) struct Started {
     pub(super) at: Duration,
 }
 
+/// What the engines are at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Activity {
+    /// The CPU holds every buffer.
+    Idle,
+    /// A step was begun, and neither taken back nor cleared away.
+    Step,
+}
+
 /// An open board.
 #[derive(Debug)]
 pub(crate) struct Device {
@@ -48,6 +58,9 @@ pub(crate) struct Device {
     pub(super) oddities: Oddities,
     /// Whether a reset failed: nothing may be touched any more.
     pub(super) dead: bool,
+    activity: Activity,
+    /// What ends a step early, if the caller gave it.
+    pub(super) cancellation: Option<Cancellation>,
     /// The longest piece that a descriptor carries, bytes.
     pub(super) largest: u32,
 }
@@ -107,6 +120,8 @@ impl Device {
             missed_interrupts: 0,
             oddities: Oddities::default(),
             dead: false,
+            activity: Activity::Idle,
+            cancellation: None,
             largest: largest_piece(capabilities.length_width),
         }
     }
@@ -147,6 +162,7 @@ impl Device {
         let largest = self.largest;
         let outline = Outline::new(plan, parameters, largest);
         self.started = Some(Started { outline, at: self.platform.now() });
+        self.activity = Activity::Step;
         for (channel, lane) in self.s2mm.iter_mut().enumerate() {
             let results = plan.results(channel);
             lane.hand_over(results)?;
@@ -191,7 +207,26 @@ impl Device {
         for lane in self.lanes_mut() {
             lane.take_back()?;
         }
+        self.activity = Activity::Idle;
         Ok(())
+    }
+
+    /// Fails if the caller has cancelled.
+    pub(super) fn check_cancelled(&self) -> Result<(), Fault> {
+        match &self.cancellation {
+            Some(cancellation) if cancellation.is_cancelled() => Err(Fault::Cancelled),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a step was begun, and neither taken back nor cleared away.
+    pub(super) fn in_flight(&self) -> bool {
+        self.activity == Activity::Step
+    }
+
+    /// Takes note that everything was reset and the buffers are back.
+    pub(super) fn was_cleared(&mut self) {
+        self.activity = Activity::Idle;
     }
 
     /// Descriptors in the chains of the step.
@@ -239,6 +274,19 @@ impl Drop for Device {
     fn drop(&mut self) {
         if self.dead {
             return;
+        }
+        if self.in_flight() {
+            // A step that was forgotten: the accelerator runs, too. What a reset does not reach
+            // is tried channel by channel.
+            if let Err(error) = self.reset() {
+                log::error!("the board could not be reset: {error}");
+            } else {
+                for lane in self.lanes_mut() {
+                    if let Err(error) = lane.was_reset() {
+                        log::error!("a buffer was lost: {error}");
+                    }
+                }
+            }
         }
         let Self { mm2s, s2mm, platform, .. } = self;
         for (sender, receiver) in mm2s.iter_mut().zip(s2mm) {

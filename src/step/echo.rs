@@ -54,9 +54,7 @@ pub(crate) struct Echoed {
 impl Accelerator {
     /// Runs an echo. After an error the board was reset, if it could be.
     pub(crate) fn echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Error> {
-        if self.device.dead {
-            return Err(Error::MustReopen);
-        }
+        self.device.settle(&self.shapes)?;
         let largest = self.device.largest;
         if echo.short_pieces {
             self.device.largest = largest_piece(LENGTH_WIDTH_MIN);
@@ -88,7 +86,7 @@ impl Accelerator {
         let none: &[Collision] = &[];
         let empty: Schedule = (0..plan.collisions).map(|_| None).collect();
         let padding = Ordered { collisions: none, schedule: &empty };
-        let sent = self.pack(&plan, echo.bodies, &padding, None);
+        let sent = self.device.pack(&plan, echo.bodies, &padding, None, &self.shapes);
         let parameters = StepParameters {
             contact_iterations: u32::from(plan.passes > 0),
             friction_iterations: 0,

@@ -111,6 +111,9 @@ pub enum Fault {
         /// The one channel that is behind all others of its direction, if there is one.
         behind: Option<ChannelName>,
     },
+    /// The caller ended the step.
+    #[error("the step was cancelled")]
+    Cancelled,
     /// Words were changed on the way.
     #[error(
         "the words {} add up to {found:#010x}, expected {expected:#010x}: memory or a stream is \
@@ -200,6 +203,7 @@ impl Fault {
             Self::Accelerator(error) => error.name(),
             Self::Deadline { awaited: Awaited::Results, .. } => "deadline",
             Self::Deadline { awaited: Awaited::Done, .. } => "no-done",
+            Self::Cancelled => "cancelled",
             Self::Checksum { .. } => "checksum",
             Self::NotFinite { .. } => "not-finite",
             Self::Gone { .. }

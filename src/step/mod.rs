@@ -2,6 +2,7 @@
 
 mod board;
 mod bring_up;
+mod cancellation;
 mod completion;
 mod device;
 mod diagnosis;
@@ -9,7 +10,10 @@ mod echo;
 mod fault;
 #[cfg(all(test, feature = "emulation"))]
 mod fault_tests;
+mod in_flight;
 mod lane;
+#[cfg(all(test, feature = "emulation"))]
+mod life_tests;
 mod locate;
 #[cfg(all(test, feature = "emulation"))]
 mod memory_tests;
@@ -17,12 +21,14 @@ mod memory_tests;
 mod mistakes;
 mod oddities;
 mod ordering;
+mod packing;
 mod phase;
 mod plan;
 #[cfg(all(test, feature = "emulation"))]
 mod planned_tests;
 mod recovery;
 mod report;
+mod results;
 mod retry;
 mod root_cause;
 mod solver;
@@ -33,8 +39,10 @@ mod tampered;
 mod tests;
 
 pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
+pub use cancellation::Cancellation;
 pub use diagnosis::{ChannelState, ControlState, Diagnosis};
 pub use fault::{AcceleratorError, Awaited, Fault, Subject};
+pub use in_flight::InFlight;
 pub use phase::Phase;
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
 pub use solver::Accelerator;

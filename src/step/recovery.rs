@@ -17,6 +17,7 @@ impl Device {
         let aftermath = match &fault {
             // The board did its part: everything is complete and back. Or it was not asked yet.
             Fault::NotFinite { .. } | Fault::NoMemory(_) => Aftermath::Untouched,
+            Fault::Cancelled if !self.in_flight() => Aftermath::Untouched,
             // What answers now is not to be written to: its registers may mean anything.
             Fault::OtherBitstream { .. } => self.give_up(&fault),
             _ => match self.recover(shapes) {
@@ -33,6 +34,22 @@ impl Device {
             },
         };
         Error::Step { fault: Box::new(fault), aftermath, diagnosis }
+    }
+
+    /// Stops a step that nobody will wait for; nothing, if there is none.
+    pub(super) fn abandon(&mut self, shapes: &[Shape]) {
+        if self.in_flight() && !self.dead {
+            log::warn!("a step was not waited for: resetting the board");
+            if let Err(error) = self.recover(shapes) {
+                self.give_up(&error);
+            }
+        }
+    }
+
+    /// Sees to a board that works on nothing: a step that was forgotten is stopped first.
+    pub(super) fn settle(&mut self, shapes: &[Shape]) -> Result<(), Error> {
+        self.abandon(shapes);
+        if self.dead { Err(Error::MustReopen) } else { Ok(()) }
     }
 
     /// Makes buffers and rings large enough for a step. A channel that does not stop for its new
@@ -72,6 +89,7 @@ impl Device {
                 log::error!("a buffer was lost: {error}");
             }
         }
+        self.was_cleared();
         self.control.load_shapes(shapes, self.capabilities.variant.inertia);
         log::info!("the board was reset after a fault");
         Ok(())

@@ -16,7 +16,8 @@ impl Device {
     /// Finds the cause of a failure: the fault, and how everything stood if the board had a part in
     /// it.
     pub(super) fn diagnose(&mut self, symptom: Symptom) -> (Fault, Option<Box<Diagnosis>>) {
-        if let Symptom::Known(fault @ (Fault::NotFinite { .. } | Fault::NoMemory(_))) = symptom {
+        use Fault::{Cancelled, NoMemory, NotFinite};
+        if let Symptom::Known(fault @ (NotFinite { .. } | NoMemory(_) | Cancelled)) = symptom {
             return (fault, None);
         }
         let seen = match symptom {

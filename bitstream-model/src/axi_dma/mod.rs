@@ -20,7 +20,7 @@ use crate::quirks::Resettable;
 use crate::stream::Stream;
 use crate::violation::Log;
 
-use channel::Channel;
+use channel::{Channel, Work};
 
 /// One of the two channels of a core.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -210,6 +210,12 @@ impl Core {
             .into_iter()
             .flatten()
             .min()
+    }
+
+    /// Whether either engine has work.
+    pub(crate) fn running(&self) -> bool {
+        let works = |channel: &Channel| !matches!(channel.work, Work::None);
+        works(&self.mm2s) || works(&self.s2mm)
     }
 
     /// Whether an enabled interrupt stands.

@@ -1,9 +1,10 @@
 //! This file is the command line: which verb, and what holds for all of them.
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 
 use clap::parser::ValueSource;
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use zynq_pgs::MemoryChoice;
 
 use crate::memory::memory;
@@ -16,6 +17,7 @@ use crate::verbs::load::LoadArgs;
 use crate::verbs::model::ModelArgs;
 use crate::verbs::order::OrderArgs;
 use crate::verbs::run::RunArgs;
+use crate::verbs::serve::ServeArgs;
 use crate::verbs::solve::SolveArgs;
 
 const EXAMPLES: &str = "\
@@ -31,6 +33,7 @@ Examples:
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check
   pgs faults                           every fault at every place, and what the driver makes of it
+  pgs serve --socket /tmp/board        and elsewhere: pgs --board socket:/tmp/board
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 
@@ -62,6 +65,7 @@ pub(crate) enum Verb {
     Order(OrderArgs),
     List(ListArgs),
     Load(LoadArgs),
+    Serve(ServeArgs),
     Check(CheckArgs),
     Faults(FaultsArgs),
 }
@@ -72,14 +76,24 @@ pub(crate) struct CommonArgs {
     /// Print one JSON document instead of text.
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// Board to use; auto takes the UIO node "pgs" if there is one, else the emulated board.
-    #[arg(long, global = true, env = "PGS_BOARD", value_name = "BOARD", default_value = "auto")]
+    /// Board to use.
+    #[arg(
+        help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), uio, devmem \
+                (registers through /dev/mem, at the addresses of the interface; needs root), \
+                emulated or socket:PATH (one that `pgs serve` serves)",
+        long,
+        global = true,
+        env = "PGS_BOARD",
+        value_name = "BOARD",
+        default_value = "auto",
+        value_parser = board_name
+    )]
     pub(crate) board: BoardName,
     /// DMA memory of a real board.
     #[arg(
         help = "DMA memory of a real board: auto (the u-dma-buf \"pgs\", else the UIO node \
                 \"pgs-memory\"), u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
-                devmem[:ADDRESS+BYTES]",
+                devmem[:ADDRESS+BYTES]; of a served board: file:PATH",
         long,
         global = true,
         env = "PGS_MEMORY",
@@ -91,13 +105,27 @@ pub(crate) struct CommonArgs {
 }
 
 /// A board, as it is named on the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum BoardName {
     Auto,
     Uio,
-    /// Registers through /dev/mem, at the addresses of the interface; needs root.
+    /// Registers through /dev/mem.
     Devmem,
     Emulated,
+    /// In another process, at this socket.
+    Socket(PathBuf),
+}
+
+/// Reads the name of a board.
+fn board_name(text: &str) -> Result<BoardName, String> {
+    match (text, text.strip_prefix("socket:")) {
+        ("auto", _) => Ok(BoardName::Auto),
+        ("uio", _) => Ok(BoardName::Uio),
+        ("devmem", _) => Ok(BoardName::Devmem),
+        ("emulated", _) => Ok(BoardName::Emulated),
+        (_, Some(path)) if !path.is_empty() => Ok(BoardName::Socket(path.into())),
+        _ => Err("expected auto, uio, devmem, emulated or socket:PATH".to_owned()),
+    }
 }
 
 /// What to do, and how.
@@ -175,6 +203,15 @@ mod tests {
     }
 
     #[test]
+    fn a_served_board_is_named_by_its_socket() {
+        let common = parsed("pgs --board socket:/a/b --memory file:c run").expect("a board").common;
+        assert_eq!(common.board, BoardName::Socket("/a/b".into()));
+        assert_eq!(common.memory, MemoryChoice::File { path: "c".into() });
+        let served = parsed("pgs serve --socket x --profile half").expect("a board");
+        assert!(matches!(served.verb, Verb::Serve(args) if args.socket.ends_with("x")));
+    }
+
+    #[test]
     fn options_of_run_before_another_verb_are_refused() {
         assert_eq!(parsed("pgs --steps 5 list").expect_err("stray"), ErrorKind::ArgumentConflict);
         assert_eq!(
@@ -199,6 +236,10 @@ mod tests {
             "pgs --bandwidth -3",
             "pgs --report-every 0",
             "pgs --memory udmabuf",
+            "pgs --memory file:",
+            "pgs --board socket:",
+            "pgs --board served",
+            "pgs serve",
             "pgs model --collisions -1 --bodies 1",
             "pgs model --collisions 1",
             "pgs solve",

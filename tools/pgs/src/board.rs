@@ -38,16 +38,18 @@ pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
     match kind {
         BoardKind::Emulated => "emulated",
         BoardKind::DevMem => "devmem",
+        BoardKind::Served => "served",
         _ => "uio",
     }
 }
 
 /// Which kind of board a name on the command line means here, and why.
-pub(crate) fn choose(name: BoardName) -> (BoardKind, String) {
+pub(crate) fn choose(name: &BoardName) -> (BoardKind, String) {
     match name {
         BoardName::Uio => (BoardKind::Uio, "as asked for".to_owned()),
         BoardName::Devmem => (BoardKind::DevMem, "as asked for".to_owned()),
         BoardName::Emulated => (BoardKind::Emulated, "as asked for".to_owned()),
+        BoardName::Socket(_) => (BoardKind::Served, "as asked for".to_owned()),
         BoardName::Auto => match uio_nodes(Path::new(UIO_CLASS)) {
             Ok(nodes) => {
                 let names = [UIO_NODE, UIO_CONTROL_NODE];
@@ -82,7 +84,7 @@ pub(crate) fn find(
     given: Option<&'static str>,
 ) -> Result<Chosen, Failure> {
     let CommonArgs { board: name, memory, .. } = common;
-    let (kind, reason) = choose(*name);
+    let (kind, reason) = choose(name);
     let (board, observer) = if kind == BoardKind::Emulated {
         if *name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
@@ -93,6 +95,11 @@ pub(crate) fn find(
         }
         let emulated = EmulatedBoard::new(config).map_err(not_built)?;
         (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
+    } else if let (BoardName::Socket(_), Some(option)) = (name, given) {
+        let error = format!("{option} says how to build an emulated board, this one is built");
+        return Err(Failure::input(error).next(format!("give {option} to its `pgs serve`")));
+    } else if let BoardName::Socket(socket) = name {
+        (BoardChoice::Served { socket: socket.clone() }, None)
     } else if let Some(option) = given {
         let error = format!("{option} says how to build an emulated board, this one is real");
         return Err(
@@ -108,7 +115,7 @@ pub(crate) fn find(
 }
 
 /// There is no such emulated board.
-fn not_built(error: ConfigError) -> Failure {
+pub(crate) fn not_built(error: ConfigError) -> Failure {
     let narrow = |numbers: &Numbers| {
         [numbers.collisions, numbers.bodies, numbers.poses]
             .iter()
@@ -138,6 +145,12 @@ pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Fai
 pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
     Failure::new(Cause::NoBoard, error)
         .next("see what there is with `pgs list`, or use the emulated board with --board emulated")
+}
+
+/// Whether a step ended because Ctrl-C was pressed, and its channels are stopped.
+pub(crate) fn is_cancelled(error: &zynq_pgs::Error) -> bool {
+    matches!(error, zynq_pgs::Error::Step { fault, .. } if matches!(**fault, Fault::Cancelled))
+        && !error.must_reopen()
 }
 
 impl Opened {

@@ -24,7 +24,7 @@ pub(crate) enum Verdict {
     Done,
     /// A comparison found differences, or a check failed.
     Differs,
-    /// Ctrl-C ended it between two steps.
+    /// Ctrl-C ended it, and no channel runs.
     Interrupted,
 }
 

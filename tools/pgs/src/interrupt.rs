@@ -1,24 +1,34 @@
-//! This file lets Ctrl-C end a command between two steps, when no channel is running.
+//! This file lets Ctrl-C end a command: between two steps, or in the middle of one, which the
+//! driver then stops and undoes.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use zynq_pgs::Cancellation;
+
+/// Has `act` done, in a thread of its own, when Ctrl-C is pressed or the system asks to end.
+pub(crate) fn take_over(act: impl FnMut() + Send + 'static) {
+    if let Err(error) = ctrlc::set_handler(act) {
+        log::warn!("Ctrl-C will end the program at once: {error}");
+    }
+}
 
 /// Whether Ctrl-C was pressed.
 #[derive(Debug, Clone)]
-pub(crate) struct Interrupt(Arc<AtomicBool>);
+pub(crate) struct Interrupt(Cancellation);
 
 impl Interrupt {
     /// Takes Ctrl-C over from the system, which would leave the channels running.
     pub(crate) fn install() -> Self {
-        let flag = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&flag);
-        if let Err(error) = ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed)) {
-            log::warn!("Ctrl-C will end the program at once: {error}");
-        }
-        Self(flag)
+        let cancellation = Cancellation::new();
+        let seen = cancellation.clone();
+        take_over(move || seen.cancel());
+        Self(cancellation)
     }
 
     pub(crate) fn is_set(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0.is_cancelled()
+    }
+
+    /// What stops a step in the middle.
+    pub(crate) fn cancellation(&self) -> Cancellation {
+        self.0.clone()
     }
 }

@@ -7,8 +7,8 @@ use bitstream_model::interface::address_map::{
 };
 use zynq_pgs::{Caching, MemoryChoice};
 
-const EXPECTED: &str = "expected auto, u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
-                        devmem[:ADDRESS+BYTES]";
+const EXPECTED: &str = "expected auto, u-dma-buf[:NAME[:write-combining]], uio[:NODE], \
+                        devmem[:ADDRESS+BYTES] or file:PATH";
 
 /// Reads a choice of memory.
 pub(crate) fn memory(text: &str) -> Result<MemoryChoice, String> {
@@ -35,6 +35,7 @@ pub(crate) fn memory(text: &str) -> Result<MemoryChoice, String> {
             Ok(MemoryChoice::UDmaBuf { name: name.to_owned(), caching })
         }
         ("uio", node) => Ok(MemoryChoice::Uio { node: node.unwrap_or(UIO_MEMORY_NODE).to_owned() }),
+        ("file", Some(path)) => Ok(MemoryChoice::File { path: path.into() }),
         ("devmem", None) => {
             Ok(MemoryChoice::DevMem { window: MEMORY_BASE..MEMORY_BASE + MEMORY_BYTES })
         }

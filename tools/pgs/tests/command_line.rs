@@ -33,6 +33,7 @@ fn every_help_has_an_example() {
         &["list"],
         &["load"],
         &["check"],
+        &["serve"],
     ] {
         let ran = run(verb.iter().copied().chain(["--help"]));
         assert_eq!(ran.code, Some(0), "{verb:?}");

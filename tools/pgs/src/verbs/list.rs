@@ -49,7 +49,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let (kind, reason) = board::choose(common.board);
+    let (kind, reason) = board::choose(&common.board);
     let chosen = board::kind_text(kind);
     let system = System::default();
     let buffers = u_dma_buf_names(&system);

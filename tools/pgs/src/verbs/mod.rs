@@ -9,6 +9,7 @@ pub(crate) mod load;
 pub(crate) mod model;
 pub(crate) mod order;
 pub(crate) mod run;
+pub(crate) mod serve;
 pub(crate) mod solve;
 pub(crate) mod table;
 
@@ -33,6 +34,7 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
         Verb::Model(args) => model::run(args, &command.common, out),
         Verb::Order(args) => order::run(args, &command.common, out),
         Verb::List(args) => list::run(args, &command.common, out),
+        Verb::Serve(args) => serve::run(args, &command.common, out),
         Verb::Load(args) => load::run(args, &command.common, out),
         Verb::Faults(args) => faults::run(args, &command.common, out),
         Verb::Check(args) => check::run(args, &command.common, out),

@@ -157,6 +157,7 @@ pub(crate) fn run(
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
 
     let interrupt = Interrupt::install();
+    opened.accelerator.set_cancellation(interrupt.cancellation());
     let every = args.report_every.unwrap_or(args.steps.div_ceil(ROWS));
     let progress = progress_bar(args.steps);
     let parameters = args.ordering.apply(args.deadline.apply(StepParameters::default()));
@@ -166,9 +167,10 @@ pub(crate) fn run(
     let mut done = 0;
     let mut retries = 0;
     while done < args.steps && !interrupt.is_set() {
-        done += 1;
-        let row = step(done, &parameters, &mut opened, &mut scene)
+        let row = step(done + 1, &parameters, &mut opened, &mut scene)
             .map_err(|error| args.faults.failure(&opened, &parameters, error))?;
+        let Some(row) = row else { break };
+        done += 1;
         retries += u64::from(row.report.retries);
         if done == 1 && !common.json {
             // Only now: a scene that is refused prints nothing but the refusal.
@@ -231,20 +233,24 @@ fn print_heading(
     out.flush()
 }
 
-/// Detects collisions and takes one step.
+/// Detects collisions and takes one step; nothing if Ctrl-C ended it.
 fn step(
     number: u32,
     parameters: &StepParameters,
     opened: &mut Opened,
     scene: &mut Scene,
-) -> Result<Row, zynq_pgs::Error> {
+) -> Result<Option<Row>, zynq_pgs::Error> {
     let begin = Instant::now();
     let ground_pairs = ground_pairs(scene.detect());
     let detect = begin.elapsed();
     let (bodies, collisions) = scene.parts_mut();
-    let report = opened.accelerator.step(bodies, collisions, parameters)?;
+    let report = match opened.accelerator.step(bodies, collisions, parameters) {
+        Ok(report) => report,
+        Err(error) if board::is_cancelled(&error) => return Ok(None),
+        Err(error) => return Err(error),
+    };
     let kinetic_energy = kinetic_energy(scene.bodies(), scene.shapes());
-    Ok(Row { step: number, ground_pairs, kinetic_energy, detect, report })
+    Ok(Some(Row { step: number, ground_pairs, kinetic_energy, detect, report }))
 }
 
 /// On stderr, and only if that is a terminal.

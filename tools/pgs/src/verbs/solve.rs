@@ -127,21 +127,23 @@ pub(crate) fn run(
         .check_shapes(opened.accelerator.capabilities().shape_capacity)
         .map_err(Failure::input)?;
     let plan = args.planned.inject(&opened, &parameters)?;
-    // The step is let finish, so that no channel is left running.
     let interrupt = Interrupt::install();
+    opened.accelerator.set_cancellation(interrupt.cancellation());
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
     let mut bodies = std::mem::take(&mut folder.bodies);
-    let report = opened
+    let stepped = opened
         .accelerator
         .set_shapes(&folder.shapes)
-        .and_then(|()| opened.accelerator.step(&mut bodies, &folder.collisions, &parameters))
-        .map_err(|error| match error.is_input() {
-            true => Failure::input(origin::locate(error, &folder)),
-            false => args.faults.failure(&opened, &parameters, error),
-        })?;
-    if interrupt.is_set() {
-        return Ok(Verdict::Interrupted);
-    }
+        .and_then(|()| opened.accelerator.step(&mut bodies, &folder.collisions, &parameters));
+    let report = match stepped {
+        Ok(_) if interrupt.is_set() => return Ok(Verdict::Interrupted),
+        Ok(report) => report,
+        Err(error) if board::is_cancelled(&error) => return Ok(Verdict::Interrupted),
+        Err(error) if error.is_input() => {
+            return Err(Failure::input(origin::locate(error, &folder)));
+        }
+        Err(error) => return Err(args.faults.failure(&opened, &parameters, error)),
+    };
     if let Some(path) = &args.out {
         folder::write_results(path, &bodies).map_err(Failure::input)?;
     }

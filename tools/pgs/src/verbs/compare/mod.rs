@@ -177,7 +177,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    if matches!(common.board, BoardName::Uio | BoardName::Devmem) {
+    if !matches!(common.board, BoardName::Auto | BoardName::Emulated) {
         let error = "`pgs compare` builds both boards itself, a real one is as its bitstream is";
         return Err(Failure::input(error).next("leave out --board (and PGS_BOARD)"));
     }

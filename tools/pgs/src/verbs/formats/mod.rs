@@ -132,6 +132,7 @@ fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Fail
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let parameters = args.deadline.apply(StepParameters::default());
     let interrupt = Interrupt::install();
+    opened.accelerator.set_cancellation(interrupt.cancellation());
     let progress = progress_bar(args.step);
     for _ in 1..args.step {
         if interrupt.is_set() {
@@ -140,11 +141,14 @@ fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Fail
         }
         scene.detect();
         let (bodies, collisions) = scene.parts_mut();
-        opened
-            .accelerator
-            .step(bodies, collisions, &parameters)
-            .map_err(|error| opened.failure(error))?;
-        progress.inc(1);
+        match opened.accelerator.step(bodies, collisions, &parameters) {
+            Ok(_) => progress.inc(1),
+            Err(error) if board::is_cancelled(&error) => {
+                progress.finish_and_clear();
+                return Ok(None);
+            }
+            Err(error) => return Err(opened.failure(error)),
+        }
     }
     progress.finish_and_clear();
     scene.detect();

@@ -1,0 +1,287 @@
+//! This file is what a driver and a board in another process say to each other.
+//!
+//! Every message has one length, so that there is none too long. Numbers are little endian.
+//!
+//! ```text
+//! request, 16 bytes   0 act      4 value    8 operand
+//! answer, 24 bytes    0 status   4 value    8 number    16 virtual time, ns
+//!
+//! act                value                operand                      answer
+//! 1 hello            protocol's version   HELLO                        value: version
+//! 2 memory           0                    the file's inode             number: bus address of byte 0
+//! 3 read             0                    address                      value: what was read
+//! 4 write            what is written      address
+//! 5 pause            0                    ns, up to LONGEST_WAIT
+//! 6 wait for the interrupt   0            ns, up to LONGEST_WAIT       value: number of the event
+//! 7 unmask           0                    0
+//! ```
+//!
+//! A driver sends the next request when it has the answer to the last one. The first is a hello.
+
+use std::time::Duration;
+
+use thiserror::Error;
+
+/// Version of these messages.
+pub const VERSION: u32 = 1;
+/// "PGSBOARD": operand of a hello.
+pub const HELLO: u64 = u64::from_le_bytes(*b"PGSBOARD");
+/// Length of a request, bytes.
+pub const REQUEST_BYTES: usize = 16;
+/// Length of an answer, bytes.
+pub const ANSWER_BYTES: usize = 24;
+/// The longest that one request lets virtual time pass. Who waits longer asks again, so that an
+/// answer is never far.
+pub const LONGEST_WAIT: Duration = Duration::from_millis(10);
+
+/// What the memory's file is called, unless it is said otherwise: the socket's name and this.
+pub const MEMORY_SUFFIX: &str = ".memory";
+
+/// What a driver asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    /// Who is there?
+    Hello {
+        /// Version of the messages that the driver speaks.
+        version: u32,
+    },
+    /// Is this the board's memory, and where on the bus?
+    Memory {
+        /// Inode of the file that the driver has open.
+        inode: u64,
+    },
+    /// A register read.
+    Read {
+        /// Physical address.
+        address: u64,
+    },
+    /// A register write.
+    Write {
+        /// Physical address.
+        address: u64,
+        /// What is written.
+        value: u32,
+    },
+    /// Virtual time passes.
+    Pause {
+        /// How much.
+        time: Duration,
+    },
+    /// Virtual time passes until an interrupt comes.
+    WaitInterrupt {
+        /// How much at most.
+        time: Duration,
+    },
+    /// Lets the next interrupt through.
+    Unmask,
+}
+
+/// A request that is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum RequestError {
+    /// There is no such act.
+    #[error("expected an act from 1 to 7, found {found}")]
+    Act {
+        /// What stands there.
+        found: u32,
+    },
+    /// A hello with another operand.
+    #[error("expected a hello with {HELLO:#018x}, found {found:#018x}: is this a driver?")]
+    Hello {
+        /// What stands there.
+        found: u64,
+    },
+    /// A wait without end.
+    #[error("expected a wait of at most {LONGEST_WAIT:?}, found {found:?}")]
+    Wait {
+        /// What was asked for.
+        found: Duration,
+    },
+    /// Something before, or other than, the hello that comes first.
+    #[error("expected a hello first, found {found:?}")]
+    NoHello {
+        /// What came.
+        found: Request,
+    },
+}
+
+impl Request {
+    /// As it is sent.
+    #[must_use]
+    pub fn encode(&self) -> [u8; REQUEST_BYTES] {
+        let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        let (act, value, operand) = match *self {
+            Self::Hello { version } => (1_u32, version, HELLO),
+            Self::Memory { inode } => (2, 0, inode),
+            Self::Read { address } => (3, 0, address),
+            Self::Write { address, value } => (4, value, address),
+            Self::Pause { time } => (5, 0, nanoseconds(time)),
+            Self::WaitInterrupt { time } => (6, 0, nanoseconds(time)),
+            Self::Unmask => (7, 0, 0),
+        };
+        let mut bytes = [0; REQUEST_BYTES];
+        bytes[..4].copy_from_slice(&act.to_le_bytes());
+        bytes[4..8].copy_from_slice(&value.to_le_bytes());
+        bytes[8..].copy_from_slice(&operand.to_le_bytes());
+        bytes
+    }
+
+    /// What was sent.
+    ///
+    /// # Errors
+    /// [`RequestError`] if it is no request.
+    pub fn decode(bytes: &[u8; REQUEST_BYTES]) -> Result<Self, RequestError> {
+        let (act, value, operand) = (word(bytes, 0), word(bytes, 4), number(bytes, 8));
+        let time = || match Duration::from_nanos(operand) {
+            time if time <= LONGEST_WAIT => Ok(time),
+            found => Err(RequestError::Wait { found }),
+        };
+        Ok(match act {
+            1 if operand == HELLO => Self::Hello { version: value },
+            1 => return Err(RequestError::Hello { found: operand }),
+            2 => Self::Memory { inode: operand },
+            3 => Self::Read { address: operand },
+            4 => Self::Write { address: operand, value },
+            5 => Self::Pause { time: time()? },
+            6 => Self::WaitInterrupt { time: time()? },
+            7 => Self::Unmask,
+            found => return Err(RequestError::Act { found }),
+        })
+    }
+}
+
+/// How a request went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Done.
+    Done,
+    /// No interrupt came.
+    Nothing,
+    /// The file is not the board's memory.
+    OtherMemory,
+    /// The board speaks another version.
+    OtherVersion,
+    /// The request was none. The board hangs up.
+    Refused,
+}
+
+impl Status {
+    const ALL: [Self; 5] =
+        [Self::Done, Self::Nothing, Self::OtherMemory, Self::OtherVersion, Self::Refused];
+}
+
+/// What the board says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Answer {
+    /// How it went.
+    pub status: Status,
+    /// A register, a version, or the number of an interrupt.
+    pub value: u32,
+    /// An address.
+    pub number: u64,
+    /// Virtual time since the board was built.
+    pub now: Duration,
+}
+
+/// An answer that is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("expected a status from 0 to 4, found {found}")]
+pub struct AnswerError {
+    /// What stands there.
+    pub found: u32,
+}
+
+impl Answer {
+    /// As it is sent.
+    #[must_use]
+    pub fn encode(&self) -> [u8; ANSWER_BYTES] {
+        let status = Status::ALL.iter().position(|status| *status == self.status);
+        let status = status.and_then(|status| u32::try_from(status).ok()).unwrap_or(u32::MAX);
+        let now = u64::try_from(self.now.as_nanos()).unwrap_or(u64::MAX);
+        let mut bytes = [0; ANSWER_BYTES];
+        bytes[..4].copy_from_slice(&status.to_le_bytes());
+        bytes[4..8].copy_from_slice(&self.value.to_le_bytes());
+        bytes[8..16].copy_from_slice(&self.number.to_le_bytes());
+        bytes[16..].copy_from_slice(&now.to_le_bytes());
+        bytes
+    }
+
+    /// What was sent.
+    ///
+    /// # Errors
+    /// [`AnswerError`] if it is no answer.
+    pub fn decode(bytes: &[u8; ANSWER_BYTES]) -> Result<Self, AnswerError> {
+        let found = word(bytes, 0);
+        let status = usize::try_from(found).ok().and_then(|place| Status::ALL.get(place));
+        Ok(Self {
+            status: *status.ok_or(AnswerError { found })?,
+            value: word(bytes, 4),
+            number: number(bytes, 8),
+            now: Duration::from_nanos(number(bytes, 16)),
+        })
+    }
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    (0..4).fold(0, |word, k| word | u32::from(bytes[at + k]) << (8 * k))
+}
+
+fn number(bytes: &[u8], at: usize) -> u64 {
+    u64::from(word(bytes, at)) | u64::from(word(bytes, at + 4)) << 32
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn every_request_is_read_as_it_was_written() {
+        let time = Duration::from_nanos(9_876_543);
+        for request in [
+            Request::Hello { version: 7 },
+            Request::Memory { inode: u64::MAX },
+            Request::Read { address: 0x1_0203_0405_0607 },
+            Request::Write { address: 0xA004_0000, value: 0xF00D_CAFE },
+            Request::Pause { time },
+            Request::WaitInterrupt { time: LONGEST_WAIT },
+            Request::Unmask,
+        ] {
+            assert_eq!(Request::decode(&request.encode()), Ok(request));
+        }
+        let bytes = Request::Write { address: 0xA0, value: 0x0102_0304 }.encode();
+        assert_eq!(bytes, [4, 0, 0, 0, 4, 3, 2, 1, 0xA0, 0, 0, 0, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn every_answer_is_read_as_it_was_written() {
+        for status in Status::ALL {
+            let now = Duration::from_nanos(0x0102_0304_0506);
+            let answer = Answer { status, value: u32::MAX, number: 1 << 63, now };
+            assert_eq!(Answer::decode(&answer.encode()), Ok(answer));
+        }
+        let mut bytes = [0; ANSWER_BYTES];
+        bytes[0] = 5;
+        assert_eq!(Answer::decode(&bytes), Err(AnswerError { found: 5 }));
+    }
+
+    #[test]
+    fn a_wait_that_is_too_long_is_refused() {
+        let time = LONGEST_WAIT + Duration::from_nanos(1);
+        for request in [Request::Pause { time }, Request::WaitInterrupt { time }] {
+            let error = Request::decode(&request.encode());
+            assert_eq!(error, Err(RequestError::Wait { found: time }));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_understood_is_what_was_sent(bytes: [u8; REQUEST_BYTES]) {
+            if let Ok(request) = Request::decode(&bytes) {
+                prop_assert_eq!(Request::decode(&request.encode()), Ok(request));
+            }
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! A board in another process: its registers, interrupt and time go through a Unix socket, its
+//! memory is a file that both processes open.
+//!
+//! ```text
+//! driver's process                              board's process
+//!   register accesses, waits --> requests  -->    Server   --> EmulatedBoard
+//!                            <-- answers   <--
+//!   DMA buffers ---------------> the file <---------------------- DMA engines
+//! ```
+//!
+//! [`message`] is what both sides share. Everything else here is the board's side: it serves one
+//! driver after the other. One that vanishes leaves the board as it is, engines running, as a
+//! process that is killed leaves a real one.
+
+pub mod message;
+
+mod memory_file;
+mod server;
+mod visit;
+
+pub use memory_file::{MemoryFile, MemoryFileError};
+pub use server::{ServeError, Server, Stopper};
+pub use visit::{Ended, Visit};

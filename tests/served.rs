@@ -1,0 +1,473 @@
+//! A board in another process is a board: same bits, same cycles; and nothing that the other side
+//! does is a panic or a wait without end.
+#![cfg(feature = "emulation")]
+
+use std::io::{Read as _, Write as _};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::JoinHandle;
+
+use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
+use bitstream_model::interface::profile::Profile;
+use bitstream_model::remote::message::{ANSWER_BYTES, Answer, Request, Status, VERSION};
+use bitstream_model::remote::{
+    Ended, MemoryFile, MemoryFileError, ServeError, Server, Stopper, Visit,
+};
+use bitstream_model::{BoardConfig, EmulatedBoard};
+use zynq_pgs::{
+    Accelerator, BoardChoice, BoardKind, Body, Collision, Contact, Error, MemoryChoice, OpenError,
+    OpenOptions, PlatformError, Pose, Shape, StepParameters, StepReport, Velocity,
+};
+
+/// A row of cubes on the ground.
+fn scene(cubes: u16) -> (Vec<Body>, Vec<Collision>) {
+    let at = |x, y, shape, velocity| Body {
+        pose: Pose { position: [x, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity,
+        shape,
+    };
+    let mut bodies = vec![at(0.0, -400.0, 0, Velocity::default())];
+    let mut collisions = Vec::new();
+    for cube in 1..=cubes {
+        let x = 2.2 * f32::from(cube);
+        let velocity = Velocity { linear: [0.1, -1.0 - x, 0.0], angular: [0.0, 0.1, 0.0] };
+        bodies.push(at(x, 0.99, 1, velocity));
+        let corner = |dx, dz| Contact { point: [x + dx, -0.01, dz], distance: -0.01 };
+        collisions.push(Collision {
+            body_a: 0,
+            body_b: u32::from(cube),
+            normal: [0.0, -1.0, 0.0],
+            count: 4,
+            contacts: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)],
+        });
+    }
+    (bodies, collisions)
+}
+
+fn bits(bodies: &[Body]) -> Vec<[u32; 13]> {
+    let numbers = |body: &Body| {
+        let Pose { position: p, orientation: q } = body.pose;
+        let Velocity { linear: l, angular: a } = body.velocity;
+        [p[0], p[1], p[2], q[0], q[1], q[2], q[3], l[0], l[1], l[2], a[0], a[1], a[2]]
+            .map(f32::to_bits)
+    };
+    bodies.iter().map(numbers).collect()
+}
+
+/// A board served by another thread.
+struct Served {
+    folder: tempfile::TempDir,
+    board: EmulatedBoard,
+    stopper: Stopper,
+    visits: Receiver<Visit>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Served {
+    fn new(config: BoardConfig) -> Self {
+        let folder = tempfile::tempdir().expect("a directory");
+        let mut server = bind(config, &folder.path().join("board")).expect("served");
+        let (board, stopper) = (server.board().clone(), server.stopper());
+        let (tell, visits) = channel();
+        let thread = std::thread::spawn(move || {
+            let told = |_: &EmulatedBoard, visit: Visit| drop(tell.send(visit));
+            server.serve(told).expect("served until it is stopped");
+        });
+        Self { folder, board, stopper, visits, thread: Some(thread) }
+    }
+
+    fn socket(&self) -> PathBuf {
+        self.folder.path().join("board")
+    }
+
+    fn options(&self) -> OpenOptions {
+        at(&self.socket())
+    }
+
+    fn open(&self) -> Accelerator {
+        let mut accelerator = Accelerator::open(self.options()).expect("a board that opens");
+        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        accelerator
+    }
+
+    /// How the last visit ended.
+    fn visit(&self) -> Visit {
+        self.visits.recv().expect("a visit that ended")
+    }
+
+    fn stop(&mut self) {
+        self.stopper.stop();
+        self.thread.take().expect("stopped once").join().expect("no panic");
+    }
+}
+
+fn memory(socket: &Path) -> Result<MemoryFile, MemoryFileError> {
+    let path = socket.with_extension("memory");
+    MemoryFile::open(&path, MEMORY_BASE, None, MEMORY_BYTES)
+}
+
+fn bind(config: BoardConfig, socket: &Path) -> Result<Server, ServeError> {
+    Server::bind(config, memory(socket)?, socket)
+}
+
+fn at(socket: &Path) -> OpenOptions {
+    let board = BoardChoice::Served { socket: socket.to_owned() };
+    OpenOptions { board, ..OpenOptions::default() }
+}
+
+fn steps(accelerator: &mut Accelerator, cubes: u16) -> (Vec<[u32; 13]>, Vec<StepReport>) {
+    let (mut bodies, collisions) = scene(cubes);
+    let step = |_| {
+        let parameters = StepParameters::default();
+        accelerator.step(&mut bodies, &collisions, &parameters).expect("a good step")
+    };
+    let reports = (0..4).map(step).collect();
+    (bits(&bodies), reports)
+}
+
+/// Cycles, register accesses, interrupts, descriptors: all but host time.
+fn counted(report: &StepReport) -> [u64; 9] {
+    let StepReport { cycles, register_reads, register_writes, interrupts, .. } = *report;
+    [
+        cycles.total,
+        cycles.work,
+        cycles.stalls,
+        cycles.waits,
+        register_reads,
+        register_writes,
+        interrupts,
+        report.descriptors,
+        report.hazards,
+    ]
+}
+
+#[test]
+fn a_served_board_gives_the_bits_and_the_cycles_of_one_in_this_process() {
+    for (profile, length_width) in [("float", 26), ("half", 14), ("naive", 26), ("windowed", 8)] {
+        let profile = Profile::by_name(profile).expect("a profile");
+        let config = BoardConfig { profile, length_width, ..BoardConfig::default() };
+        let own = EmulatedBoard::new(config).expect("a board that can be built");
+        let board = BoardChoice::Emulated(own.cpu_port());
+        let mut here = Accelerator::open(OpenOptions { board, ..OpenOptions::default() })
+            .expect("a board that opens");
+        here.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
+        let (expected, reports) = steps(&mut here, 300);
+
+        let served = Served::new(config);
+        let mut there = served.open();
+        assert_eq!(there.board().kind, BoardKind::Served);
+        assert_eq!(there.board().name, served.socket().display().to_string());
+        let (found, served_reports) = steps(&mut there, 300);
+        assert_eq!(found, expected, "{}", profile.name);
+        for (here, there) in reports.iter().zip(&served_reports) {
+            assert_eq!(counted(there), counted(here), "{}", profile.name);
+        }
+        drop(there);
+        assert!(!served.visit().left_running);
+        assert_eq!(served.board.violations(), []);
+    }
+}
+
+#[test]
+fn a_board_has_one_driver_at_a_time() {
+    let served = Served::new(BoardConfig::default());
+    let mut first = served.open();
+    let error = Accelerator::open(served.options()).expect_err("somebody has it");
+    let Error::Open(OpenError::Platform(PlatformError::Busy { path })) = &error else {
+        panic!("{error}")
+    };
+    assert!(path.ends_with("board.memory"), "{path:?}");
+    steps(&mut first, 5);
+    drop(first);
+    steps(&mut served.open(), 5);
+    assert_eq!(served.board.violations(), []);
+}
+
+#[test]
+fn a_driver_that_leaves_in_the_middle_of_a_step_leaves_the_engines_running_for_the_next_to_stop() {
+    let mut alone = Served::new(BoardConfig::default());
+    let (expected, _) = steps(&mut alone.open(), 40);
+    alone.stop();
+
+    // The messages of an opening and of a step's start, as they went; then silence.
+    let served = Served::new(BoardConfig::default());
+    let (mut bodies, collisions) = scene(40);
+    let relay = Relay::new(&served.socket(), None);
+    let options = OpenOptions {
+        memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
+        ..at(&relay.socket)
+    };
+    let mut accelerator = Accelerator::open(options).expect("a board that opens");
+    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
+    let parameters = StepParameters::default();
+    let flight = accelerator.submit(&bodies, &collisions, &parameters).expect("it starts");
+    relay.cut();
+    let visit = served.visit();
+    assert!(matches!(visit.ended, Ended::Left) && visit.left_running, "{visit:?}");
+    assert!(served.board.is_running());
+
+    // The one that was cut off cannot even stop it; its bodies are as they were.
+    let before = bits(&bodies);
+    let error = flight.wait(&mut bodies).expect_err("no board any more");
+    assert!(error.must_reopen(), "{error}");
+    assert_eq!(bits(&bodies), before);
+    assert!(matches!(
+        accelerator.step(&mut bodies, &collisions, &parameters),
+        Err(Error::MustReopen)
+    ));
+    drop(accelerator);
+
+    let (found, _) = steps(&mut served.open(), 40);
+    assert_eq!(found, expected);
+    assert_eq!(served.board.violations(), []);
+}
+
+/// Falsifies an answer.
+type Spoil = fn(&mut Vec<u8>);
+
+/// Passes messages on between a driver and a board, until it is cut.
+struct Relay {
+    _folder: tempfile::TempDir,
+    socket: PathBuf,
+    ends: Receiver<[UnixStream; 2]>,
+}
+
+impl Relay {
+    /// To that board; `spoil` falsifies the answer of that number.
+    fn new(board: &Path, spoil: Option<(usize, Spoil)>) -> Self {
+        let folder = tempfile::tempdir().expect("a directory");
+        let socket = folder.path().join("relay");
+        let listener = UnixListener::bind(&socket).expect("bound");
+        let board = board.to_owned();
+        let (tell, ends) = channel();
+        std::thread::spawn(move || {
+            let (mut driver, _) = listener.accept().expect("a driver");
+            let mut board = UnixStream::connect(board).expect("a board");
+            let ends = [&driver, &board].map(|end| end.try_clone().expect("cloned"));
+            tell.send(ends).expect("the test waits");
+            let mut request = [0; bitstream_model::remote::message::REQUEST_BYTES];
+            let mut number = 0;
+            while driver.read_exact(&mut request).is_ok() {
+                let mut answer = vec![0; ANSWER_BYTES];
+                let passed = board.write_all(&request).and_then(|()| board.read_exact(&mut answer));
+                if let Some((at, spoil)) = spoil
+                    && at == number
+                {
+                    spoil(&mut answer);
+                }
+                number += 1;
+                if passed.and_then(|()| driver.write_all(&answer)).is_err()
+                    || answer.len() < ANSWER_BYTES
+                {
+                    // The test holds a copy of it.
+                    let _ = driver.shutdown(std::net::Shutdown::Both);
+                    return;
+                }
+            }
+        });
+        Self { _folder: folder, socket, ends }
+    }
+
+    /// Cuts both ends.
+    fn cut(&self) {
+        for end in self.ends.recv().expect("somebody came") {
+            end.shutdown(std::net::Shutdown::Both).expect("cut");
+        }
+    }
+}
+
+#[test]
+fn a_server_that_is_stopped_in_the_middle_is_a_lost_board() {
+    let mut served = Served::new(BoardConfig::default());
+    let mut accelerator = served.open();
+    let (mut bodies, collisions) = scene(40);
+    let before = bits(&bodies);
+    let parameters = StepParameters::default();
+    let flight = accelerator.submit(&bodies, &collisions, &parameters).expect("it starts");
+    served.stop();
+    assert!(!served.socket().exists(), "the socket is gone");
+    let error = flight.wait(&mut bodies).expect_err("no board any more");
+    assert!(error.must_reopen(), "{error}");
+    let mut chain = Vec::new();
+    let mut source = std::error::Error::source(&error);
+    while let Some(error) = source {
+        chain.push(error.to_string());
+        source = error.source();
+    }
+    assert!(chain.iter().any(|text| text.contains("is lost: serve it again")), "{chain:?}");
+    assert_eq!(bits(&bodies), before);
+    drop(accelerator);
+    let error = Accelerator::open(served.options()).expect_err("nobody serves");
+    assert!(
+        matches!(&error, Error::Open(OpenError::Platform(PlatformError::NoServer { socket, .. }))
+            if *socket == served.socket()),
+        "{error}"
+    );
+}
+
+#[test]
+fn answers_that_make_no_sense_are_errors_at_every_point_of_a_step() {
+    let spoils: [Spoil; 3] =
+        [|answer| answer[0] = 9, |answer| answer.truncate(11), |answer| answer[0] = 4];
+    for spoil in spoils {
+        // The hello, the memory, the first register, and later ones.
+        for number in [0, 1, 2, 30, 60, 90, 110] {
+            let served = Served::new(BoardConfig::default());
+            let relay = Relay::new(&served.socket(), Some((number, spoil)));
+            let options = OpenOptions {
+                memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
+                ..at(&relay.socket)
+            };
+            let (mut bodies, collisions) = scene(10);
+            let before = bits(&bodies);
+            let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+            let parameters = StepParameters::default();
+            let stepped = Accelerator::open(options).and_then(|mut accelerator| {
+                accelerator.set_shapes(&shapes)?;
+                accelerator.step(&mut bodies, &collisions, &parameters)
+            });
+            let error = stepped.expect_err("a false answer");
+            assert!(matches!(error, Error::Open(_)) || error.must_reopen(), "{number}: {error}");
+            assert_eq!(bits(&bodies), before);
+        }
+    }
+}
+
+/// A driver's end of the socket, without a driver.
+fn raw(served: &Served) -> UnixStream {
+    UnixStream::connect(served.socket()).expect("connected")
+}
+
+fn ask(stream: &mut UnixStream, request: &[u8]) -> Answer {
+    stream.write_all(request).expect("sent");
+    let mut answer = [0; ANSWER_BYTES];
+    stream.read_exact(&mut answer).expect("answered");
+    Answer::decode(&answer).expect("an answer")
+}
+
+#[test]
+fn requests_that_make_no_sense_end_the_visit_and_nothing_else() {
+    let served = Served::new(BoardConfig::default());
+    let hello = Request::Hello { version: VERSION }.encode();
+    let refused = |first: Option<&[u8]>, request: &[u8]| {
+        let mut stream = raw(&served);
+        if let Some(first) = first {
+            assert_eq!(ask(&mut stream, first).status, Status::Done);
+        }
+        assert_eq!(ask(&mut stream, request).status, Status::Refused);
+        assert_eq!(stream.read(&mut [0]).expect("hung up"), 0);
+        let visit = served.visit();
+        assert!(matches!(visit.ended, Ended::Refused(_)), "{visit:?}");
+    };
+    refused(None, &[0; 16]);
+    refused(None, &[0xFF; 16]);
+    // A register before the hello.
+    refused(None, &Request::Read { address: 0xA004_0000 }.encode());
+    refused(Some(&hello), &[8; 16]);
+    // An hour.
+    let mut wait = Request::Unmask.encode();
+    wait[0] = 6;
+    wait[8..].copy_from_slice(&3_600_000_000_000_u64.to_le_bytes());
+    refused(Some(&hello), &wait);
+
+    // Half a request, and more than one at once.
+    let mut stream = raw(&served);
+    stream.write_all(&hello[..7]).expect("sent");
+    drop(stream);
+    assert!(matches!(served.visit().ended, Ended::Left));
+    let mut stream = raw(&served);
+    let wait = Request::WaitInterrupt { time: std::time::Duration::from_millis(1) }.encode();
+    stream.write_all(&[hello, wait, wait].concat()).expect("sent");
+    let mut answers = [0; 3 * ANSWER_BYTES];
+    stream.read_exact(&mut answers).expect("one after the other");
+    drop(stream);
+    let visit = served.visit();
+    assert!(matches!(visit.ended, Ended::Left) && visit.requests == 3, "{visit:?}");
+
+    // A board that speaks of another version, or of another memory, says so.
+    let mut stream = raw(&served);
+    let other = Request::Hello { version: VERSION + 1 }.encode();
+    assert_eq!(ask(&mut stream, &other).status, Status::OtherVersion);
+    drop(stream);
+    assert_eq!(served.visit().requests, 1);
+
+    steps(&mut served.open(), 5);
+    assert_eq!(served.board.violations(), []);
+}
+
+#[test]
+fn another_file_than_the_boards_memory_is_refused() {
+    let served = Served::new(BoardConfig::default());
+    let other = served.folder.path().join("other");
+    let options = || {
+        let memory = MemoryChoice::File { path: other.clone() };
+        OpenOptions { memory, ..served.options() }
+    };
+    let error = Accelerator::open(options()).expect_err("there is none");
+    assert!(
+        matches!(error, Error::Open(OpenError::Platform(PlatformError::File { .. }))),
+        "{error}"
+    );
+    std::fs::write(&other, [0; 1 << 16]).expect("written");
+    let error = Accelerator::open(options()).expect_err("not the board's");
+    assert!(
+        matches!(&error, Error::Open(OpenError::Platform(PlatformError::OtherMemory { memory, .. }))
+            if *memory == other),
+        "{error}"
+    );
+    // Nor is a file any other board's memory.
+    for memory in [MemoryChoice::Uio { node: "m".to_owned() }, MemoryChoice::File { path: other }] {
+        let board = match memory {
+            MemoryChoice::Uio { .. } => served.options().board,
+            _ => BoardChoice::Automatic,
+        };
+        let options = OpenOptions { board, memory, ..OpenOptions::default() };
+        let error = Accelerator::open(options).expect_err("not for this board");
+        assert!(matches!(error, Error::Open(OpenError::ServedMemory)), "{error}");
+    }
+    assert_eq!(served.board.violations(), []);
+}
+
+#[test]
+fn a_socket_has_one_server_and_one_that_was_left_behind_is_replaced() {
+    let served = Served::new(BoardConfig::default());
+    let error = bind(BoardConfig::default(), &served.socket()).expect_err("in use");
+    assert!(matches!(error, ServeError::InUse { .. }), "{error}");
+    steps(&mut served.open(), 5);
+
+    // A server that is killed leaves its socket.
+    let left = served.folder.path().join("left");
+    drop(UnixListener::bind(&left).expect("bound"));
+    assert!(left.exists());
+    let server = bind(BoardConfig::default(), &left).expect("replaced");
+    drop(server);
+    assert!(!left.exists());
+
+    // What is no socket stays.
+    std::fs::write(&left, "mine").expect("written");
+    let error = bind(BoardConfig::default(), &left).expect_err("a file");
+    assert!(matches!(error, ServeError::NoSocket { .. }), "{error}");
+    assert_eq!(std::fs::read(&left).expect("there"), b"mine");
+}
+
+#[test]
+fn memory_is_a_file_of_whole_pages_that_no_driver_has() {
+    let served = Served::new(BoardConfig::default());
+    let path = served.socket().with_extension("memory");
+    let open = |wanted| MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES);
+    assert_eq!(open(None).expect("free").addresses(), 0x5000_0000..0x5400_0000);
+    let accelerator = served.open();
+    let error = open(None).expect_err("a driver has it");
+    assert!(matches!(error, MemoryFileError::Busy { .. }), "{error}");
+    drop(accelerator);
+    for (wanted, found) in [(Some(1 << 20), MEMORY_BYTES), (Some(1 << 15), 1 << 15)] {
+        let error = open(wanted).expect_err("another length");
+        assert!(matches!(error, MemoryFileError::Length { found: f, .. } if f == found), "{error}");
+    }
+    let error = MemoryFile::open(served.folder.path(), 0, None, 1 << 16).expect_err("a directory");
+    assert!(matches!(error, MemoryFileError::NotRegular { .. }), "{error}");
+    let error = MemoryFile::open(&path.join("x"), 0, None, 1 << 16).expect_err("no directory");
+    assert!(matches!(error, MemoryFileError::File { .. }), "{error}");
+}

@@ -1,0 +1,161 @@
+//! The verb `serve`: an emulated board as a process of its own.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
+use bitstream_model::remote::message::MEMORY_SUFFIX;
+use bitstream_model::remote::{Ended, MemoryFile, ServeError, Server, Visit};
+use clap::Args;
+use serde_json::json;
+use zynq_pgs::MemoryChoice;
+
+use super::SCHEMA;
+use super::table::grouped;
+use crate::args::{BoardName, CommonArgs};
+use crate::board::not_built;
+use crate::build::described;
+use crate::failure::{Cause, Failure, Verdict};
+use crate::interrupt;
+use crate::options::BuildArgs;
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs serve --socket /tmp/board                   in one terminal
+  pgs --board socket:/tmp/board                   in another
+  pgs serve --socket /tmp/board --memory file:/dev/shm/board --profile half
+
+One driver at a time has the board. One that is killed leaves it as it is, engines running; the next
+one resets it. Ctrl-C ends it and removes the socket; the memory's file stays.";
+
+/// Serve an emulated board to drivers in other processes: registers at a Unix socket, memory in a
+/// file.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct ServeArgs {
+    /// Unix socket to make. The memory is the file of that name and ".memory", unless --memory
+    /// names another.
+    #[arg(long, value_name = "PATH")]
+    pub(crate) socket: PathBuf,
+    /// Length of the memory, MiB [default: that of the file, 64 if there is none yet]
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024))]
+    memory_mib: Option<u64>,
+    #[command(flatten)]
+    build: BuildArgs,
+}
+
+/// What was served so far.
+#[derive(Default)]
+struct Tally {
+    drivers: u64,
+    requests: u64,
+    left_running: u64,
+    violations: u64,
+}
+
+/// Serves until Ctrl-C.
+pub(crate) fn run(
+    args: &ServeArgs,
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    if !matches!(common.board, BoardName::Auto | BoardName::Emulated) {
+        let error = "`pgs serve` serves an emulated board, and no other";
+        return Err(Failure::input(error).next("leave out --board (and PGS_BOARD)"));
+    }
+    let path = match &common.memory {
+        MemoryChoice::Automatic => {
+            let mut path = args.socket.clone().into_os_string();
+            path.push(MEMORY_SUFFIX);
+            path.into()
+        }
+        MemoryChoice::File { path } => path.clone(),
+        _ => {
+            let error = "the memory of a served board is a file";
+            return Err(Failure::input(error).next("write --memory file:PATH, or leave it out"));
+        }
+    };
+    let config = args.build.config();
+    let wanted = args.memory_mib.map(|mib| mib << 20);
+    let memory =
+        MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(Failure::input)?;
+    let addresses = memory.addresses();
+    let mut server = Server::bind(config, memory, &args.socket).map_err(|error| match error {
+        ServeError::Config(error) => not_built(error),
+        error => Failure::input(error),
+    })?;
+    let stopper = server.stopper();
+    let at_signal = stopper.clone();
+    interrupt::take_over(move || at_signal.stop());
+
+    if !common.json {
+        writeln!(out, "board      {}", described(&config))?;
+        let bytes = grouped(addresses.end - addresses.start);
+        writeln!(out, "memory     {}, {bytes} bytes at {:#x}", path.display(), addresses.start)?;
+        writeln!(out, "serving    pgs --board socket:{}", args.socket.display())?;
+        out.flush()?;
+    }
+    let mut tally = Tally::default();
+    let mut written = Ok(());
+    let served = server.serve(|board, visit| {
+        // Somebody looked whether a board is served here.
+        if visit.requests == 0 && matches!(visit.ended, Ended::Left) {
+            return;
+        }
+        tally.drivers += 1;
+        tally.requests += visit.requests;
+        tally.left_running += u64::from(visit.left_running);
+        for violation in board.violations().iter().skip(at(tally.violations)) {
+            log::error!("driver {}: {violation}", tally.drivers);
+        }
+        tally.violations = board.counts().violations;
+        if !common.json {
+            written = line(out, tally.drivers, &visit);
+            if written.is_err() {
+                stopper.stop();
+            }
+        }
+    });
+    written?;
+    served.map_err(|error| Failure::new(Cause::Output, error))?;
+    let Tally { drivers, requests, left_running, violations } = tally;
+    if common.json {
+        let document = json!({
+            "schema": SCHEMA,
+            "verb": "serve",
+            "drivers": drivers,
+            "requests": requests,
+            "left_running": left_running,
+            "violations": violations,
+        });
+        writeln!(out, "{document:#}")?;
+    } else {
+        writeln!(
+            out,
+            "served     {} drivers, {} left engines running; {} requests, {} violations",
+            grouped(drivers),
+            grouped(left_running),
+            grouped(requests),
+            grouped(violations),
+        )?;
+    }
+    Ok(Verdict::Done)
+}
+
+fn at(number: u64) -> usize {
+    usize::try_from(number).unwrap_or(usize::MAX)
+}
+
+/// One driver that is gone.
+fn line(out: &mut dyn Write, number: u64, visit: &Visit) -> io::Result<()> {
+    let Visit { requests, ended, left_running, .. } = visit;
+    write!(out, "driver {number:<3} {} requests, ", grouped(*requests))?;
+    match ended {
+        Ended::Left => write!(out, "left")?,
+        Ended::Refused(error) => write!(out, "refused: {error}")?,
+        Ended::Broken(error) => write!(out, "broken off: {error}")?,
+        _ => write!(out, "gone")?,
+    }
+    writeln!(out, ", {}", if *left_running { "engines running" } else { "engines at rest" })?;
+    out.flush()
+}
