@@ -80,6 +80,9 @@ impl Device {
                     // The storm may be over, and the next step relies on interrupts.
                     self.platform.unmask_interrupt()?;
                 }
+                if let Some(started) = &self.started {
+                    self.took = Some(self.platform.now().saturating_sub(started.at));
+                }
                 acquire_from_device();
                 return Ok(interrupts);
             }
@@ -146,12 +149,18 @@ impl Device {
         if counters.cycles == u64::MAX { Err(gone()) } else { Ok(counters) }
     }
 
-    /// How long to wait for the first interrupt before looking.
+    /// How long to wait for the first interrupt before looking: twice what the step before took, so
+    /// that an interrupt that is lost costs a step, and no more.
     ///
-    /// A quarter of the default deadline is what a step takes at worst: looking earlier costs
-    /// register accesses and finds nothing, unless interrupts do not come at all.
+    /// Looking earlier costs register accesses and finds nothing, unless interrupts do not come at
+    /// all. Of the first step all that is known is that a quarter of the default deadline is what it
+    /// takes at worst.
     fn first_slice(&self, limit: Duration) -> Duration {
-        if self.missed_interrupts >= MISSED_LIMIT { GRACE } else { (limit / 4).max(SHORTEST_SLICE) }
+        if self.missed_interrupts >= MISSED_LIMIT {
+            return GRACE;
+        }
+        let worst = limit / 4;
+        self.took.map_or(worst, |took| worst.min(took.saturating_mul(2))).max(SHORTEST_SLICE)
     }
 
     fn longest_slice(&self, deadline: &Deadline) -> Duration {

@@ -52,6 +52,8 @@ pub(crate) struct Device {
     pub(super) fingerprint: Fingerprint,
     /// The step that was started last.
     pub(super) started: Option<Started>,
+    /// What the last step took on the board's clock, from its start to the end of its results.
+    pub(super) took: Option<Duration>,
     /// Interrupts that did not come although the work was done, in a row.
     pub(super) missed_interrupts: u32,
     /// What was told already.
@@ -117,6 +119,7 @@ impl Device {
             platform,
             fingerprint,
             started: None,
+            took: None,
             missed_interrupts: 0,
             oddities: Oddities::default(),
             dead: false,

@@ -1,6 +1,8 @@
 //! Faults that the emulated board is told to have, and what the driver makes of them.
 
-use bitstream_model::{BoardConfig, FaultPlan};
+use std::time::Duration;
+
+use bitstream_model::{Bandwidth, BoardConfig, FaultPlan};
 
 use super::fault_tests::{CUBES, fault_of, recovered};
 use super::oddities::Oddity;
@@ -134,4 +136,32 @@ fn a_channel_that_does_not_stop_for_its_new_ring_is_reset() {
     assert!(accelerator.device.oddities.told(Oddity::NoHalt));
     drop(accelerator);
     assert_eq!(board.violations(), []);
+}
+
+/// The interval is twice what the step before took, and 10 ms at least.
+#[test]
+fn an_interrupt_that_is_dropped_costs_at_most_one_polling_interval() {
+    for bandwidth in [Bandwidth::ZCU102_SUSTAINED, Bandwidth::BytesPerSecond(20_000_000)] {
+        let (board, mut accelerator) = open(BoardConfig { bandwidth, ..BoardConfig::default() });
+        let port = board.cpu_port();
+        let mut time_of = |fault: Option<&str>| {
+            if let Some(line) = fault {
+                board.inject(line.parse::<FaultPlan>().expect(line));
+            }
+            let before = port.now();
+            let (result, bodies) = step(&mut accelerator, 300);
+            result.expect("no failure");
+            assert_eq!(bits(&bodies), undisturbed(300));
+            port.now() - before
+        };
+        // The channels are started with the first step.
+        time_of(None);
+        let took = time_of(None);
+        let dropped = time_of(Some("irq-drop"));
+        assert_eq!(board.faults(), 1);
+        let interval = (2 * took).max(Duration::from_millis(10));
+        // All registers are read once more.
+        assert!(dropped > took && dropped < interval + Duration::from_micros(50), "{dropped:?}");
+        assert!(time_of(None) < took + Duration::from_micros(50), "relied on again");
+    }
 }
