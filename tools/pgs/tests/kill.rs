@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use common::pgs;
+use common::{Tied, pgs, signal};
 
 /// Kills, if nobody says otherwise.
 const KILLS: u32 = 20;
@@ -51,13 +51,14 @@ fn a_board_whose_driver_was_killed_serves_the_next_one_as_if_nothing_had_been() 
     let kills = std::env::var("PGS_KILLS").map_or(KILLS, |text| text.parse().expect("a number"));
     let folder = tempfile::tempdir().expect("a directory");
     let socket = folder.path().join("board");
-    let mut server = pgs()
+    let server = pgs()
         .args(["serve", "--memory-mib", "16", "--socket"])
         .arg(&socket)
         .stdout(Stdio::piped())
         .spawn()
         .expect("it starts");
-    let mut lines = BufReader::new(server.stdout.take().expect("a pipe"));
+    let mut server = Tied(server);
+    let mut lines = BufReader::new(server.0.stdout.take().expect("a pipe"));
     let mut line = String::new();
     while !line.starts_with("serving ") {
         line.clear();
@@ -83,11 +84,10 @@ fn a_board_whose_driver_was_killed_serves_the_next_one_as_if_nothing_had_been() 
         assert_eq!(digest(&socket, &after), expected, "{after}");
     }
 
-    let ended = Command::new("kill").args(["-TERM", &server.id().to_string()]).status();
-    assert!(ended.expect("kill runs").success());
+    signal("-TERM", server.0.id());
     let mut rest = String::new();
     lines.read_to_string(&mut rest).expect("text");
-    assert!(server.wait().expect("it ends").success());
+    assert!(server.0.wait().expect("it ends").success());
     let summary = rest.lines().last().expect("a summary").to_owned();
     let _ = writeln!(std::io::stderr(), "{kills} kills in a run of {whole:?}: {summary}");
     assert!(summary.ends_with(", 0 violations"), "{summary}");

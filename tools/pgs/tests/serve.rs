@@ -6,30 +6,31 @@ mod common;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 
 use bitstream_model::interface::address_map::dma_base;
 use bitstream_model::remote::message::{ANSWER_BYTES, Answer, REQUEST_BYTES, Request, Status};
-use common::{Ran, pgs, run};
+use common::{Ran, Tied, pgs, run, signal};
 
 /// `pgs serve` in a process of its own.
 struct Served {
     folder: tempfile::TempDir,
-    child: Child,
+    child: Tied,
 }
 
 impl Served {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a directory");
-        let mut child = pgs()
+        let child = pgs()
             .args(["serve", "--memory-mib", "16", "--socket"])
             .arg(folder.path().join("board"))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .expect("it starts");
-        let mut lines = BufReader::new(child.stdout.as_mut().expect("a pipe")).lines();
+        let mut child = Tied(child);
+        let mut lines = BufReader::new(child.0.stdout.as_mut().expect("a pipe")).lines();
         let serving =
             lines.find(|line| line.as_ref().is_ok_and(|line| line.starts_with("serving ")));
         assert!(serving.is_some(), "a board is served");
@@ -50,18 +51,16 @@ impl Served {
     }
 
     /// Ends it; what it did.
-    fn end(self) -> Ran {
-        signal("-TERM", &self.child);
-        let socket = self.socket();
-        let ran = Ran::from(self.child.wait_with_output().expect("it ends"));
-        assert!(!socket.exists(), "the socket is gone");
-        ran
+    fn end(mut self) -> Ran {
+        signal("-TERM", self.child.0.id());
+        let (mut stdout, mut stderr) = (String::new(), String::new());
+        let child = &mut self.child.0;
+        child.stdout.as_mut().expect("a pipe").read_to_string(&mut stdout).expect("text");
+        child.stderr.as_mut().expect("a pipe").read_to_string(&mut stderr).expect("text");
+        let code = child.wait().expect("it ends").code();
+        assert!(!self.socket().exists(), "the socket is gone");
+        Ran { code, stdout, stderr }
     }
-}
-
-fn signal(which: &str, child: &Child) {
-    let kill = Command::new("kill").args([which, &child.id().to_string()]).status();
-    assert!(kill.expect("kill runs").success());
 }
 
 #[test]
@@ -207,7 +206,7 @@ fn ctrl_c_ends_a_step_that_stalls_and_a_second_driver_is_refused_meanwhile() {
             second.stderr
         );
 
-        signal("-INT", &child);
+        signal("-INT", child.id());
         let ran = Ran::from(child.wait_with_output().expect("it ends"));
         assert_eq!((ran.code, ran.stderr.as_str()), (Some(130), ""), "{verb}");
         // It has reset every core before it went.

@@ -5,7 +5,7 @@
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
 
 use tempfile::TempDir;
 
@@ -22,6 +22,24 @@ pub(crate) fn pgs() -> Command {
     command.args(words);
     command.env("PGS_BOARD", "emulated").env("RUST_LOG", "error");
     command
+}
+
+/// A process that does not outlive the test, however that ends.
+#[derive(Debug)]
+pub(crate) struct Tied(pub(crate) Child);
+
+impl Drop for Tied {
+    fn drop(&mut self) {
+        // One that has ended needs it no more.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Asks a process to end, with that signal.
+pub(crate) fn signal(which: &str, process: u32) {
+    let kill = Command::new("kill").args([which, &process.to_string()]).status();
+    assert!(kill.expect("kill runs").success());
 }
 
 /// Says what a test skips, past the harness, which keeps what passing tests print.
