@@ -3,6 +3,8 @@
 mod board;
 mod bring_up;
 mod completion;
+#[cfg(all(test, feature = "emulation"))]
+mod confinement_tests;
 mod device;
 mod diagnosis;
 mod echo;
