@@ -192,7 +192,22 @@ impl CpuPort {
         beats: Box<[Beat]>,
         access: DeviceAccess,
     ) -> Result<(), MemoryError> {
-        lock(&self.0).memory.hand_over(address, beats, access)
+        let granted = beats.len();
+        self.hand_over_first(address, beats, granted, access)
+    }
+
+    /// Moves a buffer to the device, which may touch its first `granted` beats and no more.
+    ///
+    /// # Errors
+    /// As for [`hand_over`](Self::hand_over).
+    pub fn hand_over_first(
+        &self,
+        address: u64,
+        beats: Box<[Beat]>,
+        granted: usize,
+        access: DeviceAccess,
+    ) -> Result<(), MemoryError> {
+        lock(&self.0).memory.hand_over(address, beats, granted, access)
     }
 
     /// Moves a buffer back to the CPU.

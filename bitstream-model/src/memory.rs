@@ -82,7 +82,8 @@ pub enum Denied {
 #[derive(Debug)]
 enum Content {
     Cpu,
-    Device(Box<[Beat]>, DeviceAccess),
+    /// Of which the device may touch the first beats only, so many.
+    Device(Box<[Beat]>, DeviceAccess, usize),
     Words(Arc<[AtomicU32]>),
 }
 
@@ -192,10 +193,12 @@ impl Memory {
         self.regions.get_mut(&address).ok_or(MemoryError::Unknown { address })
     }
 
+    /// Gives the device the first `granted` beats of a buffer.
     pub(crate) fn hand_over(
         &mut self,
         address: u64,
         beats: Box<[Beat]>,
+        granted: usize,
         access: DeviceAccess,
     ) -> Result<(), MemoryError> {
         let coherency = self.coherency;
@@ -217,7 +220,7 @@ impl Memory {
             }
             _ => beats,
         };
-        region.content = Content::Device(visible, access);
+        region.content = Content::Device(visible, access, granted);
         Ok(())
     }
 
@@ -225,7 +228,7 @@ impl Memory {
         let coherency = self.coherency;
         let region = self.region_at(address)?;
         match std::mem::replace(&mut region.content, Content::Cpu) {
-            Content::Device(beats, access) => Ok(match (coherency, access) {
+            Content::Device(beats, access, _) => Ok(match (coherency, access) {
                 (Coherency::StaleReads { .. }, DeviceAccess::Read) => {
                     region.cached.clone().unwrap_or(beats)
                 }
@@ -272,9 +275,10 @@ impl Memory {
         match &region.content {
             Content::Cpu => Err(Denied::CpuOwned),
             Content::Words(_) => Err(Denied::Kind),
-            Content::Device(_, DeviceAccess::Write) => Err(Denied::Direction),
-            Content::Device(beats, DeviceAccess::Read) => {
+            Content::Device(_, DeviceAccess::Write, _) => Err(Denied::Direction),
+            Content::Device(beats, DeviceAccess::Read, granted) => {
                 let first = index(offset / BEAT_BYTES as u64);
+                let beats = beats.get(..*granted).unwrap_or(beats);
                 beats.get(first..first + count).ok_or(Denied::PastEnd)
             }
         }
@@ -286,10 +290,11 @@ impl Memory {
         match &mut region.content {
             Content::Cpu => Err(Denied::CpuOwned),
             Content::Words(_) => Err(Denied::Kind),
-            Content::Device(_, DeviceAccess::Read) => Err(Denied::Direction),
-            Content::Device(beats, DeviceAccess::Write) => {
+            Content::Device(_, DeviceAccess::Read, _) => Err(Denied::Direction),
+            Content::Device(beats, DeviceAccess::Write, granted) => {
                 let first = index(offset / BEAT_BYTES as u64);
-                beats.get_mut(first..first + count).ok_or(Denied::PastEnd)
+                let end = beats.len().min(*granted);
+                beats[..end].get_mut(first..first + count).ok_or(Denied::PastEnd)
             }
         }
     }
@@ -353,12 +358,15 @@ impl Memory {
 mod tests {
     use super::*;
 
+    /// Every beat of a buffer is granted.
+    const ALL: usize = usize::MAX;
+
     #[test]
     fn a_buffer_of_the_cpu_is_out_of_the_devices_reach() {
         let mut memory = Memory::new(40, Coherency::Coherent);
         let (address, beats) = memory.allocate(4).expect("fits");
         assert_eq!(memory.beats(address, 1).err(), Some(Denied::CpuOwned));
-        memory.hand_over(address, beats, DeviceAccess::Read).expect("the CPU owns it");
+        memory.hand_over(address, beats, ALL, DeviceAccess::Read).expect("the CPU owns it");
         assert_eq!(memory.beats(address, 4).map(<[Beat]>::len), Ok(4));
         assert_eq!(memory.beats_mut(address, 1).err(), Some(Denied::Direction));
         memory.take_back(address).expect("the device owns it");
@@ -369,7 +377,7 @@ mod tests {
     fn one_beat_past_the_end_is_denied() {
         let mut memory = Memory::new(40, Coherency::Coherent);
         let (address, beats) = memory.allocate(4).expect("fits");
-        memory.hand_over(address, beats, DeviceAccess::Read).expect("the CPU owns it");
+        memory.hand_over(address, beats, ALL, DeviceAccess::Read).expect("the CPU owns it");
         assert_eq!(memory.beats(address + 48, 2).err(), Some(Denied::PastEnd));
         assert_eq!(memory.beats(address + 64, 1).err(), Some(Denied::Unmapped));
         assert_eq!(memory.beats(address - 16, 1).err(), Some(Denied::Unmapped));
@@ -379,7 +387,7 @@ mod tests {
     fn a_released_buffer_is_gone_and_its_address_is_not_reused() {
         let mut memory = Memory::new(40, Coherency::Coherent);
         let (address, beats) = memory.allocate(4).expect("fits");
-        memory.hand_over(address, beats, DeviceAccess::Write).expect("the CPU owns it");
+        memory.hand_over(address, beats, ALL, DeviceAccess::Write).expect("the CPU owns it");
         memory.release(address).expect("it is there");
         assert_eq!(memory.beats_mut(address, 1).err(), Some(Denied::Unmapped));
         for _ in 0..8 {
@@ -426,7 +434,7 @@ mod tests {
     fn round(memory: &mut Memory, address: u64, value: u32, access: DeviceAccess) -> [Vec<u32>; 2] {
         let first = |beats: &[Beat]| beats.iter().map(|beat| beat.0[0]).collect::<Vec<_>>();
         let beats = vec![Beat([value; 4]); 8].into();
-        memory.hand_over(address, beats, access).expect("the CPU owns it");
+        memory.hand_over(address, beats, ALL, access).expect("the CPU owns it");
         let read = match access {
             DeviceAccess::Read => first(memory.beats(address, 8).expect("granted")),
             DeviceAccess::Write => {
@@ -456,5 +464,23 @@ mod tests {
         assert_eq!(rounds.next(), Some(vec![101; 8]));
         assert_eq!(rounds.next(), Some(vec![102, 102, 102, 102, 2, 2, 2, 2]));
         assert_eq!(rounds.next(), Some(vec![103, 103, 103, 103, 3, 3, 3, 3]));
+    }
+
+    #[test]
+    fn only_the_first_beats_of_a_buffer_may_be_granted() {
+        let mut memory = Memory::new(40, Coherency::Coherent);
+        for access in [DeviceAccess::Read, DeviceAccess::Write] {
+            let (address, beats) = memory.allocate(8).expect("there is room");
+            memory.hand_over(address, beats, 3, access).expect("the CPU owns it");
+            let mut touch = |beat: u64, count| match access {
+                DeviceAccess::Read => memory.beats(address + 16 * beat, count).map(|_| ()),
+                DeviceAccess::Write => memory.write(address + 16 * beat, count, |_| ()),
+            };
+            assert_eq!(touch(0, 3), Ok(()));
+            for (beat, count) in [(0, 4), (2, 2), (3, 1), (7, 1)] {
+                assert_eq!(touch(beat, count), Err(Denied::PastEnd), "{access:?}");
+            }
+            assert_eq!(memory.take_back(address).expect("it is there").len(), 8);
+        }
     }
 }

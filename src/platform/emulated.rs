@@ -82,7 +82,7 @@ impl Platform for EmulatedPlatform {
         &self,
         address: u64,
         memory: DmaMemory,
-        _: usize,
+        used: usize,
         access: Access,
     ) -> Result<(), PlatformError> {
         let DmaMemory::Heap(beats) = memory else {
@@ -92,7 +92,7 @@ impl Platform for EmulatedPlatform {
             Access::Read => DeviceAccess::Read,
             Access::Write => DeviceAccess::Write,
         };
-        self.port.hand_over(address, beats, access).map_err(refused(
+        self.port.hand_over_first(address, beats, used, access).map_err(refused(
             "hand over",
             "address",
             address,

@@ -164,6 +164,7 @@ mod tests {
 
     use super::*;
     use crate::platform::copy::{load_beats, store_beats};
+    use crate::platform::memory::{DmaMemory, MappedBeats};
 
     fn page() -> Vec<u8> {
         (0..4096u32).map(|k| u8::try_from(k % 251).expect("below 251")).collect()
@@ -189,6 +190,45 @@ mod tests {
         file.rewind().expect("rewound");
         file.read_to_end(&mut bytes).expect("read");
         bytes
+    }
+
+    /// A region in anonymous memory, which Miri can map, unlike a file.
+    fn anonymous(start: usize, bytes: usize) -> Mapping {
+        let file = file_of(&[0; 16]);
+        let lock = LockedFile::open(file.path(), 0).expect("nobody else has it");
+        let map = MmapRaw::from(memmap2::MmapMut::map_anon(start + bytes).expect("mapped"));
+        Mapping { map, start, bytes, _lock: Arc::new(lock) }
+    }
+
+    #[test]
+    fn words_and_beats_of_one_region_are_the_same_memory() {
+        let region = anonymous(0x10, 0x80);
+        region.store_word(0x7C, 7);
+        assert_eq!((region.load_word(0x7C), region.load(0x78)), (7, 7 << 32));
+        store_beats(&region, 0x20, &[Beat([1, 2, 3, 4]); 2]);
+        assert_eq!([0x2C, 0x30, 0x3C, 0x40].map(|at| region.load_word(at)), [4, 1, 4, 0]);
+        let mut back = [Beat::default(); 3];
+        load_beats(&region, 0x10, &mut back);
+        assert_eq!(back, [Beat::default(), Beat([1, 2, 3, 4]), Beat([1, 2, 3, 4])]);
+    }
+
+    #[test]
+    fn pieces_of_one_region_are_held_and_written_side_by_side() {
+        let region = Arc::new(anonymous(0x10, 0x100));
+        let piece = |at, beats| {
+            // SAFETY: anonymous memory is normal memory, which no device writes; the two pieces do
+            // not overlap, and nothing else reaches the region while they live.
+            DmaMemory::Mapped(unsafe { MappedBeats::new(Arc::clone(&region), at, beats) })
+        };
+        let (mut one, mut other) = (piece(0, 8), piece(0x80, 8));
+        std::thread::scope(|scope| {
+            scope.spawn(|| one.beats_mut().fill(Beat([1; 4])));
+            other.beats_mut().fill(Beat([2; 4]));
+        });
+        assert_eq!((one.beats()[7], other.beats()[0]), (Beat([1; 4]), Beat([2; 4])));
+        // Handed over and back, as the pool does it: the slices are gone, the words are there.
+        drop((one, other));
+        assert_eq!([0x7C, 0x80].map(|at| region.load_word(at)), [1, 2]);
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
             break;
         }
         if number == 0 || input.one_in(4) {
-            let most = if input.one_in(16) { 40 } else { 8 };
+            let most = if input.one_in(64) { 40 } else { 8 };
             scene = Scene::any(&mut input, most, most, Spoilt::Seldom);
             if accelerator.set_shapes(&scene.shapes).is_err() {
                 tally.refused += 1;
@@ -65,7 +65,7 @@ fn step(
     scene: &mut Scene,
     tally: &mut Tally,
 ) {
-    let passes = if input.one_in(16) { 12 } else { 3 };
+    let passes = if input.one_in(64) { 12 } else { 3 };
     let parameters = parameters(input, passes, Spoilt::Seldom);
     let first = layout(input);
     let again = input.one_in(4).then(|| layout(input));

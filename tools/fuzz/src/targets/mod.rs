@@ -35,7 +35,7 @@ pub const ALL: &[Target] = &[
                 kept, what the device may only read stays as it is, and time goes on",
         run: registers::run,
         longest: 256,
-        share: 4,
+        share: 280,
     },
     Target {
         name: "chains",
@@ -43,7 +43,7 @@ pub const ALL: &[Target] = &[
                 what was granted, and none that no descriptor asked for",
         run: chains::run,
         longest: 512,
-        share: 4,
+        share: 24,
     },
     Target {
         name: "packets",
@@ -51,7 +51,7 @@ pub const ALL: &[Target] = &[
                 a reset the step that was meant has the bits of a fresh board",
         run: packets::run,
         longest: 192,
-        share: 2,
+        share: 4,
     },
     Target {
         name: "folders",
@@ -59,7 +59,7 @@ pub const ALL: &[Target] = &[
                 takes is what the files say",
         run: folders::run,
         longest: 256,
-        share: 9,
+        share: 88,
     },
     Target {
         name: "confinement",
@@ -67,7 +67,7 @@ pub const ALL: &[Target] = &[
                 step, bodies untouched where it is refused, the same bits in every layout",
         run: confinement::run,
         longest: 768,
-        share: 1,
+        share: 4,
     },
     Target {
         name: "faults",

@@ -1,0 +1,8 @@
+//! This file hands the target `packets` to libFuzzer.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    if let Some(target) = fuzz::targets::by_name("packets") {
+        (target.run)(data);
+    }
+});

@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Runs the modules with unsafe code, and those that build on them, under Miri: it finds reads and
+# writes outside an allocation, references that overlap, and data races.
+#
+# Not under Miri, which maps no files: what goes through a device file. valgrind.sh runs whole steps.
+# Needs a nightly toolchain with the components miri and rust-src; the first run builds its own
+# standard library.
+# Exit code: 0 done, 1 something was found, 77 skipped: not on this machine.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+command -v rustup >/dev/null || skip "needs rustup and a nightly toolchain with miri and rust-src"
+cargo +nightly miri --version >/dev/null 2>&1 ||
+	skip "needs Miri: rustup component add --toolchain nightly miri rust-src"
+
+cd "$repository"
+# Files of the tests' own are opened and locked.
+export MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-strict-provenance ${MIRIFLAGS:-}"
+# What maps a file cannot run; names are those of the tests.
+attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs --lib -- \
+	platform::mapped::tests::words_and_beats platform::mapped::tests::pieces_of \
+	platform::copy:: platform::fence:: platform::buffer:: axi_dma::ring:: axi_dma::descriptor::
