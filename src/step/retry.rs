@@ -1,5 +1,6 @@
 //! This file takes a step again that failed, as often as it may be.
 
+use super::fault::Fault;
 use crate::error::Error;
 
 /// Attempts until one succeeds, at most `retries` times more than once and only while the board is
@@ -12,7 +13,8 @@ pub(super) fn with_retries<T>(
     loop {
         match attempt() {
             Ok(done) => return Ok((done, again)),
-            Err(error) if error.may_retry() && again < retries => {
+            // What the caller has ended is not begun anew.
+            Err(error) if error.may_retry() && !cancelled(&error) && again < retries => {
                 again += 1;
                 let name = error.fault().map_or("a fault", |fault| fault.name());
                 log::info!("the step is taken again after {name} ({again} of {retries} times)");
@@ -22,11 +24,14 @@ pub(super) fn with_retries<T>(
     }
 }
 
+fn cancelled(error: &Error) -> bool {
+    matches!(error.fault(), Some(Fault::Cancelled))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::error::Aftermath;
-    use crate::step::Fault;
 
     fn fault(aftermath: Aftermath) -> Error {
         let fault = Box::new(Fault::Gone { region: "a test".to_owned() });
@@ -58,5 +63,16 @@ mod tests {
             let (result, attempts) = tried(5, &[Some(aftermath), None]);
             assert!(result.is_err() && attempts == 1, "{aftermath:?}");
         }
+    }
+
+    #[test]
+    fn what_was_cancelled_is_not_taken_again() {
+        let mut attempts = 0;
+        let cancelled = with_retries(5, || {
+            attempts += 1;
+            let (fault, aftermath) = (Box::new(Fault::Cancelled), Aftermath::Ready);
+            Err::<(), _>(Error::Step { fault, aftermath, diagnosis: None })
+        });
+        assert!(cancelled.is_err() && attempts == 1);
     }
 }
