@@ -58,7 +58,8 @@ impl RegisterWindow for Doorbells {
     }
 
     fn write32(&self, at: u32, value: u32) {
-        let (plant, beat) = (self.plant, BEAT_BYTES as u32);
+        let plant = self.plant;
+        let beat = u32::try_from(BEAT_BYTES).expect("a few bytes");
         let mine = |core, direction| {
             let half = if direction == Direction::Mm2s { 0 } else { S2MM_OFFSET };
             core == self.core && at == half + TAILDESC.offset

@@ -14,7 +14,7 @@ cd "$repository"
 cargo build --release --locked --quiet -p pgs
 check() {
 	attend timeout "${VALGRIND_LIMIT:-600}" valgrind --quiet --error-exitcode=1 --exit-on-first-error=yes \
-		--undef-value-errors=no --leak-check=full --errors-for-leak-kinds=definite "$@"
+		--undef-value-errors=no --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite "$@"
 }
 pgs=$target_root/release/pgs
 for profile in naive float half mixed windowed windowed16; do
