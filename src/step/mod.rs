@@ -4,8 +4,6 @@ mod board;
 mod bring_up;
 mod cancellation;
 mod completion;
-#[cfg(all(test, feature = "emulation"))]
-mod confinement_tests;
 mod device;
 mod diagnosis;
 mod echo;
