@@ -233,6 +233,11 @@ impl Log {
         self.pardons = true;
     }
 
+    /// The driver resets: it knows.
+    pub(crate) fn withdraw_pardon(&mut self) {
+        self.pardons = false;
+    }
+
     /// Sets the time that violations are stamped with.
     pub(crate) fn at(&mut self, now: u64) {
         self.now = now;

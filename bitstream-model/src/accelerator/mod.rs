@@ -33,7 +33,7 @@ pub(crate) mod window;
 
 use crate::cast::register;
 use crate::config::BoardConfig;
-use crate::fault::{FaultKind, Faults, Place, StepPhase, StepShape};
+use crate::fault::{FaultKind, Faults, Place, StepPhase, StepShape, Streamed};
 use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
@@ -289,7 +289,8 @@ impl Accelerator {
                 segments.each_ref().map(|segment| segment.beats_on(core) > 0)
             }),
             contact: self.arguments.contact_iterations,
-            rounds: if once { self.passes().min(1) } else { self.passes() },
+            passes: self.passes(),
+            streamed: if once { Streamed::Once } else { Streamed::PerPass },
         }
     }
 

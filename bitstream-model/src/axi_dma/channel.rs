@@ -1,5 +1,6 @@
 //! This file holds the registers of one DMA channel and what reading and writing them does.
 
+use super::faulty::Faulty;
 use super::{Build, Direction};
 use crate::cast::{high, low, register};
 use crate::interface::axi_dma::{
@@ -39,14 +40,6 @@ pub(super) struct Descriptor {
     pub(super) rxsof: bool,
 }
 
-impl Faulty {
-    /// Whether what a fault has begun comes before all else: a beat that is still to follow a packet
-    /// before the next packet, and so the end of one that is dropped.
-    pub(super) fn holds(&self, direction: Direction) -> bool {
-        self.discards || self.extra && direction == Direction::Mm2s
-    }
-}
-
 #[derive(Debug, Clone, Copy)]
 enum Transition {
     Run,
@@ -83,23 +76,6 @@ pub(crate) struct Channel {
     pub(super) faulty: Faulty,
 }
 
-/// What faults have done to a channel, until its packet ends or its core is reset.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Faulty {
-    /// It moves nothing.
-    pub(super) stalled: bool,
-    /// Clocks more for each beat.
-    pub(super) slow: u32,
-    /// MM2S: the packet has ended on the stream, what is left of it is dropped.
-    pub(super) cut: bool,
-    /// S2MM: the packet has ended in memory, what is left of it is dropped.
-    pub(super) discards: bool,
-    /// A beat with TLAST is still to follow the packet.
-    pub(super) extra: bool,
-    /// A status that is still on its way to memory: when it arrives, where, and what.
-    pub(super) late: Option<(u64, u64, u32)>,
-}
-
 impl Channel {
     pub(super) fn new(direction: Direction) -> Self {
         Self {
@@ -125,11 +101,14 @@ impl Channel {
         }
     }
 
-    /// Drops what it is doing; whether a packet was cut off.
-    pub(super) fn stop(&mut self) -> bool {
-        let busy = self.in_packet || !matches!(self.work, Work::None);
+    /// Drops what it is doing.
+    pub(super) fn stop(&mut self) {
         self.work = Work::None;
-        busy
+    }
+
+    /// Whether it has nothing to do.
+    pub(super) fn rests(&self) -> bool {
+        matches!(self.work, Work::None)
     }
 
     /// Whether it was told to stop and has not halted yet.
@@ -352,7 +331,7 @@ impl Channel {
             Work::Fetch { ready_at, .. } => Some(ready_at),
             _ => None,
         };
-        let late = self.faulty.late.map(|(at, ..)| at);
+        let late = self.faulty.late.iter().map(|(at, ..)| *at).min();
         let halt = self.transition.map(|(at, _)| at);
         // A slow port moves its next beat only then.
         let busy = matches!(self.work, Work::Descriptor(_) | Work::Direct { .. });

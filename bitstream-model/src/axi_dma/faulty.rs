@@ -9,6 +9,31 @@ use crate::interface::record::Beat;
 use crate::interface::register::Field;
 use crate::stream::Stream;
 
+/// What faults have done to a channel, until its packet ends or its core is reset.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Faulty {
+    /// It moves nothing.
+    pub(super) stalled: bool,
+    /// Clocks more for each beat.
+    pub(super) slow: u32,
+    /// MM2S: the packet has ended on the stream, what is left of it is dropped.
+    pub(super) cut: bool,
+    /// S2MM: the packet has ended in memory, what is left of it is dropped.
+    pub(super) discards: bool,
+    /// A beat with TLAST is still to follow the packet.
+    pub(super) extra: bool,
+    /// Statuses that are still on their way to memory: when each arrives, where, and what.
+    pub(super) late: Vec<(u64, u64, u32)>,
+}
+
+impl Faulty {
+    /// Whether what a fault has begun comes before all else: a beat that is still to follow a packet
+    /// before the next packet, and so the end of one that is dropped.
+    pub(super) fn holds(&self, direction: Direction) -> bool {
+        self.discards || self.extra && direction == Direction::Mm2s
+    }
+}
+
 /// What becomes of the next beats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Next {
@@ -118,10 +143,8 @@ impl Channel {
         with: &mut Surroundings<'_>,
     ) -> bool {
         let mut changed = false;
-        if let Some((at, address, word)) = self.faulty.late
-            && at <= now
-        {
-            self.faulty.late = None;
+        while let Some(place) = self.faulty.late.iter().position(|(at, ..)| *at <= now) {
+            let (_, address, word) = self.faulty.late.remove(place);
             self.put_status(build, address, word, with);
             changed = true;
         }
@@ -133,8 +156,8 @@ impl Channel {
                     stream.mark_last();
                     changed = true;
                 }
-                // There is no room for it in the chain.
-                Direction::S2mm if matches!(self.work, Work::None) => {
+                // There is no room for it in the chain, or behind LENGTH.
+                Direction::S2mm if self.is_full() => {
                     self.faulty.extra = false;
                     self.fail(build, dmasr::DMA_INT_ERR.mask());
                     changed = true;
@@ -148,5 +171,14 @@ impl Channel {
             changed = true;
         }
         changed
+    }
+
+    /// Whether all room for a packet was used up.
+    fn is_full(&self) -> bool {
+        match self.work {
+            Work::None => true,
+            Work::Direct { moved } => moved == self.length,
+            Work::Fetch { .. } | Work::Descriptor(_) => false,
+        }
     }
 }

@@ -173,16 +173,18 @@ impl Core {
             let core = self.build.core;
             let fault = faults.at_reset(Place::Core(core));
             self.reset_until = Some(self.config.end_of_reset(now, fault));
-            for channel in [&mut self.mm2s, &mut self.s2mm] {
-                if channel.stop() {
-                    faults.packet_ends(core, channel.direction);
-                }
-            }
+            self.mm2s.stop();
+            self.s2mm.stop();
+            log.withdraw_pardon();
             return Some(false);
         }
         let build = self.build;
         let channel = self.channel(direction);
+        let rested = channel.rests();
         let doorbell = channel.write(&build, now, at, value, log)?;
+        if doorbell && rested {
+            faults.channel_begins(build.core, direction);
+        }
         if at == DMACR.offset && channel.stopping() {
             match faults.at_halt(build.core, direction) {
                 Some(FaultKind::HaltDelay { ns }) => channel.halt_later(build.cycles(ns)),

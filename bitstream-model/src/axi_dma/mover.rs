@@ -426,7 +426,7 @@ impl Channel {
         }
         if let Some(FaultKind::LateCmplted { ns }) = fault {
             let at = self.time.saturating_add(build.cycles(ns));
-            self.faulty.late = Some((at, address, word));
+            self.faulty.late.push((at, address, word));
         } else if !self.put_status(build, address, word, with) {
             return;
         }

@@ -1,7 +1,7 @@
 //! This file keeps the faults that are still to come, and says to each part of the board when it is
 //! one's turn.
 
-use super::{Fault, FaultKind, Place, Site, StepPhase, When};
+use super::{Fault, FaultKind, Place, Site, StepPhase, StepShape, When};
 use crate::axi_dma::Direction;
 use crate::interface::address_map::DMA_COUNT_MAX;
 
@@ -29,63 +29,19 @@ pub(crate) enum Due {
     Now(FaultKind),
 }
 
-/// The packets of a step: which segments each channel has, and how many passes there are.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct StepShape {
-    /// Per channel: velocities, collisions, poses.
-    pub(crate) segments: [[bool; 3]; DMA_COUNT_MAX],
-    pub(crate) contact: u32,
-    /// How often the collisions are streamed.
-    pub(crate) rounds: u32,
-}
-
-impl StepShape {
-    /// What a packet of a channel carries.
-    fn phase(&self, core: usize, packet: u32) -> Option<StepPhase> {
-        let passes = (0..self.rounds).map(|pass| match pass.checked_sub(self.contact) {
-            None => StepPhase::Contact(pass + 1),
-            // A step without contact passes, streamed once.
-            Some(_) if self.rounds == 1 => StepPhase::Contact(1),
-            Some(pass) => StepPhase::Friction(pass + 1),
-        });
-        let mut all = std::iter::once(StepPhase::Load).chain(passes).chain([StepPhase::Poses]);
-        all.find(|phase| self.packet(core, *phase) == Some(packet))
-    }
-
-    /// Which packet of a channel carries a phase, from 0.
-    fn packet(&self, core: usize, phase: StepPhase) -> Option<u32> {
-        let [load, collisions, poses] = *self.segments.get(core)?;
-        let before = u32::from(load);
-        let pass = |number: u32| {
-            // All passes in one packet, in a design that streams the collisions once.
-            let packet = if self.rounds == 1 { 0 } else { number };
-            (collisions && packet < self.rounds).then_some(before + packet)
-        };
-        match phase {
-            StepPhase::Load => load.then_some(0),
-            StepPhase::Contact(number) => pass(number.checked_sub(1)?),
-            StepPhase::Friction(number) => pass(self.contact.checked_add(number)?.checked_sub(1)?),
-            StepPhase::Poses => {
-                let passes = if collisions { self.rounds } else { 0 };
-                poses.then_some(before + passes)
-            }
-            StepPhase::Results => None,
-        }
-    }
-}
-
 /// A fault that is still to come.
 #[derive(Debug)]
 struct Armed {
     fault: Fault,
     /// How often it is still to happen.
     left: u32,
-    /// Steps begun, and packets received by each channel, when it was injected.
+    /// Steps begun, of the accelerator and of each receiver, when it was injected.
     starts: u64,
     received: [u64; DMA_COUNT_MAX],
-    /// The step that it happened in last; it comes again in a later one.
+    /// The step that it happened in last, as the part that met it counts; it comes again in a later
+    /// one.
     happened: Option<u64>,
-    /// Register accesses, stops, resets or edges that were let pass.
+    /// Register accesses, stops, resets or edges since the injection.
     passed: u64,
 }
 
@@ -96,7 +52,7 @@ pub(crate) struct Faults {
     happened: u64,
     /// Starts of the accelerator.
     starts: u64,
-    /// Packets that each channel has received.
+    /// How often each receiver was started: once a step, before the accelerator.
     received: [u64; DMA_COUNT_MAX],
     /// Packets that each channel has sent in this step.
     sent: [u32; DMA_COUNT_MAX],
@@ -135,11 +91,25 @@ impl Faults {
         self.shape = shape;
     }
 
-    /// A packet has ended, or was cut off by a reset.
+    /// A packet has ended.
     pub(crate) fn packet_ends(&mut self, core: usize, direction: Direction) {
-        match direction {
-            Direction::Mm2s => self.sent[core] += 1,
-            Direction::S2mm => self.received[core] += 1,
+        if direction == Direction::Mm2s {
+            self.sent[core] += 1;
+        }
+    }
+
+    /// A channel that rested was started.
+    pub(crate) fn channel_begins(&mut self, core: usize, direction: Direction) {
+        if direction == Direction::S2mm {
+            self.received[core] += 1;
+        }
+    }
+
+    /// The step that a part is in, as it counts: a receiver begins before the accelerator.
+    fn now(&self, channel: Option<(usize, Direction)>) -> u64 {
+        match channel {
+            Some((core, Direction::S2mm)) => self.received[core],
+            _ => self.starts,
         }
     }
 
@@ -151,16 +121,18 @@ impl Faults {
         }
     }
 
-    /// The first that `fits`, which has happened with that.
-    fn take(&mut self, fits: impl Fn(&Self, &Armed) -> bool) -> Option<FaultKind> {
+    /// The first that `fits`, which has happened with that, in a channel if it was met by one.
+    fn take(
+        &mut self,
+        channel: Option<(usize, Direction)>,
+        fits: impl Fn(&Self, &Armed) -> bool,
+    ) -> Option<FaultKind> {
         let place = self.armed.iter().position(|armed| fits(self, armed))?;
+        let now = self.now(channel);
         let armed = &mut self.armed[place];
         let kind = armed.fault.kind;
         armed.left = armed.left.saturating_sub(1);
-        armed.happened = Some(match armed.fault.place {
-            Some(Place::Channel(core, Direction::S2mm)) => self.received[core],
-            _ => self.starts,
-        });
+        armed.happened = Some(now);
         if armed.left == 0 {
             self.armed.remove(place);
         }
@@ -169,16 +141,15 @@ impl Faults {
         Some(kind)
     }
 
-    /// Whether a fault may happen in this step, as a channel counts steps.
-    ///
-    /// Receiving ends after the accelerator has: a receiver counts its packets, one a step.
+    /// Whether a fault may happen in this step, as a channel counts steps if it would meet it.
     fn in_step(&self, armed: &Armed, channel: Option<(usize, Direction)>) -> bool {
-        let (now, then, first) = match channel {
-            Some((core, Direction::S2mm)) => (self.received[core], armed.received[core], 1),
-            _ => (self.starts, armed.starts, 0),
+        let now = self.now(channel);
+        let then = match channel {
+            Some((core, Direction::S2mm)) => armed.received[core],
+            _ => armed.starts,
         };
         let again = armed.happened.is_none_or(|last| now > last);
-        again && armed.fault.step.is_none_or(|step| now - then + first == u64::from(step))
+        again && armed.fault.step.is_none_or(|step| now - then == u64::from(step))
     }
 
     fn fits(&self, armed: &Armed, turn: &Turn) -> bool {
@@ -229,7 +200,8 @@ impl Faults {
             Some(beats_until) if beats_until < beats => return Due::After(beats_until),
             _ => return Due::Nothing,
         }
-        let kind = self.take(|all, armed| all.beats_until(armed, turn) == Some(0));
+        let channel = Some((turn.core, turn.direction));
+        let kind = self.take(channel, |all, armed| all.beats_until(armed, turn) == Some(0));
         match kind {
             Some(kind) if kind.site() == Site::Board => {
                 self.for_board = Some(kind);
@@ -242,7 +214,7 @@ impl Faults {
 
     /// What happens at a descriptor or at the end of a packet.
     fn at(&mut self, turn: &Turn, site: Site) -> Option<FaultKind> {
-        self.take(|all, armed| {
+        self.take(Some((turn.core, turn.direction)), |all, armed| {
             let when = match armed.fault.when {
                 Some(When::Descriptor(number)) => number == turn.descriptors,
                 _ => true,
@@ -270,28 +242,21 @@ impl Faults {
     fn on_occasion(
         &mut self,
         site: Site,
-        channel: Option<(usize, Direction)>,
         fits: impl Fn(Option<Place>) -> bool,
     ) -> Option<FaultKind> {
         if self.none() {
             return None;
         }
-        let counts = |all: &Self, armed: &Armed| {
-            armed.fault.kind.site() == site
-                && fits(armed.fault.place)
-                && all.in_step(armed, channel)
+        let here = |armed: &Armed| armed.fault.kind.site() == site && fits(armed.fault.place);
+        let due = |armed: &Armed| match armed.fault.when {
+            Some(When::Occasion(number)) => armed.passed >= u64::from(number),
+            _ => true,
         };
-        let wanted = |armed: &Armed| match armed.fault.when {
-            Some(When::Occasion(number)) => u64::from(number),
-            _ => 0,
-        };
-        let kind = self.take(|all, armed| counts(all, armed) && armed.passed >= wanted(armed));
-        if kind.is_none() {
-            for place in 0..self.armed.len() {
-                if counts(self, &self.armed[place]) {
-                    self.armed[place].passed += 1;
-                }
-            }
+        let kind =
+            self.take(None, |all, armed| here(armed) && due(armed) && all.in_step(armed, None));
+        // Whatever happened on it: it was one.
+        for armed in self.armed.iter_mut().filter(|armed| here(armed)) {
+            armed.passed += 1;
         }
         kind
     }
@@ -299,17 +264,17 @@ impl Faults {
     /// What happens as a channel is stopped.
     pub(crate) fn at_halt(&mut self, core: usize, direction: Direction) -> Option<FaultKind> {
         let here = Place::Channel(core, direction);
-        self.on_occasion(Site::Halt, None, |place| place.is_none_or(|place| place == here))
+        self.on_occasion(Site::Halt, |place| place.is_none_or(|place| place == here))
     }
 
     /// What happens as a core or the accelerator is reset.
     pub(crate) fn at_reset(&mut self, here: Place) -> Option<FaultKind> {
-        self.on_occasion(Site::Reset, None, |place| place.is_none_or(|place| place == here))
+        self.on_occasion(Site::Reset, |place| place.is_none_or(|place| place == here))
     }
 
     /// What happens as the interrupt line rises.
     pub(crate) fn at_edge(&mut self) -> Option<FaultKind> {
-        self.on_occasion(Site::Edge, None, |_| true)
+        self.on_occasion(Site::Edge, |_| true)
     }
 
     /// What happens in the accelerator, if it is in that phase (in any, if none is said) and about to
@@ -322,7 +287,7 @@ impl Faults {
         if self.none() {
             return None;
         }
-        self.take(|all, armed| {
+        self.take(None, |all, armed| {
             let fault = &armed.fault;
             let when = match fault.when {
                 Some(When::Beat(record)) => record < records,
@@ -341,7 +306,7 @@ impl Faults {
     /// Whether the accelerator says that it is done.
     pub(crate) fn keeps_done(&mut self) -> bool {
         let kind = FaultKind::NoDone;
-        self.take(|all, armed| armed.fault.kind == kind && all.in_step(armed, None)).is_some()
+        self.take(None, |all, armed| armed.fault.kind == kind && all.in_step(armed, None)).is_some()
     }
 
     /// What happens to the board as a whole, at a register access if there is one now.
@@ -358,14 +323,14 @@ impl Faults {
                 && !Self::awaits_channel(fault)
                 && all.in_step(armed, None)
         };
-        let kind = self.take(|all, armed| {
+        let kind = self.take(None, |all, armed| {
             let due = match armed.fault.when {
                 Some(When::Access(number)) => access && armed.passed >= number,
                 _ => true,
             };
             counts(all, armed) && due
         });
-        if access && kind.is_none() {
+        if access {
             for armed in &mut self.armed {
                 armed.passed += u64::from(armed.fault.kind.site() == Site::Board);
             }
@@ -377,29 +342,11 @@ impl Faults {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fault::Streamed;
 
     fn shape() -> StepShape {
-        StepShape { segments: [[true; 3]; 4], contact: 4, rounds: 8 }
-    }
-
-    #[test]
-    fn phases_are_packets_of_a_channel() {
-        let shape = shape();
-        let packet = |phase| shape.packet(1, phase);
-        assert_eq!(packet(StepPhase::Load), Some(0));
-        assert_eq!(packet(StepPhase::Contact(1)), Some(1));
-        assert_eq!(packet(StepPhase::Friction(4)), Some(8));
-        assert_eq!(packet(StepPhase::Friction(5)), None);
-        assert_eq!(packet(StepPhase::Poses), Some(9));
-        for number in 0..10 {
-            let phase = shape.phase(1, number).expect("there are ten");
-            assert_eq!(packet(phase), Some(number));
-        }
-        assert_eq!(shape.phase(1, 10), None);
-        let once = StepShape { segments: [[false, true, false]; 4], contact: 4, rounds: 1 };
-        assert_eq!(once.packet(0, StepPhase::Friction(3)), Some(0));
-        assert_eq!(once.packet(0, StepPhase::Poses), None);
-        assert_eq!(once.phase(0, 0), Some(StepPhase::Contact(1)));
+        let streamed = Streamed::PerPass;
+        StepShape { segments: [[true; 3]; 4], contact: 4, passes: 8, streamed }
     }
 
     #[test]
@@ -428,17 +375,22 @@ mod tests {
     }
 
     #[test]
-    fn a_receiver_counts_steps_by_its_packets() {
+    fn a_receiver_counts_the_steps_that_it_was_started_for() {
         let mut faults = Faults::default();
         let fault = Fault::new(FaultKind::Stall).on(3, Direction::S2mm);
         faults.inject(Fault { step: Some(2), ..fault });
+        faults.inject(Fault { times: 2, ..Fault::new(FaultKind::ShortPacket) });
         let turn =
             Turn { core: 3, direction: Direction::S2mm, beats: 0, descriptors: 0, begins: true };
+        faults.channel_begins(3, Direction::S2mm);
         faults.step_begins(shape());
-        faults.step_begins(shape());
-        assert_eq!(faults.at_beats(&turn, 1), Due::Nothing, "still the first packet");
-        faults.packet_ends(3, Direction::S2mm);
+        assert_eq!(faults.at_beats(&turn, 1), Due::Now(FaultKind::ShortPacket));
+        assert_eq!(faults.at_beats(&turn, 1), Due::Nothing, "still the first step");
+        // The step failed, and is taken again.
+        faults.channel_begins(3, Direction::S2mm);
         assert_eq!(faults.at_beats(&turn, 1), Due::Now(FaultKind::Stall));
+        assert_eq!(faults.at_beats(&turn, 1), Due::Now(FaultKind::ShortPacket));
+        assert!(faults.none());
     }
 
     #[test]
@@ -446,8 +398,10 @@ mod tests {
         let mut faults = Faults::default();
         faults.inject(Fault::new(FaultKind::IrqDrop).when(When::Occasion(1)));
         faults.inject(Fault::new(FaultKind::PowerLost).when(When::Access(2)));
+        faults.inject(Fault::new(FaultKind::IrqDelay { ns: 1 }).when(When::Occasion(2)));
         assert_eq!(faults.at_edge(), None);
         assert_eq!(faults.at_edge(), Some(FaultKind::IrqDrop));
+        assert_eq!(faults.at_edge(), Some(FaultKind::IrqDelay { ns: 1 }));
         assert_eq!(faults.at_edge(), None);
         assert_eq!(faults.of_board(false), None);
         assert_eq!(

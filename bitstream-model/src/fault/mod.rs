@@ -6,20 +6,23 @@
 //! irq-drop,step=3
 //! ```
 //!
-//! `text.rs` reads and writes that line, `random.rs` makes one from a seed, `armed.rs` is what waits
+//! `text.rs` reads and writes that line, `check.rs` refuses what cannot be, `random.rs` makes one from a seed, `shape.rs` knows a step's packets, `armed.rs` is what waits
 //! for its occasion while the board runs.
 //!
 //! Unlike a [quirk](crate::Quirks), which lasts as long as the board, a fault happens as often as it
 //! says, once if it does not say. A reset ends what it did and does not forget what is still due.
 
 mod armed;
+mod check;
 mod random;
+mod shape;
 mod text;
 
 use crate::axi_dma::Direction;
 use crate::interface::control::ErrorCode;
 
-pub(crate) use armed::{Due, Faults, StepShape, Turn};
+pub(crate) use armed::{Due, Faults, Turn};
+pub(crate) use shape::{StepShape, Streamed};
 pub use text::FaultError;
 
 /// What goes wrong.
@@ -55,7 +58,8 @@ pub enum FaultKind {
     },
     /// A packet ends with this beat; the rest of it is lost.
     ShortPacket,
-    /// A packet is followed by a beat more, which carries its TLAST.
+    /// A packet is followed by a beat more, which carries its TLAST; received, it is one more than its
+    /// buffers must have room for.
     LongPacket,
     /// A packet has no TLAST.
     NoTlast,

@@ -90,6 +90,7 @@ fn fault(
             fault.place = Some(if is_core { Place::Core(core) } else { Place::Accelerator });
         }
         Site::Edge => fault.when = Some(When::Occasion(register(numbers.below(2)))),
+        Site::Accelerator if kind == FaultKind::NoDone => {}
         Site::Accelerator => {
             fault.phase = phase(numbers);
             fault.when = Some(When::Beat(numbers.of(&small).unwrap_or(0)));

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{Fault, FaultKind, FaultPlan, Place, Site, StepPhase, When};
+use super::{Fault, FaultKind, FaultPlan, Place, StepPhase, When};
 use crate::axi_dma::Direction;
 use crate::interface::address_map::DMA_COUNT_MAX;
 use crate::interface::control::ErrorCode;
@@ -168,10 +168,10 @@ impl FaultKind {
     fn with(self, value: u64) -> Option<Self> {
         let narrow = u32::try_from(value).ok();
         Some(match self {
-            Self::Slow { .. } => Self::Slow { clocks: narrow? },
-            // A mask of nothing would change nothing.
+            // Nothing of each would change nothing.
+            Self::Slow { .. } => Self::Slow { clocks: narrow.filter(|clocks| *clocks != 0)? },
             Self::Corrupt { .. } => Self::Corrupt { mask: narrow.filter(|mask| *mask != 0)? },
-            Self::IrqStorm { .. } => Self::IrqStorm { count: narrow? },
+            Self::IrqStorm { .. } => Self::IrqStorm { count: narrow.filter(|count| *count != 0)? },
             Self::IrqDelay { .. } => Self::IrqDelay { ns: value },
             Self::LateCmplted { .. } => Self::LateCmplted { ns: value },
             Self::HaltDelay { .. } => Self::HaltDelay { ns: value },
@@ -312,7 +312,7 @@ fn kind(text: &str) -> Result<FaultKind, FaultError> {
         Some(value) => {
             let value = number(name, value)?;
             known.with(value).ok_or_else(|| {
-                wrong("no value, or for a mask one that is not 0, of at most 32 bits")
+                wrong("no value where the fault has none; of clocks, masks and counts 1 to 0xFFFFFFFF")
             })
         }
     }
@@ -346,62 +346,6 @@ impl FromStr for Fault {
         }
         fault.check()?;
         Ok(fault)
-    }
-}
-
-impl Fault {
-    /// Whether it can happen at all where and when it says.
-    pub(super) fn check(&self) -> Result<(), FaultError> {
-        let site = self.kind.site();
-        let fits_place = match (site, self.place) {
-            (_, None) => true,
-            (
-                Site::Beat | Site::PacketEnd | Site::Fetch | Site::Completion | Site::Halt,
-                Some(place),
-            ) => matches!(place, Place::Channel(..)),
-            (Site::Reset, Some(place)) => !matches!(place, Place::Channel(..)),
-            (Site::Accelerator, Some(place)) => place == Place::Accelerator,
-            (Site::Board, Some(place)) => matches!(place, Place::Channel(..)),
-            (Site::Edge, Some(_)) => false,
-        };
-        let expected = match site {
-            Site::Reset => "it is in a whole core (dma0) or the accelerator",
-            Site::Accelerator => "it is in the accelerator",
-            Site::Edge => "it is on the one interrupt line",
-            _ => "it is in a channel (dma0.mm2s)",
-        };
-        let elsewhere =
-            |found, expected| FaultError::Elsewhere { fault: self.kind.name(), found, expected };
-        if let Some(place) = self.place
-            && !fits_place
-        {
-            return Err(elsewhere(format!("in {place}"), expected));
-        }
-        let fits_when = matches!(
-            (site, self.when),
-            (_, None)
-                | (Site::Beat | Site::Board, Some(When::Beat(_) | When::Descriptor(_)))
-                | (Site::Fetch | Site::Completion, Some(When::Descriptor(_)))
-                | (Site::Accelerator, Some(When::Beat(_)))
-                | (Site::Board, Some(When::Access(_)))
-                | (Site::Halt | Site::Reset | Site::Edge, Some(When::Occasion(_)))
-        );
-        if !fits_when {
-            let expected = match site {
-                Site::Beat => "it has beat= or bd=",
-                Site::Fetch | Site::Completion => "it has bd=",
-                Site::Accelerator => "it has beat=, the number of a record",
-                Site::Board => "it has beat= or bd= of a channel, or access=",
-                Site::Halt | Site::Reset | Site::Edge => "it has n=",
-                Site::PacketEnd => "it is at the end of a packet",
-            };
-            return Err(elsewhere("at such an occasion".to_owned(), expected));
-        }
-        let phaseless = matches!(site, Site::Halt | Site::Reset | Site::Edge);
-        if self.phase.is_some() && phaseless {
-            return Err(elsewhere("in a phase".to_owned(), "it has n= or step="));
-        }
-        Ok(())
     }
 }
 
@@ -465,13 +409,14 @@ mod tests {
             ("stall,phase=contact0", "no phase is named \"contact0\""),
             ("stall,beat=x", "beat is \"x\", expected a whole number"),
             ("stall,often=3", "\"often=3\" is none of phase="),
-            ("stall=3", "stall is \"3\", expected no value"),
+            ("stall=3", "stall is \"3\", expected no value where"),
             ("corrupt=0", "corrupt is \"0\""),
+            ("slow=0", "slow is \"0\""),
             ("slow=0x100000000", "slow is \"0x100000000\""),
             ("accelerator-error=99", "an error code of the accelerator"),
             ("accelerator-error", "accelerator-error is \"\""),
             ("sg-int-err,beat=1", "sg-int-err does not happen at such an occasion; it has bd="),
-            ("irq-drop,phase=load", "irq-drop does not happen in a phase; it has n= or step="),
+            ("irq-drop,phase=load", "irq-drop does not happen in phase load; it has n= or step="),
         ] {
             let error = text.parse::<FaultPlan>().expect_err(text).to_string();
             assert!(error.contains(part), "{text}: {error}");
