@@ -62,7 +62,9 @@ impl InterruptLine {
     /// Delivers an event if one is pending: counts it and masks the line.
     pub(crate) fn take(&mut self) -> Option<u32> {
         self.pending().then(|| {
-            self.spurious = self.spurious.saturating_sub(1);
+            if !self.level {
+                self.spurious = self.spurious.saturating_sub(1);
+            }
             self.masked = true;
             self.events = self.events.wrapping_add(1);
             self.events
@@ -120,5 +122,12 @@ mod tests {
             line.unmask();
         }
         assert_eq!((line.take(), line.rising_edges), (None, 0));
+        // Beside one that has a source it is one more.
+        line.disturb(1);
+        line.set(true, 0);
+        assert!(line.take().is_some());
+        line.set(false, 1);
+        line.unmask();
+        assert!(line.take().is_some());
     }
 }

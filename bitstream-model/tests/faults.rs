@@ -267,6 +267,34 @@ fn a_fault_waits_for_its_step_and_comes_as_often_as_it_says() {
 }
 
 #[test]
+fn every_late_status_arrives() {
+    let mut machine = machine();
+    let late = |pass| format!("late-cmplted=900000@dma1.mm2s,phase=contact{pass}");
+    machine.host.board.inject(plan(&format!("{}; {}", late(1), late(2))));
+    machine.step(&scene()).expect("nobody waits for senders");
+    assert_eq!(machine.host.board.faults(), 2);
+    let complete = |machine: &Machine| [1, 2, 3].map(|slot| machine.mm2s[1].status(slot) >> 31);
+    assert_eq!(complete(&machine), [0, 0, 1]);
+    machine.host.pause(2000);
+    assert_eq!(complete(&machine), [1, 1, 1]);
+}
+
+#[test]
+fn a_receiver_fails_in_each_step_that_is_taken_again() {
+    let mut machine = machine();
+    machine.host.board.inject(plan("dma-slv-err@dma0.s2mm,times=2; stall@dma1.s2mm,step=3"));
+    for _ in 0..2 {
+        let failure = machine.step(&scene()).map(|_| ()).expect_err("a slave error");
+        assert!(matches!(failure, Failure::Dma { core: 0, .. }), "{failure:?}");
+        machine.recover();
+    }
+    assert_eq!(machine.step(&scene()).map(|_| ()), Err(Failure::Deadline));
+    machine.recover();
+    machine.step(&scene()).expect("that was all");
+    machine.host.assert_no_violation();
+}
+
+#[test]
 fn the_packets_of_a_step_are_told() {
     let mut machine = machine();
     for _ in 0..2 {

@@ -87,7 +87,7 @@ impl Channel {
             }
             Due::Now(FaultKind::Slow { clocks }) => {
                 self.faulty.slow = clocks;
-                Next::Move(n)
+                Next::Move(1)
             }
             Due::Now(FaultKind::ShortPacket) => Next::Cut,
             Due::Now(FaultKind::Corrupt { mask }) => Next::Corrupt(mask),

@@ -24,6 +24,14 @@ impl Cell {
         self.phase.map_or_else(|| "any".to_owned(), |phase| phase.to_string())
     }
 
+    /// The channel that it is in.
+    pub(super) fn channel(&self) -> Option<(usize, Direction)> {
+        match self.plan.faults.last()?.place {
+            Some(Place::Channel(core, direction)) => Some((core, direction)),
+            _ => None,
+        }
+    }
+
     fn new(fault: Fault, larger: bool) -> Self {
         let channel = match fault.place {
             Some(Place::Channel(core, direction)) => Some((core, direction)),
@@ -61,6 +69,15 @@ fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
         StepPhase::Load | StepPhase::Poses | StepPhase::Results => true,
         StepPhase::Contact(pass) => [1, contact.div_ceil(2), contact].contains(&pass),
         StepPhase::Friction(pass) => [1, friction].contains(&pass),
+    }
+}
+
+/// The same kind, where it costs time with so much that no step ends before it is felt.
+fn felt(kind: FaultKind) -> FaultKind {
+    match kind {
+        FaultKind::Slow { .. } => FaultKind::Slow { clocks: 20_000 },
+        FaultKind::LateCmplted { .. } => FaultKind::LateCmplted { ns: 3_000_000 },
+        other => other,
     }
 }
 
@@ -120,16 +137,16 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
         .filter(|packet| packet.phase.is_some_and(|phase| shown(phase, bench.iterations())))
         .collect();
     let mut cells = Vec::new();
-    let mut short_last = 0;
+    let mut at_last = 0;
     let mut kinds = 0;
-    for kind in FaultKind::all() {
+    for kind in FaultKind::all().map(felt) {
         match place_of(kind) {
             Where::Beats => {
                 kinds += 3;
                 for packet in &packets {
                     let mut beats = positions(packet.beats);
-                    if kind == FaultKind::ShortPacket {
-                        short_last += 1;
+                    if matches!(kind, FaultKind::ShortPacket | FaultKind::Slow { .. }) {
+                        at_last += 1;
                         beats.retain(|beat| beat + 1 < packet.beats);
                     }
                     cells.extend(beats.into_iter().map(|beat| at(kind, packet, When::Beat(beat))));
@@ -175,8 +192,8 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
             cells: kinds * senders,
         },
         Impossible {
-            what: "a packet cut short at its last beat: that is whole",
-            cells: short_last,
+            what: "a packet cut short, or slow, from its last beat on: nothing follows",
+            cells: at_last,
         },
     ];
     (cells, impossible)

@@ -54,7 +54,9 @@ pub(super) fn expected(kind: FaultKind, channel: Option<(usize, Direction)>) -> 
         K::PowerLost => lost("gone"),
         K::ResetNever => lost("deadline"),
         // The stall before the reset, the hang: all that shows is that nothing comes.
-        _ => anywhere("deadline"),
+        K::Stall | K::AcceleratorHang | K::ResetSlow { .. } => anywhere("deadline"),
+        // A kind that nobody has said anything of yet passes nowhere.
+        _ => anywhere("unknown"),
     }
 }
 

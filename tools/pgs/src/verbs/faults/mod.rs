@@ -7,6 +7,7 @@ mod table;
 mod trial;
 
 use std::io::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bitstream_model::interface::profile::{PROFILES, Profile};
@@ -32,7 +33,7 @@ Examples:
 
 A cell is one fault at one place. It passes if the fault happened; a fatal one was named rightly, with
 its channel, before the deadline of the step, and changed no body; a survivable one changed no bit of
-the result; and the next step gives the bits of an undisturbed one, or, where the board is lost, every
+the result, and was felt: the step took longer, or more interrupts came; and the next step gives the bits of an undisturbed one, or, where the board is lost, every
 call says so.";
 
 /// Try every fault at every place of a step.
@@ -102,18 +103,24 @@ fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
     let work = || {
         let mut found = Vec::new();
         while let Some((place, cell)) = take(&next, &cells) {
-            found.push((place, trial::run(bench, cell)));
+            // A panic is what fails everywhere, not what ends the table.
+            let tried = catch_unwind(AssertUnwindSafe(|| trial::run(bench, cell)));
+            found.push((place, tried.unwrap_or_default()));
             bar.inc(1);
         }
         found
     };
-    let mut found: Vec<(usize, Verified)> = std::thread::scope(|scope| {
+    let found: Vec<(usize, Verified)> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
     });
     bar.finish_and_clear();
-    found.sort_by_key(|(place, _)| *place);
-    cells.into_iter().zip(found.into_iter().map(|(_, verified)| verified)).collect()
+    // What is missing has passed nothing.
+    let mut all = vec![Verified::default(); cells.len()];
+    for (place, verified) in found {
+        all[place] = verified;
+    }
+    cells.into_iter().zip(all).collect()
 }
 
 /// The next cell that nobody has taken.
