@@ -75,7 +75,7 @@ fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
 /// The same kind, where it costs time with so much that no step ends before it is felt.
 fn felt(kind: FaultKind) -> FaultKind {
     match kind {
-        FaultKind::Slow { .. } => FaultKind::Slow { clocks: 20_000 },
+        FaultKind::Slow { .. } => FaultKind::Slow { clocks: 10_000 },
         FaultKind::LateCmplted { .. } => FaultKind::LateCmplted { ns: 3_000_000 },
         other => other,
     }
