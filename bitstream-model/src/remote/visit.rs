@@ -131,6 +131,10 @@ impl<'a> Host<'a> {
             Request::Hello { version } => {
                 let status = if version == VERSION { Status::Done } else { Status::OtherVersion };
                 self.answer(status, VERSION, 0)?;
+                if version != VERSION {
+                    // Whatever it says next means something else.
+                    return Ok(Presence::Gone);
+                }
             }
             Request::Memory { inode } => {
                 let (own, address) = self.memory;

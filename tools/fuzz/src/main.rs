@@ -38,7 +38,7 @@ struct Args {
     #[arg(long, value_name = "SECONDS", default_value_t = 20)]
     limit: u64,
     /// Where inputs of findings are written.
-    #[arg(long, value_name = "FOLDER", default_value = "target/fuzz")]
+    #[arg(long, value_name = "FOLDER", default_value = "target/fuzz-findings")]
     findings: PathBuf,
     /// Runs the input of that file once, instead; a panic is not caught.
     #[arg(long, value_name = "FILE")]

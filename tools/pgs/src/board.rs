@@ -6,7 +6,7 @@ use std::path::Path;
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
-use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
+use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, FaultPlan, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::{
     Accelerator, BoardChoice, BoardKind, DevMemWindows, Fault, InputError, MemoryChoice,
@@ -18,6 +18,7 @@ use crate::build::described;
 use crate::diagnosis;
 use crate::failure::{Cause, Failure};
 use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
+use crate::planned;
 
 /// What to do about bodies that the board's inertia is too simple for.
 const WORLD_INERTIA: &str =
@@ -29,6 +30,8 @@ pub(crate) struct Opened {
     pub(crate) accelerator: Accelerator,
     /// The emulated board, as its builder sees it; none for a real one.
     pub(crate) observer: Option<EmulatedBoard>,
+    /// The faults that it was told to have.
+    pub(crate) plan: Option<FaultPlan>,
     /// Why this board and no other.
     pub(crate) reason: String,
 }
@@ -138,7 +141,7 @@ pub(crate) fn not_built(error: ConfigError) -> Failure {
 pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Failure> {
     let Chosen { options, observer, reason, .. } = find(common, build.config(), build.given())?;
     let accelerator = Accelerator::open(options).map_err(unusable)?;
-    Ok(Opened { accelerator, observer, reason })
+    Ok(Opened { accelerator, observer, plan: None, reason })
 }
 
 /// There is no board, or none that can be opened.
@@ -184,7 +187,11 @@ impl Opened {
             true => next.to_owned(),
             false => format!("{next}; the emulated board saw this misuse:{seen}"),
         };
-        diagnosis::hardware(error).next(next)
+        let failure = diagnosis::hardware(error).next(next);
+        match planned::text(self) {
+            Some(line) => failure.planned(&line, planned::to_json(self)),
+            None => failure,
+        }
     }
 
     fn kind(&self) -> &'static str {

@@ -13,6 +13,7 @@ use zynq_pgs::{Aftermath, ChannelState, Diagnosis, Error, Fault, StepParameters}
 use crate::board::Opened;
 use crate::failure::{Cause, Failure};
 use crate::ordering;
+use crate::planned;
 use crate::verbs::SCHEMA;
 
 /// What to do when a step fails.
@@ -190,6 +191,7 @@ fn bundle_json(opened: &Opened, parameters: &StepParameters, error: &Error) -> V
         "registers": diagnosis.map(Diagnosis::registers),
         "accesses": accesses,
         "misuse_seen_by_the_emulated_board": violations,
+        "faults_planned": planned::to_json(opened),
     })
 }
 

@@ -96,6 +96,15 @@ impl Failure {
         self
     }
 
+    /// Says what was planned to go wrong: in lines, and for programs.
+    pub(crate) fn planned(mut self, line: &str, faults: Value) -> Self {
+        self.details.push_str(&format!("{line}\n"));
+        if let Some(document) = &mut self.document {
+            document["faults"] = faults;
+        }
+        self
+    }
+
     /// Says what it was about: which of two boards.
     pub(crate) fn about(mut self, about: impl Into<String>) -> Self {
         self.error = Box::new(About { about: about.into(), source: self.error });

@@ -2,10 +2,10 @@
 
 use std::str::FromStr;
 
-use bitstream_model::FaultPlan;
+use bitstream_model::{BoardConfig, EmulatedBoard, FaultPlan};
 use clap::Args;
 use serde_json::{Value, json};
-use zynq_pgs::StepParameters;
+use zynq_pgs::{BoardKind, StepParameters};
 
 use crate::board::Opened;
 use crate::failure::Failure;
@@ -42,46 +42,62 @@ impl FromStr for Planned {
 }
 
 impl PlannedArgs {
-    /// Tells the board what to do wrong from its first step on; the plan, if there is one.
+    /// The plan for a board, in steps of so many passes.
+    pub(crate) fn plan(
+        &self,
+        config: &BoardConfig,
+        parameters: &StepParameters,
+    ) -> Option<FaultPlan> {
+        let (contact, friction) = (parameters.contact_iterations, parameters.friction_iterations);
+        self.fault.as_ref().map(|planned| match planned {
+            Planned::Plan(plan) => plan.clone(),
+            Planned::Seed(seed) => FaultPlan::random(*seed, config, contact, friction),
+        })
+    }
+
+    /// Tells the board what to do wrong from its first step on.
     pub(crate) fn inject(
         &self,
-        opened: &Opened,
+        opened: &mut Opened,
         parameters: &StepParameters,
-    ) -> Result<Option<FaultPlan>, Failure> {
-        let Some(planned) = &self.fault else { return Ok(None) };
+    ) -> Result<(), Failure> {
+        if self.fault.is_none() {
+            return Ok(());
+        }
         let Some(board) = &opened.observer else {
-            let error = "--fault is for emulated boards, this one is real";
-            return Err(Failure::input(error).next("leave out --fault, or add --board emulated"));
+            let next = match opened.accelerator.board().kind {
+                BoardKind::Served => "leave out --fault, or give it to the board's `pgs serve`",
+                _ => "leave out --fault, or add --board emulated",
+            };
+            let error = "--fault is for an emulated board of this process";
+            return Err(Failure::input(error).next(next));
         };
-        let plan = match planned {
-            Planned::Plan(plan) => plan.clone(),
-            Planned::Seed(seed) => FaultPlan::random(
-                *seed,
-                &board.config(),
-                parameters.contact_iterations,
-                parameters.friction_iterations,
-            ),
-        };
-        log::info!("faults: {plan}");
-        board.inject(plan.clone());
-        Ok(Some(plan))
+        if let Some(plan) = self.plan(&board.config(), parameters) {
+            board.inject(plan.clone());
+            opened.plan = Some(plan);
+        }
+        Ok(())
     }
 }
 
 /// How many of the planned faults have happened.
 fn happened(opened: &Opened) -> u64 {
-    opened.observer.as_ref().map_or(0, |board| board.faults())
+    opened.observer.as_ref().map_or(0, EmulatedBoard::faults)
 }
 
-/// For people.
-pub(crate) fn text(plan: &FaultPlan, opened: &Opened) -> String {
+/// What was planned and has happened, for people.
+pub(crate) fn text(opened: &Opened) -> Option<String> {
+    let plan = opened.plan.as_ref()?;
     let planned: u64 = plan.faults.iter().map(|fault| u64::from(fault.times)).sum();
-    format!("faults     {} of {planned} happened: {plan}", happened(opened))
+    Some(format!("faults     {} of {planned} happened: {plan}", happened(opened)))
 }
 
-/// For programs.
-pub(crate) fn to_json(plan: &FaultPlan, opened: &Opened) -> Value {
-    json!({ "plan": plan.to_string(), "happened": happened(opened) })
+/// What was planned and has happened, for programs.
+pub(crate) fn to_json(opened: &Opened) -> Value {
+    opened.plan.as_ref().map_or(
+        Value::Null,
+        |plan| json!({ "plan": plan.to_string(), "happened": happened(opened) }),
+    )
 }
 
 #[cfg(test)]

@@ -162,7 +162,7 @@ pub(crate) fn run(
     let progress = progress_bar(args.steps);
     let parameters = args.ordering.apply(args.deadline.apply(StepParameters::default()));
     let parameters = args.faults.apply(parameters);
-    let plan = args.planned.inject(&opened, &parameters)?;
+    args.planned.inject(&mut opened, &parameters)?;
     let mut documents = Vec::new();
     let mut done = 0;
     let mut retries = 0;
@@ -198,14 +198,14 @@ pub(crate) fn run(
             "board": opened.to_json(),
             "complete": complete,
             "steps": documents,
-            "faults": plan.as_ref().map(|plan| planned::to_json(plan, &opened)),
+            "faults": planned::to_json(&opened),
             "digest": { "algorithm": digest::ALGORITHM, "value": digest },
         });
         writeln!(out, "{document:#}")?;
     } else {
         writeln!(out)?;
-        if let Some(plan) = &plan {
-            writeln!(out, "{}", planned::text(plan, &opened))?;
+        if let Some(faults) = planned::text(&opened) {
+            writeln!(out, "{faults}")?;
         }
         if retries > 0 {
             writeln!(out, "retries    {} of {done} steps", grouped(retries))?;

@@ -1,14 +1,16 @@
 //! The verb `serve`: an emulated board as a process of its own.
 
+use std::fs;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use bitstream_model::BoardConfig;
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::remote::message::MEMORY_SUFFIX;
 use bitstream_model::remote::{Ended, MemoryFile, ServeError, Server, Visit};
 use clap::Args;
 use serde_json::json;
-use zynq_pgs::MemoryChoice;
+use zynq_pgs::{MemoryChoice, StepParameters};
 
 use super::SCHEMA;
 use super::table::grouped;
@@ -18,12 +20,14 @@ use crate::build::described;
 use crate::failure::{Cause, Failure, Verdict};
 use crate::interrupt;
 use crate::options::BuildArgs;
+use crate::planned::PlannedArgs;
 
 const EXAMPLES: &str = "\
 Examples:
   pgs serve --socket /tmp/board                   in one terminal
   pgs --board socket:/tmp/board                   in another
   pgs serve --socket /tmp/board --memory file:/dev/shm/board --profile half
+  pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
 
 One driver at a time has the board. One that is killed leaves it as it is, engines running; the next
 one resets it. Ctrl-C ends it and removes the socket; the memory's file stays.";
@@ -42,6 +46,8 @@ pub(crate) struct ServeArgs {
     memory_mib: Option<u64>,
     #[command(flatten)]
     build: BuildArgs,
+    #[command(flatten)]
+    planned: PlannedArgs,
 }
 
 /// What was served so far.
@@ -75,21 +81,35 @@ pub(crate) fn run(
             return Err(Failure::input(error).next("write --memory file:PATH, or leave it out"));
         }
     };
-    let config = args.build.config();
+    // What a driver does wrong is told, and is not the end of the board for the next one.
+    let config = BoardConfig { strict: false, ..args.build.config() };
+    let planned = args.planned.plan(&config, &StepParameters::default());
     let wanted = args.memory_mib.map(|mib| mib << 20);
+    let made = !path.exists();
     let memory =
         MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(Failure::input)?;
     let addresses = memory.addresses();
-    let mut server = Server::bind(config, memory, &args.socket).map_err(|error| match error {
-        ServeError::Config(error) => not_built(error),
-        error => Failure::input(error),
+    let mut server = Server::bind(config, memory, &args.socket).map_err(|error| {
+        if made && let Err(error) = fs::remove_file(&path) {
+            log::warn!("{} stays: {error}", path.display());
+        }
+        match error {
+            ServeError::Config(error) => not_built(error),
+            error => Failure::input(error),
+        }
     })?;
+    if let Some(plan) = &planned {
+        server.board().inject(plan.clone());
+    }
     let stopper = server.stopper();
     let at_signal = stopper.clone();
     interrupt::take_over(move || at_signal.stop());
 
     if !common.json {
         writeln!(out, "board      {}", described(&config))?;
+        if let Some(plan) = &planned {
+            writeln!(out, "faults     {plan}")?;
+        }
         let bytes = grouped(addresses.end - addresses.start);
         writeln!(out, "memory     {}, {bytes} bytes at {:#x}", path.display(), addresses.start)?;
         writeln!(out, "serving    pgs --board socket:{}", args.socket.display())?;

@@ -126,7 +126,7 @@ pub(crate) fn run(
     folder
         .check_shapes(opened.accelerator.capabilities().shape_capacity)
         .map_err(Failure::input)?;
-    let plan = args.planned.inject(&opened, &parameters)?;
+    args.planned.inject(&mut opened, &parameters)?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
@@ -160,15 +160,15 @@ pub(crate) fn run(
         let mut document = solved.to_json();
         document["folder"] = args.folder.display().to_string().into();
         document["board"] = opened.to_json();
-        document["faults"] = plan.as_ref().map(|plan| planned::to_json(plan, &opened)).into();
+        document["faults"] = planned::to_json(&opened);
         document["equal"] = args.compare.then_some(equal).into();
         writeln!(out, "{document:#}")?;
     } else if args.digest {
         writeln!(out, "{} {}", digest::ALGORITHM, solved.digest)?;
     } else {
         opened.print(out)?;
-        if let Some(plan) = &plan {
-            writeln!(out, "{}", planned::text(plan, &opened))?;
+        if let Some(faults) = planned::text(&opened) {
+            writeln!(out, "{faults}")?;
         }
         solved.print(out)?;
     }
