@@ -12,7 +12,7 @@ use crate::step::{Diagnosis, Fault};
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The input was refused. Nothing was sent to the board.
+    /// The input was refused, before anything of it was sent to the board.
     #[error(transparent)]
     Input(#[from] InputError),
     /// No board could be opened.
@@ -30,7 +30,8 @@ pub enum Error {
         fault: Box<Fault>,
         /// How the board stands now.
         aftermath: Aftermath,
-        /// How everything stood before the reset; `None` if the board had no part in it.
+        /// How everything stood before the reset; `None` if the board had no part in it or
+        /// cannot be reached.
         diagnosis: Option<Box<Diagnosis>>,
     },
     /// An earlier fault could not be cleared.
@@ -69,7 +70,7 @@ impl Error {
         }
     }
 
-    /// Whether the input was refused; nothing was sent to the board.
+    /// Whether the input was refused, before anything of it was sent to the board.
     #[must_use]
     pub fn is_input(&self) -> bool {
         matches!(self, Self::Input(_))

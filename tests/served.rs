@@ -5,8 +5,11 @@
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::interface::profile::Profile;
@@ -14,7 +17,7 @@ use bitstream_model::remote::message::{ANSWER_BYTES, Answer, Request, Status, VE
 use bitstream_model::remote::{
     Ended, MemoryFile, MemoryFileError, ServeError, Server, Stopper, Visit,
 };
-use bitstream_model::{BoardConfig, EmulatedBoard};
+use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault, FaultKind};
 use zynq_pgs::{
     Accelerator, BoardChoice, BoardKind, Body, Collision, Contact, Error, MemoryChoice, OpenError,
     OpenOptions, PlatformError, Pose, Shape, StepParameters, StepReport, Velocity,
@@ -224,8 +227,17 @@ fn a_driver_that_leaves_in_the_middle_of_a_step_leaves_the_engines_running_for_t
     assert_eq!(served.board.violations(), []);
 }
 
-/// Falsifies an answer.
-type Spoil = fn(&mut Vec<u8>);
+/// Falsifies the answer to a request, which is the board's of that number.
+type Spoil = Box<dyn Fn(usize, &[u8], &mut Vec<u8>) + Send>;
+
+/// Falsifies one answer.
+fn once(at: usize, spoil: fn(&mut Vec<u8>)) -> Spoil {
+    Box::new(move |number, _, answer| {
+        if number == at {
+            spoil(answer);
+        }
+    })
+}
 
 /// Passes messages on between a driver and a board, until it is cut.
 struct Relay {
@@ -235,8 +247,8 @@ struct Relay {
 }
 
 impl Relay {
-    /// To that board; `spoil` falsifies the answer of that number.
-    fn new(board: &Path, spoil: Option<(usize, Spoil)>) -> Self {
+    /// To that board.
+    fn new(board: &Path, spoil: Option<Spoil>) -> Self {
         let folder = tempfile::tempdir().expect("a directory");
         let socket = folder.path().join("relay");
         let listener = UnixListener::bind(&socket).expect("bound");
@@ -252,10 +264,8 @@ impl Relay {
             while driver.read_exact(&mut request).is_ok() {
                 let mut answer = vec![0; ANSWER_BYTES];
                 let passed = board.write_all(&request).and_then(|()| board.read_exact(&mut answer));
-                if let Some((at, spoil)) = spoil
-                    && at == number
-                {
-                    spoil(&mut answer);
+                if let Some(spoil) = &spoil {
+                    spoil(number, &request, &mut answer);
                 }
                 number += 1;
                 if passed.and_then(|()| driver.write_all(&answer)).is_err()
@@ -278,6 +288,12 @@ impl Relay {
     }
 }
 
+/// An error's texts, down to its cause.
+fn chain(error: &Error) -> Vec<String> {
+    let sources = std::iter::successors(Some(error as &dyn std::error::Error), |e| e.source());
+    sources.map(ToString::to_string).collect()
+}
+
 #[test]
 fn a_server_that_is_stopped_in_the_middle_is_a_lost_board() {
     let mut served = Served::new(BoardConfig::default());
@@ -290,13 +306,10 @@ fn a_server_that_is_stopped_in_the_middle_is_a_lost_board() {
     assert!(!served.socket().exists(), "the socket is gone");
     let error = flight.wait(&mut bodies).expect_err("no board any more");
     assert!(error.must_reopen(), "{error}");
-    let mut chain = Vec::new();
-    let mut source = std::error::Error::source(&error);
-    while let Some(error) = source {
-        chain.push(error.to_string());
-        source = error.source();
-    }
-    assert!(chain.iter().any(|text| text.contains("is lost: serve it again")), "{chain:?}");
+    let texts = chain(&error);
+    assert!(texts.iter().any(|text| text.contains("is lost: serve it again")), "{texts:?}");
+    assert_eq!(error.fault().expect("a fault").name(), "platform");
+    assert!(error.diagnosis().is_none(), "there was nothing to read");
     assert_eq!(bits(&bodies), before);
     drop(accelerator);
     let error = Accelerator::open(served.options()).expect_err("nobody serves");
@@ -309,13 +322,13 @@ fn a_server_that_is_stopped_in_the_middle_is_a_lost_board() {
 
 #[test]
 fn answers_that_make_no_sense_are_errors_at_every_point_of_a_step() {
-    let spoils: [Spoil; 3] =
+    let spoils: [fn(&mut Vec<u8>); 3] =
         [|answer| answer[0] = 9, |answer| answer.truncate(11), |answer| answer[0] = 4];
     for spoil in spoils {
         // The hello, the memory, the first register, and later ones.
         for number in [0, 1, 2, 30, 60, 90, 110] {
             let served = Served::new(BoardConfig::default());
-            let relay = Relay::new(&served.socket(), Some((number, spoil)));
+            let relay = Relay::new(&served.socket(), Some(once(number, spoil)));
             let options = OpenOptions {
                 memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
                 ..at(&relay.socket)
@@ -330,9 +343,49 @@ fn answers_that_make_no_sense_are_errors_at_every_point_of_a_step() {
             });
             let error = stepped.expect_err("a false answer");
             assert!(matches!(error, Error::Open(_)) || error.must_reopen(), "{number}: {error}");
+            // The board is lost, and not without power.
+            let texts = chain(&error);
+            assert!(texts.iter().any(|text| text.contains("is lost")), "{number}: {texts:?}");
             assert_eq!(bits(&bodies), before);
         }
     }
+}
+
+#[test]
+fn a_board_of_endless_interrupts_and_no_time_is_given_up_in_time() {
+    let served = Served::new(BoardConfig::default());
+    let started = Arc::new(AtomicBool::new(false));
+    let lying = Arc::clone(&started);
+    let spoil: Spoil = Box::new(move |_, request, answer| {
+        if !lying.load(Ordering::Relaxed) {
+            return;
+        }
+        let bytes = answer.as_slice().try_into().expect("an answer");
+        let mut said = Answer::decode(bytes).expect("the board's");
+        said.now = Duration::ZERO;
+        let wait = Request::WaitInterrupt { time: Duration::ZERO }.encode();
+        if request[0] == wait[0] {
+            (said.status, said.value) = (Status::Done, 1);
+        }
+        *answer = said.encode().to_vec();
+    });
+    let relay = Relay::new(&served.socket(), Some(spoil));
+    let options = OpenOptions {
+        memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
+        ..at(&relay.socket)
+    };
+    let mut accelerator = Accelerator::open(options).expect("a board that opens");
+    let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+    accelerator.set_shapes(&shapes).expect("shapes that fit");
+    let (mut bodies, collisions) = scene(10);
+    let before = bits(&bodies);
+    served.board.inject(Fault::new(FaultKind::Stall).on(0, Direction::S2mm));
+    started.store(true, Ordering::Relaxed);
+    let error = accelerator
+        .step(&mut bodies, &collisions, &StepParameters::default())
+        .expect_err("nothing happens");
+    assert_eq!(error.fault().expect("a fault").name(), "deadline", "{error}");
+    assert_eq!(bits(&bodies), before);
 }
 
 /// A driver's end of the socket, without a driver.
@@ -378,7 +431,7 @@ fn requests_that_make_no_sense_end_the_visit_and_nothing_else() {
     drop(stream);
     assert!(matches!(served.visit().ended, Ended::Left));
     let mut stream = raw(&served);
-    let wait = Request::WaitInterrupt { time: std::time::Duration::from_millis(1) }.encode();
+    let wait = Request::WaitInterrupt { time: Duration::from_millis(1) }.encode();
     stream.write_all(&[hello, wait, wait].concat()).expect("sent");
     let mut answers = [0; 3 * ANSWER_BYTES];
     stream.read_exact(&mut answers).expect("one after the other");

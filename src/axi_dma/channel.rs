@@ -64,6 +64,11 @@ impl Channel {
         self.name
     }
 
+    /// Bits of its bus addresses.
+    pub(crate) fn address_width(&self) -> u32 {
+        self.address_width
+    }
+
     fn read(&self, register: &Register) -> u32 {
         self.window.read32(register.offset + self.name.direction.offset())
     }

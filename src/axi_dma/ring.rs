@@ -16,6 +16,7 @@ use bitstream_model::interface::descriptor::{
     CONTROL, NXTDESC, NXTDESC_MSB, STATUS, WORDS, control,
 };
 
+use super::Direction;
 use super::descriptor::{Descriptor, DescriptorStatus};
 use crate::platform::{BusAddress, Platform, PlatformError, SharedWords};
 
@@ -32,17 +33,9 @@ pub(crate) enum Progress {
         packet_ended: bool,
     },
     /// A received packet ended before the chain did.
-    Short {
-        /// Bytes received.
-        bytes: u64,
-    },
+    Short,
     /// A descriptor failed.
-    Failed {
-        /// Its place in the chain, from 0.
-        index: usize,
-        /// Its status.
-        status: DescriptorStatus,
-    },
+    Failed,
 }
 
 /// One descriptor of a step's chain.
@@ -84,6 +77,7 @@ pub(crate) struct ChainState {
 #[derive(Debug)]
 pub(crate) struct Ring {
     words: SharedWords,
+    direction: Direction,
     count: usize,
     /// First descriptor of the chain.
     first: usize,
@@ -97,12 +91,13 @@ impl Ring {
     /// A linked ring that takes chains of up to `chain` descriptors.
     pub(crate) fn new(
         platform: &Arc<dyn Platform>,
+        direction: Direction,
         chain: usize,
         address_width: u32,
     ) -> Result<Self, PlatformError> {
         let count = chain.max(1) + 1;
         let words = SharedWords::allocate(platform, count * WORDS, address_width)?;
-        let ring = Self { words, count, first: 0, used: 0, seen: (0, 0) };
+        let ring = Self { words, direction, count, first: 0, used: 0, seen: (0, 0) };
         for index in 0..count {
             let next = ring.address_of((index + 1) % count)?;
             ring.words.write(index * WORDS + NXTDESC, next.low());
@@ -173,16 +168,16 @@ impl Ring {
             let index = (self.first + seen) % self.count;
             let status = DescriptorStatus(self.words.read(index * WORDS + STATUS));
             if status.failed() {
-                return Progress::Failed { index: seen, status };
+                return Progress::Failed;
             }
             if !status.complete() {
                 return Progress::Running;
             }
             seen += 1;
             bytes += u64::from(status.transferred());
-            packet_ended = status.packet_ended();
+            packet_ended = self.ends_packet(status);
             if packet_ended && seen < self.used {
-                return Progress::Short { bytes };
+                return Progress::Short;
             }
             // The last one is looked at again on every call: it says whether the packet ended.
             if seen < self.used {
@@ -190,6 +185,11 @@ impl Ring {
             }
         }
         Progress::Complete { bytes, packet_ended }
+    }
+
+    /// Whether a received packet ended with a descriptor. Where packets are sent the bit is reserved.
+    fn ends_packet(&self, status: DescriptorStatus) -> bool {
+        self.direction == Direction::S2mm && status.packet_ended()
     }
 
     /// A descriptor of the chain, as it stands in memory.
@@ -219,7 +219,7 @@ impl Ring {
             if state.status.failed() {
                 chain.failed.get_or_insert(state);
             }
-            if state.status.packet_ended() {
+            if self.ends_packet(state.status) {
                 chain.packet_end.get_or_insert(place);
             }
             if state.status.complete() {
@@ -252,8 +252,12 @@ mod tests {
     const RXEOF: u32 = 1 << 26;
 
     fn ring(chain: usize) -> (Ring, BusAddress) {
+        ring_of(Direction::S2mm, chain)
+    }
+
+    fn ring_of(direction: Direction, chain: usize) -> (Ring, BusAddress) {
         let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
-        let ring = Ring::new(&platform, chain, 40).expect("allocated");
+        let ring = Ring::new(&platform, direction, chain, 40).expect("allocated");
         let buffer = CpuBuffer::allocate(&platform, 16, 40).expect("allocated");
         let buffer = buffer.into_device(16, Access::Read).expect("handed over");
         (ring, buffer.range(0, 256).expect("inside"))
@@ -318,7 +322,18 @@ mod tests {
         ring.push(&descriptor(address));
         assert_eq!(ring.progress(), Progress::Running);
         ring.complete(0, COMPLETE | RXEOF | 48);
-        assert_eq!(ring.progress(), Progress::Short { bytes: 48 });
+        assert_eq!(ring.progress(), Progress::Short);
+    }
+
+    #[test]
+    fn a_packet_that_is_sent_does_not_end_by_a_reserved_bit() {
+        let (mut ring, address) = ring_of(Direction::Mm2s, 3);
+        ring.push(&descriptor(address));
+        ring.push(&descriptor(address));
+        ring.complete(0, COMPLETE | RXEOF | 64);
+        ring.complete(1, COMPLETE | RXEOF | 64);
+        assert_eq!(ring.survey(0).packet_end, None);
+        assert_eq!(ring.progress(), Progress::Complete { bytes: 128, packet_ended: false });
     }
 
     #[test]
@@ -360,13 +375,12 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_descriptor_is_named() {
+    fn a_failed_descriptor_is_found() {
         let (mut ring, address) = ring(3);
         ring.push(&descriptor(address));
         ring.push(&descriptor(address));
         ring.complete(0, COMPLETE | 64);
         ring.complete(1, 1 << 30);
-        let status = DescriptorStatus(1 << 30);
-        assert_eq!(ring.progress(), Progress::Failed { index: 1, status });
+        assert_eq!(ring.progress(), Progress::Failed);
     }
 }

@@ -129,4 +129,9 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError>;
     /// Lets the interrupt through again.
     fn unmask_interrupt(&self) -> Result<(), PlatformError>;
+
+    /// Why the board cannot be reached any more, if its registers read all ones because of that.
+    fn lost(&self) -> Option<PlatformError> {
+        None
+    }
 }

@@ -149,7 +149,11 @@ impl Line {
             }
         }
         let source = state.lost.clone().unwrap_or_else(|| Arc::new(closed()));
-        Err(PlatformError::ServerLost { socket: self.socket.clone(), source })
+        Err(self.lost_to(source))
+    }
+
+    fn lost_to(&self, source: Arc<io::Error>) -> PlatformError {
+        PlatformError::ServerLost { socket: self.socket.clone(), source }
     }
 
     /// What a register reads: all ones from a board that is lost, as from one without power.
@@ -276,6 +280,11 @@ impl Platform for RemotePlatform {
     fn unmask_interrupt(&self) -> Result<(), PlatformError> {
         self.line.ask(Request::Unmask).map(|_| ())
     }
+
+    fn lost(&self) -> Option<PlatformError> {
+        let source = self.line.state().lost.clone()?;
+        Some(self.line.lost_to(source))
+    }
 }
 
 #[cfg(test)]
@@ -302,6 +311,7 @@ mod tests {
         let platform = RemotePlatform { line: Arc::new(line), pool: Pool::new(Box::new(memory)) };
         let window = platform.control_window().expect("a window");
         assert_eq!(window.read32(0), u32::MAX);
+        assert!(matches!(platform.lost(), Some(PlatformError::ServerLost { .. })));
         window.write32(0, 1);
         platform.wait_interrupt(Duration::from_secs(3600)).expect_err("lost");
         platform.unmask_interrupt().expect_err("lost");

@@ -47,7 +47,8 @@ pub struct StepParameters {
     pub deadline: Option<Duration>,
     /// How often a step that failed is taken again, after a reset that made the board ready. Each
     /// attempt may take as long as the deadline says. What the board cannot be blamed for is not
-    /// tried again: refused input, results that are not finite, too little memory.
+    /// tried again: refused input, results that are not finite, too little memory; nor is what was
+    /// [cancelled](crate::Cancellation).
     pub retries: u32,
 }
 

@@ -10,6 +10,7 @@ use super::device::{Device, Statuses};
 use super::fault::{Awaited, Fault};
 use super::oddities::Oddity;
 use super::plan::{Plan, bytes};
+use super::report::time_of;
 use super::symptom::Symptom;
 use crate::accelerator::Counters;
 use crate::axi_dma::Progress;
@@ -26,20 +27,40 @@ const SHORTEST_SLICE: Duration = Duration::from_millis(10);
 const CANCEL_LOOK: Duration = Duration::from_millis(10);
 /// After so many missing interrupts in a row the driver no longer relies on them.
 const MISSED_LIMIT: u32 = 2;
-/// After so many interrupts without a reason in one step the line stays masked until its end.
-const STORM: u32 = 16;
+/// After so many interrupts in one step that did not end it nobody waits for another: the line stays
+/// masked until its end, and the driver looks by itself.
+const STORM: u64 = 16;
+
+/// How all chains of a step were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Chains {
+    /// Complete, at the first look.
+    Complete,
+    /// Complete, after a look at which they were not.
+    BecameComplete,
+    /// Not complete.
+    Running,
+}
 
 impl Device {
     /// Waits until every chain of the step is complete; the number of interrupts that woke.
     pub(super) fn wait(&mut self, plan: &Plan, deadline: &Deadline) -> Result<u64, Symptom> {
         let completion = self.s2mm.len() - 1;
+        // Up to the last they ended nothing. A clock that stands still must not make them endless.
         let mut interrupts = 0;
         let mut spurious = 0;
         let mut slice = self.first_slice(deadline.limit());
         loop {
             // Asked before looking, so that there is one look after the deadline.
             let remaining = deadline.remaining(&*self.platform);
-            let woke = self.wait_interrupt(slice.min(remaining))?.is_some();
+            let time = slice.min(remaining);
+            let woke = if interrupts < STORM {
+                self.wait_interrupt(time)?.is_some()
+            } else {
+                self.check_cancelled()?;
+                self.platform.pause(time);
+                false
+            };
             let statuses = self.statuses();
             self.check(&statuses)?;
             let mut pending = false;
@@ -52,8 +73,8 @@ impl Device {
             let mut packet = statuses[completion].complete();
             if woke {
                 interrupts += 1;
-                spurious += u32::from(!pending);
-                if spurious < STORM {
+                spurious += u64::from(!pending);
+                if interrupts < STORM {
                     self.platform.unmask_interrupt()?;
                 }
                 // What came between reading and unmasking raised no interrupt.
@@ -66,22 +87,24 @@ impl Device {
             }
             let looked = self.platform.now();
             let grace = if packet { GRACE.min(remaining) } else { Duration::ZERO };
-            let complete = self.complete_within(plan, grace)?;
-            if packet && self.platform.now().saturating_sub(looked) > NOTICEABLE {
+            let chains = self.complete_within(plan, grace)?;
+            // A look at many descriptors takes its time, too.
+            let waited = chains != Chains::Complete;
+            if packet && waited && self.platform.now().saturating_sub(looked) > NOTICEABLE {
                 self.oddities.tell(Oddity::LateStatus);
             }
             let odd = woke && !pending;
-            if complete {
+            if chains != Chains::Running {
                 if odd {
                     self.oddities.tell(Oddity::SpuriousInterrupt);
                 }
-                self.note_interrupt(interrupts > u64::from(spurious));
-                if spurious >= STORM {
+                if !packet && self.acknowledge_completion()? {
+                    interrupts += 1;
+                }
+                self.note_interrupt(interrupts > spurious);
+                if interrupts >= STORM {
                     // The storm may be over, and the next step relies on interrupts.
                     self.platform.unmask_interrupt()?;
-                }
-                if let Some(started) = &self.started {
-                    self.took = Some(self.platform.now().saturating_sub(started.at));
                 }
                 acquire_from_device();
                 return Ok(interrupts);
@@ -93,13 +116,13 @@ impl Device {
                 // Neither a channel nor the accelerator.
                 self.oddities.tell(Oddity::SpuriousInterrupt);
             }
-            if spurious >= STORM {
+            if interrupts >= STORM {
                 self.oddities.tell(Oddity::InterruptStorm);
             }
             if remaining.is_zero() {
                 return Err(Symptom::Late { awaited: Awaited::Results, limit: deadline.limit() });
             }
-            slice = match packet || spurious >= STORM {
+            slice = match packet || interrupts >= STORM {
                 true => GRACE,
                 // An interrupt that was none says nothing of how long it still takes.
                 false if odd => slice,
@@ -117,12 +140,31 @@ impl Device {
         loop {
             self.check_cancelled()?;
             let piece = left.min(CANCEL_LOOK);
+            let before = self.platform.now();
             let came = self.platform.wait_interrupt(piece)?;
             left -= piece;
-            if came.is_some() || left.is_zero() {
+            // A platform without an interrupt comes back early, to let the caller look.
+            let early = self.platform.now().saturating_sub(before) < piece;
+            if came.is_some() || early || left.is_zero() {
                 return Ok(came);
             }
         }
+    }
+
+    /// Acknowledges the completion of a step that was found complete before its interrupt was seen,
+    /// which would else be the next step's; whether it had reached the driver.
+    fn acknowledge_completion(&mut self) -> Result<bool, Fault> {
+        let Some(lane) = self.s2mm.last_mut() else { return Ok(false) };
+        let status = lane.channel.status();
+        if status.gone() || lane.channel.pending(status) == 0 {
+            return Ok(false);
+        }
+        lane.channel.acknowledge(status);
+        let came = self.platform.wait_interrupt(Duration::ZERO)?.is_some();
+        if came {
+            self.platform.unmask_interrupt()?;
+        }
+        Ok(came)
     }
 
     /// Waits for the accelerator to say that it is done, then reads its counters.
@@ -146,7 +188,12 @@ impl Device {
         }
         let counters = self.control.counters(&self.capabilities);
         // No step takes two thousand years.
-        if counters.cycles == u64::MAX { Err(gone()) } else { Ok(counters) }
+        if counters.cycles == u64::MAX {
+            return Err(gone());
+        }
+        let clock_khz = self.capabilities.clock_khz;
+        self.took = (clock_khz > 0).then(|| time_of(counters.cycles, clock_khz));
+        Ok(counters)
     }
 
     /// How long to wait for the first interrupt before looking: twice what the step before took, so
@@ -193,10 +240,11 @@ impl Device {
     }
 
     /// Whether all chains are complete, or become so within `grace`.
-    fn complete_within(&mut self, plan: &Plan, grace: Duration) -> Result<bool, Symptom> {
+    fn complete_within(&mut self, plan: &Plan, grace: Duration) -> Result<Chains, Symptom> {
         let Self { s2mm, mm2s, platform, .. } = self;
         let grace = Deadline::after(&**platform, grace);
         let mut next = 0;
+        let mut found = Chains::Complete;
         let ended = poll_until(&**platform, &grace, || {
             // Lanes that were complete are not looked at again.
             while next < s2mm.len() + mm2s.len() {
@@ -206,7 +254,10 @@ impl Device {
                     None => (&mut mm2s[place - s2mm.len()], None),
                 };
                 let ended = match (lane.ring_mut().progress(), expected) {
-                    (Progress::Running, _) => return None,
+                    (Progress::Running, _) => {
+                        found = Chains::BecameComplete;
+                        return None;
+                    }
                     (Progress::Complete { .. }, None) => None,
                     (Progress::Complete { bytes, packet_ended }, Some(expected))
                         if bytes == expected && (packet_ended || expected == 0) =>
@@ -223,8 +274,8 @@ impl Device {
             Some(None)
         });
         match ended {
-            None => Ok(false),
-            Some(None) => Ok(true),
+            None => Ok(Chains::Running),
+            Some(None) => Ok(found),
             Some(Some(place)) => Err(Symptom::Chain { place }),
         }
     }

@@ -52,7 +52,7 @@ pub(crate) struct Device {
     pub(super) fingerprint: Fingerprint,
     /// The step that was started last.
     pub(super) started: Option<Started>,
-    /// What the last step took on the board's clock, from its start to the end of its results.
+    /// What the last step took on the board, from its start to done, as it counted itself.
     pub(super) took: Option<Duration>,
     /// Interrupts that did not come although the work was done, in a row.
     pub(super) missed_interrupts: u32,
@@ -73,6 +73,11 @@ impl Device {
         platform: Arc<dyn Platform>,
         length_width: Option<u32>,
     ) -> Result<Self, OpenError> {
+        let opened = Self::identify(Arc::clone(&platform), length_width);
+        opened.map_err(|error| platform.lost().map_or(error, OpenError::from))
+    }
+
+    fn identify(platform: Arc<dyn Platform>, length_width: Option<u32>) -> Result<Self, OpenError> {
         let counts = Arc::<AccessCounts>::default();
         let window =
             Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;

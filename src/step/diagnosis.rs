@@ -62,6 +62,8 @@ pub struct ChannelState {
     pub bytes_expected: u64,
     /// The descriptor that failed, or else the one in work.
     pub descriptor: Option<DescriptorState>,
+    /// Bits of the bus addresses in its registers.
+    pub(super) address_width: u32,
 }
 
 /// How the control block stood.
@@ -99,7 +101,7 @@ impl fmt::Display for ChannelState {
 impl ChannelState {
     /// A channel whose chain stands like that.
     pub(super) fn new(
-        channel: ChannelName,
+        (channel, address_width): (ChannelName, u32),
         (control, status): (Dmacr, Dmasr),
         (current, tail): (u64, u64),
         chain: &ChainState,
@@ -127,6 +129,7 @@ impl ChannelState {
             bytes_moved: chain.bytes_moved,
             bytes_expected: chain.bytes_expected,
             descriptor,
+            address_width,
         }
     }
 
@@ -135,6 +138,7 @@ impl ChannelState {
         self.complete == self.descriptors
     }
 
+    /// Those that were read.
     fn registers(&self) -> impl Iterator<Item = (u32, u32)> {
         let base = match self.channel.direction {
             Direction::Mm2s => 0,
@@ -143,16 +147,18 @@ impl ChannelState {
         #[allow(clippy::cast_possible_truncation, reason = "the other half is high()")]
         let low = |address: u64| address as u32;
         let high = |address: u64| low(address >> 32);
+        let (gone, wide) = (self.status.gone(), self.address_width > 32);
         [
-            (DMACR, self.control.raw()),
-            (DMASR, self.status.raw()),
-            (CURDESC, low(self.current)),
-            (CURDESC_MSB, high(self.current)),
-            (TAILDESC, low(self.tail)),
-            (TAILDESC_MSB, high(self.tail)),
+            (DMACR, self.control.raw(), !gone),
+            (DMASR, self.status.raw(), true),
+            (CURDESC, low(self.current), !gone),
+            (CURDESC_MSB, high(self.current), !gone && wide),
+            (TAILDESC, low(self.tail), !gone),
+            (TAILDESC_MSB, high(self.tail), !gone && wide),
         ]
         .into_iter()
-        .map(move |(register, value)| (base + register.offset, value))
+        .filter(|(_, _, read)| *read)
+        .map(move |(register, value, _)| (base + register.offset, value))
     }
 }
 
@@ -227,13 +233,14 @@ impl Device {
 
 fn channel_state(lane: &Lane, before: Option<Dmasr>, outline: Option<&Outline>) -> ChannelState {
     let channel = &lane.channel;
+    let name = (channel.name(), channel.address_width());
     let now = channel.status();
     // A status that was seen and is no longer shown is what the step failed of.
     let status = before.filter(|_| now.errors() == 0).unwrap_or(now);
     if status.gone() {
         let chain = lane.survey(u64::MAX);
         return ChannelState::new(
-            channel.name(),
+            name,
             (Dmacr(u32::MAX), status),
             (u64::MAX, u64::MAX),
             &chain,
@@ -244,11 +251,5 @@ fn channel_state(lane: &Lane, before: Option<Dmasr>, outline: Option<&Outline>) 
     // Behind the status: a chain that became complete in between is not one that hangs.
     let chain = lane.survey(current);
     let registers = (channel.control(), status);
-    ChannelState::new(
-        channel.name(),
-        registers,
-        (current, channel.tail_descriptor()),
-        &chain,
-        outline,
-    )
+    ChannelState::new(name, registers, (current, channel.tail_descriptor()), &chain, outline)
 }

@@ -353,6 +353,7 @@ fn interrupts_without_a_reason_cost_no_step_and_are_told_once() {
     let accesses = |report: StepReport| report.register_reads + report.register_writes;
     let during = accesses(result.expect("a storm is odd"));
     assert!(told(&accelerator, Oddity::InterruptStorm));
+    assert!(!told(&accelerator, Oddity::LateStatus));
     // Eight status registers and a few more at each interrupt, and no thousand of them.
     assert!(during < 1_000, "{during}");
     tampered.wires().storm = 0;
@@ -372,8 +373,14 @@ fn a_step_is_taken_again_if_it_may_be_and_gives_the_same_bits() {
     let fault = Injected::new(FaultKind::DmaDecErr).on(1, Side::Mm2s);
     assert_eq!(again(&mut accelerator, 3).0.expect("nothing happens").retries, 0);
     board.inject(fault);
+    let before = board.counts();
     let (result, bodies) = again(&mut accelerator, 1);
-    assert_eq!(result.expect("taken again").retries, 1);
+    let (report, after) = (result.expect("taken again"), board.counts());
+    assert_eq!(report.retries, 1);
+    // Of both attempts, and of the reset between them.
+    assert_eq!(report.register_reads, after.register_reads - before.register_reads);
+    assert_eq!(report.register_writes, after.register_writes - before.register_writes);
+    assert!(report.register_reads + report.register_writes > 2 * 38);
     assert_eq!(bodies, undisturbed(CUBES));
     board.inject(fault);
     let (result, bodies) = again(&mut accelerator, 0);

@@ -66,10 +66,13 @@ impl<'a> InFlight<'a> {
     ///
     /// # Errors
     /// As [`Accelerator::step`]. [`InputError::OtherBodies`] if there are more or fewer bodies than
-    /// were given; the step is then stopped.
+    /// were given: the step is then stopped, and the accelerator is ready for the next;
+    /// [`Error::MustReopen`] in its place if the board could not be stopped.
     pub fn wait<B: Bodies + ?Sized>(mut self, bodies: &mut B) -> Result<StepReport, Error> {
         let (found, expected) = (bodies.len(), self.flight.bodies);
         if found != expected {
+            let Accelerator { device, shapes, .. } = &mut *self.accelerator;
+            device.settle(shapes)?;
             return Err(InputError::OtherBodies { found, expected }.into());
         }
         let ended = self.end(bodies);

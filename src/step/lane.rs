@@ -74,7 +74,7 @@ impl Lane {
     ) -> Result<(), PlatformError> {
         self.ring = None;
         let slack = descriptors.saturating_add(descriptors / 4);
-        self.ring = Some(Ring::new(platform, slack, address_width)?);
+        self.ring = Some(Ring::new(platform, self.channel.name().direction, slack, address_width)?);
         Ok(())
     }
 

@@ -37,6 +37,8 @@ mod symptom;
 mod tampered;
 #[cfg(all(test, feature = "emulation"))]
 mod tests;
+#[cfg(all(test, feature = "emulation"))]
+mod wait_tests;
 
 pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
 pub use cancellation::Cancellation;

@@ -28,7 +28,7 @@ impl Oddity {
                 "an interrupt came that no channel had asked for; is the line shared?"
             }
             Self::InterruptStorm => {
-                "interrupts come without end and without a reason: ignored until the step is over"
+                "interrupts come without end and end nothing: ignored until the step is over"
             }
             Self::NoHalt => "a channel did not stop in time; the board was reset before the step",
             Self::LateStatus => {

@@ -6,6 +6,7 @@ use super::oddities::Oddity;
 use super::plan::Plan;
 use super::root_cause::other_bitstream;
 use super::symptom::Symptom;
+use crate::axi_dma::DmaError;
 use crate::error::{Aftermath, Error};
 use crate::scene::Shape;
 
@@ -20,6 +21,8 @@ impl Device {
             Fault::Cancelled if !self.in_flight() => Aftermath::Untouched,
             // What answers now is not to be written to: its registers may mean anything.
             Fault::OtherBitstream { .. } => self.give_up(&fault),
+            // Nothing that is written arrives.
+            Fault::Platform(_) if self.platform.lost().is_some() => self.give_up(&fault),
             _ => match self.recover(shapes) {
                 Ok(()) => Aftermath::Ready,
                 Err(error) => {
@@ -60,10 +63,10 @@ impl Device {
         shapes: &[Shape],
     ) -> Result<(), Symptom> {
         let mut reserved = self.reserve(plan);
-        if let Err(Symptom::Known(Fault::Core(error))) = &reserved {
+        if let Err(Symptom::Known(Fault::Core(error @ DmaError::State { .. }))) = &reserved {
             log::debug!("resetting the board: {error}");
-            self.oddities.tell(Oddity::NoHalt);
             self.recover(shapes)?;
+            self.oddities.tell(Oddity::NoHalt);
             reserved = self.reserve(plan);
         }
         reserved.map_err(|symptom| match symptom {
@@ -74,6 +77,10 @@ impl Device {
 
     /// Resets everything and restores what a step relies on.
     fn recover(&mut self, shapes: &[Shape]) -> Result<(), Fault> {
+        self.clear(shapes).map_err(|error| self.platform.lost().map_or(error, Fault::from))
+    }
+
+    fn clear(&mut self, shapes: &[Shape]) -> Result<(), Fault> {
         self.reset()?;
         // Before the shapes are written, and anything is said of being ready.
         let found = self.control.fingerprint();

@@ -17,14 +17,21 @@ impl Device {
     /// it.
     pub(super) fn diagnose(&mut self, symptom: Symptom) -> (Fault, Option<Box<Diagnosis>>) {
         use Fault::{Cancelled, NoMemory, NotFinite};
-        if let Symptom::Known(fault @ (NotFinite { .. } | NoMemory(_) | Cancelled)) = symptom {
+        if let Symptom::Known(fault @ (NotFinite { .. } | NoMemory(_))) = symptom {
             return (fault, None);
+        }
+        if matches!(symptom, Symptom::Known(Cancelled)) && !self.in_flight() {
+            return (Cancelled, None);
         }
         let seen = match symptom {
             Symptom::Status { place, status } => Some((place, status)),
             _ => None,
         };
         let diagnosis = self.snapshot(seen);
+        // Then there was nothing to read.
+        if let Some(error) = self.platform.lost() {
+            return (error.into(), None);
+        }
         let fault = root_cause(&diagnosis, symptom);
         (fault, Some(Box::new(diagnosis)))
     }
@@ -32,12 +39,17 @@ impl Device {
 
 /// The one fault that the others follow from.
 fn root_cause(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
-    if let Some(fault) = replaced(diagnosis) {
-        return fault;
+    match (replaced(diagnosis), symptom) {
+        // Whatever else failed: what answers now is not ours.
+        (Some(fault @ Fault::OtherBitstream { .. }), _) => fault,
+        (_, Symptom::Known(fault @ (Fault::Platform(_) | Fault::Cancelled))) => fault,
+        (Some(fault), _) => fault,
+        (None, symptom) => standing(diagnosis, symptom),
     }
-    if let Symptom::Known(fault @ Fault::Platform(_)) = symptom {
-        return fault;
-    }
+}
+
+/// The cause, among what the channels and the accelerator show.
+fn standing(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
     let sticky = match &symptom {
         Symptom::Sticky(error) => Some(*error),
         _ => None,

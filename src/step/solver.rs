@@ -3,6 +3,8 @@
 //! Validate, order, reserve, pack, hand over, start; then, in [`InFlight`], wait, take back, check,
 //! unpack, commit: nothing of the caller's changes before the last.
 
+use std::sync::Arc;
+
 use super::board::{self, BoardDescription, Found, OpenOptions};
 use super::cancellation::Cancellation;
 use super::device::Device;
@@ -138,10 +140,14 @@ impl Accelerator {
         collisions: &C,
         parameters: &StepParameters,
     ) -> Result<StepReport, Error> {
+        let counts = Arc::clone(&self.device.counts);
+        let (reads, writes) = (counts.reads(), counts.writes());
         let (mut report, retries) = with_retries(parameters.retries, || {
             self.submit(bodies, collisions, parameters)?.wait(bodies)
         })?;
         report.retries = retries;
+        report.register_reads = counts.reads() - reads;
+        report.register_writes = counts.writes() - writes;
         Ok(report)
     }
 
@@ -213,10 +219,10 @@ fn launch<B: Bodies + ?Sized, C: Collisions + ?Sized>(
             + u64::from(parameters.friction_iterations),
         variant: limits.variant,
     };
+    device.check_cancelled()?;
     if plan.bodies == 0 {
         return Ok((plan, None));
     }
-    device.check_cancelled()?;
     device.reserve_or_reset(&plan, shapes)?;
     let sent = device.pack(&plan, bodies, collisions, lives, shapes);
     host.pack = watch.lap();

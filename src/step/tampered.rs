@@ -28,6 +28,8 @@ pub(super) enum Tamper {
     Clear(u32),
     /// It reads this.
     Value(u32),
+    /// These bits read 0 the next time.
+    ClearOnce(u32),
 }
 
 /// What is done to the descriptors each time when a wait for the interrupt is over.
@@ -44,6 +46,10 @@ pub(super) struct Wires {
     /// Interrupts without a source that are still to come, each when the one before is let through.
     pub(super) storm: u32,
     masked: bool,
+    /// What a look at the clock takes.
+    pub(super) look: Duration,
+    /// How long a wait for the interrupt takes at most, and finds none: as without one.
+    pub(super) patience: Option<Duration>,
 }
 
 /// The rings of descriptors, in the order in which the driver makes them: MM2S and S2MM of each core.
@@ -139,11 +145,16 @@ impl RegisterWindow for Wired {
 
     fn read32(&self, at: u32) -> u32 {
         let value = self.inner.read32(at);
-        match lock(&self.wires).reads.get(&(self.region, at)) {
+        let mut wires = lock(&self.wires);
+        match wires.reads.get(&(self.region, at)).copied() {
             None => value,
             Some(Tamper::Set(bits)) => value | bits,
             Some(Tamper::Clear(bits)) => value & !bits,
-            Some(Tamper::Value(other)) => *other,
+            Some(Tamper::Value(other)) => other,
+            Some(Tamper::ClearOnce(bits)) => {
+                wires.reads.remove(&(self.region, at));
+                value & !bits
+            }
         }
     }
 
@@ -193,6 +204,7 @@ impl Platform for Tampered {
     }
 
     fn now(&self) -> Duration {
+        self.inner.pause(self.wires().look);
         self.inner.now()
     }
 
@@ -201,6 +213,11 @@ impl Platform for Tampered {
     }
 
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+        let patience = self.wires().patience;
+        if let Some(patience) = patience {
+            self.inner.pause(patience.min(timeout));
+            return Ok(None);
+        }
         let (masked, stormy) = {
             let mut wires = self.wires();
             let (masked, stormy) = (wires.masked, wires.storm > 0);
