@@ -86,7 +86,9 @@ impl Device {
                 packet |= again.complete();
             }
             let looked = self.platform.now();
-            let grace = if packet { GRACE.min(remaining) } else { Duration::ZERO };
+            // Of the time that is left now: the wait has taken some.
+            let left = deadline.remaining(&*self.platform);
+            let grace = if packet { GRACE.min(left) } else { Duration::ZERO };
             let chains = self.complete_within(plan, grace)?;
             // A look at many descriptors takes its time, too.
             let waited = chains != Chains::Complete;

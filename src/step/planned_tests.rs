@@ -165,3 +165,21 @@ fn an_interrupt_that_is_dropped_costs_at_most_one_polling_interval() {
         assert!(time_of(None) < took + Duration::from_micros(50), "relied on again");
     }
 }
+
+/// The last channel is done late in the step, another one later still: what is polled for then has the deadline too.
+#[test]
+fn a_channel_that_is_slow_at_the_end_is_not_waited_for_beyond_the_deadline() {
+    let (board, mut accelerator) = open(BoardConfig::default());
+    step(&mut accelerator, CUBES).0.expect("a good step");
+    let plan = "slow=8000@dma3.s2mm; slow=60000@dma0.s2mm";
+    board.inject(plan.parse::<FaultPlan>().expect("a plan"));
+    let deadline = Duration::from_millis(1);
+    let mut parameters = StepParameters::default();
+    parameters.deadline = Some(deadline);
+    let (mut bodies, collisions) = scene(CUBES);
+    let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("too slow");
+    assert_eq!(board.faults(), 2);
+    assert_eq!(fault_of(&error).name(), "deadline");
+    let elapsed = error.diagnosis().expect("the board had a part in it").elapsed;
+    assert!(elapsed >= deadline && elapsed < deadline + Duration::from_micros(100), "{elapsed:?}");
+}
