@@ -174,8 +174,7 @@ fn a_channel_that_is_slow_at_the_end_is_not_waited_for_beyond_the_deadline() {
     let plan = "slow=8000@dma3.s2mm; slow=60000@dma0.s2mm";
     board.inject(plan.parse::<FaultPlan>().expect("a plan"));
     let deadline = Duration::from_millis(1);
-    let mut parameters = StepParameters::default();
-    parameters.deadline = Some(deadline);
+    let parameters = StepParameters { deadline: Some(deadline), ..StepParameters::default() };
     let (mut bodies, collisions) = scene(CUBES);
     let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("too slow");
     assert_eq!(board.faults(), 2);
