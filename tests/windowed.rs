@@ -39,13 +39,18 @@ fn differing(one: &[Body], other: &[Body]) -> usize {
     bits(one).iter().zip(bits(other)).filter(|(one, other)| **one != *other).count()
 }
 
-/// To a grid of 2^-9 m, on which differences of positions below 2^13 m are exact in f32: lever arms
-/// are then the same numbers, whether they are made from world coordinates or from offsets. Of three
-/// contact points two are left, since a third is not exact.
-fn snap(bodies: &mut [Body], collisions: &mut [Collision]) {
+/// Of 2^-9 m: differences of positions below 2^13 m are exact in f32.
+const FINE: f32 = 512.0;
+/// Of half a metre: sums and differences within a small pile are exact in binary16 too.
+const COARSE: f32 = 2.0;
+
+/// To a grid of so many points a metre, on which lever arms are the same numbers, whether they are made
+/// from world coordinates or from offsets. Of three contact points two are left, since a third is not
+/// exact.
+fn snap(bodies: &mut [Body], collisions: &mut [Collision], grid: f32) {
     let snap = |point: &mut [f32; 3]| {
         for number in point {
-            *number = (*number * 512.0).round() / 512.0;
+            *number = (*number * grid).round() / grid;
         }
     };
     bodies.iter_mut().for_each(|body| snap(&mut body.pose.position));
@@ -72,10 +77,10 @@ fn side_by_side(scene: &mut Scene, steps: usize, inertia: Inertia) -> Vec<StepRe
     float.set_shapes(scene.shapes()).expect("they fit");
     let mut reports = Vec::new();
     for step in 0..steps {
-        snap(scene.bodies_mut(), &mut []);
+        snap(scene.bodies_mut(), &mut [], FINE);
         let mut collisions = scene.detect().to_vec();
         let mut bodies = scene.bodies().to_vec();
-        snap(&mut bodies, &mut collisions);
+        snap(&mut bodies, &mut collisions, FINE);
         let mut expected = bodies.clone();
         let in_order = by_hand(&expected, &collisions, scene.shapes(), DEPTH);
         float.step(&mut expected, &in_order, &ordered(Order::AsGiven)).expect("a step");
@@ -335,24 +340,6 @@ fn a_collision_that_loses_its_points_on_the_way_fails_the_step() {
     assert!(on_the_board >= list.len(), "{on_the_board} of {}", list.len());
 }
 
-/// To a grid of half a metre, on which sums and differences within a small pile are exact in
-/// binary16 too: `half`, which streams world coordinates, has the offsets of `windowed16`.
-fn snap16(bodies: &mut [Body], collisions: &mut [Collision]) {
-    let snap = |point: &mut [f32; 3]| {
-        for number in point {
-            *number = (*number * 2.0).round() / 2.0;
-        }
-    };
-    bodies.iter_mut().for_each(|body| snap(&mut body.pose.position));
-    for collision in collisions {
-        collision.contacts.iter_mut().for_each(|contact| snap(&mut contact.point));
-        // A third is not exact.
-        if collision.count == 3 {
-            collision.count = 2;
-        }
-    }
-}
-
 /// `half` integrates poses of sixteen bits, so that velocities are compared, and handed on.
 #[test]
 fn sixteen_bits_give_the_velocities_of_half_waiting_in_the_same_order() {
@@ -365,7 +352,7 @@ fn sixteen_bits_give_the_velocities_of_half_waiting_in_the_same_order() {
     half.set_shapes(scene.shapes()).expect("they fit");
     let mut collisions = scene.detect().to_vec();
     let mut bodies = scene.bodies().to_vec();
-    snap16(&mut bodies, &mut collisions);
+    snap(&mut bodies, &mut collisions, COARSE);
     assert!(collisions.len() > 500, "{}", collisions.len());
     for (index, body) in (0_u8..).zip(&mut bodies).skip(1) {
         let off = f32::from(index) / 1_009.0;
@@ -429,7 +416,7 @@ fn the_full_step_gives_the_bits_of_one_collision_after_the_other() {
     };
     let start = vectors::load(&folder);
     let (mut bodies, mut collisions) = (start.bodies.clone(), start.collisions.clone());
-    snap(&mut bodies, &mut collisions);
+    snap(&mut bodies, &mut collisions, FINE);
     let mut expected = bodies.clone();
     let in_order = by_hand(&bodies, &collisions, &start.shapes, DEPTH);
     let (_, mut float) = open(BoardConfig { window_slots: Some(1), ..of(&FLOAT) });
