@@ -163,7 +163,7 @@ pub use scene::{
 pub use step::{
     Accelerator, AcceleratorError, Awaited, BoardChoice, BoardDescription, BoardKind, Cancellation,
     ChannelState, ControlState, Diagnosis, Fault, HostTimes, InFlight, Limit, OpenOptions, Phase,
-    StepCycles, StepReport, Subject,
+    Prepared, StepCycles, StepReport, Subject,
 };
 
 /// The README's library example is a test.
