@@ -167,3 +167,25 @@ fn steps_of_other_profiles_allocate_nothing_either() {
         assert_eq!(counted[3..], [0; 7], "{name}: {counted:?}");
     }
 }
+
+/// The board has no part in preparing: what is counted is the driver's.
+#[test]
+fn preparing_allocates_nothing_on_a_design_that_keeps_live_bodies_alone() {
+    let mut accelerator = open(profile("windowed"));
+    let (mut bodies, collisions) = scene();
+    let parameters = StepParameters::default();
+    let mut flight =
+        accelerator.submit(&bodies, &collisions, &parameters).expect("nothing disturbs it");
+    let mut counted = Vec::with_capacity(10);
+    for step in 0..10 {
+        let before = COUNTED.get();
+        let of_step = &collisions[step % 3..];
+        let next = flight.prepare(&bodies, of_step, &parameters).expect("there is memory");
+        counted.push(COUNTED.get() - before);
+        let (ended, started) = flight.wait_and_start(&mut bodies, &next);
+        ended.expect("nothing disturbs it");
+        flight = started.expect("nothing disturbs it");
+    }
+    assert!(counted[0] > 0, "the second bank is made: does the allocator count?");
+    assert_eq!(counted[6..], [0; 4], "{counted:?}");
+}
