@@ -205,13 +205,14 @@ impl Device {
         Ok(())
     }
 
-    /// Hands the buffers over, queues all descriptors, and starts; the number of doorbells.
-    pub(super) fn start(
+    /// Hands the buffers over, queues all descriptors and writes the arguments: everything but the
+    /// doorbells.
+    pub(super) fn arm(
         &mut self,
         plan: &Plan,
         bank: Bank,
         parameters: &StepParameters,
-    ) -> Result<u64, Symptom> {
+    ) -> Result<(), Symptom> {
         let largest = self.largest;
         let outline = Outline::new(plan, parameters, largest);
         self.started = Some(Started { outline, at: self.platform.now() });
@@ -241,6 +242,11 @@ impl Device {
         self.control.set_arguments(count(plan.bodies), count(plan.collisions), parameters);
         // Buffers and descriptors must be visible before the first doorbell.
         release_to_device();
+        Ok(())
+    }
+
+    /// Starts what is armed; the number of doorbells.
+    pub(super) fn start(&mut self) -> Result<u64, Symptom> {
         // Receivers first: otherwise the accelerator's output stalls, and with it the input.
         let mut doorbells = 1;
         for lane in &mut self.s2mm {

@@ -97,7 +97,8 @@ impl Accelerator {
             ..StepParameters::default()
         };
         let deadline = Deadline::after(&*self.device.platform, ECHO_LIMIT);
-        self.device.start(&plan, bank, &parameters)?;
+        self.device.arm(&plan, bank, &parameters)?;
+        self.device.start()?;
         let interrupts = self.device.wait(&plan, &deadline)?;
         let counters = self.device.collect(&deadline)?;
         self.device.take_back(bank)?;

@@ -108,7 +108,7 @@ impl<'a> InFlight<'a> {
         let interrupts = device.wait(&plan, &deadline)?;
         let counters = device.collect(&deadline)?;
         device.take_back(bank)?;
-        flight.load.host.wait = flight.watch.lap();
+        flight.load.host.wait += flight.watch.lap();
         Accelerator::check_received(&plan, sent, &counters)?;
         let mut report = self.report(&counters);
         (report.doorbells, report.interrupts) = (doorbells, interrupts);

@@ -198,10 +198,13 @@ impl Accelerator {
             let device = &mut self.device;
             let limit = plan.deadline(parameters, &device.capabilities);
             let deadline = Deadline::after(&*device.platform, limit);
-            let doorbells = device
-                .start(plan, *bank, parameters)
-                .map_err(|symptom| device.fail(symptom, &self.shapes))?;
+            let armed = device.arm(plan, *bank, parameters);
             flight.load.host.start += flight.watch.lap();
+            let doorbells = armed
+                .and_then(|()| device.start())
+                .map_err(|symptom| device.fail(symptom, &self.shapes))?;
+            // From here on the board is at work.
+            flight.load.host.wait = flight.watch.lap();
             flight.started = Some(Started { deadline, doorbells });
         }
         Ok(flight)

@@ -2,6 +2,7 @@
 //!
 //! ```sh
 //! cargo bench --bench overlap
+//! cargo bench --bench overlap -- --folder tests/golden/pile5_step60 --pack-ms 0.01
 //! cargo bench --bench overlap -- --pack-ms 3.5 --unpack-ms 0.5 --order as-given --json
 //! ```
 //!
@@ -9,17 +10,18 @@
 //! this host computes, which is not the host that a board has. So the time that packing takes there
 //! is given (`--pack-ms`, 7 ms for the thesis' step unless told otherwise), and the scene lets it pass
 //! on the board's clock while it is read. Storing the results takes as long for a byte, or
-//! `--unpack-ms`. Steps are those of a scene that stands still, each taken from the same bodies: on a
-//! board alone (serial), and each packed while the one before it is on the board (overlapped).
+//! `--unpack-ms`. The step is always the same, of a standing scene or of a folder: one after the other
+//! (serial), and each packed while the one before it is on the board (overlapped).
 //!
-//! Beside it the host times of this machine, medians: what a step costs besides packing, ordering
-//! and waiting.
+//! Beside it the host times of this machine, medians of the steps without any time added: what a step
+//! costs besides packing, ordering and waiting.
 
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
 
 use std::cell::Cell;
 use std::error::Error;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -27,6 +29,7 @@ use bench::median;
 use bitstream_model::{BoardConfig, CpuPort, EmulatedBoard};
 use scene::{Grid, Scene, SceneOptions};
 use serde_json::json;
+use step_folder::folder::Folder;
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, HostTimes, InFlight,
@@ -36,6 +39,7 @@ use zynq_pgs::{
 /// What the command line asks for.
 struct Options {
     grid: Grid,
+    folder: Option<PathBuf>,
     order: Order,
     pack: Duration,
     unpack: Option<Duration>,
@@ -47,6 +51,7 @@ impl Options {
     fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Self, Box<dyn Error>> {
         let mut options = Self {
             grid: Grid::default(),
+            folder: None,
             order: Order::HazardFree,
             pack: Duration::from_millis(7),
             unpack: None,
@@ -57,6 +62,7 @@ impl Options {
             let mut value = || arguments.next().ok_or(format!("{argument} needs a value"));
             match argument.as_str() {
                 "--grid" => options.grid = value()?.parse()?,
+                "--folder" => options.folder = Some(value()?.into()),
                 "--order" => options.order = order(&value()?)?,
                 "--pack-ms" => options.pack = milliseconds(&value()?)?,
                 "--unpack-ms" => options.unpack = Some(milliseconds(&value()?)?),
@@ -66,8 +72,8 @@ impl Options {
                 "--bench" => {}
                 other => {
                     return Err(format!(
-                        "unknown {other:?}, expected --grid, --order, --pack-ms, --unpack-ms, \
-                         --steps or --json"
+                        "unknown {other:?}, expected --grid, --folder, --order, --pack-ms, \
+                         --unpack-ms, --steps or --json"
                     )
                     .into());
                 }
@@ -92,8 +98,7 @@ fn milliseconds(text: &str) -> Result<Duration, Box<dyn Error>> {
 /// Pieces in which the host's time passes.
 const PIECES: u32 = 100;
 
-/// Bodies or collisions that are read and stored in so much of the board's time. The results are
-/// not kept: every step begins as the first.
+/// Bodies or collisions that are read and stored in so much of the board's time.
 struct Timed<'a, T: ?Sized> {
     inner: &'a T,
     port: &'a CpuPort,
@@ -116,17 +121,24 @@ impl<'a, T: ?Sized> Timed<'a, T> {
     }
 }
 
-impl Bodies for Timed<'_, [Body]> {
+/// Bodies that are stored elsewhere than they are read: every step begins as the first.
+struct Elsewhere<'a> {
+    timed: Timed<'a, [Body]>,
+    stored: Vec<Body>,
+}
+
+impl Bodies for Elsewhere<'_> {
     fn len(&self) -> usize {
-        self.inner.len()
+        self.timed.inner.len()
     }
 
     fn body(&self, index: usize) -> Body {
-        self.inner[index]
+        self.timed.inner[index]
     }
 
-    fn commit(&mut self, index: usize, _: Pose, _: Velocity) {
-        self.pass(index, self.inner.len());
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        self.timed.pass(index, self.len());
+        self.stored.commit(index, pose, velocity);
     }
 }
 
@@ -152,8 +164,9 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn bodies(&self) -> Timed<'_, [Body]> {
-        Timed::new(self.bodies, &self.port, self.unpack)
+    fn bodies(&self) -> Elsewhere<'_> {
+        let timed = Timed::new(self.bodies, &self.port, self.unpack);
+        Elsewhere { timed, stored: self.bodies.to_vec() }
     }
 
     fn collisions(&self) -> Timed<'_, [Collision]> {
@@ -231,50 +244,61 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    let scene = SceneOptions { grid: options.grid, drop: 0.0, ..Default::default() };
-    let mut scene = Scene::new(&scene)?;
-    scene.detect();
+    let (name, bodies, collisions, shapes, mut parameters) = match &options.folder {
+        Some(path) => {
+            let folder = Folder::load(path)?;
+            let name = path.display().to_string();
+            (name, folder.bodies, folder.collisions, folder.shapes, folder.parameters)
+        }
+        None => {
+            let standing = SceneOptions { grid: options.grid, drop: 0.0, ..Default::default() };
+            let mut scene = Scene::new(&standing)?;
+            scene.detect();
+            let name = format!("{} cubes", options.grid);
+            let (bodies, collisions) = (scene.bodies().to_vec(), scene.collisions().to_vec());
+            (name, bodies, collisions, scene.shapes().to_vec(), StepParameters::default())
+        }
+    };
     let emulated = EmulatedBoard::new(BoardConfig::default())?;
     let board = BoardChoice::Emulated(emulated.cpu_port());
     let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
-    accelerator.set_shapes(scene.shapes())?;
-    let mut parameters = StepParameters::default();
+    accelerator.set_shapes(&shapes)?;
     parameters.order = Some(options.order);
     let mut job = Job {
-        bodies: scene.bodies(),
-        collisions: scene.collisions(),
+        bodies: &bodies,
+        collisions: &collisions,
         parameters,
         pack: Duration::ZERO,
         unpack: Duration::ZERO,
         port: emulated.cpu_port(),
     };
-    let (_, alone) = job.serial(&mut accelerator, 1)?;
-    let alone = alone.first().ok_or("a report of one step")?;
+    // Without the time of a host that is not this one; the first makes all memory.
+    job.serial(&mut accelerator, 1)?;
+    let (_, plain) = job.serial(&mut accelerator, options.steps)?;
+    let alone = plain.first().ok_or("a report of each step")?;
     let on_board = alone.modelled_time();
     job.pack = options.pack;
     job.unpack = options.unpack.unwrap_or_else(|| {
         // The collisions are packed once, however often they are streamed.
         let passes = u64::from(alone.passes).max(1);
-        let bodies = 2 * alone.bytes_from_device;
         let packed = alone.bytes_to_device.saturating_sub(alone.bytes_from_device) / passes
             + alone.bytes_from_device;
-        debug_assert!(bodies > 0);
         options.pack.mul_f64(alone.bytes_from_device as f64 / packed.max(1) as f64)
     });
     let (serial, _) = job.serial(&mut accelerator, options.steps)?;
-    let (each, reports) = job.overlapped(&mut accelerator, options.steps)?;
+    let (each, _) = job.overlapped(&mut accelerator, options.steps)?;
     let host = job.pack + job.unpack;
     let longer = host.max(on_board);
     let ratio = each.as_secs_f64() / longer.as_secs_f64();
     let ms = |time: Duration| time.as_secs_f64() * 1e3;
-    let times = typical(&reports);
+    let times = typical(&plain);
     if options.json {
         let host_ms: serde_json::Map<_, _> =
             times.iter().map(|(name, time)| ((*name).to_owned(), ms(*time).into())).collect();
         let document = json!({
             "schema": 1,
             "bench": "overlap",
-            "grid": options.grid.to_string(),
+            "scene": name,
             "order": if options.order == Order::AsGiven { "as-given" } else { "hazard-free" },
             "bodies": job.bodies.len(),
             "collisions": job.collisions.len(),
@@ -292,8 +316,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         return Ok(());
     }
     println!(
-        "{} cubes, {} collisions, {} steps, on the board's clock\n",
-        options.grid,
+        "{name}: {} bodies, {} collisions, {} steps, on the board's clock\n",
+        job.bodies.len(),
         job.collisions.len(),
         options.steps
     );
