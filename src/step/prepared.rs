@@ -35,6 +35,31 @@ impl InFlight<'_> {
     /// board, or one whose bodies were predicted. This step is not touched, whatever happens: it is
     /// waited for as before.
     ///
+    /// ```
+    /// use zynq_pgs::{Accelerator, Body, Collision, OpenOptions, Pose, Shape, StepParameters};
+    /// # use zynq_pgs::Velocity;
+    ///
+    /// # fn main() -> Result<(), zynq_pgs::Error> {
+    /// let mut board = Accelerator::open(OpenOptions::default())?;
+    /// board.set_shapes(&[Shape::isotropic(1.0, 1.5)])?;
+    /// # let pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+    /// # let falling = Body { pose, velocity: Velocity::default(), shape: 0 };
+    /// # let world = |count| vec![falling; count];
+    /// let (mut left, mut right) = (world(2), world(3));
+    /// let none: [Collision; 0] = [];
+    /// let parameters = StepParameters::default();
+    ///
+    /// let mut flight = board.submit(&left, &none[..], &parameters)?;
+    /// let prepared = flight.prepare(&right, &none[..], &parameters)?;
+    /// let (report, started) = flight.wait_and_start(&mut left, &prepared);
+    /// assert_eq!(report?.bodies, 2);
+    /// assert_eq!(started?.wait(&mut right)?.bodies, 3);
+    /// # assert_eq!(left[1], right[2]);
+    /// # assert!(left[1].velocity.linear[1] < 0.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// The first call allocates a second set of buffers, as large as the first. Where there is too
     /// little memory for both, steps that are not prepared work as ever.
     ///
