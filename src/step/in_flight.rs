@@ -57,9 +57,9 @@ impl<'a> InFlight<'a> {
     }
 
     /// Waits for the results and puts them into the bodies, which must be those that were given to
-    /// [`Accelerator::submit`].
+    /// [`Accelerator::submit`] or [`InFlight::prepare`].
     ///
-    /// The time between the two calls counts for the deadline and for no phase of
+    /// The time between start and this call counts for the deadline and for no phase of
     /// [`StepReport::host`].
     ///
     /// # Errors

@@ -30,6 +30,8 @@ mod plan;
 mod planned_tests;
 mod prepared;
 #[cfg(all(test, feature = "emulation"))]
+mod prepared_fault_tests;
+#[cfg(all(test, feature = "emulation"))]
 mod prepared_tests;
 mod recovery;
 mod report;
