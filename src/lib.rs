@@ -125,6 +125,10 @@
 //! # }
 //! ```
 //!
+//! What does not depend on its results can be packed meanwhile, as the step of another world:
+//! [`InFlight::prepare`] validates, orders and packs it, and [`InFlight::wait_and_start`] starts it the
+//! moment that the board is through with the first.
+//!
 //! # When something fails
 //!
 //! Every error says what was expected, what was found and what to do; the bodies are as they were.
@@ -163,7 +167,7 @@ pub use scene::{
 pub use step::{
     Accelerator, AcceleratorError, Awaited, BoardChoice, BoardDescription, BoardKind, Cancellation,
     ChannelState, ControlState, Diagnosis, Fault, HostTimes, InFlight, Limit, OpenOptions, Phase,
-    StepCycles, StepReport, Subject,
+    Prepared, StepCycles, StepReport, Subject,
 };
 
 /// The README's library example is a test.

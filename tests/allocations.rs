@@ -8,6 +8,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, EmulatedBoard, Hazards};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
@@ -51,14 +52,8 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Ten steps of a row of cubes on the ground, each also in contact with the next; the allocations of
-/// each.
-fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
-    let board = EmulatedBoard::new(config).expect("a board that can be built");
-    let options =
-        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
-    let mut accelerator = Accelerator::open(options).expect("the emulated board");
-    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("they fit");
+/// A row of cubes on the ground, each also in contact with the next.
+fn scene() -> (Vec<Body>, Vec<Collision>) {
     let body = |y, shape| Body {
         pose: Pose { position: [0.0, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
         velocity: Velocity::default(),
@@ -77,6 +72,22 @@ fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
             contacts: [contact; 4],
         });
     }
+    (bodies, collisions)
+}
+
+fn open(config: BoardConfig) -> Accelerator {
+    let board = EmulatedBoard::new(config).expect("a board that can be built");
+    let options =
+        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
+    let mut accelerator = Accelerator::open(options).expect("the emulated board");
+    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("they fit");
+    accelerator
+}
+
+/// Ten steps; the allocations of each.
+fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
+    let mut accelerator = open(config);
+    let (mut bodies, collisions) = scene();
     let mut parameters = StepParameters::default();
     parameters.order = order;
     let mut counted = Vec::with_capacity(10);
@@ -88,6 +99,32 @@ fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
         counted.push(COUNTED.get() - before);
     }
     counted
+}
+
+/// Ten steps, each prepared while the one before it is on the board; the allocations of each.
+fn allocations_prepared(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
+    let mut accelerator = open(config);
+    let (mut bodies, collisions) = scene();
+    let mut parameters = StepParameters::default();
+    parameters.order = order;
+    let mut counted = Vec::with_capacity(10);
+    let mut flight =
+        accelerator.submit(&bodies, &collisions, &parameters).expect("nothing disturbs it");
+    for step in 0..10 {
+        let of_step = &collisions[step % 3..];
+        let before = COUNTED.get();
+        let next = flight.prepare(&bodies, of_step, &parameters).expect("there is memory");
+        let (ended, started) = flight.wait_and_start(&mut bodies, &next);
+        ended.expect("nothing disturbs it");
+        flight = started.expect("nothing disturbs it");
+        counted.push(COUNTED.get() - before);
+    }
+    counted
+}
+
+fn profile(name: &str) -> BoardConfig {
+    let profile = Profile::by_name(name).expect("a profile");
+    BoardConfig { profile, ..BoardConfig::default() }
 }
 
 #[test]
@@ -106,4 +143,49 @@ fn an_order_allocates_nothing_once_it_has_seen_a_step_of_that_size() {
         let counted = allocations(config, order);
         assert_eq!(counted[3..], [0; 7], "{:?} {order:?}: {counted:?}", config.hazards);
     }
+}
+
+/// Each of the two banks has seen each of the three sizes after six steps.
+#[test]
+fn prepared_steps_allocate_nothing_once_both_banks_have_seen_a_step_of_that_size() {
+    let cases = [
+        (BoardConfig::default(), None),
+        (BoardConfig::default(), Some(Order::HazardFree)),
+        (profile("mixed"), None),
+    ];
+    for (config, order) in cases {
+        let counted = allocations_prepared(config, order);
+        assert!(counted[0] > 0, "the second bank is made: does the allocator count?");
+        assert_eq!(counted[6..], [0; 4], "{} {order:?}: {counted:?}", config.profile.name);
+    }
+}
+
+#[test]
+fn steps_of_other_profiles_allocate_nothing_either() {
+    for name in ["half", "mixed", "naive"] {
+        let counted = allocations(profile(name), None);
+        assert_eq!(counted[3..], [0; 7], "{name}: {counted:?}");
+    }
+}
+
+/// The board has no part in preparing: what is counted is the driver's.
+#[test]
+fn preparing_allocates_nothing_on_a_design_that_keeps_live_bodies_alone() {
+    let mut accelerator = open(profile("windowed"));
+    let (mut bodies, collisions) = scene();
+    let parameters = StepParameters::default();
+    let mut flight =
+        accelerator.submit(&bodies, &collisions, &parameters).expect("nothing disturbs it");
+    let mut counted = Vec::with_capacity(10);
+    for step in 0..10 {
+        let before = COUNTED.get();
+        let of_step = &collisions[step % 3..];
+        let next = flight.prepare(&bodies, of_step, &parameters).expect("there is memory");
+        counted.push(COUNTED.get() - before);
+        let (ended, started) = flight.wait_and_start(&mut bodies, &next);
+        ended.expect("nothing disturbs it");
+        flight = started.expect("nothing disturbs it");
+    }
+    assert!(counted[0] > 0, "the second bank is made: does the allocator count?");
+    assert_eq!(counted[6..], [0; 4], "{counted:?}");
 }

@@ -55,6 +55,17 @@ pub enum InputError {
         expected: usize,
     },
 
+    /// A prepared step whose records are not there any more.
+    #[error(
+        "the prepared step is not in its buffers any more, because another was packed in its \
+         place, or it was prepared by another accelerator: prepare it again"
+    )]
+    NotPrepared,
+
+    /// A prepared step that was checked and packed with other shapes.
+    #[error("the shapes were replaced after the step was prepared: prepare it again")]
+    ShapesChanged,
+
     /// Separate arrays of different lengths.
     #[error("the arrays of the {what} have different lengths: give every array for all {what}")]
     UnequalLengths {

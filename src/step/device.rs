@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 
+use super::bank::Bank;
 use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
 use super::cancellation::Cancellation;
 use super::fault::Fault;
@@ -16,7 +17,9 @@ use super::symptom::Symptom;
 use crate::accelerator::{Capabilities, Control, Fingerprint, identify};
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
 use crate::error::OpenError;
-use crate::platform::{Access, AccessCounts, Platform, RegisterMap, Window, release_to_device};
+use crate::platform::{
+    Access, AccessCounts, Platform, PlatformError, RegisterMap, Window, release_to_device,
+};
 use crate::scene::StepParameters;
 
 /// Status registers of all channels: S2MM first, then MM2S.
@@ -33,7 +36,7 @@ pub(super) struct Started {
 /// What the engines are at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Activity {
-    /// The CPU holds every buffer.
+    /// No engine has a buffer in work.
     Idle,
     /// A step was begun, and neither taken back nor cleared away.
     Step,
@@ -134,17 +137,47 @@ impl Device {
         }
     }
 
-    /// Makes buffers and rings large enough for a step.
-    pub(super) fn reserve(&mut self, plan: &Plan) -> Result<(), Symptom> {
-        self.started = None;
+    /// Makes the buffers of a bank, which no engine has in work, large enough for a step.
+    pub(super) fn reserve_buffers(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
+        self.take_back_unused(bank);
         let width = self.capabilities.address_width;
         for (channel, lane) in self.mm2s.iter_mut().enumerate() {
             let beats = plan.segments(channel).poses.end;
-            lane.reserve_beats(&self.platform, beats, width)?;
+            lane.reserve_beats(&self.platform, bank, beats, width)?;
         }
         for (channel, lane) in self.s2mm.iter_mut().enumerate() {
-            lane.reserve_beats(&self.platform, plan.results(channel), width)?;
+            lane.reserve_beats(&self.platform, bank, plan.results(channel), width)?;
         }
+        Ok(())
+    }
+
+    /// Takes back the buffers of a bank that no engine has in work: what was prepared is not
+    /// started any more.
+    fn take_back_unused(&mut self, bank: Bank) {
+        for lane in self.lanes_mut() {
+            // It is made anew.
+            if let Err(error) = lane.take_back(bank) {
+                log::error!("a buffer was lost: {error}");
+            }
+        }
+    }
+
+    /// Frees the buffers of a bank that no engine has in work; whether there were any.
+    pub(super) fn release_buffers(&mut self, bank: Bank) -> bool {
+        self.take_back_unused(bank);
+        // All of them.
+        self.lanes_mut().map(|lane| lane.drop_buffer(bank)).fold(false, std::ops::BitOr::bitor)
+    }
+
+    /// Whether every lane has a buffer in that bank, whoever holds it.
+    pub(super) fn holds(&self, bank: Bank) -> bool {
+        self.lanes().all(|lane| lane.has_buffer(bank))
+    }
+
+    /// Makes the rings large enough for a step. Nothing is in flight.
+    pub(super) fn reserve_rings(&mut self, plan: &Plan) -> Result<(), Symptom> {
+        self.started = None;
+        let width = self.capabilities.address_width;
         for core in 0..self.mm2s.len() {
             let sent = plan.descriptors(core, self.largest);
             let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
@@ -161,29 +194,40 @@ impl Device {
         Ok(())
     }
 
-    /// Hands the buffers over, queues all descriptors, and starts; the number of doorbells.
-    pub(super) fn start(
+    /// Hands the buffers of a packed step over to the device, those that it does not have.
+    pub(super) fn hand_over(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
+        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
+            lane.hand_over(bank, plan.results(channel))?;
+        }
+        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
+            lane.hand_over(bank, plan.segments(channel).poses.end)?;
+        }
+        Ok(())
+    }
+
+    /// Hands the buffers over, queues all descriptors and writes the arguments: everything but the
+    /// doorbells.
+    pub(super) fn arm(
         &mut self,
         plan: &Plan,
+        bank: Bank,
         parameters: &StepParameters,
-    ) -> Result<u64, Symptom> {
+    ) -> Result<(), Symptom> {
         let largest = self.largest;
         let outline = Outline::new(plan, parameters, largest);
         self.started = Some(Started { outline, at: self.platform.now() });
         self.activity = Activity::Step;
+        self.hand_over(plan, bank)?;
         for (channel, lane) in self.s2mm.iter_mut().enumerate() {
-            let results = plan.results(channel);
-            lane.hand_over(results)?;
             lane.begin();
-            lane.queue(0, bytes(results), largest)?;
+            lane.queue(bank, 0, bytes(plan.results(channel)), largest)?;
             lane.ensure_running(&*self.platform)?;
         }
         for (channel, lane) in self.mm2s.iter_mut().enumerate() {
             let segments = plan.segments(channel);
-            lane.hand_over(segments.poses.end)?;
             lane.begin();
             let mut queue = |beats: &std::ops::Range<usize>| {
-                lane.queue(bytes(beats.start), bytes(beats.len()), largest)
+                lane.queue(bank, bytes(beats.start), bytes(beats.len()), largest)
             };
             queue(&segments.velocities)?;
             if !segments.collisions.is_empty() {
@@ -198,6 +242,11 @@ impl Device {
         self.control.set_arguments(count(plan.bodies), count(plan.collisions), parameters);
         // Buffers and descriptors must be visible before the first doorbell.
         release_to_device();
+        Ok(())
+    }
+
+    /// Starts what is armed; the number of doorbells.
+    pub(super) fn start(&mut self) -> Result<u64, Symptom> {
         // Receivers first: otherwise the accelerator's output stalls, and with it the input.
         let mut doorbells = 1;
         for lane in &mut self.s2mm {
@@ -210,10 +259,10 @@ impl Device {
         Ok(doorbells)
     }
 
-    /// Takes all buffers back after a step whose chains are complete.
-    pub(super) fn take_back(&mut self) -> Result<(), Symptom> {
+    /// Takes the buffers of a step back whose chains are complete.
+    pub(super) fn take_back(&mut self, bank: Bank) -> Result<(), Symptom> {
         for lane in self.lanes_mut() {
-            lane.take_back()?;
+            lane.take_back(bank)?;
         }
         self.activity = Activity::Idle;
         Ok(())
@@ -298,9 +347,6 @@ impl Drop for Device {
         }
         let Self { mm2s, s2mm, platform, .. } = self;
         for (sender, receiver) in mm2s.iter_mut().zip(s2mm) {
-            if !sender.running() && !receiver.running() {
-                continue;
-            }
             let stopped = sender.stop(&**platform).and_then(|()| receiver.stop(&**platform));
             let stopped = stopped
                 .or_else(|_| reset_core(&**platform, &mut sender.channel, &mut receiver.channel));
@@ -308,7 +354,7 @@ impl Drop for Device {
                 if let Err(error) = &stopped {
                     log::error!("a channel could not be stopped: {error}");
                     lane.leave_to_device();
-                } else if let Err(error) = lane.take_back() {
+                } else if let Err(error) = lane.take_all_back() {
                     log::error!("cannot take a buffer back: {error}");
                 }
             }

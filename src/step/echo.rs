@@ -66,10 +66,12 @@ impl Accelerator {
 
     fn run_echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Symptom> {
         let plan = plan(echo.bodies.len(), self.device.capabilities.variant);
+        let bank = self.bank;
+        self.loads[bank] = None;
         if echo.fresh_buffers {
-            self.device.lanes_mut().for_each(super::lane::Lane::drop_buffer);
+            self.device.release_buffers(bank);
         }
-        self.device.reserve_or_reset(&plan, &self.shapes)?;
+        self.device.reserve_or_reset(&plan, bank, &self.shapes)?;
         if let Some(dirt) = echo.dirt {
             let sides = [
                 (Direction::Mm2s, &mut self.device.mm2s),
@@ -77,7 +79,7 @@ impl Accelerator {
             ];
             for (direction, lanes) in sides {
                 for (channel, lane) in lanes.iter_mut().enumerate() {
-                    for (slot, beat) in lane.beats_mut().iter_mut().enumerate() {
+                    for (slot, beat) in lane.beats_mut(bank).iter_mut().enumerate() {
                         *beat = dirt(direction, channel, slot);
                     }
                 }
@@ -86,7 +88,7 @@ impl Accelerator {
         let none: &[Collision] = &[];
         let empty: Schedule = (0..plan.collisions).map(|_| None).collect();
         let padding = Ordered { collisions: none, schedule: &empty };
-        let sent = self.device.pack(&plan, echo.bodies, &padding, None, &self.shapes);
+        let sent = self.device.pack(&plan, bank, echo.bodies, &padding, None, &self.shapes);
         let parameters = StepParameters {
             contact_iterations: u32::from(plan.passes > 0),
             friction_iterations: 0,
@@ -95,12 +97,13 @@ impl Accelerator {
             ..StepParameters::default()
         };
         let deadline = Deadline::after(&*self.device.platform, ECHO_LIMIT);
-        self.device.start(&plan, &parameters)?;
+        self.device.arm(&plan, bank, &parameters)?;
+        self.device.start()?;
         let interrupts = self.device.wait(&plan, &deadline)?;
         let counters = self.device.collect(&deadline)?;
-        self.device.take_back()?;
+        self.device.take_back(bank)?;
         let mut channels = Default::default();
-        self.results(&plan, &mut channels);
+        self.results(&plan, bank, &mut channels);
         Ok(Echoed {
             results: channels[..plan.channels()].iter().map(|beats| beats.to_vec()).collect(),
             sent: sent.velocities.wrapping_add(sent.collisions).wrapping_add(sent.poses),

@@ -2,10 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use super::fault::Fault;
+use super::load::Load;
 use super::locate::locate;
-use super::ordering::Arranged;
-use super::packing::Sent;
-use super::plan::Plan;
 use super::report::{HostTimes, StepCycles, StepReport};
 use super::solver::Accelerator;
 use super::symptom::Symptom;
@@ -23,23 +22,16 @@ use crate::scene::{Bodies, InputError};
 #[derive(Debug)]
 #[must_use = "a step that is not waited for is stopped and was in vain"]
 pub struct InFlight<'a> {
-    accelerator: &'a mut Accelerator,
-    flight: Flight,
+    pub(super) accelerator: &'a mut Accelerator,
+    pub(super) flight: Flight,
 }
 
 /// What is known of a step between its start and its end.
 #[derive(Debug)]
 pub(super) struct Flight {
-    pub(super) plan: Plan,
+    pub(super) load: Load,
     /// Nothing, where nothing moves and nothing is streamed.
     pub(super) started: Option<Started>,
-    /// Bodies and collisions as given.
-    pub(super) bodies: usize,
-    pub(super) collisions: usize,
-    /// Entries that the order added.
-    pub(super) empty: usize,
-    pub(super) arranged: Arranged,
-    pub(super) host: HostTimes,
     pub(super) watch: Stopwatch,
     /// Register reads and writes before the step.
     pub(super) accesses: (u64, u64),
@@ -48,9 +40,15 @@ pub(super) struct Flight {
 /// A step on the board.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Started {
-    pub(super) sent: Sent,
     pub(super) deadline: Deadline,
     pub(super) doorbells: u64,
+}
+
+/// What the board said at the end of a step, whose results are back in their bank.
+#[derive(Debug)]
+pub(super) struct Ended {
+    counters: Counters,
+    report: StepReport,
 }
 
 impl<'a> InFlight<'a> {
@@ -59,9 +57,9 @@ impl<'a> InFlight<'a> {
     }
 
     /// Waits for the results and puts them into the bodies, which must be those that were given to
-    /// [`Accelerator::submit`].
+    /// [`Accelerator::submit`] or [`InFlight::prepare`].
     ///
-    /// The time between the two calls counts for the deadline and for no phase of
+    /// The time between start and this call counts for the deadline and for no phase of
     /// [`StepReport::host`].
     ///
     /// # Errors
@@ -69,30 +67,84 @@ impl<'a> InFlight<'a> {
     /// were given: the step is then stopped, and the accelerator is ready for the next;
     /// [`Error::MustReopen`] in its place if the board could not be stopped.
     pub fn wait<B: Bodies + ?Sized>(mut self, bodies: &mut B) -> Result<StepReport, Error> {
-        let (found, expected) = (bodies.len(), self.flight.bodies);
+        let ended = self.collect(bodies)?;
+        self.finish(ended, bodies)
+    }
+
+    /// Checks, reads and stores the results.
+    pub(super) fn finish<B: Bodies + ?Sized>(
+        &mut self,
+        ended: Ended,
+        bodies: &mut B,
+    ) -> Result<StepReport, Error> {
+        let read = self.read(&ended, bodies);
+        read.map_err(|fault| self.failed(fault.into()))?;
+        Ok(self.commit(ended, bodies))
+    }
+
+    /// Waits for the board, and takes back what it held of the step.
+    pub(super) fn collect<B: Bodies + ?Sized>(&mut self, bodies: &B) -> Result<Ended, Error> {
+        let (found, expected) = (bodies.len(), self.flight.load.bodies);
         if found != expected {
             let Accelerator { device, shapes, .. } = &mut *self.accelerator;
             device.settle(shapes)?;
             return Err(InputError::OtherBodies { found, expected }.into());
         }
-        let ended = self.end(bodies);
-        let Self { accelerator, flight } = &mut self;
-        let mut report = ended.map_err(|symptom| {
-            let Accelerator { device, shapes, ordering, .. } = &mut **accelerator;
-            let mut error = device.fail(symptom, shapes);
-            if flight.arranged.scheduled {
-                let lives = flight.arranged.live.map(|_| ordering.lives());
-                locate(&mut error, ordering.schedule(), lives);
-            }
-            error
-        })?;
+        self.take_results().map_err(|symptom| self.failed(symptom))
+    }
+
+    fn take_results(&mut self) -> Result<Ended, Symptom> {
+        let Self { accelerator, flight } = self;
+        let Load { plan, bank, sent, .. } = flight.load;
+        // What the caller did meanwhile.
+        flight.watch.lap();
+        let device = &mut accelerator.device;
+        let (Some(Started { deadline, doorbells }), Some(sent)) = (flight.started, sent) else {
+            // Nothing moves, and nothing of it is streamed.
+            let counts = device.capabilities.impulse_sum;
+            let counters = Counters { impulse_sum: counts.then_some(0.0), ..Counters::default() };
+            return Ok(Ended { counters, report: self.report(&counters) });
+        };
+        let interrupts = device.wait(&plan, &deadline)?;
+        let counters = device.collect(&deadline)?;
+        device.take_back(bank)?;
+        flight.load.host.wait += flight.watch.lap();
+        Accelerator::check_received(&plan, sent, &counters)?;
+        let mut report = self.report(&counters);
+        (report.doorbells, report.interrupts) = (doorbells, interrupts);
+        report.descriptors = self.accelerator.device.descriptors();
+        Ok(Ended { counters, report })
+    }
+
+    /// Checks and reads the results, which are in the accelerator's spare afterwards.
+    pub(super) fn read<B: Bodies + ?Sized>(
+        &mut self,
+        ended: &Ended,
+        bodies: &B,
+    ) -> Result<(), Fault> {
+        let Self { accelerator, flight } = self;
+        let Load { plan, bank, arranged, .. } = &flight.load;
+        if flight.started.is_some() {
+            accelerator.check_answered(plan, *bank, &ended.counters)?;
+        }
+        accelerator.unpack(plan, *bank, bodies, arranged.live)?;
+        flight.load.host.unpack = flight.watch.lap();
+        Ok(())
+    }
+
+    /// Puts what was read into the bodies.
+    pub(super) fn commit<B: Bodies + ?Sized>(
+        &mut self,
+        ended: Ended,
+        bodies: &mut B,
+    ) -> StepReport {
+        let Self { accelerator, flight } = self;
         for (index, (pose, velocity)) in accelerator.spare.drain(..).enumerate() {
             bodies.commit(index, pose, velocity);
         }
-        flight.host.commit = flight.watch.lap();
-        report.host = flight.host;
-        report.register_reads = accelerator.device.counts.reads() - flight.accesses.0;
-        report.register_writes = accelerator.device.counts.writes() - flight.accesses.1;
+        flight.load.host.commit = flight.watch.lap();
+        let mut report = ended.report;
+        report.host = flight.load.host;
         log::debug!(
             "step: {} bodies, {} collisions and {} empty entries ({:?}), {} passes, {} cycles ({} \
              stalled, {} waiting), {} hazards",
@@ -106,46 +158,38 @@ impl<'a> InFlight<'a> {
             report.cycles.waits,
             report.hazards
         );
-        Ok(report)
+        report
     }
 
-    /// Everything before commitment; the results are in the accelerator's spare afterwards.
-    fn end<B: Bodies + ?Sized>(&mut self, bodies: &B) -> Result<StepReport, Symptom> {
-        let Self { accelerator, flight } = self;
-        let (plan, live) = (&flight.plan, flight.arranged.live);
-        // What the caller did meanwhile.
-        flight.watch.lap();
-        let Some(Started { sent, deadline, doorbells }) = flight.started else {
-            // Nothing moves, and nothing of it is streamed.
-            accelerator.unpack(plan, bodies, live)?;
-            let counts = accelerator.device.capabilities.impulse_sum;
-            let counters = Counters { impulse_sum: counts.then_some(0.0), ..Counters::default() };
-            return Ok(self.report(&counters));
-        };
-        let interrupts = accelerator.device.wait(plan, &deadline)?;
-        let counters = accelerator.device.collect(&deadline)?;
-        accelerator.device.take_back()?;
-        flight.host.wait = flight.watch.lap();
-        accelerator.check_sums(plan, sent, &counters)?;
-        accelerator.unpack(plan, bodies, live)?;
-        flight.host.unpack = flight.watch.lap();
-
-        let mut report = self.report(&counters);
-        (report.doorbells, report.interrupts) = (doorbells, interrupts);
-        report.descriptors = self.accelerator.device.descriptors();
-        Ok(report)
+    /// The error of the step, after which the board is ready for the next if it can be.
+    fn failed(&mut self, symptom: Symptom) -> Error {
+        let Accelerator { device, shapes, .. } = &mut *self.accelerator;
+        let error = device.fail(symptom, shapes);
+        self.located(error)
     }
 
-    /// What the step streamed and counted.
+    /// Says of which of the caller's collisions an error speaks.
+    pub(super) fn located(&self, mut error: Error) -> Error {
+        let Load { arranged, bank, .. } = &self.flight.load;
+        if arranged.scheduled {
+            let ordering = &self.accelerator.orderings[*bank];
+            let lives = arranged.live.map(|_| ordering.lives());
+            locate(&mut error, ordering.schedule(), lives);
+        }
+        error
+    }
+
+    /// What the step streamed and counted, so far.
     fn report(&self, counters: &Counters) -> StepReport {
-        let Flight { plan, arranged, .. } = &self.flight;
+        let Load { plan, arranged, bodies, collisions, empty, .. } = &self.flight.load;
         let (work, waits) = (u64::from(counters.work), u64::from(counters.waits));
         let stalls = counters.cycles.saturating_sub(work).saturating_sub(waits);
+        let (reads, writes) = self.accelerator.accesses();
         StepReport {
-            bodies: self.flight.bodies as u64,
-            collisions: self.flight.collisions as u64,
+            bodies: *bodies as u64,
+            collisions: *collisions as u64,
             order: arranged.order,
-            empty: self.flight.empty as u64,
+            empty: *empty as u64,
             verified: arranged.verified,
             live: arranged.live,
             passes: u32::try_from(plan.passes).unwrap_or(u32::MAX),
@@ -155,8 +199,8 @@ impl<'a> InFlight<'a> {
             bytes_from_device: plan.bytes_from_device(),
             hazards: u64::from(counters.hazards),
             impulse_sum: counters.impulse_sum,
-            register_reads: 0,
-            register_writes: 0,
+            register_reads: reads - self.flight.accesses.0,
+            register_writes: writes - self.flight.accesses.1,
             doorbells: 0,
             interrupts: 0,
             descriptors: 0,

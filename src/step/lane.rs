@@ -1,13 +1,14 @@
-//! This file joins what one DMA channel needs for a step: its buffer, its ring, its registers.
+//! This file joins what one DMA channel needs for a step: its buffers, its ring, its registers.
 
 use std::sync::Arc;
 
+use super::bank::{Bank, PerBank};
 use crate::axi_dma::{ChainState, Channel, Descriptor, DmaError, Dmacr, Ring, pieces};
 use crate::platform::{Access, CpuBuffer, DeviceBuffer, Platform, PlatformError};
 
 use bitstream_model::interface::record::Beat;
 
-/// Who holds the buffer.
+/// Who holds a buffer.
 #[derive(Debug, Default)]
 enum Held {
     /// There is none, or it was lost to a fault.
@@ -24,40 +25,50 @@ pub(super) struct Lane {
     control: Dmacr,
     access: Access,
     ring: Option<Ring>,
-    held: Held,
+    held: PerBank<Held>,
     running: bool,
 }
 
 impl Lane {
     /// A lane of a channel that was reset; `control` is what it will run with.
     pub(super) fn new(channel: Channel, access: Access, control: Dmacr) -> Self {
-        Self { channel, control, access, ring: None, held: Held::Nobody, running: false }
+        Self { channel, control, access, ring: None, held: PerBank::default(), running: false }
     }
 
-    /// Makes the buffer hold `beats`. Grows with slack, never shrinks.
+    /// Makes a buffer hold `beats`. Grows with slack, never shrinks.
     pub(super) fn reserve_beats(
         &mut self,
         platform: &Arc<dyn Platform>,
+        bank: Bank,
         beats: usize,
         address_width: u32,
     ) -> Result<(), PlatformError> {
-        if let Held::Cpu(buffer) = &self.held
+        let held = &mut self.held[bank];
+        if let Held::Cpu(buffer) = held
             && buffer.beats().len() >= beats.max(1)
         {
             return Ok(());
         }
         // The old buffer goes first: memory for DMA is scarce.
-        self.held = Held::Nobody;
+        *held = Held::Nobody;
         let slack = (beats + beats / 4).max(1).next_multiple_of(4);
-        self.held = Held::Cpu(CpuBuffer::allocate(platform, slack, address_width)?);
+        *held = Held::Cpu(CpuBuffer::allocate(platform, slack, address_width)?);
         Ok(())
     }
 
-    /// Frees the buffer, if the CPU holds it: the next one is another.
-    pub(super) fn drop_buffer(&mut self) {
-        if matches!(self.held, Held::Cpu(_)) {
-            self.held = Held::Nobody;
+    /// Whether there is a buffer, whoever holds it.
+    pub(super) fn has_buffer(&self, bank: Bank) -> bool {
+        !matches!(self.held[bank], Held::Nobody)
+    }
+
+    /// Frees a buffer, if the CPU holds it; whether it did.
+    pub(super) fn drop_buffer(&mut self, bank: Bank) -> bool {
+        let held = &mut self.held[bank];
+        let was_held = matches!(held, Held::Cpu(_));
+        if was_held {
+            *held = Held::Nobody;
         }
+        was_held
     }
 
     /// Whether the ring takes a chain of so many descriptors.
@@ -87,43 +98,47 @@ impl Lane {
         Ok(())
     }
 
-    /// Whether the engine runs.
-    pub(super) fn running(&self) -> bool {
-        self.running
-    }
-
-    /// The beats that the CPU holds; none while the device does.
-    pub(super) fn beats(&self) -> &[Beat] {
-        match &self.held {
+    /// The beats of a buffer that the CPU holds; none while the device does.
+    pub(super) fn beats(&self, bank: Bank) -> &[Beat] {
+        match &self.held[bank] {
             Held::Cpu(buffer) => buffer.beats(),
             Held::Nobody | Held::Device(_) => &[],
         }
     }
 
-    /// The beats that the CPU holds, to write; none while the device does.
-    pub(super) fn beats_mut(&mut self) -> &mut [Beat] {
-        match &mut self.held {
+    /// The beats of a buffer that the CPU holds, to write; none while the device does.
+    pub(super) fn beats_mut(&mut self, bank: Bank) -> &mut [Beat] {
+        match &mut self.held[bank] {
             Held::Cpu(buffer) => buffer.beats_mut(),
             Held::Nobody | Held::Device(_) => &mut [],
         }
     }
 
-    /// Gives the buffer to the device, which will touch its first `used` beats.
-    pub(super) fn hand_over(&mut self, used: usize) -> Result<(), PlatformError> {
-        if let Held::Cpu(buffer) = std::mem::take(&mut self.held) {
-            self.held = Held::Device(buffer.into_device(used, self.access)?);
+    /// Gives a buffer to the device, which will touch its first `used` beats; nothing, if it has it.
+    pub(super) fn hand_over(&mut self, bank: Bank, used: usize) -> Result<(), PlatformError> {
+        let held = &mut self.held[bank];
+        match std::mem::take(held) {
+            Held::Cpu(buffer) => *held = Held::Device(buffer.into_device(used, self.access)?),
+            other => *held = other,
         }
         Ok(())
     }
 
-    /// Takes the buffer back, if the device has it. Only when the chain is complete, or after a
-    /// reset.
-    pub(super) fn take_back(&mut self) -> Result<(), PlatformError> {
-        match std::mem::take(&mut self.held) {
-            Held::Device(buffer) => self.held = Held::Cpu(buffer.into_cpu()?),
-            held => self.held = held,
+    /// Takes a buffer back, if the device has it. Only when its chain is complete or was never
+    /// begun, or after a reset.
+    pub(super) fn take_back(&mut self, bank: Bank) -> Result<(), PlatformError> {
+        let held = &mut self.held[bank];
+        match std::mem::take(held) {
+            Held::Device(buffer) => *held = Held::Cpu(buffer.into_cpu()?),
+            other => *held = other,
         }
         Ok(())
+    }
+
+    /// Takes back what the device has of both banks.
+    pub(super) fn take_all_back(&mut self) -> Result<(), PlatformError> {
+        let [first, second] = Bank::BOTH.map(|bank| self.take_back(bank));
+        first.and(second)
     }
 
     /// Starts the chain of a step.
@@ -134,12 +149,16 @@ impl Lane {
     /// Appends one packet, or a place for one, to the chain. A packet of no bytes is none.
     pub(super) fn queue(
         &mut self,
+        bank: Bank,
         offset: u64,
         bytes: u64,
         largest: u32,
     ) -> Result<(), PlatformError> {
-        let Self { ring: Some(ring), held: Held::Device(buffer), access, .. } = self else {
-            unreachable!("a chain begins after reserving and handing over");
+        let Self { ring: Some(ring), held, access, .. } = self else {
+            unreachable!("a chain begins after reserving");
+        };
+        let Held::Device(buffer) = &held[bank] else {
+            unreachable!("a chain begins after handing over");
         };
         // S2MM: the device marks where the packet starts and ends.
         let marks = *access == Access::Read;
@@ -183,26 +202,28 @@ impl Lane {
         self.ring.as_ref().map(|ring| ring.survey(address)).unwrap_or_default()
     }
 
-    /// Takes note that the core was reset, and takes the buffer back.
+    /// Takes note that the core was reset, and takes the buffers back.
     pub(super) fn was_reset(&mut self) -> Result<(), PlatformError> {
         self.running = false;
         self.channel.was_reset();
         if let Some(ring) = &mut self.ring {
             ring.rewind();
         }
-        self.take_back()
+        self.take_all_back()
     }
 
-    /// Gives up: an engine that could not be stopped may still reach ring and buffer. Neither is
-    /// used or freed any more, whoever holds the buffer.
+    /// Gives up: an engine that could not be stopped may still reach ring and buffers. None is used
+    /// or freed any more, whoever holds it.
     pub(super) fn leave_to_device(&mut self) {
         if let Some(ring) = &mut self.ring {
             ring.leave_to_device();
         }
-        match std::mem::take(&mut self.held) {
-            Held::Cpu(buffer) => buffer.leave_to_device(),
-            // Not freed when dropped.
-            held @ (Held::Device(_) | Held::Nobody) => self.held = held,
+        for bank in Bank::BOTH {
+            match std::mem::take(&mut self.held[bank]) {
+                Held::Cpu(buffer) => buffer.leave_to_device(),
+                // Not freed when dropped.
+                held @ (Held::Device(_) | Held::Nobody) => self.held[bank] = held,
+            }
         }
     }
 }

@@ -22,13 +22,13 @@ use crate::{
 
 const CUBES: u32 = 20;
 
-fn windowed() -> BoardConfig {
+pub(super) fn windowed() -> BoardConfig {
     let profile = Profile::by_name("windowed").expect("a profile");
     BoardConfig { profile, ..BoardConfig::default() }
 }
 
 /// A whole step gives the bits of an undisturbed one, twice, and the driver did nothing wrong.
-fn assert_works(board: &EmulatedBoard, accelerator: &mut Accelerator, after: &str) {
+pub(super) fn assert_works(board: &EmulatedBoard, accelerator: &mut Accelerator, after: &str) {
     for _ in 0..2 {
         let (mut bodies, collisions) = scene(CUBES);
         accelerator
@@ -161,10 +161,10 @@ fn results_are_not_put_into_other_bodies() {
 
 /// A caller's container that panics when it is asked for the last time that it allows.
 #[derive(Debug)]
-struct Panicking<'a, T> {
-    inner: T,
-    left: &'a Cell<u32>,
-    commits: u32,
+pub(super) struct Panicking<'a, T> {
+    pub(super) inner: T,
+    pub(super) left: &'a Cell<u32>,
+    pub(super) commits: u32,
 }
 
 impl<T> Panicking<'_, T> {

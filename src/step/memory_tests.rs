@@ -20,7 +20,7 @@ use crate::platform::{
     Access, Caching, DmaMemory, EmulatedPlatform, HardwarePlatform, MemoryChoice, Platform,
     PlatformError, RegisterChoice, RegisterWindow, SharedMemory, System, uio_fake,
 };
-use crate::{Accelerator, Aftermath, Error, Fault, Outcome, Shape, StepParameters};
+use crate::{Accelerator, Aftermath, Error, Fault, InputError, Outcome, Shape, StepParameters};
 
 const BASE: u64 = 0x6000_0000;
 const BYTES: u64 = 1 << 20;
@@ -267,4 +267,89 @@ fn memory_that_is_too_small_is_an_error_and_a_smaller_step_still_works() {
     let (result, after) = step(3);
     result.expect("there is room");
     assert_eq!(after, undisturbed(3));
+}
+
+#[test]
+fn steps_prepared_through_the_memory_of_a_real_board_give_the_same_bits() {
+    for choice in [
+        MemoryChoice::Uio { node: "pgs-memory".to_owned() },
+        u_dma_buf(Caching::Cached),
+        u_dma_buf(Caching::WriteCombining),
+    ] {
+        let (board, platform, mut accelerator) = composed(&choice, 0);
+        let sizes = [3, 40, 2, 90, 7, 7];
+        let (bodies, collisions) = scene(sizes[0]);
+        let parameters = StepParameters::default();
+        let mut flight = accelerator.submit(&bodies, &collisions, &parameters).expect("starts");
+        for (place, now) in sizes.into_iter().enumerate() {
+            let next = sizes.get(place + 1).copied().unwrap_or(11);
+            let (bodies, collisions) = scene(next);
+            let prepared =
+                flight.prepare(&bodies, &collisions, &parameters).expect("there is room");
+            let (mut bodies, _) = scene(now);
+            let (ended, started) = flight.wait_and_start(&mut bodies, &prepared);
+            ended.unwrap_or_else(|error| panic!("{choice:?}: {error}"));
+            assert_eq!(bits(&bodies), undisturbed(now), "{choice:?}, {now} cubes before {next}");
+            flight = started.expect("starts");
+        }
+        // One in flight, and one in the other bank.
+        drop(flight.prepare(&bodies, &collisions, &parameters).expect("there is room"));
+        drop(flight);
+        drop(accelerator);
+        assert_eq!(board.violations(), []);
+        let whole = usize::try_from(BYTES / 16).expect("fits");
+        platform.memory.allocate(whole).expect("all of it came back");
+    }
+}
+
+#[test]
+fn memory_for_one_bank_takes_steps_that_are_not_prepared() {
+    // Room for a step of 40 cubes, and not for two.
+    let choice = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
+    let (board, _platform, mut accelerator) = composed(&choice, BYTES - 16_384);
+    let parameters = StepParameters::default();
+    let (mut bodies, collisions) = scene(40);
+    for _ in 0..2 {
+        let mut flight = accelerator.submit(&bodies, &collisions, &parameters).expect("starts");
+        let error = flight.prepare(&bodies, &collisions, &parameters).expect_err("no room");
+        let Error::Step { fault, aftermath: Aftermath::Untouched, diagnosis: None } = &error else {
+            panic!("{error}")
+        };
+        assert!(matches!(**fault, Fault::NoMemory(_)), "{fault}");
+        flight.wait(&mut bodies).expect("a good step");
+        assert_eq!(bits(&bodies), undisturbed(40));
+        bodies = scene(40).0;
+    }
+    assert_eq!(board.violations(), []);
+}
+
+#[test]
+fn memory_of_a_prepared_step_goes_to_one_that_cannot_do_without() {
+    let choice = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
+    let (board, _platform, mut accelerator) = composed(&choice, BYTES - 16_384);
+    let parameters = StepParameters::default();
+    let (mut few, touching) = scene(3);
+    let (mut bodies, collisions) = scene(40);
+    let mut flight = accelerator.submit(&few, &touching, &parameters).expect("starts");
+    let prepared = flight.prepare(&bodies, &collisions, &parameters).expect("there is room");
+    flight.wait(&mut few).expect("a good step");
+    accelerator.step(&mut bodies, &collisions, &parameters).expect("there is room for one");
+    assert_eq!(bits(&bodies), undisturbed(40));
+    let error = accelerator.start(&prepared).map(drop).expect_err("its records are gone");
+    assert!(matches!(error, Error::Input(InputError::NotPrepared)), "{error}");
+    assert_eq!(board.violations(), []);
+}
+
+/// An open board with the memory of a real one, of which so much is in use.
+fn composed(choice: &MemoryChoice, in_use: u64) -> (EmulatedBoard, Arc<Composed>, Accelerator) {
+    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+    let platform = Arc::new(Composed::new(&board, choice));
+    if in_use > 0 {
+        let beats = usize::try_from(in_use / 16).expect("fits");
+        platform.memory.allocate(beats).expect("there is room");
+    }
+    let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
+    let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+    accelerator.set_shapes(&shapes).expect("shapes that fit");
+    (board, platform, accelerator)
 }

@@ -1,5 +1,6 @@
 //! One step, from the caller's bodies to the caller's bodies.
 
+mod bank;
 mod board;
 mod bring_up;
 mod cancellation;
@@ -14,6 +15,7 @@ mod in_flight;
 mod lane;
 #[cfg(all(test, feature = "emulation"))]
 mod life_tests;
+mod load;
 mod locate;
 #[cfg(all(test, feature = "emulation"))]
 mod memory_tests;
@@ -26,6 +28,11 @@ mod phase;
 mod plan;
 #[cfg(all(test, feature = "emulation"))]
 mod planned_tests;
+mod prepared;
+#[cfg(all(test, feature = "emulation"))]
+mod prepared_fault_tests;
+#[cfg(all(test, feature = "emulation"))]
+mod prepared_tests;
 mod recovery;
 mod report;
 mod results;
@@ -46,6 +53,7 @@ pub use diagnosis::{ChannelState, ControlState, Diagnosis};
 pub use fault::{AcceleratorError, Awaited, Fault, Subject};
 pub use in_flight::InFlight;
 pub use phase::Phase;
+pub use prepared::Prepared;
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
 pub use solver::Accelerator;
 pub(crate) use {

@@ -3,6 +3,7 @@
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::record::Beat;
 
+use super::bank::Bank;
 use super::device::Device;
 use super::plan::Plan;
 use crate::beat::pack::{
@@ -20,10 +21,11 @@ pub(super) struct Sent {
 }
 
 impl Device {
-    /// Writes the records of a step into the buffers.
+    /// Writes the records of a step into the buffers of a bank.
     pub(super) fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         plan: &Plan,
+        bank: Bank,
         bodies: &B,
         collisions: &C,
         lives: Option<&Lives>,
@@ -35,7 +37,7 @@ impl Device {
         let mut later: [(&mut [Beat], &mut [Beat]); DMA_COUNT_MAX] = Default::default();
         for (place, lane) in lanes.iter_mut().enumerate() {
             let segments = plan.segments(place);
-            let beats = &mut lane.beats_mut()[..segments.poses.end];
+            let beats = &mut lane.beats_mut(bank)[..segments.poses.end];
             let (beats, poses) = beats.split_at_mut(segments.poses.start);
             let (beats, collisions) = beats.split_at_mut(segments.collisions.start);
             channels[place] = &mut beats[segments.velocities];

@@ -1,5 +1,6 @@
 //! This file leads from any fault to "the next step works" or "open again".
 
+use super::bank::Bank;
 use super::device::Device;
 use super::fault::Fault;
 use super::oddities::Oddity;
@@ -39,6 +40,17 @@ impl Device {
         Error::Step { fault: Box::new(fault), aftermath, diagnosis }
     }
 
+    /// As [`fail`](Self::fail), of a step whose results were found wrong when the next one was on the
+    /// board already: what stands there says nothing of this one.
+    pub(super) fn fail_overtaken(&mut self, fault: Fault, shapes: &[Shape]) -> Error {
+        log::debug!("step failed: {fault}");
+        let aftermath = match self.recover(shapes) {
+            Ok(()) => Aftermath::Ready,
+            Err(error) => self.give_up(&error),
+        };
+        Error::Step { fault: Box::new(fault), aftermath, diagnosis: None }
+    }
+
     /// Stops a step that nobody will wait for; nothing, if there is none.
     pub(super) fn abandon(&mut self, shapes: &[Shape]) {
         if self.in_flight() && !self.dead {
@@ -55,19 +67,26 @@ impl Device {
         if self.dead { Err(Error::MustReopen) } else { Ok(()) }
     }
 
-    /// Makes buffers and rings large enough for a step. A channel that does not stop for its new
-    /// ring is reset, with everything else.
+    /// Makes the buffers of a bank and the rings large enough for a step.
     pub(super) fn reserve_or_reset(
         &mut self,
         plan: &Plan,
+        bank: Bank,
         shapes: &[Shape],
     ) -> Result<(), Symptom> {
-        let mut reserved = self.reserve(plan);
+        self.reserve_buffers(plan, bank).map_err(Fault::NoMemory)?;
+        self.rings_or_reset(plan, shapes)
+    }
+
+    /// Makes the rings large enough for a step. A channel that does not stop for its new ring is
+    /// reset, with everything else.
+    pub(super) fn rings_or_reset(&mut self, plan: &Plan, shapes: &[Shape]) -> Result<(), Symptom> {
+        let mut reserved = self.reserve_rings(plan);
         if let Err(Symptom::Known(Fault::Core(error @ DmaError::State { .. }))) = &reserved {
             log::debug!("resetting the board: {error}");
             self.recover(shapes)?;
             self.oddities.tell(Oddity::NoHalt);
-            reserved = self.reserve(plan);
+            reserved = self.reserve_rings(plan);
         }
         reserved.map_err(|symptom| match symptom {
             Symptom::Known(Fault::Platform(error)) => Fault::NoMemory(error).into(),

@@ -28,9 +28,9 @@ pub struct HostTimes {
     pub order: Duration,
     /// Making buffers large enough and writing the records into them.
     pub pack: Duration,
-    /// Handing over, descriptors, arguments, doorbells.
+    /// Handing over, descriptors, arguments.
     pub start: Duration,
-    /// Waiting for the accelerator, and reading its counters.
+    /// Doorbells, waiting for the accelerator, reading its counters, and taking the buffers back.
     pub wait: Duration,
     /// Reading and checking the results.
     pub unpack: Duration,

@@ -3,6 +3,7 @@
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::record::Beat;
 
+use super::bank::Bank;
 use super::fault::Fault;
 use super::packing::Sent;
 use super::plan::Plan;
@@ -15,21 +16,25 @@ use crate::order::LiveReport;
 use crate::scene::{Bodies, Pose, Velocity};
 
 impl Accelerator {
-    /// The result beats of each channel.
-    pub(super) fn results<'a>(&'a self, plan: &Plan, channels: &mut [&'a [Beat]; DMA_COUNT_MAX]) {
+    /// The result beats of each channel, in a bank.
+    pub(super) fn results<'a>(
+        &'a self,
+        plan: &Plan,
+        bank: Bank,
+        channels: &mut [&'a [Beat]; DMA_COUNT_MAX],
+    ) {
         for (place, lane) in self.device.s2mm.iter().enumerate() {
-            channels[place] = &lane.beats()[..plan.results(place)];
+            channels[place] = &lane.beats(bank)[..plan.results(place)];
         }
     }
 
-    /// Compares the accelerator's sums of words with ours, if it has any.
-    pub(super) fn check_sums(
-        &self,
+    /// Compares the accelerator's sum of the words that it received with ours, if it has one.
+    pub(super) fn check_received(
         plan: &Plan,
         sent: Sent,
         counters: &Counters,
     ) -> Result<(), Fault> {
-        let Some((received, answered)) = counters.sums else { return Ok(()) };
+        let Some((received, _)) = counters.sums else { return Ok(()) };
         #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
         let rounds = plan.rounds() as u32;
         let expected = sent
@@ -40,8 +45,19 @@ impl Accelerator {
             let direction = Direction::Mm2s;
             return Err(Fault::Checksum { direction, expected, found: received });
         }
+        Ok(())
+    }
+
+    /// Compares the accelerator's sum of the words that it sent with ours, if it has one.
+    pub(super) fn check_answered(
+        &self,
+        plan: &Plan,
+        bank: Bank,
+        counters: &Counters,
+    ) -> Result<(), Fault> {
+        let Some((_, answered)) = counters.sums else { return Ok(()) };
         let mut channels = Default::default();
-        self.results(plan, &mut channels);
+        self.results(plan, bank, &mut channels);
         let found = channels.iter().fold(0u32, |sum, beats| sum.wrapping_add(sum_of_words(beats)));
         if found != answered {
             let direction = Direction::S2mm;
@@ -56,6 +72,7 @@ impl Accelerator {
     pub(super) fn unpack<B: Bodies + ?Sized>(
         &mut self,
         plan: &Plan,
+        bank: Bank,
         bodies: &B,
         live: Option<LiveReport>,
     ) -> Result<(), Fault> {
@@ -63,10 +80,10 @@ impl Accelerator {
         let mut spare = std::mem::take(&mut self.spare);
         spare.clear();
         let mut channels = Default::default();
-        self.results(plan, &mut channels);
+        self.results(plan, bank, &mut channels);
         let layout = Segment::Results.layout(&plan.variant);
         let mut results = Results::new(&layout, &channels[..plan.channels()]);
-        let broken = match live.map(|_| self.ordering.lives()) {
+        let broken = match live.map(|_| self.orderings[bank].lives()) {
             Some(lives) => scatter(&mut results, lives.results(), bodies, &mut spare),
             None => self.in_turn(&mut results, plan.bodies, bodies, &mut spare),
         };

@@ -1,40 +1,28 @@
 //! This file is the accelerator as a caller sees it, and the first half of a step.
 //!
-//! Validate, order, reserve, pack, hand over, start; then, in [`InFlight`], wait, take back, check,
-//! unpack, commit: nothing of the caller's changes before the last.
+//! Validate, order, reserve, pack (`load.rs`); hand over, start; then, in [`InFlight`], wait, take
+//! back, check, unpack, commit: nothing of the caller's changes before the last.
 
 use std::sync::Arc;
 
+use super::bank::{Bank, PerBank};
 use super::board::{self, BoardDescription, Found, OpenOptions};
 use super::cancellation::Cancellation;
 use super::device::Device;
 use super::in_flight::{Flight, InFlight, Started, Stopwatch};
-use super::ordering::{Arranged, Hardware, Ordering};
-use super::plan::Plan;
-use super::report::{HostTimes, StepReport};
+use super::load::{Engines, Load};
+use super::ordering::Ordering;
+use super::report::StepReport;
 use super::retry::with_retries;
-use super::symptom::Symptom;
 use crate::accelerator::Capabilities;
 use crate::error::{Error, OpenError};
-use crate::order::{Lives, Ordered};
 use crate::platform::{Deadline, System};
-use crate::scene::validate::{Limits, validate, validate_shapes};
+use crate::scene::validate::{Limits, validate_shapes};
 use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
 
 /// Finds the board that the options ask for.
 pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
     board::find(&options.board, &options.memory, &System::default())
-}
-
-/// What a step is made of, once its collisions are in order.
-struct Job<'a, B: ?Sized, C: ?Sized> {
-    bodies: &'a B,
-    /// In the order in which they are sent.
-    collisions: &'a C,
-    lives: Option<&'a Lives>,
-    parameters: &'a StepParameters,
-    shapes: &'a [Shape],
-    limits: &'a Limits,
 }
 
 /// An open accelerator.
@@ -44,9 +32,16 @@ struct Job<'a, B: ?Sized, C: ?Sized> {
 pub struct Accelerator {
     board: BoardDescription,
     pub(super) device: Device,
-    limits: Limits,
+    pub(super) limits: Limits,
     pub(super) shapes: Vec<Shape>,
-    pub(super) ordering: Ordering,
+    /// How often shapes were loaded.
+    pub(super) shapes_loaded: u64,
+    /// The bank of the step that was started last, into which the next one that is not prepared goes.
+    pub(super) bank: Bank,
+    /// What lies in the banks.
+    pub(super) loads: PerBank<Option<Load>>,
+    /// How it was ordered.
+    pub(super) orderings: PerBank<Ordering>,
     /// Results of a step until all are checked. Kept, so that a step allocates nothing.
     pub(super) spare: Vec<(Pose, Velocity)>,
 }
@@ -87,8 +82,17 @@ impl Accelerator {
             bytes_per_body: device.capabilities.bytes_per_body,
             bytes_per_collision: device.capabilities.bytes_per_collision,
         };
-        let ordering = Ordering::default();
-        Self { board, device, limits, shapes: Vec::new(), ordering, spare: Vec::new() }
+        Self {
+            board,
+            device,
+            limits,
+            shapes: Vec::new(),
+            shapes_loaded: 0,
+            bank: Bank::First,
+            loads: PerBank::default(),
+            orderings: PerBank::default(),
+            spare: Vec::new(),
+        }
     }
 
     /// Which board was opened, and why.
@@ -103,7 +107,8 @@ impl Accelerator {
         &self.device.capabilities
     }
 
-    /// Loads the shapes that bodies refer to by index, in place of all earlier ones.
+    /// Loads the shapes that bodies refer to by index, in place of all earlier ones. A step that was
+    /// [prepared](InFlight::prepare) with those is not started any more.
     ///
     /// # Errors
     /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
@@ -112,6 +117,7 @@ impl Accelerator {
         self.device.settle(&self.shapes)?;
         validate_shapes(shapes, &self.limits)?;
         self.device.control.load_shapes(shapes, self.limits.variant.inertia);
+        self.shapes_loaded += 1;
         self.shapes.clear();
         self.shapes.extend_from_slice(shapes);
         Ok(())
@@ -166,69 +172,41 @@ impl Accelerator {
     ) -> Result<InFlight<'_>, Error> {
         self.device.settle(&self.shapes)?;
         let mut watch = Stopwatch::start();
-        let mut host = HostTimes::default();
-        validate(bodies, collisions, &self.shapes, parameters, &self.limits)?;
-        host.validate = watch.lap();
-        let Self { ordering, device, limits, shapes, .. } = self;
-        let on = Hardware { capabilities: &device.capabilities, limits, shapes };
-        let arranged = ordering.arrange(bodies, collisions, parameters, on)?;
-        host.order = watch.lap();
-        let accesses = (device.counts.reads(), device.counts.writes());
-        let mut empty = 0;
-        let Arranged { scheduled, live, .. } = arranged;
-        let launched = if scheduled {
-            let ordered = Ordered { collisions, schedule: ordering.schedule() };
-            let lives = live.map(|_| ordering.lives());
-            // Those that fill the last issue are of the order's making too.
-            let entries = lives.map_or(ordered.len(), |lives| lives.words().len());
-            empty = entries.saturating_sub(ordering.schedule().collisions());
-            let job = Job { bodies, collisions: &ordered, lives, parameters, shapes, limits };
-            launch(device, &job, &mut host, &mut watch)
-        } else {
-            let job = Job { bodies, collisions, lives: None, parameters, shapes, limits };
-            launch(device, &job, &mut host, &mut watch)
-        };
-        let (plan, started) = launched.map_err(|symptom| device.fail(symptom, shapes))?;
-        let flight = Flight {
-            plan,
-            started,
-            bodies: bodies.len(),
-            collisions: collisions.len(),
-            empty,
-            arranged,
-            host,
-            watch,
-            accesses,
-        };
+        let into = (self.bank, Engines::Idle);
+        let accesses = self.accesses();
+        let load = self.load(into, bodies, collisions, parameters, &mut watch)?;
+        let flight = self.begin(load, watch, accesses)?;
         Ok(InFlight::new(self, flight))
     }
-}
 
-/// Packs a step and starts it; its plan, and what was started, if there is anything to stream.
-fn launch<B: Bodies + ?Sized, C: Collisions + ?Sized>(
-    device: &mut Device,
-    job: &Job<'_, B, C>,
-    host: &mut HostTimes,
-    watch: &mut Stopwatch,
-) -> Result<(Plan, Option<Started>), Symptom> {
-    let Job { bodies, collisions, lives, parameters, shapes, limits } = *job;
-    let plan = Plan {
-        bodies: lives.map_or(bodies.len(), |lives| lives.velocities().len()),
-        collisions: lives.map_or(collisions.len(), |lives| lives.words().len()),
-        passes: u64::from(parameters.contact_iterations)
-            + u64::from(parameters.friction_iterations),
-        variant: limits.variant,
-    };
-    device.check_cancelled()?;
-    if plan.bodies == 0 {
-        return Ok((plan, None));
+    /// Register reads and writes so far.
+    pub(super) fn accesses(&self) -> (u64, u64) {
+        (self.device.counts.reads(), self.device.counts.writes())
     }
-    device.reserve_or_reset(&plan, shapes)?;
-    let sent = device.pack(&plan, bodies, collisions, lives, shapes);
-    host.pack = watch.lap();
-    let limit = plan.deadline(parameters, &device.capabilities);
-    let deadline = Deadline::after(&*device.platform, limit);
-    let doorbells = device.start(&plan, parameters)?;
-    host.start = watch.lap();
-    Ok((plan, Some(Started { sent, deadline, doorbells })))
+
+    /// Starts a step that lies in its bank. Nothing is in flight.
+    pub(super) fn begin(
+        &mut self,
+        load: Load,
+        watch: Stopwatch,
+        accesses: (u64, u64),
+    ) -> Result<Flight, Error> {
+        let Load { plan, parameters, bank, .. } = &load;
+        let mut flight = Flight { load, started: None, watch, accesses };
+        self.bank = *bank;
+        if load.sent.is_some() {
+            let device = &mut self.device;
+            let limit = plan.deadline(parameters, &device.capabilities);
+            let deadline = Deadline::after(&*device.platform, limit);
+            let armed = device.arm(plan, *bank, parameters);
+            flight.load.host.start += flight.watch.lap();
+            let doorbells = armed
+                .and_then(|()| device.start())
+                .map_err(|symptom| device.fail(symptom, &self.shapes))?;
+            // From here on the board is at work.
+            flight.load.host.wait = flight.watch.lap();
+            flight.started = Some(Started { deadline, doorbells });
+        }
+        Ok(flight)
+    }
 }

@@ -10,6 +10,7 @@ use super::planted::Planted;
 use super::{Bench, Verdict, caught, chain_of, clean, found};
 use crate::check::check_found;
 use crate::platform::{Access, CpuBuffer, DeviceBuffer, PlatformError};
+use crate::step::bank::Bank;
 use crate::step::tests::{bits, scene};
 use crate::{Outcome, StepParameters};
 
@@ -117,16 +118,20 @@ fn mistake_19_slices_of_a_buffer_that_the_device_writes() {
     let mut bench = Bench::open(BoardConfig::default(), None, None).expect("a board that opens");
     bench.step(20).expect("a step");
     let device = &mut bench.accelerator.device;
+    const FIRST: Bank = Bank::First;
     let reachable = |device: &mut crate::step::Device| {
-        device.lanes_mut().map(|lane| lane.beats().len() + lane.beats_mut().len()).sum::<usize>()
+        device
+            .lanes_mut()
+            .map(|lane| lane.beats(FIRST).len() + lane.beats_mut(FIRST).len())
+            .sum::<usize>()
     };
     assert!(reachable(device) > 0, "the CPU holds them between steps");
     for lane in device.lanes_mut() {
-        lane.hand_over(1).expect("handed over");
+        lane.hand_over(FIRST, 1).expect("handed over");
     }
     assert_eq!(reachable(device), 0);
     for lane in device.lanes_mut() {
-        lane.take_back().expect("nothing runs");
+        lane.take_back(FIRST).expect("nothing runs");
     }
     assert!(reachable(device) > 0);
     bench.close().expect("nothing went wrong");

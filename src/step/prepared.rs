@@ -1,0 +1,200 @@
+//! This file packs a step while another is on the board, and starts it when that one has ended.
+//!
+//! ```text
+//!   CPU    | pack 0 |  pack 1  |unpack 0|  pack 2  |unpack 1| ...
+//!   board           |     step 0    |     step 1      |     step 2 ...
+//! ```
+
+use super::bank::Bank;
+use super::fault::Fault;
+use super::in_flight::{Flight, InFlight, Stopwatch};
+use super::load::{Engines, Load, Ticket};
+use super::report::StepReport;
+use super::solver::Accelerator;
+use crate::error::{Aftermath, Error};
+use crate::scene::{Bodies, Collisions, InputError, StepParameters};
+
+/// A step whose records lie in DMA memory, ready to be [started](Accelerator::start).
+///
+/// It may be started more than once, as after a fault: its records stay until other ones take their
+/// place. That is the next step [prepared](InFlight::prepare) before it was started, or the second
+/// after; and, once it was started, the next step that is [submitted](Accelerator::submit) without
+/// being prepared. Dropping it costs nothing and frees nothing.
+#[derive(Debug)]
+#[must_use = "a step that was prepared is not started by itself"]
+pub struct Prepared {
+    bank: Bank,
+    ticket: Ticket,
+}
+
+impl InFlight<'_> {
+    /// Validates, orders and packs another step while the board works on this one.
+    ///
+    /// What is packed is what the caller gives now. A step that starts from the results of this one
+    /// cannot be prepared before they are there; what can be is the step of another world on the same
+    /// board, or one whose bodies were predicted. This step is not touched, whatever happens: it is
+    /// waited for as before.
+    ///
+    /// ```
+    /// use zynq_pgs::{Accelerator, Body, Collision, OpenOptions, Pose, Shape, StepParameters};
+    /// # use zynq_pgs::Velocity;
+    ///
+    /// # fn main() -> Result<(), zynq_pgs::Error> {
+    /// let mut board = Accelerator::open(OpenOptions::default())?;
+    /// board.set_shapes(&[Shape::isotropic(1.0, 1.5)])?;
+    /// # let pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+    /// # let falling = Body { pose, velocity: Velocity::default(), shape: 0 };
+    /// # let world = |count| vec![falling; count];
+    /// let (mut left, mut right) = (world(2), world(3));
+    /// let none: [Collision; 0] = [];
+    /// let parameters = StepParameters::default();
+    ///
+    /// let mut flight = board.submit(&left, &none[..], &parameters)?;
+    /// let prepared = flight.prepare(&right, &none[..], &parameters)?;
+    /// let (report, started) = flight.wait_and_start(&mut left, &prepared);
+    /// assert_eq!(report?.bodies, 2);
+    /// assert_eq!(started?.wait(&mut right)?.bodies, 3);
+    /// # assert_eq!(left[1], right[2]);
+    /// # assert!(left[1].velocity.linear[1] < 0.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// The first call allocates a second set of buffers, as large as the first. Where there is too
+    /// little memory for both, steps that are not prepared work as ever.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: the input was refused. [`Error::Step`] with
+    /// [`Fault::NoMemory`](crate::Fault::NoMemory): there is no room for a second set of buffers.
+    /// Either way what was prepared before may be gone.
+    pub fn prepare<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &B,
+        collisions: &C,
+        parameters: &StepParameters,
+    ) -> Result<Prepared, Error> {
+        let accelerator = &mut *self.accelerator;
+        let bank = self.flight.load.bank.other();
+        let into = (bank, Engines::Working);
+        let mut watch = Stopwatch::start();
+        let mut load = accelerator.load(into, bodies, collisions, parameters, &mut watch)?;
+        if load.sent.is_some() {
+            // Cleaning caches, or copying, takes its time, too.
+            accelerator.device.hand_over(&load.plan, bank).map_err(|error| {
+                accelerator.loads[bank] = None;
+                let fault = Box::new(Fault::from(error));
+                Error::Step { fault, aftermath: Aftermath::Untouched, diagnosis: None }
+            })?;
+            load.host.start = watch.lap();
+            accelerator.loads[bank] = Some(load);
+        }
+        Ok(Prepared { bank, ticket: load.ticket })
+    }
+
+    /// Waits as [`wait`](Self::wait) does, and starts a prepared step as soon as the board is through
+    /// with this one: its results are read and stored while the board works on the next.
+    ///
+    /// The two steps do not depend on each other: whether this one succeeds, fails or is refused its
+    /// bodies, the next is started if the board can be.
+    ///
+    /// # Errors
+    /// First those of [`wait`](Self::wait), then those of [`Accelerator::start`].
+    pub fn wait_and_start<B: Bodies + ?Sized>(
+        mut self,
+        bodies: &mut B,
+        next: &Prepared,
+    ) -> (Result<StepReport, Error>, Result<Self, Error>) {
+        let ended = self.collect(bodies);
+        if next.bank == self.flight.load.bank {
+            // The same step once more, where the results are that are not read yet.
+            let report = ended.and_then(|ended| self.finish(ended, bodies));
+            let started = self.accelerator.begin_prepared(next, Memory::Freed);
+            return (report, started.map(|flight| self.followed_by(flight)));
+        }
+        // Until the end of this function `self` is there to stop it, if the caller's code panics.
+        let mut started = self.accelerator.begin_prepared(next, Memory::Kept);
+        if self.accelerator.device.dead {
+            // The results were in memory that is left to the device now.
+            return (
+                ended.and(Err(Error::MustReopen)),
+                started.map(|flight| self.followed_by(flight)),
+            );
+        }
+        // What starting took is not this step's.
+        self.flight.watch.lap();
+        let report = ended.and_then(|ended| match self.read(&ended, bodies) {
+            Ok(()) => Ok(self.commit(ended, bodies)),
+            Err(fault @ Fault::NotFinite { .. }) => {
+                let fault = Box::new(fault);
+                let aftermath = Aftermath::Untouched;
+                Err(self.located(Error::Step { fault, aftermath, diagnosis: None }))
+            }
+            // Who sends wrong words is reset, which stops the next step, too.
+            Err(fault) => {
+                let Accelerator { device, shapes, .. } = &mut *self.accelerator;
+                let error = device.fail_overtaken(fault, shapes);
+                if started.is_ok() {
+                    started = self.accelerator.begin_prepared(next, Memory::Kept);
+                }
+                Err(error)
+            }
+        });
+        (report, started.map(|flight| self.followed_by(flight)))
+    }
+
+    /// The next step, in place of one that has ended.
+    fn followed_by(mut self, flight: Flight) -> Self {
+        self.flight = flight;
+        self
+    }
+}
+
+/// What may become of memory that the board has no use for, where there is too little.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Memory {
+    /// There are results in it.
+    Kept,
+    Freed,
+}
+
+impl Accelerator {
+    /// Starts a step that was [prepared](InFlight::prepare) while an earlier one was on the board.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: [`InputError::NotPrepared`] if its records are not there any more, or never
+    /// were in this accelerator; [`InputError::ShapesChanged`] if [other shapes](Self::set_shapes)
+    /// were loaded since. [`Error::Step`] and [`Error::MustReopen`] as [`Self::step`]. Where
+    /// [`Error::may_retry`] says so the prepared step may be started again.
+    pub fn start(&mut self, prepared: &Prepared) -> Result<InFlight<'_>, Error> {
+        let flight = self.begin_prepared(prepared, Memory::Freed)?;
+        Ok(InFlight::new(self, flight))
+    }
+
+    fn begin_prepared(&mut self, prepared: &Prepared, memory: Memory) -> Result<Flight, Error> {
+        self.device.settle(&self.shapes)?;
+        let watch = Stopwatch::start();
+        let accesses = self.accesses();
+        let load = self.loads[prepared.bank].filter(|load| load.ticket == prepared.ticket);
+        let Some(load @ Load { plan, bank, shapes_loaded, .. }) = load else {
+            return Err(InputError::NotPrepared.into());
+        };
+        if load.sent.is_some() && !self.device.holds(bank) {
+            // Lost to a fault.
+            return Err(InputError::NotPrepared.into());
+        }
+        if shapes_loaded != self.shapes_loaded {
+            return Err(InputError::ShapesChanged.into());
+        }
+        let mut ready = self.device.check_cancelled().map_err(Into::into);
+        if ready.is_ok() && load.sent.is_some() {
+            ready = match memory {
+                Memory::Freed => {
+                    self.or_free(bank, |this| this.device.rings_or_reset(&plan, &this.shapes))
+                }
+                Memory::Kept => self.device.rings_or_reset(&plan, &self.shapes),
+            };
+        }
+        ready.map_err(|symptom| self.device.fail(symptom, &self.shapes))?;
+        self.begin(load, watch, accesses)
+    }
+}

@@ -1,0 +1,341 @@
+//! What is won by packing the next step while one is on the board, on the board's own clock.
+//!
+//! ```sh
+//! cargo bench --bench overlap
+//! cargo bench --bench overlap -- --folder tests/golden/pile5_step60 --pack-ms 0.01
+//! cargo bench --bench overlap -- --pack-ms 3.5 --unpack-ms 0.5 --order as-given --json
+//! ```
+//!
+//! The emulated board's clock passes with register accesses and with waiting; it stands still while
+//! this host computes, which is not the host that a board has. So the time that packing takes there
+//! is given (`--pack-ms`, 7 ms for the thesis' step unless told otherwise), and the scene lets it pass
+//! on the board's clock while it is read. Storing the results takes as long for a byte, or
+//! `--unpack-ms`. The step is always the same, of a standing scene or of a folder: one after the other
+//! (serial), and each packed while the one before it is on the board (overlapped).
+//!
+//! Beside it the host times of this machine, medians of the steps without any time added: what a step
+//! costs besides packing, ordering and waiting.
+
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
+
+use std::cell::Cell;
+use std::error::Error;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use bench::median;
+use bitstream_model::{BoardConfig, CpuPort, EmulatedBoard};
+use scene::{Grid, Scene, SceneOptions};
+use serde_json::json;
+use step_folder::folder::Folder;
+use zynq_pgs::order::Order;
+use zynq_pgs::{
+    Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, HostTimes, InFlight,
+    OpenOptions, Pose, StepParameters, StepReport, Velocity,
+};
+
+/// What the command line asks for.
+struct Options {
+    grid: Grid,
+    folder: Option<PathBuf>,
+    order: Order,
+    pack: Duration,
+    unpack: Option<Duration>,
+    steps: u32,
+    json: bool,
+}
+
+impl Options {
+    fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Self, Box<dyn Error>> {
+        let mut options = Self {
+            grid: Grid::default(),
+            folder: None,
+            order: Order::HazardFree,
+            pack: Duration::from_millis(7),
+            unpack: None,
+            steps: 5,
+            json: false,
+        };
+        while let Some(argument) = arguments.next() {
+            let mut value = || arguments.next().ok_or(format!("{argument} needs a value"));
+            match argument.as_str() {
+                "--grid" => options.grid = value()?.parse()?,
+                "--folder" => options.folder = Some(value()?.into()),
+                "--order" => options.order = order(&value()?)?,
+                "--pack-ms" => options.pack = milliseconds(&value()?)?,
+                "--unpack-ms" => options.unpack = Some(milliseconds(&value()?)?),
+                "--steps" => options.steps = value()?.parse::<u32>()?.max(1),
+                "--json" => options.json = true,
+                // What cargo adds.
+                "--bench" => {}
+                other => {
+                    return Err(format!(
+                        "unknown {other:?}, expected --grid, --folder, --order, --pack-ms, \
+                         --unpack-ms, --steps or --json"
+                    )
+                    .into());
+                }
+            }
+        }
+        Ok(options)
+    }
+}
+
+fn order(name: &str) -> Result<Order, String> {
+    match name {
+        "as-given" => Ok(Order::AsGiven),
+        "hazard-free" => Ok(Order::HazardFree),
+        other => Err(format!("unknown order {other:?}, expected as-given or hazard-free")),
+    }
+}
+
+fn milliseconds(text: &str) -> Result<Duration, Box<dyn Error>> {
+    Ok(Duration::try_from_secs_f64(text.parse::<f64>()? / 1e3)?)
+}
+
+/// Pieces in which the host's time passes.
+const PIECES: u32 = 100;
+
+/// Bodies or collisions that are read and stored in so much of the board's time.
+struct Timed<'a, T: ?Sized> {
+    inner: &'a T,
+    port: &'a CpuPort,
+    time: Duration,
+    left: Cell<u32>,
+}
+
+impl<'a, T: ?Sized> Timed<'a, T> {
+    fn new(inner: &'a T, port: &'a CpuPort, time: Duration) -> Self {
+        Self { inner, port, time, left: Cell::new(PIECES) }
+    }
+
+    /// Lets a piece of the time pass, `PIECES` times in the first `count` indices.
+    fn pass(&self, index: usize, count: usize) {
+        let left = self.left.get();
+        if left > 0 && index.is_multiple_of((count / PIECES as usize).max(1)) {
+            self.left.set(left - 1);
+            self.port.pause(self.time / PIECES);
+        }
+    }
+}
+
+/// Bodies that are stored elsewhere than they are read: every step begins as the first.
+struct Elsewhere<'a> {
+    timed: Timed<'a, [Body]>,
+    stored: Vec<Body>,
+}
+
+impl Bodies for Elsewhere<'_> {
+    fn len(&self) -> usize {
+        self.timed.inner.len()
+    }
+
+    fn body(&self, index: usize) -> Body {
+        self.timed.inner[index]
+    }
+
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        self.timed.pass(index, self.len());
+        self.stored.commit(index, pose, velocity);
+    }
+}
+
+impl Collisions for Timed<'_, [Collision]> {
+    fn len(&self) -> usize {
+        self.inner.len()
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        self.pass(index, self.inner.len());
+        self.inner[index]
+    }
+}
+
+/// A scene that is stepped, and the times that its host is said to take.
+struct Job<'a> {
+    bodies: &'a [Body],
+    collisions: &'a [Collision],
+    parameters: StepParameters,
+    pack: Duration,
+    unpack: Duration,
+    port: CpuPort,
+}
+
+impl Job<'_> {
+    fn bodies(&self) -> Elsewhere<'_> {
+        let timed = Timed::new(self.bodies, &self.port, self.unpack);
+        Elsewhere { timed, stored: self.bodies.to_vec() }
+    }
+
+    fn collisions(&self) -> Timed<'_, [Collision]> {
+        Timed::new(self.collisions, &self.port, self.pack)
+    }
+
+    fn submit<'a>(
+        &self,
+        accelerator: &'a mut Accelerator,
+    ) -> Result<InFlight<'a>, zynq_pgs::Error> {
+        accelerator.submit(&self.bodies(), &self.collisions(), &self.parameters)
+    }
+
+    /// Steps one after the other; the time of each on the board's clock, and the reports.
+    fn serial(
+        &self,
+        accelerator: &mut Accelerator,
+        steps: u32,
+    ) -> Result<(Duration, Vec<StepReport>), zynq_pgs::Error> {
+        let begun = self.port.now();
+        let mut reports = Vec::new();
+        for _ in 0..steps {
+            let flight = self.submit(accelerator)?;
+            reports.push(flight.wait(&mut self.bodies())?);
+        }
+        Ok(((self.port.now() - begun) / steps, reports))
+    }
+
+    /// Each step packed while the one before it is on the board; from the start of the first to that
+    /// of the last.
+    fn overlapped(
+        &self,
+        accelerator: &mut Accelerator,
+        steps: u32,
+    ) -> Result<(Duration, Vec<StepReport>), zynq_pgs::Error> {
+        let mut flight = self.submit(accelerator)?;
+        let begun = self.port.now();
+        let mut reports = Vec::new();
+        for _ in 0..steps {
+            let next = flight.prepare(&self.bodies(), &self.collisions(), &self.parameters)?;
+            let (ended, started) = flight.wait_and_start(&mut self.bodies(), &next);
+            reports.push(ended?);
+            flight = started?;
+        }
+        let each = (self.port.now() - begun) / steps;
+        flight.wait(&mut self.bodies())?;
+        Ok((each, reports))
+    }
+}
+
+/// Medians of host times, by phase.
+fn typical(reports: &[StepReport]) -> [(&'static str, Duration); 7] {
+    let of = |phase: fn(&HostTimes) -> Duration| {
+        median(reports.iter().map(|report| phase(&report.host)).collect())
+    };
+    [
+        ("validate", of(|host| host.validate)),
+        ("order", of(|host| host.order)),
+        ("pack", of(|host| host.pack)),
+        ("start", of(|host| host.start)),
+        ("wait", of(|host| host.wait)),
+        ("unpack", of(|host| host.unpack)),
+        ("commit", of(|host| host.commit)),
+    ]
+}
+
+fn main() -> ExitCode {
+    match Options::parse(std::env::args().skip(1)).and_then(|options| run(&options)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    let (name, bodies, collisions, shapes, mut parameters) = match &options.folder {
+        Some(path) => {
+            let folder = Folder::load(path)?;
+            let name = path.display().to_string();
+            (name, folder.bodies, folder.collisions, folder.shapes, folder.parameters)
+        }
+        None => {
+            let standing = SceneOptions { grid: options.grid, drop: 0.0, ..Default::default() };
+            let mut scene = Scene::new(&standing)?;
+            scene.detect();
+            let name = format!("{} cubes", options.grid);
+            let (bodies, collisions) = (scene.bodies().to_vec(), scene.collisions().to_vec());
+            (name, bodies, collisions, scene.shapes().to_vec(), StepParameters::default())
+        }
+    };
+    let emulated = EmulatedBoard::new(BoardConfig::default())?;
+    let board = BoardChoice::Emulated(emulated.cpu_port());
+    let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
+    accelerator.set_shapes(&shapes)?;
+    parameters.order = Some(options.order);
+    let mut job = Job {
+        bodies: &bodies,
+        collisions: &collisions,
+        parameters,
+        pack: Duration::ZERO,
+        unpack: Duration::ZERO,
+        port: emulated.cpu_port(),
+    };
+    // Without the time of a host that is not this one; the first makes all memory.
+    job.serial(&mut accelerator, 1)?;
+    let (_, plain) = job.serial(&mut accelerator, options.steps)?;
+    let alone = plain.first().ok_or("a report of each step")?;
+    let on_board = alone.modelled_time();
+    job.pack = options.pack;
+    job.unpack = options.unpack.unwrap_or_else(|| {
+        // The collisions are packed once, however often they are streamed.
+        let passes = u64::from(alone.passes).max(1);
+        let packed = alone.bytes_to_device.saturating_sub(alone.bytes_from_device) / passes
+            + alone.bytes_from_device;
+        options.pack.mul_f64(alone.bytes_from_device as f64 / packed.max(1) as f64)
+    });
+    let (serial, _) = job.serial(&mut accelerator, options.steps)?;
+    let (each, _) = job.overlapped(&mut accelerator, options.steps)?;
+    let host = job.pack + job.unpack;
+    let longer = host.max(on_board);
+    let ratio = each.as_secs_f64() / longer.as_secs_f64();
+    let ms = |time: Duration| time.as_secs_f64() * 1e3;
+    let times = typical(&plain);
+    if options.json {
+        let host_ms: serde_json::Map<_, _> =
+            times.iter().map(|(name, time)| ((*name).to_owned(), ms(*time).into())).collect();
+        let document = json!({
+            "schema": 1,
+            "bench": "overlap",
+            "scene": name,
+            "order": if options.order == Order::AsGiven { "as-given" } else { "hazard-free" },
+            "bodies": job.bodies.len(),
+            "collisions": job.collisions.len(),
+            "steps": options.steps,
+            "pack_ms": ms(job.pack),
+            "unpack_ms": ms(job.unpack),
+            "board_ms": ms(on_board),
+            "serial_ms": ms(serial),
+            "overlapped_ms": ms(each),
+            "overlapped_by_longer": ratio,
+            "serial_by_overlapped": serial.as_secs_f64() / each.as_secs_f64(),
+            "host_ms": host_ms,
+        });
+        println!("{document:#}");
+        return Ok(());
+    }
+    println!(
+        "{name}: {} bodies, {} collisions, {} steps, on the board's clock\n",
+        job.bodies.len(),
+        job.collisions.len(),
+        options.steps
+    );
+    println!("pack      {:>8.3} ms  given", ms(job.pack));
+    println!(
+        "unpack    {:>8.3} ms  {}",
+        ms(job.unpack),
+        match options.unpack {
+            Some(_) => "given",
+            None => "as packing, by bytes",
+        }
+    );
+    println!("board     {:>8.3} ms  {} cycles", ms(on_board), alone.cycles.total);
+    println!("serial    {:>8.3} ms  a step", ms(serial));
+    println!("overlapped{:>8.3} ms  a step, {ratio:.3} of the longer of the two", ms(each));
+    println!("\nthis host, medians");
+    for (name, time) in times {
+        println!("{name:<10}{:>8.3} ms", ms(time));
+    }
+    Ok(())
+}
