@@ -6,6 +6,8 @@
 
 #![forbid(unsafe_code)]
 
+pub mod yardstick;
+
 use std::time::{Duration, Instant};
 
 /// Something that is timed; its result is kept from being optimised away by the caller.

@@ -11,7 +11,6 @@ mod build;
 mod compare;
 mod deviation;
 mod diagnosis;
-mod digest;
 mod failure;
 mod interrupt;
 mod loading;

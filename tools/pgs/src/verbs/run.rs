@@ -14,13 +14,13 @@ use super::table::{Column, grouped, heading, line};
 use crate::args::CommonArgs;
 use crate::board::{self, Opened};
 use crate::diagnosis::FaultArgs;
-use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
 use crate::options::{BuildArgs, DeadlineArgs};
 use crate::ordering::{self, OrderingArgs};
 use crate::planned::{self, PlannedArgs};
 use crate::scenes::SceneArgs;
+use step_folder::digest;
 
 const EXAMPLES: &str = "\
 Examples:
