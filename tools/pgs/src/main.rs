@@ -12,6 +12,7 @@ mod compare;
 mod deviation;
 mod diagnosis;
 mod failure;
+mod footprint;
 mod interrupt;
 mod loading;
 mod memory;
