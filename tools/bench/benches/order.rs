@@ -18,48 +18,25 @@ use std::hint::black_box;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use bench::{Run, medians};
+use bench::options::{Common, Pile};
+use bench::{Run, medians, milliseconds, ratio};
 use bitstream_model::interface::profile::FLOAT;
 use bitstream_model::{BoardConfig, EmulatedBoard};
-use scene::{Grid, Scene, SceneOptions};
+use clap::Parser;
+use scene::{Scene, SceneOptions};
 use serde_json::json;
 use zynq_pgs::bench::CollisionPacker;
 use zynq_pgs::order::{Checker, InputBuffers, IssueWindow, Order, OrderReport, Ordered, Orderer};
 use zynq_pgs::{Accelerator, BoardChoice, OpenOptions, StepParameters};
 
-/// What the command line asks for.
+/// Holds ordering the collisions of a step against packing them in that order.
+#[derive(Debug, Parser)]
+#[command(name = "cargo bench --bench order --")]
 struct Options {
-    grid: Grid,
-    drop: f32,
-    steps: u32,
-    runs: usize,
-    json: bool,
-}
-
-impl Options {
-    fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Self, Box<dyn Error>> {
-        let mut options =
-            Self { grid: Grid::default(), drop: 0.0, steps: 5, runs: 21, json: false };
-        while let Some(argument) = arguments.next() {
-            let mut value = || arguments.next().ok_or(format!("{argument} needs a value"));
-            match argument.as_str() {
-                "--grid" => options.grid = value()?.parse()?,
-                "--drop" => options.drop = value()?.parse()?,
-                "--steps" => options.steps = value()?.parse()?,
-                "--runs" => options.runs = value()?.parse()?,
-                "--json" => options.json = true,
-                // What cargo adds.
-                "--bench" => {}
-                other => {
-                    return Err(format!(
-                        "unknown {other:?}, expected --grid, --drop, --steps, --runs or --json"
-                    )
-                    .into());
-                }
-            }
-        }
-        Ok(options)
-    }
+    #[command(flatten)]
+    pile: Pile,
+    #[command(flatten)]
+    common: Common,
 }
 
 /// Times of one step.
@@ -76,36 +53,34 @@ struct Row {
 
 impl Row {
     fn ratio(&self) -> f64 {
-        self.order.as_secs_f64() / self.pack.as_secs_f64()
+        ratio(self.order, self.pack)
     }
 
     fn print(&self) {
-        let ms = |time: Duration| time.as_secs_f64() * 1e3;
         println!(
             "{:>5} {:>10} {:>6} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>7.2}{}",
             self.step,
             self.collisions,
             self.empty,
-            ms(self.order),
-            ms(self.verify),
-            ms(self.pack),
-            ms(self.pack_as_given),
+            milliseconds(self.order),
+            milliseconds(self.verify),
+            milliseconds(self.pack),
+            milliseconds(self.pack_as_given),
             self.ratio(),
             if self.first { "  (once, without memory of its own)" } else { "" },
         );
     }
 
     fn to_json(&self) -> serde_json::Value {
-        let ms = |time: Duration| time.as_secs_f64() * 1e3;
         json!({
             "step": self.step,
             "first": self.first,
             "collisions": self.collisions,
             "empty": self.empty,
-            "order_ms": ms(self.order),
-            "verify_ms": ms(self.verify),
-            "pack_in_order_ms": ms(self.pack),
-            "pack_as_given_ms": ms(self.pack_as_given),
+            "order_ms": milliseconds(self.order),
+            "verify_ms": milliseconds(self.verify),
+            "pack_in_order_ms": milliseconds(self.pack),
+            "pack_as_given_ms": milliseconds(self.pack_as_given),
             "order_by_pack": self.ratio(),
         })
     }
@@ -131,7 +106,7 @@ impl Kept {
 }
 
 fn main() -> ExitCode {
-    match Options::parse(std::env::args().skip(1)).and_then(|options| run(&options)) {
+    match run(&Options::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -141,45 +116,47 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    let scene = SceneOptions { grid: options.grid, drop: options.drop, ..Default::default() };
+    let (Pile { grid, drop, steps }, runs, json) =
+        (options.pile, options.common.runs(), options.common.json);
+    let scene = SceneOptions { grid, drop, ..Default::default() };
     let mut scene = Scene::new(&scene)?;
     let emulated = EmulatedBoard::new(BoardConfig::default())?;
     let board = BoardChoice::Emulated(emulated.cpu_port());
     let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
     accelerator.set_shapes(scene.shapes())?;
     let window = IssueWindow::of(accelerator.capabilities(), &StepParameters::default())?;
-    if !options.json {
+    if !json {
         println!(
             "{} cubes dropped from {} m, depth {} issue slots, medians of {} runs in turn\n",
-            options.grid,
-            options.drop,
+            grid,
+            drop,
             window.depth(),
-            options.runs,
+            runs,
         );
         println!(" step collisions  empty     order    verify      pack      pack   order");
         println!("                               ms        ms  in order  as given by pack");
     }
     let mut kept = Kept::new();
     let mut rows = Vec::new();
-    for step in 1..=options.steps {
+    for step in 1..=steps {
         scene.detect();
-        let row = measure(step, options.runs, &scene, &mut kept, window)?;
-        if !options.json {
+        let row = measure(step, runs, &scene, &mut kept, window)?;
+        if !json {
             row.print();
         }
         rows.push(row);
         let (bodies, collisions) = scene.parts_mut();
         accelerator.step(bodies, collisions, &StepParameters::default())?;
     }
-    if options.json {
+    if json {
         let rows: Vec<_> = rows.iter().map(Row::to_json).collect();
         let document = json!({
             "schema": 1,
             "bench": "order",
-            "grid": options.grid.to_string(),
-            "drop_m": options.drop,
+            "grid": grid.to_string(),
+            "drop_m": drop,
             "depth": window.depth(),
-            "runs": options.runs,
+            "runs": runs,
             "steps": rows,
         });
         println!("{document:#}");

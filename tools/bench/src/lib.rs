@@ -3,8 +3,17 @@
 //! Times of one machine mean little on another, and on a busy machine little from one minute to the
 //! next. So the things that are compared run in turn, a run of each, and what is said is the ratio
 //! of their medians.
+//!
+//! ```sh
+//! cargo bench --bench speed      # the emulated board beside a solver on the CPU
+//! cargo bench --bench order      # ordering beside packing
+//! ```
 
 #![forbid(unsafe_code)]
+
+pub mod options;
+pub mod step;
+pub mod yardstick;
 
 use std::time::{Duration, Instant};
 
@@ -25,9 +34,22 @@ pub fn medians(runs: usize, contestants: &mut [Run<'_>]) -> Vec<Duration> {
 }
 
 /// The middle one, the later of two; zero of none.
+#[must_use]
 pub fn median(mut times: Vec<Duration>) -> Duration {
     times.sort_unstable();
     times.get(times.len() / 2).copied().unwrap_or_default()
+}
+
+/// In milliseconds.
+#[must_use]
+pub fn milliseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+/// How long the first takes, in the time of the second.
+#[must_use]
+pub fn ratio(time: Duration, of: Duration) -> f64 {
+    time.as_secs_f64() / of.as_secs_f64()
 }
 
 #[cfg(test)]

@@ -14,13 +14,14 @@ use super::table::{Column, grouped, heading, line};
 use crate::args::CommonArgs;
 use crate::board::{self, Opened};
 use crate::diagnosis::FaultArgs;
-use crate::digest;
 use crate::failure::{Failure, Verdict};
+use crate::footprint::Footprint;
 use crate::interrupt::Interrupt;
 use crate::options::{BuildArgs, DeadlineArgs};
 use crate::ordering::{self, OrderingArgs};
 use crate::planned::{self, PlannedArgs};
 use crate::scenes::SceneArgs;
+use step_folder::digest;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -163,6 +164,8 @@ pub(crate) fn run(
     let parameters = args.ordering.apply(args.deadline.apply(StepParameters::default()));
     let parameters = args.faults.apply(parameters);
     args.planned.inject(&mut opened, &parameters)?;
+    let variant = opened.accelerator.capabilities().variant;
+    let mut footprint = Footprint::default();
     let mut documents = Vec::new();
     let mut done = 0;
     let mut retries = 0;
@@ -172,6 +175,7 @@ pub(crate) fn run(
         let Some(row) = row else { break };
         done += 1;
         retries += u64::from(row.report.retries);
+        footprint.see(&variant, &row.report);
         if done == 1 && !common.json {
             // Only now: a scene that is refused prints nothing but the refusal.
             progress.suspend(|| print_heading(args, &opened, &row.report, out))?;
@@ -199,6 +203,7 @@ pub(crate) fn run(
             "complete": complete,
             "steps": documents,
             "faults": planned::to_json(&opened),
+            "memory": footprint.to_json(),
             "digest": { "algorithm": digest::ALGORITHM, "value": digest },
         });
         writeln!(out, "{document:#}")?;
@@ -212,6 +217,9 @@ pub(crate) fn run(
         }
         if !complete {
             writeln!(out, "interrupted after {done} of {} steps", args.steps)?;
+        }
+        if let Some(memory) = footprint.text() {
+            writeln!(out, "memory     {memory}")?;
         }
         writeln!(out, "digest     {} {digest}", digest::ALGORITHM)?;
     }

@@ -15,7 +15,6 @@ use crate::args::CommonArgs;
 use crate::board;
 use crate::compare::{self, Difference};
 use crate::diagnosis::FaultArgs;
-use crate::digest;
 use crate::failure::{Failure, Verdict};
 use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use crate::interrupt::Interrupt;
@@ -24,6 +23,7 @@ use crate::options::{BuildArgs, DeadlineArgs};
 use crate::ordering::{self, OrderingArgs};
 use crate::origin;
 use crate::planned::{self, PlannedArgs};
+use step_folder::digest;
 
 const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
 const VELOCITIES_FRICTION: &str = "out_vel_friction.npy";

@@ -4,6 +4,7 @@
 //! shared out among threads in ranges of pairs, whose results are joined in their order: the number
 //! of threads changes nothing but the time.
 
+mod boxes;
 mod broad;
 mod ground;
 mod narrow;

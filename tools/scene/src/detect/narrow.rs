@@ -1,7 +1,8 @@
 //! This file finds where two bodies touch.
 //!
 //! parry3d computes the contact manifold in the frame of its first shape, which is our body A. Its
-//! normal points from A to B, ours from B to A; its distances mean the same.
+//! normal points from A to B, ours from B to A; its distances mean the same. Of two boxes the manifold
+//! is computed [here](super::boxes), with the same bits.
 
 use parry3d::math::{Pose, Rotation, Vector};
 use parry3d::query::details::contact_manifold_cuboid_cuboid;
@@ -9,6 +10,7 @@ use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDis
 use parry3d::shape::{Ball, Capsule, Cuboid, PackedFeatureId, Shape};
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
 
+use super::boxes::{self, Point, Touch};
 use super::reduce::{Candidate, reduce};
 use super::{Geometries, MARGIN};
 use crate::Geometry;
@@ -28,7 +30,15 @@ const SAME_DEPTH: f32 = 1e-4;
 pub(super) struct Narrow {
     manifold: ContactManifold<(), ()>,
     candidates: Vec<Candidate>,
-    on_b: Vec<Vector>,
+    /// Where they are on B.
+    on_b: Vec<[f32; 3]>,
+}
+
+/// Whose frame a point is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Frame {
+    A,
+    B,
 }
 
 impl Default for Narrow {
@@ -49,37 +59,36 @@ impl Narrow {
         let body_b = bodies.get(usize::try_from(b).ok()?)?;
         let (pose_a, pose_b) = (pose(body_a), pose(body_b));
         let (geometry_a, geometry_b) = (geometries.of(body_a)?, geometries.of(body_b)?);
-        let curved = self.touch(&pose_a.inv_mul(&pose_b), geometry_a, geometry_b)?;
-
+        let b_in_a = pose_a.inv_mul(&pose_b);
         self.candidates.clear();
         self.on_b.clear();
-        for point in &self.manifold.points {
-            if curved && self.on_b.iter().any(|p| p.distance_squared(point.local_p2) < SAME_POINT) {
-                continue;
-            }
-            // Written so that a NaN is no contact.
-            if point.dist <= MARGIN && point.dist.is_finite() && point.local_p2.is_finite() {
-                self.candidates
-                    .push(Candidate { point: point.local_p1.to_array(), distance: point.dist });
-                self.on_b.push(point.local_p2);
-            }
-        }
+        let (axis, frame) = match self.touch_boxes(&b_in_a, geometry_a, geometry_b) {
+            Touch::Apart => return None,
+            Touch::Along(axis) => (axis, Frame::A),
+            Touch::Unknown => (self.ask_parry(&b_in_a, geometry_a, geometry_b)?, Frame::B),
+        };
         if self.candidates.is_empty() {
             return None;
         }
-        let normal = -(pose_a.rotation * self.manifold.local_n1);
+        let normal = -(pose_a.rotation * Vector::from_array(axis));
         let error = (normal.length() - 1.0).abs();
         if error > NORMAL_TOLERANCE || error.is_nan() {
             return None;
         }
 
-        let (chosen, count) = reduce(&self.candidates, self.manifold.local_n1.to_array());
+        let (chosen, count) = reduce(&self.candidates, axis);
+        let mut on_b = chosen.map(|index| self.on_b.get(index).copied().unwrap_or_default());
+        if frame == Frame::A {
+            on_b = boxes::in_b(&b_in_a, on_b);
+        }
         let mut contacts = [Contact::default(); CONTACT_POINTS];
-        for (contact, &index) in contacts.iter_mut().zip(&chosen[..count]) {
-            *contact = Contact {
-                point: (pose_b * self.on_b[index]).to_array(),
-                distance: self.candidates[index].distance,
-            };
+        for (place, contact) in contacts.iter_mut().enumerate().take(count) {
+            let point = pose_b * Vector::from_array(on_b[place]);
+            if !point.is_finite() {
+                return None;
+            }
+            let distance = self.candidates[chosen[place]].distance;
+            *contact = Contact { point: point.to_array(), distance };
         }
         // At most four.
         let count = u32::try_from(count).ok()?;
@@ -88,9 +97,35 @@ impl Narrow {
 }
 
 impl Narrow {
-    /// Has parry compute the manifold of two geometries; whether one has a curved side. `None` if
-    /// parry does not know the pair.
-    fn touch(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<bool> {
+    /// Takes the points of two boxes, on B in the frame of A.
+    fn touch_boxes(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Touch {
+        let (Geometry::Box { half_extents: a }, Geometry::Box { half_extents: b }) = (a, b) else {
+            return Touch::Unknown;
+        };
+        let Self { candidates, on_b, .. } = self;
+        boxes::touch(b_in_a, a, b, |point| take(candidates, on_b, point))
+    }
+
+    /// Takes the points of two geometries from parry, on B in its own frame; the axis, from A to B in the
+    /// frame of A. `None` if parry does not know the pair.
+    fn ask_parry(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<[f32; 3]> {
+        let curved = self.parry(b_in_a, a, b)?;
+        let Self { manifold, candidates, on_b } = self;
+        for point in &manifold.points {
+            let (on_a, distance) = (point.local_p1.to_array(), point.dist);
+            let same = |other: &[f32; 3]| {
+                Vector::from_array(*other).distance_squared(point.local_p2) < SAME_POINT
+            };
+            if curved && on_b.iter().any(same) {
+                continue;
+            }
+            take(candidates, on_b, Point { on_a, on_b: point.local_p2.to_array(), distance });
+        }
+        Some(manifold.local_n1.to_array())
+    }
+
+    /// Has parry compute the manifold of two geometries; whether one has a curved side.
+    fn parry(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<bool> {
         // Without points and normals of an earlier pair parry starts afresh, so that a result
         // depends on the two poses alone.
         let manifold = &mut self.manifold;
@@ -118,6 +153,16 @@ impl Narrow {
             self.manifold.points.pop();
         }
         Some(true)
+    }
+}
+
+/// Takes a point that is near enough.
+fn take(candidates: &mut Vec<Candidate>, on_b: &mut Vec<[f32; 3]>, point: Point) {
+    // Written so that a NaN is no contact.
+    let finite = point.distance.is_finite() && point.on_b.iter().all(|value| value.is_finite());
+    if point.distance <= MARGIN && finite {
+        candidates.push(Candidate { point: point.on_a, distance: point.distance });
+        on_b.push(point.on_b);
     }
 }
 

@@ -11,11 +11,11 @@ use super::Side;
 use crate::args::{BoardName, CommonArgs};
 use crate::board::{self, Opened};
 use crate::deviation::unmoved_share;
-use crate::digest;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::origin;
 use crate::sixteen::Sixteen;
+use step_folder::digest;
 
 /// What a board steps.
 pub(super) enum World<'a> {

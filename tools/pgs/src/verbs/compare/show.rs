@@ -7,8 +7,8 @@ use scene::Penetration;
 use super::lane::{Lane, Measured};
 use super::{CompareArgs, Row, vector};
 use crate::deviation::Deviation;
-use crate::digest;
 use crate::verbs::table::{Column, grouped, heading, line, number, signed};
+use step_folder::digest;
 
 const COLUMNS: [Column; 17] = [
     Column { name: "step", unit: "", width: 5 },

@@ -3,7 +3,7 @@
 use zynq_pgs::Body;
 
 /// Name of the algorithm, as it is printed beside every digest.
-pub(crate) const ALGORITHM: &str = "fnv1a-64";
+pub const ALGORITHM: &str = "fnv1a-64";
 
 const OFFSET_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
@@ -12,7 +12,8 @@ const PRIME: u64 = 0x0000_0100_0000_01b3;
 /// velocity, body by body.
 ///
 /// Source: Fowler, Noll, Vo; draft-eastlake-fnv.
-pub(crate) fn of_bodies(bodies: &[Body]) -> u64 {
+#[must_use]
+pub fn of_bodies(bodies: &[Body]) -> u64 {
     bodies.iter().fold(OFFSET_BASIS, |digest, body| {
         let digest = of_numbers(digest, &body.pose.position);
         let digest = of_numbers(digest, &body.pose.orientation);

@@ -1,0 +1,80 @@
+//! This file has valgrind count the yardstick's instructions: what noise hides.
+
+use std::error::Error;
+use std::process::Command;
+
+use serde_json::{Value, json};
+use zynq_pgs::StepParameters;
+
+use crate::{Options, Outcome};
+
+/// The functions that are counted, and the passes that they are about.
+const COUNTED: [(&str, Passes); 4] = [
+    ("bench::yardstick::Yardstick::solve", |parameters| {
+        parameters.contact_iterations + parameters.friction_iterations
+    }),
+    ("bench::yardstick::Yardstick::make_rows", |_| 1),
+    ("bench::yardstick::passes::contact", |parameters| parameters.contact_iterations),
+    ("bench::yardstick::passes::friction", |parameters| parameters.friction_iterations),
+];
+
+/// Of the passes of a step, some.
+type Passes = fn(&StepParameters) -> u32;
+
+/// The scene, where no folder is given: large enough that its borders hardly count.
+const GRID: &str = "10x10x10";
+
+pub(crate) fn measure(options: &Options) -> Outcome {
+    if Command::new("valgrind").arg("--version").output().is_err() {
+        eprintln!("skipped: instructions (valgrind is not installed)");
+        return Ok(Value::Null);
+    }
+    let mut counts = Vec::new();
+    for (function, passes) in COUNTED {
+        counts.push(each(options, function, passes)?);
+    }
+    let [all, rows, contact, friction] = counts[..] else { return Err("a count for each".into()) };
+    if !options.common.json {
+        println!("Instructions of the yardstick, counted by callgrind");
+        println!(
+            "  {contact:.0} a pair and contact pass, {friction:.0} a pair and friction pass, {rows:.0} a \
+             pair for its rows: {all:.0} a pair and pass in all\n"
+        );
+    }
+    Ok(json!({
+        "per_pair_and_contact_pass": contact,
+        "per_pair_and_friction_pass": friction,
+        "per_pair_for_rows": rows,
+        "per_pair_and_pass_of_total": all,
+    }))
+}
+
+/// Instructions in a function, for each collision of each pass that it is about.
+fn each(options: &Options, function: &str, passes: Passes) -> Result<f64, Box<dyn Error>> {
+    let mut command = Command::new("valgrind");
+    command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]);
+    command.arg(format!("--toggle-collect={function}"));
+    command.arg(std::env::current_exe()?).arg("--yardstick");
+    match &options.input {
+        Some(folder) => command.arg("--input").arg(folder),
+        None => command.args(["--grid", GRID, "--steps", "2"]),
+    };
+    let output = command.output()?;
+    let (text, log) = (String::from_utf8(output.stdout)?, String::from_utf8(output.stderr)?);
+    if !output.status.success() {
+        return Err(format!("valgrind: {log}").into());
+    }
+    let numbers: Vec<u32> = text.split_whitespace().map(str::parse).collect::<Result<_, _>>()?;
+    let [collisions, contact, friction] = numbers[..] else {
+        return Err(format!("three numbers are expected, found {text:?}").into());
+    };
+    let mut parameters = StepParameters::default();
+    (parameters.contact_iterations, parameters.friction_iterations) = (contact, friction);
+    let collected = log.lines().find_map(|line| line.split_once("Collected :"));
+    let (_, collected) = collected.ok_or("callgrind does not say what it collected")?;
+    let instructions: f64 = collected.trim().parse()?;
+    if instructions == 0.0 {
+        return Err(format!("callgrind has not seen {function}").into());
+    }
+    Ok(instructions / (f64::from(collisions) * f64::from(passes(&parameters))))
+}

@@ -1,0 +1,96 @@
+//! This file measures how the time of a step grows with the scene.
+
+use std::time::Duration;
+
+use bench::median;
+use bench::options::Pile;
+use bench::step::{Emulated, Step};
+use bitstream_model::BoardConfig;
+use bitstream_model::interface::profile::{FLOAT, Profile, WINDOWED};
+use scene::Grid;
+use serde_json::{Value, json};
+
+use crate::{Options, Outcome};
+
+/// Steps of the piles before the one that is measured.
+const STEPS: u32 = 3;
+
+/// Piles and the designs that carry them: the on-chip memory of `windowed` holds the live bodies
+/// only. The longest pile is no thicker across than the thesis', so that bodies live as long.
+const PILES: [(&str, &Profile); 4] =
+    [("10x10x10", &FLOAT), ("20x20x20", &FLOAT), ("36x30x36", &FLOAT), ("100x25x40", &WINDOWED)];
+
+struct Row {
+    profile: &'static str,
+    cubes: u32,
+    collisions: usize,
+    wait: Duration,
+}
+
+impl Row {
+    /// Nanoseconds a collision.
+    fn each(&self) -> f64 {
+        self.wait.as_secs_f64() * 1e9 / self.collisions as f64
+    }
+}
+
+pub(crate) fn measure(options: &Options) -> Outcome {
+    let mut steps = Vec::new();
+    for (grid, profile) in PILES {
+        let grid: Grid = grid.parse()?;
+        let config = BoardConfig { profile, ..BoardConfig::default() };
+        steps.push((grid, config, Step::of_pile(&Pile::standing(grid, STEPS), config)?));
+    }
+    let mut boards = Vec::new();
+    for (_, config, step) in &steps {
+        boards.push((Emulated::new(step, *config)?, Vec::new()));
+    }
+    for run in 0..=options.common.runs() {
+        for (board, times) in &mut boards {
+            let taken = board.take()?;
+            if run > 0 {
+                times.push(taken.report.host.wait);
+            }
+        }
+    }
+    let rows: Vec<Row> = steps
+        .iter()
+        .zip(boards)
+        .map(|((grid, config, step), (_, times))| Row {
+            profile: config.profile.name,
+            cubes: grid.cubes(),
+            collisions: step.collisions.len(),
+            wait: median(times),
+        })
+        .collect();
+    let [_, second, last, _] = &rows[..] else { return Err("a row for each pile".into()) };
+    let growth = last.each() / second.each();
+    if !options.common.json {
+        println!("Time of a step by the size of the scene, beats to results");
+        println!("  profile       cubes  collisions         ms  ns a collision");
+        for row in &rows {
+            println!(
+                "  {:<9} {:>9} {:>11} {:>10.3} {:>15.1}",
+                row.profile,
+                row.cubes,
+                row.collisions,
+                bench::milliseconds(row.wait),
+                row.each()
+            );
+        }
+        println!("  a collision takes {growth:.3} times as long in the third as in the second\n");
+    }
+    let rows: Vec<Value> = rows
+        .iter()
+        .map(|row| {
+            json!({
+                "profile": row.profile,
+                "cubes": row.cubes,
+                "collisions": row.collisions,
+                "wait_ms": bench::milliseconds(row.wait),
+                "ns_per_collision": row.each(),
+            })
+        })
+        .collect();
+    Ok(json!({ "piles": rows, "third_by_second": growth }))
+}

@@ -1,0 +1,127 @@
+//! The emulated board beside a solver on the CPU; growth, memory, and an older `pgs`.
+//!
+//! ```sh
+//! cargo bench --bench speed
+//! cargo bench --bench speed -- --section solver --input FOLDER --json
+//! cargo bench --bench speed -- --section old --old /usr/local/bin/pgs
+//! ```
+//!
+//! What is measured is a step of the thesis' cubes, standing on the ground and stepped on the
+//! emulated board, or the step in a folder of arrays (`--input`). The board takes it in the order
+//! without hazards, and so does the yardstick: a sequential scalar solver, see `bench::yardstick`.
+//! Both give the same bits, or nothing is printed.
+
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
+
+mod callgrind;
+mod growth;
+mod process;
+mod solver;
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use bench::options::{Common, Pile};
+use bench::step::Step;
+use bitstream_model::BoardConfig;
+use clap::{Parser, ValueEnum};
+use serde_json::{Map, Value, json};
+
+/// Holds the emulated board against a solver on the CPU.
+#[derive(Debug, Parser)]
+#[command(name = "cargo bench --bench speed --")]
+struct Options {
+    /// What to measure [default: all but `old`]
+    #[arg(long, value_enum)]
+    section: Vec<Section>,
+    /// Measure the step in this folder of arrays, not a pile's
+    #[arg(long, value_name = "DIR")]
+    input: Option<PathBuf>,
+    #[command(flatten)]
+    pile: Pile,
+    /// An older `pgs`, to run the thesis' scene beside this one
+    #[arg(long, value_name = "BINARY")]
+    old: Option<PathBuf>,
+    /// Steps of each run of the thesis' scene
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    run_steps: u32,
+    /// Only solve the step with the yardstick, once.
+    #[arg(long, hide = true)]
+    yardstick: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Section {
+    /// The time of a step beside the yardstick, and the driver's share of it
+    Solver,
+    /// Instructions of the yardstick, counted by valgrind
+    Instructions,
+    /// Time per collision from small scenes to large ones
+    Growth,
+    /// Peak memory of `pgs run`
+    Memory,
+    /// Time of `pgs run` beside an older one (`--old`)
+    Old,
+}
+
+impl Options {
+    fn has(&self, section: Section) -> bool {
+        match self.section.is_empty() {
+            true => section != Section::Old || self.old.is_some(),
+            false => self.section.contains(&section),
+        }
+    }
+
+    fn step(&self) -> Result<Step, Box<dyn Error>> {
+        match &self.input {
+            Some(folder) => Step::load(folder),
+            None => Step::of_pile(&self.pile, BoardConfig::default()),
+        }
+    }
+}
+
+/// What JSON says of a section; its text is printed as it comes.
+type Outcome = Result<Value, Box<dyn Error>>;
+
+/// Measures a section.
+type Measure = fn(&Options) -> Outcome;
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    if options.yardstick {
+        return solver::only_yardstick(&options.step()?);
+    }
+    let mut document = Map::new();
+    document.insert("schema".to_owned(), 1.into());
+    document.insert("bench".to_owned(), "speed".into());
+    document.insert("runs".to_owned(), options.common.runs().into());
+    let sections: [(Section, &str, Measure); 5] = [
+        (Section::Solver, "solver", solver::measure),
+        (Section::Instructions, "instructions", callgrind::measure),
+        (Section::Growth, "growth", growth::measure),
+        (Section::Memory, "memory", process::memory),
+        (Section::Old, "old", process::old),
+    ];
+    for (section, name, measure) in sections {
+        if options.has(section) {
+            document.insert(name.to_owned(), measure(options)?);
+        }
+    }
+    if options.common.json {
+        println!("{:#}", json!(document));
+    }
+    Ok(())
+}

@@ -1,0 +1,141 @@
+//! This file makes the step that is measured, of a folder of arrays or of a pile, and takes it on
+//! emulated boards.
+
+use std::error::Error;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use bitstream_model::{BoardConfig, EmulatedBoard};
+use scene::{Scene, SceneOptions};
+use step_folder::folder::Folder;
+use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer};
+use zynq_pgs::{
+    Accelerator, BoardChoice, Body, Collision, OpenOptions, Shape, StepParameters, StepReport,
+};
+
+use crate::options::Pile;
+
+/// Everything that one step takes.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// What it is.
+    pub name: String,
+    /// The shape table.
+    pub shapes: Vec<Shape>,
+    /// The bodies before the step.
+    pub bodies: Vec<Body>,
+    /// The collisions, as they were found.
+    pub collisions: Vec<Collision>,
+    /// The parameters.
+    pub parameters: StepParameters,
+}
+
+/// Opens an emulated board.
+fn open(config: BoardConfig, shapes: &[Shape]) -> Result<Accelerator, Box<dyn Error>> {
+    let board = BoardChoice::Emulated(EmulatedBoard::new(config)?.cpu_port());
+    let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
+    accelerator.set_shapes(shapes)?;
+    Ok(accelerator)
+}
+
+impl Step {
+    /// The step in a folder.
+    ///
+    /// # Errors
+    /// If the folder does not hold one.
+    pub fn load(path: &Path) -> Result<Self, Box<dyn Error>> {
+        let Folder { bodies, shapes, collisions, parameters, .. } = Folder::load(path)?;
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        Ok(Self { name, shapes, bodies, collisions, parameters })
+    }
+
+    /// The last step of a pile: those before it are taken on the emulated board.
+    ///
+    /// # Errors
+    /// If there is no such pile, or a step fails.
+    pub fn of_pile(pile: &Pile, config: BoardConfig) -> Result<Self, Box<dyn Error>> {
+        let Pile { grid, drop, steps } = *pile;
+        let mut scene = Scene::new(&SceneOptions { grid, drop, ..Default::default() })?;
+        let mut accelerator = open(config, scene.shapes())?;
+        let parameters = StepParameters::default();
+        let mut sent = parameters;
+        sent.order = Some(Order::HazardFree);
+        scene.detect();
+        for _ in 1..steps {
+            let (bodies, collisions) = scene.parts_mut();
+            accelerator.step(bodies, collisions, &sent)?;
+            scene.detect();
+        }
+        Ok(Self {
+            name: format!("step {steps} of {grid} cubes dropped from {drop} m"),
+            shapes: scene.shapes().to_vec(),
+            bodies: scene.bodies().to_vec(),
+            collisions: scene.collisions().to_vec(),
+            parameters,
+        })
+    }
+
+    /// The collisions in the order without hazards, as a board of that build is sent them.
+    ///
+    /// # Errors
+    /// If there is no such order.
+    pub fn in_order(&self, config: BoardConfig) -> Result<Vec<Collision>, Box<dyn Error>> {
+        let accelerator = open(config, &self.shapes)?;
+        let window = IssueWindow::of(accelerator.capabilities(), &self.parameters)?;
+        let mut buffers = InputBuffers::new();
+        let input = buffers.gather(&self.bodies, &self.collisions, &self.shapes);
+        let mut orderer = Orderer::new();
+        let schedule = orderer.order(&input, Order::HazardFree, window)?;
+        let entries = (0..schedule.len()).filter_map(|entry| schedule.get(entry));
+        Ok(entries.map(|index| self.collisions[index]).collect())
+    }
+}
+
+/// An emulated board that takes the same step again and again, in the order without hazards.
+#[derive(Debug)]
+pub struct Emulated<'a> {
+    step: &'a Step,
+    accelerator: Accelerator,
+    parameters: StepParameters,
+    bodies: Vec<Body>,
+}
+
+/// One step taken.
+#[derive(Debug, Clone, Copy)]
+pub struct Taken {
+    /// What the driver says.
+    pub report: StepReport,
+    /// Host time of the call.
+    pub call: Duration,
+}
+
+impl<'a> Emulated<'a> {
+    /// A board of that build.
+    ///
+    /// # Errors
+    /// If it cannot be built.
+    pub fn new(step: &'a Step, config: BoardConfig) -> Result<Self, Box<dyn Error>> {
+        let mut parameters = step.parameters;
+        parameters.order = Some(Order::HazardFree);
+        let accelerator = open(config, &step.shapes)?;
+        Ok(Self { step, accelerator, parameters, bodies: Vec::new() })
+    }
+
+    /// Takes the step from its start.
+    ///
+    /// # Errors
+    /// If the step fails.
+    pub fn take(&mut self) -> Result<Taken, Box<dyn Error>> {
+        self.bodies.clone_from(&self.step.bodies);
+        let begin = Instant::now();
+        let collisions = &self.step.collisions;
+        let report = self.accelerator.step(&mut self.bodies, collisions, &self.parameters)?;
+        Ok(Taken { report, call: begin.elapsed() })
+    }
+
+    /// The bodies as the last step left them.
+    #[must_use]
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+}

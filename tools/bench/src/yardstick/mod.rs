@@ -1,0 +1,224 @@
+//! This folder is the yardstick: what a CPU takes for the same step, solved one collision after the
+//! other.
+//!
+//! A sequential solver in scalar f32, written from the formulae and from nothing else: records in
+//! the order in which they are solved, one array of bodies, no lanes, no threads. It is meant to be
+//! as good as such a loop is. What does not change during a step is computed once: effective masses,
+//! biases, lever arms of friction and its directions, and whether spin is damped. Velocities, mass
+//! and inertia of a body are one piece of memory, and so is what a pass needs of a collision. The
+//! moments are computed in every pass, because reading them back takes longer.
+//!
+//! Its bits are Bullet's: see the tests.
+//!
+//! Source: `tests/golden/README.md`, the formulae that Bullet's vectors were made with.
+
+#![allow(clippy::float_cmp, reason = "zero is exact: nothing to do, or a body that does not move")]
+
+mod integrate;
+mod passes;
+mod rows;
+mod vector;
+
+use std::time::{Duration, Instant};
+
+use zynq_pgs::{Body, Collision, Pose, Shape, StepParameters, Velocity};
+
+use rows::{ContactRows, FrictionRows};
+
+/// One collision as it comes: 112 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C)]
+pub struct Record {
+    normal: [f32; 3],
+    count: u32,
+    position_a: [f32; 3],
+    body_a: u32,
+    position_b: [f32; 3],
+    body_b: u32,
+    /// x, y, z and distance.
+    points: [[f32; 4]; 4],
+}
+
+const _: () = assert!(size_of::<Record>() == 112);
+
+impl Record {
+    fn new(bodies: &[Body], collision: &Collision) -> Self {
+        let position = |body: u32| bodies[index(body)].pose.position;
+        Self {
+            normal: collision.normal,
+            count: collision.count,
+            position_a: position(collision.body_a),
+            body_a: collision.body_a,
+            position_b: position(collision.body_b),
+            body_b: collision.body_b,
+            points: collision.contacts.map(|contact| {
+                let [x, y, z] = contact.point;
+                [x, y, z, contact.distance]
+            }),
+        }
+    }
+
+    /// The points that there are.
+    #[inline]
+    fn used(&self) -> &[[f32; 4]] {
+        &self.points[..index(self.count).min(4)]
+    }
+}
+
+/// What a collision reads and writes of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C, align(16))]
+struct Moving {
+    linear: [f32; 3],
+    inverse_mass: f32,
+    angular: [f32; 3],
+    inverse_inertia: [f32; 3],
+}
+
+/// An index as memory takes it.
+#[inline]
+const fn index(number: u32) -> usize {
+    number as usize
+}
+
+/// Where the time of a step went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stages {
+    /// Making constraint rows.
+    pub rows: Duration,
+    /// The contact passes.
+    pub contact: Duration,
+    /// The friction passes.
+    pub friction: Duration,
+    /// Moving the bodies.
+    pub integration: Duration,
+}
+
+impl Stages {
+    /// All passes.
+    #[must_use]
+    pub fn passes(&self) -> Duration {
+        self.contact + self.friction
+    }
+
+    /// All of the step.
+    #[must_use]
+    pub fn total(&self) -> Duration {
+        self.rows + self.passes() + self.integration
+    }
+}
+
+/// A solver with one step to solve, as often as wanted.
+#[derive(Debug)]
+pub struct Yardstick {
+    parameters: StepParameters,
+    given: Vec<(Pose, Moving)>,
+    shapes: Vec<u32>,
+    records: Vec<Record>,
+    poses: Vec<Pose>,
+    bodies: Vec<Moving>,
+    contacts: Vec<ContactRows>,
+    frictions: Vec<FrictionRows>,
+}
+
+impl Yardstick {
+    /// For a step whose collisions are solved in the order given.
+    ///
+    /// # Panics
+    /// If a collision names a body, or a body a shape, that is not there.
+    pub fn new<'a>(
+        shapes: &[Shape],
+        bodies: &[Body],
+        collisions: impl IntoIterator<Item = &'a Collision>,
+        parameters: &StepParameters,
+    ) -> Self {
+        let moving = |body: &Body| {
+            let Shape { inverse_mass, inverse_inertia } = shapes[index(body.shape)];
+            let Velocity { linear, angular } = body.velocity;
+            (body.pose, Moving { linear, inverse_mass, angular, inverse_inertia })
+        };
+        let records = collisions.into_iter().map(|collision| Record::new(bodies, collision));
+        let records: Vec<Record> = records.collect();
+        Self {
+            parameters: *parameters,
+            given: bodies.iter().map(moving).collect(),
+            shapes: bodies.iter().map(|body| body.shape).collect(),
+            poses: Vec::with_capacity(bodies.len()),
+            bodies: Vec::with_capacity(bodies.len()),
+            contacts: Vec::with_capacity(records.len()),
+            frictions: Vec::with_capacity(records.len()),
+            records,
+        }
+    }
+
+    /// The records, in their order.
+    #[must_use]
+    pub fn records(&self) -> &[Record] {
+        &self.records
+    }
+
+    /// Solves the step from its start; the times do not include going back there.
+    ///
+    /// Never inlined: tools that count find it by its name.
+    #[inline(never)]
+    pub fn solve(&mut self) -> Stages {
+        self.poses.clear();
+        self.poses.extend(self.given.iter().map(|(pose, _)| *pose));
+        self.bodies.clear();
+        self.bodies.extend(self.given.iter().map(|(_, body)| *body));
+        let mut last = Instant::now();
+        let mut lap = || {
+            let now = Instant::now();
+            now.duration_since(std::mem::replace(&mut last, now))
+        };
+        self.make_rows();
+        let rows = lap();
+        for _ in 0..self.parameters.contact_iterations {
+            passes::contact(&mut self.contacts, &mut self.bodies);
+        }
+        let contact = lap();
+        passes::limits(self.parameters.friction, &self.contacts, &mut self.frictions);
+        for _ in 0..self.parameters.friction_iterations {
+            passes::friction(&mut self.frictions, &mut self.bodies);
+        }
+        let friction = lap();
+        if self.parameters.integrate {
+            for (pose, body) in self.poses.iter_mut().zip(&mut self.bodies) {
+                if body.inverse_mass != 0.0 {
+                    integrate::integrate(&self.parameters, pose, body);
+                }
+            }
+        }
+        Stages { rows, contact, friction, integration: lap() }
+    }
+
+    #[inline(never)]
+    fn make_rows(&mut self) {
+        let StepParameters { position_drift, position_coefficient, time_step, .. } =
+            self.parameters;
+        let pair =
+            |record: &Record| [record.body_a, record.body_b].map(|body| &self.bodies[index(body)]);
+        let per_second = 1.0 / time_step;
+        self.contacts.clear();
+        self.contacts.extend(self.records.iter().map(|record| {
+            let pair = pair(record);
+            ContactRows::new(record, pair, position_drift, position_coefficient, per_second)
+        }));
+        self.frictions.clear();
+        self.frictions
+            .extend(self.records.iter().map(|record| FrictionRows::new(record, pair(record))));
+    }
+
+    /// The bodies as the last [`solve`](Self::solve) left them; none before.
+    #[must_use]
+    pub fn bodies(&self) -> Vec<Body> {
+        let states = self.poses.iter().zip(&self.bodies).zip(&self.shapes);
+        states
+            .map(|((pose, body), shape)| Body {
+                pose: *pose,
+                velocity: Velocity { linear: body.linear, angular: body.angular },
+                shape: *shape,
+            })
+            .collect()
+    }
+}
