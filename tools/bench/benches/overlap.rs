@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! cargo bench --bench overlap
-//! cargo bench --bench overlap -- --folder tests/golden/pile5_step60 --pack-ms 0.01
+//! cargo bench --bench overlap -- --input tests/golden/pile5_step60 --pack-ms 0.01
 //! cargo bench --bench overlap -- --pack-ms 3.5 --unpack-ms 0.5 --order as-given --json
 //! ```
 //!
@@ -25,74 +25,60 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use bench::median;
+use bench::options::{Common, Pile};
+use bench::step::Step;
+use bench::{median, milliseconds};
 use bitstream_model::{BoardConfig, CpuPort, EmulatedBoard};
-use scene::{Grid, Scene, SceneOptions};
+use clap::{Parser, ValueEnum};
+use scene::Grid;
 use serde_json::json;
-use step_folder::folder::Folder;
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, HostTimes, InFlight,
     OpenOptions, Pose, StepParameters, StepReport, Velocity,
 };
 
-/// What the command line asks for.
+/// Holds steps that overlap against the longer of packing and the board, on the board's clock.
+#[derive(Debug, Parser)]
+#[command(name = "cargo bench --bench overlap --")]
 struct Options {
+    /// Cubes along each axis, standing; y is up
+    #[arg(long, value_name = "NXxNYxNZ", default_value_t, conflicts_with = "input")]
     grid: Grid,
-    folder: Option<PathBuf>,
-    order: Order,
-    pack: Duration,
-    unpack: Option<Duration>,
-    steps: u32,
-    json: bool,
+    /// The step in this folder of arrays instead of a pile
+    #[arg(long, value_name = "DIR")]
+    input: Option<PathBuf>,
+    /// Order in which the collisions are sent
+    #[arg(long, value_enum, default_value_t = Sent::HazardFree)]
+    order: Sent,
+    /// Time that packing a step takes on the board's processor, ms
+    #[arg(long, value_name = "MS", default_value = "7", value_parser = time)]
+    pack_ms: Duration,
+    /// Time that storing the results takes there, ms [default: as long for a byte as packing]
+    #[arg(long, value_name = "MS", value_parser = time)]
+    unpack_ms: Option<Duration>,
+    #[command(flatten)]
+    common: Common,
 }
 
-impl Options {
-    fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Self, Box<dyn Error>> {
-        let mut options = Self {
-            grid: Grid::default(),
-            folder: None,
-            order: Order::HazardFree,
-            pack: Duration::from_millis(7),
-            unpack: None,
-            steps: 5,
-            json: false,
-        };
-        while let Some(argument) = arguments.next() {
-            let mut value = || arguments.next().ok_or(format!("{argument} needs a value"));
-            match argument.as_str() {
-                "--grid" => options.grid = value()?.parse()?,
-                "--folder" => options.folder = Some(value()?.into()),
-                "--order" => options.order = order(&value()?)?,
-                "--pack-ms" => options.pack = milliseconds(&value()?)?,
-                "--unpack-ms" => options.unpack = Some(milliseconds(&value()?)?),
-                "--steps" => options.steps = value()?.parse::<u32>()?.max(1),
-                "--json" => options.json = true,
-                // What cargo adds.
-                "--bench" => {}
-                other => {
-                    return Err(format!(
-                        "unknown {other:?}, expected --grid, --folder, --order, --pack-ms, \
-                         --unpack-ms, --steps or --json"
-                    )
-                    .into());
-                }
-            }
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Sent {
+    AsGiven,
+    HazardFree,
+}
+
+impl Sent {
+    fn order(self) -> Order {
+        match self {
+            Self::AsGiven => Order::AsGiven,
+            Self::HazardFree => Order::HazardFree,
         }
-        Ok(options)
     }
 }
 
-fn order(name: &str) -> Result<Order, String> {
-    match name {
-        "as-given" => Ok(Order::AsGiven),
-        "hazard-free" => Ok(Order::HazardFree),
-        other => Err(format!("unknown order {other:?}, expected as-given or hazard-free")),
-    }
-}
-
-fn milliseconds(text: &str) -> Result<Duration, Box<dyn Error>> {
-    Ok(Duration::try_from_secs_f64(text.parse::<f64>()? / 1e3)?)
+fn time(text: &str) -> Result<Duration, String> {
+    let ms: f64 = text.parse().map_err(|_| "expected a number of milliseconds".to_owned())?;
+    Duration::try_from_secs_f64(ms / 1e3).map_err(|error| error.to_string())
 }
 
 /// Pieces in which the host's time passes.
@@ -234,7 +220,7 @@ fn typical(reports: &[StepReport]) -> [(&'static str, Duration); 7] {
 }
 
 fn main() -> ExitCode {
-    match Options::parse(std::env::args().skip(1)).and_then(|options| run(&options)) {
+    match run(&Options::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -244,26 +230,17 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    let (name, bodies, collisions, shapes, mut parameters) = match &options.folder {
-        Some(path) => {
-            let folder = Folder::load(path)?;
-            let name = path.display().to_string();
-            (name, folder.bodies, folder.collisions, folder.shapes, folder.parameters)
-        }
-        None => {
-            let standing = SceneOptions { grid: options.grid, drop: 0.0, ..Default::default() };
-            let mut scene = Scene::new(&standing)?;
-            scene.detect();
-            let name = format!("{} cubes", options.grid);
-            let (bodies, collisions) = (scene.bodies().to_vec(), scene.collisions().to_vec());
-            (name, bodies, collisions, scene.shapes().to_vec(), StepParameters::default())
-        }
+    let step = match &options.input {
+        Some(path) => Step::load(path)?,
+        None => Step::of_pile(&Pile::standing(options.grid, 1), BoardConfig::default())?,
     };
+    let Step { name, shapes, bodies, collisions, mut parameters } = step;
+    let steps = u32::try_from(options.common.runs())?;
     let emulated = EmulatedBoard::new(BoardConfig::default())?;
     let board = BoardChoice::Emulated(emulated.cpu_port());
     let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
     accelerator.set_shapes(&shapes)?;
-    parameters.order = Some(options.order);
+    parameters.order = Some(options.order.order());
     let mut job = Job {
         bodies: &bodies,
         collisions: &collisions,
@@ -274,35 +251,35 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     };
     // Without the time of a host that is not this one; the first makes all memory.
     job.serial(&mut accelerator, 1)?;
-    let (_, plain) = job.serial(&mut accelerator, options.steps)?;
+    let (_, plain) = job.serial(&mut accelerator, steps)?;
     let alone = plain.first().ok_or("a report of each step")?;
     let on_board = alone.modelled_time();
-    job.pack = options.pack;
-    job.unpack = options.unpack.unwrap_or_else(|| {
+    job.pack = options.pack_ms;
+    job.unpack = options.unpack_ms.unwrap_or_else(|| {
         // The collisions are packed once, however often they are streamed.
         let passes = u64::from(alone.passes).max(1);
         let packed = alone.bytes_to_device.saturating_sub(alone.bytes_from_device) / passes
             + alone.bytes_from_device;
-        options.pack.mul_f64(alone.bytes_from_device as f64 / packed.max(1) as f64)
+        options.pack_ms.mul_f64(alone.bytes_from_device as f64 / packed.max(1) as f64)
     });
-    let (serial, _) = job.serial(&mut accelerator, options.steps)?;
-    let (each, _) = job.overlapped(&mut accelerator, options.steps)?;
+    let (serial, _) = job.serial(&mut accelerator, steps)?;
+    let (each, _) = job.overlapped(&mut accelerator, steps)?;
     let host = job.pack + job.unpack;
     let longer = host.max(on_board);
     let ratio = each.as_secs_f64() / longer.as_secs_f64();
-    let ms = |time: Duration| time.as_secs_f64() * 1e3;
+    let ms = milliseconds;
     let times = typical(&plain);
-    if options.json {
+    if options.common.json {
         let host_ms: serde_json::Map<_, _> =
             times.iter().map(|(name, time)| ((*name).to_owned(), ms(*time).into())).collect();
         let document = json!({
             "schema": 1,
             "bench": "overlap",
             "scene": name,
-            "order": if options.order == Order::AsGiven { "as-given" } else { "hazard-free" },
+            "order": if options.order == Sent::AsGiven { "as-given" } else { "hazard-free" },
             "bodies": job.bodies.len(),
             "collisions": job.collisions.len(),
-            "steps": options.steps,
+            "steps": steps,
             "pack_ms": ms(job.pack),
             "unpack_ms": ms(job.unpack),
             "board_ms": ms(on_board),
@@ -319,13 +296,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         "{name}: {} bodies, {} collisions, {} steps, on the board's clock\n",
         job.bodies.len(),
         job.collisions.len(),
-        options.steps
+        steps
     );
     println!("pack      {:>8.3} ms  given", ms(job.pack));
     println!(
         "unpack    {:>8.3} ms  {}",
         ms(job.unpack),
-        match options.unpack {
+        match options.unpack_ms {
             Some(_) => "given",
             None => "as packing, by bytes",
         }
