@@ -4,8 +4,9 @@ use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::Beat;
 
-use crate::beat::pack::pack_collisions;
+use crate::beat::pack::{Entries, Target, pack_collisions, survey};
 use crate::beat::stripe::Segment;
+use crate::record::end::{End, Ends};
 use crate::scene::{Bodies, Collisions, Shape};
 
 /// Packs collisions as a step does, into memory of its own instead of a board's.
@@ -13,13 +14,14 @@ use crate::scene::{Bodies, Collisions, Shape};
 pub struct CollisionPacker {
     variant: Variant,
     channels: [Vec<Beat>; DMA_COUNT_MAX],
+    ends: Vec<End>,
 }
 
 impl CollisionPacker {
     /// For one bitstream; without memory of its own yet.
     #[must_use]
     pub fn new(variant: Variant) -> Self {
-        Self { variant, channels: Default::default() }
+        Self { variant, channels: Default::default(), ends: Vec::new() }
     }
 
     /// Packs the records of all collisions over the bitstream's channels; returns the sum of their
@@ -39,7 +41,10 @@ impl CollisionPacker {
         }
         let mut channels = self.channels.each_mut().map(Vec::as_mut_slice);
         let channels = &mut channels[..streams];
-        pack_collisions(&self.variant, bodies, collisions, count, shapes, channels)
+        let target = Target { variant: &self.variant, shapes, quick: None };
+        survey(target, bodies, bodies.len(), &mut self.ends);
+        let entries = Entries { collisions, count, scheduled: false, words: None };
+        pack_collisions(target, Ends(&self.ends), &entries, channels).0
     }
 }
 

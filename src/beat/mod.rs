@@ -1,5 +1,6 @@
 //! This folder lays records out over the channels of a board, and reads results back from them.
 
+mod deal;
 pub(crate) mod pack;
 #[cfg(test)]
 mod pack_tests;

@@ -29,34 +29,37 @@ impl Sixteen {
         }
     }
 
-    /// Rows of f32 as rows of this format. Where `integers` says so the word beside the vec3 is an
-    /// unsigned integer, which validation has found to fit.
+    /// Records of f32 as records of this format. Where `integers` says so the word beside the vec3
+    /// is an unsigned integer, which validation has found to fit.
+    ///
+    /// Many at once: how the machine converts is found out once a call.
     #[inline]
     pub(crate) fn narrow<const ROWS: usize>(
         self,
-        rows: &[Beat; ROWS],
+        records: &[[Beat; ROWS]],
         integers: &[bool; ROWS],
-    ) -> [Row; ROWS] {
-        let mut narrow = [[0; LANES]; ROWS];
+        narrow: &mut [[Row; ROWS]],
+    ) {
+        let wide: &[f32] = bytemuck::cast_slice(records.as_flattened());
+        let words = narrow.as_flattened_mut().as_flattened_mut();
         match self {
             Self::Binary16 => {
-                let numbers: &mut [f16] = narrow.as_flattened_mut().reinterpret_cast_mut();
-                numbers.convert_from_f32_slice(bytemuck::cast_slice(rows));
+                let numbers: &mut [f16] = words.reinterpret_cast_mut();
+                numbers.convert_from_f32_slice(wide);
             }
             Self::Thesis16 => {
-                for (to, from) in narrow.iter_mut().zip(rows) {
-                    *to = from.0.map(thesis16::narrow);
+                for (to, from) in words.iter_mut().zip(wide) {
+                    *to = thesis16::narrow(from.to_bits());
                 }
             }
         }
-        for ((to, from), integer) in narrow.iter_mut().zip(rows).zip(integers) {
-            if *integer {
+        for (row, _) in integers.iter().enumerate().filter(|(_, integer)| **integer) {
+            for (to, from) in narrow.iter_mut().zip(records) {
                 #[expect(clippy::cast_possible_truncation, reason = "validated to fit")]
-                let word = from.0[WORD_LANE] as u16;
-                to[WORD_LANE] = word;
+                let word = from[row].0[WORD_LANE] as u16;
+                to[row][WORD_LANE] = word;
             }
         }
-        narrow
     }
 
     /// Rows of f32 numbers from rows of this format.
@@ -82,8 +85,18 @@ impl Sixteen {
 mod tests {
     use super::*;
 
+    fn narrowed_rows<const ROWS: usize>(
+        format: Sixteen,
+        rows: [Beat; ROWS],
+        integers: [bool; ROWS],
+    ) -> [Row; ROWS] {
+        let mut narrow = [[Row::default(); ROWS]];
+        format.narrow(&[rows], &integers, &mut narrow);
+        narrow[0]
+    }
+
     fn narrowed(format: Sixteen, value: f32) -> u16 {
-        format.narrow(&[Beat([value.to_bits(); 4])], &[false])[0][1]
+        narrowed_rows(format, [Beat([value.to_bits(); 4])], [false])[0][1]
     }
 
     #[test]
@@ -98,7 +111,7 @@ mod tests {
     fn integers_are_integers_in_either_format() {
         for format in [Sixteen::Binary16, Sixteen::Thesis16] {
             let row = Beat([0x3F80_0000, 0xC000_0000, 0x4248_0000, 0xABCD]);
-            let [with, without] = format.narrow(&[row; 2], &[true, false]);
+            let [with, without] = narrowed_rows(format, [row; 2], [true, false]);
             // 1, -2, 50 are exact in both.
             assert_eq!(with, [0x3C00, 0xC000, 0x5240, 0xABCD]);
             assert_eq!(without, [0x3C00, 0xC000, 0x5240, 0x0000]);

@@ -17,6 +17,7 @@ use crate::accelerator::{Capabilities, Control, Fingerprint, identify};
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
 use crate::error::OpenError;
 use crate::platform::{Access, AccessCounts, Platform, RegisterMap, Window, release_to_device};
+use crate::record::end::End;
 use crate::scene::StepParameters;
 
 /// Status registers of all channels: S2MM first, then MM2S.
@@ -65,6 +66,8 @@ pub(crate) struct Device {
     pub(super) cancellation: Option<Cancellation>,
     /// The longest piece that a descriptor carries, bytes.
     pub(super) largest: u32,
+    /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
+    pub(super) ends: Vec<End>,
 }
 
 impl Device {
@@ -131,6 +134,7 @@ impl Device {
             activity: Activity::Idle,
             cancellation: None,
             largest: largest_piece(capabilities.length_width),
+            ends: Vec::new(),
         }
     }
 
@@ -146,9 +150,7 @@ impl Device {
             lane.reserve_beats(&self.platform, plan.results(channel), width)?;
         }
         for core in 0..self.mm2s.len() {
-            let sent = plan.descriptors(core, self.largest);
-            let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
-            let received = usize::try_from(received).unwrap_or(usize::MAX);
+            let [sent, received] = self.descriptors_of(plan, core);
             for (lane, descriptors) in
                 [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
             {
@@ -159,6 +161,25 @@ impl Device {
             }
         }
         Ok(())
+    }
+
+    /// Whether buffers and rings are large enough for a step as they are.
+    pub(super) fn has_room(&self, plan: &Plan) -> bool {
+        (0..self.mm2s.len()).all(|core| {
+            let (mm2s, s2mm) = (&self.mm2s[core], &self.s2mm[core]);
+            let [sent, received] = self.descriptors_of(plan, core);
+            mm2s.beats().len() >= plan.segments(core).poses.end
+                && s2mm.beats().len() >= plan.results(core)
+                && mm2s.ring_takes(sent)
+                && s2mm.ring_takes(received)
+        })
+    }
+
+    /// Descriptors that a step takes of both channels of a core.
+    fn descriptors_of(&self, plan: &Plan, core: usize) -> [usize; 2] {
+        let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
+        let received = usize::try_from(received).unwrap_or(usize::MAX);
+        [plan.descriptors(core, self.largest), received]
     }
 
     /// Hands the buffers over, queues all descriptors, and starts; the number of doorbells.

@@ -9,6 +9,7 @@ use bitstream_model::interface::record::Beat;
 
 use super::plan::{Plan, bytes};
 use super::solver::Accelerator;
+use super::packing::Load;
 use super::symptom::Symptom;
 use crate::axi_dma::{Direction, largest_piece};
 use crate::beat::stripe::{Place, Segment};
@@ -86,7 +87,15 @@ impl Accelerator {
         let none: &[Collision] = &[];
         let empty: Schedule = (0..plan.collisions).map(|_| None).collect();
         let padding = Ordered { collisions: none, schedule: &empty };
-        let sent = self.device.pack(&plan, echo.bodies, &padding, None, &self.shapes);
+        let load = Load {
+            bodies: echo.bodies,
+            collisions: &padding,
+            scheduled: true,
+            lives: None,
+            shapes: &self.shapes,
+            quick: None,
+        };
+        let (sent, _) = self.device.pack(&plan, &load);
         let parameters = StepParameters {
             contact_iterations: u32::from(plan.passes > 0),
             friction_iterations: 0,

@@ -10,16 +10,17 @@ use super::cancellation::Cancellation;
 use super::device::Device;
 use super::in_flight::{Flight, InFlight, Started, Stopwatch};
 use super::ordering::{Arranged, Hardware, Ordering};
+use super::packing::Load;
 use super::plan::Plan;
 use super::report::{HostTimes, StepReport};
 use super::retry::with_retries;
 use super::symptom::Symptom;
 use crate::accelerator::Capabilities;
 use crate::error::{Error, OpenError};
-use crate::order::{Lives, Ordered};
+use crate::order::Ordered;
 use crate::platform::{Deadline, System};
-use crate::scene::validate::{Limits, validate, validate_shapes};
-use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
+use crate::scene::validate::{Limits, Quick, preflight, validate, validate_shapes};
+use crate::scene::{Bodies, Collisions, InputError, Pose, Shape, StepParameters, Velocity};
 
 /// Finds the board that the options ask for.
 pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
@@ -28,13 +29,26 @@ pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
 
 /// What a step is made of, once its collisions are in order.
 struct Job<'a, B: ?Sized, C: ?Sized> {
-    bodies: &'a B,
-    /// In the order in which they are sent.
-    collisions: &'a C,
-    lives: Option<&'a Lives>,
+    load: Load<'a, B, C>,
+    /// Whether all collisions are sent.
+    all: bool,
     parameters: &'a StepParameters,
-    shapes: &'a [Shape],
     limits: &'a Limits,
+    /// The whole of validation.
+    check: &'a dyn Fn() -> Result<(), InputError>,
+}
+
+/// Why a step was not started.
+#[derive(Debug)]
+enum Stop {
+    Input(InputError),
+    Symptom(Symptom),
+}
+
+impl<S: Into<Symptom>> From<S> for Stop {
+    fn from(symptom: S) -> Self {
+        Self::Symptom(symptom.into())
+    }
 }
 
 /// An open accelerator.
@@ -167,11 +181,16 @@ impl Accelerator {
         self.device.settle(&self.shapes)?;
         let mut watch = Stopwatch::start();
         let mut host = HostTimes::default();
-        validate(bodies, collisions, &self.shapes, parameters, &self.limits)?;
-        host.validate = watch.lap();
         let Self { ordering, device, limits, shapes, .. } = self;
+        let quick = Quick::new(preflight(bodies, collisions, shapes, parameters, limits)?);
+        // What is not right is said by the whole of validation, before anything else is.
+        let check = || validate(bodies, collisions, shapes, parameters, limits);
+        host.validate = watch.lap();
         let on = Hardware { capabilities: &device.capabilities, limits, shapes };
-        let arranged = ordering.arrange(bodies, collisions, parameters, on)?;
+        let arranged = match ordering.arrange(bodies, collisions, parameters, on) {
+            Ok(arranged) => arranged,
+            Err(error) => return Err(check().err().unwrap_or(error).into()),
+        };
         host.order = watch.lap();
         let accesses = (device.counts.reads(), device.counts.writes());
         let mut empty = 0;
@@ -182,13 +201,21 @@ impl Accelerator {
             // Those that fill the last issue are of the order's making too.
             let entries = lives.map_or(ordered.len(), |lives| lives.words().len());
             empty = entries.saturating_sub(ordering.schedule().collisions());
-            let job = Job { bodies, collisions: &ordered, lives, parameters, shapes, limits };
+            let all = ordering.schedule().collisions() == collisions.len();
+            let load =
+                Load { bodies, collisions: &ordered, scheduled, lives, shapes, quick: Some(&quick) };
+            let job = Job { load, all, parameters, limits, check: &check };
             launch(device, &job, &mut host, &mut watch)
         } else {
-            let job = Job { bodies, collisions, lives: None, parameters, shapes, limits };
+            let quick = Some(&quick);
+            let load = Load { bodies, collisions, scheduled, lives: None, shapes, quick };
+            let job = Job { load, all: true, parameters, limits, check: &check };
             launch(device, &job, &mut host, &mut watch)
         };
-        let (plan, started) = launched.map_err(|symptom| device.fail(symptom, shapes))?;
+        let (plan, started) = launched.map_err(|stop| match stop {
+            Stop::Input(error) => error.into(),
+            Stop::Symptom(symptom) => device.fail(symptom, shapes),
+        })?;
         let flight = Flight {
             plan,
             started,
@@ -205,13 +232,17 @@ impl Accelerator {
 }
 
 /// Packs a step and starts it; its plan, and what was started, if there is anything to stream.
+///
+/// Input is looked at while it is packed. Where it is not all packed, or the board is touched
+/// before, or the step ends early, it is validated first.
 fn launch<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     device: &mut Device,
     job: &Job<'_, B, C>,
     host: &mut HostTimes,
     watch: &mut Stopwatch,
-) -> Result<(Plan, Option<Started>), Symptom> {
-    let Job { bodies, collisions, lives, parameters, shapes, limits } = *job;
+) -> Result<(Plan, Option<Started>), Stop> {
+    let Job { load, all, parameters, limits, check } = job;
+    let Load { bodies, collisions, lives, shapes, .. } = *load;
     let plan = Plan {
         bodies: lives.map_or(bodies.len(), |lives| lives.velocities().len()),
         collisions: lives.map_or(collisions.len(), |lives| lives.words().len()),
@@ -219,12 +250,19 @@ fn launch<B: Bodies + ?Sized, C: Collisions + ?Sized>(
             + u64::from(parameters.friction_iterations),
         variant: limits.variant,
     };
-    device.check_cancelled()?;
+    let cancelled = device.check_cancelled();
+    if !all || plan.bodies == 0 || cancelled.is_err() || !device.has_room(&plan) {
+        check().map_err(Stop::Input)?;
+    }
+    cancelled?;
     if plan.bodies == 0 {
         return Ok((plan, None));
     }
     device.reserve_or_reset(&plan, shapes)?;
-    let sent = device.pack(&plan, bodies, collisions, lives, shapes);
+    let (sent, good) = device.pack(&plan, load);
+    if !good {
+        check().map_err(Stop::Input)?;
+    }
     host.pack = watch.lap();
     let limit = plan.deadline(parameters, &device.capabilities);
     let deadline = Deadline::after(&*device.platform, limit);

@@ -66,6 +66,35 @@ impl Rows<'_> {
         sum.into_iter().fold(fit, |fit, sum| fit & (sum <= LARGEST))
     }
 
+    /// Whether a bitstream that computes rows in binary16 surely computes these: the longest arms of
+    /// all contact points, whose numbers are in range, are taken together.
+    ///
+    /// What is longer in any component is no shorter after any of the roundings, so that what is
+    /// found to fit here fits each point by itself.
+    #[inline]
+    pub(super) fn surely_fit(&self, origin: [f32; 3], flush: bool) -> bool {
+        let positions = self.positions.map(|position| difference(position, origin));
+        let mut longest = [[0.0_f32; 3]; 2];
+        let mut furthest = [0.0_f32; 3];
+        let [first, ..] = self.collision.contacts;
+        for (ordinal, contact) in (0..).zip(&self.collision.contacts) {
+            // One that is not in use counts as the first does.
+            let point = if ordinal < self.collision.count { contact.point } else { first.point };
+            let point = difference(point, origin);
+            furthest = longer(furthest, point.map(f32::abs));
+            for (longest, position) in longest.iter_mut().zip(positions) {
+                *longest = longer(*longest, arm(point, position));
+            }
+        }
+        let short = longest.as_flattened().iter().fold(true, |fit, arm| fit & (*arm <= LONGEST_ARM));
+        // Four of them, and a little for the roundings of their sum.
+        let sum = furthest.iter().fold(true, |fit, point| fit & (*point <= LARGEST / 4.01));
+        short
+            & sum
+            & (self.inverse_mass() >= 1.0 / LARGEST)
+            & (self.inverse_effective_mass(longest) <= largest(flush))
+    }
+
     fn inverse_mass(&self) -> f32 {
         self.shapes[0].inverse_mass + self.shapes[1].inverse_mass
     }
@@ -156,6 +185,11 @@ fn arm(point: [f32; 3], position: [f32; 3]) -> [f32; 3] {
         let (x, p) = (point[k], position[k]);
         (x - p).abs() + (x.abs() + p.abs()) * LOSS
     })
+}
+
+/// The larger of each component.
+fn longer(one: [f32; 3], other: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|k| one[k].max(other[k]))
 }
 
 /// Adds magnitudes.

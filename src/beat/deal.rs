@@ -1,0 +1,109 @@
+//! This file deals the beats of a segment out to its channels.
+//!
+//! A block of records is laid out in the cache first; then its beats go to the channels one after
+//! the other, each a run of whole beats upwards, as memory that combines writes wants them. Nothing
+//! is read back: the sum that the accelerator is checked with is taken on the way.
+
+use bitstream_model::interface::record::{Beat, LANES};
+
+use super::stripe::{Deal, Layout, Place};
+use super::unpack::{add, total};
+
+/// Records of a block. Divisible by the records of a group of every stripe, so that each block
+/// begins with a group; and so few that a block, read and written, lies in the innermost cache.
+pub(super) const BLOCK: usize = 30;
+
+/// Writes the beats of one segment.
+pub(super) struct Dealer<'a, 'b> {
+    channels: &'a mut [&'b mut [Beat]],
+    deal: Deal,
+    padded: bool,
+    lanes: [u32; LANES],
+}
+
+impl<'a, 'b> Dealer<'a, 'b> {
+    /// From the first beat on.
+    ///
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+    pub(super) fn new(layout: &Layout, channels: &'a mut [&'b mut [Beat]]) -> Self {
+        let (deal, padded) = (Deal::new(layout.stripe), layout.stripe.padded);
+        Self { channels, deal, padded, lanes: [0; LANES] }
+    }
+
+    /// Writes the next beats.
+    #[inline]
+    pub(super) fn write(&mut self, beats: &[Beat]) {
+        beats.iter().for_each(|beat| add(&mut self.lanes, *beat));
+        let rest = match self.deal.group().len() {
+            _ if !self.deal.at_end_of_group() => beats,
+            1 => self.groups::<1>(beats),
+            2 => self.groups::<2>(beats),
+            3 => self.groups::<3>(beats),
+            4 => self.groups::<4>(beats),
+            5 => self.groups::<5>(beats),
+            7 => self.groups::<7>(beats),
+            _ => beats,
+        };
+        for beat in rest {
+            let Place { channel, slot } = self.deal.next();
+            self.channels[channel][slot] = *beat;
+        }
+    }
+
+    /// Writes whole groups of `G` beats; what is left of the beats.
+    #[inline]
+    fn groups<'c, const G: usize>(&mut self, beats: &'c [Beat]) -> &'c [Beat] {
+        let (groups, rest) = beats.as_chunks::<G>();
+        for (channel, to) in self.channels.iter_mut().enumerate() {
+            let (places, share) = places::<G>(self.deal.group(), channel);
+            let slots = self.deal.take(channel, groups.len() * share);
+            let to = &mut to[slots];
+            match share {
+                0 => {}
+                1 => run::<G, 1>(groups, &places, to),
+                2 => run::<G, 2>(groups, &places, to),
+                3 => run::<G, 3>(groups, &places, to),
+                _ => {
+                    for (to, group) in to.chunks_exact_mut(share).zip(groups) {
+                        to.iter_mut().zip(places).for_each(|(to, place)| *to = group[place]);
+                    }
+                }
+            }
+        }
+        rest
+    }
+
+    /// Fills the last group if the stripe says so; the sum of all words, modulo 2^32.
+    pub(super) fn finish(mut self) -> u32 {
+        while self.padded && !self.deal.at_end_of_group() {
+            self.write(&[Beat::default()]);
+        }
+        total(self.lanes)
+    }
+}
+
+/// Which beats of a group of `G` go to a channel, and how many they are.
+fn places<const G: usize>(group: &[u8], channel: usize) -> ([usize; G], usize) {
+    let (mut places, mut share) = ([0; G], 0);
+    for (place, stream) in group.iter().enumerate().take(G) {
+        if usize::from(*stream) == channel {
+            places[share] = place;
+            share += 1;
+        }
+    }
+    (places, share)
+}
+
+/// Writes the `S` beats of each group that go to one channel.
+#[inline]
+fn run<const G: usize, const S: usize>(
+    groups: &[[Beat; G]],
+    places: &[usize; G],
+    to: &mut [Beat],
+) {
+    // Said once here, so that it is not asked of every beat.
+    let places: [usize; S] = std::array::from_fn(|at| places[at % G].min(G - 1));
+    for (to, group) in to.as_chunks_mut::<S>().0.iter_mut().zip(groups) {
+        *to = places.map(|place| group[place]);
+    }
+}
