@@ -10,14 +10,14 @@
 //! something is.
 
 use bitstream_model::interface::profile::{Geometry, Inertia, Variant};
-use bitstream_model::interface::record::{Beat, collision, pose, relative, velocity};
+use bitstream_model::interface::record::{Beat, pose, relative, velocity};
 
 use super::deal::{BLOCK, Dealer};
 use super::stripe::{Layout, Segment};
 use crate::record;
 use crate::record::end::{End, Ends};
 use crate::record::sixteen::{Row, Sixteen};
-use crate::scene::validate::Quick;
+use crate::scene::validate::{Block, Quick, head};
 use crate::scene::{
     Bodies, Body, CONTACT_POINTS, Collision, Collisions, Contact, Pose, Shape, Velocity,
 };
@@ -136,22 +136,28 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
 ) -> (u32, bool) {
     match target.variant.profile.geometry {
         Geometry::Absolute => {
-            let encode = |_, it: &Collision| {
-                let [a, b] = [ends.get(it.body_a), ends.get(it.body_b)];
+            let encode = |_, it: &Collision, [a, b]: [End; 2]| {
                 record::collision::encode(it, a.position, b.position)
             };
             let integers = &record::collision::INTEGERS;
-            pack_entries::<_, { collision::ROWS }>(target, ends, entries, integers, channels, encode)
+            let look = |quick: &Quick<'_>, block: &Block<'_>, records: &[_]| {
+                quick.absolute(block, records)
+            };
+            pack_entries(target, ends, entries, integers, channels, encode, look)
         }
         Geometry::Relative => {
-            let encode = |index, it: &Collision| relative_record(ends, entries.words, index, it);
+            let encode =
+                |index, it: &Collision, ends| relative_record(ends, entries.words, index, it);
             let integers = &record::relative::INTEGERS;
-            pack_entries::<_, { relative::ROWS }>(target, ends, entries, integers, channels, encode)
+            let look = |quick: &Quick<'_>, block: &Block<'_>, records: &[_]| {
+                quick.relative(block, records)
+            };
+            pack_entries(target, ends, entries, integers, channels, encode, look)
         }
     }
 }
 
-/// Reads, looks at, encodes and deals out collisions, a block at a time.
+/// Reads, encodes, looks at and deals out collisions, a block at a time.
 #[inline]
 fn pack_entries<C: Collisions + ?Sized, const ROWS: usize>(
     target: Target<'_>,
@@ -159,7 +165,8 @@ fn pack_entries<C: Collisions + ?Sized, const ROWS: usize>(
     entries: &Entries<'_, C>,
     integers: &[bool; ROWS],
     channels: &mut [&mut [Beat]],
-    encode: impl Fn(usize, &Collision) -> [Beat; ROWS],
+    encode: impl Fn(usize, &Collision, [End; 2]) -> [Beat; ROWS],
+    look: impl Fn(&Quick<'_>, &Block<'_>, &[[Beat; ROWS]]) -> bool,
 ) -> (u32, bool) {
     let Entries { collisions, count, scheduled, .. } = *entries;
     let layout = Segment::Collisions.layout(target.variant);
@@ -167,17 +174,34 @@ fn pack_entries<C: Collisions + ?Sized, const ROWS: usize>(
     let mut stage = Stage::new(&layout);
     let mut block = [NOTHING; BLOCK];
     let mut good = true;
+    let (structures, looks) = (collisions.structures(), target.quick.is_some());
     for first in (0..count).step_by(BLOCK) {
         let block = &mut block[..(count - first).min(BLOCK)];
-        // Nothing else between them, so that many are under way at once from wherever they lie.
-        for (at, to) in block.iter_mut().enumerate() {
-            *to = collisions.collision(first + at);
+        let block = match structures.and_then(|all| all.get(first..first + block.len())) {
+            Some(block) => block,
+            None => {
+                for (at, to) in block.iter_mut().enumerate() {
+                    *to = collisions.collision(first + at);
+                }
+                block
+            }
+        };
+        if scheduled {
+            // They lie anywhere: on their way while this block is dealt with.
+            (first + BLOCK..count).take(BLOCK).for_each(|next| collisions.soon(next));
+        }
+        let mut heads = true;
+        let records = stage.records(block.len());
+        for (at, (to, from)) in records.iter_mut().zip(block).enumerate() {
+            let of_both = [ends.get(from.body_a), ends.get(from.body_b)];
+            if looks {
+                heads &= head(from, of_both, scheduled);
+            }
+            *to = encode(first + at, from, of_both);
         }
         if let Some(quick) = target.quick {
-            good &= quick.collisions(first, block, ends, scheduled);
-        }
-        for (at, (to, from)) in stage.records(block.len()).iter_mut().zip(&*block).enumerate() {
-            *to = encode(first + at, from);
+            let block = Block { first, collisions: block, ends, scheduled, heads };
+            good &= look(quick, &block, records);
         }
         stage.deal(block.len(), integers, &mut dealer);
     }
@@ -191,14 +215,13 @@ const REFUSED: [u32; 2] = [u32::MAX; 2];
 ///
 /// Nobody reads the marks of padding, so that a collision which had contact points when the marks
 /// were made and has none now would shift all bodies behind it: it is sent as one to be refused.
-#[inline]
+#[inline(always)]
 fn relative_record(
-    ends: Ends<'_>,
+    [a, b]: [End; 2],
     words: Option<&[[u32; 2]]>,
     index: usize,
     collision: &Collision,
 ) -> [Beat; relative::ROWS] {
-    let [a, b] = [ends.get(collision.body_a), ends.get(collision.body_b)];
     let moves = [!a.is_static(), !b.is_static()];
     let [a, b] = record::relative::anchors([a.position, b.position], moves);
     let Some(words) = words else { return record::relative::encode(collision, a, b) };
@@ -249,12 +272,15 @@ const NOTHING: Collision = Collision {
 /// Reads the next block of `count` bodies.
 #[inline]
 fn read<'a, B: Bodies + ?Sized>(
-    bodies: &B,
+    bodies: &'a B,
     first: usize,
     count: usize,
     block: &'a mut [Body; BLOCK],
 ) -> &'a [Body] {
     let block = &mut block[..(count - first).min(BLOCK)];
+    if let Some(block) = bodies.structures().and_then(|all| all.get(first..first + block.len())) {
+        return block;
+    }
     for (at, to) in block.iter_mut().enumerate() {
         *to = bodies.body(first + at);
     }

@@ -3,9 +3,7 @@
 
 use proptest::prelude::*;
 
-use super::pack::{
-    Chosen, Entries, Target, pack_collisions, pack_poses, pack_velocities, survey,
-};
+use super::pack::{Chosen, Entries, Target, pack_collisions, pack_poses, pack_velocities, survey};
 use super::stripe::Segment;
 use crate::interface::number::{Numbers, StreamFormat};
 use crate::interface::profile::{

@@ -62,14 +62,13 @@ impl Sixteen {
         }
     }
 
-    /// Rows of f32 numbers from rows of this format.
+    /// Rows of f32 numbers from rows of this format. Many at once, as [`Self::narrow`].
     #[inline]
-    pub(crate) fn widen<const ROWS: usize>(self, rows: &[Row; ROWS]) -> [Beat; ROWS] {
-        let mut wide = [Beat::default(); ROWS];
+    pub(crate) fn widen(self, rows: &[Row], wide: &mut [Beat]) {
         match self {
             Self::Binary16 => {
                 let numbers: &[f16] = rows.as_flattened().reinterpret_cast();
-                numbers.convert_to_f32_slice(bytemuck::cast_slice_mut(&mut wide));
+                numbers.convert_to_f32_slice(bytemuck::cast_slice_mut(wide));
             }
             Self::Thesis16 => {
                 for (to, from) in wide.iter_mut().zip(rows) {
@@ -77,7 +76,6 @@ impl Sixteen {
                 }
             }
         }
-        wide
     }
 }
 
@@ -93,6 +91,12 @@ mod tests {
         let mut narrow = [[Row::default(); ROWS]];
         format.narrow(&[rows], &integers, &mut narrow);
         narrow[0]
+    }
+
+    fn widened(format: Sixteen, row: Row) -> Beat {
+        let mut wide = [Beat::default()];
+        format.widen(&[row], &mut wide);
+        wide[0]
     }
 
     fn narrowed(format: Sixteen, value: f32) -> u16 {
@@ -123,7 +127,7 @@ mod tests {
     #[test]
     fn binary16_is_rounded_to_nearest_even_over_its_whole_range() {
         for bits in 0..0x7BFF_u16 {
-            let [low, high] = Sixteen::Binary16.widen(&[[bits, bits + 1, 0, 0]])[0]
+            let [low, high] = widened(Sixteen::Binary16, [bits, bits + 1, 0, 0])
                 .0
                 .first_chunk()
                 .map(|[low, high]| [f32::from_bits(*low), f32::from_bits(*high)])
@@ -148,7 +152,7 @@ mod tests {
     #[test]
     fn what_is_not_finite_comes_back_as_such() {
         let finite = |format: Sixteen, word: u16| {
-            f32::from_bits(format.widen(&[[word, 0, 0, 0]])[0].0[0]).is_finite()
+            f32::from_bits(widened(format, [word, 0, 0, 0]).0[0]).is_finite()
         };
         for format in [Sixteen::Binary16, Sixteen::Thesis16] {
             for word in 0..=u16::MAX {

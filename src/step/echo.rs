@@ -7,9 +7,9 @@ use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MIN;
 use bitstream_model::interface::profile::{Flow, Variant};
 use bitstream_model::interface::record::Beat;
 
+use super::packing::Load;
 use super::plan::{Plan, bytes};
 use super::solver::Accelerator;
-use super::packing::Load;
 use super::symptom::Symptom;
 use crate::axi_dma::{Direction, largest_piece};
 use crate::beat::stripe::{Place, Segment};

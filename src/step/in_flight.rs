@@ -117,7 +117,7 @@ impl<'a> InFlight<'a> {
         flight.watch.lap();
         let Some(Started { sent, deadline, doorbells }) = flight.started else {
             // Nothing moves, and nothing of it is streamed.
-            accelerator.unpack(plan, bodies, live)?;
+            accelerator.unpack(plan, bodies, live, None)?;
             let counts = accelerator.device.capabilities.impulse_sum;
             let counters = Counters { impulse_sum: counts.then_some(0.0), ..Counters::default() };
             return Ok(self.report(&counters));
@@ -126,8 +126,8 @@ impl<'a> InFlight<'a> {
         let counters = accelerator.device.collect(&deadline)?;
         accelerator.device.take_back()?;
         flight.host.wait = flight.watch.lap();
-        accelerator.check_sums(plan, sent, &counters)?;
-        accelerator.unpack(plan, bodies, live)?;
+        Accelerator::check_received(plan, sent, &counters)?;
+        accelerator.unpack(plan, bodies, live, counters.sums.map(|(_, answered)| answered))?;
         flight.host.unpack = flight.watch.lap();
 
         let mut report = self.report(&counters);

@@ -47,6 +47,8 @@ pub use fault::{AcceleratorError, Awaited, Fault, Subject};
 pub use in_flight::InFlight;
 pub use phase::Phase;
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
+#[cfg(feature = "bench")]
+pub(crate) use results::Results;
 pub use solver::Accelerator;
 pub(crate) use {
     board::Found,

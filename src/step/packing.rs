@@ -71,8 +71,12 @@ impl Device {
                 (velocities, pack_poses(target, &chosen, plan.bodies, poses), good)
             }
         };
-        let of_entries =
-            Entries { collisions, count: plan.collisions, scheduled, words: lives.map(Lives::words) };
+        let of_entries = Entries {
+            collisions,
+            count: plan.collisions,
+            scheduled,
+            words: lives.map(Lives::words),
+        };
         let (collisions, good) =
             pack_collisions(target, Ends(ends), &of_entries, &mut entries[active]);
         (Sent { velocities, collisions, poses }, bodies_good & good)

@@ -202,8 +202,14 @@ impl Accelerator {
             let entries = lives.map_or(ordered.len(), |lives| lives.words().len());
             empty = entries.saturating_sub(ordering.schedule().collisions());
             let all = ordering.schedule().collisions() == collisions.len();
-            let load =
-                Load { bodies, collisions: &ordered, scheduled, lives, shapes, quick: Some(&quick) };
+            let load = Load {
+                bodies,
+                collisions: &ordered,
+                scheduled,
+                lives,
+                shapes,
+                quick: Some(&quick),
+            };
             let job = Job { load, all, parameters, limits, check: &check };
             launch(device, &job, &mut host, &mut watch)
         } else {

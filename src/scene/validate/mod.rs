@@ -11,7 +11,7 @@ mod range;
 mod rows;
 mod shape;
 
-pub(crate) use quick::Quick;
+pub(crate) use quick::{Block, Quick, head};
 pub(crate) use shape::{needed, validate_shapes};
 
 use self::body::{check_body, shape_of};

@@ -6,6 +6,7 @@
 
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::Variant;
+use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES};
 
 use super::Scene;
 use super::range::{fits, origin, used};
@@ -64,35 +65,6 @@ impl Rows<'_> {
             fit &= short & (self.inverse_effective_mass(arms) <= largest(flush));
         }
         sum.into_iter().fold(fit, |fit, sum| fit & (sum <= LARGEST))
-    }
-
-    /// Whether a bitstream that computes rows in binary16 surely computes these: the longest arms of
-    /// all contact points, whose numbers are in range, are taken together.
-    ///
-    /// What is longer in any component is no shorter after any of the roundings, so that what is
-    /// found to fit here fits each point by itself.
-    #[inline]
-    pub(super) fn surely_fit(&self, origin: [f32; 3], flush: bool) -> bool {
-        let positions = self.positions.map(|position| difference(position, origin));
-        let mut longest = [[0.0_f32; 3]; 2];
-        let mut furthest = [0.0_f32; 3];
-        let [first, ..] = self.collision.contacts;
-        for (ordinal, contact) in (0..).zip(&self.collision.contacts) {
-            // One that is not in use counts as the first does.
-            let point = if ordinal < self.collision.count { contact.point } else { first.point };
-            let point = difference(point, origin);
-            furthest = longer(furthest, point.map(f32::abs));
-            for (longest, position) in longest.iter_mut().zip(positions) {
-                *longest = longer(*longest, arm(point, position));
-            }
-        }
-        let short = longest.as_flattened().iter().fold(true, |fit, arm| fit & (*arm <= LONGEST_ARM));
-        // Four of them, and a little for the roundings of their sum.
-        let sum = furthest.iter().fold(true, |fit, point| fit & (*point <= LARGEST / 4.01));
-        short
-            & sum
-            & (self.inverse_mass() >= 1.0 / LARGEST)
-            & (self.inverse_effective_mass(longest) <= largest(flush))
     }
 
     fn inverse_mass(&self) -> f32 {
@@ -174,6 +146,65 @@ impl Rows<'_> {
     }
 }
 
+/// The bodies of a collision, as [`surely_fit`] looks at them.
+pub(super) struct Ends<'a> {
+    /// Rows that hold their positions, as they are streamed.
+    pub(super) positions: [&'a Beat; 2],
+    pub(super) shapes: [&'a Shape; 2],
+}
+
+/// Whether a bitstream that computes rows in binary16 surely computes these: the longest arms of all
+/// contact points, whose numbers are in range, are taken together.
+///
+/// What is longer in any component is no shorter after any of the roundings, so that what is found
+/// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
+/// left out at the end.
+#[inline]
+pub(super) fn surely_fit(
+    ends: &Ends<'_>,
+    points: &[Beat; CONTACT_POINTS],
+    count: u32,
+    flush: bool,
+) -> bool {
+    let positions = ends.positions.map(|beat| beat.0.map(f32::from_bits));
+    let mut longest = [[0.0_f32; LANES]; 2];
+    let mut furthest = [0.0_f32; LANES];
+    let first = points[0].0.map(f32::from_bits);
+    for (ordinal, point) in (0..).zip(points) {
+        // One that is not in use counts as the first does.
+        let used = ordinal < count;
+        let point: [f32; LANES] =
+            std::array::from_fn(|k| if used { f32::from_bits(point.0[k]) } else { first[k] });
+        for k in 0..LANES {
+            furthest[k] = larger(furthest[k], point[k].abs());
+        }
+        for (longest, position) in longest.iter_mut().zip(&positions) {
+            for k in 0..LANES {
+                let (x, p) = (point[k], position[k]);
+                longest[k] = larger(longest[k], (x - p).abs() + (x.abs() + p.abs()) * LOSS);
+            }
+        }
+    }
+    let [a, b] = ends.shapes;
+    let mass = a.inverse_mass + b.inverse_mass;
+    let mut fit = mass >= 1.0 / LARGEST;
+    let mut turning = [0.0; 2];
+    for ((turning, shape), [rx, ry, rz, _]) in turning.iter_mut().zip(ends.shapes).zip(longest) {
+        let [x, y, z] = shape.inverse_inertia;
+        *turning = x.max(y).max(z) * (rx * rx + ry * ry + rz * rz);
+        fit &= (rx <= LONGEST_ARM) & (ry <= LONGEST_ARM) & (rz <= LONGEST_ARM);
+    }
+    fit &= mass + turning[0] + turning[1] <= largest(flush);
+    // Four of them, and a little for the roundings of their sum.
+    let [x, y, z, _] = furthest;
+    fit & (x <= LARGEST / 4.01) & (y <= LARGEST / 4.01) & (z <= LARGEST / 4.01)
+}
+
+#[inline]
+fn larger(one: f32, other: f32) -> f32 {
+    if one > other { one } else { other }
+}
+
 /// The largest inverse effective mass whose reciprocal is not 0, 1/kg.
 const fn largest(flush: bool) -> f32 {
     if flush { LARGEST_FLUSHED } else { LARGEST }
@@ -185,11 +216,6 @@ fn arm(point: [f32; 3], position: [f32; 3]) -> [f32; 3] {
         let (x, p) = (point[k], position[k]);
         (x - p).abs() + (x.abs() + p.abs()) * LOSS
     })
-}
-
-/// The larger of each component.
-fn longer(one: [f32; 3], other: [f32; 3]) -> [f32; 3] {
-    std::array::from_fn(|k| one[k].max(other[k]))
 }
 
 /// Adds magnitudes.
