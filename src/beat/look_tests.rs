@@ -22,6 +22,11 @@ const SHAPES: [Shape; 4] = [
 ];
 const BODIES: usize = 40;
 
+/// All that a bitstream takes: the last is too heavy for one that flushes.
+fn shapes(limits: &Limits) -> &'static [Shape] {
+    if limits.flush_subnormals { &SHAPES[..3] } else { &SHAPES }
+}
+
 fn limits(variant: Variant, flush_subnormals: bool) -> Limits {
     Limits {
         variant,
@@ -37,11 +42,11 @@ fn limits(variant: Variant, flush_subnormals: bool) -> Limits {
 
 fn any_limits() -> impl Strategy<Value = Limits> {
     let profiles = vec![&NAIVE, &FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16];
-    let short_rows = [Precision::F32, Precision::Binary16];
-    let formats = [StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16];
+    let short_rows = vec![Precision::F32, Precision::Binary16];
+    let formats = vec![StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16];
     (
         prop::sample::select(profiles),
-        prop::option::of((prop::sample::select(&short_rows), prop::sample::select(&formats))),
+        prop::option::of((prop::sample::select(short_rows), prop::sample::select(formats))),
         any::<bool>(),
         any::<bool>(),
     )
@@ -82,7 +87,7 @@ fn any_f32() -> impl Strategy<Value = f32> {
 
 /// As [`any_f32`], but rarely at an edge.
 fn mostly() -> impl Strategy<Value = f32> {
-    prop_oneof![40 => -5.0_f32..5.0, 1 => any_f32()]
+    prop_oneof![300 => -5.0_f32..5.0, 1 => any_f32()]
 }
 
 fn any_vec3() -> impl Strategy<Value = [f32; 3]> {
@@ -93,7 +98,7 @@ prop_compose! {
     fn any_body()(
         position in any_vec3(),
         orientation in prop_oneof![
-            20 => Just([0.0, 0.6, 0.0, 0.8]),
+            400 => Just([0.0, 0.6, 0.0, 0.8]),
             1 => [any_f32(), any_f32(), any_f32(), any_f32()],
             1 => Just([1e-6, 0.0, 0.0, 0.0]),
             1 => Just([0.9e-6, 0.0, 0.0, 0.0]),
@@ -101,8 +106,8 @@ prop_compose! {
         ],
         linear in any_vec3(),
         angular in any_vec3(),
-        shape in prop_oneof![60 => 1_u32..3, 10 => Just(0), 1 => 3_u32..6, 1 => any::<u32>()],
-        moves in prop::bool::weighted(0.02),
+        shape in prop_oneof![600 => 1_u32..3, 100 => Just(0), 1 => 3_u32..6, 1 => any::<u32>()],
+        moves in prop::bool::weighted(0.01),
     ) -> Body {
         let mut velocity = Velocity { linear, angular };
         if shape == 0 && !moves {
@@ -115,17 +120,17 @@ prop_compose! {
 prop_compose! {
     fn any_collision()(
         pair in prop_oneof![
-            60 => (0_u32..40, 1_u32..40).prop_map(|(a, by)| [a, (a + by) % 40]),
+            300 => (0_u32..40, 1_u32..40).prop_map(|(a, by)| [a, (a + by) % 40]),
             1 => [0_u32..42, 0_u32..42],
             1 => [any::<u32>(), any::<u32>()],
         ],
         normal in prop_oneof![
-            30 => Just([0.0_f32, -1.0, 0.0]),
-            1 => [0.99_f32..1.01, Just(0.0_f32), Just(0.0_f32)],
-            1 => [0.9989_f32..1.0011, Just(0.0_f32), Just(0.0_f32)],
+            300 => Just([0.0_f32, -1.0, 0.0]),
+            1 => (0.99_f32..1.01).prop_map(|x| [x, 0.0, 0.0]),
+            1 => (0.9989_f32..1.0011).prop_map(|x| [x, 0.0, 0.0]),
             1 => any_vec3(),
         ],
-        count in prop_oneof![60 => 1_u32..5, 1 => Just(0), 1 => Just(5), 1 => any::<u32>()],
+        count in prop_oneof![300 => 1_u32..5, 1 => Just(0), 1 => Just(5), 1 => any::<u32>()],
         points in [any_vec3(), any_vec3(), any_vec3(), any_vec3()],
         distances in [mostly(), mostly(), mostly(), mostly()],
         unused in any::<u32>().prop_map(f32::from_bits),
@@ -159,11 +164,11 @@ fn said(
     collisions: &Vec<Collision>,
     schedule: Option<&Schedule>,
 ) -> Option<(bool, Result<(), InputError>)> {
-    let parameters = StepParameters::default();
-    let scene = preflight(bodies, collisions, &SHAPES, &parameters, limits).ok()?;
+    let (parameters, shapes) = (StepParameters::default(), shapes(limits));
+    let scene = preflight(bodies, collisions, shapes, &parameters, limits).ok()?;
     let quick = Quick::new(scene);
     let variant = &limits.variant;
-    let target = Target { variant, shapes: &SHAPES, quick: Some(&quick) };
+    let target = Target { variant, shapes, quick: Some(&quick) };
     let mut ends = Vec::new();
     let count = bodies.len();
     let mut velocities = buffers(variant, Segment::Velocities, count);
@@ -191,7 +196,7 @@ fn said(
             pack_collisions(target, Ends(&ends), &entries, &mut views(&mut channels)).1
         }
     };
-    Some((bodies_good & good, validate(bodies, collisions, &SHAPES, &parameters, limits)))
+    Some((bodies_good & good, validate(bodies, collisions, shapes, &parameters, limits)))
 }
 
 proptest! {
@@ -208,7 +213,7 @@ proptest! {
         let schedule: Option<Schedule> = order.map(|seed| {
             // Somewhere an empty entry, all others backwards.
             let mut entries: Vec<Option<u32>> =
-                (0..).zip(&collisions).map(|(at, _)| Some(at)).rev().collect();
+                (0..u32::try_from(collisions.len()).expect("few")).rev().map(Some).collect();
             let at = usize::try_from(seed % (collisions.len() as u64 + 1)).expect("few");
             entries.insert(at, None);
             entries.into_iter().collect()
