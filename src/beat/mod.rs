@@ -6,5 +6,6 @@ mod look_tests;
 pub(crate) mod pack;
 #[cfg(test)]
 mod pack_tests;
+mod stage;
 pub(crate) mod stripe;
 pub(crate) mod unpack;

@@ -13,10 +13,10 @@ use bitstream_model::interface::profile::{Geometry, Inertia, Variant};
 use bitstream_model::interface::record::{Beat, pose, relative, velocity};
 
 use super::deal::{BLOCK, Dealer};
-use super::stripe::{Layout, Segment};
+use super::stage::Stage;
+use super::stripe::Segment;
 use crate::record;
 use crate::record::end::{End, Ends};
-use crate::record::sixteen::{Row, Sixteen};
 use crate::scene::validate::{Block, Quick, head};
 use crate::scene::{
     Bodies, Body, CONTACT_POINTS, Collision, Collisions, Contact, Pose, Shape, Velocity,
@@ -66,7 +66,7 @@ pub(crate) fn survey<B: Bodies + ?Sized>(
 /// where the bitstream wants it; the sums of both, modulo 2^32, and whether validation refuses
 /// none.
 ///
-/// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+/// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says.
 pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
@@ -92,7 +92,7 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
 /// Writes the velocity records of `count` bodies, and their inertia where the bitstream wants it;
 /// returns the sum of the words written, modulo 2^32.
 ///
-/// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+/// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says.
 pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
@@ -304,6 +304,7 @@ struct Velocities<'a, 'b> {
 }
 
 /// With and without inertia.
+#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
 enum VelocityStage {
     Isotropic(Stage<{ velocity::ROWS }>),
     World(Stage<{ velocity::WORLD_ROWS }>),
@@ -374,44 +375,3 @@ fn world_velocity(body: &Body, shapes: &[Shape]) -> [Beat; velocity::WORLD_ROWS]
     let inertia = record::inertia::about_world_axes(shape, body.pose.orientation);
     record::velocity::encode_world(body, &inertia)
 }
-
-/// A block of records on its way.
-struct Stage<const ROWS: usize> {
-    wide: [[Beat; ROWS]; BLOCK],
-    /// The same in sixteen bits: two rows a beat, without a gap between records.
-    narrow: [[Beat; ROWS]; BLOCK / 2],
-    format: Option<Sixteen>,
-}
-
-impl<const ROWS: usize> Stage<ROWS> {
-    fn new(layout: &Layout) -> Self {
-        Self {
-            wide: [[Beat::default(); ROWS]; BLOCK],
-            narrow: [[Beat::default(); ROWS]; BLOCK / 2],
-            format: Sixteen::of(layout.format),
-        }
-    }
-
-    /// The records of the block, to write.
-    #[inline]
-    fn records(&mut self, count: usize) -> &mut [[Beat; ROWS]] {
-        &mut self.wide[..count]
-    }
-
-    /// Sends the block to the channels, in the format of the stream.
-    #[inline]
-    fn deal(&mut self, count: usize, integers: &[bool; ROWS], dealer: &mut Dealer<'_, '_>) {
-        let records = &self.wide[..count];
-        let Some(format) = self.format else { return dealer.write(records.as_flattened()) };
-        let rows: &mut [Row] = bytemuck::cast_slice_mut(self.narrow.as_flattened_mut());
-        format.narrow(records, integers, &mut rows.as_chunks_mut().0[..count]);
-        let used = count * ROWS;
-        if used % 2 != 0 {
-            // The last beat of the segment.
-            rows[used] = Row::default();
-        }
-        dealer.write(&self.narrow.as_flattened()[..used.div_ceil(2)]);
-    }
-}
-
-const _: () = assert!(BLOCK.is_multiple_of(2));

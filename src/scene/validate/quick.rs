@@ -100,7 +100,7 @@ impl<'a> Quick<'a> {
             good &= self.bodies.bound(&[[linear, angular, position, orientation]]);
             let [x, y, z, w] = body.pose.orientation;
             let square = x * x + y * y + z * z + w * w;
-            good &= (square >= ORIENTATION) & (square <= f32::MAX) & end.has_shape();
+            good &= (ORIENTATION..=f32::MAX).contains(&square) & end.has_shape();
             let speeds = [body.velocity.linear, body.velocity.angular];
             let moves = speeds.as_flattened().iter().fold(0, |bits, v| bits | v.to_bits());
             good &= !end.is_static() | (moves & MAGNITUDE == 0);
