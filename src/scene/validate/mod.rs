@@ -1,7 +1,8 @@
 //! This folder refuses bad input before anything is sent.
 //!
-//! One pass over the bodies, one over the collisions. What passes here, a board of the same
-//! capacities accepts.
+//! One pass over the bodies, one over the collisions ([`validate`]). What passes here, a board of
+//! the same capacities accepts. A step looks at its input while it packs it ([`Quick`]), and comes
+//! here for the words of what it has found.
 
 mod body;
 mod collision;
