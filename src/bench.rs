@@ -1,25 +1,29 @@
-//! This file lets a benchmark pack collisions without a board: feature `bench`.
+//! This file lets a benchmark pack and unpack without a board: feature `bench`.
 
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::profile::Variant;
-use bitstream_model::interface::record::Beat;
+use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
-use crate::beat::pack::pack_collisions;
+use crate::beat::pack::{Entries, Target, pack_bodies, pack_collisions, survey};
 use crate::beat::stripe::Segment;
-use crate::scene::{Bodies, Collisions, Shape};
+use crate::record::end::{End, Ends};
+use crate::scene::validate::{Limits, Quick, preflight};
+use crate::scene::{Bodies, Collisions, InputError, Pose, Shape, StepParameters, Velocity};
+use crate::step::Results;
 
 /// Packs collisions as a step does, into memory of its own instead of a board's.
 #[derive(Debug)]
 pub struct CollisionPacker {
     variant: Variant,
     channels: [Vec<Beat>; DMA_COUNT_MAX],
+    ends: Vec<End>,
 }
 
 impl CollisionPacker {
     /// For one bitstream; without memory of its own yet.
     #[must_use]
     pub fn new(variant: Variant) -> Self {
-        Self { variant, channels: Default::default() }
+        Self { variant, channels: Default::default(), ends: Vec::new() }
     }
 
     /// Packs the records of all collisions over the bitstream's channels; returns the sum of their
@@ -39,15 +43,189 @@ impl CollisionPacker {
         }
         let mut channels = self.channels.each_mut().map(Vec::as_mut_slice);
         let channels = &mut channels[..streams];
-        pack_collisions(&self.variant, bodies, collisions, count, shapes, channels)
+        let target = Target { variant: &self.variant, shapes, quick: None };
+        survey(target, bodies, bodies.len(), &mut self.ends);
+        let entries = Entries { collisions, count, scheduled: false, words: None };
+        pack_collisions(target, Ends(&self.ends), &entries, channels).0
     }
+}
+
+/// Packs all segments of steps, as a step does, into memory of its own.
+#[derive(Debug)]
+pub struct StepPacker {
+    limits: Limits,
+    velocities: [Vec<Beat>; DMA_COUNT_MAX],
+    collisions: [Vec<Beat>; DMA_COUNT_MAX],
+    poses: [Vec<Beat>; DMA_COUNT_MAX],
+    ends: Vec<End>,
+}
+
+impl StepPacker {
+    /// For one bitstream, of the capacities of its profile; without memory of its own yet.
+    #[must_use]
+    pub fn new(variant: Variant) -> Self {
+        Self {
+            limits: Limits {
+                variant,
+                flush_subnormals: false,
+                body_capacity: variant.body_capacity(),
+                collision_capacity: u32::MAX,
+                shape_capacity: u32::MAX,
+                memory_bytes: variant.profile.memory.bytes,
+                bytes_per_body: variant.bytes_per_body(),
+                bytes_per_collision: variant.bytes_per_collision(),
+            },
+            velocities: Default::default(),
+            collisions: Default::default(),
+            poses: Default::default(),
+            ends: Vec::new(),
+        }
+    }
+
+    /// Writes the records of all bodies, unchecked; returns the sum of their words, modulo 2^32.
+    pub fn pack_bodies<B: Bodies + ?Sized>(&mut self, bodies: &B, shapes: &[Shape]) -> u32 {
+        let variant = self.limits.variant;
+        self.bodies(bodies, Target { variant: &variant, shapes, quick: None }).0
+    }
+
+    /// Writes the records of all collisions of the bodies that were packed last, unchecked; returns
+    /// the sum of their words, modulo 2^32. `scheduled` says whether they are in an order that was
+    /// made for them.
+    pub fn pack_collisions<C: Collisions + ?Sized>(
+        &mut self,
+        collisions: &C,
+        shapes: &[Shape],
+        scheduled: bool,
+    ) -> u32 {
+        let variant = self.limits.variant;
+        self.entries(collisions, scheduled, Target { variant: &variant, shapes, quick: None }).0
+    }
+
+    /// Writes and checks everything; returns the sum of all words, modulo 2^32, or `None` if
+    /// validation refuses something.
+    ///
+    /// # Errors
+    /// What a step refuses whatever its bodies and collisions hold.
+    pub fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &B,
+        collisions: &C,
+        shapes: &[Shape],
+        scheduled: bool,
+    ) -> Result<Option<u32>, InputError> {
+        let limits = self.limits;
+        let scene = preflight(bodies, collisions, shapes, &StepParameters::default(), &limits)?;
+        let quick = Quick::new(scene);
+        let target = Target { variant: &limits.variant, shapes, quick: Some(&quick) };
+        let (of_bodies, bodies_good) = self.bodies(bodies, target);
+        let (of_collisions, good) = self.entries(collisions, scheduled, target);
+        Ok((bodies_good & good).then(|| of_bodies.wrapping_add(of_collisions)))
+    }
+
+    /// Bytes of the records of so many bodies, and of so many collisions.
+    #[must_use]
+    pub fn bytes(&self, bodies: usize, collisions: usize) -> [usize; 2] {
+        let beats = |segment: Segment, records| segment.layout(&self.limits.variant).beats(records);
+        [
+            beats(Segment::Velocities, bodies) + beats(Segment::Poses, bodies),
+            beats(Segment::Collisions, collisions),
+        ]
+        .map(|beats| beats * BEAT_BYTES)
+    }
+
+    fn bodies<B: Bodies + ?Sized>(&mut self, bodies: &B, target: Target<'_>) -> (u32, bool) {
+        let count = bodies.len();
+        let velocities = &mut channels(&mut self.velocities, Segment::Velocities, count, target);
+        let poses = &mut channels(&mut self.poses, Segment::Poses, count, target);
+        let active = ..target.variant.profile.mm2s_widths.len();
+        let ends = &mut self.ends;
+        let (velocities, poses, good) =
+            pack_bodies(target, bodies, count, ends, &mut velocities[active], &mut poses[active]);
+        (velocities.wrapping_add(poses), good)
+    }
+
+    fn entries<C: Collisions + ?Sized>(
+        &mut self,
+        collisions: &C,
+        scheduled: bool,
+        target: Target<'_>,
+    ) -> (u32, bool) {
+        let count = collisions.len();
+        let channels = &mut channels(&mut self.collisions, Segment::Collisions, count, target);
+        let active = ..target.variant.profile.mm2s_widths.len();
+        let entries = Entries { collisions, count, scheduled, words: None };
+        pack_collisions(target, Ends(&self.ends), &entries, &mut channels[active])
+    }
+}
+
+/// Reads results as a step does, from memory of its own instead of a board's.
+#[derive(Debug)]
+pub struct Unpacker {
+    variant: Variant,
+    channels: [Vec<Beat>; DMA_COUNT_MAX],
+    states: Vec<(Pose, Velocity)>,
+}
+
+impl Unpacker {
+    /// For one bitstream and so many bodies, whose results are all the same finite numbers.
+    #[must_use]
+    pub fn new(variant: Variant, bodies: usize) -> Self {
+        let layout = Segment::Results.layout(&variant);
+        let mut channels: [Vec<Beat>; DMA_COUNT_MAX] = Default::default();
+        for (place, channel) in channels.iter_mut().enumerate() {
+            // 1 in f32; 1.875 and 0 in sixteen bits.
+            let one = Beat([0x3F80_0000; 4]);
+            channel.resize(layout.beats_on_channel(bodies, place), one);
+        }
+        Self { variant, channels, states: Vec::new() }
+    }
+
+    /// Bytes of the results.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.channels.iter().map(Vec::len).sum::<usize>() * BEAT_BYTES
+    }
+
+    /// Reads and checks the results of all bodies; returns the sum of their words, modulo 2^32, or
+    /// `None` if something is not finite.
+    pub fn unpack<B: Bodies + ?Sized>(&mut self, bodies: &B, shapes: &[Shape]) -> Option<u32> {
+        let layout = Segment::Results.layout(&self.variant);
+        let channels = self.channels.each_ref().map(Vec::as_slice);
+        let active = ..self.variant.profile.s2mm_widths.len();
+        self.states.clear();
+        let results = Results { layout: &layout, channels: &channels[active] };
+        let (sum, broken) = results.in_turn(bodies.len(), bodies, shapes, &mut self.states);
+        broken.is_none().then_some(sum)
+    }
+
+    /// Stores what was read last with the bodies.
+    pub fn commit<B: Bodies + ?Sized>(&self, bodies: &mut B) {
+        for (index, (pose, velocity)) in self.states.iter().enumerate() {
+            bodies.commit(index, *pose, *velocity);
+        }
+    }
+}
+
+/// The channels of a segment, as long as they must be for so many records.
+fn channels<'a>(
+    memory: &'a mut [Vec<Beat>; DMA_COUNT_MAX],
+    segment: Segment,
+    records: usize,
+    target: Target<'_>,
+) -> [&'a mut [Beat]; DMA_COUNT_MAX] {
+    let layout = segment.layout(target.variant);
+    let used = target.variant.profile.mm2s_widths.len();
+    for (place, channel) in memory.iter_mut().enumerate().take(used) {
+        channel.resize(layout.beats_on_channel(records, place), Beat::default());
+    }
+    memory.each_mut().map(Vec::as_mut_slice)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::interface::profile::FLOAT;
-    use crate::scene::{Body, Collision, Contact, Pose, Velocity};
+    use crate::scene::{Body, Collision, Contact};
 
     #[test]
     fn every_collision_is_packed() {

@@ -4,149 +4,233 @@
 //! whole beats, and never read: the sum that the accelerator is checked with is taken from the
 //! values on their way.
 //!
-//! Records become rows (`record`), rows become beats ([`Writer`]), the profile's stripe deals these
-//! out. The stripes of `float`, through which most bytes go, are written out.
+//! It goes by blocks of records that lie in the cache: what the caller has is read into one, looked
+//! at, made rows of ([`record`]) and, where the stream has sixteen bits, narrowed; then the block is
+//! dealt out to the channels ([`Dealer`]). What is wrong with the input is not said here, only that
+//! something is.
 
 use bitstream_model::interface::profile::{Geometry, Inertia, Variant};
-use bitstream_model::interface::record::{Beat, LANES, pose, velocity};
-use bitstream_model::interface::stripe::Stripe;
+use bitstream_model::interface::record::{Beat, pose, relative, velocity};
 
-use super::stripe::{Deal, Layout, Place, Segment};
-use super::unpack::{add, total};
+use super::deal::{BLOCK, Dealer};
+use super::stage::Stage;
+use super::stripe::Segment;
 use crate::record;
-use crate::record::sixteen::{Row, Sixteen};
-use crate::scene::{Bodies, Body, Collision, Collisions, Pose, Shape, Velocity};
+use crate::record::end::{End, Ends};
+use crate::scene::validate::{Block, Quick, head};
+use crate::scene::{
+    Bodies, Body, CONTACT_POINTS, Collision, Collisions, Contact, Pose, Shape, Velocity,
+};
 
-/// Stripes with a path of their own.
-const FLOAT_BODIES: Stripe = Stripe { streams: &[0, 1, 2, 3], padded: false };
-const FLOAT_COLLISIONS: Stripe = Stripe { streams: &[0, 1, 2, 3, 0, 1, 2], padded: false };
+/// What records are packed for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Target<'a> {
+    pub(crate) variant: &'a Variant,
+    pub(crate) shapes: &'a [Shape],
+    /// Looks at everything on its way; without it nothing is wrong.
+    pub(crate) quick: Option<&'a Quick<'a>>,
+}
+
+/// The collisions of a step, as they are sent.
+#[derive(Debug)]
+pub(crate) struct Entries<'a, C: ?Sized> {
+    pub(crate) collisions: &'a C,
+    /// Records, those that an order added included.
+    pub(crate) count: usize,
+    /// Whether they are in an order that was made for them, which may have added some.
+    pub(crate) scheduled: bool,
+    /// What stands in place of the bodies' indices, of each record. Only for
+    /// [`Geometry::Relative`].
+    pub(crate) words: Option<&'a [[u32; 2]]>,
+}
+
+/// Looks at all bodies and remembers what their collisions' records are made from; whether
+/// validation refuses none.
+pub(crate) fn survey<B: Bodies + ?Sized>(
+    target: Target<'_>,
+    bodies: &B,
+    count: usize,
+    ends: &mut Vec<End>,
+) -> bool {
+    ends.clear();
+    let mut block = [NOBODY; BLOCK];
+    let mut good = true;
+    for first in (0..count).step_by(BLOCK) {
+        let bodies = read(bodies, first, count, &mut block);
+        good &= target.survey(first, bodies, ends);
+    }
+    good
+}
+
+/// Surveys `count` bodies and writes their velocity and pose records, the first with their inertia
+/// where the bitstream wants it; the sums of both, modulo 2^32, and whether validation refuses
+/// none.
+///
+/// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says.
+pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
+    target: Target<'_>,
+    bodies: &B,
+    count: usize,
+    ends: &mut Vec<End>,
+    velocities: &mut [&mut [Beat]],
+    poses: &mut [&mut [Beat]],
+) -> (u32, u32, bool) {
+    ends.clear();
+    let mut velocities = Velocities::new(target, velocities);
+    let mut poses = Poses::new(target, poses);
+    let mut block = [NOBODY; BLOCK];
+    let mut good = true;
+    for first in (0..count).step_by(BLOCK) {
+        let bodies = read(bodies, first, count, &mut block);
+        good &= target.survey(first, bodies, ends);
+        velocities.write(bodies);
+        poses.write(bodies);
+    }
+    (velocities.finish(), poses.finish(), good)
+}
 
 /// Writes the velocity records of `count` bodies, and their inertia where the bitstream wants it;
 /// returns the sum of the words written, modulo 2^32.
 ///
-/// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+/// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says.
 pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
-    variant: &Variant,
+    target: Target<'_>,
     bodies: &B,
     count: usize,
-    shapes: &[Shape],
     channels: &mut [&mut [Beat]],
 ) -> u32 {
-    let layout = Segment::Velocities.layout(variant);
-    match variant.inertia {
-        Inertia::Isotropic => {
-            let integers = &record::velocity::INTEGERS;
-            let record = |index| record::velocity::encode(&bodies.body(index));
-            pack_pairs(&layout, count, integers, channels, record)
-        }
-        Inertia::World => {
-            let integers = &record::velocity::WORLD_INTEGERS;
-            let record = |index| world_velocity(&bodies.body(index), shapes);
-            pack_dealt(&layout, count, integers, channels, record)
-        }
+    let mut velocities = Velocities::new(target, channels);
+    let mut block = [NOBODY; BLOCK];
+    for first in (0..count).step_by(BLOCK) {
+        velocities.write(read(bodies, first, count, &mut block));
     }
+    velocities.finish()
 }
 
 /// Writes the pose records of `count` bodies; otherwise as [`pack_velocities`].
 pub(crate) fn pack_poses<B: Bodies + ?Sized>(
-    variant: &Variant,
+    target: Target<'_>,
     bodies: &B,
     count: usize,
     channels: &mut [&mut [Beat]],
 ) -> u32 {
-    let layout = Segment::Poses.layout(variant);
-    let record = |index| record::pose::encode(&bodies.body(index));
-    pack_pairs(&layout, count, &record::pose::INTEGERS, channels, record)
+    let mut poses = Poses::new(target, channels);
+    let mut block = [NOBODY; BLOCK];
+    for first in (0..count).step_by(BLOCK) {
+        poses.write(read(bodies, first, count, &mut block));
+    }
+    poses.finish()
 }
 
-/// Writes the records of `count` collisions; otherwise as [`pack_velocities`].
+/// Writes the records of collisions; the sum of the words written, modulo 2^32, and whether validation
+/// refuses none.
 ///
 /// A body that does not exist has its position written as zeros, and one without a shape is static.
-/// Validation has refused it; should a caller's [`Collisions`] answer differently the second time,
-/// the accelerator refuses the index.
-pub(crate) fn pack_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
-    variant: &Variant,
-    bodies: &B,
-    collisions: &C,
-    count: usize,
-    shapes: &[Shape],
+/// Should a caller's [`Collisions`] have passed validation and answer differently now, the
+/// accelerator refuses the index.
+pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
+    target: Target<'_>,
+    ends: Ends<'_>,
+    entries: &Entries<'_, C>,
     channels: &mut [&mut [Beat]],
-) -> u32 {
-    let body_count = bodies.len();
-    let position = |index| body(bodies, body_count, index).map_or([0.0; 3], |b| b.pose.position);
-    let layout = Segment::Collisions.layout(variant);
-    match variant.profile.geometry {
+) -> (u32, bool) {
+    match target.variant.profile.geometry {
         Geometry::Absolute => {
+            let encode = |_, it: &Collision, [a, b]: [End; 2]| {
+                record::collision::encode(it, a.position, b.position)
+            };
             let integers = &record::collision::INTEGERS;
-            pack_sevens(&layout, count, integers, channels, |index| {
-                let collision = collisions.collision(index);
-                let (a, b) = (position(collision.body_a), position(collision.body_b));
-                record::collision::encode(&collision, a, b)
-            })
+            let look = |quick: &Quick<'_>, block: &Block<'_>, records: &[_]| {
+                quick.absolute(block, records)
+            };
+            pack_entries(target, ends, entries, integers, channels, encode, look)
         }
         Geometry::Relative => {
+            let encode =
+                |index, it: &Collision, ends| relative_record(ends, entries.words, index, it);
             let integers = &record::relative::INTEGERS;
-            pack_dealt(&layout, count, integers, channels, |index| {
-                let collision = collisions.collision(index);
-                let [a, b] = anchors(bodies, body_count, &collision, shapes);
-                record::relative::encode(&collision, a, b)
-            })
+            let look = |quick: &Quick<'_>, block: &Block<'_>, records: &[_]| {
+                quick.relative(block, records)
+            };
+            pack_entries(target, ends, entries, integers, channels, encode, look)
         }
     }
+}
+
+/// Reads, encodes, looks at and deals out collisions, a block at a time.
+#[inline]
+fn pack_entries<C: Collisions + ?Sized, const ROWS: usize>(
+    target: Target<'_>,
+    ends: Ends<'_>,
+    entries: &Entries<'_, C>,
+    integers: &[bool; ROWS],
+    channels: &mut [&mut [Beat]],
+    encode: impl Fn(usize, &Collision, [End; 2]) -> [Beat; ROWS],
+    look: impl Fn(&Quick<'_>, &Block<'_>, &[[Beat; ROWS]]) -> bool,
+) -> (u32, bool) {
+    let Entries { collisions, count, scheduled, .. } = *entries;
+    let layout = Segment::Collisions.layout(target.variant);
+    let mut dealer = Dealer::new(&layout, channels);
+    let mut stage = Stage::new(&layout);
+    let mut block = [NOTHING; BLOCK];
+    let mut good = true;
+    let (structures, looks) = (collisions.structures(), target.quick.is_some());
+    for first in (0..count).step_by(BLOCK) {
+        let block = &mut block[..(count - first).min(BLOCK)];
+        let block = match structures.and_then(|all| all.get(first..first + block.len())) {
+            Some(block) => block,
+            None => {
+                for (at, to) in block.iter_mut().enumerate() {
+                    *to = collisions.collision(first + at);
+                }
+                block
+            }
+        };
+        if scheduled {
+            // They lie anywhere: on their way while this block is dealt with.
+            (first + BLOCK..count).take(BLOCK).for_each(|next| collisions.soon(next));
+        }
+        let mut heads = true;
+        let records = stage.records(block.len());
+        for (at, (to, from)) in records.iter_mut().zip(block).enumerate() {
+            let of_both = [ends.get(from.body_a), ends.get(from.body_b)];
+            if looks {
+                heads &= head(from, of_both, scheduled);
+            }
+            *to = encode(first + at, from, of_both);
+        }
+        if let Some(quick) = target.quick {
+            let block = Block { first, collisions: block, ends, scheduled, heads };
+            good &= look(quick, &block, records);
+        }
+        stage.deal(block.len(), integers, &mut dealer);
+    }
+    (dealer.finish(), good)
 }
 
 /// What no record of a live body holds; the accelerator refuses a collision of it with itself.
 const REFUSED: [u32; 2] = [u32::MAX; 2];
 
-/// Writes the records of collisions with these words in place of the bodies' indices; otherwise as
-/// [`pack_collisions`]. Only for [`Geometry::Relative`].
+/// The record of a collision relative to body A, with its words, if there are any.
 ///
 /// Nobody reads the marks of padding, so that a collision which had contact points when the marks
 /// were made and has none now would shift all bodies behind it: it is sent as one to be refused.
-pub(crate) fn pack_marked_collisions<B: Bodies + ?Sized, C: Collisions + ?Sized>(
-    variant: &Variant,
-    bodies: &B,
-    collisions: &C,
-    words: &[[u32; 2]],
-    shapes: &[Shape],
-    channels: &mut [&mut [Beat]],
-) -> u32 {
-    let body_count = bodies.len();
-    let layout = Segment::Collisions.layout(variant);
-    pack_dealt(&layout, words.len(), &record::relative::INTEGERS, channels, |index| {
-        let mut collision = collisions.collision(index);
-        let [a, b] = anchors(bodies, body_count, &collision, shapes);
-        let mut words = words[index];
-        if collision.count == 0 && words != [0; 2] {
-            (collision.count, words) = (1, REFUSED);
-        }
-        [collision.body_a, collision.body_b] = words;
-        record::relative::encode(&collision, a, b)
-    })
-}
-
-/// The body of that index, if there is one.
-fn body<B: Bodies + ?Sized>(bodies: &B, count: usize, index: u32) -> Option<Body> {
-    match usize::try_from(index) {
-        Ok(index) if index < count => Some(bodies.body(index)),
-        _ => None,
-    }
-}
-
-/// The positions that the relative record of a collision is made from.
-#[inline]
-fn anchors<B: Bodies + ?Sized>(
-    bodies: &B,
-    count: usize,
+#[inline(always)]
+fn relative_record(
+    [a, b]: [End; 2],
+    words: Option<&[[u32; 2]]>,
+    index: usize,
     collision: &Collision,
-    shapes: &[Shape],
-) -> [[f32; 3]; 2] {
-    let end = |index| {
-        let Some(body) = body(bodies, count, index) else { return ([0.0; 3], false) };
-        (body.pose.position, !shape_of(&body, shapes).is_static())
-    };
-    let ((a, a_moves), (b, b_moves)) = (end(collision.body_a), end(collision.body_b));
-    record::relative::anchors([a, b], [a_moves, b_moves])
+) -> [Beat; relative::ROWS] {
+    let moves = [!a.is_static(), !b.is_static()];
+    let [a, b] = record::relative::anchors([a.position, b.position], moves);
+    let Some(words) = words else { return record::relative::encode(collision, a, b) };
+    let (mut collision, mut words) = (*collision, words[index]);
+    if collision.count == 0 && words != [0; 2] {
+        (collision.count, words) = (1, REFUSED);
+    }
+    [collision.body_a, collision.body_b] = words;
+    record::relative::encode(&collision, a, b)
 }
 
 /// Some of the bodies, in an order of their own: a view of what is packed.
@@ -170,166 +254,124 @@ impl<B: Bodies + ?Sized> Bodies for Chosen<'_, B> {
     fn commit(&mut self, _: usize, _: Pose, _: Velocity) {}
 }
 
-/// The shape of a body; a static one for a shape that is not in the table.
-fn shape_of<'a>(body: &Body, shapes: &'a [Shape]) -> &'a Shape {
-    let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
-    shape.unwrap_or(&Shape::STATIC)
+/// What a block of bodies holds before it is read.
+const NOBODY: Body = Body {
+    pose: Pose { position: [0.0; 3], orientation: [0.0; 4] },
+    velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] },
+    shape: 0,
+};
+/// What a block of collisions holds before it is read.
+const NOTHING: Collision = Collision {
+    body_a: 0,
+    body_b: 0,
+    normal: [0.0; 3],
+    count: 0,
+    contacts: [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS],
+};
+
+/// Reads the next block of `count` bodies.
+#[inline]
+fn read<'a, B: Bodies + ?Sized>(
+    bodies: &'a B,
+    first: usize,
+    count: usize,
+    block: &'a mut [Body; BLOCK],
+) -> &'a [Body] {
+    let block = &mut block[..(count - first).min(BLOCK)];
+    if let Some(block) = bodies.structures().and_then(|all| all.get(first..first + block.len())) {
+        return block;
+    }
+    for (at, to) in block.iter_mut().enumerate() {
+        *to = bodies.body(first + at);
+    }
+    block
+}
+
+impl Target<'_> {
+    /// Remembers the ends of a block of bodies; whether validation refuses none.
+    #[inline]
+    fn survey(&self, first: usize, bodies: &[Body], ends: &mut Vec<End>) -> bool {
+        ends.extend(bodies.iter().map(|body| End::of(body, self.shapes)));
+        self.quick.is_none_or(|quick| quick.bodies(first, bodies, &ends[first..]))
+    }
+}
+
+/// Writes velocity records, a block at a time.
+struct Velocities<'a, 'b> {
+    shapes: &'a [Shape],
+    dealer: Dealer<'a, 'b>,
+    stage: VelocityStage,
+}
+
+/// With and without inertia.
+#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
+enum VelocityStage {
+    Isotropic(Stage<{ velocity::ROWS }>),
+    World(Stage<{ velocity::WORLD_ROWS }>),
+}
+
+impl<'a, 'b> Velocities<'a, 'b> {
+    fn new(target: Target<'a>, channels: &'a mut [&'b mut [Beat]]) -> Self {
+        let layout = Segment::Velocities.layout(target.variant);
+        let stage = match target.variant.inertia {
+            Inertia::Isotropic => VelocityStage::Isotropic(Stage::new(&layout)),
+            Inertia::World => VelocityStage::World(Stage::new(&layout)),
+        };
+        Self { shapes: target.shapes, dealer: Dealer::new(&layout, channels), stage }
+    }
+
+    #[inline]
+    fn write(&mut self, bodies: &[Body]) {
+        match &mut self.stage {
+            VelocityStage::Isotropic(stage) => {
+                for (to, body) in stage.records(bodies.len()).iter_mut().zip(bodies) {
+                    *to = record::velocity::encode(body);
+                }
+                stage.deal(bodies.len(), &record::velocity::INTEGERS, &mut self.dealer);
+            }
+            VelocityStage::World(stage) => {
+                for (to, body) in stage.records(bodies.len()).iter_mut().zip(bodies) {
+                    *to = world_velocity(body, self.shapes);
+                }
+                stage.deal(bodies.len(), &record::velocity::WORLD_INTEGERS, &mut self.dealer);
+            }
+        }
+    }
+
+    fn finish(self) -> u32 {
+        self.dealer.finish()
+    }
+}
+
+/// Writes pose records, a block at a time.
+struct Poses<'a, 'b> {
+    dealer: Dealer<'a, 'b>,
+    stage: Stage<{ pose::ROWS }>,
+}
+
+impl<'a, 'b> Poses<'a, 'b> {
+    fn new(target: Target<'_>, channels: &'a mut [&'b mut [Beat]]) -> Self {
+        let layout = Segment::Poses.layout(target.variant);
+        Self { dealer: Dealer::new(&layout, channels), stage: Stage::new(&layout) }
+    }
+
+    #[inline]
+    fn write(&mut self, bodies: &[Body]) {
+        for (to, body) in self.stage.records(bodies.len()).iter_mut().zip(bodies) {
+            *to = record::pose::encode(body);
+        }
+        self.stage.deal(bodies.len(), &record::pose::INTEGERS, &mut self.dealer);
+    }
+
+    fn finish(self) -> u32 {
+        self.dealer.finish()
+    }
 }
 
 /// The velocity record of a body with its inertia.
 fn world_velocity(body: &Body, shapes: &[Shape]) -> [Beat; velocity::WORLD_ROWS] {
-    let shape = shape_of(body, shapes);
+    let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
+    let shape = shape.unwrap_or(&Shape::STATIC);
     let inertia = record::inertia::about_world_axes(shape, body.pose.orientation);
     record::velocity::encode_world(body, &inertia)
-}
-
-/// Writes records of seven rows.
-fn pack_sevens(
-    layout: &Layout,
-    count: usize,
-    integers: &[bool; 7],
-    channels: &mut [&mut [Beat]],
-    record: impl Fn(usize) -> [Beat; 7],
-) -> u32 {
-    let (FLOAT_COLLISIONS, None, [first, second, third, fourth]) =
-        (layout.stripe, Sixteen::of(layout.format), &mut *channels)
-    else {
-        return pack_dealt(layout, count, integers, channels, record);
-    };
-    // Here all divisions are by constants.
-    let mut lanes = [0; LANES];
-    let pairs = first.as_chunks_mut::<2>().0.iter_mut();
-    let pairs = pairs.zip(second.as_chunks_mut::<2>().0);
-    let pairs = pairs.zip(third.as_chunks_mut::<2>().0);
-    for (index, (((first, second), third), fourth)) in pairs.zip(fourth.iter_mut()).enumerate() {
-        let beats = record(index);
-        beats.iter().for_each(|beat| add(&mut lanes, *beat));
-        let [beat_0, beat_1, beat_2, beat_3, beat_4, beat_5, beat_6] = beats;
-        *first = [beat_0, beat_4];
-        *second = [beat_1, beat_5];
-        *third = [beat_2, beat_6];
-        *fourth = beat_3;
-    }
-    total(lanes)
-}
-
-/// Writes records of two rows.
-fn pack_pairs(
-    layout: &Layout,
-    count: usize,
-    integers: &[bool; pose::ROWS],
-    channels: &mut [&mut [Beat]],
-    record: impl Fn(usize) -> [Beat; pose::ROWS],
-) -> u32 {
-    let (FLOAT_BODIES, None, [first, second, third, fourth]) =
-        (layout.stripe, Sixteen::of(layout.format), &mut *channels)
-    else {
-        return pack_dealt(layout, count, integers, channels, record);
-    };
-    // Two records fill one slot of each channel; an odd last one has only the first two.
-    let mut lanes = [0; LANES];
-    let mut encode = |index| {
-        let beats = record(index);
-        beats.iter().for_each(|beat| add(&mut lanes, *beat));
-        beats
-    };
-    let whole = fourth.len();
-    let (first, first_tail) = first.split_at_mut(whole);
-    let (second, second_tail) = second.split_at_mut(whole);
-    let slots = first.iter_mut().zip(second).zip(third.iter_mut()).zip(fourth.iter_mut());
-    for (slot, (((first, second), third), fourth)) in slots.enumerate() {
-        [*first, *second] = encode(2 * slot);
-        [*third, *fourth] = encode(2 * slot + 1);
-    }
-    for (first, second) in first_tail.iter_mut().zip(second_tail) {
-        [*first, *second] = encode(2 * whole);
-    }
-    total(lanes)
-}
-
-/// Writes records of any kind over any stripe, and its padding.
-fn pack_dealt<const ROWS: usize>(
-    layout: &Layout,
-    count: usize,
-    integers: &[bool; ROWS],
-    channels: &mut [&mut [Beat]],
-    record: impl Fn(usize) -> [Beat; ROWS],
-) -> u32 {
-    let mut writer = Writer::new(layout, channels);
-    match Sixteen::of(layout.format) {
-        None => {
-            for index in 0..count {
-                record(index).into_iter().for_each(|row| writer.push(row));
-            }
-        }
-        Some(format) => {
-            for index in 0..count {
-                writer.push_rows(&format.narrow(&record(index), integers));
-            }
-        }
-    }
-    writer.finish(layout.stripe.padded)
-}
-
-/// Deals beats out to the channels and adds up their words.
-struct Writer<'a, 'b> {
-    channels: &'a mut [&'b mut [Beat]],
-    deal: Deal,
-    lanes: [u32; LANES],
-    /// A row of sixteen bits that waits for the other half of its beat.
-    half: Option<Row>,
-}
-
-impl<'a, 'b> Writer<'a, 'b> {
-    fn new(layout: &Layout, channels: &'a mut [&'b mut [Beat]]) -> Self {
-        Self { channels, deal: Deal::new(layout.stripe), lanes: [0; LANES], half: None }
-    }
-
-    #[inline]
-    fn push(&mut self, beat: Beat) {
-        let Place { channel, slot } = self.deal.next();
-        self.channels[channel][slot] = beat;
-        add(&mut self.lanes, beat);
-    }
-
-    /// Two rows a beat, without a gap between records.
-    #[inline]
-    fn push_rows(&mut self, mut rows: &[Row]) {
-        if let (Some(low), [high, rest @ ..]) = (self.half, rows) {
-            self.half = None;
-            self.push(bytemuck::cast([low, *high]));
-            rows = rest;
-        }
-        let (pairs, last) = rows.as_chunks::<2>();
-        for pair in pairs {
-            self.push(bytemuck::cast(*pair));
-        }
-        if let [row] = last {
-            self.half = Some(*row);
-        }
-    }
-
-    /// Fills the last beat, and the last group if the stripe says so; the sum of all words.
-    fn finish(mut self, padded: bool) -> u32 {
-        if let Some(low) = self.half.take() {
-            self.push(bytemuck::cast([low, Row::default()]));
-        }
-        while padded && !self.deal.at_end_of_group() {
-            self.push(Beat::default());
-        }
-        total(self.lanes)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::interface::profile::FLOAT;
-    use crate::interface::stripe::Stripes;
-
-    /// Or `float` takes the slow path.
-    #[test]
-    fn the_stripes_with_a_path_of_their_own_are_those_of_float() {
-        assert_eq!(FLOAT.stripes, Stripes::new(FLOAT_COLLISIONS, FLOAT_BODIES));
-    }
 }

@@ -3,13 +3,14 @@
 
 use proptest::prelude::*;
 
-use super::pack::{Chosen, pack_collisions, pack_marked_collisions, pack_poses, pack_velocities};
+use super::pack::{Chosen, Entries, Target, pack_collisions, pack_poses, pack_velocities, survey};
 use super::stripe::Segment;
 use crate::interface::number::{Numbers, StreamFormat};
 use crate::interface::profile::{
     FLOAT, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,
 };
 use crate::interface::record::Beat;
+use crate::record::end::Ends;
 use crate::scene::{
     Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
     Velocity,
@@ -229,13 +230,33 @@ const SHAPES: [Shape; 3] = [
 fn velocities(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     let count = bodies.len();
     packed(spec, Segment::Velocities, count, |views| {
-        pack_velocities(&spec.variant, bodies, count, &SHAPES, views)
+        pack_velocities(target(spec), bodies, count, views)
     })
 }
 
 fn poses(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     let count = bodies.len();
-    packed(spec, Segment::Poses, count, |views| pack_poses(&spec.variant, bodies, count, views))
+    packed(spec, Segment::Poses, count, |views| pack_poses(target(spec), bodies, count, views))
+}
+
+fn target(spec: &Spec) -> Target<'_> {
+    Target { variant: &spec.variant, shapes: &SHAPES, quick: None }
+}
+
+/// The beats of collisions, with words in place of the bodies' indices.
+fn entries(
+    spec: &Spec,
+    bodies: &(impl Bodies + ?Sized),
+    collisions: &(impl Collisions + ?Sized),
+    words: Option<&[[u32; 2]]>,
+) -> Vec<Vec<Beat>> {
+    let count = collisions.len();
+    let mut ends = Vec::new();
+    survey(target(spec), bodies, bodies.len(), &mut ends);
+    let entries = Entries { collisions, count, scheduled: false, words };
+    packed(spec, Segment::Collisions, count, |views| {
+        pack_collisions(target(spec), Ends(&ends), &entries, views).0
+    })
 }
 
 fn collisions(
@@ -243,10 +264,7 @@ fn collisions(
     bodies: &(impl Bodies + ?Sized),
     collisions: &(impl Collisions + ?Sized),
 ) -> Vec<Vec<Beat>> {
-    let count = collisions.len();
-    packed(spec, Segment::Collisions, count, |views| {
-        pack_collisions(&spec.variant, bodies, collisions, count, &SHAPES, views)
-    })
+    entries(spec, bodies, collisions, None)
 }
 
 /// Any number that every format has a word for: within 65,504, tiny ones and both zeros among them.
@@ -400,9 +418,7 @@ proptest! {
         let words: Vec<[u32; 2]> =
             (0..).zip(&list).map(|(at, _)| [seed, (seed + 77 * at) % 0x8000]).collect();
         let count = list.len();
-        let marked = packed(&spec, Segment::Collisions, count, |views| {
-            pack_marked_collisions(&spec.variant, &bodies, &list, &words, &SHAPES, views)
-        });
+        let marked = entries(&spec, &bodies, &list, Some(&words));
         let plain = collisions(&spec, &bodies, &list);
         let needed = 6 * count;
         let mut reader = Reader::new(&spec, spec.collision_group, spec.collisions, &marked, needed);

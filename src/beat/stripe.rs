@@ -23,6 +23,8 @@
 //!
 //! Source: interface specification, streams.
 
+use std::ops::Range;
+
 use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::{LANES, pose, result};
@@ -150,6 +152,19 @@ impl Deal {
         let slot = self.slots[channel];
         self.slots[channel] += 1;
         Place { channel, slot }
+    }
+
+    /// The channel of each beat of a group.
+    pub(super) const fn group(&self) -> &'static [u8] {
+        self.group
+    }
+
+    /// Takes the next slots of one channel. The caller does so for all channels, and whole groups.
+    #[inline]
+    pub(super) fn take(&mut self, channel: usize, slots: usize) -> Range<usize> {
+        let first = self.slots[channel];
+        self.slots[channel] += slots;
+        first..self.slots[channel]
     }
 
     /// Whether the group is whole.

@@ -1,55 +1,166 @@
 //! This file reads the results out of the channels' beats.
+//!
+//! The memory may be slow to read, so each beat is read once: a block of records is collected from
+//! the channels, one after the other, and the sum of what was read is taken on the way.
 
 use bitstream_model::interface::record::{Beat, LANES, result};
 
+use super::deal::{BLOCK, places};
 use super::stripe::{Deal, Layout, Place};
 use crate::record;
 use crate::record::sixteen::{Row, Sixteen};
 use crate::scene::{Pose, Velocity};
 
-/// The new states of the bodies, one after the other, from the result segments, one a channel.
+/// A record of results, in f32.
+pub(crate) type Record = [Beat; result::ROWS];
+
+/// Reads the results of `count` bodies, a block at a time, from the result segments, one a channel;
+/// returns the sum of all their 32-bit words, modulo 2^32: what the accelerator counts of what it
+/// sent.
+///
+/// A number that the accelerator could not hold is not finite.
 ///
 /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
-#[derive(Debug)]
-pub(crate) struct Results<'a> {
+pub(crate) fn for_each_block(
+    layout: &Layout,
+    channels: &[&[Beat]],
+    count: usize,
+    mut take: impl FnMut(&[Record]),
+) -> u32 {
+    let mut collector = Collector::new(layout, channels);
+    let mut wide = [Record::default(); BLOCK];
+    let mut narrow = [[Beat::default(); result::ROWS]; BLOCK / 2];
+    for first in (0..count).step_by(BLOCK) {
+        let records = &mut wide[..(count - first).min(BLOCK)];
+        match Sixteen::of(layout.format) {
+            None => collector.read(records.as_flattened_mut()),
+            Some(format) => {
+                // Two beats a record: an even number of rows.
+                let beats = &mut narrow.as_flattened_mut()[..records.len() * (result::ROWS / 2)];
+                collector.read(beats);
+                let rows: &[Row] = bytemuck::cast_slice(beats);
+                format.widen(rows, records.as_flattened_mut());
+            }
+        }
+        take(records);
+    }
+    collector.finish()
+}
+
+/// The new state of a body.
+#[inline]
+pub(crate) fn state(record: &Record) -> (Pose, Velocity) {
+    record::result::decode(record)
+}
+
+/// Whether all numbers of these records are finite. Without a branch per number.
+#[inline]
+pub(crate) fn finite(records: &[Record]) -> bool {
+    const INFINITE: u32 = f32::INFINITY.to_bits();
+    let mut infinite = [false; LANES];
+    for record in records {
+        for (row, Beat(words)) in record.iter().enumerate() {
+            // What lies beside a vec3 is nobody's.
+            let numbers = if row == result::ORIENTATION { LANES } else { LANES - 1 };
+            for (infinite, word) in infinite.iter_mut().zip(words).take(numbers) {
+                *infinite |= word & INFINITE == INFINITE;
+            }
+        }
+    }
+    infinite == [false; LANES]
+}
+
+/// Reads beats in their order.
+struct Collector<'a> {
     channels: &'a [&'a [Beat]],
     deal: Deal,
-    format: Option<Sixteen>,
+    lanes: [u32; LANES],
 }
 
-impl<'a> Results<'a> {
-    /// From the first body on.
-    pub(crate) fn new(layout: &Layout, channels: &'a [&'a [Beat]]) -> Self {
-        Self { channels, deal: Deal::new(layout.stripe), format: Sixteen::of(layout.format) }
+impl<'a> Collector<'a> {
+    /// From the first beat on.
+    fn new(layout: &Layout, channels: &'a [&'a [Beat]]) -> Self {
+        Self { channels, deal: Deal::new(layout.stripe), lanes: [0; LANES] }
     }
 
-    /// The new state of the next body. A number that the accelerator could not hold is not finite.
+    /// Reads the next beats.
     #[inline]
-    pub(crate) fn next(&mut self) -> (Pose, Velocity) {
-        let rows = match self.format {
-            None => std::array::from_fn(|_| self.beat()),
-            Some(format) => {
-                let beats: [Beat; result::ROWS / 2] = std::array::from_fn(|_| self.beat());
-                let rows: [Row; result::ROWS] = bytemuck::cast(beats);
-                format.widen(&rows)
-            }
+    fn read(&mut self, beats: &mut [Beat]) {
+        let rest = match self.deal.group().len() {
+            _ if !self.deal.at_end_of_group() => beats,
+            1 => self.groups::<1>(beats),
+            2 => self.groups::<2>(beats),
+            3 => self.groups::<3>(beats),
+            4 => self.groups::<4>(beats),
+            5 => self.groups::<5>(beats),
+            _ => beats,
         };
-        record::result::decode(&rows)
+        for beat in rest {
+            let Place { channel, slot } = self.deal.next();
+            *beat = self.channels[channel][slot];
+            add(&mut self.lanes, *beat);
+        }
     }
 
+    /// Reads whole groups of `G` beats; what is left to read.
     #[inline]
-    fn beat(&mut self) -> Beat {
-        let Place { channel, slot } = self.deal.next();
-        self.channels[channel][slot]
+    fn groups<'c, const G: usize>(&mut self, beats: &'c mut [Beat]) -> &'c mut [Beat] {
+        let (groups, rest) = beats.as_chunks_mut::<G>();
+        for (channel, from) in self.channels.iter().enumerate() {
+            let (places, share) = places::<G>(self.deal.group(), channel);
+            let from = &from[self.deal.take(channel, groups.len() * share)];
+            let lanes = &mut self.lanes;
+            match share {
+                0 => {}
+                1 => run::<G, 1>(from, places, groups, lanes),
+                2 => run::<G, 2>(from, places, groups, lanes),
+                _ => {
+                    for (from, group) in from.chunks_exact(share).zip(groups.iter_mut()) {
+                        for (from, place) in from.iter().zip(places) {
+                            group[place] = *from;
+                            add(lanes, *from);
+                        }
+                    }
+                }
+            }
+        }
+        rest
+    }
+
+    /// The sum of all words, of those that fill the last group too.
+    fn finish(mut self) -> u32 {
+        for (channel, beats) in self.channels.iter().enumerate() {
+            let used = self.deal.take(channel, 0).start;
+            beats[used..].iter().for_each(|beat| add(&mut self.lanes, *beat));
+        }
+        total(self.lanes)
     }
 }
 
-/// Sum of all 32-bit words, modulo 2^32: what the accelerator counts of what it sent.
+/// Reads the `S` beats of each group that one channel has, and adds them up.
+#[inline]
+fn run<const G: usize, const S: usize>(
+    from: &[Beat],
+    places: [usize; G],
+    groups: &mut [[Beat; G]],
+    lanes: &mut [u32; LANES],
+) {
+    // Said once here, so that it is not asked of every beat.
+    let places: [usize; S] = std::array::from_fn(|at| places[at % G].min(G - 1));
+    let mut sum = *lanes;
+    for (group, from) in groups.iter_mut().zip(from.as_chunks::<S>().0) {
+        for (beat, place) in from.iter().zip(places) {
+            group[place] = *beat;
+            add(&mut sum, *beat);
+        }
+    }
+    *lanes = sum;
+}
+
+/// Sum of all 32-bit words, modulo 2^32.
 pub(crate) fn sum_of_words(beats: &[Beat]) -> u32 {
     let mut lanes = [0_u32; LANES];
-    for beat in beats {
-        add(&mut lanes, *beat);
-    }
+    beats.iter().for_each(|beat| add(&mut lanes, *beat));
     total(lanes)
 }
 
@@ -74,11 +185,50 @@ mod tests {
     use crate::interface::profile::{HALF, PROFILES, Variant};
     use proptest::prelude::*;
 
+    /// Everything that is read, and the sum.
+    fn read(layout: &Layout, channels: &[&[Beat]], count: usize) -> (Vec<(Pose, Velocity)>, u32) {
+        let mut states = Vec::new();
+        let sum = for_each_block(layout, channels, count, |records| {
+            states.extend(records.iter().map(state));
+        });
+        assert_eq!(states.len(), count);
+        (states, sum)
+    }
+
+    /// Word by word, in 64 bits.
+    fn sum_of(segments: &[Vec<Beat>]) -> u32 {
+        let words = segments.iter().flatten().flat_map(|beat| beat.0);
+        let sum: u64 = words.map(u64::from).sum();
+        u32::try_from(sum & 0xFFFF_FFFF).expect("32 bits")
+    }
+
     #[test]
-    fn the_sum_wraps() {
-        assert_eq!(sum_of_words(&[]), 0);
-        assert_eq!(sum_of_words(&[Beat([1, 2, 3, 4]), Beat([10, 20, 30, 40])]), 110);
-        assert_eq!(sum_of_words(&[Beat([u32::MAX, 0, 0, 0]), Beat([0, 0, 0, 3])]), 2);
+    fn the_sum_wraps_and_holds_the_padding() {
+        let layout = Segment::Results.layout(&HALF.default_variant());
+        // A body fills two beats of five.
+        let segments = [
+            vec![Beat([1, 2, 3, 4]), Beat([10, 20, 30, 40])],
+            vec![Beat([u32::MAX, 0, 0, 0]), Beat([0, 0, 0, 3])],
+            vec![Beat([100; 4])],
+        ];
+        let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
+        assert_eq!(read(&layout, &views, 1).1, 110 + 2 + 400);
+        assert_eq!(read(&layout, &[&[], &[], &[]], 0).1, 0);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_found_wherever_it_is_and_nothing_else_is() {
+        let largest = f32::MAX.to_bits();
+        let records = [[Beat([largest; 4]); 4]; 3];
+        assert!(finite(&records) && finite(&[]));
+        for value in [f32::INFINITY, f32::NEG_INFINITY, f32::NAN] {
+            for at in 0..16 {
+                let mut records = records;
+                records[1][at / 4].0[at % 4] = value.to_bits();
+                let beside = [3, 11, 15].contains(&at);
+                assert_eq!(finite(&records), beside, "{value} {at}");
+            }
+        }
     }
 
     /// Numbers of a record in the order of its rows.
@@ -97,7 +247,7 @@ mod tests {
         /// The beats are laid out as the record table and the stripe say, without `place`.
         #[test]
         fn every_f32_result_comes_back_bit_for_bit(
-            words in prop::collection::vec(any::<[u32; 16]>(), 0..30),
+            words in prop::collection::vec(any::<[u32; 16]>(), 0..100),
             profile in prop::sample::select(PROFILES.to_vec()),
         ) {
             prop_assume!(profile.numbers.poses == StreamFormat::F32);
@@ -109,16 +259,16 @@ mod tests {
             }
             let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
             let layout = Segment::Results.layout(&profile.default_variant());
-            let mut results = Results::new(&layout, &views);
-            for expected in &words {
-                let (pose, velocity) = results.next();
+            let (states, sum) = read(&layout, &views, words.len());
+            prop_assert_eq!(sum, sum_of(&segments));
+            for (expected, (pose, velocity)) in words.iter().zip(states) {
                 prop_assert_eq!(numbers(pose, velocity), of_words(expected));
             }
         }
 
         #[test]
         fn every_sixteen_bit_result_comes_back_as_its_number(
-            words in prop::collection::vec(any::<[u16; 16]>(), 0..30),
+            words in prop::collection::vec(any::<[u16; 16]>(), 0..100),
             thesis in any::<bool>(),
         ) {
             // half: 0 0 1 1 2, two beats a record.
@@ -132,9 +282,9 @@ mod tests {
             let numbers_of = Numbers { poses, ..HALF.numbers };
             let layout =
                 Segment::Results.layout(&Variant { numbers: numbers_of, ..HALF.default_variant() });
-            let mut results = Results::new(&layout, &views);
-            for expected in &words {
-                let (pose, velocity) = results.next();
+            let (states, sum) = read(&layout, &views, words.len());
+            prop_assert_eq!(sum, sum_of(&segments));
+            for (expected, (pose, velocity)) in words.iter().zip(states) {
                 for (found, word) in numbers(pose, velocity).into_iter().zip(of_words(expected)) {
                     let found = f32::from_bits(found);
                     let (f, m) = (i32::from(word >> 10 & 31), f64::from(word & 1023) / 1024.0);
@@ -157,13 +307,7 @@ mod tests {
         fn the_sum_is_that_of_the_words_one_by_one(
             beats in prop::collection::vec(any::<[u32; 4]>().prop_map(Beat), 0..40),
         ) {
-            let mut expected = 0_u64;
-            for Beat(words) in &beats {
-                for word in words {
-                    expected += u64::from(*word);
-                }
-            }
-            prop_assert_eq!(u64::from(sum_of_words(&beats)), expected & 0xFFFF_FFFF);
+            prop_assert_eq!(sum_of_words(&beats), sum_of(&[beats]));
         }
     }
 }

@@ -97,6 +97,10 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
         self.schedule.get(index).map_or(PADDING, |index| self.collisions.collision(index))
     }
 
+    fn soon(&self, index: usize) {
+        self.schedule.get(index).into_iter().for_each(|index| self.collisions.soon(index));
+    }
+
     fn lengths_agree(&self) -> bool {
         self.collisions.lengths_agree() && self.schedule.collisions() == self.collisions.len()
     }

@@ -49,6 +49,7 @@ mod pool;
 #[cfg(feature = "emulation")]
 mod remote;
 mod reserved;
+mod stream;
 mod sync_mode;
 mod sysfs;
 mod system;
@@ -76,6 +77,7 @@ pub(crate) use memory::{DmaMemory, SharedMemory};
 #[cfg(feature = "emulation")]
 pub(crate) use remote::{RemotePlatform, memory_beside};
 pub use reserved::ReservedMemory;
+pub(crate) use stream::{Slots, Streamed, prefetch};
 pub use system::{System, UIO_CLASS};
 pub use u_dma_buf::{Caching, u_dma_buf_names};
 pub use uio::{UioMap, UioNode, uio_nodes};

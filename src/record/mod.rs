@@ -6,6 +6,7 @@
 //! decided elsewhere (`beat`).
 
 pub(crate) mod collision;
+pub(crate) mod end;
 pub(crate) mod inertia;
 pub(crate) mod pose;
 pub(crate) mod relative;

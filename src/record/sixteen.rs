@@ -29,44 +29,46 @@ impl Sixteen {
         }
     }
 
-    /// Rows of f32 as rows of this format. Where `integers` says so the word beside the vec3 is an
-    /// unsigned integer, which validation has found to fit.
+    /// Records of f32 as records of this format. Where `integers` says so the word beside the vec3
+    /// is an unsigned integer, which validation has found to fit.
+    ///
+    /// Many at once: how the machine converts is found out once a call.
     #[inline]
     pub(crate) fn narrow<const ROWS: usize>(
         self,
-        rows: &[Beat; ROWS],
+        records: &[[Beat; ROWS]],
         integers: &[bool; ROWS],
-    ) -> [Row; ROWS] {
-        let mut narrow = [[0; LANES]; ROWS];
+        narrow: &mut [[Row; ROWS]],
+    ) {
+        let wide: &[f32] = bytemuck::cast_slice(records.as_flattened());
+        let words = narrow.as_flattened_mut().as_flattened_mut();
         match self {
             Self::Binary16 => {
-                let numbers: &mut [f16] = narrow.as_flattened_mut().reinterpret_cast_mut();
-                numbers.convert_from_f32_slice(bytemuck::cast_slice(rows));
+                let numbers: &mut [f16] = words.reinterpret_cast_mut();
+                numbers.convert_from_f32_slice(wide);
             }
             Self::Thesis16 => {
-                for (to, from) in narrow.iter_mut().zip(rows) {
-                    *to = from.0.map(thesis16::narrow);
+                for (to, from) in words.iter_mut().zip(wide) {
+                    *to = thesis16::narrow(from.to_bits());
                 }
             }
         }
-        for ((to, from), integer) in narrow.iter_mut().zip(rows).zip(integers) {
-            if *integer {
+        for (row, _) in integers.iter().enumerate().filter(|(_, integer)| **integer) {
+            for (to, from) in narrow.iter_mut().zip(records) {
                 #[expect(clippy::cast_possible_truncation, reason = "validated to fit")]
-                let word = from.0[WORD_LANE] as u16;
-                to[WORD_LANE] = word;
+                let word = from[row].0[WORD_LANE] as u16;
+                to[row][WORD_LANE] = word;
             }
         }
-        narrow
     }
 
-    /// Rows of f32 numbers from rows of this format.
+    /// Rows of f32 numbers from rows of this format. Many at once, as [`Self::narrow`].
     #[inline]
-    pub(crate) fn widen<const ROWS: usize>(self, rows: &[Row; ROWS]) -> [Beat; ROWS] {
-        let mut wide = [Beat::default(); ROWS];
+    pub(crate) fn widen(self, rows: &[Row], wide: &mut [Beat]) {
         match self {
             Self::Binary16 => {
                 let numbers: &[f16] = rows.as_flattened().reinterpret_cast();
-                numbers.convert_to_f32_slice(bytemuck::cast_slice_mut(&mut wide));
+                numbers.convert_to_f32_slice(bytemuck::cast_slice_mut(wide));
             }
             Self::Thesis16 => {
                 for (to, from) in wide.iter_mut().zip(rows) {
@@ -74,7 +76,6 @@ impl Sixteen {
                 }
             }
         }
-        wide
     }
 }
 
@@ -82,8 +83,24 @@ impl Sixteen {
 mod tests {
     use super::*;
 
+    fn narrowed_rows<const ROWS: usize>(
+        format: Sixteen,
+        rows: [Beat; ROWS],
+        integers: [bool; ROWS],
+    ) -> [Row; ROWS] {
+        let mut narrow = [[Row::default(); ROWS]];
+        format.narrow(&[rows], &integers, &mut narrow);
+        narrow[0]
+    }
+
+    fn widened(format: Sixteen, row: Row) -> Beat {
+        let mut wide = [Beat::default()];
+        format.widen(&[row], &mut wide);
+        wide[0]
+    }
+
     fn narrowed(format: Sixteen, value: f32) -> u16 {
-        format.narrow(&[Beat([value.to_bits(); 4])], &[false])[0][1]
+        narrowed_rows(format, [Beat([value.to_bits(); 4])], [false])[0][1]
     }
 
     #[test]
@@ -98,7 +115,7 @@ mod tests {
     fn integers_are_integers_in_either_format() {
         for format in [Sixteen::Binary16, Sixteen::Thesis16] {
             let row = Beat([0x3F80_0000, 0xC000_0000, 0x4248_0000, 0xABCD]);
-            let [with, without] = format.narrow(&[row; 2], &[true, false]);
+            let [with, without] = narrowed_rows(format, [row; 2], [true, false]);
             // 1, -2, 50 are exact in both.
             assert_eq!(with, [0x3C00, 0xC000, 0x5240, 0xABCD]);
             assert_eq!(without, [0x3C00, 0xC000, 0x5240, 0x0000]);
@@ -110,7 +127,7 @@ mod tests {
     #[test]
     fn binary16_is_rounded_to_nearest_even_over_its_whole_range() {
         for bits in 0..0x7BFF_u16 {
-            let [low, high] = Sixteen::Binary16.widen(&[[bits, bits + 1, 0, 0]])[0]
+            let [low, high] = widened(Sixteen::Binary16, [bits, bits + 1, 0, 0])
                 .0
                 .first_chunk()
                 .map(|[low, high]| [f32::from_bits(*low), f32::from_bits(*high)])
@@ -135,7 +152,7 @@ mod tests {
     #[test]
     fn what_is_not_finite_comes_back_as_such() {
         let finite = |format: Sixteen, word: u16| {
-            f32::from_bits(format.widen(&[[word, 0, 0, 0]])[0].0[0]).is_finite()
+            f32::from_bits(widened(format, [word, 0, 0, 0]).0[0]).is_finite()
         };
         for format in [Sixteen::Binary16, Sixteen::Thesis16] {
             for word in 0..=u16::MAX {

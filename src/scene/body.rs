@@ -47,6 +47,11 @@ pub trait Bodies {
     /// Stores the new state of body `index`.
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity);
 
+    /// All of them, where they lie in an array of structures: they are read there, without a copy.
+    fn structures(&self) -> Option<&[Body]> {
+        None
+    }
+
     /// Whether there are none.
     fn is_empty(&self) -> bool {
         self.len() == 0
@@ -68,6 +73,10 @@ impl Bodies for [Body] {
         self[index]
     }
 
+    fn structures(&self) -> Option<&[Body]> {
+        Some(self)
+    }
+
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
         let body = &mut self[index];
         body.pose = pose;
@@ -82,6 +91,10 @@ impl Bodies for Vec<Body> {
 
     fn body(&self, index: usize) -> Body {
         self[index]
+    }
+
+    fn structures(&self) -> Option<&[Body]> {
+        Some(self)
     }
 
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {

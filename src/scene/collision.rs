@@ -3,6 +3,8 @@
 /// Contact points of a collision, at most.
 pub use bitstream_model::interface::record::CONTACT_POINTS;
 
+use crate::platform::prefetch;
+
 /// One point at which two bodies touch.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Contact {
@@ -39,6 +41,18 @@ pub trait Collisions {
     /// Collision `index`, which is below [`len`](Self::len).
     fn collision(&self, index: usize) -> Collision;
 
+    /// All of them, where they lie in an array of structures: they are read there, without a copy.
+    fn structures(&self) -> Option<&[Collision]> {
+        None
+    }
+
+    /// Says that collision `index`, which is below [`len`](Self::len), is asked for soon. Where
+    /// collisions are read in an order of their own, a layout that can have it fetched gains by
+    /// that; nothing else comes of it.
+    fn soon(&self, index: usize) {
+        let _ = index;
+    }
+
     /// Whether there are none.
     fn is_empty(&self) -> bool {
         self.len() == 0
@@ -59,6 +73,14 @@ impl Collisions for [Collision] {
     fn collision(&self, index: usize) -> Collision {
         self[index]
     }
+
+    fn structures(&self) -> Option<&[Collision]> {
+        Some(self)
+    }
+
+    fn soon(&self, index: usize) {
+        self.get(index).into_iter().for_each(prefetch);
+    }
 }
 
 impl Collisions for Vec<Collision> {
@@ -68,6 +90,14 @@ impl Collisions for Vec<Collision> {
 
     fn collision(&self, index: usize) -> Collision {
         self[index]
+    }
+
+    fn structures(&self) -> Option<&[Collision]> {
+        Some(self)
+    }
+
+    fn soon(&self, index: usize) {
+        self.get(index).into_iter().for_each(prefetch);
     }
 }
 
@@ -93,6 +123,13 @@ impl Collisions for CollisionArrays<'_> {
         [self.normals.len(), self.counts.len(), self.contacts.len()]
             .iter()
             .all(|length| *length == self.len())
+    }
+
+    fn soon(&self, index: usize) {
+        self.bodies.get(index).into_iter().for_each(prefetch);
+        self.normals.get(index).into_iter().for_each(prefetch);
+        self.counts.get(index).into_iter().for_each(prefetch);
+        self.contacts.get(index).into_iter().for_each(prefetch);
     }
 
     fn collision(&self, index: usize) -> Collision {

@@ -20,6 +20,7 @@ use crate::error::OpenError;
 use crate::platform::{
     Access, AccessCounts, Platform, PlatformError, RegisterMap, Window, release_to_device,
 };
+use crate::record::end::End;
 use crate::scene::StepParameters;
 
 /// Status registers of all channels: S2MM first, then MM2S.
@@ -68,6 +69,8 @@ pub(crate) struct Device {
     pub(super) cancellation: Option<Cancellation>,
     /// The longest piece that a descriptor carries, bytes.
     pub(super) largest: u32,
+    /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
+    pub(super) ends: Vec<End>,
 }
 
 impl Device {
@@ -134,6 +137,7 @@ impl Device {
             activity: Activity::Idle,
             cancellation: None,
             largest: largest_piece(capabilities.length_width),
+            ends: Vec::new(),
         }
     }
 
@@ -179,9 +183,7 @@ impl Device {
         self.started = None;
         let width = self.capabilities.address_width;
         for core in 0..self.mm2s.len() {
-            let sent = plan.descriptors(core, self.largest);
-            let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
-            let received = usize::try_from(received).unwrap_or(usize::MAX);
+            let [sent, received] = self.descriptors_of(plan, core);
             for (lane, descriptors) in
                 [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
             {
@@ -192,6 +194,25 @@ impl Device {
             }
         }
         Ok(())
+    }
+
+    /// Whether the buffers of a bank, and the rings, are large enough for a step as they are.
+    pub(super) fn has_room(&self, plan: &Plan, bank: Bank) -> bool {
+        (0..self.mm2s.len()).all(|core| {
+            let (mm2s, s2mm) = (&self.mm2s[core], &self.s2mm[core]);
+            let [sent, received] = self.descriptors_of(plan, core);
+            mm2s.beats(bank).len() >= plan.segments(core).poses.end
+                && s2mm.beats(bank).len() >= plan.results(core)
+                && mm2s.ring_takes(sent)
+                && s2mm.ring_takes(received)
+        })
+    }
+
+    /// Descriptors that a step takes of both channels of a core.
+    fn descriptors_of(&self, plan: &Plan, core: usize) -> [usize; 2] {
+        let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
+        let received = usize::try_from(received).unwrap_or(usize::MAX);
+        [plan.descriptors(core, self.largest), received]
     }
 
     /// Hands the buffers of a packed step over to the device, those that it does not have.

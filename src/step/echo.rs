@@ -7,6 +7,7 @@ use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MIN;
 use bitstream_model::interface::profile::{Flow, Variant};
 use bitstream_model::interface::record::Beat;
 
+use super::packing::Source;
 use super::plan::{Plan, bytes};
 use super::solver::Accelerator;
 use super::symptom::Symptom;
@@ -88,7 +89,15 @@ impl Accelerator {
         let none: &[Collision] = &[];
         let empty: Schedule = (0..plan.collisions).map(|_| None).collect();
         let padding = Ordered { collisions: none, schedule: &empty };
-        let sent = self.device.pack(&plan, bank, echo.bodies, &padding, None, &self.shapes);
+        let source = Source {
+            bodies: echo.bodies,
+            collisions: &padding,
+            scheduled: true,
+            lives: None,
+            shapes: &self.shapes,
+            quick: None,
+        };
+        let (sent, _) = self.device.pack(&plan, bank, &source);
         let parameters = StepParameters {
             contact_iterations: u32::from(plan.passes > 0),
             friction_iterations: 0,

@@ -6,15 +6,15 @@ use super::bank::Bank;
 use super::fault::Fault;
 use super::in_flight::Stopwatch;
 use super::ordering::{Arranged, Hardware};
-use super::packing::Sent;
+use super::packing::{Sent, Source};
 use super::plan::Plan;
 use super::report::HostTimes;
 use super::solver::Accelerator;
 use super::symptom::Symptom;
 use crate::error::{Aftermath, Error};
 use crate::order::Ordered;
-use crate::scene::validate::validate;
-use crate::scene::{Bodies, Collisions, StepParameters};
+use crate::scene::validate::{Quick, preflight, validate};
+use crate::scene::{Bodies, Collisions, InputError, StepParameters};
 
 /// What tells one packing from all others of this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,14 +68,21 @@ impl Accelerator {
         watch: &mut Stopwatch,
     ) -> Result<Load, Error> {
         let mut host = HostTimes::default();
-        validate(bodies, collisions, &self.shapes, parameters, &self.limits)?;
+        preflight(bodies, collisions, &self.shapes, parameters, &self.limits)?;
         host.validate = watch.lap();
         // Whatever comes of this one, a caller's panic included: the earlier one is gone.
         self.loads[bank] = None;
         let Self { orderings, device, limits, shapes, .. } = self;
         let ordering = &mut orderings[bank];
         let on = Hardware { capabilities: &device.capabilities, limits, shapes };
-        let arranged = ordering.arrange(bodies, collisions, parameters, on)?;
+        let arranged = match ordering.arrange(bodies, collisions, parameters, on) {
+            Ok(arranged) => arranged,
+            Err(error) => {
+                // What is not right with the input is said before what is not right with its order.
+                self.validate(bodies, collisions, parameters)?;
+                return Err(error.into());
+            }
+        };
         host.order = watch.lap();
 
         let lives = arranged.live.map(|_| ordering.lives());
@@ -96,13 +103,25 @@ impl Accelerator {
                 + u64::from(parameters.friction_iterations),
             variant: limits.variant,
         };
-        let sent = match self.make_room(&plan, bank, engines) {
-            Ok(()) if plan.bodies > 0 => {
-                Some(self.pack_in_order(&plan, bank, arranged, bodies, collisions))
+        // All of the input is looked at while it is packed. Where it is not all packed, or something
+        // else may end the step before, it is validated first.
+        let all = !arranged.scheduled || ordering.schedule().collisions() == collisions.len();
+        let cancelled = engines == Engines::Idle && device.check_cancelled().is_err();
+        if !all || plan.bodies == 0 || cancelled || !device.has_room(&plan, bank) {
+            self.validate(bodies, collisions, parameters)?;
+        }
+        if let Err(symptom) = self.make_room(&plan, bank, engines) {
+            return Err(self.refuse(symptom, engines));
+        }
+        let mut sent = None;
+        if plan.bodies > 0 {
+            let (packed, good) =
+                self.pack_in_order(&plan, bank, arranged, (bodies, collisions), parameters)?;
+            if !good {
+                self.validate(bodies, collisions, parameters)?;
             }
-            Ok(()) => None,
-            Err(symptom) => return Err(self.refuse(symptom, engines)),
-        };
+            sent = Some(packed);
+        }
         host.pack = watch.lap();
         let load = Load {
             ticket: Ticket::new(),
@@ -159,23 +178,37 @@ impl Accelerator {
         tried
     }
 
+    /// The whole of validation.
+    fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &self,
+        bodies: &B,
+        collisions: &C,
+        parameters: &StepParameters,
+    ) -> Result<(), InputError> {
+        validate(bodies, collisions, &self.shapes, parameters, &self.limits)
+    }
+
+    /// Packs; whether validation refuses nothing of what was packed.
     fn pack_in_order<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         plan: &Plan,
         bank: Bank,
         arranged: Arranged,
-        bodies: &B,
-        collisions: &C,
-    ) -> Sent {
-        let Self { orderings, device, shapes, .. } = self;
+        (bodies, collisions): (&B, &C),
+        parameters: &StepParameters,
+    ) -> Result<(Sent, bool), InputError> {
+        let Self { orderings, device, limits, shapes, .. } = self;
+        let quick = Quick::new(preflight(bodies, collisions, shapes, parameters, limits)?);
         let ordering = &orderings[bank];
-        let lives = arranged.live.map(|_| ordering.lives());
-        if arranged.scheduled {
-            let ordered = Ordered { collisions, schedule: ordering.schedule() };
-            device.pack(plan, bank, bodies, &ordered, lives, shapes)
+        let (lives, quick) = (arranged.live.map(|_| ordering.lives()), Some(&quick));
+        Ok(if arranged.scheduled {
+            let collisions = &Ordered { collisions, schedule: ordering.schedule() };
+            let source = Source { bodies, collisions, scheduled: true, lives, shapes, quick };
+            device.pack(plan, bank, &source)
         } else {
-            device.pack(plan, bank, bodies, collisions, lives, shapes)
-        }
+            let source = Source { bodies, collisions, scheduled: false, lives, shapes, quick };
+            device.pack(plan, bank, &source)
+        })
     }
 
     /// The error of a step that could not be packed.

@@ -55,6 +55,8 @@ pub use in_flight::InFlight;
 pub use phase::Phase;
 pub use prepared::Prepared;
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
+#[cfg(feature = "bench")]
+pub(crate) use results::Results;
 pub use solver::Accelerator;
 pub(crate) use {
     board::Found,

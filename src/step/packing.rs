@@ -7,9 +7,11 @@ use super::bank::Bank;
 use super::device::Device;
 use super::plan::Plan;
 use crate::beat::pack::{
-    Chosen, pack_collisions, pack_marked_collisions, pack_poses, pack_velocities,
+    Chosen, Entries, Target, pack_bodies, pack_collisions, pack_poses, pack_velocities, survey,
 };
 use crate::order::Lives;
+use crate::record::end::Ends;
+use crate::scene::validate::Quick;
 use crate::scene::{Bodies, Collisions, Shape};
 
 /// What a step sent, for comparison with what the accelerator received.
@@ -20,56 +22,65 @@ pub(super) struct Sent {
     pub(super) poses: u32,
 }
 
+/// What is packed.
+#[derive(Debug)]
+pub(super) struct Source<'a, B: ?Sized, C: ?Sized> {
+    pub(super) bodies: &'a B,
+    /// In the order in which they are sent.
+    pub(super) collisions: &'a C,
+    /// Whether that order was made for them.
+    pub(super) scheduled: bool,
+    pub(super) lives: Option<&'a Lives>,
+    pub(super) shapes: &'a [Shape],
+    /// Looks at everything on its way.
+    pub(super) quick: Option<&'a Quick<'a>>,
+}
+
 impl Device {
-    /// Writes the records of a step into the buffers of a bank.
+    /// Writes the records of a step into the buffers of a bank; whether validation refuses nothing of what it
+    /// was given.
     pub(super) fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         plan: &Plan,
         bank: Bank,
-        bodies: &B,
-        collisions: &C,
-        lives: Option<&Lives>,
-        shapes: &[Shape],
-    ) -> Sent {
-        let mut channels: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
-        let lanes = &mut self.mm2s;
+        source: &Source<'_, B, C>,
+    ) -> (Sent, bool) {
+        let Source { bodies, collisions, scheduled, lives, shapes, quick } = *source;
+        let mut velocities: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
+        let mut entries: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
+        let mut poses: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
         // One borrow of each buffer, cut into its three segments.
-        let mut later: [(&mut [Beat], &mut [Beat]); DMA_COUNT_MAX] = Default::default();
-        for (place, lane) in lanes.iter_mut().enumerate() {
+        for (place, lane) in self.mm2s.iter_mut().enumerate() {
             let segments = plan.segments(place);
             let beats = &mut lane.beats_mut(bank)[..segments.poses.end];
-            let (beats, poses) = beats.split_at_mut(segments.poses.start);
-            let (beats, collisions) = beats.split_at_mut(segments.collisions.start);
-            channels[place] = &mut beats[segments.velocities];
-            later[place] = (&mut collisions[..segments.collisions.len()], poses);
+            let (beats, last) = beats.split_at_mut(segments.poses.start);
+            let (beats, middle) = beats.split_at_mut(segments.collisions.start);
+            velocities[place] = &mut beats[segments.velocities];
+            entries[place] = &mut middle[..segments.collisions.len()];
+            poses[place] = last;
         }
-        let (variant, count) = (&plan.variant, plan.bodies);
         let active = ..plan.channels();
-        let views = &mut channels[active];
-        let velocities = match lives.map(Lives::velocities) {
-            Some(order) => {
-                let chosen = Chosen { bodies, order };
-                pack_velocities(variant, &chosen, count, shapes, views)
+        let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
+        let target = Target { variant: &plan.variant, shapes, quick };
+        let ends = &mut self.ends;
+        let (velocities, poses, bodies_good) = match lives {
+            None => pack_bodies(target, bodies, plan.bodies, ends, velocities, poses),
+            Some(lives) => {
+                let good = survey(target, bodies, bodies.len(), ends);
+                let chosen = Chosen { bodies, order: lives.velocities() };
+                let velocities = pack_velocities(target, &chosen, plan.bodies, velocities);
+                let chosen = Chosen { bodies, order: lives.results() };
+                (velocities, pack_poses(target, &chosen, plan.bodies, poses), good)
             }
-            None => pack_velocities(variant, bodies, count, shapes, views),
         };
-        let mut poses_of: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
-        for (place, (collisions, poses)) in later.into_iter().enumerate() {
-            channels[place] = collisions;
-            poses_of[place] = poses;
-        }
-        let views = &mut channels[active];
-        let collisions = match lives.map(Lives::words) {
-            Some(words) => {
-                pack_marked_collisions(variant, bodies, collisions, words, shapes, views)
-            }
-            None => pack_collisions(variant, bodies, collisions, plan.collisions, shapes, views),
+        let of_entries = Entries {
+            collisions,
+            count: plan.collisions,
+            scheduled,
+            words: lives.map(Lives::words),
         };
-        let views = &mut poses_of[active];
-        let poses = match lives.map(Lives::results) {
-            Some(order) => pack_poses(variant, &Chosen { bodies, order }, count, views),
-            None => pack_poses(variant, bodies, count, views),
-        };
-        Sent { velocities, collisions, poses }
+        let (collisions, good) =
+            pack_collisions(target, Ends(ends), &of_entries, &mut entries[active]);
+        (Sent { velocities, collisions, poses }, bodies_good & good)
     }
 }

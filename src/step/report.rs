@@ -22,11 +22,12 @@ pub struct StepCycles {
 /// With the emulated board, `wait` is the time that the emulation takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct HostTimes {
-    /// Checking the input.
+    /// Checking parameters, shapes and sizes. Bodies and collisions are looked at while they are
+    /// packed, except where a step's buffers have yet to be made.
     pub validate: Duration,
     /// Putting the collisions in order.
     pub order: Duration,
-    /// Making buffers large enough and writing the records into them.
+    /// Making buffers large enough, looking at bodies and collisions, and writing their records.
     pub pack: Duration,
     /// Handing over, descriptors, arguments.
     pub start: Duration,

@@ -1,4 +1,6 @@
 //! This file checks the results of a step and reads them, all before any of them is committed.
+//!
+//! Each beat is read once: what is checked is checked on its way.
 
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::record::Beat;
@@ -10,10 +12,10 @@ use super::plan::Plan;
 use super::solver::Accelerator;
 use crate::accelerator::Counters;
 use crate::axi_dma::Direction;
-use crate::beat::stripe::Segment;
-use crate::beat::unpack::{Results, sum_of_words};
+use crate::beat::stripe::{Layout, Segment};
+use crate::beat::unpack::{finite, for_each_block, state};
 use crate::order::LiveReport;
-use crate::scene::{Bodies, Pose, Velocity};
+use crate::scene::{Bodies, Body, Pose, Shape, Velocity};
 
 impl Accelerator {
     /// The result beats of each channel, in a bank.
@@ -48,25 +50,8 @@ impl Accelerator {
         Ok(())
     }
 
-    /// Compares the accelerator's sum of the words that it sent with ours, if it has one.
-    pub(super) fn check_answered(
-        &self,
-        plan: &Plan,
-        bank: Bank,
-        counters: &Counters,
-    ) -> Result<(), Fault> {
-        let Some((_, answered)) = counters.sums else { return Ok(()) };
-        let mut channels = Default::default();
-        self.results(plan, bank, &mut channels);
-        let found = channels.iter().fold(0u32, |sum, beats| sum.wrapping_add(sum_of_words(beats)));
-        if found != answered {
-            let direction = Direction::S2mm;
-            return Err(Fault::Checksum { direction, expected: answered, found });
-        }
-        Ok(())
-    }
-
-    /// Reads the results into the spare.
+    /// Reads the results into the spare, and compares the accelerator's sum of the words that it sent
+    /// with ours, if it has one.
     ///
     /// Where only live bodies are kept, `live` says so: results come in an order of their own then.
     pub(super) fn unpack<B: Bodies + ?Sized>(
@@ -75,6 +60,7 @@ impl Accelerator {
         bank: Bank,
         bodies: &B,
         live: Option<LiveReport>,
+        answered: Option<u32>,
     ) -> Result<(), Fault> {
         // A panic of the caller's loses it: the next step makes it anew.
         let mut spare = std::mem::take(&mut self.spare);
@@ -82,73 +68,93 @@ impl Accelerator {
         let mut channels = Default::default();
         self.results(plan, bank, &mut channels);
         let layout = Segment::Results.layout(&plan.variant);
-        let mut results = Results::new(&layout, &channels[..plan.channels()]);
-        let broken = match live.map(|_| self.orderings[bank].lives()) {
-            Some(lives) => scatter(&mut results, lives.results(), bodies, &mut spare),
-            None => self.in_turn(&mut results, plan.bodies, bodies, &mut spare),
+        let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
+        let (found, broken) = match live.map(|_| self.orderings[bank].lives()) {
+            Some(lives) => results.scatter(lives.results(), bodies, &mut spare),
+            None => results.in_turn(plan.bodies, bodies, &self.shapes, &mut spare),
         };
         self.spare = spare;
-        match broken {
-            Some(body) => Err(Fault::NotFinite { body }),
-            None => Ok(()),
+        match (answered, broken) {
+            (Some(expected), _) if expected != found => {
+                Err(Fault::Checksum { direction: Direction::S2mm, expected, found })
+            }
+            (_, Some(body)) => Err(Fault::NotFinite { body }),
+            _ => Ok(()),
         }
     }
+}
 
-    /// Reads the results of all bodies in their order; the first that is not finite.
-    fn in_turn<B: Bodies + ?Sized>(
-        &self,
-        results: &mut Results<'_>,
+/// The result segments of a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Results<'a> {
+    pub(crate) layout: &'a Layout,
+    /// One a channel.
+    pub(crate) channels: &'a [&'a [Beat]],
+}
+
+impl Results<'_> {
+    /// Reads the results of `count` bodies in their order; the sum of the words that were read, and
+    /// the first body that is not finite.
+    ///
+    /// A static body does not move, whatever comes back for it.
+    pub(crate) fn in_turn<B: Bodies + ?Sized>(
+        self,
         count: usize,
         bodies: &B,
+        shapes: &[Shape],
         spare: &mut Vec<(Pose, Velocity)>,
-    ) -> Option<usize> {
+    ) -> (u32, Option<usize>) {
+        let is_static = |body: &Body| {
+            let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
+            shape.is_none_or(Shape::is_static)
+        };
+        let mut broken = None;
         spare.reserve(count);
-        for index in 0..count {
-            let (pose, velocity) = results.next();
+        let sum = for_each_block(self.layout, self.channels, count, |records| {
+            let first = spare.len();
+            spare.extend(records.iter().map(state));
+            if broken.is_none() && !finite(records) {
+                let wrong = (first..).zip(records).filter(|(_, it)| !finite(&[**it]));
+                broken = wrong.map(|(index, _)| index).find(|at| !is_static(&bodies.body(*at)));
+            }
+            for (index, state) in (first..).zip(&mut spare[first..]) {
+                let own = bodies.body(index);
+                if is_static(&own) {
+                    *state = (own.pose, own.velocity);
+                }
+            }
+        });
+        (sum, broken)
+    }
+
+    /// Reads results in the order of these bodies, and leaves all others as they are; otherwise as
+    /// [`Self::in_turn`].
+    fn scatter<B: Bodies + ?Sized>(
+        self,
+        order: &[u32],
+        bodies: &B,
+        spare: &mut Vec<(Pose, Velocity)>,
+    ) -> (u32, Option<usize>) {
+        spare.extend((0..bodies.len()).map(|index| {
             let own = bodies.body(index);
-            let shape = usize::try_from(own.shape).ok().and_then(|shape| self.shapes.get(shape));
-            if shape.is_none_or(|shape| shape.inverse_mass == 0.0) {
-                // A static body does not move, whatever comes back for it.
-                spare.push((own.pose, own.velocity));
-                continue;
+            (own.pose, own.velocity)
+        }));
+        let mut broken: Option<usize> = None;
+        let mut order_left = order.iter();
+        let sum = for_each_block(self.layout, self.channels, order.len(), |records| {
+            let all_finite = finite(records);
+            for (record, body) in records.iter().zip(&mut order_left) {
+                let index = *body as usize;
+                if !all_finite && !finite(&[*record]) {
+                    broken = Some(broken.map_or(index, |lowest| lowest.min(index)));
+                }
+                // Should a caller's bodies have become fewer, there is nothing to be told of the
+                // others.
+                if let Some(to) = spare.get_mut(index) {
+                    *to = state(record);
+                }
             }
-            if !finite(&pose, &velocity) {
-                return Some(index);
-            }
-            spare.push((pose, velocity));
-        }
-        None
+        });
+        (sum, broken)
     }
-}
-
-/// Reads results in the order of these bodies, and leaves all others as they are; the first body
-/// that is not finite.
-fn scatter<B: Bodies + ?Sized>(
-    results: &mut Results<'_>,
-    order: &[u32],
-    bodies: &B,
-    spare: &mut Vec<(Pose, Velocity)>,
-) -> Option<usize> {
-    spare.extend((0..bodies.len()).map(|index| {
-        let own = bodies.body(index);
-        (own.pose, own.velocity)
-    }));
-    let mut broken = None;
-    for body in order {
-        let (pose, velocity) = results.next();
-        let index = *body as usize;
-        if !finite(&pose, &velocity) {
-            broken = Some(broken.map_or(index, |lowest: usize| lowest.min(index)));
-        }
-        // Should a caller's bodies have become fewer, there is nothing to be told of the others.
-        if let Some(state) = spare.get_mut(index) {
-            *state = (pose, velocity);
-        }
-    }
-    broken
-}
-
-fn finite(pose: &Pose, velocity: &Velocity) -> bool {
-    let all = |numbers: &[f32]| numbers.iter().all(|number| number.is_finite());
-    all(&pose.position) && all(&pose.orientation) && all(&velocity.linear) && all(&velocity.angular)
 }

@@ -1,15 +1,18 @@
 //! This folder refuses bad input before anything is sent.
 //!
-//! One pass over the bodies, one over the collisions. What passes here, a board of the same
-//! capacities accepts.
+//! One pass over the bodies, one over the collisions ([`validate`]). What passes here, a board of
+//! the same capacities accepts. A step looks at its input while it packs it ([`Quick`]), and comes
+//! here for the words of what it has found.
 
 mod body;
 mod collision;
 mod parameters;
+mod quick;
 mod range;
 mod rows;
 mod shape;
 
+pub(crate) use quick::{Block, Quick, head};
 pub(crate) use shape::{needed, validate_shapes};
 
 use self::body::{check_body, shape_of};
@@ -18,7 +21,7 @@ use self::parameters::check_parameters;
 use self::range::{Held, check_range};
 use self::rows::Rows;
 use self::shape::check_shapes;
-use super::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
+use super::{Bodies, Collision, Collisions, Demand, InputError, Shape, StepParameters};
 use crate::record::relative::anchors;
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::{Geometry, Variant};
@@ -66,6 +69,30 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     parameters: &StepParameters,
     limits: &Limits,
 ) -> Result<(), InputError> {
+    let scene = preflight(bodies, collisions, shapes, parameters, limits)?;
+    for index in 0..scene.demand.bodies {
+        check_body(index, &bodies.body(index), &scene)?;
+    }
+    // A body without a shape was refused above.
+    let end = |index: usize| {
+        let body = bodies.body(index);
+        (body.pose.position, shapes.get(shape_of(&body)).unwrap_or(&Shape::STATIC))
+    };
+    for index in 0..scene.demand.collisions {
+        check_whole(index, &collisions.collision(index), end, &scene)?;
+    }
+    Ok(())
+}
+
+/// What a step refuses whatever its bodies and collisions hold: the first part of [`validate`].
+/// Returns what the rest looks at.
+pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
+    bodies: &B,
+    collisions: &C,
+    shapes: &'a [Shape],
+    parameters: &StepParameters,
+    limits: &'a Limits,
+) -> Result<Scene<'a>, InputError> {
     for (what, agree) in
         [("bodies", bodies.lengths_agree()), ("collisions", collisions.lengths_agree())]
     {
@@ -73,53 +100,50 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
             return Err(InputError::UnequalLengths { what });
         }
     }
-    let body_count = bodies.len();
     let demand =
-        Demand { bodies: body_count, collisions: collisions.len(), inertia: needed(shapes) };
+        Demand { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
     check_parameters(parameters, &demand, limits)?;
     check_room(&demand, limits)?;
     check_shapes(shapes, &demand, limits)?;
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
-    let scene = Scene { shapes, demand, variant: &limits.variant, held, flush_subnormals };
-    for index in 0..body_count {
-        check_body(index, &bodies.body(index), &scene)?;
+    Ok(Scene { shapes, demand, variant: &limits.variant, held, flush_subnormals })
+}
+
+/// What of one collision a step refuses; `end` is the position and the shape of a body.
+#[inline]
+fn check_whole<'a>(
+    index: usize,
+    collision: &Collision,
+    end: impl Fn(usize) -> ([f32; 3], &'a Shape),
+    scene: &Scene<'_>,
+) -> Result<(), InputError> {
+    let (body_a, body_b) = check_collision(index, collision, scene.demand.bodies)?;
+    let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
+    let (mut positions, shapes) = ([a, b], [shape_a, shape_b]);
+    let moves = shapes.map(|shape| !shape.is_static());
+    if moves == [false, false] {
+        let Collision { body_a, body_b, .. } = *collision;
+        return Err(InputError::BothStatic { collision: index, body_a, body_b });
     }
-    // A body without a shape was refused above.
-    let shape = |index: usize| shapes.get(shape_of(&bodies.body(index))).unwrap_or(&Shape::STATIC);
-    let short_rows = limits.variant.numbers.rows == Precision::Binary16;
     // What is finite in world coordinates is in the range of f32 as it is.
-    let in_range = held.collisions == StreamFormat::F32
-        && limits.variant.profile.geometry == Geometry::Absolute;
-    for index in 0..collisions.len() {
-        let collision = collisions.collision(index);
-        let (body_a, body_b) = check_collision(index, &collision, body_count)?;
-        let shapes = [shape(body_a), shape(body_b)];
-        let moves = shapes.map(|shape| !shape.is_static());
-        if moves == [false, false] {
-            return Err(InputError::BothStatic {
-                collision: index,
-                body_a: collision.body_a,
-                body_b: collision.body_b,
-            });
-        }
-        if !in_range {
-            let mut positions = [body_a, body_b].map(|body| bodies.body(body).pose.position);
-            if limits.variant.profile.geometry == Geometry::Relative {
-                positions = anchors(positions, moves);
-            }
-            check_range(index, &collision, positions, &scene)?;
-            if short_rows {
-                Rows { index, collision: &collision, positions, shapes }.check(&scene)?;
-            }
-        }
+    let geometry = scene.variant.profile.geometry;
+    if scene.held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute {
+        return Ok(());
+    }
+    if geometry == Geometry::Relative {
+        positions = anchors(positions, moves);
+    }
+    check_range(index, collision, positions, scene)?;
+    if scene.variant.numbers.rows == Precision::Binary16 {
+        Rows { index, collision, positions, shapes }.check(scene)?;
     }
     Ok(())
 }
 
 /// What the checks of single bodies and collisions look at beside them.
 #[derive(Debug)]
-struct Scene<'a> {
+pub(crate) struct Scene<'a> {
     shapes: &'a [Shape],
     demand: Demand,
     variant: &'a Variant,
@@ -184,7 +208,7 @@ fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
 pub(super) mod tests {
     use super::*;
     use crate::interface::profile::{self, Inertia, Profile};
-    use crate::scene::{Body, BodyArrays, Collision, CollisionArrays, Contact, Pose, Velocity};
+    use crate::scene::{Body, BodyArrays, CollisionArrays, Contact, Pose, Velocity};
 
     /// What a bitstream of that profile reports.
     pub(in crate::scene::validate) const fn on(

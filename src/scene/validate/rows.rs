@@ -6,6 +6,7 @@
 
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::Variant;
+use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES};
 
 use super::Scene;
 use super::range::{fits, origin, used};
@@ -143,6 +144,65 @@ impl Rows<'_> {
             carriers,
         }
     }
+}
+
+/// The bodies of a collision, as [`surely_fit`] looks at them.
+pub(super) struct Ends<'a> {
+    /// Rows that hold their positions, as they are streamed.
+    pub(super) positions: [&'a Beat; 2],
+    pub(super) shapes: [&'a Shape; 2],
+}
+
+/// Whether a bitstream that computes rows in binary16 surely computes these: the longest arms of all
+/// contact points, whose numbers are in range, are taken together.
+///
+/// What is longer in any component is no shorter after any of the roundings, so that what is found
+/// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
+/// left out at the end.
+#[inline]
+pub(super) fn surely_fit(
+    ends: &Ends<'_>,
+    points: &[Beat; CONTACT_POINTS],
+    count: u32,
+    flush: bool,
+) -> bool {
+    let positions = ends.positions.map(|beat| beat.0.map(f32::from_bits));
+    let mut longest = [[0.0_f32; LANES]; 2];
+    let mut furthest = [0.0_f32; LANES];
+    let first = points[0].0.map(f32::from_bits);
+    for (ordinal, point) in (0..).zip(points) {
+        // One that is not in use counts as the first does.
+        let used = ordinal < count;
+        let point: [f32; LANES] =
+            std::array::from_fn(|k| if used { f32::from_bits(point.0[k]) } else { first[k] });
+        for k in 0..LANES {
+            furthest[k] = larger(furthest[k], point[k].abs());
+        }
+        for (longest, position) in longest.iter_mut().zip(&positions) {
+            for k in 0..LANES {
+                let (x, p) = (point[k], position[k]);
+                longest[k] = larger(longest[k], (x - p).abs() + (x.abs() + p.abs()) * LOSS);
+            }
+        }
+    }
+    let [a, b] = ends.shapes;
+    let mass = a.inverse_mass + b.inverse_mass;
+    let mut fit = mass >= 1.0 / LARGEST;
+    let mut turning = [0.0; 2];
+    for ((turning, shape), [rx, ry, rz, _]) in turning.iter_mut().zip(ends.shapes).zip(longest) {
+        let [x, y, z] = shape.inverse_inertia;
+        *turning = x.max(y).max(z) * (rx * rx + ry * ry + rz * rz);
+        fit &= (rx <= LONGEST_ARM) & (ry <= LONGEST_ARM) & (rz <= LONGEST_ARM);
+    }
+    fit &= mass + turning[0] + turning[1] <= largest(flush);
+    // Four of them, and a little for the roundings of their sum.
+    let [x, y, z, _] = furthest;
+    fit & (x <= LARGEST / 4.01) & (y <= LARGEST / 4.01) & (z <= LARGEST / 4.01)
+}
+
+#[inline]
+fn larger(one: f32, other: f32) -> f32 {
+    if one > other { one } else { other }
 }
 
 /// The largest inverse effective mass whose reciprocal is not 0, 1/kg.

@@ -1,0 +1,269 @@
+//! What is said of the input while it is packed, against what validation says of it.
+
+use proptest::prelude::*;
+
+use super::pack::{Entries, Target, pack_bodies, pack_collisions, survey};
+use super::stripe::Segment;
+use crate::interface::number::{Numbers, Precision, StreamFormat};
+use crate::interface::profile::{
+    FLOAT, Geometry, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,
+};
+use crate::interface::record::Beat;
+use crate::order::{Ordered, Schedule};
+use crate::record::end::Ends;
+use crate::scene::validate::{Limits, Quick, preflight, validate};
+use crate::scene::{Body, Collision, Contact, InputError, Pose, Shape, StepParameters, Velocity};
+
+const SHAPES: [Shape; 4] = [
+    Shape::STATIC,
+    Shape::isotropic(1.0, 1.5),
+    Shape::isotropic(0.5, 100.0),
+    Shape::isotropic(1e-5, 0.0),
+];
+const BODIES: usize = 40;
+
+/// All that a bitstream takes: the last is too heavy for one that flushes.
+fn shapes(limits: &Limits) -> &'static [Shape] {
+    if limits.flush_subnormals { &SHAPES[..3] } else { &SHAPES }
+}
+
+fn limits(variant: Variant, flush_subnormals: bool) -> Limits {
+    Limits {
+        variant,
+        flush_subnormals,
+        body_capacity: variant.body_capacity(),
+        collision_capacity: 1000,
+        shape_capacity: 64,
+        memory_bytes: u32::MAX,
+        bytes_per_body: 1,
+        bytes_per_collision: 1,
+    }
+}
+
+fn any_limits() -> impl Strategy<Value = Limits> {
+    let profiles = vec![&NAIVE, &FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16];
+    let short_rows = vec![Precision::F32, Precision::Binary16];
+    let formats = vec![StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16];
+    (
+        prop::sample::select(profiles),
+        prop::option::of((prop::sample::select(short_rows), prop::sample::select(formats))),
+        any::<bool>(),
+        any::<bool>(),
+    )
+        .prop_map(|(profile, other, world, flush)| {
+            let mut variant = profile.default_variant();
+            if let Some((rows, format)) = other {
+                let numbers = Numbers { rows, collisions: format, ..variant.numbers };
+                // Sixteen bits have half as many beats: of these the stripe has to know.
+                let same = format.bits() == variant.numbers.collisions.bits();
+                variant.numbers = if same { numbers } else { Numbers { rows, ..variant.numbers } };
+            }
+            variant.inertia = if world { Inertia::World } else { Inertia::Isotropic };
+            limits(variant, flush)
+        })
+}
+
+/// Numbers at which a check may turn over, and others.
+fn any_f32() -> impl Strategy<Value = f32> {
+    let edges = [
+        0.0,
+        -0.0,
+        65_504.0,
+        -65_504.0,
+        65_504.0_f32.next_up(),
+        43_000.0,
+        16_000.0,
+        210.0,
+        1e-6,
+        f32::MAX,
+        -f32::MAX,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+        1e-40,
+    ];
+    prop_oneof![20 => -5.0_f32..5.0, 1 => prop::sample::select(edges.to_vec())]
+}
+
+/// As [`any_f32`], but rarely at an edge.
+fn mostly() -> impl Strategy<Value = f32> {
+    prop_oneof![300 => -5.0_f32..5.0, 1 => any_f32()]
+}
+
+fn any_vec3() -> impl Strategy<Value = [f32; 3]> {
+    [mostly(), mostly(), mostly()]
+}
+
+prop_compose! {
+    fn any_body()(
+        position in any_vec3(),
+        orientation in prop_oneof![
+            400 => Just([0.0, 0.6, 0.0, 0.8]),
+            1 => [any_f32(), any_f32(), any_f32(), any_f32()],
+            1 => Just([1e-6, 0.0, 0.0, 0.0]),
+            1 => Just([0.9e-6, 0.0, 0.0, 0.0]),
+            1 => Just([1e30; 4]),
+        ],
+        linear in any_vec3(),
+        angular in any_vec3(),
+        shape in prop_oneof![600 => 1_u32..3, 100 => Just(0), 1 => 3_u32..6, 1 => any::<u32>()],
+        moves in prop::bool::weighted(0.01),
+    ) -> Body {
+        let mut velocity = Velocity { linear, angular };
+        if shape == 0 && !moves {
+            velocity = Velocity::default();
+        }
+        Body { pose: Pose { position, orientation }, velocity, shape }
+    }
+}
+
+prop_compose! {
+    fn any_collision()(
+        pair in prop_oneof![
+            300 => (0_u32..40, 1_u32..40).prop_map(|(a, by)| [a, (a + by) % 40]),
+            1 => [0_u32..42, 0_u32..42],
+            1 => [any::<u32>(), any::<u32>()],
+        ],
+        normal in prop_oneof![
+            300 => Just([0.0_f32, -1.0, 0.0]),
+            1 => (0.99_f32..1.01).prop_map(|x| [x, 0.0, 0.0]),
+            1 => (0.9989_f32..1.0011).prop_map(|x| [x, 0.0, 0.0]),
+            1 => any_vec3(),
+        ],
+        count in prop_oneof![300 => 1_u32..5, 1 => Just(0), 1 => Just(5), 1 => any::<u32>()],
+        points in [any_vec3(), any_vec3(), any_vec3(), any_vec3()],
+        distances in [mostly(), mostly(), mostly(), mostly()],
+        unused in any::<u32>().prop_map(f32::from_bits),
+    ) -> Collision {
+        let mut contacts = [Contact { point: [unused; 3], distance: unused }; 4];
+        for (at, contact) in contacts.iter_mut().enumerate().take(count.min(4) as usize) {
+            *contact = Contact { point: points[at], distance: distances[at] };
+        }
+        let [body_a, body_b] = pair;
+        Collision { body_a, body_b, normal, count, contacts }
+    }
+}
+
+/// Buffers for so many records.
+fn buffers(variant: &Variant, segment: Segment, records: usize) -> Vec<Vec<Beat>> {
+    let layout = segment.layout(variant);
+    let channels = variant.profile.mm2s_widths.len();
+    (0..channels)
+        .map(|channel| vec![Beat::default(); layout.beats_on_channel(records, channel)])
+        .collect()
+}
+
+fn views(buffers: &mut [Vec<Beat>]) -> Vec<&mut [Beat]> {
+    buffers.iter_mut().map(Vec::as_mut_slice).collect()
+}
+
+/// What packing and validation say, unless the step is refused whatever it holds.
+fn said(
+    limits: &Limits,
+    bodies: &Vec<Body>,
+    collisions: &Vec<Collision>,
+    schedule: Option<&Schedule>,
+) -> Option<(bool, Result<(), InputError>)> {
+    let (parameters, shapes) = (StepParameters::default(), shapes(limits));
+    let scene = preflight(bodies, collisions, shapes, &parameters, limits).ok()?;
+    let quick = Quick::new(scene);
+    let variant = &limits.variant;
+    let target = Target { variant, shapes, quick: Some(&quick) };
+    let mut ends = Vec::new();
+    let count = bodies.len();
+    let mut velocities = buffers(variant, Segment::Velocities, count);
+    let mut poses = buffers(variant, Segment::Poses, count);
+    let (.., bodies_good) = pack_bodies(
+        target,
+        bodies,
+        count,
+        &mut ends,
+        &mut views(&mut velocities),
+        &mut views(&mut poses),
+    );
+    assert_eq!(survey(target, bodies, count, &mut Vec::new()), bodies_good);
+    let good = match schedule {
+        None => {
+            let count = collisions.len();
+            let entries = Entries { collisions, count, scheduled: false, words: None };
+            let mut channels = buffers(variant, Segment::Collisions, count);
+            pack_collisions(target, Ends(&ends), &entries, &mut views(&mut channels)).1
+        }
+        Some(schedule) => {
+            let (ordered, count) = (Ordered { collisions, schedule }, schedule.len());
+            let entries = Entries { collisions: &ordered, count, scheduled: true, words: None };
+            let mut channels = buffers(variant, Segment::Collisions, count);
+            pack_collisions(target, Ends(&ends), &entries, &mut views(&mut channels)).1
+        }
+    };
+    Some((bodies_good & good, validate(bodies, collisions, shapes, &parameters, limits)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1500))]
+
+    /// In either order: what is refused is noticed, and nothing else is.
+    #[test]
+    fn packing_notices_what_validation_refuses(
+        limits in any_limits(),
+        bodies in prop::collection::vec(any_body(), BODIES),
+        collisions in prop::collection::vec(any_collision(), 0..70),
+        order in any::<Option<u64>>(),
+    ) {
+        let schedule: Option<Schedule> = order.map(|seed| {
+            // Somewhere an empty entry, all others backwards.
+            let mut entries: Vec<Option<u32>> =
+                (0..u32::try_from(collisions.len()).expect("few")).rev().map(Some).collect();
+            let at = usize::try_from(seed % (collisions.len() as u64 + 1)).expect("few");
+            entries.insert(at, None);
+            entries.into_iter().collect()
+        });
+        // Of these an order is never made.
+        let alike = collisions.iter().any(|it| it.body_a == it.body_b);
+        prop_assume!(schedule.is_none() || !alike);
+        if let Some((good, valid)) = said(&limits, &bodies, &collisions, schedule.as_ref()) {
+            prop_assert_eq!(good, valid.is_ok(), "{:?}", valid);
+        }
+    }
+}
+
+/// Or the property above would hold of nothing: both happen, of every kind of geometry and rows.
+#[test]
+fn a_good_scene_is_good_and_one_wrong_number_is_not() {
+    let pose = Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] };
+    let bodies: Vec<Body> = (0..BODIES)
+        .map(|_| Body {
+            pose,
+            velocity: Velocity { linear: [1.0; 3], angular: [2.0; 3] },
+            shape: 1,
+        })
+        .collect();
+    let contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
+    let collision = Collision {
+        body_a: 3,
+        body_b: 4,
+        normal: [0.0, 1.0, 0.0],
+        count: 3,
+        contacts: [contact, contact, contact, Contact { point: [f32::NAN; 3], distance: f32::NAN }],
+    };
+    let collisions = vec![collision; 61];
+    for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16] {
+        let relative = profile.geometry == Geometry::Relative;
+        let limits = limits(profile.default_variant(), true);
+        let said = |bodies: &Vec<Body>, collisions: &Vec<Collision>| {
+            let (good, valid) =
+                said(&limits, bodies, collisions, None).expect("nothing else wrong");
+            assert_eq!(good, valid.is_ok(), "{relative} {valid:?}");
+            good
+        };
+        assert!(said(&bodies, &collisions));
+        for at in [0, 29, 30, 60] {
+            let mut wrong = collisions.clone();
+            wrong[at].contacts[2].distance = f32::INFINITY;
+            assert!(!said(&bodies, &wrong));
+            let mut wrong = bodies.clone();
+            wrong[at % BODIES].velocity.angular[2] = f32::NAN;
+            assert!(!said(&wrong, &collisions));
+        }
+    }
+}

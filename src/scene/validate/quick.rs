@@ -1,0 +1,205 @@
+//! This file looks at the input of a step while it is packed: a block at a time, in the cache.
+//!
+//! Without a branch per number it is found out whether everything of a record is surely right. One
+//! of which that cannot be said is checked as [`validate`](super::validate) does; what that refuses
+//! is refused there, by its own words and in its own order.
+
+use bitstream_model::interface::number::{Precision, StreamFormat};
+use bitstream_model::interface::profile::Geometry;
+use bitstream_model::interface::record::{
+    Beat, CONTACT_POINTS, LANES, WORD_LANE, collision, relative,
+};
+
+use super::body::check_body;
+use super::rows::{Ends as RowEnds, surely_fit};
+use super::{Scene, check_whole};
+use crate::record;
+use crate::record::end::{End, Ends};
+use crate::scene::{Body, Collision, InputError};
+
+/// How far from 1 the square of a normal's length surely may be: the length itself is half as far.
+const NORMAL: f32 = InputError::NORMAL_TOLERANCE;
+/// Square of twice the length that an orientation must have.
+const ORIENTATION: f32 = 4.0 * InputError::SHORTEST_ORIENTATION * InputError::SHORTEST_ORIENTATION;
+/// An f32 without its sign.
+const MAGNITUDE: u32 = u32::MAX >> 1;
+#[expect(clippy::cast_possible_truncation, reason = "four")]
+const MOST_POINTS: u32 = CONTACT_POINTS as u32;
+
+/// Largest magnitudes of the words of a record, as bits: magnitudes are in the order of their bits,
+/// and infinity and NaN are beyond all numbers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Largest<const ROWS: usize>([[u32; LANES]; ROWS]);
+
+impl<const ROWS: usize> Largest<ROWS> {
+    /// Numbers of at most `limit`, but what lies beside the vec3 of these rows.
+    fn new(limit: f32, beside: [u32; ROWS]) -> Self {
+        Self(beside.map(|word| {
+            let mut row = [limit.to_bits(); LANES];
+            row[WORD_LANE] = word;
+            row
+        }))
+    }
+
+    /// Whether all of these records are within.
+    #[inline]
+    fn bound(&self, records: &[[Beat; ROWS]]) -> bool {
+        let mut beyond = [false; LANES];
+        for record in records {
+            for (Beat(words), largest) in record.iter().zip(&self.0) {
+                for ((beyond, word), largest) in beyond.iter_mut().zip(words).zip(largest) {
+                    *beyond |= word & MAGNITUDE > *largest;
+                }
+            }
+        }
+        beyond == [false; LANES]
+    }
+}
+
+/// Looks at the bodies and collisions of one step.
+#[derive(Debug)]
+pub(crate) struct Quick<'a> {
+    scene: Scene<'a>,
+    short_rows: bool,
+    bodies: Largest<4>,
+    absolute: Largest<{ collision::ROWS }>,
+    relative: Largest<{ relative::ROWS }>,
+}
+
+impl<'a> Quick<'a> {
+    /// For what passed [`preflight`](super::preflight).
+    pub(crate) fn new(scene: Scene<'a>) -> Self {
+        let held = scene.held;
+        let any = u32::MAX;
+        let [velocities, poses, limit] =
+            [held.velocities, held.poses, held.collisions].map(StreamFormat::largest);
+        let number = limit.to_bits();
+        // That of a point which is not there is infinite; one that is there is looked at.
+        let distance = f32::INFINITY.to_bits();
+        let Largest([linear, angular]) = Largest::new(velocities, [any; 2]);
+        let Largest([position, orientation]) = Largest::new(poses, [any, poses.to_bits()]);
+        let geometry = scene.variant.profile.geometry;
+        Self {
+            short_rows: scene.variant.numbers.rows == Precision::Binary16
+                && !(held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute),
+            bodies: Largest([linear, angular, position, orientation]),
+            absolute: Largest::new(limit, [any, any, any, number, number, number, number]),
+            relative: Largest::new(limit, [any, any, distance, distance, distance, distance]),
+            scene,
+        }
+    }
+
+    /// Whether validation refuses nothing of these bodies, the first of which has the index `first`;
+    /// `ends` are theirs.
+    #[inline]
+    pub(crate) fn bodies(&self, first: usize, bodies: &[Body], ends: &[End]) -> bool {
+        let mut good = true;
+        for (body, end) in bodies.iter().zip(ends) {
+            let [linear, angular] = record::velocity::encode(body);
+            let [position, orientation] = record::pose::encode(body);
+            good &= self.bodies.bound(&[[linear, angular, position, orientation]]);
+            let [x, y, z, w] = body.pose.orientation;
+            let square = x * x + y * y + z * z + w * w;
+            good &= (ORIENTATION..=f32::MAX).contains(&square) & end.has_shape();
+            let speeds = [body.velocity.linear, body.velocity.angular];
+            let moves = speeds.as_flattened().iter().fold(0, |bits, v| bits | v.to_bits());
+            good &= !end.is_static() | (moves & MAGNITUDE == 0);
+        }
+        good || (first..).zip(bodies).all(|(at, body)| check_body(at, body, &self.scene).is_ok())
+    }
+
+    /// Whether validation refuses nothing of these collisions, whose records in world coordinates
+    /// these are.
+    #[inline]
+    pub(crate) fn absolute(&self, block: &Block<'_>, records: &[[Beat; collision::ROWS]]) -> bool {
+        let mut good = block.heads & self.absolute.bound(records);
+        if self.short_rows {
+            for (rows, collision) in records.iter().zip(block.collisions) {
+                let [_, a, b, points @ ..] = rows;
+                good &= self.rows(block, collision, [a, b], points);
+            }
+        }
+        good || self.exactly(block)
+    }
+
+    /// As [`Self::absolute`], of records relative to body A.
+    #[inline]
+    pub(crate) fn relative(&self, block: &Block<'_>, records: &[[Beat; relative::ROWS]]) -> bool {
+        let mut good = block.heads & self.relative.bound(records);
+        let limit = self.scene.held.collisions.largest();
+        for (rows, collision) in records.iter().zip(block.collisions) {
+            for (ordinal, contact) in (0..).zip(&collision.contacts) {
+                good &= (contact.distance.abs() <= limit) | (ordinal >= collision.count);
+            }
+            if self.short_rows {
+                let [_, offset, points @ ..] = rows;
+                good &= self.rows(block, collision, [&Beat([0; LANES]), offset], points);
+            }
+        }
+        good || self.exactly(block)
+    }
+
+    /// Whether a bitstream that computes rows in sixteen bits surely computes these.
+    #[inline]
+    fn rows(
+        &self,
+        block: &Block<'_>,
+        collision: &Collision,
+        positions: [&Beat; 2],
+        points: &[Beat; CONTACT_POINTS],
+    ) -> bool {
+        let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
+        let shapes = ends.map(|end| end.shape(self.scene.shapes));
+        let ends = RowEnds { positions, shapes };
+        surely_fit(&ends, points, collision.count, self.scene.flush_subnormals)
+            | (block.scheduled & is_padding(collision))
+    }
+
+    /// Looks at a block as validation does.
+    #[cold]
+    fn exactly(&self, block: &Block<'_>) -> bool {
+        let end = |body: usize| {
+            let end = u32::try_from(body).map_or(End::MISSING, |body| block.ends.get(body));
+            (end.position, end.shape(self.scene.shapes))
+        };
+        (block.first..).zip(block.collisions).all(|(index, collision)| {
+            (block.scheduled & is_padding(collision))
+                || check_whole(index, collision, end, &self.scene).is_ok()
+        })
+    }
+}
+
+/// Collisions that are looked at together.
+#[derive(Debug)]
+pub(crate) struct Block<'a> {
+    /// Index of the first.
+    pub(crate) first: usize,
+    pub(crate) collisions: &'a [Collision],
+    /// Of all bodies.
+    pub(crate) ends: Ends<'a>,
+    /// Whether they are in an order that was made for them. One without contact points may be of
+    /// the order's making then: that none of the caller's is, ordering has found.
+    pub(crate) scheduled: bool,
+    /// Whether [`head`] is right for all of them.
+    pub(crate) heads: bool,
+}
+
+/// Whether normal, count and bodies of a collision are surely right.
+#[inline]
+pub(crate) fn head(collision: &Collision, [a, b]: [End; 2], scheduled: bool) -> bool {
+    let [x, y, z] = collision.normal;
+    let square = x * x + y * y + z * z;
+    let right = ((square - 1.0).abs() <= NORMAL)
+        & (collision.count.wrapping_sub(1) < MOST_POINTS)
+        & (collision.body_a != collision.body_b)
+        & a.has_shape()
+        & b.has_shape()
+        & !(a.is_static() & b.is_static());
+    right | (scheduled & is_padding(collision))
+}
+
+/// Whether an order may have made it.
+#[inline]
+fn is_padding(collision: &Collision) -> bool {
+    (collision.count == 0) & (collision.body_a == collision.body_b)
+}

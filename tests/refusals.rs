@@ -1,0 +1,109 @@
+//! A step that is refused says the same whether its buffers are there already, so that it is looked
+//! at while it is packed, or not, so that it is validated first; and in either order. Afterwards all
+//! is as it was.
+#![cfg(feature = "emulation")]
+
+use bitstream_model::{BoardConfig, EmulatedBoard};
+use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, Profile, WINDOWED};
+use zynq_pgs::order::Order;
+use zynq_pgs::{
+    Accelerator, BoardChoice, Body, Collision, Contact, OpenOptions, Pose, Shape, StepParameters,
+    Velocity,
+};
+
+const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+
+/// A row of cubes on the ground, each in contact with the next.
+fn scene() -> (Vec<Body>, Vec<Collision>) {
+    let body = |x, y, shape| Body {
+        pose: Pose { position: [x, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity: Velocity::default(),
+        shape,
+    };
+    let mut bodies = vec![body(0.0, -1.0, 0)];
+    let mut collisions = Vec::new();
+    let mut x = 0.0;
+    for cube in 1..100 {
+        bodies.push(body(x, 0.99, 1));
+        let contact = Contact { point: [x - 1.0, 0.5, 0.25], distance: -0.01 };
+        let normal = if cube == 1 { [0.0, -1.0, 0.0] } else { [-1.0, 0.0, 0.0] };
+        let (body_a, body_b) = (cube - 1, cube);
+        collisions.push(Collision { body_a, body_b, normal, count: 2, contacts: [contact; 4] });
+        x += 2.0;
+    }
+    (bodies, collisions)
+}
+
+fn open(profile: &'static Profile) -> Accelerator {
+    let config = BoardConfig { profile, ..BoardConfig::default() };
+    let board = EmulatedBoard::new(config).expect("a board that can be built");
+    let board = BoardChoice::Emulated(board.cpu_port());
+    let options = OpenOptions { board, ..OpenOptions::default() };
+    let mut accelerator = Accelerator::open(options).expect("the emulated board");
+    accelerator.set_shapes(&SHAPES).expect("they fit");
+    accelerator
+}
+
+type Mistake = (&'static str, fn(&mut Vec<Body>, &mut Vec<Collision>));
+
+/// One at a time, and the last two together: bodies are looked at first, the first of them first.
+const MISTAKES: [Mistake; 15] = [
+    ("position", |bodies, _| bodies[77].pose.position[1] = f32::NAN),
+    ("orientation", |bodies, _| bodies[30].pose.orientation = [0.0; 4]),
+    ("infinite orientation", |bodies, _| bodies[29].pose.orientation[3] = f32::INFINITY),
+    ("linear velocity", |bodies, _| bodies[99].velocity.linear[2] = f32::NEG_INFINITY),
+    ("static body", |bodies, _| bodies[0].velocity.angular[0] = 1.0),
+    ("shape", |bodies, _| bodies[31].shape = 2),
+    ("no body", |_, collisions| collisions[98].body_b = 100),
+    ("same body", |_, collisions| collisions[60].body_b = collisions[60].body_a),
+    ("count 0", |_, collisions| collisions[59].count = 0),
+    ("count 5", |_, collisions| collisions[0].count = 5),
+    ("normal", |_, collisions| collisions[29].normal = [0.0, 0.998, 0.0]),
+    ("contact", |_, collisions| collisions[30].contacts[1].point[2] = f32::NAN),
+    ("both static", |bodies, collisions| {
+        bodies[50].shape = 0;
+        (collisions[50].body_a, collisions[50].body_b) = (50, 0);
+    }),
+    ("padding", |_, collisions| {
+        (collisions[7].body_a, collisions[7].body_b, collisions[7].count) = (0, 0, 0);
+    }),
+    ("several", |bodies, collisions| {
+        collisions[3].count = 9;
+        bodies[98].shape = 9;
+        bodies[97].pose.orientation = [f32::NAN; 4];
+    }),
+];
+
+#[test]
+fn a_refusal_is_the_same_before_packing_and_while_packing() {
+    let (bodies, collisions) = scene();
+    for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED] {
+        let orders = [Order::AsGiven, Order::HazardFree];
+        for order in orders.into_iter().filter(|order| {
+            // Where only live bodies are kept, the order is made in any case.
+            profile.name != "windowed" || *order == Order::HazardFree
+        }) {
+            let mut parameters = StepParameters::default();
+            parameters.order = Some(order);
+            let mut warm = open(profile);
+            let (mut expected, mut state) = (bodies.clone(), bodies.clone());
+            warm.step(&mut state, &collisions, &parameters).expect("a step");
+            open(profile).step(&mut expected, &collisions, &parameters).expect("a step");
+            for (name, mistake) in MISTAKES {
+                let (mut wrong, mut list) = (bodies.clone(), collisions.clone());
+                mistake(&mut wrong, &mut list);
+                let before = format!("{wrong:?}");
+                let cold = open(profile).step(&mut wrong.clone(), &list, &parameters);
+                let cold = cold.expect_err(name);
+                let found = warm.step(&mut wrong, &list, &parameters).expect_err(name);
+                assert!(found.is_input(), "{} {order:?} {name}: {found}", profile.name);
+                assert_eq!(format!("{found:?}"), format!("{cold:?}"), "{name}");
+                assert_eq!(format!("{wrong:?}"), before, "{name}: the bodies are as they were");
+            }
+            // Nothing of it is left.
+            let mut state = bodies.clone();
+            warm.step(&mut state, &collisions, &parameters).expect("a step");
+            assert_eq!(state, expected);
+        }
+    }
+}
