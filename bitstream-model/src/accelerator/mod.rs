@@ -15,6 +15,8 @@
 //! nothing of who sent it.
 
 mod array;
+#[allow(dead_code, reason = "the phases do not run it yet")]
+mod batch;
 mod control;
 mod decode;
 mod inertia;

@@ -1,0 +1,266 @@
+//! The collisions of a step decoded once, and the passes over them, many at a time.
+//!
+//! ```text
+//! beats -> place.rs (which are independent) -> block.rs (side by side) -> passes
+//! ```
+//!
+//! Only collisions that share no moving body change places, so that every bit is that of
+//! `solver.rs` taking one after the other. It is for the layout of records in f32 with isotropic
+//! inertia and subnormals kept.
+
+mod block;
+mod place;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use super::array::Row;
+use super::decode::Collision;
+use super::inertia::Isotropic;
+use super::number::Single;
+use super::pipeline::Entry;
+use super::segment::PacketError;
+use super::solver::{self, Impulses, Mass, SolverParameters, Velocity};
+use super::turn::fixed_impulse;
+use crate::cast::register;
+use crate::interface::control::ErrorCode;
+use crate::interface::number::StreamFormat;
+use crate::interface::record::{Beat, CONTACT_POINTS, WORD_LANE, collision};
+
+use block::{Block, LANES};
+use place::Places;
+
+/// The slot of a padding entry.
+const NO_SLOT: u32 = u32::MAX;
+
+/// What a pass is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stage {
+    contact: bool,
+    /// The last contact pass, of which the impulses are counted, or the first friction pass, which
+    /// finds their sums.
+    turning: bool,
+}
+
+impl Stage {
+    fn new(pass: u32, contact: u32) -> Self {
+        if pass < contact {
+            Self { contact: true, turning: pass + 1 == contact }
+        } else {
+            Self { contact: false, turning: pass == contact }
+        }
+    }
+
+    /// The pass over one collision; returns its share of the impulse sum.
+    fn solve(
+        self,
+        collision: &Collision,
+        parameters: &SolverParameters,
+        masses: &[Mass; 2],
+        velocities: &mut [Velocity; 2],
+        impulses: &mut Impulses,
+    ) -> u64 {
+        type One = Single;
+        if self.contact {
+            solver::contact::<One, One, Isotropic>(
+                collision, parameters, masses, velocities, impulses,
+            );
+            return if self.turning { fixed_impulse::<One>(impulses) } else { 0 };
+        }
+        if self.turning {
+            *impulses = [solver::normal_sum::<One>(impulses), 0.0, 0.0, 0.0];
+        }
+        solver::friction::<One, One, Isotropic>(
+            collision, parameters, masses, velocities, impulses,
+        );
+        0
+    }
+}
+
+/// The collisions of a step.
+#[derive(Debug)]
+pub(super) struct Batch {
+    blocks: Vec<Block>,
+    places: Places,
+    /// Block and lane of each collision.
+    slots: Vec<u32>,
+    impulse_sum: u64,
+}
+
+impl Batch {
+    /// Takes at most `threads` threads, of which one is the caller's, and SIMD lanes or not.
+    pub(super) fn new(_threads: usize, _lanes: bool) -> Self {
+        Self { blocks: Vec::new(), places: Places::default(), slots: Vec::new(), impulse_sum: 0 }
+    }
+
+    /// Begins a step: forgets the last one's collisions and makes room for so many.
+    pub(super) fn begin(&mut self, collisions: usize) {
+        self.blocks.clear();
+        self.blocks.reserve(collisions.div_ceil(LANES));
+        self.slots.clear();
+        self.slots.reserve(collisions);
+        self.places.begin(collisions);
+        self.impulse_sum = 0;
+    }
+
+    /// Collisions decoded, padding entries among them.
+    pub(super) fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Decodes the next `count` records, of 2, 2, 2 and 1 beats on the four streams.
+    ///
+    /// # Errors
+    ///
+    /// The first collision that the decoder refuses; those before it stay.
+    pub(super) fn decode(
+        &mut self,
+        streams: [&[Beat]; 4],
+        count: usize,
+        shape_of: &[u8],
+        masses: &[Mass],
+    ) -> Result<(), PacketError> {
+        self.places.bodies(shape_of.len());
+        for record in 0..count {
+            let pair =
+                |stream: usize| [streams[stream][2 * record], streams[stream][2 * record + 1]];
+            let ([a, e], [b, f], [c, g], d) = (pair(0), pair(1), pair(2), streams[3][record]);
+            self.record([a, b, c, d, e, f, g].map(|beat| beat.0), shape_of, masses)?;
+        }
+        Ok(())
+    }
+
+    /// Decodes the next record.
+    fn record(
+        &mut self,
+        rows: [Row; collision::ROWS],
+        shape_of: &[u8],
+        masses: &[Mass],
+    ) -> Result<(), PacketError> {
+        let index = register(self.slots.len());
+        let count = rows[collision::NORMAL][WORD_LANE];
+        if count == 0 {
+            self.slots.push(NO_SLOT);
+            return Ok(());
+        }
+        let bodies = [rows[collision::BODY_A][WORD_LANE], rows[collision::BODY_B][WORD_LANE]];
+        let moving = moving(count, bodies, shape_of, masses).map_err(|code| PacketError {
+            code,
+            channel: 0,
+            beat: index,
+        })?;
+        let place = self.places.place(index, bodies, moving);
+        if place.block == self.blocks.len() {
+            self.blocks.push(Block::EMPTY);
+        }
+        let block = &mut self.blocks[place.block];
+        block.put(place.lane, &Collision::absolute(StreamFormat::F32, &rows), moving);
+        if place.serial {
+            block.kind[0] |= block::kind::SERIAL;
+        }
+        self.slots.push(register(place.block * LANES + place.lane));
+        Ok(())
+    }
+
+    /// Block and lane of a collision, or `None` for a padding entry.
+    fn slot(&self, index: usize) -> Option<(usize, usize)> {
+        let slot = *self.slots.get(index)?;
+        (slot != NO_SLOT).then_some((slot as usize / LANES, slot as usize % LANES))
+    }
+
+    /// The bodies of a decoded collision and which of them move, or `None` for a padding entry.
+    pub(super) fn entry(&self, index: usize) -> Option<Entry> {
+        self.slot(index).map(|(block, lane)| self.blocks[block].entry(lane))
+    }
+
+    /// The smallest distance, in collisions, of two that share a moving body; `u32::MAX` without.
+    pub(super) fn distance(&self) -> u32 {
+        self.places.distance().unwrap_or(u32::MAX)
+    }
+
+    /// Runs whole passes over all collisions. Of the step's passes, numbered from 0, the first
+    /// `contact` are contact passes. `velocities` are those of all bodies.
+    pub(super) fn run(
+        &mut self,
+        passes: Range<u32>,
+        contact: u32,
+        parameters: &SolverParameters,
+        shape_of: &[u8],
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+    ) {
+        for pass in passes {
+            let all = 0..self.len();
+            self.run_part(pass, all, contact, parameters, shape_of, masses, velocities);
+        }
+    }
+
+    /// Runs a part of one pass, one collision after the other in the order received.
+    #[expect(clippy::too_many_arguments, reason = "those of `run` and which part")]
+    pub(super) fn run_part(
+        &mut self,
+        pass: u32,
+        part: Range<usize>,
+        contact: u32,
+        parameters: &SolverParameters,
+        shape_of: &[u8],
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+    ) {
+        let stage = Stage::new(pass, contact);
+        for index in part {
+            let Some((block, lane)) = self.slot(index) else { continue };
+            let block = &mut self.blocks[block];
+            let Entry { bodies, moving } = block.entry(lane);
+            let sides = bodies.map(|body| body as usize);
+            let mut pair = sides.map(|body| velocities[body]);
+            let mut impulses = block.impulses(lane);
+            let masses = sides.map(|body| masses[usize::from(shape_of[body])]);
+            let collision = block.collision(lane);
+            let sum = stage.solve(&collision, parameters, &masses, &mut pair, &mut impulses);
+            self.impulse_sum = self.impulse_sum.saturating_add(sum);
+            block.put_impulses(lane, impulses);
+            for side in 0..2 {
+                if moving[side] {
+                    velocities[sides[side]] = pair[side];
+                }
+            }
+        }
+    }
+
+    /// The accumulated impulses of a collision after the passes run so far.
+    pub(super) fn impulses(&self, index: usize) -> Impulses {
+        self.slot(index)
+            .map_or([0.0; CONTACT_POINTS], |(block, lane)| self.blocks[block].impulses(lane))
+    }
+
+    /// What the last contact pass has added to the accelerator's impulse sum.
+    pub(super) fn impulse_sum(&self) -> u64 {
+        self.impulse_sum
+    }
+}
+
+/// Which bodies of a collision with a contact move, or what is wrong with it.
+#[inline]
+fn moving(
+    count: u32,
+    bodies: [u32; 2],
+    shape_of: &[u8],
+    masses: &[Mass],
+) -> Result<[bool; 2], ErrorCode> {
+    if count as usize > CONTACT_POINTS {
+        return Err(ErrorCode::ContactCount);
+    }
+    let [Some(&a), Some(&b)] = bodies.map(|body| shape_of.get(body as usize)) else {
+        return Err(ErrorCode::BodyIndex);
+    };
+    if bodies[0] == bodies[1] {
+        return Err(ErrorCode::SelfCollision);
+    }
+    let moving = [a, b].map(|shape| masses[usize::from(shape)].inverse_mass != 0.0);
+    if moving == [false; 2] {
+        return Err(ErrorCode::StaticPair);
+    }
+    Ok(moving)
+}
