@@ -79,6 +79,23 @@ pub enum Denied {
     NoAnswer,
 }
 
+/// Beats in a buffer that the device reads. While it owns the buffer they stay as they are, so that
+/// beats of equal sources are equal: each hand-over makes sources of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Source {
+    /// Where the first one is.
+    address: u64,
+    /// Which hand-over it was.
+    grant: u64,
+}
+
+impl Source {
+    /// The same from so many beats further on.
+    pub(crate) fn further(self, beats: u64) -> Self {
+        Self { address: self.address + beats * BEAT_BYTES as u64, ..self }
+    }
+}
+
 #[derive(Debug)]
 enum Content {
     Cpu,
@@ -91,6 +108,8 @@ enum Content {
 struct Region {
     bytes: u64,
     content: Content,
+    /// The number of its last hand-over.
+    grant: u64,
     /// What the CPU's caches hold of it, where they do not agree with memory.
     cached: Option<Box<[Beat]>>,
 }
@@ -111,6 +130,8 @@ pub(crate) struct Memory {
     address_limit: u64,
     next_is_high: bool,
     coherency: Coherency,
+    /// Hand-overs so far.
+    grants: u64,
     /// Memory that is not kept here, instead of all ranges.
     outside: Option<Outside>,
 }
@@ -129,6 +150,7 @@ impl Memory {
             address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
             next_is_high: false,
             coherency,
+            grants: 0,
             outside: None,
         }
     }
@@ -143,6 +165,7 @@ impl Memory {
             address_limit: 0,
             next_is_high: false,
             coherency: Coherency::Coherent,
+            grants: 0,
             outside: Some(Outside::new(memory, granted)),
         }
     }
@@ -163,7 +186,7 @@ impl Memory {
         };
         let address = part.start;
         part.start += take;
-        self.regions.insert(address, Region { bytes, content, cached: None });
+        self.regions.insert(address, Region { bytes, content, grant: 0, cached: None });
         Ok(address)
     }
 
@@ -202,6 +225,8 @@ impl Memory {
         access: DeviceAccess,
     ) -> Result<(), MemoryError> {
         let coherency = self.coherency;
+        self.grants += 1;
+        let grant = self.grants;
         let region = self.region_at(address)?;
         if !matches!(region.content, Content::Cpu) {
             return Err(MemoryError::State { address, state: "the CPU does not own it" });
@@ -221,6 +246,7 @@ impl Memory {
             _ => beats,
         };
         region.content = Content::Device(visible, access, granted);
+        region.grant = grant;
         Ok(())
     }
 
@@ -271,6 +297,27 @@ impl Memory {
         if let Some(ref mut outside) = self.outside {
             return outside.read(address, count);
         }
+        self.owned(address, count).map(|(_, beats)| beats)
+    }
+
+    /// Where beats are that the device reads, if they stay as they are while it owns them: memory
+    /// outside may change at any time. The address is a multiple of a beat.
+    pub(crate) fn source(&self, address: u64, count: usize) -> Result<Option<Source>, Denied> {
+        if self.outside.is_some() {
+            return Ok(None);
+        }
+        let grant = self.owned(address, count).map(|(region, _)| region.grant)?;
+        Ok(Some(Source { address, grant }))
+    }
+
+    /// Beats of a source, if the device owns its buffer still.
+    pub(crate) fn view(&self, from: Source, count: usize) -> Option<&[Beat]> {
+        let (region, beats) = self.owned(from.address, count).ok()?;
+        (region.grant == from.grant).then_some(beats)
+    }
+
+    /// Beats that the device reads in a buffer that it owns.
+    fn owned(&self, address: u64, count: usize) -> Result<(&Region, &[Beat]), Denied> {
         let (region, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
         match &region.content {
             Content::Cpu => Err(Denied::CpuOwned),
@@ -279,7 +326,8 @@ impl Memory {
             Content::Device(beats, DeviceAccess::Read, granted) => {
                 let first = index(offset / BEAT_BYTES as u64);
                 let beats = beats.get(..*granted).unwrap_or(beats);
-                beats.get(first..first + count).ok_or(Denied::PastEnd)
+                let beats = beats.get(first..first + count).ok_or(Denied::PastEnd)?;
+                Ok((region, beats))
             }
         }
     }

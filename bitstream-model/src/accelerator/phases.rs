@@ -17,6 +17,7 @@ use crate::interface::control::ErrorCode;
 use crate::interface::number::{Precision, StreamFormat};
 use crate::interface::profile::{Depth, Geometry, Inertia, Variant};
 use crate::interface::record::{CONTACT_POINTS, pose, result};
+use crate::memory::Memory;
 use crate::stream::Stream;
 
 impl Accelerator {
@@ -64,12 +65,14 @@ impl Accelerator {
         &mut self,
         mut segment: Segment,
         inputs: &mut [Stream],
+        memory: &Memory,
     ) -> Result<bool, PacketError> {
         let records = segment.available(inputs);
         if records == 0 {
             return segment.check_waiting(inputs).map(|()| false);
         }
         segment.check(records, inputs)?;
+        segment.fetch(records, inputs, memory);
         let mut reader = segment.reader(0, inputs);
         for body in segment.done..segment.done + records {
             let arrival = self.arrival(body, &mut reader)?;
@@ -103,13 +106,15 @@ impl Accelerator {
         self.config.depth(if contact { profile.contact } else { profile.friction })
     }
 
-    fn start_pass(&mut self, number: u32) {
+    pub(super) fn start_pass(&mut self, number: u32) {
         if number == self.passes() {
+            self.compute_to(number, 0);
             let (poses, results) = (self.poses_in(), self.results_out());
             self.phase = Phase::Integrate { poses, results };
             return;
         }
         self.pipeline.start_pass(self.depth(number).window.into());
+        self.replay.begin_pass(self.pipeline.depth());
         self.phase = Phase::Pass { number, segment: self.collisions_in() };
     }
 
@@ -308,6 +313,7 @@ impl Accelerator {
         mut results: Results,
         inputs: &mut [Stream],
         outputs: &mut [Stream],
+        memory: &Memory,
     ) -> Result<bool, PacketError> {
         let arrived = poses.available(inputs);
         let records = arrived.min(results.room(outputs));
@@ -318,6 +324,7 @@ impl Accelerator {
             return Ok(false);
         }
         poses.check(records, inputs)?;
+        poses.fetch(records, inputs, memory);
         let format = self.variant.numbers.poses;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
