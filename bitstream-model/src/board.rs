@@ -13,6 +13,7 @@ use crate::interface::control::IDENTIFICATION;
 use crate::interface::record::{BEAT_BYTES, Beat};
 use crate::interrupt::InterruptLine;
 use crate::memory::{Memory, MemoryError};
+use crate::pace::Recurrence;
 use crate::quirks::InterruptWiring;
 use crate::stream::Stream;
 use crate::violation::{Log, RegisterAccess, ViolationKind};
@@ -69,6 +70,8 @@ pub(crate) struct Board {
     pub(crate) credit: u64,
     /// The engine that has the first turn at the memory.
     pub(crate) turn: usize,
+    /// What is known of how collisions flow.
+    pub(crate) recurrence: Option<Recurrence>,
 }
 
 impl Board {
@@ -97,6 +100,7 @@ impl Board {
             counts: Counts::default(),
             credit: 0,
             turn: 0,
+            recurrence: None,
         }
     }
 

@@ -7,7 +7,6 @@
 //!
 //! A board can be built on memory outside instead (`outside.rs`); then it allocates none.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -120,7 +119,8 @@ const GUARD: u64 = 4096;
 /// Physical memory.
 #[derive(Debug)]
 pub(crate) struct Memory {
-    regions: BTreeMap<u64, Region>,
+    /// By their addresses.
+    regions: Vec<(u64, Region)>,
     /// What was never allocated, on both sides of 4 GiB.
     low: Range<u64>,
     high: Range<u64>,
@@ -143,7 +143,7 @@ impl Memory {
         // a high address cut to 32 bits must not meet a buffer.
         const SYSTEM: u64 = 1 << 30;
         Self {
-            regions: BTreeMap::new(),
+            regions: Vec::new(),
             low: DDR_LOW.start + SYSTEM..DDR_LOW.end,
             high: DDR_HIGH.start..DDR_HIGH.end - SYSTEM,
             released: Vec::new(),
@@ -158,7 +158,7 @@ impl Memory {
     /// Memory outside the board, of which the device may touch what is granted.
     pub(crate) fn outside(memory: Box<dyn DeviceMemory>, granted: Vec<Range<u64>>) -> Self {
         Self {
-            regions: BTreeMap::new(),
+            regions: Vec::new(),
             low: 0..0,
             high: 0..0,
             released: Vec::new(),
@@ -186,7 +186,9 @@ impl Memory {
         };
         let address = part.start;
         part.start += take;
-        self.regions.insert(address, Region { bytes, content, grant: 0, cached: None });
+        let place = self.regions.partition_point(|(start, _)| *start < address);
+        let region = Region { bytes, content, grant: 0, cached: None };
+        self.regions.insert(place, (address, region));
         Ok(address)
     }
 
@@ -212,8 +214,15 @@ impl Memory {
         Ok((address, shared))
     }
 
+    /// The place of the range that begins there.
+    fn begins_at(&self, address: u64) -> Result<usize, MemoryError> {
+        let place = self.regions.binary_search_by_key(&address, |(start, _)| *start);
+        place.map_err(|_| MemoryError::Unknown { address })
+    }
+
     fn region_at(&mut self, address: u64) -> Result<&mut Region, MemoryError> {
-        self.regions.get_mut(&address).ok_or(MemoryError::Unknown { address })
+        let place = self.begins_at(address)?;
+        Ok(&mut self.regions[place].1)
     }
 
     /// Gives the device the first `granted` beats of a buffer.
@@ -273,7 +282,8 @@ impl Memory {
     }
 
     pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
-        let region = self.regions.remove(&address).ok_or(MemoryError::Unknown { address })?;
+        let place = self.begins_at(address)?;
+        let (_, region) = self.regions.remove(place);
         self.released.retain(|range| !range.is_empty());
         self.released.push(address..address + region.bytes.next_multiple_of(GUARD) + GUARD);
         Ok(())
@@ -281,7 +291,15 @@ impl Memory {
 
     /// The range that holds `address`, and the offset in it.
     fn find(&self, address: u64, bytes: u64) -> Result<(&Region, u64), Denied> {
-        let (start, region) = self.regions.range(..=address).next_back().ok_or(Denied::Unmapped)?;
+        let (place, offset) = self.place_of(address, bytes)?;
+        Ok((&self.regions[place].1, offset))
+    }
+
+    /// The place of that range, and the offset.
+    fn place_of(&self, address: u64, bytes: u64) -> Result<(usize, u64), Denied> {
+        let behind = self.regions.partition_point(|(start, _)| *start <= address);
+        let place = behind.checked_sub(1).ok_or(Denied::Unmapped)?;
+        let (start, region) = &self.regions[place];
         let offset = address - start;
         if offset >= region.bytes {
             return Err(Denied::Unmapped);
@@ -289,7 +307,7 @@ impl Memory {
         if bytes > region.bytes - offset {
             return Err(Denied::PastEnd);
         }
-        Ok((region, offset))
+        Ok((place, offset))
     }
 
     /// Beats that the device reads. The address is a multiple of a beat.
@@ -333,9 +351,8 @@ impl Memory {
     }
 
     fn beats_mut(&mut self, address: u64, count: usize) -> Result<&mut [Beat], Denied> {
-        let (_, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
-        let (_, region) = self.regions.range_mut(..=address).next_back().ok_or(Denied::Unmapped)?;
-        match &mut region.content {
+        let (place, offset) = self.place_of(address, (count * BEAT_BYTES) as u64)?;
+        match &mut self.regions[place].1.content {
             Content::Cpu => Err(Denied::CpuOwned),
             Content::Words(_) => Err(Denied::Kind),
             Content::Device(_, DeviceAccess::Read, _) => Err(Denied::Direction),

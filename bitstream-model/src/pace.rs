@@ -7,9 +7,10 @@
 
 use crate::accelerator::striping::STREAMS_MAX;
 use crate::board::{BURST_BEATS, STARVED_CYCLES};
+use crate::cast::index;
 
 /// What the memory delivers; bytes times the clock in kHz.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Supply {
     /// Each cycle.
     pub(crate) income: u64,
@@ -20,7 +21,7 @@ pub(crate) struct Supply {
 }
 
 /// What stays the same.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Rules {
     /// Beats of a collision on each stream that has any.
     pub(crate) share: [usize; STREAMS_MAX],
@@ -65,6 +66,37 @@ pub(crate) struct Standing {
     pub(crate) turn: usize,
 }
 
+impl Flowed {
+    /// So many times over, with what has flowed before.
+    fn repeated(&self, times: u64, before: &Self) -> Self {
+        let of = index(times);
+        Self {
+            cycles: before.cycles + times * self.cycles,
+            waits: before.waits + times * self.waits,
+            records: before.records + of * self.records,
+            beats: std::array::from_fn(|k| before.beats[k] + of * self.beats[k]),
+        }
+    }
+
+    /// What has flowed since then.
+    fn since(&self, then: &Self) -> Self {
+        Self {
+            cycles: self.cycles - then.cycles,
+            waits: self.waits - then.waits,
+            records: self.records - then.records,
+            beats: std::array::from_fn(|k| self.beats[k] - then.beats[k]),
+        }
+    }
+}
+
+/// What comes to the same again, where every collision takes an interval.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Recurrence {
+    rules: Rules,
+    standing: Standing,
+    flows: Flowed,
+}
+
 /// Everything that flows.
 #[derive(Debug, Clone)]
 pub(crate) struct Pace {
@@ -102,58 +134,64 @@ impl Pace {
     }
 
     /// The same where every collision takes an interval: what recurs is not gone through again, but
-    /// for the last `last` collisions at least.
-    pub(crate) fn run_evenly(&mut self, last: usize, mut enter: impl FnMut(Slice)) {
+    /// for the last `last` collisions at least. What is known to recur is kept for another time.
+    pub(crate) fn run_evenly(
+        &mut self,
+        last: usize,
+        known: &mut Option<Recurrence>,
+        mut enter: impl FnMut(Slice),
+    ) {
         let interval = self.rules.interval;
         let mut enter = |slice: Slice| {
             enter(slice);
             slice.records as u64 * interval
         };
+        if known.is_some_and(|known| known.rules != self.rules) {
+            *known = None;
+        }
         // Looks for the standing of some slices ago, each time of twice as many.
         let (mut then, mut since, mut patience) = ((self.standing, self.flowed), 0, 1_u32);
-        while self.slice(&mut enter).is_some() {
-            since += 1;
-            if self.standing == then.0 {
-                self.repeat(&then.1, last);
+        loop {
+            if let Some(known) = known.filter(|known| known.standing == self.standing) {
+                self.repeat(&known.flows, last);
                 break;
             }
-            if since == patience {
+            if self.slice(&mut enter).is_none() {
+                break;
+            }
+            since += 1;
+            if self.standing == then.0 {
+                let flows = self.flowed.since(&then.1);
+                let (rules, standing) = (self.rules, self.standing);
+                *known = Some(Recurrence { rules, standing, flows });
+            } else if since == patience {
                 (then, since, patience) = ((self.standing, self.flowed), 0, patience * 2);
             }
         }
         self.run(&mut enter);
     }
 
-    /// Goes through what has flowed since then as often as the limits leave room for, but for the
-    /// collisions that come last.
-    fn repeat(&mut self, then: &Flowed, last: usize) {
-        let (flowed, limits) = (self.flowed, self.limits);
-        let cycles = flowed.cycles - then.cycles;
-        let records = flowed.records - then.records;
-        let mut times = u64::MAX;
-        let mut room = |left: u64, each: u64| {
-            if let Some(fit) = left.checked_div(each) {
-                times = times.min(fit);
-            }
+    /// Lets what recurs flow as often as the limits leave room for, but for the collisions that come
+    /// last.
+    fn repeat(&mut self, flows: &Flowed, last: usize) {
+        let left = |limit: u64, flowed: u64, each: u64| (limit - flowed).checked_div(each);
+        let (limits, flowed) = (self.limits, self.flowed);
+        let of_beats = |k: usize| {
+            let (limit, flowed) = (limits.beats[k] as u64, flowed.beats[k] as u64);
+            left(limit, flowed, flows.beats[k] as u64)
         };
-        room(limits.cycles - flowed.cycles, cycles);
-        room((limits.records - flowed.records) as u64, records as u64);
-        for k in 0..STREAMS_MAX {
-            let each = flowed.beats[k] - then.beats[k];
-            room((limits.beats[k] - flowed.beats[k]) as u64, each as u64);
-        }
-        // Once more than fits the end, and those that are to be gone through.
-        let kept = 1 + last.div_ceil(records.max(1)) as u64;
-        let times = times.saturating_sub(kept);
-        let of = crate::cast::index(times);
-        self.flowed = Flowed {
-            cycles: flowed.cycles + times * cycles,
-            waits: flowed.waits + times * (flowed.waits - then.waits),
-            records: flowed.records + of * records,
-            beats: std::array::from_fn(|k| {
-                flowed.beats[k] + of * (flowed.beats[k] - then.beats[k])
-            }),
-        };
+        let times = (0..STREAMS_MAX)
+            .map(of_beats)
+            .chain([
+                left(limits.cycles, flowed.cycles, flows.cycles),
+                left(limits.records as u64, flowed.records as u64, flows.records as u64),
+            ])
+            .flatten()
+            .min();
+        // The last time may meet a limit.
+        let kept = 1 + last.div_ceil(flows.records.max(1)) as u64;
+        let times = times.map_or(0, |times| times.saturating_sub(kept));
+        self.flowed = flows.repeated(times, &flowed);
     }
 
     /// One slice: the accelerator works on what is there, then the engines refill for as long as that
@@ -224,7 +262,7 @@ impl Pace {
                 } else {
                     *credit / beat_cost
                 };
-                let moved = crate::cast::index(burst).min(room[*turn / 2]);
+                let moved = index(burst).min(room[*turn / 2]);
                 room[*turn / 2] -= moved;
                 put(*turn / 2, moved);
                 *credit -= moved as u64 * beat_cost;
@@ -234,6 +272,78 @@ impl Pace {
             };
             *turn = if *turn + 1 == engines { 0 } else { *turn + 1 };
             without_beats = if moved == 0 { without_beats + 1 } else { 0 };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The `float` design at 275 MHz, with that bandwidth in bytes a second.
+    fn pace(bandwidth: Option<u64>, depth: usize, standing: Standing) -> Pace {
+        let beat_cost = 16 * 275_000;
+        Pace {
+            rules: Rules {
+                share: [2, 2, 2, 1],
+                depth,
+                engines: 8,
+                interval: 2,
+                interval_max: 2,
+                supply: bandwidth.map(|bytes| Supply {
+                    income: bytes / 1000,
+                    beat_cost,
+                    reserve: BURST_BEATS * 8 * beat_cost,
+                }),
+            },
+            limits: Limits {
+                cycles: 1_000_000,
+                records: 127_746,
+                beats: [255_492, 255_492, 255_492, 127_746],
+            },
+            standing,
+            flowed: Flowed::default(),
+        }
+    }
+
+    const EMPTY: Standing = Standing { held: [0; STREAMS_MAX], credit: 0, turn: 0 };
+
+    #[test]
+    fn what_recurs_is_what_each_slice_would_have_given() {
+        let bandwidths = [
+            None,
+            Some(12_800_000_000),
+            Some(17_070_000_000),
+            Some(3_700_000_000),
+            Some(7_123_456_789),
+            Some(100_000_000),
+        ];
+        for bandwidth in bandwidths {
+            for (depth, held) in [(512, [0; 4]), (16, [3, 1, 0, 9]), (64, [0, 7, 64, 2])] {
+                let mut each = pace(bandwidth, depth, Standing { held, ..EMPTY });
+                let mut slices = 0;
+                let mut last = [(0, 0, 0); 4];
+                each.run(|Slice { cycles, first, records }| {
+                    slices += 1;
+                    last.rotate_left(1);
+                    last[3] = (cycles, first, records);
+                    2 * records as u64
+                });
+                let mut known = None;
+                for _ in 0..2 {
+                    let mut even = pace(bandwidth, depth, Standing { held, ..EMPTY });
+                    let (mut gone_through, mut last_even) = (0, [(0, 0, 0); 4]);
+                    even.run_evenly(158, &mut known, |Slice { cycles, first, records }| {
+                        gone_through += 1;
+                        last_even.rotate_left(1);
+                        last_even[3] = (cycles, first, records);
+                    });
+                    assert_eq!(even.flowed, each.flowed, "{bandwidth:?} {depth}");
+                    assert_eq!(even.standing, each.standing, "{bandwidth:?} {depth}");
+                    assert_eq!(last_even, last, "{bandwidth:?} {depth}");
+                    assert!(known.is_none() || gone_through < slices, "{bandwidth:?} {depth}");
+                }
+            }
         }
     }
 }

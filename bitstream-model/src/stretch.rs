@@ -13,7 +13,7 @@ impl Board {
     /// happens in them.
     pub(crate) fn stretch(&mut self, until: u64) {
         let Some(mut pace) = self.pace(until) else { return };
-        self.accelerator.flow(&mut pace);
+        self.accelerator.flow(&mut pace, &mut self.recurrence);
         let Flowed { cycles, beats, .. } = pace.flowed;
         if cycles == 0 {
             return;

@@ -17,6 +17,7 @@
 mod array;
 #[allow(dead_code, reason = "until the passes take threads")]
 mod batch;
+mod bodies;
 mod control;
 mod decode;
 mod inertia;
@@ -42,7 +43,7 @@ use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
 use crate::interface::profile::{Flow, Inertia, Variant};
-use crate::interface::record::CONTACT_POINTS;
+use crate::interface::record::{Beat, CONTACT_POINTS};
 use crate::memory::Memory;
 use crate::quirks::Resettable;
 use crate::stream::Stream;
@@ -111,6 +112,8 @@ pub(crate) struct Accelerator {
     inertias: Vec<inertia::Stored>,
     impulses: Vec<Impulses>,
     replay: Replay,
+    /// Rows of results on their way to each stream.
+    rows: [Vec<Beat>; striping::STREAMS_MAX],
     window: Option<Box<window::Windowed>>,
 }
 
@@ -140,6 +143,7 @@ impl Accelerator {
             inertias: Vec::new(),
             impulses: Vec::new(),
             replay: Replay::new(config),
+            rows: Default::default(),
             window: None,
         }
     }

@@ -74,8 +74,9 @@ impl Replay {
             && variant.numbers == Numbers::F32
             && variant.inertia == Inertia::Isotropic
             && profile.geometry == Geometry::Absolute
-            && profile.stripes.collisions == FLOAT.stripes.collisions
+            && profile.stripes == FLOAT.stripes
             && profile.mm2s_widths == FLOAT.mm2s_widths
+            && profile.s2mm_widths == FLOAT.s2mm_widths
             && profile.collisions_per_issue == 1
             && matches!(profile.flow, Flow::Passes)
             && config.subnormals == Subnormals::Keep

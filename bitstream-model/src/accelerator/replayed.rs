@@ -6,7 +6,7 @@ use super::segment::{PacketError, Segment};
 use super::{Accelerator, Phase};
 use crate::interface::record::CONTACT_POINTS;
 use crate::memory::Memory;
-use crate::pace::{Pace, Slice};
+use crate::pace::{Pace, Recurrence, Slice};
 use crate::stream::Stream;
 
 impl Accelerator {
@@ -181,12 +181,12 @@ impl Accelerator {
     }
 
     /// Lets collisions flow.
-    pub(crate) fn flow(&mut self, pace: &mut Pace) {
+    pub(crate) fn flow(&mut self, pace: &mut Pace, known: &mut Option<Recurrence>) {
         let Some((_, segment)) = self.flowing() else { return };
         let (start, done) = (self.clock, segment.done);
         if self.replay.even {
             let last = self.replay.slots();
-            pace.run_evenly(last, |Slice { cycles, first, records }| {
+            pace.run_evenly(last, known, |Slice { cycles, first, records }| {
                 self.replay.enter(start + cycles, done + first, records);
             });
         } else {

@@ -128,6 +128,20 @@ impl Segment {
         sum
     }
 
+    /// Beats taken so far from one stream.
+    pub(super) fn taken_from(&self, stream: usize) -> usize {
+        self.taken[stream]
+    }
+
+    /// Beats of the next `records` records on each stream.
+    pub(super) fn beats_of_next(&self, records: usize) -> PerStream {
+        let mut beats = self.array.striping.counts(self.array.beats_of(self.done + records));
+        for (beats, taken) in beats.iter_mut().zip(self.taken) {
+            *beats -= taken;
+        }
+        beats
+    }
+
     /// The next `records` records have been read where they are.
     pub(super) fn skip(&mut self, records: usize, streams: &mut [Stream]) {
         self.done += records;
@@ -140,9 +154,10 @@ impl Segment {
 
     /// Lets the next `records` records, which have arrived, be in the streams themselves.
     pub(super) fn fetch(&self, records: usize, streams: &mut [Stream], memory: &Memory) {
-        let after = self.array.striping.counts(self.array.beats_of(self.done + records));
-        for (k, stream) in streams.iter_mut().enumerate().filter(|(_, stream)| stream.refers()) {
-            stream.fetch(after[k] - self.taken[k], memory);
+        for (stream, beats) in streams.iter_mut().zip(self.beats_of_next(records)) {
+            if stream.refers() {
+                stream.fetch(beats, memory);
+            }
         }
     }
 
