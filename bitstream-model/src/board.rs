@@ -13,8 +13,8 @@ use crate::interface::control::IDENTIFICATION;
 use crate::interface::record::{BEAT_BYTES, Beat};
 use crate::interrupt::InterruptLine;
 use crate::memory::{Memory, MemoryError};
-use crate::pace::Recurrence;
 use crate::quirks::InterruptWiring;
+use crate::recurrence::Recurrence;
 use crate::stream::Stream;
 use crate::violation::{Log, RegisterAccess, ViolationKind};
 
@@ -71,7 +71,7 @@ pub(crate) struct Board {
     /// The engine that has the first turn at the memory.
     pub(crate) turn: usize,
     /// What is known of how collisions flow.
-    pub(crate) recurrence: Option<Recurrence>,
+    pub(crate) recurrence: Recurrence,
 }
 
 impl Board {
@@ -100,7 +100,7 @@ impl Board {
             counts: Counts::default(),
             credit: 0,
             turn: 0,
-            recurrence: None,
+            recurrence: Recurrence::default(),
         }
     }
 

@@ -32,6 +32,8 @@ mod outside;
 mod pace;
 #[cfg(feature = "emulation")]
 mod quirks;
+#[cfg(feature = "emulation")]
+mod recurrence;
 #[cfg(all(feature = "emulation", unix))]
 pub mod remote;
 #[cfg(feature = "emulation")]

@@ -8,6 +8,7 @@
 use crate::accelerator::striping::STREAMS_MAX;
 use crate::board::{BURST_BEATS, STARVED_CYCLES};
 use crate::cast::index;
+use crate::recurrence::Recurrence;
 
 /// What the memory delivers; bytes times the clock in kHz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,7 +57,7 @@ pub(crate) struct Flowed {
 }
 
 /// What decides how it goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Standing {
     /// Beats in each FIFO.
     pub(crate) held: [usize; STREAMS_MAX],
@@ -64,37 +65,6 @@ pub(crate) struct Standing {
     pub(crate) credit: u64,
     /// The engine that has the first turn.
     pub(crate) turn: usize,
-}
-
-impl Flowed {
-    /// So many times over, with what has flowed before.
-    fn repeated(&self, times: u64, before: &Self) -> Self {
-        let of = index(times);
-        Self {
-            cycles: before.cycles + times * self.cycles,
-            waits: before.waits + times * self.waits,
-            records: before.records + of * self.records,
-            beats: std::array::from_fn(|k| before.beats[k] + of * self.beats[k]),
-        }
-    }
-
-    /// What has flowed since then.
-    fn since(&self, then: &Self) -> Self {
-        Self {
-            cycles: self.cycles - then.cycles,
-            waits: self.waits - then.waits,
-            records: self.records - then.records,
-            beats: std::array::from_fn(|k| self.beats[k] - then.beats[k]),
-        }
-    }
-}
-
-/// What comes to the same again, where every collision takes an interval.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Recurrence {
-    rules: Rules,
-    standing: Standing,
-    flows: Flowed,
 }
 
 /// Everything that flows.
@@ -138,7 +108,7 @@ impl Pace {
     pub(crate) fn run_evenly(
         &mut self,
         last: usize,
-        known: &mut Option<Recurrence>,
+        known: &mut Recurrence,
         mut enter: impl FnMut(Slice),
     ) {
         let interval = self.rules.interval;
@@ -146,52 +116,14 @@ impl Pace {
             enter(slice);
             slice.records as u64 * interval
         };
-        if known.is_some_and(|known| known.rules != self.rules) {
-            *known = None;
-        }
-        // Looks for the standing of some slices ago, each time of twice as many.
-        let (mut then, mut since, mut patience) = ((self.standing, self.flowed), 0, 1_u32);
-        loop {
-            if let Some(known) = known.filter(|known| known.standing == self.standing) {
-                self.repeat(&known.flows, last);
-                break;
-            }
+        known.suit(&self.rules);
+        while !known.leap(self, last) {
+            known.look(&self.standing, &self.flowed);
             if self.slice(&mut enter).is_none() {
-                break;
-            }
-            since += 1;
-            if self.standing == then.0 {
-                let flows = self.flowed.since(&then.1);
-                let (rules, standing) = (self.rules, self.standing);
-                *known = Some(Recurrence { rules, standing, flows });
-            } else if since == patience {
-                (then, since, patience) = ((self.standing, self.flowed), 0, patience * 2);
+                return;
             }
         }
         self.run(&mut enter);
-    }
-
-    /// Lets what recurs flow as often as the limits leave room for, but for the collisions that come
-    /// last.
-    fn repeat(&mut self, flows: &Flowed, last: usize) {
-        let left = |limit: u64, flowed: u64, each: u64| (limit - flowed).checked_div(each);
-        let (limits, flowed) = (self.limits, self.flowed);
-        let of_beats = |k: usize| {
-            let (limit, flowed) = (limits.beats[k] as u64, flowed.beats[k] as u64);
-            left(limit, flowed, flows.beats[k] as u64)
-        };
-        let times = (0..STREAMS_MAX)
-            .map(of_beats)
-            .chain([
-                left(limits.cycles, flowed.cycles, flows.cycles),
-                left(limits.records as u64, flowed.records as u64, flows.records as u64),
-            ])
-            .flatten()
-            .min();
-        // The last time may meet a limit.
-        let kept = 1 + last.div_ceil(flows.records.max(1)) as u64;
-        let times = times.map_or(0, |times| times.saturating_sub(kept));
-        self.flowed = flows.repeated(times, &flowed);
     }
 
     /// One slice: the accelerator works on what is there, then the engines refill for as long as that
@@ -329,7 +261,7 @@ mod tests {
                     last[3] = (cycles, first, records);
                     2 * records as u64
                 });
-                let mut known = None;
+                let mut known = Recurrence::default();
                 for _ in 0..2 {
                     let mut even = pace(bandwidth, depth, Standing { held, ..EMPTY });
                     let (mut gone_through, mut last_even) = (0, [(0, 0, 0); 4]);
@@ -341,7 +273,7 @@ mod tests {
                     assert_eq!(even.flowed, each.flowed, "{bandwidth:?} {depth}");
                     assert_eq!(even.standing, each.standing, "{bandwidth:?} {depth}");
                     assert_eq!(last_even, last, "{bandwidth:?} {depth}");
-                    assert!(known.is_none() || gone_through < slices, "{bandwidth:?} {depth}");
+                    assert!(!known.is_known() || gone_through < slices, "{bandwidth:?} {depth}");
                 }
             }
         }

@@ -6,7 +6,8 @@ use super::segment::{PacketError, Segment};
 use super::{Accelerator, Phase};
 use crate::interface::record::CONTACT_POINTS;
 use crate::memory::Memory;
-use crate::pace::{Pace, Recurrence, Slice};
+use crate::pace::{Pace, Slice};
+use crate::recurrence::Recurrence;
 use crate::stream::Stream;
 
 impl Accelerator {
@@ -181,7 +182,7 @@ impl Accelerator {
     }
 
     /// Lets collisions flow.
-    pub(crate) fn flow(&mut self, pace: &mut Pace, known: &mut Option<Recurrence>) {
+    pub(crate) fn flow(&mut self, pace: &mut Pace, known: &mut Recurrence) {
         let Some((_, segment)) = self.flowing() else { return };
         let (start, done) = (self.clock, segment.done);
         if self.replay.even {
