@@ -9,7 +9,11 @@
 //! inertia and subnormals kept.
 
 mod block;
+mod front;
+mod kernel;
+mod lanes;
 mod place;
+mod pool;
 #[cfg(test)]
 mod tests;
 
@@ -28,8 +32,10 @@ use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::{Beat, CONTACT_POINTS, WORD_LANE, collision};
 
-use block::{Block, LANES};
+use block::{Block, LANES, ROWS_APART, THREADS_MAX};
+use front::{Fronts, Line, Passes, Width};
 use place::Places;
+use pool::Pool;
 
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
@@ -86,12 +92,38 @@ pub(super) struct Batch {
     /// Block and lane of each collision.
     slots: Vec<u32>,
     impulse_sum: u64,
+    width: Width,
+    pool: Pool,
+    fronts: Fronts,
+    /// Whether the fronts know all that is decoded.
+    measured: bool,
+    /// Whether the blocks say which spins are damped.
+    spins: bool,
+    /// Bodies that the collisions are about.
+    bodies: usize,
+    lines: Vec<Line>,
 }
 
 impl Batch {
     /// Takes at most `threads` threads, of which one is the caller's, and SIMD lanes or not.
-    pub(super) fn new(_threads: usize, _lanes: bool) -> Self {
-        Self { blocks: Vec::new(), places: Places::default(), slots: Vec::new(), impulse_sum: 0 }
+    pub(super) fn new(threads: usize, lanes: bool) -> Self {
+        Self::with_width(threads, if lanes { Width::found() } else { Width::One })
+    }
+
+    fn with_width(threads: usize, width: Width) -> Self {
+        Self {
+            blocks: Vec::new(),
+            places: Places::default(),
+            slots: Vec::new(),
+            impulse_sum: 0,
+            width,
+            pool: Pool::new(threads.clamp(1, THREADS_MAX) - 1),
+            fronts: Fronts::default(),
+            measured: false,
+            spins: false,
+            bodies: 0,
+            lines: Vec::new(),
+        }
     }
 
     /// Begins a step: forgets the last one's collisions and makes room for so many.
@@ -102,6 +134,9 @@ impl Batch {
         self.slots.reserve(collisions);
         self.places.begin(collisions);
         self.impulse_sum = 0;
+        self.measured = false;
+        self.spins = false;
+        self.bodies = 0;
     }
 
     /// Collisions decoded, padding entries among them.
@@ -122,6 +157,9 @@ impl Batch {
         masses: &[Mass],
     ) -> Result<(), PacketError> {
         self.places.bodies(shape_of.len());
+        self.bodies = self.bodies.max(shape_of.len());
+        self.measured = false;
+        self.spins = false;
         for record in 0..count {
             let pair =
                 |stream: usize| [streams[stream][2 * record], streams[stream][2 * record + 1]];
@@ -190,9 +228,29 @@ impl Batch {
         masses: &[Mass],
         velocities: &mut [Velocity],
     ) {
-        for pass in passes {
-            let all = 0..self.len();
-            self.run_part(pass, all, contact, parameters, shape_of, masses, velocities);
+        if passes.is_empty() || self.blocks.is_empty() {
+            return;
+        }
+        if !self.measured {
+            self.fronts.measure(&self.places);
+            self.measured = true;
+        }
+        let lines = (ROWS_APART as usize + self.bodies.max(velocities.len())).div_ceil(2);
+        if self.lines.len() < lines {
+            self.lines.resize(lines, Line::default());
+        }
+        let own = &mut self.lines[ROWS_APART as usize / 2..];
+        for (body, (velocity, shape)) in velocities.iter().zip(shape_of).enumerate() {
+            own[body / 2].put(body % 2 == 1, velocity, &masses[usize::from(*shape)]);
+        }
+        let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
+        let run = Passes { numbers: &passes, contact, finding, parameters, width: self.width };
+        let sum = self.fronts.run(run, &mut self.blocks, &mut self.lines, &mut self.pool);
+        self.impulse_sum = self.impulse_sum.saturating_add(sum);
+        self.spins |= finding.is_some();
+        let own = &self.lines[ROWS_APART as usize / 2..];
+        for (body, velocity) in velocities.iter_mut().enumerate() {
+            *velocity = own[body / 2].velocity(body % 2 == 1);
         }
     }
 

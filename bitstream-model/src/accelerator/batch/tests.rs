@@ -208,6 +208,12 @@ fn steps(collisions: usize, special: bool) -> impl Strategy<Value = Step> {
         })
 }
 
+/// A batch of one of the widths that there are.
+fn batch(threads: usize, width: prop::sample::Index) -> Batch {
+    let widths: Vec<Width> = Width::all().collect();
+    Batch::with_width(threads, *width.get(&widths))
+}
+
 /// Runs a step in a batch, the passes in two calls, and compares.
 fn check(step: &Step, batch: Batch, contact: u32, passes: u32, halt: u32) -> Batch {
     let mut batch = step.decoded(batch, step.records.len() / 3, &MASSES);
@@ -248,10 +254,10 @@ proptest! {
         contact in 0_u32..4,
         friction in 0_u32..4,
         halt in 0_u32..8,
-        lanes: bool,
+        width: prop::sample::Index,
         threads in 1_usize..4,
     ) {
-        check(&step, Batch::new(threads, lanes), contact, contact + friction, halt);
+        check(&step, batch(threads, width), contact, contact + friction, halt);
     }
 
     #[test]
@@ -259,19 +265,19 @@ proptest! {
         step in steps(200, true),
         contact in 0_u32..3,
         friction in 0_u32..3,
-        lanes: bool,
+        width: prop::sample::Index,
     ) {
-        check(&step, Batch::new(1, lanes), contact, contact + friction, 1);
+        check(&step, batch(1, width), contact, contact + friction, 1);
     }
 
     #[test]
     fn a_part_of_a_pass_has_those_bits_too(
         step in steps(200, false),
         cut in 0_usize..200,
-        lanes: bool,
+        width: prop::sample::Index,
     ) {
         let cut = cut.min(step.records.len());
-        let mut batch = step.decoded(Batch::new(1, lanes), cut, &MASSES);
+        let mut batch = step.decoded(batch(1, width), cut, &MASSES);
         let mut velocities = step.velocities.clone();
         let shapes = &step.shape_of;
         batch.run(0..2, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
