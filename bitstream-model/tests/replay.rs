@@ -15,10 +15,13 @@ use common::ring::WHOLE;
 use common::scene::{AT_REST, Body, Collision, Lane, STATIC, Step, bits, result_beats};
 use common::sg::{Failure, Flight, LONG, Machine, Outcome};
 
+/// Bodies as bits; cycles, stalls, waits, impulse sum and hazards; sums of what was received and sent.
+type Visible = (Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2]);
+
 /// Everything that a host can see of some steps.
 #[derive(Debug, Clone, PartialEq)]
 struct Seen {
-    steps: Vec<Result<(Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2]), Failure>>,
+    steps: Vec<Result<Visible, Failure>>,
     counters: Vec<Vec<u32>>,
     counts: Counts,
     packets: Vec<PacketCount>,
@@ -28,7 +31,7 @@ struct Seen {
 }
 
 /// What can be seen of an outcome.
-fn visible(outcome: &Outcome) -> (Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2]) {
+fn visible(outcome: &Outcome) -> Visible {
     let Outcome { cycles, stalls, waits, impulse_sum, .. } = *outcome;
     (
         outcome.bodies.iter().map(bits).collect(),

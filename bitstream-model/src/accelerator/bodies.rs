@@ -4,10 +4,14 @@
 
 use super::Accelerator;
 use super::decode;
+use super::integrate::integrate;
+use super::number::Single;
 use super::results::Results;
 use super::segment::{PacketError, Segment};
+use super::solver::Velocity;
 use super::striping::STREAMS_MAX;
-use super::turn::Arrival;
+use crate::cast::register;
+use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::Beat;
 use crate::memory::Memory;
@@ -72,12 +76,18 @@ impl Accelerator {
         records: usize,
         views: Views<'_>,
     ) -> Result<u32, PacketError> {
-        for (body, rows) in rows_of(segment, records, views) {
+        let masses = self.replay.masses.as_slice();
+        let bodies = self.velocities.iter_mut().zip(&mut self.shape_of).skip(segment.done);
+        for ((body, rows), (kept, kept_shape)) in rows_of(segment, records, views).zip(bodies) {
             let (velocity, shape) = decode::velocity(StreamFormat::F32, &rows);
-            let Arrival { velocity, shape, .. } =
-                self.arrived(body, velocity, shape, Default::default())?;
-            self.velocities[body] = velocity;
-            self.shape_of[body] = shape;
+            let mass = masses.get(shape as usize);
+            let (Some(mass), Ok(shape)) = (mass, u8::try_from(shape)) else {
+                let beat = register(body);
+                return Err(PacketError { code: ErrorCode::ShapeIndex, channel: 0, beat });
+            };
+            // A static body's words are not looked at.
+            *kept = if mass.inverse_mass == 0.0 { Velocity::default() } else { velocity };
+            *kept_shape = shape;
         }
         Ok(sum(views))
     }
@@ -93,11 +103,16 @@ impl Accelerator {
     ) -> [u32; 2] {
         let mut rows = std::mem::take(&mut self.rows);
         rows.iter_mut().for_each(Vec::clear);
+        let integration = self.arguments.integrate.then_some(&self.arguments.integration);
         for (body, pose) in rows_of(poses, records, views) {
-            let pose = decode::pose(StreamFormat::F32, &pose);
+            let (mut pose, mut velocity) =
+                (decode::pose(StreamFormat::F32, &pose), self.velocities[body]);
             let mass = &self.replay.masses[usize::from(self.shape_of[body])];
-            let moves = mass.inverse_mass != 0.0;
-            let (pose, velocity) = self.integrated(moves, pose, self.velocities[body]);
+            if let Some(integration) = integration
+                && mass.inverse_mass != 0.0
+            {
+                (pose, velocity) = integrate::<Single>(integration, &pose, &velocity);
+            }
             let result = decode::result(StreamFormat::F32, &pose, &velocity);
             for (rows, row) in rows.iter_mut().zip(result) {
                 rows.push(Beat(row));

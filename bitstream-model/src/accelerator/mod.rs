@@ -15,7 +15,6 @@
 //! nothing of who sent it.
 
 mod array;
-#[allow(dead_code, reason = "until the passes take threads")]
 mod batch;
 mod bodies;
 mod control;

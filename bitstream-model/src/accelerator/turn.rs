@@ -81,18 +81,6 @@ impl Accelerator {
                 (decode::velocity(format, &rows), inertia)
             }
         };
-        self.arrived(body, velocity, shape, inertia)
-    }
-
-    /// The same of what its record says.
-    #[inline]
-    pub(super) fn arrived(
-        &self,
-        body: usize,
-        velocity: Velocity,
-        shape: u32,
-        inertia: inertia::Stored,
-    ) -> Result<Arrival, PacketError> {
         let known = (shape as usize) < self.registers.shapes().len();
         let Some(shape) = u8::try_from(shape).ok().filter(|_| known) else {
             return Err(PacketError {

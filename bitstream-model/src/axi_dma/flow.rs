@@ -1,14 +1,30 @@
-//! This file lets beats flow through a channel that are counted elsewhere, in the middle of a
-//! descriptor, where a channel does nothing but move them.
+//! This file is for a channel that does nothing out of the ordinary: it waits, or moves beats in the
+//! middle of a descriptor, which are counted elsewhere.
 
-use super::Core;
 use super::channel::{Channel, Work};
 use super::mover::BEAT;
+use super::{Core, Direction};
 use crate::cast::register;
 use crate::interface::axi_dma::dmacr;
 use crate::interface::record::BEAT_BYTES;
+use crate::stream::Stream;
 
 impl Channel {
+    /// Whether it has to wait for beats, for space or for work, and nothing else can happen in it.
+    #[inline]
+    pub(super) fn cannot_move(&self, stream: &Stream) -> bool {
+        let waits = match self.direction {
+            Direction::Mm2s => stream.space() == 0,
+            Direction::S2mm => stream.len() == 0,
+        };
+        let works = match self.work {
+            Work::None => !waits && self.direction == Direction::S2mm,
+            Work::Fetch { .. } => true,
+            Work::Descriptor(_) | Work::Direct { .. } => !waits,
+        };
+        !works && self.faulty.late.is_empty() && !self.faulty.extra && !self.faulty.discards
+    }
+
     /// Whether it works as it should, and its clock is not ahead.
     fn in_order(&self, now: u64) -> bool {
         let plain = !dmacr::KEYHOLE.is_set(self.control) && self.time <= now;

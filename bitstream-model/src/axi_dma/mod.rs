@@ -231,6 +231,7 @@ impl Core {
 
     /// Moves up to `limit` beats of one channel until the clock shows `end`; returns how many, and
     /// whether anything happened at all.
+    #[inline]
     pub(crate) fn run(
         &mut self,
         direction: Direction,
@@ -244,6 +245,11 @@ impl Core {
             return (0, false);
         }
         let build = self.build;
-        self.channel(direction).run(&build, start, end, limit, stream, with)
+        let channel = self.channel(direction);
+        if channel.cannot_move(stream) {
+            channel.time = channel.time.max(start);
+            return (0, false);
+        }
+        channel.run(&build, start, end, limit, stream, with)
     }
 }

@@ -79,6 +79,7 @@ impl Channel {
                     self.fetch(build, address, with);
                     changed = true;
                 }
+                Work::Descriptor(_) if moved == limit => break,
                 Work::Descriptor(mut bd) => {
                     let left = bd.length - bd.moved;
                     let n = self.portion(build, left, end, limit - moved, stream);
