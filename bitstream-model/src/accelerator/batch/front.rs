@@ -22,7 +22,8 @@ use super::super::turn::fixed_impulse;
 use super::Stage;
 use super::block::{Block, LANES, kind};
 use super::kernel::{self, Pass};
-use super::lanes::{Lanes, Portable, Quad, Work};
+use super::lanes::{Lanes, Portable, Quad, Work, prefetch};
+use super::order::Order;
 use super::place::Places;
 use super::pool::Pool;
 use crate::cast::register;
@@ -33,7 +34,7 @@ use super::lanes::Neon;
 use super::lanes::{Avx2, Avx512};
 
 /// Blocks of a chunk.
-const CHUNK: usize = 4;
+const CHUNK: usize = 8;
 /// Passes that a thread takes at once.
 const BUNDLE: usize = 4;
 /// Looks at another thread's front before the processor is given away.
@@ -79,6 +80,7 @@ struct Progress(AtomicUsize);
 /// What the fronts are made of, kept from step to step.
 #[derive(Debug, Default)]
 pub(super) struct Fronts {
+    order: Order,
     /// For each chunk the last one that must have been left by the pass before.
     needs: Vec<u32>,
     progress: Vec<Progress>,
@@ -96,14 +98,15 @@ pub(super) struct Passes<'a> {
 }
 
 impl Fronts {
-    /// Finds how far each chunk's bodies reach.
+    /// Finds the order of the blocks and how far each chunk's bodies reach in it.
     pub(super) fn measure(&mut self, places: &Places) {
-        let chunk = |block: u32| block as usize / CHUNK;
+        self.order.find(places.again());
+        let chunk = |block: u32| self.order.places[block as usize] / register(CHUNK);
         self.needs.clear();
         self.needs.extend((0..places.blocks().div_ceil(CHUNK)).map(register));
         for [first, last] in places.uses() {
-            let need = &mut self.needs[chunk(first)];
-            *need = (*need).max(register(chunk(last)));
+            let need = &mut self.needs[chunk(first) as usize];
+            *need = (*need).max(chunk(last));
         }
     }
 
@@ -126,7 +129,7 @@ impl Fronts {
         let field = Field {
             passes,
             blocks: blocks.as_mut_ptr(),
-            count: blocks.len(),
+            order: &self.order.blocks,
             quads: lines.as_mut_ptr().cast(),
             needs: &self.needs,
             progress: &self.progress[..count],
@@ -164,7 +167,8 @@ impl Line {
 struct Field<'a> {
     passes: Passes<'a>,
     blocks: *mut Block,
-    count: usize,
+    /// All blocks, each once.
+    order: &'a [u32],
     quads: *mut Quad,
     needs: &'a [u32],
     progress: &'a [Progress],
@@ -255,7 +259,7 @@ impl Field<'_> {
             spare: 2 * (register(thread) + 1),
         };
         let mut sum = 0;
-        let blocks = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.count);
+        let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
         let work = ChunkWork { field: self, pass, blocks, sum: &mut sum };
         match self.passes.width {
             Width::One => work.one_by_one(),
@@ -278,16 +282,20 @@ impl Field<'_> {
 struct ChunkWork<'a> {
     field: &'a Field<'a>,
     pass: Pass<'a>,
-    blocks: Range<usize>,
+    blocks: &'a [u32],
     sum: &'a mut u64,
 }
 
 impl Work for ChunkWork<'_> {
     #[inline(always)]
     fn with<L: Lanes>(self, lanes: L) {
-        for index in self.blocks {
-            // SAFETY: there are so many blocks.
-            let block = unsafe { self.field.blocks.add(index) };
+        for (at, &index) in self.blocks.iter().enumerate() {
+            if let Some(ahead) = self.blocks.get(at + 1) {
+                let ahead = self.field.blocks.wrapping_add(*ahead as usize);
+                prefetch(ahead);
+            }
+            // SAFETY: `order` has numbers of blocks.
+            let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
             if block.serial() {
@@ -307,9 +315,9 @@ impl Work for ChunkWork<'_> {
 
 impl ChunkWork<'_> {
     fn one_by_one(self) {
-        for index in self.blocks {
-            // SAFETY: there are so many blocks.
-            let block = unsafe { self.field.blocks.add(index) };
+        for &index in self.blocks {
+            // SAFETY: `order` has numbers of blocks.
+            let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
             // SAFETY: so are the rows of its bodies.

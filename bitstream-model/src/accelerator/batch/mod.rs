@@ -12,6 +12,7 @@ mod block;
 mod front;
 mod kernel;
 mod lanes;
+mod order;
 mod place;
 mod pool;
 #[cfg(test)]

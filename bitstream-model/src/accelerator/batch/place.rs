@@ -37,8 +37,12 @@ pub(super) struct Places {
     bodies: Vec<Body>,
     /// Lanes taken of each block.
     taken: Vec<u8>,
+    /// And how many of them by the first collision of a body with a static one.
+    firsts: Vec<u8>,
     /// Where to look for an empty lane: the block itself while it has one, else one behind it.
     next: Vec<u32>,
+    /// The first later block that uses a body of each block again.
+    again: Vec<u32>,
     collisions: usize,
     distance: Option<u32>,
 }
@@ -48,10 +52,14 @@ impl Places {
     pub(super) fn begin(&mut self, collisions: usize) {
         self.bodies.clear();
         self.taken.clear();
+        self.firsts.clear();
         self.next.clear();
+        self.again.clear();
         let blocks = collisions.div_ceil(LANES);
         self.taken.reserve(blocks);
+        self.firsts.reserve(blocks);
         self.next.reserve(blocks);
+        self.again.reserve(blocks);
         self.collisions = 0;
         self.distance = None;
     }
@@ -66,6 +74,11 @@ impl Places {
     /// Blocks that hold a collision.
     pub(super) fn blocks(&self) -> usize {
         self.taken.len()
+    }
+
+    /// For each block the first later one that uses one of its bodies again.
+    pub(super) fn again(&self) -> &[u32] {
+        &self.again
     }
 
     /// The smallest distance of two collisions with a moving body in common.
@@ -83,15 +96,21 @@ impl Places {
     #[inline]
     pub(super) fn place(&mut self, number: u32, bodies: [u32; 2], moving: [bool; 2]) -> Place {
         let mut from = 0;
+        let mut used = false;
         for side in 0..2 {
             let body = &self.bodies[bodies[side] as usize];
             if moving[side] && body.first != NONE {
                 from = from.max(body.last + 1);
+                used = true;
                 let distance = number - body.collision;
                 self.distance = Some(self.distance.map_or(distance, |least| least.min(distance)));
             }
         }
+        let first = !used && moving != [true; 2];
         let mut block = self.with_empty_lane(from as usize);
+        while !first && self.of_firsts(block) {
+            block = self.with_empty_lane(block + 1);
+        }
         let mut serial = false;
         if block == self.taken.len() {
             let last = block.wrapping_sub(1);
@@ -102,11 +121,14 @@ impl Places {
                 serial = true;
             } else {
                 self.taken.push(0);
+                self.firsts.push(0);
                 self.next.push(register(block));
+                self.again.push(NONE);
             }
         }
         let lane = usize::from(self.taken[block]);
         self.taken[block] += 1;
+        self.firsts[block] += u8::from(first);
         if lane + 1 == LANES {
             self.next[block] = register(block) + 1;
         }
@@ -116,12 +138,27 @@ impl Places {
                 let body = &mut self.bodies[bodies[side] as usize];
                 if body.first == NONE {
                     body.first = register(block);
+                } else if body.last != register(block) {
+                    let again = &mut self.again[body.last as usize];
+                    *again = (*again).min(register(block));
                 }
                 body.last = register(block);
                 body.collision = number;
             }
         }
         Place { block, lane, serial }
+    }
+
+    /// Whether a block is for first collisions with static bodies alone: such a run of them can be
+    /// put off.
+    #[inline]
+    fn of_firsts(&self, block: usize) -> bool {
+        let full = |firsts: u8| usize::from(firsts) == LANES;
+        let Some((firsts, taken)) = self.firsts.get(block).zip(self.taken.get(block)) else {
+            return false;
+        };
+        let run = *firsts >= 4 || block > 0 && full(self.firsts[block - 1]);
+        run && *firsts > 0 && firsts == taken
     }
 
     /// The first block from `at` on that has an empty lane, or the number of blocks.

@@ -380,8 +380,8 @@ fn two_static_bodies_are_refused() {
 #[test]
 fn independent_collisions_stay_in_their_order_in_full_blocks() {
     // Every 40th collision has the same bodies.
-    let pairs: Vec<[u32; 2]> = (0..400).map(|i| [0, 1 + i % 40]).collect();
-    let step = chain(&pairs, 41, &[0]);
+    let pairs: Vec<[u32; 2]> = (0..400).map(|i| [i % 40, 40 + i % 40]).collect();
+    let step = chain(&pairs, 80, &[]);
     let batch = check(&step, Batch::new(2, true), 2, 4, 4);
     assert_eq!(batch.slots, (0..400).collect::<Vec<u32>>());
     assert_eq!(batch.distance(), 40);

@@ -146,3 +146,17 @@ unsafe fn quad(quads: *const Quad, index: &Words<u32>, lane: usize, half: usize)
     // SAFETY: the caller promises it.
     unsafe { quads.add(index[lane] as usize * 2 + half) }
 }
+
+/// Asks for a value that is used soon, where the processor can be asked.
+#[inline(always)]
+pub(super) fn prefetch<T>(value: *const T) {
+    #[cfg(target_arch = "x86_64")]
+    for line in (0..size_of::<T>()).step_by(64) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let line = value.cast::<i8>().wrapping_add(line);
+        // SAFETY: the instruction is of SSE and reads nothing: any address will do.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(line) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
+}
