@@ -7,7 +7,7 @@ use crate::cast::index;
 use crate::pace::{Flowed, Limits, Pace, Rules, Standing};
 
 /// The most slices of a period that are remembered.
-const SLICES_MAX: usize = 1 << 13;
+const SLICES_MAX: usize = 1 << 11;
 
 /// The slices of a period: how it stands at the beginning of each, and what has flowed until then.
 #[derive(Debug, Default)]
@@ -68,7 +68,9 @@ impl Recurrence {
         if self.rules != Some(*rules) {
             self.rules = Some(*rules);
             self.slices.clear();
+            self.slices.reserve(SLICES_MAX);
             self.places.clear();
+            self.places.reserve(SLICES_MAX);
         }
         self.seen = None;
     }
