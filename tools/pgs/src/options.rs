@@ -152,7 +152,11 @@ pub(crate) fn address_width(text: &str) -> Result<u32, String> {
     whole(text, 32, 64)
 }
 
-fn whole<T: FromStr + PartialOrd + Display>(text: &str, low: T, high: T) -> Result<T, String> {
+fn whole<T: Copy + FromStr + PartialOrd + Display>(
+    text: &str,
+    low: T,
+    high: T,
+) -> Result<T, String> {
     match text.parse() {
         Ok(number) if (low..=high).contains(&number) => Ok(number),
         _ => Err(format!("expected a whole number from {low} to {high}")),
