@@ -70,6 +70,22 @@ impl Width {
     pub(super) fn found() -> Self {
         Self::all().next().unwrap_or(Self::One)
     }
+
+    /// Runs something with the lanes, or gives it back where there are none.
+    #[inline]
+    pub(super) fn run<W: Work>(self, work: W) -> Result<(), W> {
+        match self {
+            Self::One => return Err(work),
+            Self::Portable(lanes) => lanes.run(work),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(lanes) => lanes.run(work),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(lanes) => lanes.run(work),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(lanes) => lanes.run(work),
+        }
+        Ok(())
+    }
 }
 
 /// How far a pass has come, in chunks; alone in its cache lines.
@@ -261,15 +277,8 @@ impl Field<'_> {
         let mut sum = 0;
         let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
         let work = ChunkWork { field: self, pass, blocks, sum: &mut sum };
-        match self.passes.width {
-            Width::One => work.one_by_one(),
-            Width::Portable(lanes) => lanes.run(work),
-            #[cfg(target_arch = "x86_64")]
-            Width::Avx2(lanes) => lanes.run(work),
-            #[cfg(target_arch = "x86_64")]
-            Width::Avx512(lanes) => lanes.run(work),
-            #[cfg(target_arch = "aarch64")]
-            Width::Neon(lanes) => lanes.run(work),
+        if let Err(work) = self.passes.width.run(work) {
+            work.one_by_one();
         }
         if sum > 0 {
             let add = |before: u64| Some(before.saturating_add(sum));

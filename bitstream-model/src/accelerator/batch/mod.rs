@@ -15,12 +15,12 @@ mod lanes;
 mod order;
 mod place;
 mod pool;
+mod records;
 #[cfg(test)]
 mod tests;
 
 use std::ops::Range;
 
-use super::array::Row;
 use super::decode::Collision;
 use super::inertia::Isotropic;
 use super::number::Single;
@@ -31,12 +31,13 @@ use super::turn::fixed_impulse;
 use crate::cast::register;
 use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
-use crate::interface::record::{Beat, CONTACT_POINTS, WORD_LANE, collision};
+use crate::interface::record::{Beat, CONTACT_POINTS};
 
 use block::{Block, LANES, ROWS_APART, THREADS_MAX};
 use front::{Fronts, Line, Passes, Width};
-use place::Places;
+use place::{Place, Places};
 use pool::Pool;
+use records::{Fill, Records};
 
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
@@ -83,6 +84,13 @@ impl Stage {
         );
         0
     }
+}
+
+/// A collision that has a place.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    place: Place,
+    moving: [bool; 2],
 }
 
 /// The collisions of a step.
@@ -161,30 +169,53 @@ impl Batch {
         self.bodies = self.bodies.max(shape_of.len());
         self.measured = false;
         self.spins = false;
-        for record in 0..count {
-            let pair =
-                |stream: usize| [streams[stream][2 * record], streams[stream][2 * record + 1]];
-            let ([a, e], [b, f], [c, g], d) = (pair(0), pair(1), pair(2), streams[3][record]);
-            self.record([a, b, c, d, e, f, g].map(|beat| beat.0), shape_of, masses)?;
+        let records = Records { streams };
+        let mut at = 0;
+        while at < count {
+            let mut placed = [None; LANES];
+            // In hazard-free order as many as the block begun last has empty lanes.
+            let last = self.slots.last().filter(|slot| **slot != NO_SLOT);
+            let taken = last.map_or(0, |slot| (*slot as usize + 1) % LANES);
+            let most = (LANES - taken).min(count - at);
+            let mut done = 0;
+            let mut refused = Ok(());
+            while done < most && refused.is_ok() {
+                match self.place(records.heads(at + done), shape_of, masses) {
+                    Ok(place) => {
+                        placed[done] = place;
+                        done += 1;
+                    }
+                    Err(error) => refused = Err(error),
+                }
+            }
+            if !self.fill(&records, at, &placed) {
+                for (record, placed) in (at..at + done).zip(&placed) {
+                    let Some(Placed { place, moving }) = placed else { continue };
+                    let collision = Collision::absolute(StreamFormat::F32, &records.rows(record));
+                    self.blocks[place.block].put(place.lane, &collision, *moving);
+                }
+            }
+            refused?;
+            at += done;
         }
         Ok(())
     }
 
-    /// Decodes the next record.
-    fn record(
+    /// Places the next collision, or nothing for a padding entry.
+    #[inline]
+    fn place(
         &mut self,
-        rows: [Row; collision::ROWS],
+        [normal, body_a, body_b]: [u32; 3],
         shape_of: &[u8],
         masses: &[Mass],
-    ) -> Result<(), PacketError> {
+    ) -> Result<Option<Placed>, PacketError> {
         let index = register(self.slots.len());
-        let count = rows[collision::NORMAL][WORD_LANE];
-        if count == 0 {
+        if normal == 0 {
             self.slots.push(NO_SLOT);
-            return Ok(());
+            return Ok(None);
         }
-        let bodies = [rows[collision::BODY_A][WORD_LANE], rows[collision::BODY_B][WORD_LANE]];
-        let moving = moving(count, bodies, shape_of, masses).map_err(|code| PacketError {
+        let bodies = [body_a, body_b];
+        let moving = moving(normal, bodies, shape_of, masses).map_err(|code| PacketError {
             code,
             channel: 0,
             beat: index,
@@ -193,13 +224,34 @@ impl Batch {
         if place.block == self.blocks.len() {
             self.blocks.push(Block::EMPTY);
         }
-        let block = &mut self.blocks[place.block];
-        block.put(place.lane, &Collision::absolute(StreamFormat::F32, &rows), moving);
         if place.serial {
-            block.kind[0] |= block::kind::SERIAL;
+            self.blocks[place.block].kind[0] |= block::kind::SERIAL;
         }
         self.slots.push(register(place.block * LANES + place.lane));
-        Ok(())
+        Ok(Some(Placed { place, moving }))
+    }
+
+    /// Puts records side by side at once where they are a block in their order; whether they were.
+    fn fill(
+        &mut self,
+        records: &Records<'_>,
+        first: usize,
+        placed: &[Option<Placed>; LANES],
+    ) -> bool {
+        let Some(number) = placed[0].map(|placed| placed.place.block) else { return false };
+        let in_order = placed.iter().enumerate().all(|(lane, placed)| {
+            placed.is_some_and(|Placed { place, .. }| place.block == number && place.lane == lane)
+        });
+        let block = &mut self.blocks[number];
+        if !in_order || self.width.run(Fill { records, first, block }).is_err() {
+            return false;
+        }
+        for (lane, placed) in placed.iter().enumerate() {
+            let [count, body_a, body_b] = records.heads(first + lane);
+            let moving = placed.map_or([false; 2], |placed| placed.moving);
+            self.blocks[number].put_kind(lane, [body_a, body_b], count as usize, moving);
+        }
+        true
     }
 
     /// Block and lane of a collision, or `None` for a padding entry.

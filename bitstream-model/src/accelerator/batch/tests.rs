@@ -2,7 +2,9 @@
 
 use proptest::prelude::*;
 
+use super::super::array::Row;
 use super::*;
+use crate::interface::record::{WORD_LANE, collision};
 
 const PARAMETERS: SolverParameters =
     SolverParameters { time_step: 1.0 / 60.0, drift: 0.005, coefficient: 0.2, friction: 0.7 };
