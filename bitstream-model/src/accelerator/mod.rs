@@ -15,7 +15,6 @@
 //! nothing of who sent it.
 
 mod array;
-#[allow(dead_code, reason = "one set of lanes uses what another does not")]
 mod batch;
 mod bodies;
 mod control;
