@@ -10,17 +10,18 @@ use crate::cast::index;
 use crate::config::{Bandwidth, BoardConfig};
 use crate::fault::{Fault, FaultKind, Faults};
 use crate::interface::control::IDENTIFICATION;
-use crate::interface::record::BEAT_BYTES;
+use crate::interface::record::{BEAT_BYTES, Beat};
 use crate::interrupt::InterruptLine;
-use crate::memory::Memory;
+use crate::memory::{Memory, MemoryError};
 use crate::quirks::InterruptWiring;
+use crate::recurrence::Recurrence;
 use crate::stream::Stream;
 use crate::violation::{Log, RegisterAccess, ViolationKind};
 
 /// Beats that an engine moves before the next one has its turn at the memory: an AXI burst.
-const BURST_BEATS: u64 = 16;
+pub(crate) const BURST_BEATS: u64 = 16;
 /// Cycles after which an accelerator that waits looks at its streams again.
-const STARVED_CYCLES: u64 = 64;
+pub(crate) const STARVED_CYCLES: u64 = 64;
 
 /// What happened on a board since it was built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -54,21 +55,23 @@ pub(crate) struct Board {
     pub(crate) memory: Memory,
     pub(crate) interrupt: InterruptLine,
     pub(crate) log: Log,
-    cores: Vec<Core>,
-    accelerator: Accelerator,
-    inputs: Vec<Stream>,
-    outputs: Vec<Stream>,
-    moved: Moved,
-    faults: Faults,
+    pub(crate) cores: Vec<Core>,
+    pub(crate) accelerator: Accelerator,
+    pub(crate) inputs: Vec<Stream>,
+    pub(crate) outputs: Vec<Stream>,
+    pub(crate) moved: Moved,
+    pub(crate) faults: Faults,
     /// The programmable logic has lost its power.
     powerless: bool,
     /// Another design was loaded; what its IDENTIFICATION reads.
     other_design: Option<u32>,
     counts: Counts,
     /// What the memory can still deliver at once, in bytes times the clock in kHz.
-    credit: u64,
+    pub(crate) credit: u64,
     /// The engine that has the first turn at the memory.
-    turn: usize,
+    pub(crate) turn: usize,
+    /// What is known of how collisions flow.
+    pub(crate) recurrence: Recurrence,
 }
 
 impl Board {
@@ -97,6 +100,7 @@ impl Board {
             counts: Counts::default(),
             credit: 0,
             turn: 0,
+            recurrence: Recurrence::default(),
         }
     }
 
@@ -258,13 +262,14 @@ impl Board {
                 break;
             }
             self.tick();
+            self.stretch(until);
             let event = self.next_event().map_or(until, |event| event.min(until));
             let limit = event - self.now;
             if self.accelerator.starts() {
                 self.moved.packets.clear();
             }
             let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
-            let ran = self.accelerator.run(limit, inputs, outputs, &mut self.faults);
+            let ran = self.accelerator.run(limit, inputs, outputs, &mut self.faults, &self.memory);
             let waits = ran.cycles == 0;
             let mut slice = if waits { limit.min(STARVED_CYCLES) } else { ran.cycles };
             if waits && ran.progressed {
@@ -284,6 +289,25 @@ impl Board {
             self.update_interrupt();
         }
         self.log.at(self.now);
+    }
+
+    /// Moves a buffer back to the CPU; beats of it that are on the way are there already.
+    pub(crate) fn take_back(&mut self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
+        self.fetch();
+        self.memory.take_back(address)
+    }
+
+    /// Gives memory back.
+    pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
+        self.fetch();
+        self.memory.release(address)
+    }
+
+    /// Lets all beats that are on the way be in the streams themselves.
+    fn fetch(&mut self) {
+        for stream in &mut self.inputs {
+            stream.fetch(stream.len(), &self.memory);
+        }
     }
 
     fn tick(&mut self) {
@@ -360,6 +384,7 @@ impl Board {
             log: &mut self.log,
             moved: &mut self.moved,
             faults: &mut self.faults,
+            by_reference: self.accelerator.by_reference(),
         };
         self.cores[number].run(direction, start, end, limit, stream, &mut with)
     }

@@ -1,6 +1,9 @@
 //! This file says how an emulated board can be built: the choices that a bitstream, a block design
 //! and a device tree fix on a real one.
 
+use std::num::NonZero;
+use std::sync::OnceLock;
+
 use crate::accelerator::striping::{GROUP_MAX, STREAMS_MAX};
 use crate::accelerator::window;
 use crate::fault::FaultKind;
@@ -91,6 +94,10 @@ const SHAPES_MAX: u32 = (CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE;
 /// 32-bit words of a beat.
 const BEAT_WORDS: u32 = 4;
 
+/// Threads of the host, at most; more than a few have nothing to do.
+const THREADS_MAX: usize = 64;
+const THREADS_DEFAULT_MAX: usize = 4;
+
 /// How to build an emulated board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoardConfig {
@@ -120,6 +127,14 @@ pub struct BoardConfig {
     pub delays: Delays,
     /// What is built wrongly.
     pub quirks: Quirks,
+    /// Threads of the host that the arithmetic may take, the caller's among them. Like the next two
+    /// without any influence on results, counters and cycles.
+    pub threads: usize,
+    /// Whether collisions that have no body in common are computed side by side, where the host can.
+    pub lanes: bool,
+    /// Whether collisions are decoded once and replayed in the other passes, where the design allows
+    /// for it and the bytes are the same.
+    pub replay: bool,
 }
 
 impl Default for BoardConfig {
@@ -140,8 +155,19 @@ impl Default for BoardConfig {
             strict: true,
             delays: Delays::default(),
             quirks: Quirks::default(),
+            threads: threads_of_host(),
+            lanes: true,
+            replay: true,
         }
     }
+}
+
+/// Threads that are worth their while here.
+fn threads_of_host() -> usize {
+    static THREADS: OnceLock<usize> = OnceLock::new();
+    *THREADS.get_or_init(|| {
+        std::thread::available_parallelism().map_or(1, NonZero::get).min(THREADS_DEFAULT_MAX)
+    })
 }
 
 /// A board that cannot be built.
@@ -259,6 +285,7 @@ impl BoardConfig {
             LENGTH_WIDTH_MIN.into(),
             LENGTH_WIDTH_MAX.into(),
         )?;
+        range("threads of the host", self.threads as u64, 1, THREADS_MAX as u64)?;
         range("FIFO depth in beats", self.delays.fifo_beats as u64, 16, 1 << 20)?;
         check_profile(self.profile)?;
         let name = self.profile.name;

@@ -215,7 +215,7 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError`] if nothing was allocated at `address`, or the device does not own it.
     pub fn take_back(&self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
-        lock(&self.0).memory.take_back(address)
+        lock(&self.0).take_back(address)
     }
 
     /// Gives memory back; from then on the device may not touch it.
@@ -223,7 +223,7 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError::Unknown`] if nothing was allocated at `address`.
     pub fn release(&self, address: u64) -> Result<(), MemoryError> {
-        lock(&self.0).memory.release(address)
+        lock(&self.0).release(address)
     }
 }
 

@@ -29,11 +29,19 @@ mod memory;
 #[cfg(feature = "emulation")]
 mod outside;
 #[cfg(feature = "emulation")]
+mod pace;
+#[cfg(feature = "emulation")]
 mod quirks;
+#[cfg(feature = "emulation")]
+mod recurrence;
 #[cfg(all(feature = "emulation", unix))]
 pub mod remote;
 #[cfg(feature = "emulation")]
+mod span;
+#[cfg(feature = "emulation")]
 mod stream;
+#[cfg(feature = "emulation")]
+mod stretch;
 #[cfg(feature = "emulation")]
 pub mod timing;
 #[cfg(feature = "emulation")]

@@ -7,7 +7,6 @@
 //!
 //! A board can be built on memory outside instead (`outside.rs`); then it allocates none.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -79,6 +78,23 @@ pub enum Denied {
     NoAnswer,
 }
 
+/// Beats in a buffer that the device reads. While it owns the buffer they stay as they are, so that
+/// beats of equal sources are equal: each hand-over makes sources of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Source {
+    /// Where the first one is.
+    address: u64,
+    /// Which hand-over it was.
+    grant: u64,
+}
+
+impl Source {
+    /// The same from so many beats further on.
+    pub(crate) fn further(self, beats: u64) -> Self {
+        Self { address: self.address + beats * BEAT_BYTES as u64, ..self }
+    }
+}
+
 #[derive(Debug)]
 enum Content {
     Cpu,
@@ -91,6 +107,8 @@ enum Content {
 struct Region {
     bytes: u64,
     content: Content,
+    /// The number of its last hand-over.
+    grant: u64,
     /// What the CPU's caches hold of it, where they do not agree with memory.
     cached: Option<Box<[Beat]>>,
 }
@@ -101,7 +119,8 @@ const GUARD: u64 = 4096;
 /// Physical memory.
 #[derive(Debug)]
 pub(crate) struct Memory {
-    regions: BTreeMap<u64, Region>,
+    /// By their addresses.
+    regions: Vec<(u64, Region)>,
     /// What was never allocated, on both sides of 4 GiB.
     low: Range<u64>,
     high: Range<u64>,
@@ -111,6 +130,8 @@ pub(crate) struct Memory {
     address_limit: u64,
     next_is_high: bool,
     coherency: Coherency,
+    /// Hand-overs so far.
+    grants: u64,
     /// Memory that is not kept here, instead of all ranges.
     outside: Option<Outside>,
 }
@@ -122,13 +143,14 @@ impl Memory {
         // a high address cut to 32 bits must not meet a buffer.
         const SYSTEM: u64 = 1 << 30;
         Self {
-            regions: BTreeMap::new(),
+            regions: Vec::new(),
             low: DDR_LOW.start + SYSTEM..DDR_LOW.end,
             high: DDR_HIGH.start..DDR_HIGH.end - SYSTEM,
             released: Vec::new(),
             address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
             next_is_high: false,
             coherency,
+            grants: 0,
             outside: None,
         }
     }
@@ -136,13 +158,14 @@ impl Memory {
     /// Memory outside the board, of which the device may touch what is granted.
     pub(crate) fn outside(memory: Box<dyn DeviceMemory>, granted: Vec<Range<u64>>) -> Self {
         Self {
-            regions: BTreeMap::new(),
+            regions: Vec::new(),
             low: 0..0,
             high: 0..0,
             released: Vec::new(),
             address_limit: 0,
             next_is_high: false,
             coherency: Coherency::Coherent,
+            grants: 0,
             outside: Some(Outside::new(memory, granted)),
         }
     }
@@ -163,7 +186,9 @@ impl Memory {
         };
         let address = part.start;
         part.start += take;
-        self.regions.insert(address, Region { bytes, content, cached: None });
+        let place = self.regions.partition_point(|(start, _)| *start < address);
+        let region = Region { bytes, content, grant: 0, cached: None };
+        self.regions.insert(place, (address, region));
         Ok(address)
     }
 
@@ -189,8 +214,15 @@ impl Memory {
         Ok((address, shared))
     }
 
+    /// The place of the range that begins there.
+    fn begins_at(&self, address: u64) -> Result<usize, MemoryError> {
+        let place = self.regions.binary_search_by_key(&address, |(start, _)| *start);
+        place.map_err(|_| MemoryError::Unknown { address })
+    }
+
     fn region_at(&mut self, address: u64) -> Result<&mut Region, MemoryError> {
-        self.regions.get_mut(&address).ok_or(MemoryError::Unknown { address })
+        let place = self.begins_at(address)?;
+        Ok(&mut self.regions[place].1)
     }
 
     /// Gives the device the first `granted` beats of a buffer.
@@ -202,6 +234,8 @@ impl Memory {
         access: DeviceAccess,
     ) -> Result<(), MemoryError> {
         let coherency = self.coherency;
+        self.grants += 1;
+        let grant = self.grants;
         let region = self.region_at(address)?;
         if !matches!(region.content, Content::Cpu) {
             return Err(MemoryError::State { address, state: "the CPU does not own it" });
@@ -221,6 +255,7 @@ impl Memory {
             _ => beats,
         };
         region.content = Content::Device(visible, access, granted);
+        region.grant = grant;
         Ok(())
     }
 
@@ -247,7 +282,8 @@ impl Memory {
     }
 
     pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
-        let region = self.regions.remove(&address).ok_or(MemoryError::Unknown { address })?;
+        let place = self.begins_at(address)?;
+        let (_, region) = self.regions.remove(place);
         self.released.retain(|range| !range.is_empty());
         self.released.push(address..address + region.bytes.next_multiple_of(GUARD) + GUARD);
         Ok(())
@@ -255,7 +291,15 @@ impl Memory {
 
     /// The range that holds `address`, and the offset in it.
     fn find(&self, address: u64, bytes: u64) -> Result<(&Region, u64), Denied> {
-        let (start, region) = self.regions.range(..=address).next_back().ok_or(Denied::Unmapped)?;
+        let (place, offset) = self.place_of(address, bytes)?;
+        Ok((&self.regions[place].1, offset))
+    }
+
+    /// The place of that range, and the offset.
+    fn place_of(&self, address: u64, bytes: u64) -> Result<(usize, u64), Denied> {
+        let behind = self.regions.partition_point(|(start, _)| *start <= address);
+        let place = behind.checked_sub(1).ok_or(Denied::Unmapped)?;
+        let (start, region) = &self.regions[place];
         let offset = address - start;
         if offset >= region.bytes {
             return Err(Denied::Unmapped);
@@ -263,7 +307,7 @@ impl Memory {
         if bytes > region.bytes - offset {
             return Err(Denied::PastEnd);
         }
-        Ok((region, offset))
+        Ok((place, offset))
     }
 
     /// Beats that the device reads. The address is a multiple of a beat.
@@ -271,6 +315,27 @@ impl Memory {
         if let Some(ref mut outside) = self.outside {
             return outside.read(address, count);
         }
+        self.owned(address, count).map(|(_, beats)| beats)
+    }
+
+    /// Where beats are that the device reads, if they stay as they are while it owns them: memory
+    /// outside may change at any time. The address is a multiple of a beat.
+    pub(crate) fn source(&self, address: u64, count: usize) -> Result<Option<Source>, Denied> {
+        if self.outside.is_some() {
+            return Ok(None);
+        }
+        let grant = self.owned(address, count).map(|(region, _)| region.grant)?;
+        Ok(Some(Source { address, grant }))
+    }
+
+    /// Beats of a source, if the device owns its buffer still.
+    pub(crate) fn view(&self, from: Source, count: usize) -> Option<&[Beat]> {
+        let (region, beats) = self.owned(from.address, count).ok()?;
+        (region.grant == from.grant).then_some(beats)
+    }
+
+    /// Beats that the device reads in a buffer that it owns.
+    fn owned(&self, address: u64, count: usize) -> Result<(&Region, &[Beat]), Denied> {
         let (region, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
         match &region.content {
             Content::Cpu => Err(Denied::CpuOwned),
@@ -279,15 +344,15 @@ impl Memory {
             Content::Device(beats, DeviceAccess::Read, granted) => {
                 let first = index(offset / BEAT_BYTES as u64);
                 let beats = beats.get(..*granted).unwrap_or(beats);
-                beats.get(first..first + count).ok_or(Denied::PastEnd)
+                let beats = beats.get(first..first + count).ok_or(Denied::PastEnd)?;
+                Ok((region, beats))
             }
         }
     }
 
     fn beats_mut(&mut self, address: u64, count: usize) -> Result<&mut [Beat], Denied> {
-        let (_, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
-        let (_, region) = self.regions.range_mut(..=address).next_back().ok_or(Denied::Unmapped)?;
-        match &mut region.content {
+        let (place, offset) = self.place_of(address, (count * BEAT_BYTES) as u64)?;
+        match &mut self.regions[place].1.content {
             Content::Cpu => Err(Denied::CpuOwned),
             Content::Words(_) => Err(Denied::Kind),
             Content::Device(_, DeviceAccess::Read, _) => Err(Denied::Direction),

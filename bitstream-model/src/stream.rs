@@ -1,13 +1,16 @@
 //! This file is an AXI4-Stream with a FIFO of 128-bit beats: beats, TLAST, back-pressure.
 //!
 //! A narrower stream carries a beat in several cycles; that is the mover's and the accelerator's
-//! business, here a beat is a beat.
+//! business, here a beat is a beat. A beat is in the FIFO itself, or what is there says from which
+//! buffer it comes: the bytes are then looked at where they are, if anybody wants them.
 
 use std::collections::VecDeque;
 use std::fmt;
 
 use crate::cast::index;
 use crate::interface::record::Beat;
+use crate::memory::{Memory, Source};
+use crate::span::Spans;
 
 /// A FIFO of beats between a DMA channel and the accelerator.
 pub(crate) struct Stream {
@@ -19,6 +22,8 @@ pub(crate) struct Stream {
     /// Beat numbers that carry TLAST, and those with invalid bytes (TKEEP).
     lasts: VecDeque<u64>,
     partials: VecDeque<u64>,
+    /// Beats that are not in the ring, in order.
+    spans: Spans,
 }
 
 /// Sum of all words.
@@ -46,6 +51,7 @@ impl Stream {
             put: 0,
             lasts: VecDeque::with_capacity(64),
             partials: VecDeque::new(),
+            spans: Spans::with_capacity(64),
         }
     }
 
@@ -54,6 +60,7 @@ impl Stream {
         self.put = 0;
         self.lasts.clear();
         self.partials.clear();
+        self.spans.clear();
     }
 
     /// Beats in the FIFO.
@@ -72,11 +79,54 @@ impl Stream {
     /// Puts beats in; there must be space for them.
     pub(crate) fn push(&mut self, beats: &[Beat]) {
         assert!(beats.len() <= self.space(), "the sender looks at the space first");
-        let at = self.slot(self.put);
+        self.copy_in(self.put, beats);
+        self.put += beats.len() as u64;
+    }
+
+    /// Writes beats to the ring, from that number on.
+    fn copy_in(&mut self, number: u64, beats: &[Beat]) {
+        let at = self.slot(number);
         let first = beats.len().min(self.ring.len() - at);
         self.ring[at..at + first].copy_from_slice(&beats[..first]);
         self.ring[..beats.len() - first].copy_from_slice(&beats[first..]);
-        self.put += beats.len() as u64;
+    }
+
+    /// Puts beats in that stay where they are. Of those that are taken again at once there may be
+    /// more than the FIFO has space for.
+    pub(crate) fn push_span(&mut self, source: Source, count: usize) {
+        self.spans.push(self.put, count as u64, source);
+        self.put += count as u64;
+    }
+
+    /// How many of the next beats, of at most `most` from `ahead` places behind the front on, are
+    /// together in a buffer, and where the first of them is; or how many are in the FIFO itself.
+    pub(crate) fn piece(&self, ahead: usize, most: usize) -> (usize, Option<Source>) {
+        let first = self.taken + ahead as u64;
+        self.spans.piece(first, (first + most as u64).min(self.put))
+    }
+
+    /// Copies the next `beats` beats into the FIFO, as far as they are elsewhere.
+    pub(crate) fn fetch(&mut self, beats: usize, memory: &Memory) {
+        let end = self.taken + (beats as u64).min(self.put - self.taken);
+        while let Some(span) = self.spans.front().filter(|span| span.first < end) {
+            let end = span.end().min(end);
+            let from = memory.view(span.source, index(end - span.first));
+            debug_assert!(from.is_some(), "whoever takes a buffer back fetches its beats first");
+            if let Some(from) = from {
+                self.copy_in(span.first, from);
+            }
+            self.spans.drop_to(end);
+        }
+    }
+
+    /// Whether beats are elsewhere.
+    pub(crate) fn refers(&self) -> bool {
+        !self.spans.is_empty()
+    }
+
+    /// Whether a beat carries a mark.
+    pub(crate) fn marked(&self) -> bool {
+        !(self.lasts.is_empty() && self.partials.is_empty())
     }
 
     /// Marks the newest beat with TLAST.
@@ -89,7 +139,7 @@ impl Stream {
         self.partials.push_back(self.put - 1);
     }
 
-    /// The beat `ahead` places behind the front; it must be in the FIFO.
+    /// The beat `ahead` places behind the front; it must be in the FIFO itself.
     #[inline]
     pub(crate) fn peek(&self, ahead: usize) -> Beat {
         debug_assert!(ahead < self.len(), "the receiver looks at the length first");
@@ -106,7 +156,8 @@ impl Stream {
         self.partials.front().map(|number| index(number - self.taken))
     }
 
-    /// Takes `beats` beats out, with their marks; the sum of their words.
+    /// Takes `beats` beats out, with their marks; the sum of their words, which must be in the FIFO
+    /// itself.
     pub(crate) fn take_sum(&mut self, beats: usize) -> u32 {
         assert!(beats <= self.len(), "the receiver looks at the length first");
         let at = self.slot(self.taken);
@@ -117,7 +168,7 @@ impl Stream {
     }
 
     /// Takes `beats` beats out, with their marks.
-    fn pop(&mut self, beats: usize) {
+    pub(crate) fn pop(&mut self, beats: usize) {
         assert!(beats <= self.len(), "the receiver looks at the length first");
         self.taken += beats as u64;
         for marks in [&mut self.lasts, &mut self.partials] {
@@ -125,6 +176,7 @@ impl Stream {
                 marks.pop_front();
             }
         }
+        self.spans.drop_to(self.taken);
     }
 
     /// Copies the front beats out and takes them.

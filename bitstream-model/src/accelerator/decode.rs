@@ -23,7 +23,7 @@ fn number(format: StreamFormat, word: u32) -> f32 {
 }
 
 /// The word of that format nearest to a number.
-#[inline]
+#[inline(always)]
 fn word(format: StreamFormat, number: f32) -> u32 {
     match format {
         StreamFormat::F32 => number.to_bits(),
@@ -97,6 +97,7 @@ impl Collision {
 }
 
 /// A velocity record: the velocity and the shape index.
+#[inline(always)]
 pub(super) fn velocity(
     format: StreamFormat,
     [linear, angular]: &[Row; velocity::ROWS],
@@ -114,6 +115,7 @@ pub(super) fn world_inertia(format: StreamFormat, rows: &[Row; velocity::WORLD_R
 }
 
 /// A pose record.
+#[inline(always)]
 pub(super) fn pose(format: StreamFormat, rows: &[Row; pose::ROWS]) -> Pose {
     Pose {
         position: vec3(format, rows[pose::POSITION]),
@@ -122,19 +124,19 @@ pub(super) fn pose(format: StreamFormat, rows: &[Row; pose::ROWS]) -> Pose {
 }
 
 /// The result record of a body.
+#[inline(always)]
 pub(super) fn result(
     format: StreamFormat,
     pose: &Pose,
     velocity: &Velocity,
 ) -> [Row; result::ROWS] {
-    let row = |[x, y, z]: [f32; 3]| {
-        let [x, y, z] = [x, y, z].map(|number| word(format, number));
-        [x, y, z, 0]
-    };
+    let word = |number| word(format, number);
+    let row = |[x, y, z]: [f32; 3], w| [word(x), word(y), word(z), w];
+    let [x, y, z, w] = pose.orientation;
     let mut rows = [[0; 4]; result::ROWS];
-    rows[result::POSITION] = row(pose.position);
-    rows[result::ORIENTATION] = pose.orientation.map(|number| word(format, number));
-    rows[result::LINEAR] = row(velocity.linear);
-    rows[result::ANGULAR] = row(velocity.angular);
+    rows[result::POSITION] = row(pose.position, 0);
+    rows[result::ORIENTATION] = row([x, y, z], word(w));
+    rows[result::LINEAR] = row(velocity.linear, 0);
+    rows[result::ANGULAR] = row(velocity.angular, 0);
     rows
 }

@@ -15,6 +15,8 @@
 //! nothing of who sent it.
 
 mod array;
+mod batch;
+mod bodies;
 mod control;
 mod decode;
 mod inertia;
@@ -22,6 +24,8 @@ mod integrate;
 mod number;
 mod phases;
 mod pipeline;
+mod replay;
+mod replayed;
 mod results;
 mod segment;
 mod sixteen;
@@ -38,16 +42,20 @@ use crate::interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
 use crate::interface::profile::{Flow, Inertia, Variant};
-use crate::interface::record::CONTACT_POINTS;
+use crate::interface::record::{Beat, CONTACT_POINTS};
+use crate::memory::Memory;
 use crate::quirks::Resettable;
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
 
 use control::{Arguments, Counters, Registers, Request};
 use pipeline::Pipeline;
+use replay::Replay;
 use results::Results;
 use segment::Segment;
 use solver::{Impulses, Velocity};
+
+pub(crate) use replay::{Coming, SHARE};
 
 /// Where a step stands.
 #[derive(Debug, Clone, Copy)]
@@ -102,6 +110,9 @@ pub(crate) struct Accelerator {
     /// With world inertia, that of each body.
     inertias: Vec<inertia::Stored>,
     impulses: Vec<Impulses>,
+    replay: Replay,
+    /// Rows of results on their way to each stream.
+    rows: [Vec<Beat>; striping::STREAMS_MAX],
     window: Option<Box<window::Windowed>>,
 }
 
@@ -130,6 +141,8 @@ impl Accelerator {
             shape_of: Vec::new(),
             inertias: Vec::new(),
             impulses: Vec::new(),
+            replay: Replay::new(config),
+            rows: Default::default(),
             window: None,
         }
     }
@@ -225,6 +238,7 @@ impl Accelerator {
         inputs: &mut [Stream],
         outputs: &mut [Stream],
         faults: &mut Faults,
+        memory: &Memory,
     ) -> Ran {
         let mut ran = Ran::default();
         if !self.running() {
@@ -254,10 +268,13 @@ impl Accelerator {
             let left = limit - ran.cycles;
             let progress = match self.phase {
                 Phase::Idle | Phase::Failed => break,
-                Phase::Load(segment) => self.load(segment, inputs),
+                Phase::Load(segment) => self.load(segment, inputs, memory),
+                Phase::Pass { number, segment } if self.replay.on => {
+                    self.replayed(number, segment, left, inputs, memory)
+                }
                 Phase::Pass { number, segment } => self.pass(number, segment, left, inputs),
                 Phase::Integrate { poses, results } => {
-                    self.integrate(poses, results, inputs, outputs)
+                    self.integrate(poses, results, inputs, outputs, memory)
                 }
                 // It has worked on what has arrived.
                 Phase::Window if ran.cycles > 0 => break,
@@ -334,6 +351,9 @@ impl Accelerator {
     fn fail(&mut self, code: ErrorCode, channel: usize, detail: u32) {
         log::debug!("accelerator: {} (stream {channel}, detail {detail})", code.describe());
         self.registers.fail(code, channel, detail);
+        if let Phase::Pass { number, segment } = self.phase {
+            self.compute_to(number, segment.done);
+        }
         self.phase = Phase::Failed;
         self.debt = 0;
         self.end_step();
@@ -382,8 +402,12 @@ impl Accelerator {
         if variant.inertia == Inertia::World {
             self.inertias.resize(bodies, inertia::Stored::default());
         }
+        let collisions = arguments.collisions as usize;
+        self.replay.begin(collisions, self.registers.shapes());
         self.impulses.clear();
-        self.impulses.resize(arguments.collisions as usize, [0.0; CONTACT_POINTS]);
+        if !self.replay.on {
+            self.impulses.resize(collisions, [0.0; CONTACT_POINTS]);
+        }
         self.pipeline.start_step(bodies);
         self.phase = Phase::Load(self.velocities_in());
     }

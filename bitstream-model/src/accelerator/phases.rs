@@ -17,6 +17,7 @@ use crate::interface::control::ErrorCode;
 use crate::interface::number::{Precision, StreamFormat};
 use crate::interface::profile::{Depth, Geometry, Inertia, Variant};
 use crate::interface::record::{CONTACT_POINTS, pose, result};
+use crate::memory::Memory;
 use crate::stream::Stream;
 
 impl Accelerator {
@@ -64,12 +65,38 @@ impl Accelerator {
         &mut self,
         mut segment: Segment,
         inputs: &mut [Stream],
+        memory: &Memory,
     ) -> Result<bool, PacketError> {
         let records = segment.available(inputs);
         if records == 0 {
             return segment.check_waiting(inputs).map(|()| false);
         }
         segment.check(records, inputs)?;
+        let before = segment.cycles();
+        let sum = if let Some(views) = self.views(&segment, records, inputs, memory) {
+            let sum = self.load_views(&segment, records, views)?;
+            segment.skip(records, inputs);
+            sum
+        } else {
+            segment.fetch(records, inputs, memory);
+            self.load_records(&segment, records, inputs)?;
+            segment.advance(records, inputs)
+        };
+        self.received(sum);
+        self.debt += segment.cycles() - before;
+        self.phase = Phase::Load(segment);
+        if segment.finished() {
+            self.start_pass(0);
+        }
+        Ok(true)
+    }
+
+    fn load_records(
+        &mut self,
+        segment: &Segment,
+        records: usize,
+        inputs: &[Stream],
+    ) -> Result<(), PacketError> {
         let mut reader = segment.reader(0, inputs);
         for body in segment.done..segment.done + records {
             let arrival = self.arrival(body, &mut reader)?;
@@ -79,15 +106,7 @@ impl Accelerator {
             self.velocities[body] = arrival.velocity;
             self.shape_of[body] = arrival.shape;
         }
-        let before = segment.cycles();
-        let sum = segment.advance(records, inputs);
-        self.received(sum);
-        self.debt += segment.cycles() - before;
-        self.phase = Phase::Load(segment);
-        if segment.finished() {
-            self.start_pass(0);
-        }
-        Ok(true)
+        Ok(())
     }
 
     /// Passes of the step; without collisions there is none. Arguments that were refused may be any.
@@ -103,13 +122,15 @@ impl Accelerator {
         self.config.depth(if contact { profile.contact } else { profile.friction })
     }
 
-    fn start_pass(&mut self, number: u32) {
+    pub(super) fn start_pass(&mut self, number: u32) {
         if number == self.passes() {
+            self.compute_to(number, 0);
             let (poses, results) = (self.poses_in(), self.results_out());
             self.phase = Phase::Integrate { poses, results };
             return;
         }
         self.pipeline.start_pass(self.depth(number).window.into());
+        self.replay.begin_pass(self.pipeline.depth());
         self.phase = Phase::Pass { number, segment: self.collisions_in() };
     }
 
@@ -308,6 +329,7 @@ impl Accelerator {
         mut results: Results,
         inputs: &mut [Stream],
         outputs: &mut [Stream],
+        memory: &Memory,
     ) -> Result<bool, PacketError> {
         let arrived = poses.available(inputs);
         let records = arrived.min(results.room(outputs));
@@ -318,23 +340,45 @@ impl Accelerator {
             return Ok(false);
         }
         poses.check(records, inputs)?;
-        let format = self.variant.numbers.poses;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
+        let [received, sent] = if let Some(views) = self.views(&poses, records, inputs, memory) {
+            let sums = self.integrate_views(&poses, &mut results, records, views, outputs);
+            poses.skip(records, inputs);
+            sums
+        } else {
+            poses.fetch(records, inputs, memory);
+            let sent = self.integrate_records(&poses, &mut results, records, inputs, outputs);
+            [poses.advance(records, inputs), sent]
+        };
+        self.received(received);
+        self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sent);
+        self.debt += cycles(&poses, &results) - before;
+        let finished = poses.finished();
+        self.phase = if finished { Phase::Ending } else { Phase::Integrate { poses, results } };
+        Ok(true)
+    }
+
+    /// Integrates the next bodies and sends their results; the sum of all words that were sent.
+    fn integrate_records(
+        &self,
+        poses: &Segment,
+        results: &mut Results,
+        records: usize,
+        inputs: &[Stream],
+        outputs: &mut [Stream],
+    ) -> u32 {
+        let format = self.variant.numbers.poses;
         let mut reader = poses.reader(0, inputs);
+        let mut sent = 0_u32;
         for body in poses.done..poses.done + records {
             let pose = decode::pose(format, &reader.record());
             let velocity = self.velocities[body];
             let moves = self.mass(self.shape_of[body], [0.0; 6]).inverse_mass != 0.0;
             let (pose, velocity) = self.integrated(moves, pose, velocity);
             let sum = results.send(&decode::result(format, &pose, &velocity), outputs);
-            self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sum);
+            sent = sent.wrapping_add(sum);
         }
-        let sum = poses.advance(records, inputs);
-        self.received(sum);
-        self.debt += cycles(&poses, &results) - before;
-        let finished = poses.finished();
-        self.phase = if finished { Phase::Ending } else { Phase::Integrate { poses, results } };
-        Ok(true)
+        sent
     }
 }

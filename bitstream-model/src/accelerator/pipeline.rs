@@ -89,7 +89,7 @@ impl Pipeline {
     }
 
     /// Issue slots from a read to the first slot that sees its write-back.
-    fn depth(&self) -> u64 {
+    pub(super) fn depth(&self) -> u64 {
         self.window.div_ceil(self.interval).max(1)
     }
 

@@ -59,6 +59,24 @@ impl Results {
         sum
     }
 
+    /// Sends `records` records, for which there must be room, of a row for each stream.
+    pub(super) fn send_rows(
+        &mut self,
+        records: usize,
+        rows: &[Vec<Beat>; STREAMS_MAX],
+        streams: &mut [Stream],
+    ) {
+        for (k, (stream, rows)) in streams.iter_mut().zip(rows).enumerate() {
+            stream.push(rows);
+            self.sent[k] += rows.len();
+            if self.sent[k] == self.array.packets[k] && !rows.is_empty() {
+                stream.mark_last();
+            }
+        }
+        self.done += records;
+        self.beats += records * result::ROWS;
+    }
+
     fn push(&mut self, beat: Beat, streams: &mut [Stream]) -> u32 {
         let (k, number) = self.array.striping.places(self.beats).take();
         streams[k].push(&[beat]);

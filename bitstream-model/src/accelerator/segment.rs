@@ -6,6 +6,7 @@ use super::striping::{PerStream, Places, STREAMS_MAX};
 use crate::cast::register;
 use crate::interface::control::ErrorCode;
 use crate::interface::record::{Beat, LANES};
+use crate::memory::Memory;
 use crate::stream::Stream;
 
 /// A packet that does not end where it must.
@@ -125,6 +126,39 @@ impl Segment {
         }
         self.taken = after;
         sum
+    }
+
+    /// Beats taken so far from one stream.
+    pub(super) fn taken_from(&self, stream: usize) -> usize {
+        self.taken[stream]
+    }
+
+    /// Beats of the next `records` records on each stream.
+    pub(super) fn beats_of_next(&self, records: usize) -> PerStream {
+        let mut beats = self.array.striping.counts(self.array.beats_of(self.done + records));
+        for (beats, taken) in beats.iter_mut().zip(self.taken) {
+            *beats -= taken;
+        }
+        beats
+    }
+
+    /// The next `records` records have been read where they are.
+    pub(super) fn skip(&mut self, records: usize, streams: &mut [Stream]) {
+        self.done += records;
+        let after = self.array.striping.counts(self.array.beats_of(self.done));
+        for (k, stream) in streams.iter_mut().enumerate() {
+            stream.pop(after[k] - self.taken[k]);
+        }
+        self.taken = after;
+    }
+
+    /// Lets the next `records` records, which have arrived, be in the streams themselves.
+    pub(super) fn fetch(&self, records: usize, streams: &mut [Stream], memory: &Memory) {
+        for (stream, beats) in streams.iter_mut().zip(self.beats_of_next(records)) {
+            if stream.refers() {
+                stream.fetch(beats, memory);
+            }
+        }
     }
 
     pub(super) fn finished(&self) -> bool {

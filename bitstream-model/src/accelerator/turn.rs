@@ -21,6 +21,13 @@ fn to_fixed(value: f64) -> u64 {
     value as u64
 }
 
+/// The normal impulses of a collision after the last contact pass, as they are counted.
+#[inline]
+pub(super) fn fixed_impulse<U: Format>(impulses: &Impulses) -> u64 {
+    let sum = f64::from(solver::normal_sum::<U>(impulses));
+    to_fixed(sum * f64::from(1_u32 << IMPULSE_SUM_FRACTION_BITS))
+}
+
 /// A body as it is loaded.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Arrival {
@@ -116,10 +123,8 @@ impl Accelerator {
             solver::contact::<R, U, I>(collision, parameters, masses, velocities, impulses);
             *impulses = self.stored(precision, *impulses);
             if pass + 1 == contacts {
-                let sum = f64::from(solver::normal_sum::<U>(impulses));
-                let unit = f64::from(1_u32 << IMPULSE_SUM_FRACTION_BITS);
                 self.counters.impulse_sum =
-                    self.counters.impulse_sum.saturating_add(to_fixed(sum * unit));
+                    self.counters.impulse_sum.saturating_add(fixed_impulse::<U>(impulses));
             }
         } else {
             if pass == contacts {

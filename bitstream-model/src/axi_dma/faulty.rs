@@ -27,6 +27,12 @@ pub(super) struct Faulty {
 }
 
 impl Faulty {
+    /// Whether nothing is wrong.
+    pub(super) fn none(&self) -> bool {
+        let Self { stalled, slow, cut, discards, extra, late } = self;
+        !(*stalled || *cut || *discards || *extra) && *slow == 0 && late.is_empty()
+    }
+
     /// Whether what a fault has begun comes before all else: a beat that is still to follow a packet
     /// before the next packet, and so the end of one that is dropped.
     pub(super) fn holds(&self, direction: Direction) -> bool {

@@ -1,12 +1,14 @@
 //! The emulated AXI DMA core: two channels, one reset.
 //!
 //! `channel.rs` holds the registers of one channel and their side effects, `mover.rs` the engine
-//! that fetches descriptors and moves beats, `faulty.rs` what faults do to both. Both directions are one piece of code.
+//! that fetches descriptors and moves beats, `faulty.rs` what faults do to both;
+//! `flow.rs` is the shortcut where nothing happens. Both directions are one piece of code.
 //!
 //! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
 
 mod channel;
 mod faulty;
+mod flow;
 mod mover;
 
 use std::fmt;
@@ -92,6 +94,8 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) log: &'a mut Log,
     pub(crate) moved: &'a mut Moved,
     pub(crate) faults: &'a mut Faults,
+    /// Whether the receiver takes beats that stay in their buffer.
+    pub(crate) by_reference: bool,
 }
 
 /// One AXI DMA.
@@ -227,6 +231,7 @@ impl Core {
 
     /// Moves up to `limit` beats of one channel until the clock shows `end`; returns how many, and
     /// whether anything happened at all.
+    #[inline]
     pub(crate) fn run(
         &mut self,
         direction: Direction,
@@ -240,6 +245,11 @@ impl Core {
             return (0, false);
         }
         let build = self.build;
-        self.channel(direction).run(&build, start, end, limit, stream, with)
+        let channel = self.channel(direction);
+        if channel.cannot_move(stream) {
+            channel.time = channel.time.max(start);
+            return (0, false);
+        }
+        channel.run(&build, start, end, limit, stream, with)
     }
 }

@@ -15,11 +15,12 @@ use crate::interface::descriptor::{
 };
 use crate::interface::record::{BEAT_BYTES, Beat};
 use crate::interface::register::Field;
+use crate::memory::Denied;
 use crate::stream::Stream;
 use crate::violation::ViolationKind;
 
 #[expect(clippy::cast_possible_truncation, reason = "it is 16")]
-const BEAT: u32 = BEAT_BYTES as u32;
+pub(super) const BEAT: u32 = BEAT_BYTES as u32;
 const KEYHOLE_BEATS: usize = 1;
 
 /// What a descriptor or transfer still has.
@@ -78,6 +79,7 @@ impl Channel {
                     self.fetch(build, address, with);
                     changed = true;
                 }
+                Work::Descriptor(_) if moved == limit => break,
                 Work::Descriptor(mut bd) => {
                     let left = bd.length - bd.moved;
                     let n = self.portion(build, left, end, limit - moved, stream);
@@ -235,6 +237,9 @@ impl Channel {
         // the violation was recorded when the descriptor was fetched.
         let at = at & !(u64::from(BEAT) - 1);
         let denied = match self.direction {
+            Direction::Mm2s if with.by_reference && mask == 0 && !self.faulty.cut => {
+                self.refer(at, n, stream, with).err()
+            }
             Direction::Mm2s => match with.memory.beats(at, n) {
                 Ok(_) if self.faulty.cut => None,
                 Ok(beats) => {
@@ -286,6 +291,22 @@ impl Channel {
             stream.mark_partial();
         }
         Some(whole && last)
+    }
+
+    /// MM2S: puts beats on the stream that stay where they are, if they cannot change there.
+    fn refer(
+        &self,
+        at: u64,
+        n: usize,
+        stream: &mut Stream,
+        with: &mut Surroundings<'_>,
+    ) -> Result<(), Denied> {
+        match with.memory.source(at, n)? {
+            Some(source) => stream.push_span(source, n),
+            None => stream.push(with.memory.beats(at, n)?),
+        }
+        with.moved.beats_read += n as u64;
+        Ok(())
     }
 
     fn keyhole_address(&self, at: u64) -> u64 {

@@ -158,7 +158,9 @@ impl BuildArgs {
     /// The first option that was given.
     pub(crate) fn given(&self) -> Option<&'static str> {
         let part = || PARTS.iter().find(|part| (part.get)(self).is_some()).map(|part| part.option);
-        self.profile.map(|_| "--profile").or_else(part)
+        // How it is computed is no part of what it is, and of no text.
+        let host = || self.threads.map(|_| "--threads").or_else(|| self.lanes.map(|_| "--lanes"));
+        self.profile.map(|_| "--profile").or_else(part).or_else(host)
     }
 }
 
@@ -386,6 +388,7 @@ mod tests {
                     bandwidth: numbers.1,
                     length_width: widths.0,
                     address_width: widths.1,
+                    ..BuildArgs::default()
                 },
             )
     }

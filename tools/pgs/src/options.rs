@@ -1,6 +1,8 @@
 //! This file holds the options of the emulated board and of a step, and how they are written on the
 //! command line.
 
+use std::fmt::Display;
+use std::str::FromStr;
 use std::time::Duration;
 
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
@@ -48,6 +50,14 @@ pub(crate) struct BuildArgs {
     /// Width of DMA addresses in bits, 32 to 64 [default: 40]
     #[arg(long, value_name = "BITS", value_parser = address_width)]
     pub(crate) address_width: Option<u32>,
+    /// Threads of this machine that the arithmetic may take; no result depends on it [default: as
+    /// many as there are, at most 4]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub(crate) threads: Option<usize>,
+    /// Whether independent collisions are computed side by side; no result depends on it [default:
+    /// on]
+    #[arg(long, value_enum)]
+    pub(crate) lanes: Option<LanesName>,
 }
 
 /// A choice of a build whose names stand on the command line and in its text.
@@ -107,6 +117,10 @@ choice!(HazardsName means Hazards:
     Interlocked is Hazards::Interlocked,
     Unchecked is Hazards::Unchecked,
 );
+choice!(LanesName means bool:
+    On is true,
+    Off is false,
+);
 choice!(SubnormalsName means Subnormals:
     Keep is Subnormals::Keep,
     Flush is Subnormals::Flush,
@@ -123,6 +137,11 @@ pub(crate) fn window(text: &str) -> Result<u32, String> {
     whole(text, 1, u32::MAX)
 }
 
+/// Reads a number of threads.
+pub(crate) fn threads(text: &str) -> Result<usize, String> {
+    whole(text, 1, 64)
+}
+
 /// Reads the width of a length register.
 pub(crate) fn length_width(text: &str) -> Result<u32, String> {
     whole(text, 8, 26)
@@ -133,7 +152,11 @@ pub(crate) fn address_width(text: &str) -> Result<u32, String> {
     whole(text, 32, 64)
 }
 
-fn whole(text: &str, low: u32, high: u32) -> Result<u32, String> {
+fn whole<T: Copy + FromStr + PartialOrd + Display>(
+    text: &str,
+    low: T,
+    high: T,
+) -> Result<T, String> {
     match text.parse() {
         Ok(number) if (low..=high).contains(&number) => Ok(number),
         _ => Err(format!("expected a whole number from {low} to {high}")),
@@ -156,6 +179,8 @@ impl BuildArgs {
             bandwidth: self.bandwidth.unwrap_or(default.bandwidth),
             length_width: self.length_width.unwrap_or(default.length_width),
             address_width: self.address_width.unwrap_or(default.address_width),
+            threads: self.threads.unwrap_or(default.threads),
+            lanes: self.lanes.map_or(default.lanes, |name| name.meaning()),
             ..default
         }
     }
@@ -203,6 +228,8 @@ impl BuildArgs {
             bandwidth: unlike(config.bandwidth, default.bandwidth),
             length_width: unlike(config.length_width, default.length_width),
             address_width: unlike(config.address_width, default.address_width),
+            threads: unlike(config.threads, default.threads),
+            lanes: unlike(config.lanes, default.lanes).and_then(|on| LanesName::of(&on)),
         }
     }
 }

@@ -1,0 +1,385 @@
+//! This file runs passes over blocks as moving fronts: a pass follows the one before as soon as that
+//! has finished with the bodies.
+//!
+//! ```text
+//! pass 0   ################>            chunks of blocks, in their order
+//! pass 1   ##########>                  behind by as far as the bodies of a chunk reach
+//! pass 2   ####>
+//! ```
+//!
+//! So the collisions are read from memory once for several passes, and threads take different ones.
+//! Each thread takes the next few passes that nobody has, and waits only for the pass before them,
+//! which another has and works on.
+
+#![allow(unsafe_code, reason = "threads share blocks and rows and take turns by passes")]
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+
+use super::super::number::Single;
+use super::super::solver::{Mass, SolverParameters, Velocity};
+use super::super::turn::fixed_impulse;
+use super::Stage;
+use super::block::{Block, LANES, kind};
+use super::kernel::{self, Pass};
+use super::lanes::{Lanes, Portable, Quad, Work, prefetch};
+use super::order::Order;
+use super::place::Places;
+use super::pool::Pool;
+use crate::cast::register;
+
+#[cfg(target_arch = "aarch64")]
+use super::lanes::Neon;
+#[cfg(target_arch = "x86_64")]
+use super::lanes::{Avx2, Avx512};
+
+/// Blocks of a chunk.
+const CHUNK: usize = 8;
+/// Passes that a thread takes at once.
+const BUNDLE: usize = 4;
+/// Looks at another thread's front before the processor is given away.
+const SPINS: u32 = 200;
+
+/// The lanes to compute with.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Width {
+    /// One collision after the other.
+    One,
+    Portable(Portable),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+    #[cfg(target_arch = "aarch64")]
+    Neon(Neon),
+}
+
+impl Width {
+    /// All that the processor has, the widest first.
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        #[cfg(target_arch = "x86_64")]
+        let own = [Avx512::found().map(Self::Avx512), Avx2::found().map(Self::Avx2)];
+        #[cfg(target_arch = "aarch64")]
+        let own = [Some(Self::Neon(Neon))];
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        let own = [None];
+        own.into_iter().flatten().chain([Self::Portable(Portable), Self::One])
+    }
+
+    /// The widest that the processor has.
+    pub(super) fn found() -> Self {
+        Self::all().next().unwrap_or(Self::One)
+    }
+
+    /// Runs something with the lanes, or gives it back where there are none.
+    #[inline]
+    pub(super) fn run<W: Work>(self, work: W) -> Result<(), W> {
+        match self {
+            Self::One => return Err(work),
+            Self::Portable(lanes) => lanes.run(work),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(lanes) => lanes.run(work),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(lanes) => lanes.run(work),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(lanes) => lanes.run(work),
+        }
+        Ok(())
+    }
+}
+
+/// How far a pass has come, in chunks; alone in its cache lines.
+#[derive(Debug, Default)]
+#[repr(align(128))]
+struct Progress(AtomicUsize);
+
+/// What the fronts are made of, kept from step to step.
+#[derive(Debug, Default)]
+pub(super) struct Fronts {
+    order: Order,
+    /// For each chunk the last one that must have been left by the pass before.
+    needs: Vec<u32>,
+    progress: Vec<Progress>,
+}
+
+/// The passes of one run.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Passes<'a> {
+    pub(super) numbers: &'a Range<u32>,
+    pub(super) contact: u32,
+    /// The friction pass that finds which spins are damped.
+    pub(super) finding: Option<u32>,
+    pub(super) parameters: &'a SolverParameters,
+    pub(super) width: Width,
+}
+
+impl Fronts {
+    /// Finds the order of the blocks and how far each chunk's bodies reach in it.
+    pub(super) fn measure(&mut self, places: &Places) {
+        self.order.find(places.again());
+        let chunk = |block: u32| self.order.places[block as usize] / register(CHUNK);
+        self.needs.clear();
+        self.needs.extend((0..places.blocks().div_ceil(CHUNK)).map(register));
+        for [first, last] in places.uses() {
+            let need = &mut self.needs[chunk(first) as usize];
+            *need = (*need).max(chunk(last));
+        }
+    }
+
+    /// Runs passes over all blocks; returns the impulses that the last contact pass counts. The rows
+    /// of the blocks are in `lines`.
+    pub(super) fn run(
+        &mut self,
+        passes: Passes<'_>,
+        blocks: &mut [Block],
+        lines: &mut [Line],
+        pool: &mut Pool,
+    ) -> u64 {
+        let count = passes.numbers.len();
+        if self.progress.len() < count {
+            self.progress.resize_with(count, Progress::default);
+        }
+        for progress in &mut self.progress {
+            *progress.0.get_mut() = 0;
+        }
+        let field = Field {
+            passes,
+            blocks: blocks.as_mut_ptr(),
+            order: &self.order.blocks,
+            quads: lines.as_mut_ptr().cast(),
+            needs: &self.needs,
+            progress: &self.progress[..count],
+            next: AtomicUsize::new(0),
+            sum: AtomicU64::new(0),
+            broken: AtomicBool::new(false),
+        };
+        pool.run(&|thread| field.work(thread));
+        field.sum.into_inner()
+    }
+}
+
+/// Rows of velocities: two to a cache line. A row is the linear velocity and the inverse mass, then
+/// the angular velocity and the inverse inertia.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(64))]
+pub(super) struct Line([Quad; 4]);
+
+impl Line {
+    pub(super) fn put(&mut self, second: bool, velocity: &Velocity, mass: &Mass) {
+        let ([x, y, z], [p, q, r]) = (velocity.linear, velocity.angular);
+        let at = 2 * usize::from(second);
+        self.0[at] = [x, y, z, mass.inverse_mass];
+        self.0[at + 1] = [p, q, r, mass.inverse_inertia[0]];
+    }
+
+    pub(super) fn velocity(&self, second: bool) -> Velocity {
+        let at = 2 * usize::from(second);
+        let ([x, y, z, _], [p, q, r, _]) = (self.0[at], self.0[at + 1]);
+        Velocity { linear: [x, y, z], angular: [p, q, r] }
+    }
+}
+
+/// What the threads of a run share.
+struct Field<'a> {
+    passes: Passes<'a>,
+    blocks: *mut Block,
+    /// All blocks, each once.
+    order: &'a [u32],
+    quads: *mut Quad,
+    needs: &'a [u32],
+    progress: &'a [Progress],
+    /// The next pass that nobody has taken.
+    next: AtomicUsize,
+    sum: AtomicU64,
+    /// A thread has panicked: its fronts stand still.
+    broken: AtomicBool,
+}
+
+// SAFETY: blocks and rows are accessed in `chunk` alone, for a chunk and a pass that one thread has.
+// Those of another pass over the same bodies or blocks have ended before, which `progress` says
+// with release and acquire.
+unsafe impl Sync for Field<'_> {}
+
+/// Marks the field as broken unless it is forgotten.
+struct Breaks<'a>(&'a AtomicBool);
+
+impl Drop for Breaks<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.store(true, Ordering::Release);
+        }
+    }
+}
+
+impl Field<'_> {
+    /// What a thread does: takes passes while there are any.
+    fn work(&self, thread: usize) {
+        let _breaks = Breaks(&self.broken);
+        loop {
+            let first = self.next.fetch_add(BUNDLE, Ordering::Relaxed);
+            if first >= self.progress.len() {
+                return;
+            }
+            let last = (first + BUNDLE).min(self.progress.len());
+            if !self.bundle(first..last, thread) {
+                return;
+            }
+        }
+    }
+
+    /// Runs neighbouring passes, the later ones as close behind as they may be. Returns whether they
+    /// came to their end.
+    fn bundle(&self, passes: Range<usize>, thread: usize) -> bool {
+        let chunks = self.needs.len();
+        let mut at = [0; BUNDLE];
+        let mut idle = 0;
+        while at[passes.len() - 1] < chunks {
+            let mut limit = match passes.start {
+                0 => chunks,
+                first => self.progress[first - 1].0.load(Ordering::Acquire),
+            };
+            let mut worked = false;
+            for (pass, at) in passes.clone().zip(&mut at) {
+                // The first goes on by one chunk, the others as far as they can.
+                let mut most = if pass == passes.start { 1 } else { usize::MAX };
+                while most > 0 && *at < chunks && (self.needs[*at] as usize) < limit {
+                    self.chunk(pass, *at, thread);
+                    *at += 1;
+                    most -= 1;
+                    worked = true;
+                    self.progress[pass].0.store(*at, Ordering::Release);
+                }
+                limit = *at;
+            }
+            idle = if worked { 0 } else { idle + 1 };
+            if idle > 0 && self.broken.load(Ordering::Acquire) {
+                return false;
+            }
+            if idle > SPINS {
+                std::thread::yield_now();
+            } else if idle > 0 {
+                std::hint::spin_loop();
+            }
+        }
+        true
+    }
+
+    /// Runs a pass over a chunk that the pass before has left behind.
+    fn chunk(&self, pass: usize, chunk: usize, thread: usize) {
+        let number = self.passes.numbers.start + register(pass);
+        let stage = Stage::new(number, self.passes.contact);
+        let pass = Pass {
+            stage,
+            finds: self.passes.finding == Some(number),
+            parameters: self.passes.parameters,
+            spare: 2 * (register(thread) + 1),
+        };
+        let mut sum = 0;
+        let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
+        let work = ChunkWork { field: self, pass, blocks, sum: &mut sum };
+        if let Err(work) = self.passes.width.run(work) {
+            work.one_by_one();
+        }
+        if sum > 0 {
+            let add = |before: u64| Some(before.saturating_add(sum));
+            let _ = self.sum.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
+        }
+    }
+}
+
+/// A pass over the blocks of a chunk.
+struct ChunkWork<'a> {
+    field: &'a Field<'a>,
+    pass: Pass<'a>,
+    blocks: &'a [u32],
+    sum: &'a mut u64,
+}
+
+impl Work for ChunkWork<'_> {
+    #[inline(always)]
+    fn with<L: Lanes>(self, lanes: L) {
+        for (at, &index) in self.blocks.iter().enumerate() {
+            if let Some(ahead) = self.blocks.get(at + 1) {
+                let ahead = self.field.blocks.wrapping_add(*ahead as usize);
+                prefetch(ahead);
+            }
+            // SAFETY: `order` has numbers of blocks.
+            let block = unsafe { self.field.blocks.add(index as usize) };
+            // SAFETY: and this one is the thread's: see `Sync`.
+            let block = unsafe { &mut *block };
+            if block.serial() {
+                // SAFETY: so are the rows of its bodies, and the spare one.
+                let sum = unsafe { one_by_one(&self.pass, block, self.field.quads) };
+                *self.sum = self.sum.saturating_add(sum);
+                continue;
+            }
+            // SAFETY: the same.
+            unsafe { kernel::solve(lanes, &self.pass, block, self.field.quads) };
+            if self.pass.stage.contact && self.pass.stage.turning {
+                *self.sum = self.sum.saturating_add(counted(block));
+            }
+        }
+    }
+}
+
+impl ChunkWork<'_> {
+    fn one_by_one(self) {
+        for &index in self.blocks {
+            // SAFETY: `order` has numbers of blocks.
+            let block = unsafe { self.field.blocks.add(index as usize) };
+            // SAFETY: and this one is the thread's: see `Sync`.
+            let block = unsafe { &mut *block };
+            // SAFETY: so are the rows of its bodies.
+            let sum = unsafe { one_by_one(&self.pass, block, self.field.quads) };
+            *self.sum = self.sum.saturating_add(sum);
+        }
+    }
+}
+
+/// The impulses of a block after the last contact pass; empty lanes have none.
+fn counted(block: &Block) -> u64 {
+    (0..LANES)
+        .fold(0, |sum, lane| sum.saturating_add(fixed_impulse::<Single>(&block.impulses(lane))))
+}
+
+/// A pass over the collisions of a block, one after the other.
+///
+/// # Safety
+///
+/// The rows of the block exist. Nobody writes those while this runs, nor reads those of moving bodies.
+unsafe fn one_by_one(pass: &Pass<'_>, block: &mut Block, quads: *mut Quad) -> u64 {
+    let mut sum = 0_u64;
+    for lane in 0..LANES {
+        let collision = block.collision(lane);
+        if collision.count == 0 {
+            continue;
+        }
+        let mut masses = [Mass::default(); 2];
+        let mut velocities = [Velocity::default(); 2];
+        for side in 0..2 {
+            // SAFETY: the caller promises that the row exists.
+            let row = unsafe { quads.cast::<[Quad; 2]>().add(block.rows[side][lane] as usize) };
+            // SAFETY: the caller promises that it can be read.
+            let [[x, y, z, m], [p, q, r, k]] = unsafe { row.read() };
+            velocities[side] = Velocity { linear: [x, y, z], angular: [p, q, r] };
+            masses[side] = Mass { inverse_mass: m, inverse_inertia: [k, 0.0, 0.0, 0.0, 0.0, 0.0] };
+        }
+        let mut impulses = block.impulses(lane);
+        let share =
+            pass.stage.solve(&collision, pass.parameters, &masses, &mut velocities, &mut impulses);
+        sum = sum.saturating_add(share);
+        block.put_impulses(lane, impulses);
+        for side in 0..2 {
+            if block.kind[lane] & kind::MOVES[side] != 0 {
+                let (Velocity { linear: [x, y, z], angular: [p, q, r] }, mass) =
+                    (velocities[side], masses[side]);
+                let row = [[x, y, z, mass.inverse_mass], [p, q, r, mass.inverse_inertia[0]]];
+                // SAFETY: the caller promises that the row exists.
+                let at = unsafe { quads.cast::<[Quad; 2]>().add(block.rows[side][lane] as usize) };
+                // SAFETY: the caller promises that a moving body's can be written.
+                unsafe { at.write(row) };
+            }
+        }
+    }
+    sum
+}

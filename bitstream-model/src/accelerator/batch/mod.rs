@@ -1,0 +1,377 @@
+//! The collisions of a step decoded once, and the passes over them, many at a time.
+//!
+//! ```text
+//! beats -> place.rs (which are independent) -> block.rs (side by side) -> passes
+//! ```
+//!
+//! Only collisions that share no moving body change places, so that every bit is that of
+//! `solver.rs` taking one after the other. It is for the layout of records in f32 with isotropic
+//! inertia and subnormals kept.
+
+mod block;
+mod front;
+mod kernel;
+mod lanes;
+mod order;
+mod place;
+mod pool;
+mod records;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use super::decode::Collision;
+use super::inertia::Isotropic;
+use super::number::Single;
+use super::pipeline::Entry;
+use super::segment::PacketError;
+use super::solver::{self, Impulses, Mass, SolverParameters, Velocity};
+use super::turn::fixed_impulse;
+use crate::cast::register;
+use crate::interface::control::ErrorCode;
+use crate::interface::number::StreamFormat;
+use crate::interface::record::{Beat, CONTACT_POINTS};
+
+use block::{Block, LANES, ROWS_APART, THREADS_MAX};
+use front::{Fronts, Line, Passes, Width};
+use place::{Place, Places};
+use pool::Pool;
+use records::{Fill, Records};
+
+/// The slot of a padding entry.
+const NO_SLOT: u32 = u32::MAX;
+
+/// What a pass is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stage {
+    contact: bool,
+    /// The last contact pass, of which the impulses are counted, or the first friction pass, which
+    /// finds their sums.
+    turning: bool,
+}
+
+impl Stage {
+    fn new(pass: u32, contact: u32) -> Self {
+        if pass < contact {
+            Self { contact: true, turning: pass + 1 == contact }
+        } else {
+            Self { contact: false, turning: pass == contact }
+        }
+    }
+
+    /// The pass over one collision; returns its share of the impulse sum.
+    fn solve(
+        self,
+        collision: &Collision,
+        parameters: &SolverParameters,
+        masses: &[Mass; 2],
+        velocities: &mut [Velocity; 2],
+        impulses: &mut Impulses,
+    ) -> u64 {
+        type One = Single;
+        if self.contact {
+            solver::contact::<One, One, Isotropic>(
+                collision, parameters, masses, velocities, impulses,
+            );
+            return if self.turning { fixed_impulse::<One>(impulses) } else { 0 };
+        }
+        if self.turning {
+            *impulses = [solver::normal_sum::<One>(impulses), 0.0, 0.0, 0.0];
+        }
+        solver::friction::<One, One, Isotropic>(
+            collision, parameters, masses, velocities, impulses,
+        );
+        0
+    }
+}
+
+/// A collision that has a place.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    place: Place,
+    moving: [bool; 2],
+}
+
+/// The collisions of a step.
+#[derive(Debug)]
+pub(super) struct Batch {
+    blocks: Vec<Block>,
+    places: Places,
+    /// Block and lane of each collision.
+    slots: Vec<u32>,
+    impulse_sum: u64,
+    width: Width,
+    pool: Pool,
+    fronts: Fronts,
+    /// Whether the fronts know all that is decoded.
+    measured: bool,
+    /// Whether the blocks say which spins are damped.
+    spins: bool,
+    /// Bodies that the collisions are about.
+    bodies: usize,
+    lines: Vec<Line>,
+}
+
+impl Batch {
+    /// Takes at most `threads` threads, of which one is the caller's, and SIMD lanes or not.
+    pub(super) fn new(threads: usize, lanes: bool) -> Self {
+        Self::with_width(threads, if lanes { Width::found() } else { Width::One })
+    }
+
+    fn with_width(threads: usize, width: Width) -> Self {
+        Self {
+            blocks: Vec::new(),
+            places: Places::default(),
+            slots: Vec::new(),
+            impulse_sum: 0,
+            width,
+            pool: Pool::new(threads.clamp(1, THREADS_MAX) - 1),
+            fronts: Fronts::default(),
+            measured: false,
+            spins: false,
+            bodies: 0,
+            lines: Vec::new(),
+        }
+    }
+
+    /// Begins a step: forgets the last one's collisions and makes room for so many.
+    pub(super) fn begin(&mut self, collisions: usize) {
+        self.blocks.clear();
+        self.blocks.reserve(collisions.div_ceil(LANES));
+        self.slots.clear();
+        self.slots.reserve(collisions);
+        self.places.begin(collisions);
+        self.impulse_sum = 0;
+        self.measured = false;
+        self.spins = false;
+        self.bodies = 0;
+    }
+
+    /// Collisions decoded, padding entries among them.
+    pub(super) fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Decodes the next `count` records, of 2, 2, 2 and 1 beats on the four streams.
+    ///
+    /// # Errors
+    ///
+    /// The first collision that the decoder refuses; those before it stay.
+    pub(super) fn decode(
+        &mut self,
+        streams: [&[Beat]; 4],
+        count: usize,
+        shape_of: &[u8],
+        masses: &[Mass],
+    ) -> Result<(), PacketError> {
+        self.places.bodies(shape_of.len());
+        self.bodies = self.bodies.max(shape_of.len());
+        self.measured = false;
+        self.spins = false;
+        let records = Records { streams };
+        let mut at = 0;
+        while at < count {
+            let mut placed = [None; LANES];
+            // In hazard-free order as many as the block begun last has empty lanes.
+            let last = self.slots.last().filter(|slot| **slot != NO_SLOT);
+            let taken = last.map_or(0, |slot| (*slot as usize + 1) % LANES);
+            let most = (LANES - taken).min(count - at);
+            let mut done = 0;
+            let mut refused = Ok(());
+            while done < most && refused.is_ok() {
+                match self.place(records.heads(at + done), shape_of, masses) {
+                    Ok(place) => {
+                        placed[done] = place;
+                        done += 1;
+                    }
+                    Err(error) => refused = Err(error),
+                }
+            }
+            if !self.fill(&records, at, &placed) {
+                for (record, placed) in (at..at + done).zip(&placed) {
+                    let Some(Placed { place, moving }) = placed else { continue };
+                    let collision = Collision::absolute(StreamFormat::F32, &records.rows(record));
+                    self.blocks[place.block].put(place.lane, &collision, *moving);
+                }
+            }
+            refused?;
+            at += done;
+        }
+        Ok(())
+    }
+
+    /// Places the next collision, or nothing for a padding entry.
+    #[inline]
+    fn place(
+        &mut self,
+        [normal, body_a, body_b]: [u32; 3],
+        shape_of: &[u8],
+        masses: &[Mass],
+    ) -> Result<Option<Placed>, PacketError> {
+        let index = register(self.slots.len());
+        if normal == 0 {
+            self.slots.push(NO_SLOT);
+            return Ok(None);
+        }
+        let bodies = [body_a, body_b];
+        let moving = moving(normal, bodies, shape_of, masses).map_err(|code| PacketError {
+            code,
+            channel: 0,
+            beat: index,
+        })?;
+        let place = self.places.place(index, bodies, moving);
+        if place.block == self.blocks.len() {
+            self.blocks.push(Block::EMPTY);
+        }
+        if place.serial {
+            self.blocks[place.block].kind[0] |= block::kind::SERIAL;
+        }
+        self.slots.push(register(place.block * LANES + place.lane));
+        Ok(Some(Placed { place, moving }))
+    }
+
+    /// Puts records side by side at once where they are a block in their order; whether they were.
+    fn fill(
+        &mut self,
+        records: &Records<'_>,
+        first: usize,
+        placed: &[Option<Placed>; LANES],
+    ) -> bool {
+        let Some(number) = placed[0].map(|placed| placed.place.block) else { return false };
+        let in_order = placed.iter().enumerate().all(|(lane, placed)| {
+            placed.is_some_and(|Placed { place, .. }| place.block == number && place.lane == lane)
+        });
+        let block = &mut self.blocks[number];
+        if !in_order || self.width.run(Fill { records, first, block }).is_err() {
+            return false;
+        }
+        for (lane, placed) in placed.iter().enumerate() {
+            let [count, body_a, body_b] = records.heads(first + lane);
+            let moving = placed.map_or([false; 2], |placed| placed.moving);
+            self.blocks[number].put_kind(lane, [body_a, body_b], count as usize, moving);
+        }
+        true
+    }
+
+    /// Block and lane of a collision, or `None` for a padding entry.
+    fn slot(&self, index: usize) -> Option<(usize, usize)> {
+        let slot = *self.slots.get(index)?;
+        (slot != NO_SLOT).then_some((slot as usize / LANES, slot as usize % LANES))
+    }
+
+    /// The bodies of a decoded collision and which of them move, or `None` for a padding entry.
+    pub(super) fn entry(&self, index: usize) -> Option<Entry> {
+        self.slot(index).map(|(block, lane)| self.blocks[block].entry(lane))
+    }
+
+    /// The smallest distance, in collisions, of two that share a moving body; `u32::MAX` without.
+    pub(super) fn distance(&self) -> u32 {
+        self.places.distance().unwrap_or(u32::MAX)
+    }
+
+    /// Runs whole passes over all collisions. Of the step's passes, numbered from 0, the first
+    /// `contact` are contact passes. `velocities` are those of all bodies.
+    pub(super) fn run(
+        &mut self,
+        passes: Range<u32>,
+        contact: u32,
+        parameters: &SolverParameters,
+        shape_of: &[u8],
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+    ) {
+        if passes.is_empty() || self.blocks.is_empty() {
+            return;
+        }
+        if !self.measured {
+            self.fronts.measure(&self.places);
+            self.measured = true;
+        }
+        let lines = (ROWS_APART as usize + self.bodies.max(velocities.len())).div_ceil(2);
+        if self.lines.len() < lines {
+            self.lines.resize(lines, Line::default());
+        }
+        let own = &mut self.lines[ROWS_APART as usize / 2..];
+        for (body, (velocity, shape)) in velocities.iter().zip(shape_of).enumerate() {
+            own[body / 2].put(body % 2 == 1, velocity, &masses[usize::from(*shape)]);
+        }
+        let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
+        let run = Passes { numbers: &passes, contact, finding, parameters, width: self.width };
+        let sum = self.fronts.run(run, &mut self.blocks, &mut self.lines, &mut self.pool);
+        self.impulse_sum = self.impulse_sum.saturating_add(sum);
+        self.spins |= finding.is_some();
+        let own = &self.lines[ROWS_APART as usize / 2..];
+        for (body, velocity) in velocities.iter_mut().enumerate() {
+            *velocity = own[body / 2].velocity(body % 2 == 1);
+        }
+    }
+
+    /// Runs a part of one pass, one collision after the other in the order received.
+    #[expect(clippy::too_many_arguments, reason = "those of `run` and which part")]
+    pub(super) fn run_part(
+        &mut self,
+        pass: u32,
+        part: Range<usize>,
+        contact: u32,
+        parameters: &SolverParameters,
+        shape_of: &[u8],
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+    ) {
+        let stage = Stage::new(pass, contact);
+        for index in part {
+            let Some((block, lane)) = self.slot(index) else { continue };
+            let block = &mut self.blocks[block];
+            let Entry { bodies, moving } = block.entry(lane);
+            let sides = bodies.map(|body| body as usize);
+            let mut pair = sides.map(|body| velocities[body]);
+            let mut impulses = block.impulses(lane);
+            let masses = sides.map(|body| masses[usize::from(shape_of[body])]);
+            let collision = block.collision(lane);
+            let sum = stage.solve(&collision, parameters, &masses, &mut pair, &mut impulses);
+            self.impulse_sum = self.impulse_sum.saturating_add(sum);
+            block.put_impulses(lane, impulses);
+            for side in 0..2 {
+                if moving[side] {
+                    velocities[sides[side]] = pair[side];
+                }
+            }
+        }
+    }
+
+    /// The accumulated impulses of a collision after the passes run so far.
+    pub(super) fn impulses(&self, index: usize) -> Impulses {
+        self.slot(index)
+            .map_or([0.0; CONTACT_POINTS], |(block, lane)| self.blocks[block].impulses(lane))
+    }
+
+    /// What the last contact pass has added to the accelerator's impulse sum.
+    pub(super) fn impulse_sum(&self) -> u64 {
+        self.impulse_sum
+    }
+}
+
+/// Which bodies of a collision with a contact move, or what is wrong with it.
+#[inline]
+fn moving(
+    count: u32,
+    bodies: [u32; 2],
+    shape_of: &[u8],
+    masses: &[Mass],
+) -> Result<[bool; 2], ErrorCode> {
+    if count as usize > CONTACT_POINTS {
+        return Err(ErrorCode::ContactCount);
+    }
+    let [Some(&a), Some(&b)] = bodies.map(|body| shape_of.get(body as usize)) else {
+        return Err(ErrorCode::BodyIndex);
+    };
+    if bodies[0] == bodies[1] {
+        return Err(ErrorCode::SelfCollision);
+    }
+    let moving = [a, b].map(|shape| masses[usize::from(shape)].inverse_mass != 0.0);
+    if moving == [false; 2] {
+        return Err(ErrorCode::StaticPair);
+    }
+    Ok(moving)
+}

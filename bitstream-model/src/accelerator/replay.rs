@@ -1,0 +1,288 @@
+//! This file takes the collisions of a step from their buffers once, and replays them in the other
+//! passes, as long as these bring the same bytes.
+//!
+//! What a pass takes and how long is accounted for beat by beat as ever; what it computes is left for
+//! later, until somebody can see it, and then done for many passes at once. The bytes are the same
+//! where they come from the same place of the same hand-over of a buffer: the device owns it, and
+//! nobody writes to it. Where a stream brings anything else, the rest of the step goes the long way.
+
+use super::batch::Batch;
+use super::control::Shape;
+use super::pipeline::{Entry, Pipeline};
+use super::segment::{PacketError, Segment};
+use super::solver::Mass;
+use super::striping::STREAMS_MAX;
+use crate::config::{BoardConfig, Hazards, Subnormals};
+use crate::interface::number::Numbers;
+use crate::interface::profile::{FLOAT, Flow, Geometry, Inertia};
+use crate::interface::record::Beat;
+use crate::memory::{Memory, Source};
+use crate::span::Spans;
+use crate::stream::Stream;
+
+/// Beats of a collision on each stream.
+pub(crate) const SHARE: [usize; STREAMS_MAX] = [2, 2, 2, 1];
+/// Beats of a collision on a stream, at most.
+const SHARE_MAX: usize = 2;
+/// Collisions that are decoded at once: what stays in the cache while they are added up.
+const CHUNK: usize = 1024;
+/// Issue slots of a hazard window that are kept in mind.
+const SLOTS_MAX: usize = 512;
+
+/// Beats that are about to come to a stream: where from, and how many.
+pub(crate) type Coming = [Option<(Source, usize)>; STREAMS_MAX];
+
+/// Collisions that entered one an interval.
+#[derive(Debug, Clone, Copy, Default)]
+struct Entered {
+    clock: u64,
+    first: usize,
+    records: usize,
+}
+
+/// The collisions of a step.
+#[derive(Debug)]
+pub(super) struct Replay {
+    /// Whether the design is one of those that it knows.
+    possible: bool,
+    /// Whether the step has brought nothing so far that it cannot replay.
+    pub(super) on: bool,
+    pub(super) batch: Batch,
+    /// Passes that were computed.
+    pub(super) computed: u32,
+    /// Mass properties of each shape.
+    pub(super) masses: Vec<Mass>,
+    /// Where the beats of the decoded collisions are, stream by stream.
+    origin: [Spans; STREAMS_MAX],
+    /// The sum of all words of as many collisions.
+    sums: Vec<u32>,
+    /// What the decoder said to the collision behind the last one decoded.
+    pub(super) refused: Option<PacketError>,
+    /// Issue slots from a collision to the first that sees its write-back.
+    slots: usize,
+    /// Whether each collision entered as soon as it had come, up to now in this pass.
+    pub(super) even: bool,
+    /// The last collisions that entered so.
+    entered: Box<[Entered]>,
+    next_entered: usize,
+}
+
+impl Replay {
+    pub(super) fn new(config: &BoardConfig) -> Self {
+        let (profile, variant) = (config.profile, config.variant());
+        let possible = config.replay
+            && variant.numbers == Numbers::F32
+            && variant.inertia == Inertia::Isotropic
+            && profile.geometry == Geometry::Absolute
+            && profile.stripes == FLOAT.stripes
+            && profile.mm2s_widths == FLOAT.mm2s_widths
+            && profile.s2mm_widths == FLOAT.s2mm_widths
+            && profile.collisions_per_issue == 1
+            && matches!(profile.flow, Flow::Passes)
+            && config.subnormals == Subnormals::Keep
+            && config.hazards == Hazards::Interlocked;
+        Self {
+            possible,
+            on: possible,
+            batch: Batch::new(config.threads, config.lanes),
+            computed: 0,
+            masses: Vec::new(),
+            origin: std::array::from_fn(|_| Spans::with_capacity(64)),
+            sums: Vec::new(),
+            refused: None,
+            slots: 0,
+            even: true,
+            entered: vec![Entered::default(); SLOTS_MAX].into(),
+            next_entered: 0,
+        }
+    }
+
+    /// A step begins.
+    pub(super) fn begin(&mut self, collisions: usize, shapes: &[Shape]) {
+        self.on = self.possible;
+        if !self.on {
+            return;
+        }
+        self.batch.begin(collisions);
+        self.computed = 0;
+        self.masses.clear();
+        self.masses.extend(shapes.iter().map(|shape| Mass {
+            inverse_mass: shape.inverse_mass,
+            inverse_inertia: [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
+        }));
+        self.origin.iter_mut().for_each(Spans::clear);
+        self.sums.clear();
+        self.sums.reserve(collisions + 1);
+        self.sums.push(0);
+        self.refused = None;
+    }
+
+    /// A pass begins, with a hazard window of so many issue slots.
+    pub(super) fn begin_pass(&mut self, slots: u64) {
+        self.slots = usize::try_from(slots).unwrap_or(usize::MAX);
+        self.entered.fill(Entered::default());
+        self.next_entered = 0;
+        self.even = self.slots <= SLOTS_MAX && self.far_enough();
+    }
+
+    /// Whether no decoded collision is so close behind another that it may have to wait for it.
+    fn far_enough(&self) -> bool {
+        self.batch.distance() as usize >= self.slots
+    }
+
+    /// Collisions of which everything is known.
+    pub(super) fn known(&self) -> usize {
+        self.batch.len()
+    }
+
+    /// Issue slots that collisions have to be apart.
+    pub(super) fn slots(&self) -> usize {
+        self.slots
+    }
+
+    /// Decodes what is on the streams and what is about to come behind that. The segment says which
+    /// collisions of the first pass are next.
+    pub(super) fn look_ahead(
+        &mut self,
+        segment: &Segment,
+        inputs: &[Stream],
+        coming: &Coming,
+        shape_of: &[u8],
+        memory: &Memory,
+    ) {
+        let total = segment.done + segment.left();
+        // Where beats are, by their number behind the front of their stream.
+        let piece = |k: usize, ahead: usize, most: usize| {
+            let there = inputs[k].len();
+            match coming[k] {
+                _ if ahead < there => inputs[k].piece(ahead, most),
+                Some((source, count)) => {
+                    let at = ahead - there;
+                    (count.saturating_sub(at).min(most), Some(source.further(at as u64)))
+                }
+                None => (0, None),
+            }
+        };
+        while self.refused.is_none() && self.known() < total {
+            let known = self.known();
+            let ahead = |k: usize| (known - segment.done) * SHARE[k];
+            let mut records = CHUNK.min(total - known);
+            for (k, share) in SHARE.into_iter().enumerate() {
+                records = records.min(piece(k, ahead(k), records * share).0 / share);
+            }
+            // Where the beats of a collision are not together it is gathered.
+            let apart = records == 0;
+            let records = records.max(1);
+            let mut gathered = [[Beat::default(); SHARE_MAX]; STREAMS_MAX];
+            let mut streams: [&[Beat]; STREAMS_MAX] = [&[]; STREAMS_MAX];
+            let mut sources = [[None; SHARE_MAX]; STREAMS_MAX];
+            let step = |share: usize| if apart { 1 } else { records * share };
+            for (k, share) in SHARE.into_iter().enumerate() {
+                for at in (0..records * share).step_by(step(share)) {
+                    let (count, source) = piece(k, ahead(k) + at, step(share));
+                    let view = source.and_then(|source| memory.view(source, count));
+                    let Some(view) = view.filter(|view| view.len() == step(share)) else { return };
+                    if apart {
+                        gathered[k][at] = view[0];
+                    } else {
+                        streams[k] = view;
+                    }
+                    sources[k][at] = source;
+                }
+            }
+            for (k, share) in SHARE.into_iter().enumerate() {
+                let first = (known * share) as u64;
+                for (at, source) in (0..).zip(sources[k].into_iter().flatten()) {
+                    self.origin[k].push(first + at, step(share) as u64, source);
+                }
+                if apart {
+                    streams[k] = &gathered[k][..share];
+                }
+            }
+            self.refused = self.batch.decode(streams, records, shape_of, &self.masses).err();
+            self.add_up(streams, self.known() - known);
+        }
+    }
+
+    /// Adds the words of the next records up.
+    fn add_up(&mut self, streams: [&[Beat]; STREAMS_MAX], records: usize) {
+        let [a, b, c, d] = streams;
+        let mut sum = self.sums.last().copied().unwrap_or(0);
+        let pairs = a.as_chunks::<2>().0.iter().zip(b.as_chunks::<2>().0).zip(c.as_chunks::<2>().0);
+        for ((([a, e], [b, f]), [c, g]), d) in pairs.zip(d).take(records) {
+            let mut lanes = a.0;
+            for beat in [b, c, d, e, f, g] {
+                for (lane, word) in lanes.iter_mut().zip(beat.0) {
+                    *lane = lane.wrapping_add(word);
+                }
+            }
+            sum = lanes.into_iter().fold(sum, u32::wrapping_add);
+            self.sums.push(sum);
+        }
+    }
+
+    /// The sum of all words of some collisions.
+    pub(super) fn sum(&self, first: usize, records: usize) -> u32 {
+        self.sums[first + records].wrapping_sub(self.sums[first])
+    }
+
+    /// Whether the next `records` collisions on the streams are the decoded ones.
+    pub(super) fn same(&self, segment: &Segment, records: usize, inputs: &[Stream]) -> bool {
+        SHARE.into_iter().enumerate().all(|(k, share)| {
+            let (first, most) = ((segment.done * share) as u64, records * share);
+            let mut at = 0;
+            while at < most {
+                let (count, source) = inputs[k].piece(at, most - at);
+                let same = |from| self.origin[k].holds(first + at as u64, count, from);
+                if count == 0 || !source.is_some_and(same) {
+                    return false;
+                }
+                at += count;
+            }
+            true
+        })
+    }
+
+    /// Whether what is about to come to the streams goes on with the decoded collisions, as far as it
+    /// belongs to the segment.
+    pub(super) fn goes_on(&self, segment: &Segment, inputs: &[Stream], coming: &Coming) -> bool {
+        SHARE.into_iter().enumerate().all(|(k, share)| {
+            let Some((source, count)) = coming[k] else { return false };
+            let next = segment.done * share + inputs[k].len();
+            let left = ((segment.done + segment.left()) * share).saturating_sub(next);
+            self.origin[k].holds(next as u64, count.min(left), source)
+        })
+    }
+
+    /// Collisions enter one an interval from that clock on.
+    pub(super) fn enter(&mut self, clock: u64, first: usize, records: usize) {
+        self.entered[self.next_entered] = Entered { clock, first, records };
+        self.next_entered = (self.next_entered + 1) % SLOTS_MAX;
+    }
+
+    /// From now on collisions may have to wait for those that have entered.
+    pub(super) fn end_even(&mut self, interval: u64, pipeline: &mut Pipeline) {
+        if !std::mem::replace(&mut self.even, false) {
+            return;
+        }
+        let (newer, older) = self.entered.split_at(self.next_entered);
+        for Entered { clock, first, records } in older.iter().chain(newer) {
+            for (at, index) in (*first..first + records).enumerate() {
+                if let Some(entry) = self.batch.entry(index) {
+                    pipeline.entered(clock + at as u64 * interval, &entry);
+                }
+            }
+        }
+    }
+
+    /// Looks again whether a collision may have to wait.
+    pub(super) fn look_at_distances(&mut self, interval: u64, pipeline: &mut Pipeline) {
+        if self.even && !self.far_enough() {
+            self.end_even(interval, pipeline);
+        }
+    }
+
+    pub(super) fn entry(&self, index: usize) -> Option<Entry> {
+        self.batch.entry(index)
+    }
+}

@@ -1,0 +1,63 @@
+//! This file is for a channel that does nothing out of the ordinary: it waits, or moves beats in the
+//! middle of a descriptor, which are counted elsewhere.
+
+use super::channel::{Channel, Work};
+use super::mover::BEAT;
+use super::{Core, Direction};
+use crate::cast::register;
+use crate::interface::axi_dma::dmacr;
+use crate::interface::record::BEAT_BYTES;
+use crate::stream::Stream;
+
+impl Channel {
+    /// Whether it has to wait for beats, for space or for work, and nothing else can happen in it.
+    #[inline]
+    pub(super) fn cannot_move(&self, stream: &Stream) -> bool {
+        let waits = match self.direction {
+            Direction::Mm2s => stream.space() == 0,
+            Direction::S2mm => stream.len() == 0,
+        };
+        let works = match self.work {
+            Work::None => !waits && self.direction == Direction::S2mm,
+            Work::Fetch { .. } => true,
+            Work::Descriptor(_) | Work::Direct { .. } => !waits,
+        };
+        !works && self.faulty.late.is_empty() && !self.faulty.extra && !self.faulty.discards
+    }
+
+    /// Whether it works as it should, and its clock is not ahead.
+    fn in_order(&self, now: u64) -> bool {
+        let plain = !dmacr::KEYHOLE.is_set(self.control) && self.time <= now;
+        plain && self.next_event().is_none() && self.faulty.none()
+    }
+}
+
+impl Core {
+    /// MM2S: where the rest of the descriptor's data is that it moves, and how many beats.
+    pub(crate) fn flows(&self, now: u64) -> Option<(u64, usize)> {
+        let Work::Descriptor(bd) = self.mm2s.work else { return None };
+        let at = bd.buffer + u64::from(bd.moved);
+        let left = bd.length - bd.moved;
+        let whole = at.is_multiple_of(BEAT.into()) && self.reset_until.is_none();
+        let beats = (left / BEAT) as usize;
+        (whole && self.mm2s.in_order(now) && self.build.mm2s_beat_shift == 0).then_some((at, beats))
+    }
+
+    /// S2MM: whether it does nothing as long as nothing comes.
+    pub(crate) fn rests_without_beats(&self, now: u64) -> bool {
+        let fetches = matches!(self.s2mm.work, Work::Fetch { .. });
+        self.reset_until.is_none() && !fetches && self.s2mm.in_order(now)
+    }
+
+    /// MM2S: so many beats have been moved, fewer than the descriptor had.
+    pub(crate) fn flowed(&mut self, beats: usize) {
+        if let Work::Descriptor(bd) = &mut self.mm2s.work
+            && beats > 0
+        {
+            bd.moved += register(beats * BEAT_BYTES);
+            bd.rxsof |= !self.mm2s.in_packet;
+            self.mm2s.in_packet = true;
+            self.mm2s.beats += beats as u64;
+        }
+    }
+}

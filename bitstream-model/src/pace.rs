@@ -1,0 +1,281 @@
+//! This file counts beats instead of moving them: how far the engines and the accelerator come, slice
+//! by slice, while nothing but the collisions of one pass flows.
+//!
+//! It is what `board.rs` does with everything that can happen in between left out, to the beat: the
+//! same slices, the same turns at the memory. What flows settles soon and then recurs, so that most of
+//! it is a known stretch so many times over.
+
+use crate::accelerator::striping::STREAMS_MAX;
+use crate::board::{BURST_BEATS, STARVED_CYCLES};
+use crate::cast::index;
+use crate::recurrence::Recurrence;
+
+/// What the memory delivers; bytes times the clock in kHz.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Supply {
+    /// Each cycle.
+    pub(crate) income: u64,
+    /// For a beat.
+    pub(crate) beat_cost: u64,
+    /// What is kept from one slice to the next, at most.
+    pub(crate) reserve: u64,
+}
+
+/// What stays the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Rules {
+    /// Beats of a collision on each stream that has any.
+    pub(crate) share: [usize; STREAMS_MAX],
+    /// Beats that a FIFO holds.
+    pub(crate) depth: usize,
+    /// Engines that have their turns: two for each core, of which the first one flows.
+    pub(crate) engines: usize,
+    /// Cycles from one collision to the next, unless it waits for its bodies, and then at most.
+    pub(crate) interval: u64,
+    pub(crate) interval_max: u64,
+    /// Nothing, where the bandwidth has no limit.
+    pub(crate) supply: Option<Supply>,
+}
+
+/// How far it may go: what ends something is not for here.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    /// Cycles, collisions, and beats on each stream; none of them is reached.
+    pub(crate) cycles: u64,
+    pub(crate) records: usize,
+    pub(crate) beats: [usize; STREAMS_MAX],
+}
+
+/// What has flowed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Flowed {
+    pub(crate) cycles: u64,
+    /// Cycles of them in which no collision was there.
+    pub(crate) waits: u64,
+    pub(crate) records: usize,
+    pub(crate) beats: [usize; STREAMS_MAX],
+}
+
+/// What decides how it goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Standing {
+    /// Beats in each FIFO.
+    pub(crate) held: [usize; STREAMS_MAX],
+    /// What the memory can deliver at once.
+    pub(crate) credit: u64,
+    /// The engine that has the first turn.
+    pub(crate) turn: usize,
+}
+
+/// Everything that flows.
+#[derive(Debug, Clone)]
+pub(crate) struct Pace {
+    pub(crate) rules: Rules,
+    pub(crate) limits: Limits,
+    pub(crate) standing: Standing,
+    pub(crate) flowed: Flowed,
+}
+
+/// Which slice it was, told once for each in which collisions were taken.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slice {
+    /// Cycles and collisions since the beginning.
+    pub(crate) cycles: u64,
+    pub(crate) first: usize,
+    pub(crate) records: usize,
+}
+
+impl Pace {
+    /// Collisions of which all beats are there.
+    fn there(&self) -> usize {
+        let mut there = usize::MAX;
+        for (held, share) in self.standing.held.iter().zip(self.rules.share) {
+            if let Some(records) = held.checked_div(share) {
+                there = there.min(records);
+            }
+        }
+        there
+    }
+
+    /// Goes on for whole slices, as far as no limit can be reached. `enter` says how many cycles the
+    /// collisions of a slice take.
+    pub(crate) fn run(&mut self, mut enter: impl FnMut(Slice) -> u64) {
+        while self.slice(&mut enter).is_some() {}
+    }
+
+    /// The same where every collision takes an interval: what recurs is not gone through again, but
+    /// for the last `last` collisions at least. What is known to recur is kept for another time.
+    pub(crate) fn run_evenly(
+        &mut self,
+        last: usize,
+        known: &mut Recurrence,
+        mut enter: impl FnMut(Slice),
+    ) {
+        let interval = self.rules.interval;
+        let mut enter = |slice: Slice| {
+            enter(slice);
+            slice.records as u64 * interval
+        };
+        known.suit(&self.rules);
+        while !known.leap(self, last) {
+            known.look(&self.standing, &self.flowed);
+            if self.slice(&mut enter).is_none() {
+                return;
+            }
+        }
+        self.run(&mut enter);
+    }
+
+    /// One slice: the accelerator works on what is there, then the engines refill for as long as that
+    /// took. Nothing, and no change, if a limit could be reached in it.
+    #[inline]
+    fn slice(&mut self, enter: &mut impl FnMut(Slice) -> u64) -> Option<()> {
+        let there = self.there();
+        let longest = match there {
+            0 => STARVED_CYCLES,
+            _ => there as u64 * self.rules.interval_max,
+        };
+        let Flowed { cycles, records, beats, .. } = self.flowed;
+        if cycles + longest >= self.limits.cycles || records + there >= self.limits.records {
+            return None;
+        }
+        let share = self.rules.share;
+        for k in 0..STREAMS_MAX {
+            let space = self.rules.depth - self.standing.held[k] + there * share[k];
+            if share[k] > 0 && beats[k] + space >= self.limits.beats[k] {
+                return None;
+            }
+        }
+        let slice = if there == 0 {
+            self.flowed.waits += STARVED_CYCLES;
+            STARVED_CYCLES
+        } else {
+            for (held, share) in self.standing.held.iter_mut().zip(share) {
+                *held -= there * share;
+            }
+            self.flowed.records += there;
+            enter(Slice { cycles, first: records, records: there })
+        };
+        self.flowed.cycles += slice;
+        self.refill(slice);
+        Some(())
+    }
+
+    /// Lets the engines put beats into the FIFOs for that many cycles, each a burst in turn until the
+    /// memory has no more.
+    #[inline]
+    fn refill(&mut self, cycles: u64) {
+        let Rules { share, depth, engines, supply, .. } = self.rules;
+        let Standing { held, credit, turn } = &mut self.standing;
+        // An engine moves a beat a cycle.
+        let most = usize::try_from(cycles).unwrap_or(usize::MAX);
+        let mut room = [0; STREAMS_MAX];
+        for k in 0..STREAMS_MAX {
+            if share[k] > 0 {
+                room[k] = most.min(depth - held[k]);
+            }
+        }
+        let mut put = |k: usize, beats: usize| {
+            held[k] += beats;
+            self.flowed.beats[k] += beats;
+        };
+        let Some(Supply { income, beat_cost, reserve }) = supply else {
+            for (k, beats) in room.into_iter().enumerate() {
+                put(k, beats);
+            }
+            return;
+        };
+        *credit = (*credit).min(reserve).saturating_add(cycles.saturating_mul(income));
+        let mut without_beats = 0;
+        while without_beats < engines && *credit >= beat_cost {
+            let moved = if turn.is_multiple_of(2) {
+                let burst = if *credit >= BURST_BEATS * beat_cost {
+                    BURST_BEATS
+                } else {
+                    *credit / beat_cost
+                };
+                let moved = index(burst).min(room[*turn / 2]);
+                room[*turn / 2] -= moved;
+                put(*turn / 2, moved);
+                *credit -= moved as u64 * beat_cost;
+                moved
+            } else {
+                0
+            };
+            *turn = if *turn + 1 == engines { 0 } else { *turn + 1 };
+            without_beats = if moved == 0 { without_beats + 1 } else { 0 };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The `float` design at 275 MHz, with that bandwidth in bytes a second.
+    fn pace(bandwidth: Option<u64>, depth: usize, standing: Standing) -> Pace {
+        let beat_cost = 16 * 275_000;
+        Pace {
+            rules: Rules {
+                share: [2, 2, 2, 1],
+                depth,
+                engines: 8,
+                interval: 2,
+                interval_max: 2,
+                supply: bandwidth.map(|bytes| Supply {
+                    income: bytes / 1000,
+                    beat_cost,
+                    reserve: BURST_BEATS * 8 * beat_cost,
+                }),
+            },
+            limits: Limits {
+                cycles: 1_000_000,
+                records: 127_746,
+                beats: [255_492, 255_492, 255_492, 127_746],
+            },
+            standing,
+            flowed: Flowed::default(),
+        }
+    }
+
+    const EMPTY: Standing = Standing { held: [0; STREAMS_MAX], credit: 0, turn: 0 };
+
+    #[test]
+    fn what_recurs_is_what_each_slice_would_have_given() {
+        let bandwidths = [
+            None,
+            Some(12_800_000_000),
+            Some(17_070_000_000),
+            Some(3_700_000_000),
+            Some(7_123_456_789),
+            Some(100_000_000),
+        ];
+        for bandwidth in bandwidths {
+            for (depth, held) in [(512, [0; 4]), (16, [3, 1, 0, 9]), (64, [0, 7, 64, 2])] {
+                let mut each = pace(bandwidth, depth, Standing { held, ..EMPTY });
+                let mut slices = 0;
+                let mut last = [(0, 0, 0); 4];
+                each.run(|Slice { cycles, first, records }| {
+                    slices += 1;
+                    last.rotate_left(1);
+                    last[3] = (cycles, first, records);
+                    2 * records as u64
+                });
+                let mut known = Recurrence::default();
+                for _ in 0..2 {
+                    let mut even = pace(bandwidth, depth, Standing { held, ..EMPTY });
+                    let (mut gone_through, mut last_even) = (0, [(0, 0, 0); 4]);
+                    even.run_evenly(158, &mut known, |Slice { cycles, first, records }| {
+                        gone_through += 1;
+                        last_even.rotate_left(1);
+                        last_even[3] = (cycles, first, records);
+                    });
+                    assert_eq!(even.flowed, each.flowed, "{bandwidth:?} {depth}");
+                    assert_eq!(even.standing, each.standing, "{bandwidth:?} {depth}");
+                    assert_eq!(last_even, last, "{bandwidth:?} {depth}");
+                    assert!(!known.is_known() || gone_through < slices, "{bandwidth:?} {depth}");
+                }
+            }
+        }
+    }
+}

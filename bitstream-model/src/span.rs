@@ -1,0 +1,89 @@
+//! This file keeps account of beats that are still in the buffers that they come from: which numbers
+//! they have on their stream, and where they are.
+
+use std::collections::VecDeque;
+
+use crate::cast::index;
+use crate::memory::Source;
+
+/// Beats one after the other, on the stream as in their buffer.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    /// The number of the first one.
+    pub(crate) first: u64,
+    pub(crate) count: u64,
+    pub(crate) source: Source,
+}
+
+impl Span {
+    pub(crate) fn end(&self) -> u64 {
+        self.first + self.count
+    }
+
+    /// Where the beat of that number is, which is one of them.
+    pub(crate) fn at(&self, number: u64) -> Source {
+        self.source.further(number - self.first)
+    }
+}
+
+/// Spans in the order of their numbers, with gaps where beats are elsewhere.
+#[derive(Debug, Default)]
+pub(crate) struct Spans(VecDeque<Span>);
+
+impl Spans {
+    pub(crate) fn with_capacity(spans: usize) -> Self {
+        Self(VecDeque::with_capacity(spans))
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Adds beats behind all others.
+    pub(crate) fn push(&mut self, first: u64, count: u64, source: Source) {
+        match self.0.back_mut() {
+            Some(back) if back.end() == first && back.at(first) == source => back.count += count,
+            _ => self.0.push_back(Span { first, count, source }),
+        }
+    }
+
+    /// How many of the beats from number `first` to `end` are together in a buffer, and where the
+    /// first of them is; or how many are not in any.
+    pub(crate) fn piece(&self, first: u64, end: u64) -> (usize, Option<Source>) {
+        let place = self.0.partition_point(|span| span.end() <= first);
+        let (end, source) = match self.0.get(place) {
+            Some(span) if span.first <= first => (end.min(span.end()), Some(span.at(first))),
+            Some(span) => (end.min(span.first), None),
+            None => (end, None),
+        };
+        (index(end.saturating_sub(first)), source)
+    }
+
+    /// Whether all the beats from that number on are there, and come from there.
+    pub(crate) fn holds(&self, first: u64, count: usize, source: Source) -> bool {
+        self.piece(first, first + count as u64) == (count, Some(source))
+    }
+
+    /// Forgets the beats before that number.
+    pub(crate) fn drop_to(&mut self, number: u64) {
+        while let Some(front) = self.0.front_mut() {
+            if front.end() > number {
+                if front.first < number {
+                    let count = front.end() - number;
+                    *front = Span { first: number, count, source: front.at(number) };
+                }
+                break;
+            }
+            self.0.pop_front();
+        }
+    }
+
+    /// The first ones.
+    pub(crate) fn front(&self) -> Option<Span> {
+        self.0.front().copied()
+    }
+}
