@@ -8,6 +8,7 @@ mod boxes;
 mod broad;
 mod ground;
 mod narrow;
+mod points;
 mod reduce;
 
 use std::num::NonZero;
