@@ -1,10 +1,17 @@
-//! This file has valgrind count the yardstick's instructions: what noise hides.
+//! This file has valgrind count instructions, of the yardstick and of packing: what noise hides.
 
 use std::error::Error;
+use std::hint::black_box;
 use std::process::Command;
 
+use bench::step::Step;
+use bench::yardstick::Yardstick;
+use bitstream_model::BoardConfig;
+use bitstream_model::interface::profile::FLOAT;
+use clap::ValueEnum;
 use serde_json::{Value, json};
 use zynq_pgs::StepParameters;
+use zynq_pgs::bench::CollisionPacker;
 
 use crate::{Options, Outcome};
 
@@ -24,14 +31,51 @@ type Passes = fn(&StepParameters) -> u32;
 /// The scene, where no folder is given: large enough that its borders hardly count.
 const GRID: &str = "10x10x10";
 
+/// What is done alone, to be counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Only {
+    /// Solve the step with the yardstick
+    Yardstick,
+    /// Pack its collisions, as they are given
+    Pack,
+}
+
+/// Does it, and says how many collisions and passes there were.
+pub(crate) fn run(only: Only, step: &Step) -> Result<(), Box<dyn Error>> {
+    match only {
+        Only::Yardstick => {
+            let in_order = step.in_order(BoardConfig::default())?;
+            let Step { shapes, bodies, parameters, .. } = step;
+            Yardstick::new(shapes, bodies, &in_order, parameters).solve();
+        }
+        Only::Pack => {
+            let mut packer = CollisionPacker::new(FLOAT.default_variant());
+            black_box(packer.pack(&step.bodies, &step.collisions, &step.shapes));
+        }
+    }
+    let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
+    println!("{} {contact_iterations} {friction_iterations}", step.collisions.len());
+    Ok(())
+}
+
+/// Whether valgrind is; says so if not.
+pub(crate) fn is_there(section: &str) -> bool {
+    let there = Command::new("valgrind").arg("--version").output().is_ok();
+    if !there {
+        eprintln!("skipped: {section} (valgrind is not installed)");
+    }
+    there
+}
+
 pub(crate) fn measure(options: &Options) -> Outcome {
-    if Command::new("valgrind").arg("--version").output().is_err() {
-        eprintln!("skipped: instructions (valgrind is not installed)");
+    if !is_there("instructions") {
         return Ok(Value::Null);
     }
     let mut counts = Vec::new();
     for (function, passes) in COUNTED {
-        counts.push(each(options, function, passes)?);
+        let (instructions, parameters, collisions) = count(options, Only::Yardstick, function)?;
+        let passes = f64::from(passes(&parameters));
+        counts.push(instructions / (collisions * passes));
     }
     let [all, rows, contact, friction] = counts[..] else { return Err("a count for each".into()) };
     if !options.common.json {
@@ -49,12 +93,20 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     }))
 }
 
-/// Instructions in a function, for each collision of each pass that it is about.
-fn each(options: &Options, function: &str, passes: Passes) -> Result<f64, Box<dyn Error>> {
+/// Instructions in a function, the iterations of the step and its collisions.
+pub(crate) fn count(
+    options: &Options,
+    only: Only,
+    function: &str,
+) -> Result<(f64, StepParameters, f64), Box<dyn Error>> {
     let mut command = Command::new("valgrind");
     command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]);
     command.arg(format!("--toggle-collect={function}"));
-    command.arg(std::env::current_exe()?).arg("--yardstick");
+    command.arg(std::env::current_exe()?).arg("--only");
+    command.arg(match only {
+        Only::Yardstick => "yardstick",
+        Only::Pack => "pack",
+    });
     match &options.input {
         Some(folder) => command.arg("--input").arg(folder),
         None => command.args(["--grid", GRID, "--steps", "2"]),
@@ -76,5 +128,5 @@ fn each(options: &Options, function: &str, passes: Passes) -> Result<f64, Box<dy
     if instructions == 0.0 {
         return Err(format!("callgrind has not seen {function}").into());
     }
-    Ok(instructions / (f64::from(collisions) * f64::from(passes(&parameters))))
+    Ok((instructions, parameters, collisions.into()))
 }

@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
 
+mod a53;
 mod callgrind;
 mod growth;
 mod process;
@@ -47,9 +48,9 @@ struct Options {
     /// Steps of each run of the thesis' scene
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     run_steps: u32,
-    /// Only solve the step with the yardstick, once.
-    #[arg(long, hide = true)]
-    yardstick: bool,
+    /// Only do this, once: for a tool that counts.
+    #[arg(long, value_enum, hide = true)]
+    only: Option<callgrind::Only>,
     #[command(flatten)]
     common: Common,
 }
@@ -60,6 +61,8 @@ enum Section {
     Solver,
     /// Instructions of the yardstick, counted by valgrind
     Instructions,
+    /// What packing takes of a Cortex-A53, on paper (docs/a53-cost.md)
+    A53,
     /// Time per collision from small scenes to large ones
     Growth,
     /// Peak memory of `pgs run`
@@ -101,16 +104,17 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    if options.yardstick {
-        return solver::only_yardstick(&options.step()?);
+    if let Some(only) = options.only {
+        return callgrind::run(only, &options.step()?);
     }
     let mut document = Map::new();
     document.insert("schema".to_owned(), 1.into());
     document.insert("bench".to_owned(), "speed".into());
     document.insert("runs".to_owned(), options.common.runs().into());
-    let sections: [(Section, &str, Measure); 5] = [
+    let sections: [(Section, &str, Measure); 6] = [
         (Section::Solver, "solver", solver::measure),
         (Section::Instructions, "instructions", callgrind::measure),
+        (Section::A53, "a53", a53::measure),
         (Section::Growth, "growth", growth::measure),
         (Section::Memory, "memory", process::memory),
         (Section::Old, "old", process::old),

@@ -1,6 +1,5 @@
 //! This file holds a step of the emulated board against the yardstick, and the driver's own share.
 
-use std::error::Error;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -10,7 +9,6 @@ use bench::{median, milliseconds, ratio};
 use bitstream_model::BoardConfig;
 use serde_json::{Value, json};
 use step_folder::digest;
-use zynq_pgs::StepParameters;
 
 use crate::{Options, Outcome};
 
@@ -212,14 +210,4 @@ fn document(step: &Step, measure: &Measure, boards: &[Measured], digest: u64) ->
         },
         "boards": boards,
     })
-}
-
-/// For a tool that counts: everything but the yardstick is left away.
-pub(crate) fn only_yardstick(step: &Step) -> Result<(), Box<dyn Error>> {
-    let in_order = step.in_order(BoardConfig::default())?;
-    let mut yardstick = Yardstick::new(&step.shapes, &step.bodies, &in_order, &step.parameters);
-    yardstick.solve();
-    let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
-    println!("{} {contact_iterations} {friction_iterations}", step.collisions.len());
-    Ok(())
 }

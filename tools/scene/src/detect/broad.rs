@@ -42,7 +42,10 @@ struct Entry {
 #[derive(Debug, Default)]
 pub(super) struct Broad {
     entries: Vec<Entry>,
-    keys: Vec<u64>,
+    /// Pairs, lower index first, as the cells have them.
+    found: Vec<(u32, u32)>,
+    /// Where the pairs of each body end.
+    ends: Vec<usize>,
 }
 
 impl Broad {
@@ -59,8 +62,8 @@ impl Broad {
         self.entries.extend(placed.filter_map(|(i, b)| entry(i, b, geometries.of(b)?)));
         self.entries.sort_unstable_by_key(|entry| (entry.cell, entry.index));
 
-        self.keys.clear();
-        let entries = &self.entries;
+        self.found.clear();
+        let Self { entries, found, .. } = self;
         // Rows after the own one, as steps in x and y.
         for (dx, dy) in [(0, 0), (0, 1), (1, -1), (1, 0), (1, 1)] {
             let row = (dx << (2 * BITS)) + (dy << BITS);
@@ -83,20 +86,60 @@ impl Broad {
                         } else {
                             (other.index, own.index)
                         };
-                        self.keys.push(u64::from(a) << 32 | u64::from(b));
+                        found.push((a, b));
                     }
                 }
             }
         }
-        self.keys.sort_unstable();
+        self.sort(bodies.len(), pairs);
+    }
+
+    /// Writes the pairs that were found, sorted.
+    ///
+    /// By their lower body they are counted into place: that one has few partners, which are sorted
+    /// among themselves.
+    fn sort(&mut self, bodies: usize, pairs: &mut Vec<(u32, u32)>) {
+        let Self { found, ends, .. } = self;
+        ends.clear();
+        ends.resize(bodies, 0);
+        for (a, _) in &*found {
+            ends[*a as usize] += 1;
+        }
+        let mut begin = 0;
+        for end in &mut *ends {
+            // Until its pairs are in place, where the next one goes.
+            begin += std::mem::replace(end, begin);
+        }
         pairs.clear();
-        pairs.extend(self.keys.iter().map(|&key| {
-            #[allow(clippy::cast_possible_truncation, reason = "the lower half is wanted")]
-            let b = key as u32;
-            #[allow(clippy::cast_possible_truncation, reason = "32 bits are left")]
-            let a = (key >> 32) as u32;
-            (a, b)
-        }));
+        pairs.resize(found.len(), (0, 0));
+        for pair in &*found {
+            let next = &mut ends[pair.0 as usize];
+            pairs[*next] = *pair;
+            *next += 1;
+        }
+        let mut begin = 0;
+        for end in &*ends {
+            sort_few(&mut pairs[begin..*end]);
+            begin = *end;
+        }
+    }
+}
+
+/// Sorts the pairs of one body, which in a pile are few.
+fn sort_few(pairs: &mut [(u32, u32)]) {
+    const FEW: usize = 24;
+    if pairs.len() > FEW {
+        pairs.sort_unstable();
+        return;
+    }
+    for sorted in 1..pairs.len() {
+        let pair = pairs[sorted];
+        let mut at = sorted;
+        while at > 0 && pairs[at - 1].1 > pair.1 {
+            pairs[at] = pairs[at - 1];
+            at -= 1;
+        }
+        pairs[at] = pair;
     }
 }
 

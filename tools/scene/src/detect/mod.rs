@@ -8,6 +8,7 @@ mod boxes;
 mod broad;
 mod ground;
 mod narrow;
+mod points;
 mod reduce;
 
 use std::num::NonZero;
@@ -84,14 +85,19 @@ impl Detector {
         }
         let mut work = self.workers.iter_mut().zip(self.pairs.chunks(share));
         let own = work.next();
-        thread::scope(|scope| {
-            for (worker, pairs) in work {
-                scope.spawn(|| worker.collide(bodies, geometries, pairs));
-            }
-            if let Some((worker, pairs)) = own {
-                worker.collide(bodies, geometries, pairs);
-            }
-        });
+        // A scope takes memory even without threads.
+        if threads > 1 {
+            thread::scope(|scope| {
+                for (worker, pairs) in work {
+                    scope.spawn(|| worker.collide(bodies, geometries, pairs));
+                }
+                if let Some((worker, pairs)) = own {
+                    worker.collide(bodies, geometries, pairs);
+                }
+            });
+        } else if let Some((worker, pairs)) = own {
+            worker.collide(bodies, geometries, pairs);
+        }
         let used = self.pairs.chunks(share).len();
         for worker in &self.workers[..used] {
             collisions.extend_from_slice(&worker.found);

@@ -10,8 +10,9 @@ use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDis
 use parry3d::shape::{Ball, Capsule, Cuboid, PackedFeatureId, Shape};
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
 
-use super::boxes::{self, Point, Touch};
-use super::reduce::{Candidate, reduce};
+use super::boxes::{self, Touch};
+use super::points::Points;
+use super::reduce::reduce;
 use super::{Geometries, MARGIN};
 use crate::Geometry;
 
@@ -29,9 +30,7 @@ const SAME_DEPTH: f32 = 1e-4;
 #[derive(Debug)]
 pub(super) struct Narrow {
     manifold: ContactManifold<(), ()>,
-    candidates: Vec<Candidate>,
-    /// Where they are on B.
-    on_b: Vec<[f32; 3]>,
+    points: Points,
 }
 
 /// Whose frame a point is in.
@@ -43,7 +42,7 @@ enum Frame {
 
 impl Default for Narrow {
     fn default() -> Self {
-        Self { manifold: ContactManifold::new(), candidates: Vec::new(), on_b: Vec::new() }
+        Self { manifold: ContactManifold::new(), points: Points::default() }
     }
 }
 
@@ -60,14 +59,14 @@ impl Narrow {
         let (pose_a, pose_b) = (pose(body_a), pose(body_b));
         let (geometry_a, geometry_b) = (geometries.of(body_a)?, geometries.of(body_b)?);
         let b_in_a = pose_a.inv_mul(&pose_b);
-        self.candidates.clear();
-        self.on_b.clear();
+        self.points.clear();
         let (axis, frame) = match self.touch_boxes(&b_in_a, geometry_a, geometry_b) {
             Touch::Apart => return None,
             Touch::Along(axis) => (axis, Frame::A),
             Touch::Unknown => (self.ask_parry(&b_in_a, geometry_a, geometry_b)?, Frame::B),
         };
-        if self.candidates.is_empty() {
+        let candidates = self.points.candidates();
+        if candidates.is_empty() {
             return None;
         }
         let normal = -(pose_a.rotation * Vector::from_array(axis));
@@ -76,8 +75,9 @@ impl Narrow {
             return None;
         }
 
-        let (chosen, count) = reduce(&self.candidates, axis);
-        let mut on_b = chosen.map(|index| self.on_b.get(index).copied().unwrap_or_default());
+        let (chosen, count) = reduce(candidates, axis);
+        let on_b = self.points.on_b();
+        let mut on_b = chosen.map(|index| on_b.get(index).copied().unwrap_or_default());
         if frame == Frame::A {
             on_b = boxes::in_b(&b_in_a, on_b);
         }
@@ -87,7 +87,7 @@ impl Narrow {
             if !point.is_finite() {
                 return None;
             }
-            let distance = self.candidates[chosen[place]].distance;
+            let distance = candidates[chosen[place]].distance;
             *contact = Contact { point: point.to_array(), distance };
         }
         // At most four.
@@ -102,24 +102,22 @@ impl Narrow {
         let (Geometry::Box { half_extents: a }, Geometry::Box { half_extents: b }) = (a, b) else {
             return Touch::Unknown;
         };
-        let Self { candidates, on_b, .. } = self;
-        boxes::touch(b_in_a, a, b, |point| take(candidates, on_b, point))
+        boxes::touch(b_in_a, a, b, &mut self.points)
     }
 
     /// Takes the points of two geometries from parry, on B in its own frame; the axis, from A to B in the
     /// frame of A. `None` if parry does not know the pair.
     fn ask_parry(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<[f32; 3]> {
         let curved = self.parry(b_in_a, a, b)?;
-        let Self { manifold, candidates, on_b } = self;
+        let Self { manifold, points } = self;
         for point in &manifold.points {
-            let (on_a, distance) = (point.local_p1.to_array(), point.dist);
             let same = |other: &[f32; 3]| {
                 Vector::from_array(*other).distance_squared(point.local_p2) < SAME_POINT
             };
-            if curved && on_b.iter().any(same) {
+            if curved && points.on_b().iter().any(same) {
                 continue;
             }
-            take(candidates, on_b, Point { on_a, on_b: point.local_p2.to_array(), distance });
+            points.take(point.local_p1.to_array(), point.local_p2.to_array(), point.dist);
         }
         Some(manifold.local_n1.to_array())
     }
@@ -153,16 +151,6 @@ impl Narrow {
             self.manifold.points.pop();
         }
         Some(true)
-    }
-}
-
-/// Takes a point that is near enough.
-fn take(candidates: &mut Vec<Candidate>, on_b: &mut Vec<[f32; 3]>, point: Point) {
-    // Written so that a NaN is no contact.
-    let finite = point.distance.is_finite() && point.on_b.iter().all(|value| value.is_finite());
-    if point.distance <= MARGIN && finite {
-        candidates.push(Candidate { point: point.on_a, distance: point.distance });
-        on_b.push(point.on_b);
     }
 }
 

@@ -5,10 +5,12 @@ use wide::f32x4;
 
 use super::axis::{basis, steepest};
 use super::lanes::{Four, Vec3, cross, dot, negate, subtract};
-use super::{Placed, Point};
+use super::{Placed, Points};
 
 /// A number within so many steps of another is the same.
 const SAME_STEPS: u32 = 4;
+/// Share of a number that is more than those steps.
+const NEARLY: f32 = 1e-5;
 
 /// Four corners as they are seen along the axis.
 #[derive(Clone, Copy)]
@@ -38,9 +40,9 @@ fn face(half_extents: Vec3, direction: Vec3) -> Four {
     }
 }
 
-/// Hands over each point at which the faces of two boxes touch that look along `axis`, a unit vector
+/// Takes each point at which the faces of two boxes touch that look along `axis`, a unit vector
 /// from A to B in the frame of A.
-pub(super) fn points(placed: &Placed, axis: Vec3, mut each: impl FnMut(Point)) {
+pub(super) fn points(placed: &Placed, axis: Vec3, points: &mut Points) {
     let basis = basis(axis);
     let along = Four::splat(axis);
     let of_a = face(placed.half_a, axis);
@@ -49,31 +51,27 @@ pub(super) fn points(placed: &Placed, axis: Vec3, mut each: impl FnMut(Point)) {
     let (seen_a, seen_b) = (Seen::new(of_a, basis), Seen::new(of_b, basis));
     let (corners_a, corners_b) = (of_a.vectors(), of_b.vectors());
 
-    let mut hand_over = |lanes: u32, on_a: Four, on_b: Four, distances: f32x4| {
-        if lanes == 0 {
-            return;
-        }
-        let (on_a, on_b, distances) = (on_a.vectors(), on_b.vectors(), distances.to_array());
-        for lane in (0..4).filter(|lane| lanes >> lane & 1 == 1) {
-            each(Point { on_a: on_a[lane], on_b: on_b[lane], distance: distances[lane] });
-        }
-    };
-
     // Corners of A, onto the face of B.
     let normal = normal(&corners_b);
     let slope = dot(normal, axis);
-    if !(slope.abs() <= f32::EPSILON) {
+    if slope.abs() > f32::EPSILON {
         let to_face = Four::splat(corners_b[0]).minus(of_a).dot(Four::splat(normal));
         let distances = to_face / f32x4::splat(slope);
-        hand_over(inside(seen_a, seen_b), of_a, of_a.plus(along.times(distances)), distances);
+        let lanes = inside(seen_a, seen_b);
+        if lanes != 0 {
+            points.take_lanes(lanes, of_a, of_a.plus(along.times(distances)), distances);
+        }
     }
     // Corners of B, onto the face of A.
     let normal = self::normal(&corners_a);
     let slope = -dot(normal, axis);
-    if !(slope.abs() <= f32::EPSILON) {
+    if slope.abs() > f32::EPSILON {
         let to_face = Four::splat(corners_a[0]).minus(of_b).dot(Four::splat(normal));
         let distances = to_face / f32x4::splat(slope);
-        hand_over(inside(seen_b, seen_a), of_b.minus(along.times(distances)), of_b, distances);
+        let lanes = inside(seen_b, seen_a);
+        if lanes != 0 {
+            points.take_lanes(lanes, of_b.minus(along.times(distances)), of_b, distances);
+        }
     }
     // Each edge of B with those of A.
     let next = next(of_a);
@@ -85,7 +83,7 @@ pub(super) fn points(placed: &Placed, axis: Vec3, mut each: impl FnMut(Point)) {
             let on_a = of_a.times(one - s).plus(next.times(s));
             let to = Four::splat(corners_b[(j + 1) % 4]);
             let on_b = Four::splat(from).times(one - t).plus(to.times(t));
-            hand_over(lanes, on_a, on_b, on_b.minus(on_a).dot(along));
+            points.take_lanes(lanes, on_a, on_b, on_b.minus(on_a).dot(along));
         }
     }
 }
@@ -174,10 +172,12 @@ impl Crossings {
         let short = self.squared.simd_le(tiny) | determinant.simd_le(tiny);
         let within = |share: f32x4| share.simd_gt(zero) & share.simd_lt(one);
         let mut lanes = (!short & within(s) & within(t)).to_bitmask() & 0b1111;
-        if lanes != 0 {
+        // Parallel, up to rounding, can only be what is nearly so.
+        let nearly = determinant.simd_le(ae * f32x4::splat(NEARLY)).to_bitmask();
+        if lanes & nearly != 0 {
             let (ae, bb) = (ae.to_array(), bb.to_array());
             for lane in 0..4 {
-                // Parallel, up to rounding; neither number is negative.
+                // Neither number is negative.
                 if ae[lane].to_bits().abs_diff(bb[lane].to_bits()) <= SAME_STEPS {
                     lanes &= !(1 << lane);
                 }

@@ -1,0 +1,101 @@
+//! This file computes what packing a step takes of a Cortex-A53, on paper: nothing was measured on one.
+//!
+//! The instructions are counted on this machine; clock and bandwidth are published, see
+//! `docs/a53-cost.md`.
+
+use std::time::Duration;
+
+use bench::milliseconds;
+use bench::step::Emulated;
+use bitstream_model::BoardConfig;
+use bitstream_model::interface::profile::FLOAT;
+use serde_json::{Value, json};
+
+use crate::callgrind::{Only, count, is_there};
+use crate::{Options, Outcome};
+
+/// The APU's clock on the ZCU102, Hz.
+const CLOCK: f64 = 1.2e9;
+/// Instructions a clock: the core issues two at most, and in order.
+const PER_CLOCK: [f64; 2] = [1.0, 2.0];
+/// Bytes a second that a memcpy of 8 MB delivers on A53 cores of another chip, by how many take part
+/// (TI SPRADG0A, AM62P, `bw_mem 8M bcopy`).
+const COPIED: [(u32, f64); 3] = [(1, 1956.71e6), (2, 3122.66e6), (4, 3605.80e6)];
+
+fn seconds(time: f64) -> Duration {
+    Duration::from_secs_f64(time)
+}
+
+pub(crate) fn measure(options: &Options) -> Outcome {
+    if !is_there("a53") {
+        return Ok(Value::Null);
+    }
+    let (instructions, _, packed) =
+        count(options, Only::Pack, "*zynq_pgs::bench::CollisionPacker*pack*")?;
+    let each = instructions / packed;
+    let step = options.step()?;
+    let report = Emulated::new(&step, BoardConfig::default())?.take()?.report;
+    let words = FLOAT.default_variant().words();
+    let bytes = |words: u32, records: u64| f64::from(words * u32::BITS / 8) * records as f64;
+    let entries = report.collisions + report.empty;
+    let collisions = bytes(words.collision, entries);
+    let bodies = bytes(words.velocity + words.pose, report.bodies);
+    let results = bytes(words.result, report.bodies);
+    let device = report.modelled_time();
+    let computing = PER_CLOCK.map(|rate| seconds(each * entries as f64 / (CLOCK * rate)));
+    let rows: Vec<(u32, Duration, Duration)> = COPIED
+        .iter()
+        .map(|(cores, rate)| {
+            (*cores, seconds((collisions + bodies) / rate), seconds(results / rate))
+        })
+        .collect();
+    if !options.common.json {
+        println!("A step on a Cortex-A53, on paper: {}", step.name);
+        println!(
+            "  {:.2} MB of collisions and {:.2} MB of bodies are written, {:.2} MB of results read",
+            collisions / 1e6,
+            bodies / 1e6,
+            results / 1e6
+        );
+        let [one, two] = computing.map(milliseconds);
+        println!(
+            "  packing takes {each:.0} instructions a collision: {one:.1} ms at one a clock, {two:.1} at two"
+        );
+        println!("  the accelerator takes {:.2} ms at 12.8 GB/s (modelled)", milliseconds(device));
+        println!("  cores  writing  reading  one after the other  overlapped");
+        for (cores, write, read) in &rows {
+            let host = *write + *read;
+            println!(
+                "  {cores:>5} {:>8.2} {:>8.2} {:>20.2} {:>11.2}",
+                milliseconds(*write),
+                milliseconds(*read),
+                milliseconds(host + device),
+                milliseconds(host.max(device))
+            );
+        }
+        println!();
+    }
+    let rows: Vec<Value> = rows
+        .iter()
+        .map(|(cores, write, read)| {
+            let host = *write + *read;
+            json!({
+                "cores": cores,
+                "write_ms": milliseconds(*write),
+                "read_ms": milliseconds(*read),
+                "one_after_the_other_ms": milliseconds(host + device),
+                "overlapped_ms": milliseconds(host.max(device)),
+            })
+        })
+        .collect();
+    Ok(json!({
+        "collision_bytes": collisions,
+        "body_bytes": bodies,
+        "result_bytes": results,
+        "instructions_per_collision": each,
+        "compute_ms_at_one_a_clock": milliseconds(computing[0]),
+        "compute_ms_at_two_a_clock": milliseconds(computing[1]),
+        "device_ms": milliseconds(device),
+        "copying": rows,
+    }))
+}
