@@ -67,11 +67,11 @@ impl Accelerator {
         parameters: &StepParameters,
         watch: &mut Stopwatch,
     ) -> Result<Load, Error> {
+        // Whatever comes of this one, a refusal or a caller's panic: the earlier one is gone.
+        self.loads[bank] = None;
         let mut host = HostTimes::default();
         preflight(bodies, collisions, &self.shapes, parameters, &self.limits)?;
         host.validate = watch.lap();
-        // Whatever comes of this one, a caller's panic included: the earlier one is gone.
-        self.loads[bank] = None;
         let Self { orderings, device, limits, shapes, .. } = self;
         let ordering = &mut orderings[bank];
         let on = Hardware { capabilities: &device.capabilities, limits, shapes };

@@ -13,8 +13,13 @@ use step_folder::digest;
 use crate::{Options, Outcome};
 
 /// Builds of the emulated board that must give the same bits.
-fn variants() -> [(&'static str, BoardConfig); 1] {
-    [("board", BoardConfig::default())]
+fn variants() -> [(&'static str, BoardConfig); 3] {
+    let with = |threads, lanes| BoardConfig { threads, lanes, ..BoardConfig::default() };
+    [
+        ("board, 1 thread", with(1, true)),
+        ("board, 2 threads", with(2, true)),
+        ("board, 1 thread, without lanes", with(1, false)),
+    ]
 }
 
 /// Median times of one build.
