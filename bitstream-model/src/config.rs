@@ -94,8 +94,8 @@ const SHAPES_MAX: u32 = (CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE;
 /// 32-bit words of a beat.
 const BEAT_WORDS: u32 = 4;
 
-/// Threads of the host, at most; more than a few have nothing to do.
-const THREADS_MAX: usize = 64;
+/// Threads of [`BoardConfig::threads`], at most; more than a few have nothing to do.
+pub const THREADS_MAX: usize = 31;
 const THREADS_DEFAULT_MAX: usize = 4;
 
 /// How to build an emulated board.

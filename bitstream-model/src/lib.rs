@@ -51,7 +51,7 @@ mod violation;
 pub use {
     axi_dma::{Direction, PacketCount},
     board::Counts,
-    config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, Subnormals},
+    config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, Subnormals, THREADS_MAX},
     fault::{Consequence, Fault, FaultError, FaultKind, FaultPlan, Place, StepPhase, When},
     handle::{CpuPort, EmulatedBoard},
     memory::{Denied, DeviceAccess, MemoryError},

@@ -126,8 +126,8 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
 /// refuses none.
 ///
 /// A body that does not exist has its position written as zeros, and one without a shape is static.
-/// Should a caller's [`Collisions`] have passed validation and answer differently now, the
-/// accelerator refuses the index.
+/// Should a caller's [`Collisions`] answer differently from one look to the next, the accelerator
+/// refuses the index.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,

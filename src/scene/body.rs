@@ -48,6 +48,9 @@ pub trait Bodies {
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity);
 
     /// All of them, where they lie in an array of structures: they are read there, without a copy.
+    ///
+    /// They are what [`body`](Self::body) gives for every index. A view that changes anything leaves
+    /// it as it is.
     fn structures(&self) -> Option<&[Body]> {
         None
     }

@@ -42,6 +42,9 @@ pub trait Collisions {
     fn collision(&self, index: usize) -> Collision;
 
     /// All of them, where they lie in an array of structures: they are read there, without a copy.
+    ///
+    /// They are what [`collision`](Self::collision) gives for every index. A view that changes
+    /// anything leaves it as it is.
     fn structures(&self) -> Option<&[Collision]> {
         None
     }

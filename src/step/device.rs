@@ -157,7 +157,7 @@ impl Device {
 
     /// Takes back the buffers of a bank that no engine has in work: what was prepared is not
     /// started any more.
-    fn take_back_unused(&mut self, bank: Bank) {
+    pub(super) fn take_back_unused(&mut self, bank: Bank) {
         for lane in self.lanes_mut() {
             // It is made anew.
             if let Err(error) = lane.take_back(bank) {

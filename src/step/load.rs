@@ -69,6 +69,7 @@ impl Accelerator {
     ) -> Result<Load, Error> {
         // Whatever comes of this one, a refusal or a caller's panic: the earlier one is gone.
         self.loads[bank] = None;
+        self.device.take_back_unused(bank);
         let mut host = HostTimes::default();
         preflight(bodies, collisions, &self.shapes, parameters, &self.limits)?;
         host.validate = watch.lap();

@@ -44,7 +44,8 @@ pub(super) struct Hardware<'a> {
 }
 
 impl Ordering {
-    /// Orders the collisions of a step that was validated.
+    /// Orders the collisions of a step. Its lengths and parameters were validated, what bodies and
+    /// collisions hold was not: their indices are checked here.
     ///
     /// # Errors
     /// [`InputError::OrderTooLong`], [`InputError::Order`]; where only live bodies are kept,

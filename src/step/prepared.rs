@@ -195,6 +195,11 @@ impl Accelerator {
             };
         }
         ready.map_err(|symptom| self.device.fail(symptom, &self.shapes))?;
+        if load.sent.is_some() && !self.device.holds(bank) {
+            // Lost to a reset that the rings wanted.
+            self.loads[bank] = None;
+            return Err(InputError::NotPrepared.into());
+        }
         self.begin(load, watch, accesses)
     }
 }

@@ -84,7 +84,7 @@ impl Replay {
         Self {
             possible,
             on: possible,
-            batch: Batch::new(config.threads, config.lanes),
+            batch: Batch::new(if possible { config.threads } else { 1 }, config.lanes),
             computed: 0,
             masses: Vec::new(),
             origin: std::array::from_fn(|_| Spans::with_capacity(64)),

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, Inertia, PROFILES, Profile};
-use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
+use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals, THREADS_MAX};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use zynq_pgs::StepParameters;
@@ -139,7 +139,7 @@ pub(crate) fn window(text: &str) -> Result<u32, String> {
 
 /// Reads a number of threads.
 pub(crate) fn threads(text: &str) -> Result<usize, String> {
-    whole(text, 1, 64)
+    whole(text, 1, THREADS_MAX)
 }
 
 /// Reads the width of a length register.

@@ -8,6 +8,7 @@ use super::super::decode::Collision;
 use super::super::pipeline::Entry;
 use super::super::solver::Impulses;
 use crate::cast::register;
+use crate::config::THREADS_MAX;
 use crate::interface::record::CONTACT_POINTS;
 
 /// Collisions of a block.
@@ -21,8 +22,8 @@ pub(super) type Words<T = f32> = [T; LANES];
 pub(super) const ROWS_APART: u32 = 64;
 /// The row that empty lanes read: zeros.
 pub(super) const EMPTY_ROW: u32 = 0;
-/// Threads at most.
-pub(super) const THREADS_MAX: usize = ROWS_APART as usize / 2 - 1;
+// One for each thread.
+const _: () = assert!(ROWS_APART as usize / 2 > THREADS_MAX);
 
 /// What a lane is: bits.
 pub(super) mod kind {

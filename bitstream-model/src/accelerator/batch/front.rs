@@ -200,13 +200,13 @@ struct Field<'a> {
 // with release and acquire.
 unsafe impl Sync for Field<'_> {}
 
-/// Marks the field as broken unless it is forgotten.
-struct Breaks<'a>(&'a AtomicBool);
+/// Marks the field as broken when it goes, unless it was taken off before.
+struct Breaks<'a>(Option<&'a AtomicBool>);
 
 impl Drop for Breaks<'_> {
     fn drop(&mut self) {
-        if std::thread::panicking() {
-            self.0.store(true, Ordering::Release);
+        if let Some(broken) = self.0 {
+            broken.store(true, Ordering::Release);
         }
     }
 }
@@ -214,17 +214,18 @@ impl Drop for Breaks<'_> {
 impl Field<'_> {
     /// What a thread does: takes passes while there are any.
     fn work(&self, thread: usize) {
-        let _breaks = Breaks(&self.broken);
+        let mut breaks = Breaks(Some(&self.broken));
         loop {
             let first = self.next.fetch_add(BUNDLE, Ordering::Relaxed);
             if first >= self.progress.len() {
-                return;
+                break;
             }
             let last = (first + BUNDLE).min(self.progress.len());
             if !self.bundle(first..last, thread) {
-                return;
+                break;
             }
         }
+        breaks.0 = None;
     }
 
     /// Runs neighbouring passes, the later ones as close behind as they may be. Returns whether they

@@ -29,11 +29,12 @@ use super::segment::PacketError;
 use super::solver::{self, Impulses, Mass, SolverParameters, Velocity};
 use super::turn::fixed_impulse;
 use crate::cast::register;
+use crate::config::THREADS_MAX;
 use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::{Beat, CONTACT_POINTS};
 
-use block::{Block, LANES, ROWS_APART, THREADS_MAX};
+use block::{Block, LANES, ROWS_APART};
 use front::{Fronts, Line, Passes, Width};
 use place::{Place, Places};
 use pool::Pool;

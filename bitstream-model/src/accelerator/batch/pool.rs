@@ -103,6 +103,8 @@ impl Pool {
         let leave = Leave(&self.shared);
         let mut state = self.shared.state();
         state.job = Some(shared_job);
+        // One that nobody was told of, because the caller panicked too.
+        state.panic = None;
         state.jobs += 1;
         drop(state);
         self.shared.begins.notify_all();
@@ -165,6 +167,7 @@ mod tests {
     #[test]
     fn a_panic_of_any_thread_is_the_callers() {
         let mut pool = Pool::new(2);
+        assert_eq!(pool.workers.len(), 2, "threads start");
         for culprit in 0..2 {
             let met = AtomicUsize::new(0);
             let outcome = catch_unwind(AssertUnwindSafe(|| {

@@ -147,7 +147,7 @@ impl Mask for EightMask {
     }
 }
 
-/// Rows for columns in each pair lanes.
+/// Rows for columns in each four lanes.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn transposed([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
@@ -297,7 +297,7 @@ impl Lanes for Avx2 {
             let mut pair = [self.zero_quad(); 2];
             for (part, pair) in pair.iter_mut().enumerate() {
                 let quad = &quads[(4 * part + group) * stride];
-                // SAFETY: a quad is pair numbers.
+                // SAFETY: a quad is four numbers.
                 *pair = unsafe { _mm_loadu_ps(quad.as_ptr()) };
             }
             // SAFETY: there is an `Avx2` only where the processor has it.
