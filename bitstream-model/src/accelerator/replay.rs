@@ -226,10 +226,12 @@ impl Replay {
         self.sums[first + records].wrapping_sub(self.sums[first])
     }
 
-    /// Whether the next `records` collisions on the streams are the decoded ones.
+    /// Whether the next `records` collisions on the streams are the decoded ones, as far as they have
+    /// come: on some streams there may be more of them than on others.
     pub(super) fn same(&self, segment: &Segment, records: usize, inputs: &[Stream]) -> bool {
         SHARE.into_iter().enumerate().all(|(k, share)| {
-            let (first, most) = ((segment.done * share) as u64, records * share);
+            let first = (segment.done * share) as u64;
+            let most = (records * share).min(inputs[k].len());
             let mut at = 0;
             while at < most {
                 let (count, source) = inputs[k].piece(at, most - at);

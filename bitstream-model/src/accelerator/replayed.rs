@@ -175,7 +175,7 @@ impl Accelerator {
         let there = segment.available(inputs);
         let known = self.replay.known() - segment.done;
         let same = there <= known
-            && self.replay.same(&segment, there, inputs)
+            && self.replay.same(&segment, known, inputs)
             && self.replay.goes_on(&segment, inputs, &coming);
         let stall_max = if self.replay.even { 0 } else { u64::from(self.depth(number).window) };
         same.then_some((known.min(segment.left()), self.interval() + stall_max))

@@ -216,7 +216,8 @@ impl Machine {
         Outcome {
             bodies: unpack(&host.variant(), &streams, bodies),
             cycles,
-            stalls: cycles - work - waits,
+            // A board without power reads as all ones.
+            stalls: cycles.wrapping_sub(work).wrapping_sub(waits),
             waits,
             hazards: host.control(control::HAZARDS),
             sum_received: host.control(control::SUM_RECEIVED),

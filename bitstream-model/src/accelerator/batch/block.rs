@@ -4,12 +4,12 @@
 //! the record, then the accumulated impulses. The collisions of a block share no moving body, but
 //! for those of a serial one, which are taken one after the other.
 
+use super::super::array::Row;
 use super::super::decode::Collision;
 use super::super::pipeline::Entry;
 use super::super::solver::Impulses;
-use crate::cast::register;
 use crate::config::THREADS_MAX;
-use crate::interface::record::CONTACT_POINTS;
+use crate::interface::record::{CONTACT_POINTS, collision};
 
 /// Collisions of a block.
 pub(super) const LANES: usize = 16;
@@ -35,6 +35,33 @@ pub(super) mod kind {
     pub(in super::super) const SPINS: u32 = 1 << 10;
     /// In the first lane: the collisions are taken one after the other.
     pub(in super::super) const SERIAL: u32 = 1 << 11;
+
+    /// That of a collision.
+    #[inline(always)]
+    pub(in super::super) fn of(count: u32, moving: [bool; 2], serial: bool) -> u32 {
+        count & COUNT
+            | u32::from(moving[0]) * MOVES[0]
+            | u32::from(moving[1]) * MOVES[1]
+            | u32::from(serial) * SERIAL
+    }
+}
+
+/// What records are beside their numbers: those of a block, or fewer.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub(super) struct Heads {
+    rows: [Words<u32>; 2],
+    /// 0 in a padding entry; any lane may say that the block is serial.
+    kind: Words<u32>,
+}
+
+impl Heads {
+    #[inline(always)]
+    pub(super) fn put(&mut self, lane: usize, bodies: [u32; 2], kind: u32) {
+        self.rows[0][lane] = bodies[0].wrapping_add(ROWS_APART);
+        self.rows[1][lane] = bodies[1].wrapping_add(ROWS_APART);
+        self.kind[lane] = kind;
+    }
 }
 
 /// Sixteen collisions.
@@ -71,37 +98,43 @@ impl Block {
         self.kind[0] & kind::SERIAL != 0
     }
 
-    /// Puts a collision into an empty lane.
-    #[inline]
-    pub(super) fn put(&mut self, lane: usize, collision: &Collision, moving: [bool; 2]) {
-        for axis in 0..3 {
-            self.normal[axis][lane] = collision.normal[axis];
-            self.position_a[axis][lane] = collision.position_a[axis];
-            self.position_b[axis][lane] = collision.position_b[axis];
-        }
-        for (rows, contact) in self.contacts.iter_mut().zip(&collision.contacts) {
-            for (row, word) in rows.iter_mut().zip(contact) {
-                row[lane] = *word;
-            }
-        }
-        self.put_kind(lane, [collision.body_a, collision.body_b], collision.count, moving);
-    }
-
-    /// The words of a collision that are no numbers.
-    #[inline]
-    pub(super) fn put_kind(
+    /// Puts a record into an empty lane; its head is that of lane `from`.
+    pub(super) fn put(
         &mut self,
         lane: usize,
-        bodies: [u32; 2],
-        count: usize,
-        moving: [bool; 2],
+        rows: &[Row; collision::ROWS],
+        heads: &Heads,
+        from: usize,
     ) {
-        let mut word = register(count) & kind::COUNT;
-        for side in 0..2 {
-            self.rows[side][lane] = bodies[side] + ROWS_APART;
-            word |= if moving[side] { kind::MOVES[side] } else { 0 };
+        for axis in 0..3 {
+            self.normal[axis][lane] = f32::from_bits(rows[collision::NORMAL][axis]);
+            self.position_a[axis][lane] = f32::from_bits(rows[collision::BODY_A][axis]);
+            self.position_b[axis][lane] = f32::from_bits(rows[collision::BODY_B][axis]);
         }
-        self.kind[lane] |= word;
+        for (words, row) in self.contacts.iter_mut().zip(&rows[collision::CONTACTS..]) {
+            for (words, word) in words.iter_mut().zip(row) {
+                words[lane] = f32::from_bits(*word);
+            }
+        }
+        for side in 0..2 {
+            self.rows[side][lane] = heads.rows[side][from];
+        }
+        self.kind[lane] |= heads.kind[from] & !kind::SERIAL;
+        self.kind[0] |= heads.kind[from] & kind::SERIAL;
+    }
+
+    /// Puts what is no numbers into all lanes, and clears the impulses.
+    #[inline(always)]
+    pub(super) fn put_heads(&mut self, heads: &Heads) {
+        self.rows = heads.rows;
+        self.kind = heads.kind;
+        self.impulses = [[0.0; LANES]; CONTACT_POINTS];
+        // In the first lane alone.
+        let serial = heads.kind.iter().fold(0, |all, kind| all | kind) & kind::SERIAL;
+        if serial != 0 {
+            self.kind.iter_mut().for_each(|kind| *kind &= !kind::SERIAL);
+            self.kind[0] |= serial;
+        }
     }
 
     pub(super) fn count(&self, lane: usize) -> usize {

@@ -31,12 +31,11 @@ use super::turn::fixed_impulse;
 use crate::cast::register;
 use crate::config::THREADS_MAX;
 use crate::interface::control::ErrorCode;
-use crate::interface::number::StreamFormat;
 use crate::interface::record::{Beat, CONTACT_POINTS};
 
-use block::{Block, LANES, ROWS_APART};
+use block::{Block, Heads, LANES, ROWS_APART};
 use front::{Fronts, Line, Passes, Width};
-use place::{Place, Places};
+use place::Places;
 use pool::Pool;
 use records::{Fill, Records};
 
@@ -87,16 +86,10 @@ impl Stage {
     }
 }
 
-/// A collision that has a place.
-#[derive(Debug, Clone, Copy)]
-struct Placed {
-    place: Place,
-    moving: [bool; 2],
-}
-
 /// The collisions of a step.
 #[derive(Debug)]
 pub(super) struct Batch {
+    /// Those of the places, then what earlier steps have left.
     blocks: Vec<Block>,
     places: Places,
     /// Block and lane of each collision.
@@ -138,8 +131,8 @@ impl Batch {
 
     /// Begins a step: forgets the last one's collisions and makes room for so many.
     pub(super) fn begin(&mut self, collisions: usize) {
-        self.blocks.clear();
-        self.blocks.reserve(collisions.div_ceil(LANES));
+        let blocks = collisions.div_ceil(LANES);
+        self.blocks.reserve(blocks.saturating_sub(self.blocks.len()));
         self.slots.clear();
         self.slots.reserve(collisions);
         self.places.begin(collisions);
@@ -173,27 +166,36 @@ impl Batch {
         let records = Records { streams };
         let mut at = 0;
         while at < count {
-            let mut placed = [None; LANES];
             // In hazard-free order as many as the block begun last has empty lanes.
             let last = self.slots.last().filter(|slot| **slot != NO_SLOT);
             let taken = last.map_or(0, |slot| (*slot as usize + 1) % LANES);
             let most = (LANES - taken).min(count - at);
+            let (first, begun) = (self.slots.len(), self.places.blocks());
+            let mut heads = Heads::default();
             let mut done = 0;
             let mut refused = Ok(());
-            while done < most && refused.is_ok() {
-                match self.place(records.heads(at + done), shape_of, masses) {
-                    Ok(place) => {
-                        placed[done] = place;
-                        done += 1;
+            while done < most {
+                let [count, body_a, body_b] = records.heads(at + done);
+                match self.place(count, [body_a, body_b], shape_of, masses) {
+                    Ok(kind) => heads.put(done, [body_a, body_b], kind),
+                    Err(error) => {
+                        refused = Err(error);
+                        break;
                     }
-                    Err(error) => refused = Err(error),
                 }
+                done += 1;
             }
-            if !self.fill(&records, at, &placed) {
-                for (record, placed) in (at..at + done).zip(&placed) {
-                    let Some(Placed { place, moving }) = placed else { continue };
-                    let collision = Collision::absolute(StreamFormat::F32, &records.rows(record));
-                    self.blocks[place.block].put(place.lane, &collision, *moving);
+            if self.blocks.len() < self.places.blocks() {
+                self.blocks.resize(self.places.blocks(), Block::EMPTY);
+            }
+            if !self.fill(&records, at, first, &heads) {
+                let blocks = self.places.blocks();
+                self.blocks[begun..blocks].fill(Block::EMPTY);
+                for (lane, slot) in self.slots[first..].iter().enumerate() {
+                    if *slot != NO_SLOT {
+                        let (block, to) = (*slot as usize / LANES, *slot as usize % LANES);
+                        self.blocks[block].put(to, &records.rows(at + lane), &heads, lane);
+                    }
                 }
             }
             refused?;
@@ -202,57 +204,40 @@ impl Batch {
         Ok(())
     }
 
-    /// Places the next collision, or nothing for a padding entry.
-    #[inline]
+    /// Places the next collision; returns what its lane is, 0 for a padding entry.
+    #[inline(always)]
     fn place(
         &mut self,
-        [normal, body_a, body_b]: [u32; 3],
+        count: u32,
+        bodies: [u32; 2],
         shape_of: &[u8],
         masses: &[Mass],
-    ) -> Result<Option<Placed>, PacketError> {
+    ) -> Result<u32, PacketError> {
         let index = register(self.slots.len());
-        if normal == 0 {
+        if count == 0 {
             self.slots.push(NO_SLOT);
-            return Ok(None);
+            return Ok(0);
         }
-        let bodies = [body_a, body_b];
-        let moving = moving(normal, bodies, shape_of, masses).map_err(|code| PacketError {
-            code,
-            channel: 0,
-            beat: index,
-        })?;
+        let moving = match moving(count, bodies, shape_of, masses) {
+            Ok(moving) => moving,
+            Err(code) => return Err(PacketError { code, channel: 0, beat: index }),
+        };
         let place = self.places.place(index, bodies, moving);
-        if place.block == self.blocks.len() {
-            self.blocks.push(Block::EMPTY);
-        }
-        if place.serial {
-            self.blocks[place.block].kind[0] |= block::kind::SERIAL;
-        }
         self.slots.push(register(place.block * LANES + place.lane));
-        Ok(Some(Placed { place, moving }))
+        Ok(block::kind::of(count, moving, place.serial))
     }
 
     /// Puts records side by side at once where they are a block in their order; whether they were.
-    fn fill(
-        &mut self,
-        records: &Records<'_>,
-        first: usize,
-        placed: &[Option<Placed>; LANES],
-    ) -> bool {
-        let Some(number) = placed[0].map(|placed| placed.place.block) else { return false };
-        let in_order = placed.iter().enumerate().all(|(lane, placed)| {
-            placed.is_some_and(|Placed { place, .. }| place.block == number && place.lane == lane)
-        });
-        let block = &mut self.blocks[number];
-        if !in_order || self.width.run(Fill { records, first, block }).is_err() {
+    /// Their slots are those from `slot` on.
+    fn fill(&mut self, records: &Records<'_>, first: usize, slot: usize, heads: &Heads) -> bool {
+        let Some(slots) = self.slots[slot..].first_chunk::<LANES>() else { return false };
+        let number = slots[0] as usize / LANES;
+        let in_order = slots.iter().zip(number * LANES..).all(|(slot, to)| *slot as usize == to);
+        if !in_order {
             return false;
         }
-        for (lane, placed) in placed.iter().enumerate() {
-            let [count, body_a, body_b] = records.heads(first + lane);
-            let moving = placed.map_or([false; 2], |placed| placed.moving);
-            self.blocks[number].put_kind(lane, [body_a, body_b], count as usize, moving);
-        }
-        true
+        let block = &mut self.blocks[number];
+        self.width.run(Fill { records, first, heads, block }).is_ok()
     }
 
     /// Block and lane of a collision, or `None` for a padding entry.
@@ -282,7 +267,7 @@ impl Batch {
         masses: &[Mass],
         velocities: &mut [Velocity],
     ) {
-        if passes.is_empty() || self.blocks.is_empty() {
+        if passes.is_empty() || self.places.blocks() == 0 {
             return;
         }
         if !self.measured {
@@ -299,7 +284,8 @@ impl Batch {
         }
         let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
         let run = Passes { numbers: &passes, contact, finding, parameters, width: self.width };
-        let sum = self.fronts.run(run, &mut self.blocks, &mut self.lines, &mut self.pool);
+        let blocks = &mut self.blocks[..self.places.blocks()];
+        let sum = self.fronts.run(run, blocks, &mut self.lines, &mut self.pool);
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
         self.spins |= finding.is_some();
         let own = &self.lines[ROWS_APART as usize / 2..];
@@ -354,7 +340,7 @@ impl Batch {
 }
 
 /// Which bodies of a collision with a contact move, or what is wrong with it.
-#[inline]
+#[inline(always)]
 fn moving(
     count: u32,
     bodies: [u32; 2],
@@ -364,13 +350,15 @@ fn moving(
     if count as usize > CONTACT_POINTS {
         return Err(ErrorCode::ContactCount);
     }
-    let [Some(&a), Some(&b)] = bodies.map(|body| shape_of.get(body as usize)) else {
+    let shapes = (shape_of.get(bodies[0] as usize), shape_of.get(bodies[1] as usize));
+    let (Some(&a), Some(&b)) = shapes else {
         return Err(ErrorCode::BodyIndex);
     };
     if bodies[0] == bodies[1] {
         return Err(ErrorCode::SelfCollision);
     }
-    let moving = [a, b].map(|shape| masses[usize::from(shape)].inverse_mass != 0.0);
+    let moves = |shape: u8| masses[usize::from(shape)].inverse_mass != 0.0;
+    let moving = [moves(a), moves(b)];
     if moving == [false; 2] {
         return Err(ErrorCode::StaticPair);
     }

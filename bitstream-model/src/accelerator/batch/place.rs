@@ -43,6 +43,8 @@ pub(super) struct Places {
     next: Vec<u32>,
     /// The first later block that uses a body of each block again.
     again: Vec<u32>,
+    /// The first block with an empty lane, or the number of blocks.
+    open: usize,
     collisions: usize,
     distance: Option<u32>,
 }
@@ -60,6 +62,7 @@ impl Places {
         self.firsts.reserve(blocks);
         self.next.reserve(blocks);
         self.again.reserve(blocks);
+        self.open = 0;
         self.collisions = 0;
         self.distance = None;
     }
@@ -107,7 +110,10 @@ impl Places {
             }
         }
         let first = !used && moving != [true; 2];
-        let mut block = self.with_empty_lane(from as usize);
+        let mut block = self.open;
+        if from as usize > block {
+            block = self.with_empty_lane(from as usize);
+        }
         while !first && self.of_firsts(block) {
             block = self.with_empty_lane(block + 1);
         }
@@ -131,6 +137,9 @@ impl Places {
         self.firsts[block] += u8::from(first);
         if lane + 1 == LANES {
             self.next[block] = register(block) + 1;
+            if block == self.open {
+                self.open = self.with_empty_lane(block + 1);
+            }
         }
         self.collisions += 1;
         for side in 0..2 {

@@ -1,7 +1,7 @@
 //! This file reads collision records where their beats are, and puts sixteen of them side by side.
 
 use super::super::array::Row;
-use super::block::{Block, LANES, Words};
+use super::block::{Block, Heads, LANES, Words};
 use super::lanes::{Lanes, Quad, Work};
 use crate::interface::record::{Beat, WORD_LANE, collision};
 
@@ -31,17 +31,21 @@ impl Records<'_> {
     }
 
     /// The number of contacts and the two bodies of a record.
-    #[inline]
+    #[inline(always)]
     pub(super) fn heads(&self, record: usize) -> [u32; 3] {
-        [collision::NORMAL, collision::BODY_A, collision::BODY_B]
-            .map(|row| self.row(record, row)[WORD_LANE])
+        [
+            self.row(record, collision::NORMAL)[WORD_LANE],
+            self.row(record, collision::BODY_A)[WORD_LANE],
+            self.row(record, collision::BODY_B)[WORD_LANE],
+        ]
     }
 }
 
-/// Puts the numbers of sixteen records side by side.
+/// Puts sixteen records side by side.
 pub(super) struct Fill<'a> {
     pub(super) records: &'a Records<'a>,
     pub(super) first: usize,
+    pub(super) heads: &'a Heads,
     pub(super) block: &'a mut Block,
 }
 
@@ -64,6 +68,7 @@ fn store<L: Lanes>(lanes: L, columns: [L::Numbers; 4], words: &mut [Words], at: 
 impl Work for Fill<'_> {
     #[inline(always)]
     fn with<L: Lanes>(self, lanes: L) {
+        self.block.put_heads(self.heads);
         let mut at = 0;
         while at < LANES {
             let column = columns(lanes, &self, collision::NORMAL, at);

@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::super::array::Row;
 use super::*;
+use crate::interface::number::StreamFormat;
 use crate::interface::record::{WORD_LANE, collision};
 
 const PARAMETERS: SolverParameters =
