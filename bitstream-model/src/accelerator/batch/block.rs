@@ -39,10 +39,8 @@ pub(super) mod kind {
     /// That of a collision.
     #[inline(always)]
     pub(in super::super) fn of(count: u32, moving: [bool; 2], serial: bool) -> u32 {
-        count & COUNT
-            | u32::from(moving[0]) * MOVES[0]
-            | u32::from(moving[1]) * MOVES[1]
-            | u32::from(serial) * SERIAL
+        let sides = (u32::from(moving[0]) * MOVES[0]) | (u32::from(moving[1]) * MOVES[1]);
+        count & COUNT | sides | (u32::from(serial) * SERIAL)
     }
 }
 
@@ -106,10 +104,12 @@ impl Block {
         heads: &Heads,
         from: usize,
     ) {
+        let [normal, body_a, body_b] =
+            [rows[collision::NORMAL], rows[collision::BODY_A], rows[collision::BODY_B]];
         for axis in 0..3 {
-            self.normal[axis][lane] = f32::from_bits(rows[collision::NORMAL][axis]);
-            self.position_a[axis][lane] = f32::from_bits(rows[collision::BODY_A][axis]);
-            self.position_b[axis][lane] = f32::from_bits(rows[collision::BODY_B][axis]);
+            self.normal[axis][lane] = f32::from_bits(normal[axis]);
+            self.position_a[axis][lane] = f32::from_bits(body_a[axis]);
+            self.position_b[axis][lane] = f32::from_bits(body_b[axis]);
         }
         for (words, row) in self.contacts.iter_mut().zip(&rows[collision::CONTACTS..]) {
             for (words, word) in words.iter_mut().zip(row) {
