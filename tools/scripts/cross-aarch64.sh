@@ -36,7 +36,8 @@ if [ $run_tests = yes ]; then
 	test_all() {
 		attend timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" "$@"
 	}
-	time_of test_all -p zynq-pgs -p bitstream-model -p zynq-pgs-scene --lib \
-		--test accelerator --test formats --test profiles --test replay --test shapes --test widths
-	time_of test_all -p pgs --test golden
+	# All at once: what they have in common is then built once.
+	time_of test_all -p zynq-pgs -p bitstream-model -p zynq-pgs-scene -p pgs --lib \
+		--test accelerator --test formats --test profiles --test replay --test shapes --test widths \
+		--test golden
 fi

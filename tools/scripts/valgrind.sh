@@ -11,7 +11,8 @@ set -euo pipefail
 
 command -v valgrind >/dev/null || need_packages valgrind
 cd "$repository"
-cargo build --release --locked --quiet -p pgs
+# With the benchmarks' library, as `cargo run` builds it.
+cargo build --release --locked --quiet
 check() {
 	attend timeout "${VALGRIND_LIMIT:-600}" valgrind --quiet --error-exitcode=1 --exit-on-first-error=yes \
 		--undef-value-errors=no --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite "$@"
