@@ -153,6 +153,7 @@ pub use accelerator::{Capabilities, ControlError, IdentityError};
 pub use axi_dma::{
     ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
 };
+pub use beat::writer::Writer;
 pub use bitstream_model::interface;
 pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use error::{Aftermath, Error, OpenError};
