@@ -127,7 +127,8 @@
 //!
 //! What does not depend on its results can be packed meanwhile, as the step of another world:
 //! [`InFlight::prepare`] validates, orders and packs it, and [`InFlight::wait_and_start`] starts it the
-//! moment that the board is through with the first.
+//! moment that the board is through with the first. Collisions that are found one after the other
+//! need no array: [`Accelerator::write`] takes each as it is found.
 //!
 //! # When something fails
 //!
