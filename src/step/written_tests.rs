@@ -50,7 +50,7 @@ fn assert_works(accelerator: &mut Accelerator, what: &str) {
 
 #[test]
 fn written_collisions_are_those_given_at_once() {
-    for profile in PROFILES.into_iter().filter(|profile| matches!(profile.flow, Flow::Passes)) {
+    for profile in PROFILES.iter().filter(|profile| matches!(profile.flow, Flow::Passes)) {
         let (board, mut accelerator) = open(BoardConfig { profile, ..BoardConfig::default() });
         let (given, collisions) = scene(CUBES);
         assert!(collisions.len() > 90, "more than three blocks");
