@@ -127,7 +127,8 @@
 //!
 //! What does not depend on its results can be packed meanwhile, as the step of another world:
 //! [`InFlight::prepare`] validates, orders and packs it, and [`InFlight::wait_and_start`] starts it the
-//! moment that the board is through with the first.
+//! moment that the board is through with the first. Collisions that are found one after the other
+//! need no array: [`Accelerator::write`] takes each as it is found.
 //!
 //! # When something fails
 //!
@@ -153,6 +154,7 @@ pub use accelerator::{Capabilities, ControlError, IdentityError};
 pub use axi_dma::{
     ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
 };
+pub use beat::writer::Writer;
 pub use bitstream_model::interface;
 pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use error::{Aftermath, Error, OpenError};

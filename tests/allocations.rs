@@ -122,6 +122,24 @@ fn allocations_prepared(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
     counted
 }
 
+/// Ten steps whose collisions are written one after the other; the allocations of each.
+fn allocations_written(config: BoardConfig) -> Vec<u64> {
+    let mut accelerator = open(config);
+    let (mut bodies, collisions) = scene();
+    let parameters = StepParameters::default();
+    let mut counted = Vec::with_capacity(10);
+    for step in 0..10 {
+        let before = COUNTED.get();
+        let written = accelerator.write(&bodies, collisions.len(), &parameters, |records| {
+            collisions[step % 3..].iter().for_each(|collision| records.push(collision));
+        });
+        let flight = written.and_then(|step| accelerator.start(&step)?.wait(&mut bodies));
+        flight.expect("nothing disturbs it");
+        counted.push(COUNTED.get() - before);
+    }
+    counted
+}
+
 fn profile(name: &str) -> BoardConfig {
     let profile = Profile::by_name(name).expect("a profile");
     BoardConfig { profile, ..BoardConfig::default() }
@@ -165,6 +183,15 @@ fn steps_of_other_profiles_allocate_nothing_either() {
     for name in ["half", "mixed", "naive"] {
         let counted = allocations(profile(name), None);
         assert_eq!(counted[3..], [0; 7], "{name}: {counted:?}");
+    }
+}
+
+#[test]
+fn written_steps_allocate_nothing() {
+    for name in ["float", "half", "mixed", "naive"] {
+        let counted = allocations_written(profile(name));
+        assert!(counted[0] > 0, "the first step makes buffers: does the allocator count?");
+        assert_eq!(counted[1..], [0; 9], "{name}: {counted:?}");
     }
 }
 

@@ -9,3 +9,4 @@ mod pack_tests;
 mod stage;
 pub(crate) mod stripe;
 pub(crate) mod unpack;
+pub(crate) mod writer;

@@ -174,7 +174,7 @@ fn pack_entries<C: Collisions + ?Sized, const ROWS: usize>(
     let mut stage = Stage::new(&layout);
     let mut block = [NOTHING; BLOCK];
     let mut good = true;
-    let (structures, looks) = (collisions.structures(), target.quick.is_some());
+    let structures = collisions.structures();
     for first in (0..count).step_by(BLOCK) {
         let block = &mut block[..(count - first).min(BLOCK)];
         let block = match structures.and_then(|all| all.get(first..first + block.len())) {
@@ -190,22 +190,35 @@ fn pack_entries<C: Collisions + ?Sized, const ROWS: usize>(
             // They lie anywhere: on their way while this block is dealt with.
             (first + BLOCK..count).take(BLOCK).for_each(|next| collisions.soon(next));
         }
-        let mut heads = true;
-        let records = stage.records(block.len());
-        for (at, (to, from)) in records.iter_mut().zip(block).enumerate() {
-            let of_both = [ends.get(from.body_a), ends.get(from.body_b)];
-            if looks {
-                heads &= head(from, of_both, scheduled);
-            }
-            *to = encode(first + at, from, of_both);
-        }
-        if let Some(quick) = target.quick {
-            let block = Block { first, collisions: block, ends, scheduled, heads };
-            good &= look(quick, &block, records);
-        }
-        stage.deal(block.len(), integers, &mut dealer);
+        let block = Block { first, collisions: block, ends, scheduled, heads: true };
+        good &=
+            pack_block(target.quick, block, integers, (&mut stage, &mut dealer), &encode, &look);
     }
     (dealer.finish(), good)
+}
+
+/// Encodes, looks at and deals out a block of collisions; whether validation refuses none.
+#[inline]
+pub(super) fn pack_block<const ROWS: usize>(
+    quick: Option<&Quick<'_>>,
+    mut block: Block<'_>,
+    integers: &[bool; ROWS],
+    (stage, dealer): (&mut Stage<ROWS>, &mut Dealer<'_, '_>),
+    encode: impl Fn(usize, &Collision, [End; 2]) -> [Beat; ROWS],
+    look: impl Fn(&Quick<'_>, &Block<'_>, &[[Beat; ROWS]]) -> bool,
+) -> bool {
+    let Block { first, collisions, ends, scheduled, .. } = block;
+    let records = stage.records(collisions.len());
+    for (at, (to, from)) in records.iter_mut().zip(collisions).enumerate() {
+        let of_both = [ends.get(from.body_a), ends.get(from.body_b)];
+        if quick.is_some() {
+            block.heads &= head(from, of_both, scheduled);
+        }
+        *to = encode(first + at, from, of_both);
+    }
+    let good = quick.is_none_or(|quick| look(quick, &block, records));
+    stage.deal(collisions.len(), integers, dealer);
+    good
 }
 
 /// What no record of a live body holds; the accelerator refuses a collision of it with itself.
@@ -216,7 +229,7 @@ const REFUSED: [u32; 2] = [u32::MAX; 2];
 /// Nobody reads the marks of padding, so that a collision which had contact points when the marks
 /// were made and has none now would shift all bodies behind it: it is sent as one to be refused.
 #[inline(always)]
-fn relative_record(
+pub(super) fn relative_record(
     [a, b]: [End; 2],
     words: Option<&[[u32; 2]]>,
     index: usize,
@@ -261,7 +274,7 @@ const NOBODY: Body = Body {
     shape: 0,
 };
 /// What a block of collisions holds before it is read.
-const NOTHING: Collision = Collision {
+pub(crate) const NOTHING: Collision = Collision {
     body_a: 0,
     body_b: 0,
     normal: [0.0; 3],

@@ -62,6 +62,21 @@ pub enum InputError {
     )]
     NotPrepared,
 
+    /// More collisions were written than room was made for.
+    #[error("more than the {announced} collisions that were announced were written: announce more")]
+    MoreThanAnnounced {
+        /// Collisions announced.
+        announced: usize,
+    },
+
+    /// Collisions that are written one by one go to the board as they come.
+    #[error(
+        "collisions that are written one by one cannot be put into another order, verified, or \
+         placed on a bitstream that keeps live bodies alone: ask for the order as given, \
+         unverified, on one that takes it, or give all collisions at once (step, submit, prepare)"
+    )]
+    WrittenInOrder,
+
     /// A prepared step that was checked and packed with other shapes.
     #[error("the shapes were replaced after the step was prepared: prepare it again")]
     ShapesChanged,

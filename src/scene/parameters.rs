@@ -52,6 +52,13 @@ pub struct StepParameters {
     pub retries: u32,
 }
 
+impl StepParameters {
+    /// Passes over the collisions, of both kinds.
+    pub(crate) const fn passes(&self) -> u64 {
+        self.contact_iterations as u64 + self.friction_iterations as u64
+    }
+}
+
 impl Default for StepParameters {
     fn default() -> Self {
         Self {

@@ -146,7 +146,7 @@ impl Device {
         self.take_back_unused(bank);
         let width = self.capabilities.address_width;
         for (channel, lane) in self.mm2s.iter_mut().enumerate() {
-            let beats = plan.segments(channel).poses.end;
+            let beats = plan.segments(channel).end();
             lane.reserve_beats(&self.platform, bank, beats, width)?;
         }
         for (channel, lane) in self.s2mm.iter_mut().enumerate() {
@@ -201,7 +201,7 @@ impl Device {
         (0..self.mm2s.len()).all(|core| {
             let (mm2s, s2mm) = (&self.mm2s[core], &self.s2mm[core]);
             let [sent, received] = self.descriptors_of(plan, core);
-            mm2s.beats(bank).len() >= plan.segments(core).poses.end
+            mm2s.beats(bank).len() >= plan.segments(core).end()
                 && s2mm.beats(bank).len() >= plan.results(core)
                 && mm2s.ring_takes(sent)
                 && s2mm.ring_takes(received)
@@ -221,7 +221,7 @@ impl Device {
             lane.hand_over(bank, plan.results(channel))?;
         }
         for (channel, lane) in self.mm2s.iter_mut().enumerate() {
-            lane.hand_over(bank, plan.segments(channel).poses.end)?;
+            lane.hand_over(bank, plan.segments(channel).end())?;
         }
         Ok(())
     }

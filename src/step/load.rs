@@ -22,7 +22,7 @@ pub(super) struct Ticket(u64);
 
 impl Ticket {
     /// One that nobody has.
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         Self(NEXT.fetch_add(1, Atomic::Relaxed))
     }
@@ -67,9 +67,7 @@ impl Accelerator {
         parameters: &StepParameters,
         watch: &mut Stopwatch,
     ) -> Result<Load, Error> {
-        // Whatever comes of this one, a refusal or a caller's panic: the earlier one is gone.
-        self.loads[bank] = None;
-        self.device.take_back_unused(bank);
+        self.forget(bank);
         let mut host = HostTimes::default();
         preflight(bodies, collisions, &self.shapes, parameters, &self.limits)?;
         host.validate = watch.lap();
@@ -100,8 +98,7 @@ impl Accelerator {
         let plan = Plan {
             bodies: lives.map_or(bodies.len(), |lives| lives.velocities().len()),
             collisions: entries,
-            passes: u64::from(parameters.contact_iterations)
-                + u64::from(parameters.friction_iterations),
+            passes: parameters.passes(),
             variant: limits.variant,
         };
         // All of the input is looked at while it is packed. Where it is not all packed, or something
@@ -141,8 +138,20 @@ impl Accelerator {
         Ok(load)
     }
 
+    /// Forgets what lies in a bank, and takes its buffers back. Whatever comes of what is packed
+    /// into it, a refusal or a caller's panic: the earlier step is gone.
+    pub(super) fn forget(&mut self, bank: Bank) {
+        self.loads[bank] = None;
+        self.device.take_back_unused(bank);
+    }
+
     /// Makes buffers, and rings if nothing runs on them, large enough.
-    fn make_room(&mut self, plan: &Plan, bank: Bank, engines: Engines) -> Result<(), Symptom> {
+    pub(super) fn make_room(
+        &mut self,
+        plan: &Plan,
+        bank: Bank,
+        engines: Engines,
+    ) -> Result<(), Symptom> {
         if engines == Engines::Idle {
             self.device.check_cancelled()?;
         }
@@ -213,7 +222,7 @@ impl Accelerator {
     }
 
     /// The error of a step that could not be packed.
-    fn refuse(&mut self, symptom: Symptom, engines: Engines) -> Error {
+    pub(super) fn refuse(&mut self, symptom: Symptom, engines: Engines) -> Error {
         match (symptom, engines) {
             // The board has no part in it, and is at work.
             (Symptom::Known(fault), Engines::Working) => {

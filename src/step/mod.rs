@@ -46,6 +46,9 @@ mod tampered;
 mod tests;
 #[cfg(all(test, feature = "emulation"))]
 mod wait_tests;
+mod written;
+#[cfg(all(test, feature = "emulation"))]
+mod written_tests;
 
 pub use board::{BoardChoice, BoardDescription, BoardKind, OpenOptions};
 pub use cancellation::Cancellation;

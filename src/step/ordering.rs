@@ -110,7 +110,7 @@ impl Ordering {
 }
 
 /// The order of a step that asks for none.
-fn automatic(capabilities: &Capabilities) -> Order {
+pub(super) fn automatic(capabilities: &Capabilities) -> Order {
     let waits = capabilities.interlocked && capabilities.window.is_none();
     if waits { Order::AsGiven } else { Order::HazardFree }
 }

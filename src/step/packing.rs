@@ -5,14 +5,16 @@ use bitstream_model::interface::record::Beat;
 
 use super::bank::Bank;
 use super::device::Device;
+use super::lane::Lane;
 use super::plan::Plan;
 use crate::beat::pack::{
     Chosen, Entries, Target, pack_bodies, pack_collisions, pack_poses, pack_velocities, survey,
 };
+use crate::beat::writer::Writer;
 use crate::order::Lives;
 use crate::record::end::Ends;
 use crate::scene::validate::Quick;
-use crate::scene::{Bodies, Collisions, Shape};
+use crate::scene::{Bodies, Collisions, InputError, Shape};
 
 /// What a step sent, for comparison with what the accelerator received.
 #[derive(Debug, Clone, Copy)]
@@ -46,19 +48,7 @@ impl Device {
         source: &Source<'_, B, C>,
     ) -> (Sent, bool) {
         let Source { bodies, collisions, scheduled, lives, shapes, quick } = *source;
-        let mut velocities: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
-        let mut entries: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
-        let mut poses: [&mut [Beat]; DMA_COUNT_MAX] = Default::default();
-        // One borrow of each buffer, cut into its three segments.
-        for (place, lane) in self.mm2s.iter_mut().enumerate() {
-            let segments = plan.segments(place);
-            let beats = &mut lane.beats_mut(bank)[..segments.poses.end];
-            let (beats, last) = beats.split_at_mut(segments.poses.start);
-            let (beats, middle) = beats.split_at_mut(segments.collisions.start);
-            velocities[place] = &mut beats[segments.velocities];
-            entries[place] = &mut middle[..segments.collisions.len()];
-            poses[place] = last;
-        }
+        let Cut { mut velocities, mut poses, mut entries } = Cut::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
         let target = Target { variant: &plan.variant, shapes, quick };
@@ -82,5 +72,57 @@ impl Device {
         let (collisions, good) =
             pack_collisions(target, Ends(ends), &of_entries, &mut entries[active]);
         (Sent { velocities, collisions, poses }, bodies_good & good)
+    }
+
+    /// Writes the records of a step whose collisions are written one after the other, by
+    /// `narrow_phase`; returns how many they are. What is refused of a body, `refuse` says.
+    pub(super) fn pack_written<B: Bodies + ?Sized>(
+        &mut self,
+        plan: &Plan,
+        bank: Bank,
+        target: Target<'_>,
+        bodies: &B,
+        refuse: impl FnOnce() -> Result<(), InputError>,
+        narrow_phase: impl FnOnce(&mut Writer<'_>),
+    ) -> Result<(Sent, usize), InputError> {
+        let Cut { mut velocities, mut poses, mut entries } = Cut::of(&mut self.mm2s, plan, bank);
+        let active = ..plan.channels();
+        let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
+        let ends = &mut self.ends;
+        let (velocities, poses, good) =
+            pack_bodies(target, bodies, plan.bodies, ends, velocities, poses);
+        if !good {
+            refuse()?;
+        }
+        let mut writer = Writer::new(target, Ends(ends), plan.collisions, &mut entries[active]);
+        narrow_phase(&mut writer);
+        let (collisions, count) = writer.finish()?;
+        Ok((Sent { velocities, collisions, poses }, count))
+    }
+}
+
+/// The buffers of the MM2S lanes, each cut into its three segments.
+struct Cut<'a> {
+    velocities: [&'a mut [Beat]; DMA_COUNT_MAX],
+    poses: [&'a mut [Beat]; DMA_COUNT_MAX],
+    entries: [&'a mut [Beat]; DMA_COUNT_MAX],
+}
+
+impl<'a> Cut<'a> {
+    /// One borrow of each buffer, for what it was made large enough for.
+    fn of(lanes: &'a mut [Lane], plan: &Plan, bank: Bank) -> Self {
+        let (mut velocities, mut poses, mut entries) = <([_; _], [_; _], [_; _])>::default();
+        for (place, lane) in lanes.iter_mut().enumerate() {
+            let segments = plan.segments(place);
+            let beats = &mut lane.beats_mut(bank)[..segments.end()];
+            let (first, beats) = beats.split_at_mut(segments.poses.start);
+            let (second, third) = beats.split_at_mut(segments.poses.len());
+            velocities[place] = &mut first[segments.velocities];
+            poses[place] = second;
+            if !segments.collisions.is_empty() {
+                entries[place] = &mut third[segments.collisions.start - segments.poses.end..];
+            }
+        }
+        Self { velocities, poses, entries }
     }
 }

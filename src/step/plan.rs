@@ -2,8 +2,10 @@
 //! descriptors they take, and how long the step may last.
 //!
 //! ```text
-//! MM2S buffer of a channel: | velocities | collisions | poses |    each from a multiple of 64 bytes
+//! MM2S buffer of a channel: | velocities | poses | collisions |    each from a multiple of 64 bytes
 //! ```
+//!
+//! Collisions come last, so that there may be fewer of them than room was made for.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -38,8 +40,19 @@ pub(super) struct Plan {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Segments {
     pub(super) velocities: Range<usize>,
-    pub(super) collisions: Range<usize>,
     pub(super) poses: Range<usize>,
+    pub(super) collisions: Range<usize>,
+}
+
+impl Segments {
+    /// Beats up to the end of the last.
+    pub(super) const fn end(&self) -> usize {
+        if self.collisions.start == self.collisions.end {
+            self.poses.end
+        } else {
+            self.collisions.end
+        }
+    }
 }
 
 /// Bytes of a number of beats.
@@ -68,9 +81,9 @@ impl Plan {
             start..start + segment.layout(&self.variant).beats_on_channel(records, channel)
         };
         let velocities = place(Segment::Velocities, self.bodies, 0);
-        let collisions = place(Segment::Collisions, self.collisions, velocities.end);
-        let poses = place(Segment::Poses, self.bodies, collisions.end);
-        Segments { velocities, collisions, poses }
+        let poses = place(Segment::Poses, self.bodies, velocities.end);
+        let collisions = place(Segment::Collisions, self.collisions, poses.end);
+        Segments { velocities, poses, collisions }
     }
 
     /// Beats of results on one S2MM channel.
@@ -81,7 +94,7 @@ impl Plan {
     /// Descriptors of one MM2S channel, whose descriptors carry at most `largest` bytes.
     pub(super) fn descriptors(&self, channel: usize, largest: u32) -> usize {
         let count = |range: Range<usize>| pieces(bytes(range.len()), largest).count();
-        let Segments { velocities, collisions, poses } = self.segments(channel);
+        let Segments { velocities, poses, collisions } = self.segments(channel);
         let rounds = usize::try_from(self.rounds()).unwrap_or(usize::MAX);
         (count(velocities) + count(poses)).saturating_add(count(collisions).saturating_mul(rounds))
     }
@@ -90,7 +103,7 @@ impl Plan {
     pub(super) fn bytes_to_device(&self) -> u64 {
         (0..self.channels())
             .map(|channel| {
-                let Segments { velocities, collisions, poses } = self.segments(channel);
+                let Segments { velocities, poses, collisions } = self.segments(channel);
                 bytes(velocities.len() + poses.len())
                     .saturating_add(bytes(collisions.len()).saturating_mul(self.rounds()))
             })

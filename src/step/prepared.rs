@@ -23,8 +23,8 @@ use crate::scene::{Bodies, Collisions, InputError, StepParameters};
 #[derive(Debug)]
 #[must_use = "a step that was prepared is not started by itself"]
 pub struct Prepared {
-    bank: Bank,
-    ticket: Ticket,
+    pub(super) bank: Bank,
+    pub(super) ticket: Ticket,
 }
 
 impl InFlight<'_> {
@@ -74,10 +74,16 @@ impl InFlight<'_> {
         parameters: &StepParameters,
     ) -> Result<Prepared, Error> {
         let accelerator = &mut *self.accelerator;
-        let bank = self.flight.load.bank.other();
-        let into = (bank, Engines::Working);
+        let into = (self.flight.load.bank.other(), Engines::Working);
         let mut watch = Stopwatch::start();
-        let mut load = accelerator.load(into, bodies, collisions, parameters, &mut watch)?;
+        let load = accelerator.load(into, bodies, collisions, parameters, &mut watch)?;
+        self.hand_over(load)
+    }
+
+    /// Hands what was packed while this step is on the board over to the device.
+    pub(super) fn hand_over(&mut self, mut load: Load) -> Result<Prepared, Error> {
+        let (accelerator, bank) = (&mut *self.accelerator, load.bank);
+        let mut watch = Stopwatch::start();
         if load.sent.is_some() {
             // Cleaning caches, or copying, takes its time, too.
             accelerator.device.hand_over(&load.plan, bank).map_err(|error| {

@@ -158,13 +158,23 @@ impl<'a> Quick<'a> {
     /// Looks at a block as validation does.
     #[cold]
     fn exactly(&self, block: &Block<'_>) -> bool {
+        self.refusal(block).is_ok()
+    }
+
+    /// What validation refuses of a block.
+    ///
+    /// # Errors
+    /// That of the first collision that it refuses.
+    pub(crate) fn refusal(&self, block: &Block<'_>) -> Result<(), InputError> {
         let end = |body: usize| {
             let end = u32::try_from(body).map_or(End::MISSING, |body| block.ends.get(body));
             (end.position, end.shape(self.scene.shapes))
         };
-        (block.first..).zip(block.collisions).all(|(index, collision)| {
-            (block.scheduled & is_padding(collision))
-                || check_whole(index, collision, end, &self.scene).is_ok()
+        (block.first..).zip(block.collisions).try_for_each(|(index, collision)| {
+            if block.scheduled & is_padding(collision) {
+                return Ok(());
+            }
+            check_whole(index, collision, end, &self.scene)
         })
     }
 }

@@ -198,8 +198,12 @@ impl Planted {
         let chain = place.chain.clone();
         let Some(last) = chain.last() else { return };
         let bytes = |bd: &Bd| state.buffers.range(..=bd.buffer()).next_back();
-        let fits = bytes(last)
-            .is_some_and(|(base, bytes)| last.buffer() + u64::from(last.length()) == base + bytes);
+        let fits = |bd: &Bd| {
+            let end = bd.buffer() + u64::from(bd.length());
+            bytes(bd).is_some_and(|(base, bytes)| end == base + bytes)
+        };
+        // Where a buffer's end is sent several times, the last.
+        let fitting = chain.iter().rfind(|bd| fits(bd));
         match state.mistake {
             Some(Mistake::AddressCut) => chain.iter().for_each(|bd| bd.set(BUFFER_MSB, 0)),
             Some(Mistake::LengthSpills) if channel.1 == Direction::Mm2s => {
@@ -213,13 +217,17 @@ impl Planted {
                     bd.set(STATUS, *left);
                 }
             }
-            Some(Mistake::BeatTooLong(wanted)) if wanted == channel && fits => {
-                last.set(CONTROL, last.get(CONTROL) + BEAT);
-                state.planted = true;
+            Some(Mistake::BeatTooLong(wanted)) if wanted == channel => {
+                if let Some(last) = fitting {
+                    last.set(CONTROL, last.get(CONTROL) + BEAT);
+                    state.planted = true;
+                }
             }
-            Some(Mistake::BeatTooHigh(wanted)) if wanted == channel && fits => {
-                last.set_buffer(last.buffer() + u64::from(BEAT));
-                state.planted = true;
+            Some(Mistake::BeatTooHigh(wanted)) if wanted == channel => {
+                if let Some(last) = fitting {
+                    last.set_buffer(last.buffer() + u64::from(BEAT));
+                    state.planted = true;
+                }
             }
             Some(Mistake::FreedBuffer(wanted)) if wanted == channel => {
                 if let Some(freed) = state.freed.first().copied() {
@@ -233,7 +241,7 @@ impl Planted {
             }
             _ => {}
         }
-        if fits {
+        if fitting.is_some() {
             state.fitted.push(channel);
         }
         if let (Some(Trouble::StaleDescriptor(wanted)), [_, second, ..]) =

@@ -1,0 +1,170 @@
+//! This file writes collisions into the channels' buffers as a caller finds them, one after the
+//! other.
+
+use std::fmt;
+
+use bitstream_model::interface::profile::Geometry;
+use bitstream_model::interface::record::{Beat, collision, relative};
+
+use super::deal::{BLOCK, Dealer};
+use super::pack::{NOTHING, Target, pack_block, relative_record};
+use super::stage::Stage;
+use super::stripe::Segment;
+use crate::record;
+use crate::record::end::Ends;
+use crate::scene::validate::Block;
+use crate::scene::{Collision, InputError};
+
+/// Takes the collisions of a step straight into the memory that the board reads.
+///
+/// A few of them lie in the cache until their records are made; no copy of the others is kept.
+pub struct Writer<'a> {
+    target: Target<'a>,
+    ends: Ends<'a>,
+    dealer: Dealer<'a, 'a>,
+    stage: EntryStage,
+    /// Collisions whose records are not made yet.
+    block: [Collision; BLOCK],
+    held: usize,
+    /// Records written.
+    written: usize,
+    room: usize,
+    refused: Option<InputError>,
+}
+
+/// Of either kind of record.
+#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
+enum EntryStage {
+    Absolute(Stage<{ collision::ROWS }>),
+    Relative(Stage<{ relative::ROWS }>),
+}
+
+impl fmt::Debug for Writer<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { written, held, room, refused, .. } = self;
+        f.debug_struct("Writer")
+            .field("len", &(written + held))
+            .field("room", room)
+            .field("refused", refused)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Writer<'a> {
+    /// From the first collision on, with room for so many.
+    ///
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel)
+    /// says for `room`.
+    pub(crate) fn new(
+        target: Target<'a>,
+        ends: Ends<'a>,
+        room: usize,
+        channels: &'a mut [&'a mut [Beat]],
+    ) -> Self {
+        let layout = Segment::Collisions.layout(target.variant);
+        let stage = match target.variant.profile.geometry {
+            Geometry::Absolute => EntryStage::Absolute(Stage::new(&layout)),
+            Geometry::Relative => EntryStage::Relative(Stage::new(&layout)),
+        };
+        Self {
+            target,
+            ends,
+            dealer: Dealer::new(&layout, channels),
+            stage,
+            block: [NOTHING; BLOCK],
+            held: 0,
+            written: 0,
+            room,
+            refused: None,
+        }
+    }
+
+    /// Writes the next collision. Its index is that of [`Self::len`] before.
+    ///
+    /// Whether it is right is looked at a little later: what is wrong with one is said when all are
+    /// written, and what comes after it is not written any more ([`Self::is_refused`]).
+    #[inline]
+    pub fn push(&mut self, collision: &Collision) {
+        if self.written + self.held == self.room {
+            self.overfull();
+            return;
+        }
+        self.block[self.held] = *collision;
+        self.held += 1;
+        if self.held == BLOCK {
+            self.flush();
+        }
+    }
+
+    /// Number of collisions written so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.written + self.held
+    }
+
+    /// Whether there are none so far.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether a collision was found to be wrong: the step is refused, whatever is written after it.
+    #[must_use]
+    pub fn is_refused(&self) -> bool {
+        self.refused.is_some()
+    }
+
+    #[cold]
+    fn overfull(&mut self) {
+        // What was wrong before is said first.
+        self.flush();
+        self.refused.get_or_insert(InputError::MoreThanAnnounced { announced: self.room });
+    }
+
+    /// Makes the records of what is held.
+    fn flush(&mut self) {
+        let count = std::mem::take(&mut self.held);
+        if self.refused.is_some() || count == 0 {
+            return;
+        }
+        let Self { target, ends, dealer, stage, written, .. } = self;
+        let (quick, collisions) = (target.quick, &self.block[..count]);
+        let block =
+            || Block { first: *written, collisions, ends: *ends, scheduled: false, heads: true };
+        let good = match stage {
+            EntryStage::Absolute(stage) => pack_block(
+                quick,
+                block(),
+                &record::collision::INTEGERS,
+                (stage, dealer),
+                |_, it, [a, b]| record::collision::encode(it, a.position, b.position),
+                |quick, block, records| quick.absolute(block, records),
+            ),
+            EntryStage::Relative(stage) => pack_block(
+                quick,
+                block(),
+                &record::relative::INTEGERS,
+                (stage, dealer),
+                |index, it, ends| relative_record(ends, None, index, it),
+                |quick, block, records| quick.relative(block, records),
+            ),
+        };
+        if !good {
+            self.refused = quick.and_then(|quick| quick.refusal(&block()).err());
+        }
+        self.written += count;
+    }
+
+    /// Ends the segment; the sum of the words written, modulo 2^32, and how many collisions there are.
+    ///
+    /// # Errors
+    /// What validation refuses of the first collision that is wrong;
+    /// [`InputError::MoreThanAnnounced`].
+    pub(crate) fn finish(mut self) -> Result<(u32, usize), InputError> {
+        self.flush();
+        match self.refused {
+            Some(refused) => Err(refused),
+            None => Ok((self.dealer.finish(), self.written)),
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! This file brings a step into a bank of buffers whose collisions the caller writes as it finds them.
+
+use super::bank::Bank;
+use super::in_flight::{InFlight, Stopwatch};
+use super::load::{Engines, Load, Ticket};
+use super::ordering::{Arranged, automatic};
+use super::plan::Plan;
+use super::prepared::Prepared;
+use super::report::HostTimes;
+use super::solver::Accelerator;
+use crate::beat::pack::Target;
+use crate::beat::writer::Writer;
+use crate::error::Error;
+use crate::order::Order;
+use crate::scene::validate::{Quick, preflight, validate};
+use crate::scene::{Bodies, Collision, Collisions, InputError, StepParameters};
+
+impl Accelerator {
+    /// Packs a step whose collisions `narrow_phase` writes, at most `announced` of them: their
+    /// records go straight into the memory that the board reads, and the caller needs no array of
+    /// them.
+    ///
+    /// They are solved in the order in which they are written, so that the parameters must ask for
+    /// [`Order::AsGiven`], or for none on a bitstream that waits for its hazards, where that is what
+    /// a step takes by itself.
+    ///
+    /// The step takes the place of the one that was started last; [`Self::start`] starts it.
+    /// [`StepReport::host`](crate::StepReport::host) counts the narrow phase as packing.
+    ///
+    /// ```
+    /// use zynq_pgs::{Accelerator, Body, Collision, Contact, OpenOptions, Pose, Shape};
+    /// # use zynq_pgs::{StepParameters, Velocity};
+    ///
+    /// # fn main() -> Result<(), zynq_pgs::Error> {
+    /// let mut board = Accelerator::open(OpenOptions::default())?;
+    /// board.set_shapes(&[Shape::isotropic(1.0, 6.0)])?;
+    /// // Cubes of 1 m, one on the other.
+    /// let at = |y| Pose { position: [0.0, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] };
+    /// let cube = |y| Body { pose: at(y), velocity: Velocity::default(), shape: 0 };
+    /// let mut tower: Vec<Body> = (0_u8..10).map(|floor| cube(f32::from(floor))).collect();
+    ///
+    /// let step = board.write(&tower, 9, &StepParameters::default(), |records| {
+    ///     for (below, (body_b, body_a)) in tower.iter().zip((0..9).zip(1..)) {
+    ///         let [x, y, z] = below.pose.position;
+    ///         let corners = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]];
+    ///         let contacts = corners.map(|[dx, dz]| Contact {
+    ///             point: [x + dx, y + 0.5, z + dz],
+    ///             distance: 0.0,
+    ///         });
+    ///         records.push(&Collision { body_a, body_b, normal: [0.0, 1.0, 0.0], count: 4, contacts });
+    ///     }
+    /// })?;
+    /// let report = board.start(&step)?.wait(&mut tower)?;
+    /// assert_eq!(report.collisions, 9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Input`] as [`Self::step`], and [`InputError::WrittenInOrder`],
+    /// [`InputError::MoreThanAnnounced`]. [`Error::Step`] if there is no memory for so many;
+    /// [`Error::MustReopen`] after a fault that could not be cleared.
+    pub fn write<B: Bodies + ?Sized>(
+        &mut self,
+        bodies: &B,
+        announced: usize,
+        parameters: &StepParameters,
+        narrow_phase: impl FnOnce(&mut Writer<'_>),
+    ) -> Result<Prepared, Error> {
+        self.device.settle(&self.shapes)?;
+        let into = (self.bank, Engines::Idle);
+        let load = self.load_written(into, bodies, announced, parameters, narrow_phase)?;
+        Ok(Prepared { bank: load.bank, ticket: load.ticket })
+    }
+
+    /// As [`load`](Self::load), of collisions that are written.
+    fn load_written<B: Bodies + ?Sized>(
+        &mut self,
+        (bank, engines): (Bank, Engines),
+        bodies: &B,
+        announced: usize,
+        parameters: &StepParameters,
+        narrow_phase: impl FnOnce(&mut Writer<'_>),
+    ) -> Result<Load, Error> {
+        self.forget(bank);
+        let mut watch = Stopwatch::start();
+        let mut host = HostTimes::default();
+        let capabilities = &self.device.capabilities;
+        let order = parameters.order.unwrap_or_else(|| automatic(capabilities));
+        let as_they_come = order == Order::AsGiven && !parameters.verify_order;
+        if !as_they_come || capabilities.window.is_some() {
+            return Err(InputError::WrittenInOrder.into());
+        }
+        let announced = Announced(announced);
+        preflight(bodies, &announced, &self.shapes, parameters, &self.limits)?;
+        host.validate = watch.lap();
+        let mut plan = Plan {
+            bodies: bodies.len(),
+            collisions: announced.0,
+            passes: parameters.passes(),
+            variant: self.limits.variant,
+        };
+        if let Err(symptom) = self.make_room(&plan, bank, engines) {
+            return Err(self.refuse(symptom, engines));
+        }
+        let Self { device, limits, shapes, .. } = self;
+        let quick = Quick::new(preflight(bodies, &announced, shapes, parameters, limits)?);
+        let target = Target { variant: &plan.variant, shapes, quick: Some(&quick) };
+        let refuse = || validate(bodies, &Announced(0), shapes, parameters, limits);
+        let (sent, written) =
+            device.pack_written(&plan, bank, target, bodies, refuse, narrow_phase)?;
+        plan.collisions = written;
+        host.pack = watch.lap();
+        let load = Load {
+            ticket: Ticket::new(),
+            bank,
+            plan,
+            sent: Some(sent),
+            parameters: *parameters,
+            bodies: bodies.len(),
+            collisions: written,
+            empty: 0,
+            arranged: Arranged { order, scheduled: false, verified: None, live: None },
+            shapes_loaded: self.shapes_loaded,
+            host,
+        };
+        self.loads[bank] = Some(load);
+        Ok(load)
+    }
+}
+
+impl InFlight<'_> {
+    /// As [`Accelerator::write`], while the board works on this step: see [`Self::prepare`].
+    ///
+    /// # Errors
+    /// Those of [`Accelerator::write`] and of [`Self::prepare`].
+    pub fn write<B: Bodies + ?Sized>(
+        &mut self,
+        bodies: &B,
+        announced: usize,
+        parameters: &StepParameters,
+        narrow_phase: impl FnOnce(&mut Writer<'_>),
+    ) -> Result<Prepared, Error> {
+        let into = (self.flight.load.bank.other(), Engines::Working);
+        let load =
+            self.accelerator.load_written(into, bodies, announced, parameters, narrow_phase)?;
+        self.hand_over(load)
+    }
+}
+
+/// So many collisions, of which nothing else is known yet.
+struct Announced(usize);
+
+impl Collisions for Announced {
+    fn len(&self) -> usize {
+        self.0
+    }
+
+    fn collision(&self, _: usize) -> Collision {
+        crate::beat::pack::NOTHING
+    }
+}
