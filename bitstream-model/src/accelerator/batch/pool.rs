@@ -90,6 +90,11 @@ impl Pool {
         Self { shared, workers }
     }
 
+    /// Whether there is no thread but the caller's.
+    pub(super) fn is_empty(&self) -> bool {
+        self.workers.is_empty()
+    }
+
     /// Runs work on the calling thread and on every worker that comes in time; returns when the
     /// caller's has ended and no worker is in it.
     pub(super) fn run(&mut self, job: &(dyn Fn(usize) + Sync)) {
