@@ -11,15 +11,14 @@ use std::sync::{Mutex, PoisonError};
 use super::super::segment::PacketError;
 use super::super::solver::Mass;
 use super::block::{self, Block, LANES, Words};
-use super::front::Width;
 use super::place::Places;
 use super::pool::Pool;
 use super::queue::Queue;
 use super::records::{Fill, Records, sum};
+use super::width::Width;
 use super::{Batch, NO_SLOT};
 use crate::cast::register;
-use crate::interface::control::ErrorCode;
-use crate::interface::record::{Beat, CONTACT_POINTS};
+use crate::interface::record::Beat;
 
 /// Blocks that a thread fills at once.
 const RUN: usize = 8;
@@ -65,8 +64,6 @@ pub(super) struct Group {
 struct Intake<'a, 'b> {
     records: Records<'b>,
     count: usize,
-    shape_of: &'b [u8],
-    masses: &'b [Mass],
     width: Width,
     places: &'b mut Places,
     slots: &'b mut Vec<u32>,
@@ -93,9 +90,9 @@ impl<'a> Intake<'a, '_> {
             && self.places.blocks() + LANES <= end
             && self.put_off.len() < PUT_OFF
         {
-            let group = self.group();
+            let (group, block) = self.group();
             self.at += group.count;
-            match self.whole(&group) {
+            match block {
                 Some(block) => {
                     let (first, begin, blocks) = self.run;
                     let follows = first + blocks * LANES == group.first && begin + blocks == block;
@@ -130,8 +127,8 @@ impl<'a> Intake<'a, '_> {
     }
 
     /// Finds the next records their blocks: in hazard-free order as many as the block begun last has
-    /// empty lanes.
-    fn group(&mut self) -> Group {
+    /// empty lanes. Returns the block if they are one in their order.
+    fn group(&mut self) -> (Group, Option<usize>) {
         let last = self.slots.last().filter(|slot| **slot != NO_SLOT);
         let taken = last.map_or(0, |slot| (*slot as usize + 1) % LANES);
         let most = (LANES - taken).min(self.count - self.at);
@@ -142,8 +139,18 @@ impl<'a> Intake<'a, '_> {
             blocks: self.places.blocks()..0,
             kinds: [0; LANES],
         };
-        while group.count < most {
-            let [count, body_a, body_b] = self.records.heads(self.at + group.count);
+        let records = self.records;
+        let heads = records.heads(self.at).take(most);
+        let number = register(group.slot);
+        if let Some((block, lanes)) = self.places.place_together(number, heads, &mut group.kinds) {
+            let first = register(block * LANES);
+            self.slots.extend(first..first + register(lanes));
+            group.count = lanes;
+            if lanes == LANES {
+                return (group, Some(block));
+            }
+        }
+        for [count, body_a, body_b] in records.heads(self.at).take(most).skip(group.count) {
             match self.place(count, [body_a, body_b]) {
                 Ok(kind) => group.kinds[group.count] = kind,
                 Err(error) => {
@@ -154,32 +161,21 @@ impl<'a> Intake<'a, '_> {
             group.count += 1;
         }
         group.blocks.end = self.places.blocks();
-        group
+        (group, None)
     }
 
     /// Places the next collision; returns what its lane is, 0 for a padding entry.
-    #[inline(always)]
     fn place(&mut self, count: u32, bodies: [u32; 2]) -> Result<u32, PacketError> {
         let index = register(self.slots.len());
         if count == 0 {
             self.slots.push(NO_SLOT);
             return Ok(0);
         }
-        let moving = match moving(count, bodies, self.shape_of, self.masses) {
-            Ok(moving) => moving,
-            Err(code) => return Err(PacketError { code, channel: 0, beat: index }),
-        };
+        let error = |code| PacketError { code, channel: 0, beat: index };
+        let moving = self.places.moving(count, bodies).map_err(error)?;
         let place = self.places.place(index, bodies, moving);
         self.slots.push(register(place.block * LANES + place.lane));
         Ok(block::kind::of(count, moving, place.serial))
-    }
-
-    /// The block that the records of a group are in their order, if they are one.
-    fn whole(&self, group: &Group) -> Option<usize> {
-        let slots = self.slots[group.slot..].first_chunk::<LANES>()?;
-        let block = slots[0] as usize / LANES;
-        let in_order = slots.iter().zip(block * LANES..).all(|(slot, to)| *slot as usize == to);
-        in_order.then_some(block)
     }
 }
 
@@ -198,7 +194,8 @@ impl Batch {
         masses: &[Mass],
         sums: &mut [u32],
     ) -> Result<(), PacketError> {
-        self.places.bodies(shape_of.len());
+        let moves = |body: usize| masses[usize::from(shape_of[body])].inverse_mass != 0.0;
+        self.places.bodies(shape_of.len(), moves);
         self.bodies = self.bodies.max(shape_of.len());
         self.measured = false;
         self.spins = false;
@@ -214,8 +211,6 @@ impl Batch {
             let mut intake = Intake {
                 records,
                 count,
-                shape_of,
-                masses,
                 width: self.width,
                 places: &mut self.places,
                 slots: &mut self.slots,
@@ -275,32 +270,6 @@ fn share(intake: &mut Intake<'_, '_>, pool: &mut Pool) {
         }
         queue.work(|run| run.fill(&records, width));
     });
-}
-
-/// Which bodies of a collision with a contact move, or what is wrong with it.
-#[inline(always)]
-fn moving(
-    count: u32,
-    bodies: [u32; 2],
-    shape_of: &[u8],
-    masses: &[Mass],
-) -> Result<[bool; 2], ErrorCode> {
-    if count as usize > CONTACT_POINTS {
-        return Err(ErrorCode::ContactCount);
-    }
-    let shapes = (shape_of.get(bodies[0] as usize), shape_of.get(bodies[1] as usize));
-    let (Some(&a), Some(&b)) = shapes else {
-        return Err(ErrorCode::BodyIndex);
-    };
-    if bodies[0] == bodies[1] {
-        return Err(ErrorCode::SelfCollision);
-    }
-    let moves = |shape: u8| masses[usize::from(shape)].inverse_mass != 0.0;
-    let moving = [moves(a), moves(b)];
-    if moving == [false; 2] {
-        return Err(ErrorCode::StaticPair);
-    }
-    Ok(moving)
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ mod queue;
 mod records;
 #[cfg(test)]
 mod tests;
+mod width;
 
 use std::ops::Range;
 
@@ -33,10 +34,11 @@ use crate::config::THREADS_MAX;
 use crate::interface::record::CONTACT_POINTS;
 
 use block::{Block, LANES, ROWS_APART};
-use front::{Fronts, Line, Passes, Width};
+use front::{Fronts, Line, Passes};
 use intake::{Group, PUT_OFF};
 use place::Places;
 use pool::Pool;
+use width::Width;
 
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
@@ -162,7 +164,7 @@ impl Batch {
 
     /// The smallest distance, in collisions, of two that share a moving body; `u32::MAX` without.
     pub(super) fn distance(&self) -> u32 {
-        self.places.distance().unwrap_or(u32::MAX)
+        self.places.distance()
     }
 
     /// Runs whole passes over all collisions. Of the step's passes, numbered from 0, the first

@@ -17,7 +17,7 @@ pub(super) struct Records<'a> {
     pub(super) streams: [&'a [Beat]; STREAMS],
 }
 
-impl Records<'_> {
+impl<'a> Records<'a> {
     #[inline(always)]
     fn row(&self, record: usize, row: usize) -> Row {
         let stream = row % STREAMS;
@@ -30,14 +30,16 @@ impl Records<'_> {
         std::array::from_fn(|row| self.row(record, row))
     }
 
-    /// The number of contacts and the two bodies of a record.
+    /// The number of contacts and the two bodies of records, from one on.
     #[inline(always)]
-    pub(super) fn heads(&self, record: usize) -> [u32; 3] {
-        [
-            self.row(record, collision::NORMAL)[WORD_LANE],
-            self.row(record, collision::BODY_A)[WORD_LANE],
-            self.row(record, collision::BODY_B)[WORD_LANE],
-        ]
+    pub(super) fn heads(&self, first: usize) -> impl Iterator<Item = [u32; 3]> {
+        const { assert!(collision::NORMAL == 0 && collision::BODY_A == 1 && collision::BODY_B == 2) };
+        let [normals, bodies_a, bodies_b, _] = self.streams;
+        let from =
+            |stream: &'a [Beat]| stream.as_chunks::<2>().0.get(first..).unwrap_or(&[]).iter();
+        let word = |[beat, _]: &[Beat; 2]| beat.0[WORD_LANE];
+        let bodies = from(bodies_a).zip(from(bodies_b));
+        from(normals).zip(bodies).map(move |(n, (a, b))| [word(n), word(a), word(b)])
     }
 }
 

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use super::super::super::array::Row;
 use super::super::tests::{MASSES, batch};
 use super::*;
+use crate::interface::control::ErrorCode;
 use crate::interface::record::{WORD_LANE, collision};
 
 /// Records and the shapes of the bodies that they are about.
@@ -59,13 +60,14 @@ impl Scene {
     fn serially(&self) -> Found {
         let mut places = Places::default();
         places.begin(self.records.len());
-        places.bodies(self.shape_of.len());
+        let moves = |body: usize| MASSES[usize::from(self.shape_of[body])].inverse_mass != 0.0;
+        places.bodies(self.shape_of.len(), moves);
         let (mut blocks, mut slots, mut sums) = (Vec::new(), Vec::new(), Vec::new());
         for (index, rows) in (0..).zip(&self.records) {
             let bodies = [rows[collision::BODY_A][WORD_LANE], rows[collision::BODY_B][WORD_LANE]];
             let count = rows[collision::NORMAL][WORD_LANE];
             if count > 0 {
-                let moving = match moving(count, bodies, &self.shape_of, &MASSES) {
+                let moving = match places.moving(count, bodies) {
                     Ok(moving) => moving,
                     Err(code) => {
                         let error = PacketError { code, channel: 0, beat: index };
