@@ -335,6 +335,7 @@ impl ChunkWork<'_> {
 }
 
 /// The impulses of a block after the last contact pass; empty lanes have none.
+#[inline(always)]
 fn counted(block: &Block) -> u64 {
     (0..LANES)
         .fold(0, |sum, lane| sum.saturating_add(fixed_impulse::<Single>(&block.impulses(lane))))

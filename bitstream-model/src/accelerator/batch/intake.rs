@@ -21,7 +21,7 @@ use crate::cast::register;
 use crate::interface::record::Beat;
 
 /// Blocks that a thread fills at once.
-const RUN: usize = 8;
+const RUN: usize = 16;
 /// Runs that wait for a thread, at most.
 const WAITING: usize = 8;
 /// Groups that are put off until the threads have ended, at most.
@@ -140,6 +140,9 @@ impl<'a> Intake<'a, '_> {
             kinds: [0; LANES],
         };
         let records = self.records;
+        for [_, body_a, body_b] in records.heads(self.at + LANES).take(LANES) {
+            self.places.expect([body_a, body_b]);
+        }
         let heads = records.heads(self.at).take(most);
         let number = register(group.slot);
         if let Some((block, lanes)) = self.places.place_together(number, heads, &mut group.kinds) {

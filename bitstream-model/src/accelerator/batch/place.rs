@@ -6,6 +6,7 @@
 //! blocks are full and the order is the one received.
 
 use super::block::{LANES, Words, kind};
+use super::lanes::prefetch;
 use crate::cast::register;
 use crate::interface::control::ErrorCode;
 use crate::interface::record::CONTACT_POINTS;
@@ -104,6 +105,14 @@ impl Places {
         used.map(|body| [body.first, body.behind - 1])
     }
 
+    /// Asks for bodies that are looked at soon.
+    #[inline(always)]
+    pub(super) fn expect(&self, bodies: [u32; 2]) {
+        for body in bodies {
+            prefetch(self.bodies.as_ptr().wrapping_add(body as usize));
+        }
+    }
+
     /// Which bodies of a collision with a contact move, or what is wrong with it.
     #[inline(always)]
     pub(super) fn moving(&self, count: u32, bodies: [u32; 2]) -> Result<[bool; 2], ErrorCode> {
@@ -138,12 +147,12 @@ impl Places {
             return None;
         }
         let block = register(self.open);
+        let (bodies, again) = (&mut self.bodies[..], &mut self.again[..]);
         let after_firsts = self.firsts.last().is_some_and(|firsts| usize::from(*firsts) == LANES);
         let run = if after_firsts { 1 } else { RUN };
         let (mut lanes, mut firsts, mut distance) = (0_u8, 0_u8, self.distance);
         for ((number, [count, a, b]), kind) in (number..).zip(heads).zip(kinds) {
-            let (Some(&body_a), Some(&body_b)) =
-                (self.bodies.get(a as usize), self.bodies.get(b as usize))
+            let (Some(&body_a), Some(&body_b)) = (bodies.get(a as usize), bodies.get(b as usize))
             else {
                 break;
             };
@@ -159,10 +168,10 @@ impl Places {
                 let since = if body.behind > 0 { number - body.collision } else { u32::MAX };
                 distance = distance.min(since);
                 if body.moves {
-                    let again = &mut self.again[body.behind as usize];
+                    let again = &mut again[body.behind as usize];
                     *again = (*again).min(block);
                     let first = body.first.min(block);
-                    self.bodies[at as usize] =
+                    bodies[at as usize] =
                         Body { first, behind: block + 1, collision: number, moves: true };
                 }
             }
