@@ -43,6 +43,9 @@ use width::Width;
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
 
+/// Things that a thread makes at once.
+const TOGETHER: usize = 512;
+
 /// What a pass is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Stage {
@@ -135,7 +138,8 @@ impl Batch {
 
     /// Begins a step: forgets the last one's collisions and makes room for so many.
     pub(super) fn begin(&mut self, collisions: usize) {
-        let blocks = collisions.div_ceil(LANES) + LANES;
+        // Decoded in parts they want some more at the end of each.
+        let blocks = collisions.div_ceil(LANES) + 2 * LANES;
         self.blocks.reserve(blocks.saturating_sub(self.blocks.len()));
         self.slots.clear();
         self.slots.reserve(collisions);
@@ -149,6 +153,21 @@ impl Batch {
     /// Collisions decoded, padding entries among them.
     pub(super) fn len(&self) -> usize {
         self.slots.len()
+    }
+
+    /// Whether there are threads beside the caller's.
+    pub(super) fn has_threads(&self) -> bool {
+        !self.pool.is_empty()
+    }
+
+    /// Makes something of each of many things on all threads.
+    pub(super) fn make<T: Sync, R: Send>(
+        &mut self,
+        from: &[T],
+        to: &mut [R],
+        make: impl Fn(&T) -> R + Sync,
+    ) {
+        self.pool.each(TOGETHER, (from, to), make);
     }
 
     /// Block and lane of a collision, or `None` for a padding entry.
