@@ -4,7 +4,7 @@
 
 use super::Accelerator;
 use super::decode;
-use super::integrate::integrate;
+use super::integrate::{Turn, integrate};
 use super::number::Single;
 use super::results::Results;
 use super::segment::{PacketError, Segment};
@@ -92,6 +92,20 @@ impl Accelerator {
         Ok(sum(views))
     }
 
+    /// Finds what becomes of the bodies before their poses come, where threads can help.
+    pub(super) fn turn_ahead(&mut self) {
+        let (on, integrates) = (self.replay.on, self.arguments.integrate);
+        if !on || !integrates || !self.replay.batch.has_threads() {
+            return;
+        }
+        let integration = &self.arguments.integration;
+        let none = Turn::new(integration, &Velocity::default());
+        self.turns.resize(self.velocities.len(), none);
+        self.turned = true;
+        let turn = |velocity: &Velocity| Turn::new(integration, velocity);
+        self.replay.batch.make(&self.velocities, &mut self.turns, turn);
+    }
+
     /// Integrates the next bodies and sends their results; the sums of what has come and gone.
     pub(super) fn integrate_views(
         &mut self,
@@ -104,6 +118,7 @@ impl Accelerator {
         let mut rows = std::mem::take(&mut self.rows);
         rows.iter_mut().for_each(Vec::clear);
         let integration = self.arguments.integrate.then_some(&self.arguments.integration);
+        let turns = if self.turned { self.turns.as_slice() } else { &[] };
         for (body, pose) in rows_of(poses, records, views) {
             let (mut pose, mut velocity) =
                 (decode::pose(StreamFormat::F32, &pose), self.velocities[body]);
@@ -111,7 +126,10 @@ impl Accelerator {
             if let Some(integration) = integration
                 && mass.inverse_mass != 0.0
             {
-                (pose, velocity) = integrate::<Single>(integration, &pose, &velocity);
+                (pose, velocity) = match turns.get(body) {
+                    Some(turn) => turn.of(&pose),
+                    None => integrate::<Single>(integration, &pose, &velocity),
+                };
             }
             let result = decode::result(StreamFormat::F32, &pose, &velocity);
             for (rows, row) in rows.iter_mut().zip(result) {

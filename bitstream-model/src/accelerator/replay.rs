@@ -24,8 +24,6 @@ use crate::stream::Stream;
 pub(crate) const SHARE: [usize; STREAMS_MAX] = [2, 2, 2, 1];
 /// Beats of a collision on a stream, at most.
 const SHARE_MAX: usize = 2;
-/// Collisions that are decoded at once: what stays in the cache while they are added up.
-const CHUNK: usize = 1024;
 /// Issue slots of a hazard window that are kept in mind.
 const SLOTS_MAX: usize = 512;
 
@@ -54,7 +52,7 @@ pub(super) struct Replay {
     pub(super) masses: Vec<Mass>,
     /// Where the beats of the decoded collisions are, stream by stream.
     origin: [Spans; STREAMS_MAX],
-    /// The sum of all words of as many collisions.
+    /// The sum of all words of none of them, of the first one, of the first two...
     sums: Vec<u32>,
     /// What the decoder said to the collision behind the last one decoded.
     pub(super) refused: Option<PacketError>,
@@ -88,7 +86,7 @@ impl Replay {
             computed: 0,
             masses: Vec::new(),
             origin: std::array::from_fn(|_| Spans::with_capacity(64)),
-            sums: Vec::new(),
+            sums: vec![0],
             refused: None,
             slots: 0,
             even: true,
@@ -111,9 +109,9 @@ impl Replay {
             inverse_inertia: [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
         }));
         self.origin.iter_mut().for_each(Spans::clear);
-        self.sums.clear();
-        self.sums.reserve(collisions + 1);
-        self.sums.push(0);
+        if self.sums.len() <= collisions {
+            self.sums.resize(collisions + 1, 0);
+        }
         self.refused = None;
     }
 
@@ -166,7 +164,7 @@ impl Replay {
         while self.refused.is_none() && self.known() < total {
             let known = self.known();
             let ahead = |k: usize| (known - segment.done) * SHARE[k];
-            let mut records = CHUNK.min(total - known);
+            let mut records = total - known;
             for (k, share) in SHARE.into_iter().enumerate() {
                 records = records.min(piece(k, ahead(k), records * share).0 / share);
             }
@@ -199,25 +197,14 @@ impl Replay {
                     streams[k] = &gathered[k][..share];
                 }
             }
-            self.refused = self.batch.decode(streams, records, shape_of, &self.masses).err();
-            self.add_up(streams, self.known() - known);
-        }
-    }
-
-    /// Adds the words of the next records up.
-    fn add_up(&mut self, streams: [&[Beat]; STREAMS_MAX], records: usize) {
-        let [a, b, c, d] = streams;
-        let mut sum = self.sums.last().copied().unwrap_or(0);
-        let pairs = a.as_chunks::<2>().0.iter().zip(b.as_chunks::<2>().0).zip(c.as_chunks::<2>().0);
-        for ((([a, e], [b, f]), [c, g]), d) in pairs.zip(d).take(records) {
-            let mut lanes = a.0;
-            for beat in [b, c, d, e, f, g] {
-                for (lane, word) in lanes.iter_mut().zip(beat.0) {
-                    *lane = lane.wrapping_add(word);
-                }
+            let [before, sums @ ..] = &mut self.sums[known..=known + records] else { return };
+            let (shapes, masses) = (shape_of, &self.masses);
+            self.refused = self.batch.decode(streams, records, shapes, masses, sums).err();
+            let mut sum = *before;
+            for each in &mut sums[..self.batch.len() - known] {
+                sum = sum.wrapping_add(*each);
+                *each = sum;
             }
-            sum = lanes.into_iter().fold(sum, u32::wrapping_add);
-            self.sums.push(sum);
         }
     }
 

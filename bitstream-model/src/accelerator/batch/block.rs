@@ -9,7 +9,7 @@ use super::super::decode::Collision;
 use super::super::pipeline::Entry;
 use super::super::solver::Impulses;
 use crate::config::THREADS_MAX;
-use crate::interface::record::{CONTACT_POINTS, collision};
+use crate::interface::record::{CONTACT_POINTS, WORD_LANE, collision};
 
 /// Collisions of a block.
 pub(super) const LANES: usize = 16;
@@ -41,24 +41,6 @@ pub(super) mod kind {
     pub(in super::super) fn of(count: u32, moving: [bool; 2], serial: bool) -> u32 {
         let sides = (u32::from(moving[0]) * MOVES[0]) | (u32::from(moving[1]) * MOVES[1]);
         count & COUNT | sides | (u32::from(serial) * SERIAL)
-    }
-}
-
-/// What records are beside their numbers: those of a block, or fewer.
-#[derive(Debug, Clone, Copy, Default)]
-#[repr(align(64))]
-pub(super) struct Heads {
-    rows: [Words<u32>; 2],
-    /// 0 in a padding entry; any lane may say that the block is serial.
-    kind: Words<u32>,
-}
-
-impl Heads {
-    #[inline(always)]
-    pub(super) fn put(&mut self, lane: usize, bodies: [u32; 2], kind: u32) {
-        self.rows[0][lane] = bodies[0].wrapping_add(ROWS_APART);
-        self.rows[1][lane] = bodies[1].wrapping_add(ROWS_APART);
-        self.kind[lane] = kind;
     }
 }
 
@@ -96,14 +78,8 @@ impl Block {
         self.kind[0] & kind::SERIAL != 0
     }
 
-    /// Puts a record into an empty lane; its head is that of lane `from`.
-    pub(super) fn put(
-        &mut self,
-        lane: usize,
-        rows: &[Row; collision::ROWS],
-        heads: &Heads,
-        from: usize,
-    ) {
+    /// Puts a record of a kind into an empty lane.
+    pub(super) fn put(&mut self, lane: usize, rows: &[Row; collision::ROWS], kind: u32) {
         let [normal, body_a, body_b] =
             [rows[collision::NORMAL], rows[collision::BODY_A], rows[collision::BODY_B]];
         for axis in 0..3 {
@@ -116,21 +92,20 @@ impl Block {
                 words[lane] = f32::from_bits(*word);
             }
         }
-        for side in 0..2 {
-            self.rows[side][lane] = heads.rows[side][from];
+        for (rows, row) in self.rows.iter_mut().zip([body_a, body_b]) {
+            rows[lane] = row[WORD_LANE].wrapping_add(ROWS_APART);
         }
-        self.kind[lane] |= heads.kind[from] & !kind::SERIAL;
-        self.kind[0] |= heads.kind[from] & kind::SERIAL;
+        self.kind[lane] |= kind & !kind::SERIAL;
+        self.kind[0] |= kind & kind::SERIAL;
     }
 
-    /// Puts what is no numbers into all lanes, and clears the impulses.
+    /// Sets the kinds of all lanes, and clears the impulses.
     #[inline(always)]
-    pub(super) fn put_heads(&mut self, heads: &Heads) {
-        self.rows = heads.rows;
-        self.kind = heads.kind;
+    pub(super) fn begin(&mut self, kinds: &Words<u32>) {
+        self.kind = *kinds;
         self.impulses = [[0.0; LANES]; CONTACT_POINTS];
         // In the first lane alone.
-        let serial = heads.kind.iter().fold(0, |all, kind| all | kind) & kind::SERIAL;
+        let serial = kinds.iter().fold(0, |all, kind| all | kind) & kind::SERIAL;
         if serial != 0 {
             self.kind.iter_mut().for_each(|kind| *kind &= !kind::SERIAL);
             self.kind[0] |= serial;

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! So the collisions are read from memory once for several passes, and threads take different ones.
-//! Each thread takes the next few passes that nobody has, and waits only for the pass before them,
-//! which another has and works on.
+//! Each thread takes the next few passes that nobody has. While these have to wait for the pass before
+//! them, and when there are no more, it helps with the passes of others, the last ones first.
 
 #![allow(unsafe_code, reason = "threads share blocks and rows and take turns by passes")]
 
@@ -22,16 +22,12 @@ use super::super::turn::fixed_impulse;
 use super::Stage;
 use super::block::{Block, LANES, kind};
 use super::kernel::{self, Pass};
-use super::lanes::{Lanes, Portable, Quad, Work, prefetch};
+use super::lanes::{Lanes, Quad, Work, prefetch};
 use super::order::Order;
 use super::place::Places;
 use super::pool::Pool;
+use super::width::Width;
 use crate::cast::register;
-
-#[cfg(target_arch = "aarch64")]
-use super::lanes::Neon;
-#[cfg(target_arch = "x86_64")]
-use super::lanes::{Avx2, Avx512};
 
 /// Blocks of a chunk.
 const CHUNK: usize = 8;
@@ -40,58 +36,14 @@ const BUNDLE: usize = 4;
 /// Looks at another thread's front before the processor is given away.
 const SPINS: u32 = 200;
 
-/// The lanes to compute with.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Width {
-    /// One collision after the other.
-    One,
-    Portable(Portable),
-    #[cfg(target_arch = "x86_64")]
-    Avx2(Avx2),
-    #[cfg(target_arch = "x86_64")]
-    Avx512(Avx512),
-    #[cfg(target_arch = "aarch64")]
-    Neon(Neon),
-}
-
-impl Width {
-    /// All that the processor has, the widest first.
-    pub(super) fn all() -> impl Iterator<Item = Self> {
-        #[cfg(target_arch = "x86_64")]
-        let own = [Avx512::found().map(Self::Avx512), Avx2::found().map(Self::Avx2)];
-        #[cfg(target_arch = "aarch64")]
-        let own = [Some(Self::Neon(Neon))];
-        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-        let own = [None];
-        own.into_iter().flatten().chain([Self::Portable(Portable), Self::One])
-    }
-
-    /// The widest that the processor has.
-    pub(super) fn found() -> Self {
-        Self::all().next().unwrap_or(Self::One)
-    }
-
-    /// Runs something with the lanes, or gives it back where there are none.
-    #[inline]
-    pub(super) fn run<W: Work>(self, work: W) -> Result<(), W> {
-        match self {
-            Self::One => return Err(work),
-            Self::Portable(lanes) => lanes.run(work),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(lanes) => lanes.run(work),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(lanes) => lanes.run(work),
-            #[cfg(target_arch = "aarch64")]
-            Self::Neon(lanes) => lanes.run(work),
-        }
-        Ok(())
-    }
-}
-
 /// How far a pass has come, in chunks; alone in its cache lines.
 #[derive(Debug, Default)]
 #[repr(align(128))]
-struct Progress(AtomicUsize);
+struct Progress {
+    chunks: AtomicUsize,
+    /// A thread works on the next one.
+    taken: AtomicBool,
+}
 
 /// What the fronts are made of, kept from step to step.
 #[derive(Debug, Default)]
@@ -140,7 +92,7 @@ impl Fronts {
             self.progress.resize_with(count, Progress::default);
         }
         for progress in &mut self.progress {
-            *progress.0.get_mut() = 0;
+            *progress = Progress::default();
         }
         let field = Field {
             passes,
@@ -152,6 +104,7 @@ impl Fronts {
             next: AtomicUsize::new(0),
             sum: AtomicU64::new(0),
             broken: AtomicBool::new(false),
+            alone: pool.is_empty(),
         };
         pool.run(&|thread| field.work(thread));
         field.sum.into_inner()
@@ -193,11 +146,13 @@ struct Field<'a> {
     sum: AtomicU64,
     /// A thread has panicked: its fronts stand still.
     broken: AtomicBool,
+    /// There is one thread only.
+    alone: bool,
 }
 
-// SAFETY: blocks and rows are accessed in `chunk` alone, for a chunk and a pass that one thread has.
-// Those of another pass over the same bodies or blocks have ended before, which `progress` says
-// with release and acquire.
+// SAFETY: blocks and rows are accessed in `chunk` alone, for the next chunk of a pass that one thread
+// has taken. Those of the pass before over the same bodies or blocks have ended, which `progress` says
+// with release and acquire, and so have those of this pass that came before.
 unsafe impl Sync for Field<'_> {}
 
 /// Marks the field as broken when it goes, unless it was taken off before.
@@ -212,57 +167,99 @@ impl Drop for Breaks<'_> {
 }
 
 impl Field<'_> {
-    /// What a thread does: takes passes while there are any.
+    /// What a thread does: takes passes while there are any, then helps.
     fn work(&self, thread: usize) {
         let mut breaks = Breaks(Some(&self.broken));
+        let mut own = 0..0;
+        let mut idle = 0;
         loop {
-            let first = self.next.fetch_add(BUNDLE, Ordering::Relaxed);
-            if first >= self.progress.len() {
+            if own.clone().all(|pass| self.ended(pass)) {
+                own = self.next_bundle();
+            }
+            if own.is_empty() && self.ended(self.progress.len() - 1) {
                 break;
             }
-            let last = (first + BUNDLE).min(self.progress.len());
-            if !self.bundle(first..last, thread) {
+            if self.bundle(own.clone(), thread) || !self.alone && self.help(thread) {
+                idle = 0;
+                continue;
+            }
+            idle += 1;
+            if self.broken.load(Ordering::Acquire) {
                 break;
+            }
+            if idle > SPINS {
+                std::thread::yield_now();
+            } else {
+                std::hint::spin_loop();
             }
         }
         breaks.0 = None;
     }
 
-    /// Runs neighbouring passes, the later ones as close behind as they may be. Returns whether they
-    /// came to their end.
+    /// The next passes that nobody has.
+    fn next_bundle(&self) -> Range<usize> {
+        let count = self.progress.len();
+        if self.next.load(Ordering::Relaxed) >= count {
+            return 0..0;
+        }
+        let first = self.next.fetch_add(BUNDLE, Ordering::Relaxed).min(count);
+        first..(first + BUNDLE).min(count)
+    }
+
+    /// Whether a pass has come to its end.
+    fn ended(&self, pass: usize) -> bool {
+        self.progress[pass].chunks.load(Ordering::Acquire) == self.needs.len()
+    }
+
+    /// Runs neighbouring passes, the later ones as close behind as they may be: the first by one
+    /// chunk, the others as far as they can. Returns whether any went on.
     fn bundle(&self, passes: Range<usize>, thread: usize) -> bool {
-        let chunks = self.needs.len();
-        let mut at = [0; BUNDLE];
-        let mut idle = 0;
-        while at[passes.len() - 1] < chunks {
-            let mut limit = match passes.start {
-                0 => chunks,
-                first => self.progress[first - 1].0.load(Ordering::Acquire),
-            };
-            let mut worked = false;
-            for (pass, at) in passes.clone().zip(&mut at) {
-                // The first goes on by one chunk, the others as far as they can.
-                let mut most = if pass == passes.start { 1 } else { usize::MAX };
-                while most > 0 && *at < chunks && (self.needs[*at] as usize) < limit {
-                    self.chunk(pass, *at, thread);
-                    *at += 1;
-                    most -= 1;
-                    worked = true;
-                    self.progress[pass].0.store(*at, Ordering::Release);
+        let mut worked = false;
+        for pass in passes.clone() {
+            while self.go_on(pass, thread) {
+                worked = true;
+                if pass == passes.start {
+                    break;
                 }
-                limit = *at;
-            }
-            idle = if worked { 0 } else { idle + 1 };
-            if idle > 0 && self.broken.load(Ordering::Acquire) {
-                return false;
-            }
-            if idle > SPINS {
-                std::thread::yield_now();
-            } else if idle > 0 {
-                std::hint::spin_loop();
             }
         }
-        true
+        worked
+    }
+
+    /// Runs a chunk of the last pass that can go on. Returns whether there was one.
+    fn help(&self, thread: usize) -> bool {
+        (0..self.progress.len()).rev().any(|pass| self.go_on(pass, thread))
+    }
+
+    /// Runs the next chunk of a pass if the pass before has left its bodies behind and no other
+    /// thread has it. Returns whether it did.
+    fn go_on(&self, pass: usize, thread: usize) -> bool {
+        let Progress { chunks, taken } = &self.progress[pass];
+        let limit = match pass {
+            0 => self.needs.len(),
+            _ => self.progress[pass - 1].chunks.load(Ordering::Acquire),
+        };
+        let free = |at: usize| self.needs.get(at).is_some_and(|need| (*need as usize) < limit);
+        let mut at = chunks.load(Ordering::Acquire);
+        if !free(at) {
+            return false;
+        }
+        if !self.alone {
+            if taken.load(Ordering::Relaxed) || taken.swap(true, Ordering::Acquire) {
+                return false;
+            }
+            // It may have gone on until then.
+            at = chunks.load(Ordering::Acquire);
+        }
+        let free = free(at);
+        if free {
+            self.chunk(pass, at, thread);
+            chunks.store(at + 1, Ordering::Release);
+        }
+        if !self.alone {
+            taken.store(false, Ordering::Release);
+        }
+        free
     }
 
     /// Runs a pass over a chunk that the pass before has left behind.
@@ -338,6 +335,7 @@ impl ChunkWork<'_> {
 }
 
 /// The impulses of a block after the last contact pass; empty lanes have none.
+#[inline(always)]
 fn counted(block: &Block) -> u64 {
     (0..LANES)
         .fold(0, |sum, lane| sum.saturating_add(fixed_impulse::<Single>(&block.impulses(lane))))

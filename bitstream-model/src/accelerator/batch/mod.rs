@@ -1,7 +1,7 @@
 //! The collisions of a step decoded once, and the passes over them, many at a time.
 //!
 //! ```text
-//! beats -> place.rs (which are independent) -> block.rs (side by side) -> passes
+//! beats -> intake.rs: place.rs (which are independent), block.rs (side by side) -> passes
 //! ```
 //!
 //! Only collisions that share no moving body change places, so that every bit is that of
@@ -10,14 +10,17 @@
 
 mod block;
 mod front;
+mod intake;
 mod kernel;
 mod lanes;
 mod order;
 mod place;
 mod pool;
+mod queue;
 mod records;
 #[cfg(test)]
 mod tests;
+mod width;
 
 use std::ops::Range;
 
@@ -25,22 +28,23 @@ use super::decode::Collision;
 use super::inertia::Isotropic;
 use super::number::Single;
 use super::pipeline::Entry;
-use super::segment::PacketError;
 use super::solver::{self, Impulses, Mass, SolverParameters, Velocity};
 use super::turn::fixed_impulse;
-use crate::cast::register;
 use crate::config::THREADS_MAX;
-use crate::interface::control::ErrorCode;
-use crate::interface::record::{Beat, CONTACT_POINTS};
+use crate::interface::record::CONTACT_POINTS;
 
-use block::{Block, Heads, LANES, ROWS_APART};
-use front::{Fronts, Line, Passes, Width};
+use block::{Block, LANES, ROWS_APART};
+use front::{Fronts, Line, Passes};
+use intake::{Group, PUT_OFF};
 use place::Places;
 use pool::Pool;
-use records::{Fill, Records};
+use width::Width;
 
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
+
+/// Things that a thread makes at once.
+const TOGETHER: usize = 512;
 
 /// What a pass is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +109,8 @@ pub(super) struct Batch {
     /// Bodies that the collisions are about.
     bodies: usize,
     lines: Vec<Line>,
+    /// Records that wait for their blocks while these are filled.
+    put_off: Vec<Group>,
 }
 
 impl Batch {
@@ -126,12 +132,14 @@ impl Batch {
             spins: false,
             bodies: 0,
             lines: Vec::new(),
+            put_off: Vec::with_capacity(PUT_OFF),
         }
     }
 
     /// Begins a step: forgets the last one's collisions and makes room for so many.
     pub(super) fn begin(&mut self, collisions: usize) {
-        let blocks = collisions.div_ceil(LANES);
+        // Decoded in parts they want some more at the end of each.
+        let blocks = collisions.div_ceil(LANES) + 2 * LANES;
         self.blocks.reserve(blocks.saturating_sub(self.blocks.len()));
         self.slots.clear();
         self.slots.reserve(collisions);
@@ -147,97 +155,19 @@ impl Batch {
         self.slots.len()
     }
 
-    /// Decodes the next `count` records, of 2, 2, 2 and 1 beats on the four streams.
-    ///
-    /// # Errors
-    ///
-    /// The first collision that the decoder refuses; those before it stay.
-    pub(super) fn decode(
-        &mut self,
-        streams: [&[Beat]; 4],
-        count: usize,
-        shape_of: &[u8],
-        masses: &[Mass],
-    ) -> Result<(), PacketError> {
-        self.places.bodies(shape_of.len());
-        self.bodies = self.bodies.max(shape_of.len());
-        self.measured = false;
-        self.spins = false;
-        let records = Records { streams };
-        let mut at = 0;
-        while at < count {
-            // In hazard-free order as many as the block begun last has empty lanes.
-            let last = self.slots.last().filter(|slot| **slot != NO_SLOT);
-            let taken = last.map_or(0, |slot| (*slot as usize + 1) % LANES);
-            let most = (LANES - taken).min(count - at);
-            let (first, begun) = (self.slots.len(), self.places.blocks());
-            let mut heads = Heads::default();
-            let mut done = 0;
-            let mut refused = Ok(());
-            while done < most {
-                let [count, body_a, body_b] = records.heads(at + done);
-                match self.place(count, [body_a, body_b], shape_of, masses) {
-                    Ok(kind) => heads.put(done, [body_a, body_b], kind),
-                    Err(error) => {
-                        refused = Err(error);
-                        break;
-                    }
-                }
-                done += 1;
-            }
-            if self.blocks.len() < self.places.blocks() {
-                self.blocks.resize(self.places.blocks(), Block::EMPTY);
-            }
-            if !self.fill(&records, at, first, &heads) {
-                let blocks = self.places.blocks();
-                self.blocks[begun..blocks].fill(Block::EMPTY);
-                for (lane, slot) in self.slots[first..].iter().enumerate() {
-                    if *slot != NO_SLOT {
-                        let (block, to) = (*slot as usize / LANES, *slot as usize % LANES);
-                        self.blocks[block].put(to, &records.rows(at + lane), &heads, lane);
-                    }
-                }
-            }
-            refused?;
-            at += done;
-        }
-        Ok(())
+    /// Whether there are threads beside the caller's.
+    pub(super) fn has_threads(&self) -> bool {
+        !self.pool.is_empty()
     }
 
-    /// Places the next collision; returns what its lane is, 0 for a padding entry.
-    #[inline(always)]
-    fn place(
+    /// Makes something of each of many things on all threads.
+    pub(super) fn make<T: Sync, R: Send>(
         &mut self,
-        count: u32,
-        bodies: [u32; 2],
-        shape_of: &[u8],
-        masses: &[Mass],
-    ) -> Result<u32, PacketError> {
-        let index = register(self.slots.len());
-        if count == 0 {
-            self.slots.push(NO_SLOT);
-            return Ok(0);
-        }
-        let moving = match moving(count, bodies, shape_of, masses) {
-            Ok(moving) => moving,
-            Err(code) => return Err(PacketError { code, channel: 0, beat: index }),
-        };
-        let place = self.places.place(index, bodies, moving);
-        self.slots.push(register(place.block * LANES + place.lane));
-        Ok(block::kind::of(count, moving, place.serial))
-    }
-
-    /// Puts records side by side at once where they are a block in their order; whether they were.
-    /// Their slots are those from `slot` on.
-    fn fill(&mut self, records: &Records<'_>, first: usize, slot: usize, heads: &Heads) -> bool {
-        let Some(slots) = self.slots[slot..].first_chunk::<LANES>() else { return false };
-        let number = slots[0] as usize / LANES;
-        let in_order = slots.iter().zip(number * LANES..).all(|(slot, to)| *slot as usize == to);
-        if !in_order {
-            return false;
-        }
-        let block = &mut self.blocks[number];
-        self.width.run(Fill { records, first, heads, block }).is_ok()
+        from: &[T],
+        to: &mut [R],
+        make: impl Fn(&T) -> R + Sync,
+    ) {
+        self.pool.each(TOGETHER, (from, to), make);
     }
 
     /// Block and lane of a collision, or `None` for a padding entry.
@@ -253,7 +183,7 @@ impl Batch {
 
     /// The smallest distance, in collisions, of two that share a moving body; `u32::MAX` without.
     pub(super) fn distance(&self) -> u32 {
-        self.places.distance().unwrap_or(u32::MAX)
+        self.places.distance()
     }
 
     /// Runs whole passes over all collisions. Of the step's passes, numbered from 0, the first
@@ -337,30 +267,4 @@ impl Batch {
     pub(super) fn impulse_sum(&self) -> u64 {
         self.impulse_sum
     }
-}
-
-/// Which bodies of a collision with a contact move, or what is wrong with it.
-#[inline(always)]
-fn moving(
-    count: u32,
-    bodies: [u32; 2],
-    shape_of: &[u8],
-    masses: &[Mass],
-) -> Result<[bool; 2], ErrorCode> {
-    if count as usize > CONTACT_POINTS {
-        return Err(ErrorCode::ContactCount);
-    }
-    let shapes = (shape_of.get(bodies[0] as usize), shape_of.get(bodies[1] as usize));
-    let (Some(&a), Some(&b)) = shapes else {
-        return Err(ErrorCode::BodyIndex);
-    };
-    if bodies[0] == bodies[1] {
-        return Err(ErrorCode::SelfCollision);
-    }
-    let moves = |shape: u8| masses[usize::from(shape)].inverse_mass != 0.0;
-    let moving = [moves(a), moves(b)];
-    if moving == [false; 2] {
-        return Err(ErrorCode::StaticPair);
-    }
-    Ok(moving)
 }

@@ -5,21 +5,31 @@
 //! block after block gives the bits of taking collision after collision. In hazard-free order the
 //! blocks are full and the order is the one received.
 
-use super::block::LANES;
+use super::block::{LANES, Words, kind};
+use super::lanes::prefetch;
 use crate::cast::register;
+use crate::interface::control::ErrorCode;
+use crate::interface::record::CONTACT_POINTS;
 
 /// No block, no collision.
 const NONE: u32 = u32::MAX;
+/// First collisions with static bodies that are a run.
+const RUN: u8 = 4;
 /// Empty lanes that may be left behind beside one for every two collisions: few serial blocks in
 /// small scenes, at most three times the memory of full blocks in any.
 const EMPTY_MAX: usize = 64 * LANES;
 
+/// A body and where it is used; a static one is used nowhere.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(16))]
 struct Body {
+    /// The first block that uses it.
     first: u32,
-    last: u32,
+    /// The block behind the last that uses it, 0 if none does.
+    behind: u32,
     /// The last collision.
     collision: u32,
+    moves: bool,
 }
 
 /// Where a collision goes.
@@ -41,12 +51,12 @@ pub(super) struct Places {
     firsts: Vec<u8>,
     /// Where to look for an empty lane: the block itself while it has one, else one behind it.
     next: Vec<u32>,
-    /// The first later block that uses a body of each block again.
+    /// The first later block that uses a body of each block again, from the second entry on.
     again: Vec<u32>,
     /// The first block with an empty lane, or the number of blocks.
     open: usize,
     collisions: usize,
-    distance: Option<u32>,
+    distance: u32,
 }
 
 impl Places {
@@ -61,17 +71,17 @@ impl Places {
         self.taken.reserve(blocks);
         self.firsts.reserve(blocks);
         self.next.reserve(blocks);
-        self.again.reserve(blocks);
+        self.again.reserve(blocks + 1);
+        self.again.push(NONE);
         self.open = 0;
         self.collisions = 0;
-        self.distance = None;
+        self.distance = u32::MAX;
     }
 
-    /// Makes room for so many bodies.
-    pub(super) fn bodies(&mut self, bodies: usize) {
-        if self.bodies.len() < bodies {
-            self.bodies.resize(bodies, Body { first: NONE, last: NONE, collision: NONE });
-        }
+    /// Makes room for so many bodies, of which `moves` says which move.
+    pub(super) fn bodies(&mut self, bodies: usize, moves: impl Fn(usize) -> bool) {
+        let body = |body| Body { first: NONE, behind: 0, collision: 0, moves: moves(body) };
+        self.bodies.extend((self.bodies.len()..bodies).map(body));
     }
 
     /// Blocks that hold a collision.
@@ -81,35 +91,119 @@ impl Places {
 
     /// For each block the first later one that uses one of its bodies again.
     pub(super) fn again(&self) -> &[u32] {
-        &self.again
+        self.again.get(1..).unwrap_or(&[])
     }
 
-    /// The smallest distance of two collisions with a moving body in common.
-    pub(super) fn distance(&self) -> Option<u32> {
+    /// The smallest distance of two collisions with a moving body in common; `u32::MAX` without.
+    pub(super) fn distance(&self) -> u32 {
         self.distance
     }
 
     /// Where each body that moves and collides is used.
     pub(super) fn uses(&self) -> impl Iterator<Item = [u32; 2]> {
-        self.bodies.iter().filter(|body| body.first != NONE).map(|body| [body.first, body.last])
+        let used = self.bodies.iter().filter(|body| body.behind > 0);
+        used.map(|body| [body.first, body.behind - 1])
     }
 
-    /// Places collision `number`, larger than those before, between two bodies below the number
-    /// given to [`bodies`](Self::bodies).
+    /// Asks for bodies that are looked at soon.
+    #[inline(always)]
+    pub(super) fn expect(&self, bodies: [u32; 2]) {
+        for body in bodies {
+            prefetch(self.bodies.as_ptr().wrapping_add(body as usize));
+        }
+    }
+
+    /// Which bodies of a collision with a contact move, or what is wrong with it.
+    #[inline(always)]
+    pub(super) fn moving(&self, count: u32, bodies: [u32; 2]) -> Result<[bool; 2], ErrorCode> {
+        if count as usize > CONTACT_POINTS {
+            return Err(ErrorCode::ContactCount);
+        }
+        let [a, b] = bodies.map(|body| self.bodies.get(body as usize));
+        let (Some(a), Some(b)) = (a, b) else {
+            return Err(ErrorCode::BodyIndex);
+        };
+        if bodies[0] == bodies[1] {
+            return Err(ErrorCode::SelfCollision);
+        }
+        if !a.moves && !b.moves {
+            return Err(ErrorCode::StaticPair);
+        }
+        Ok([a.moves, b.moves])
+    }
+
+    /// Places as many of the next collisions, of which the first is `number`, as are a block in their
+    /// order: all, if they share no body and nothing is wrong with them. `heads` are their counts and
+    /// bodies; their kinds are added to `kinds`. Returns the block, or `None` if there is an empty lane
+    /// elsewhere.
+    #[inline]
+    pub(super) fn place_together(
+        &mut self,
+        number: u32,
+        heads: impl Iterator<Item = [u32; 3]>,
+        kinds: &mut Words<u32>,
+    ) -> Option<(usize, usize)> {
+        if self.open < self.taken.len() {
+            return None;
+        }
+        let block = register(self.open);
+        let (bodies, again) = (&mut self.bodies[..], &mut self.again[..]);
+        let after_firsts = self.firsts.last().is_some_and(|firsts| usize::from(*firsts) == LANES);
+        let run = if after_firsts { 1 } else { RUN };
+        let (mut lanes, mut firsts, mut distance) = (0_u8, 0_u8, self.distance);
+        for ((number, [count, a, b]), kind) in (number..).zip(heads).zip(kinds) {
+            let (Some(&body_a), Some(&body_b)) = (bodies.get(a as usize), bodies.get(b as usize))
+            else {
+                break;
+            };
+            let wrong = count.wrapping_sub(1) as usize >= CONTACT_POINTS || a == b;
+            let static_pair = !(body_a.moves || body_b.moves);
+            let shared = body_a.behind.max(body_b.behind) > block;
+            let first = body_a.behind | body_b.behind == 0 && body_a.moves != body_b.moves;
+            let elsewhere = !first && firsts == lanes && firsts >= run;
+            if wrong || static_pair || shared || elsewhere {
+                break;
+            }
+            for (at, body) in [(a, body_a), (b, body_b)] {
+                let since = if body.behind > 0 { number - body.collision } else { u32::MAX };
+                distance = distance.min(since);
+                if body.moves {
+                    let again = &mut again[body.behind as usize];
+                    *again = (*again).min(block);
+                    let first = body.first.min(block);
+                    bodies[at as usize] =
+                        Body { first, behind: block + 1, collision: number, moves: true };
+                }
+            }
+            *kind = kind::of(count, [body_a.moves, body_b.moves], false);
+            firsts += u8::from(first);
+            lanes += 1;
+        }
+        if lanes > 0 {
+            let full = usize::from(lanes) == LANES;
+            self.taken.push(lanes);
+            self.firsts.push(firsts);
+            self.next.push(block + u32::from(full));
+            self.again.push(NONE);
+            self.open += usize::from(full);
+            self.collisions += usize::from(lanes);
+            self.distance = distance;
+        }
+        Some((block as usize, usize::from(lanes)))
+    }
+
+    /// Places collision `number`, larger than those before, between two of the bodies.
     #[inline]
     pub(super) fn place(&mut self, number: u32, bodies: [u32; 2], moving: [bool; 2]) -> Place {
         let mut from = 0;
-        let mut used = false;
-        for side in 0..2 {
-            let body = &self.bodies[bodies[side] as usize];
-            if moving[side] && body.first != NONE {
-                from = from.max(body.last + 1);
-                used = true;
-                let distance = number - body.collision;
-                self.distance = Some(self.distance.map_or(distance, |least| least.min(distance)));
+        for body in bodies {
+            let body = &self.bodies[body as usize];
+            if body.behind > 0 {
+                from = from.max(body.behind);
+                self.distance = self.distance.min(number - body.collision);
             }
         }
-        let first = !used && moving != [true; 2];
+        let first = from == 0 && moving != [true; 2];
         let mut block = self.open;
         if from as usize > block {
             block = self.with_empty_lane(from as usize);
@@ -142,16 +236,16 @@ impl Places {
             }
         }
         self.collisions += 1;
-        for side in 0..2 {
-            if moving[side] {
-                let body = &mut self.bodies[bodies[side] as usize];
-                if body.first == NONE {
-                    body.first = register(block);
-                } else if body.last != register(block) {
-                    let again = &mut self.again[body.last as usize];
+        for body in bodies {
+            let body = &mut self.bodies[body as usize];
+            if body.moves {
+                let behind = register(block) + 1;
+                if body.behind != behind {
+                    let again = &mut self.again[body.behind as usize];
                     *again = (*again).min(register(block));
                 }
-                body.last = register(block);
+                body.first = body.first.min(register(block));
+                body.behind = behind;
                 body.collision = number;
             }
         }
@@ -166,7 +260,7 @@ impl Places {
         let Some((firsts, taken)) = self.firsts.get(block).zip(self.taken.get(block)) else {
             return false;
         };
-        let run = *firsts >= 4 || block > 0 && full(self.firsts[block - 1]);
+        let run = *firsts >= RUN || block > 0 && full(self.firsts[block - 1]);
         run && *firsts > 0 && firsts == taken
     }
 

@@ -1,5 +1,5 @@
-//! This file keeps the threads that help with the passes. They wait between steps; nothing is started
-//! and nothing allocated from one to the next.
+//! This file keeps the threads that help with decoding, passes and integration. They wait in between;
+//! nothing is started and nothing allocated from one step to the next.
 //!
 //! Nobody waits for a thread that has not begun: one that comes late finds nothing to do.
 
@@ -90,6 +90,30 @@ impl Pool {
         Self { shared, workers }
     }
 
+    /// Whether there is no thread but the caller's.
+    pub(super) fn is_empty(&self) -> bool {
+        self.workers.is_empty()
+    }
+
+    /// Does something to each item on all threads, on so many neighbours at once.
+    pub(super) fn each<T: Sync, R: Send>(
+        &mut self,
+        together: usize,
+        (from, to): (&[T], &mut [R]),
+        make: impl Fn(&T) -> R + Sync,
+    ) {
+        let parts = Mutex::new(from.chunks(together).zip(to.chunks_mut(together)));
+        self.run(&|_| {
+            loop {
+                let part = parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some((from, to)) = part else { break };
+                for (from, to) in from.iter().zip(to) {
+                    *to = make(from);
+                }
+            }
+        });
+    }
+
     /// Runs work on the calling thread and on every worker that comes in time; returns when the
     /// caller's has ended and no worker is in it.
     pub(super) fn run(&mut self, job: &(dyn Fn(usize) + Sync)) {
@@ -161,6 +185,21 @@ mod tests {
                 }
             });
             assert_eq!(done.into_inner(), 50);
+        }
+    }
+
+    #[test]
+    fn each_thing_is_made_once_and_in_its_place() {
+        let mut pool = Pool::new(2);
+        for count in [0, 1, 7, 8, 9, 1000] {
+            let from: Vec<usize> = (0..count).collect();
+            let (mut to, made) = (vec![usize::MAX; count], AtomicUsize::new(0));
+            pool.each(8, (&from, &mut to), |from| {
+                made.fetch_add(1, Ordering::AcqRel);
+                3 * from
+            });
+            assert_eq!(made.into_inner(), count);
+            assert!(to.iter().zip(&from).all(|(to, from)| *to == 3 * from));
         }
     }
 

@@ -1,8 +1,8 @@
 //! This file reads collision records where their beats are, and puts sixteen of them side by side.
 
 use super::super::array::Row;
-use super::block::{Block, Heads, LANES, Words};
-use super::lanes::{Lanes, Quad, Work};
+use super::block::{Block, LANES, ROWS_APART, Words};
+use super::lanes::{Lanes, Numbers, Quad, Work};
 use crate::interface::record::{Beat, WORD_LANE, collision};
 
 /// Beats of a record on each stream, which take turns.
@@ -17,7 +17,7 @@ pub(super) struct Records<'a> {
     pub(super) streams: [&'a [Beat]; STREAMS],
 }
 
-impl Records<'_> {
+impl<'a> Records<'a> {
     #[inline(always)]
     fn row(&self, record: usize, row: usize) -> Row {
         let stream = row % STREAMS;
@@ -30,31 +30,40 @@ impl Records<'_> {
         std::array::from_fn(|row| self.row(record, row))
     }
 
-    /// The number of contacts and the two bodies of a record.
+    /// The number of contacts and the two bodies of records, from one on.
     #[inline(always)]
-    pub(super) fn heads(&self, record: usize) -> [u32; 3] {
-        [
-            self.row(record, collision::NORMAL)[WORD_LANE],
-            self.row(record, collision::BODY_A)[WORD_LANE],
-            self.row(record, collision::BODY_B)[WORD_LANE],
-        ]
+    pub(super) fn heads(&self, first: usize) -> impl Iterator<Item = [u32; 3]> {
+        const { assert!(collision::NORMAL == 0 && collision::BODY_A == 1 && collision::BODY_B == 2) };
+        let [normals, bodies_a, bodies_b, _] = self.streams;
+        let from =
+            |stream: &'a [Beat]| stream.as_chunks::<2>().0.get(first..).unwrap_or(&[]).iter();
+        let word = |[beat, _]: &[Beat; 2]| beat.0[WORD_LANE];
+        let bodies = from(bodies_a).zip(from(bodies_b));
+        from(normals).zip(bodies).map(move |(n, (a, b))| [word(n), word(a), word(b)])
     }
 }
 
-/// Puts sixteen records side by side.
+/// Puts records side by side, sixteen in each block, of kinds that are known, and adds the words of
+/// each up.
 pub(super) struct Fill<'a> {
     pub(super) records: &'a Records<'a>,
     pub(super) first: usize,
-    pub(super) heads: &'a Heads,
-    pub(super) block: &'a mut Block,
+    pub(super) kinds: &'a [Words<u32>],
+    pub(super) blocks: &'a mut [Block],
+    pub(super) sums: &'a mut [u32],
 }
 
-/// A row of records from one on, for the lanes from `at` on.
+/// The sum of all words of a record.
+pub(super) fn sum(rows: &[Row; collision::ROWS]) -> u32 {
+    rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
+}
+
+/// A row of records, one for each lane, from record `first` on.
 #[inline(always)]
-fn columns<L: Lanes>(lanes: L, fill: &Fill<'_>, row: usize, at: usize) -> [L::Numbers; 4] {
+fn columns<L: Lanes>(lanes: L, records: &Records<'_>, first: usize, row: usize) -> [L::Numbers; 4] {
     let stream = row % STREAMS;
-    let first = (fill.first + at) * BEATS[stream] + row / STREAMS;
-    let quads: &[Quad] = bytemuck::cast_slice(&fill.records.streams[stream][first..]);
+    let first = first * BEATS[stream] + row / STREAMS;
+    let quads: &[Quad] = bytemuck::cast_slice(&records.streams[stream][first..]);
     lanes.transposed(quads, BEATS[stream])
 }
 
@@ -65,23 +74,57 @@ fn store<L: Lanes>(lanes: L, columns: [L::Numbers; 4], words: &mut [Words], at: 
     }
 }
 
+#[inline(always)]
+fn added<N: Numbers>([a, b, c, d]: [N; 4]) -> N {
+    a.with_words(b).with_words(c.with_words(d))
+}
+
 impl Work for Fill<'_> {
     #[inline(always)]
     fn with<L: Lanes>(self, lanes: L) {
-        self.block.put_heads(self.heads);
-        let mut at = 0;
-        while at < LANES {
-            let column = columns(lanes, &self, collision::NORMAL, at);
-            store(lanes, column, &mut self.block.normal, at);
-            let column = columns(lanes, &self, collision::BODY_A, at);
-            store(lanes, column, &mut self.block.position_a, at);
-            let column = columns(lanes, &self, collision::BODY_B, at);
-            store(lanes, column, &mut self.block.position_b, at);
-            for contact in 0..self.block.contacts.len() {
-                let column = columns(lanes, &self, collision::CONTACTS + contact, at);
-                store(lanes, column, &mut self.block.contacts[contact], at);
+        let Self { records, first, kinds, blocks, sums } = self;
+        let apart = lanes.splat(f32::from_bits(ROWS_APART));
+        let sums = sums.as_chunks_mut::<LANES>().0;
+        for (number, ((block, kinds), sums)) in blocks.iter_mut().zip(kinds).zip(sums).enumerate() {
+            block.begin(kinds);
+            let mut at = 0;
+            while at < LANES {
+                let row = |row| columns(lanes, records, first + number * LANES + at, row);
+                let normal = row(collision::NORMAL);
+                store(lanes, normal, &mut block.normal, at);
+                let [body_a, body_b] = [row(collision::BODY_A), row(collision::BODY_B)];
+                store(lanes, body_a, &mut block.position_a, at);
+                store(lanes, body_b, &mut block.position_b, at);
+                for (rows, body) in block.rows.iter_mut().zip([body_a, body_b]) {
+                    let rows = bytemuck::cast_mut(rows);
+                    lanes.store(body[WORD_LANE].with_words(apart), rows, at);
+                }
+                let mut sum = added(normal).with_words(added(body_a)).with_words(added(body_b));
+                for (contact, words) in block.contacts.iter_mut().enumerate() {
+                    let contact = row(collision::CONTACTS + contact);
+                    store(lanes, contact, words, at);
+                    sum = sum.with_words(added(contact));
+                }
+                lanes.store(sum, bytemuck::cast_mut(sums), at);
+                at += L::WIDTH;
             }
-            at += L::WIDTH;
+        }
+    }
+}
+
+impl Fill<'_> {
+    /// The same, one record after the other.
+    pub(super) fn one_by_one(self) {
+        let Self { records, mut first, kinds, blocks, sums } = self;
+        let sums = sums.as_chunks_mut::<LANES>().0;
+        for ((block, kinds), sums) in blocks.iter_mut().zip(kinds).zip(sums) {
+            *block = Block::EMPTY;
+            for (lane, (kind, sum_of)) in kinds.iter().zip(sums).enumerate() {
+                let rows = records.rows(first + lane);
+                block.put(lane, &rows, *kind);
+                *sum_of = sum(&rows);
+            }
+            first += LANES;
         }
     }
 }

@@ -64,6 +64,12 @@ fn zero(numbers: __m256) -> __m256 {
     _mm256_cmp_ps::<_CMP_EQ_OQ>(numbers, _mm256_setzero_ps())
 }
 
+#[inline]
+#[target_feature(enable = "avx2")]
+fn words_added(a: __m256, b: __m256) -> __m256 {
+    _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)))
+}
+
 impl Neg for Eight {
     type Output = Self;
 
@@ -118,6 +124,12 @@ impl Numbers for Eight {
     fn or(self, mask: EightMask, other: Self) -> Self {
         // SAFETY: numbers are made where the processor has AVX2.
         Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })
+    }
+
+    #[inline(always)]
+    fn with_words(self, other: Self) -> Self {
+        // SAFETY: numbers are made where the processor has AVX2.
+        Self(unsafe { words_added(self.0, other.0) })
     }
 }
 

@@ -59,6 +59,12 @@ fn zero(numbers: __m512) -> __mmask16 {
     _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(numbers, _mm512_setzero_ps())
 }
 
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn words_added(a: __m512, b: __m512) -> __m512 {
+    _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)))
+}
+
 impl Neg for Sixteen {
     type Output = Self;
 
@@ -113,6 +119,12 @@ impl Numbers for Sixteen {
     fn or(self, mask: SixteenMask, other: Self) -> Self {
         // SAFETY: numbers are made where the processor has AVX-512F.
         Self(unsafe { _mm512_mask_blend_ps(mask.0, other.0, self.0) })
+    }
+
+    #[inline(always)]
+    fn with_words(self, other: Self) -> Self {
+        // SAFETY: numbers are made where the processor has AVX-512F.
+        Self(unsafe { words_added(self.0, other.0) })
     }
 }
 

@@ -61,6 +61,9 @@ pub(super) trait Numbers:
 
     /// These where the mask says yes, and `other` elsewhere.
     fn or(self, mask: Self::Mask, other: Self) -> Self;
+
+    /// Their words added as whole numbers that wrap.
+    fn with_words(self, other: Self) -> Self;
 }
 
 /// Yes or no in each lane.

@@ -90,6 +90,12 @@ impl Numbers for Four {
         // SAFETY: the target has NEON, asserted above.
         Self(unsafe { vbslq_f32(mask.0, self.0, other.0) })
     }
+
+    #[inline(always)]
+    fn with_words(self, other: Self) -> Self {
+        // SAFETY: the target has NEON, asserted above.
+        Self(unsafe { words_added(self.0, other.0) })
+    }
 }
 
 impl Mask for FourMask {
@@ -123,6 +129,12 @@ impl Mask for FourMask {
         // SAFETY: the target has NEON, asserted above.
         unsafe { bits(self.0) }
     }
+}
+
+#[inline]
+#[target_feature(enable = "neon")]
+fn words_added(a: float32x4_t, b: float32x4_t) -> float32x4_t {
+    vreinterpretq_f32_u32(vaddq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b)))
 }
 
 /// Rows for columns.

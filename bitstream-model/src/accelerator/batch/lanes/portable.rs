@@ -94,6 +94,12 @@ impl Numbers for Four {
         let either = |lane: usize| if mask.0[lane] { self.0[lane] } else { other.0[lane] };
         Self(std::array::from_fn(either))
     }
+
+    #[inline(always)]
+    fn with_words(self, other: Self) -> Self {
+        let sum = |lane: usize| self.0[lane].to_bits().wrapping_add(other.0[lane].to_bits());
+        Self(std::array::from_fn(|lane| f32::from_bits(sum(lane))))
+    }
 }
 
 impl Mask for FourMask {
