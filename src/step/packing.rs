@@ -10,7 +10,7 @@ use crate::beat::pack::{
     Chosen, Entries, Target, pack_bodies, pack_collisions, pack_poses, pack_velocities, survey,
 };
 use crate::order::Lives;
-use crate::record::end::Ends;
+use crate::record::end::{Ends, Survey};
 use crate::scene::validate::Quick;
 use crate::scene::{Bodies, Collisions, Shape};
 
@@ -62,11 +62,11 @@ impl Device {
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
         let target = Target { variant: &plan.variant, shapes, quick };
-        let ends = &mut self.ends;
+        let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, bodies_good) = match lives {
-            None => pack_bodies(target, bodies, plan.bodies, ends, velocities, poses),
+            None => pack_bodies(target, bodies, plan.bodies, into, velocities, poses),
             Some(lives) => {
-                let good = survey(target, bodies, bodies.len(), ends);
+                let good = survey(target, bodies, bodies.len(), into);
                 let chosen = Chosen { bodies, order: lives.velocities() };
                 let velocities = pack_velocities(target, &chosen, plan.bodies, velocities);
                 let chosen = Chosen { bodies, order: lives.results() };
@@ -80,7 +80,7 @@ impl Device {
             words: lives.map(Lives::words),
         };
         let (collisions, good) =
-            pack_collisions(target, Ends(ends), &of_entries, &mut entries[active]);
+            pack_collisions(target, Ends(&self.ends), &of_entries, &mut entries[active]);
         (Sent { velocities, collisions, poses }, bodies_good & good)
     }
 }
