@@ -103,6 +103,13 @@ impl<'a> Collector<'a> {
     #[inline]
     fn groups<'c, const G: usize>(&mut self, beats: &'c mut [Beat]) -> &'c mut [Beat] {
         let (groups, rest) = beats.as_chunks_mut::<G>();
+        if self.deal.one_a_channel() && self.channels.len() == G {
+            let from = std::array::from_fn(|channel| {
+                &self.channels[channel][self.deal.take(channel, groups.len())]
+            });
+            one_each(from, groups, &mut self.sum);
+            return rest;
+        }
         for (channel, from) in self.channels.iter().enumerate() {
             let (places, share) = places::<G>(self.deal.group(), channel);
             let from = &from[self.deal.take(channel, groups.len() * share)];
@@ -133,6 +140,21 @@ impl<'a> Collector<'a> {
         }
         total(self.sum)
     }
+}
+
+/// Reads groups of which each channel has one beat, in the order of the channels.
+#[inline]
+fn one_each<const G: usize>(from: [&[Beat]; G], groups: &mut [[Beat; G]], sum: &mut Lanes) {
+    // Said once here, so that it is not asked of every beat.
+    let from = from.map(|beats| &beats[..groups.len()]);
+    let mut total = *sum;
+    for (at, group) in groups.iter_mut().enumerate() {
+        for (beat, from) in group.iter_mut().zip(from) {
+            *beat = from[at];
+            total = total.plus(Lanes::from(from[at]));
+        }
+    }
+    *sum = total;
 }
 
 /// Reads the `S` beats of each group that one channel has, and adds them up.
