@@ -6,10 +6,11 @@ use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
 use crate::beat::pack::{Entries, Target, pack_bodies, pack_collisions, survey};
 use crate::beat::stripe::Segment;
-use crate::record::end::{End, Ends};
+use crate::beat::unpack::Record;
+use crate::record::end::{End, Ends, Survey};
 use crate::scene::validate::{Limits, Quick, preflight};
-use crate::scene::{Bodies, Collisions, InputError, Pose, Shape, StepParameters, Velocity};
-use crate::step::Results;
+use crate::scene::{Bodies, Collisions, InputError, Shape, StepParameters};
+use crate::step::{Results, commit};
 
 /// Packs collisions as a step does, into memory of its own instead of a board's.
 #[derive(Debug)]
@@ -17,13 +18,14 @@ pub struct CollisionPacker {
     variant: Variant,
     channels: [Vec<Beat>; DMA_COUNT_MAX],
     ends: Vec<End>,
+    statics: Vec<u32>,
 }
 
 impl CollisionPacker {
     /// For one bitstream; without memory of its own yet.
     #[must_use]
     pub fn new(variant: Variant) -> Self {
-        Self { variant, channels: Default::default(), ends: Vec::new() }
+        Self { variant, channels: Default::default(), ends: Vec::new(), statics: Vec::new() }
     }
 
     /// Packs the records of all collisions over the bitstream's channels; returns the sum of their
@@ -44,7 +46,8 @@ impl CollisionPacker {
         let mut channels = self.channels.each_mut().map(Vec::as_mut_slice);
         let channels = &mut channels[..streams];
         let target = Target { variant: &self.variant, shapes, quick: None };
-        survey(target, bodies, bodies.len(), &mut self.ends);
+        let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
+        survey(target, bodies, bodies.len(), into);
         let entries = Entries { collisions, count, scheduled: false, words: None };
         pack_collisions(target, Ends(&self.ends), &entries, channels).0
     }
@@ -58,6 +61,7 @@ pub struct StepPacker {
     collisions: [Vec<Beat>; DMA_COUNT_MAX],
     poses: [Vec<Beat>; DMA_COUNT_MAX],
     ends: Vec<End>,
+    statics: Vec<u32>,
 }
 
 impl StepPacker {
@@ -79,6 +83,7 @@ impl StepPacker {
             collisions: Default::default(),
             poses: Default::default(),
             ends: Vec::new(),
+            statics: Vec::new(),
         }
     }
 
@@ -138,9 +143,9 @@ impl StepPacker {
         let velocities = &mut channels(&mut self.velocities, Segment::Velocities, count, target);
         let poses = &mut channels(&mut self.poses, Segment::Poses, count, target);
         let active = ..target.variant.profile.mm2s_widths.len();
-        let ends = &mut self.ends;
+        let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
         let (velocities, poses, good) =
-            pack_bodies(target, bodies, count, ends, &mut velocities[active], &mut poses[active]);
+            pack_bodies(target, bodies, count, into, &mut velocities[active], &mut poses[active]);
         (velocities.wrapping_add(poses), good)
     }
 
@@ -163,21 +168,27 @@ impl StepPacker {
 pub struct Unpacker {
     variant: Variant,
     channels: [Vec<Beat>; DMA_COUNT_MAX],
-    states: Vec<(Pose, Velocity)>,
+    statics: Vec<u32>,
+    spare: Vec<Record>,
 }
 
 impl Unpacker {
-    /// For one bitstream and so many bodies, whose results are all the same finite numbers.
+    /// For one bitstream and these bodies, whose results are all the same finite numbers. Packing
+    /// them remembers which never move; it is done here.
     #[must_use]
-    pub fn new(variant: Variant, bodies: usize) -> Self {
+    pub fn new<B: Bodies + ?Sized>(variant: Variant, bodies: &B, shapes: &[Shape]) -> Self {
         let layout = Segment::Results.layout(&variant);
         let mut channels: [Vec<Beat>; DMA_COUNT_MAX] = Default::default();
         for (place, channel) in channels.iter_mut().enumerate() {
             // 1 in f32; 1.875 and 0 in sixteen bits.
             let one = Beat([0x3F80_0000; 4]);
-            channel.resize(layout.beats_on_channel(bodies, place), one);
+            channel.resize(layout.beats_on_channel(bodies.len(), place), one);
         }
-        Self { variant, channels, states: Vec::new() }
+        let (mut ends, mut statics) = (Vec::new(), Vec::new());
+        let target = Target { variant: &variant, shapes, quick: None };
+        let into = Survey { ends: &mut ends, statics: &mut statics };
+        survey(target, bodies, bodies.len(), into);
+        Self { variant, channels, statics, spare: Vec::new() }
     }
 
     /// Bytes of the results.
@@ -188,21 +199,18 @@ impl Unpacker {
 
     /// Reads and checks the results of all bodies; returns the sum of their words, modulo 2^32, or
     /// `None` if something is not finite.
-    pub fn unpack<B: Bodies + ?Sized>(&mut self, bodies: &B, shapes: &[Shape]) -> Option<u32> {
+    pub fn unpack<B: Bodies + ?Sized>(&mut self, bodies: &B) -> Option<u32> {
         let layout = Segment::Results.layout(&self.variant);
         let channels = self.channels.each_ref().map(Vec::as_slice);
         let active = ..self.variant.profile.s2mm_widths.len();
-        self.states.clear();
         let results = Results { layout: &layout, channels: &channels[active] };
-        let (sum, broken) = results.in_turn(bodies.len(), bodies, shapes, &mut self.states);
+        let (sum, broken) = results.in_turn(bodies.len(), bodies, &self.statics, &mut self.spare);
         broken.is_none().then_some(sum)
     }
 
     /// Stores what was read last with the bodies.
     pub fn commit<B: Bodies + ?Sized>(&self, bodies: &mut B) {
-        for (index, (pose, velocity)) in self.states.iter().enumerate() {
-            bodies.commit(index, *pose, *velocity);
-        }
+        commit(&self.spare, bodies);
     }
 }
 
@@ -225,7 +233,7 @@ fn channels<'a>(
 mod tests {
     use super::*;
     use crate::interface::profile::FLOAT;
-    use crate::scene::{Body, Collision, Contact};
+    use crate::scene::{Body, Collision, Contact, Pose, Velocity};
 
     #[test]
     fn every_collision_is_packed() {

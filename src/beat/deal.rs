@@ -4,27 +4,22 @@
 //! the other, each a run of whole beats upwards, as memory that combines writes wants them. Nothing
 //! is read back: the sum that the accelerator is checked with is taken on the way.
 
-use bitstream_model::interface::record::{BEAT_BYTES, Beat, LANES};
+use bitstream_model::interface::record::Beat;
 
 use super::stripe::{Deal, Layout, Place};
-use super::unpack::{add, total};
-use crate::platform::{Slots, Streamed};
+use super::unpack::total;
+use crate::platform::Lanes;
 
 /// Records of a block. Divisible by the records of a group of every stripe, so that each block
 /// begins with a group; and so few that a block, read and written, lies in the innermost cache.
-pub(super) const BLOCK: usize = 30;
-
-/// Beats from which on a segment goes past the caches: what has more than 2 MiB is not in them any
-/// more when the device reads it. Tests have both ways with few records.
-const STREAMED: usize = if cfg!(test) { 64 } else { (2 << 20) / BEAT_BYTES };
+pub(crate) const BLOCK: usize = 30;
 
 /// Writes the beats of one segment.
 pub(super) struct Dealer<'a, 'b> {
-    channels: Streamed<'a, 'b>,
+    channels: &'a mut [&'b mut [Beat]],
     deal: Deal,
     padded: bool,
-    lanes: [u32; LANES],
-    past_caches: bool,
+    sum: Lanes,
 }
 
 impl<'a, 'b> Dealer<'a, 'b> {
@@ -32,13 +27,11 @@ impl<'a, 'b> Dealer<'a, 'b> {
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
     pub(super) fn new(layout: &Layout, channels: &'a mut [&'b mut [Beat]]) -> Self {
-        let beats: usize = channels.iter().map(|beats| beats.len()).sum();
         Self {
-            channels: Streamed::new(channels),
+            channels,
             deal: Deal::new(layout.stripe),
             padded: layout.stripe.padded,
-            lanes: [0; LANES],
-            past_caches: beats > STREAMED,
+            sum: Lanes::all(0),
         }
     }
 
@@ -57,8 +50,8 @@ impl<'a, 'b> Dealer<'a, 'b> {
         };
         for beat in rest {
             let Place { channel, slot } = self.deal.next();
-            self.channels.put(channel, slot, *beat);
-            add(&mut self.lanes, *beat);
+            self.channels[channel][slot] = *beat;
+            self.sum = self.sum.plus(Lanes::from(*beat));
         }
     }
 
@@ -66,26 +59,22 @@ impl<'a, 'b> Dealer<'a, 'b> {
     #[inline]
     fn groups<'c, const G: usize>(&mut self, beats: &'c [Beat]) -> &'c [Beat] {
         let (groups, rest) = beats.as_chunks::<G>();
-        for channel in 0..self.channels.len() {
+        for (channel, to) in self.channels.iter_mut().enumerate() {
             let (places, share) = places::<G>(self.deal.group(), channel);
-            let slots = self.deal.take(channel, groups.len() * share);
-            let to = self.channels.slots(channel, slots);
-            let lanes = &mut self.lanes;
-            match (share, self.past_caches) {
-                (0, _) => {}
-                (1, false) => run::<G, 1, false>(groups, places, to, lanes),
-                (1, true) => run::<G, 1, true>(groups, places, to, lanes),
-                (2, false) => run::<G, 2, false>(groups, places, to, lanes),
-                (2, true) => run::<G, 2, true>(groups, places, to, lanes),
-                (3, false) => run::<G, 3, false>(groups, places, to, lanes),
-                (3, true) => run::<G, 3, true>(groups, places, to, lanes),
+            let to = &mut to[self.deal.take(channel, groups.len() * share)];
+            let sum = &mut self.sum;
+            match share {
+                0 => {}
+                1 => run::<G, 1>(groups, places, to, sum),
+                2 => run::<G, 2>(groups, places, to, sum),
+                3 => run::<G, 3>(groups, places, to, sum),
                 _ => {
-                    let places = &places[..share];
-                    let beats = groups.iter().flat_map(|group| places.iter().map(|at| group[*at]));
-                    to.write::<1, false>(beats.map(|beat| {
-                        add(lanes, beat);
-                        [beat]
-                    }));
+                    let beats =
+                        groups.iter().flat_map(|group| places[..share].iter().map(|at| group[*at]));
+                    for (to, beat) in to.iter_mut().zip(beats) {
+                        *to = beat;
+                        *sum = sum.plus(Lanes::from(beat));
+                    }
                 }
             }
         }
@@ -97,7 +86,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
         while self.padded && !self.deal.at_end_of_group() {
             self.write(&[Beat::default()]);
         }
-        total(self.lanes)
+        total(self.sum)
     }
 }
 
@@ -115,19 +104,19 @@ pub(super) fn places<const G: usize>(group: &[u8], channel: usize) -> ([usize; G
 
 /// Writes the `S` beats of each group that go to one channel, and adds them up.
 #[inline]
-fn run<const G: usize, const S: usize, const PAST_CACHES: bool>(
+fn run<const G: usize, const S: usize>(
     groups: &[[Beat; G]],
     places: [usize; G],
-    to: Slots<'_>,
-    lanes: &mut [u32; LANES],
+    to: &mut [Beat],
+    sum: &mut Lanes,
 ) {
     // Said once here, so that it is not asked of every beat.
     let places: [usize; S] = std::array::from_fn(|at| places[at % G].min(G - 1));
-    let mut sum = *lanes;
-    to.write::<S, PAST_CACHES>(groups.iter().map(|group| {
-        let beats = places.map(|place| group[place]);
-        beats.iter().for_each(|beat| add(&mut sum, *beat));
-        beats
-    }));
-    *lanes = sum;
+    let mut total = *sum;
+    for (to, group) in to.as_chunks_mut::<S>().0.iter_mut().zip(groups) {
+        let beats = places.map(|place| Lanes::from(group[place]));
+        total = beats.iter().fold(total, |total, beat| total.plus(*beat));
+        *to = beats.map(Beat::from);
+    }
+    *sum = total;
 }

@@ -10,7 +10,7 @@ use crate::interface::profile::{
 };
 use crate::interface::record::Beat;
 use crate::order::{Ordered, Schedule};
-use crate::record::end::Ends;
+use crate::record::end::{End, Ends, Survey};
 use crate::scene::validate::{Limits, Quick, preflight, validate};
 use crate::scene::{Body, Collision, Contact, InputError, Pose, Shape, StepParameters, Velocity};
 
@@ -169,7 +169,7 @@ fn said(
     let quick = Quick::new(scene);
     let variant = &limits.variant;
     let target = Target { variant, shapes, quick: Some(&quick) };
-    let mut ends = Vec::new();
+    let (mut ends, mut statics) = (Vec::new(), Vec::new());
     let count = bodies.len();
     let mut velocities = buffers(variant, Segment::Velocities, count);
     let mut poses = buffers(variant, Segment::Poses, count);
@@ -177,11 +177,18 @@ fn said(
         target,
         bodies,
         count,
-        &mut ends,
+        Survey { ends: &mut ends, statics: &mut statics },
         &mut views(&mut velocities),
         &mut views(&mut poses),
     );
-    assert_eq!(survey(target, bodies, count, &mut Vec::new()), bodies_good);
+    let moves =
+        |body: &Body| shapes.get(body.shape as usize).is_some_and(|shape| !shape.is_static());
+    let still = (0..).zip(bodies).filter(|(_, body)| !moves(body)).map(|(at, _)| at);
+    assert_eq!(statics, still.collect::<Vec<u32>>());
+    let (mut other_ends, mut other_statics) = (vec![End::MISSING], vec![7]);
+    let into = Survey { ends: &mut other_ends, statics: &mut other_statics };
+    assert_eq!(survey(target, bodies, count, into), bodies_good);
+    assert_eq!((other_ends.len(), other_statics), (ends.len(), statics));
     let good = match schedule {
         None => {
             let count = collisions.len();

@@ -15,8 +15,9 @@ use bitstream_model::interface::record::{Beat, pose, relative, velocity};
 use super::deal::{BLOCK, Dealer};
 use super::stage::Stage;
 use super::stripe::Segment;
+use crate::platform::prefetch;
 use crate::record;
-use crate::record::end::{End, Ends};
+use crate::record::end::{End, Ends, Survey};
 use crate::scene::validate::{Block, Quick, head};
 use crate::scene::{
     Bodies, Body, CONTACT_POINTS, Collision, Collisions, Contact, Pose, Shape, Velocity,
@@ -44,20 +45,20 @@ pub(crate) struct Entries<'a, C: ?Sized> {
     pub(crate) words: Option<&'a [[u32; 2]]>,
 }
 
-/// Looks at all bodies and remembers what their collisions' records are made from; whether
-/// validation refuses none.
+/// Looks at all bodies and remembers what their collisions' records are made from, and which never
+/// move; whether validation refuses none.
 pub(crate) fn survey<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
     count: usize,
-    ends: &mut Vec<End>,
+    mut into: Survey<'_>,
 ) -> bool {
-    ends.clear();
+    into.clear();
     let mut block = [NOBODY; BLOCK];
     let mut good = true;
     for first in (0..count).step_by(BLOCK) {
         let bodies = read(bodies, first, count, &mut block);
-        good &= target.survey(first, bodies, ends);
+        good &= target.survey(first, bodies, &mut into);
     }
     good
 }
@@ -71,18 +72,18 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
     count: usize,
-    ends: &mut Vec<End>,
+    mut into: Survey<'_>,
     velocities: &mut [&mut [Beat]],
     poses: &mut [&mut [Beat]],
 ) -> (u32, u32, bool) {
-    ends.clear();
+    into.clear();
     let mut velocities = Velocities::new(target, velocities);
     let mut poses = Poses::new(target, poses);
     let mut block = [NOBODY; BLOCK];
     let mut good = true;
     for first in (0..count).step_by(BLOCK) {
         let bodies = read(bodies, first, count, &mut block);
-        good &= target.survey(first, bodies, ends);
+        good &= target.survey(first, bodies, &mut into);
         velocities.write(bodies);
         poses.write(bodies);
     }
@@ -136,9 +137,7 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
 ) -> (u32, bool) {
     match target.variant.profile.geometry {
         Geometry::Absolute => {
-            let encode = |_, it: &Collision, [a, b]: [End; 2]| {
-                record::collision::encode(it, a.position, b.position)
-            };
+            let encode = |_, it: &Collision, ends: [End; 2]| record::collision::encode(it, ends);
             let integers = &record::collision::INTEGERS;
             let look = |quick: &Quick<'_>, block: &Block<'_>, records: &[_]| {
                 quick.absolute(block, records)
@@ -156,6 +155,9 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
         }
     }
 }
+
+/// Collisions that are fetched ahead of the one that is read.
+const AHEAD: usize = 16;
 
 /// Reads, encodes, looks at and deals out collisions, a block at a time.
 #[inline]
@@ -178,18 +180,23 @@ fn pack_entries<C: Collisions + ?Sized, const ROWS: usize>(
     for first in (0..count).step_by(BLOCK) {
         let block = &mut block[..(count - first).min(BLOCK)];
         let block = match structures.and_then(|all| all.get(first..first + block.len())) {
-            Some(block) => block,
+            Some(block) => {
+                let ahead = structures.and_then(|all| all.get(first + block.len() + AHEAD..));
+                ahead.into_iter().flatten().take(block.len()).for_each(prefetch);
+                block
+            }
             None => {
-                for (at, to) in block.iter_mut().enumerate() {
-                    *to = collisions.collision(first + at);
+                for (index, to) in (first..).zip(&mut *block) {
+                    // They lie anywhere: on their way while those before them are dealt with.
+                    if scheduled && index + AHEAD < count {
+                        collisions.soon(index + AHEAD);
+                    }
+                    *to = collisions.collision(index);
+                    ends.soon([to.body_a, to.body_b]);
                 }
                 block
             }
         };
-        if scheduled {
-            // They lie anywhere: on their way while this block is dealt with.
-            (first + BLOCK..count).take(BLOCK).for_each(|next| collisions.soon(next));
-        }
         let block = Block { first, collisions: block, ends, scheduled, heads: true };
         good &=
             pack_block(target.quick, block, integers, (&mut stage, &mut dealer), &encode, &look);
@@ -209,14 +216,20 @@ pub(super) fn pack_block<const ROWS: usize>(
 ) -> bool {
     let Block { first, collisions, ends, scheduled, .. } = block;
     let records = stage.records(collisions.len());
-    for (at, (to, from)) in records.iter_mut().zip(collisions).enumerate() {
-        let of_both = [ends.get(from.body_a), ends.get(from.body_b)];
-        if quick.is_some() {
-            block.heads &= head(from, of_both, scheduled);
+    let of_both = |from: &Collision| [from.body_a, from.body_b].map(|body| ends.get(body));
+    let from = collisions.iter().map(|from| (from, of_both(from)));
+    let mut good = true;
+    if let Some(quick) = quick {
+        for (at, (to, (from, ends))) in records.iter_mut().zip(from).enumerate() {
+            block.heads &= head(from, ends, scheduled);
+            *to = encode(first + at, from, ends);
         }
-        *to = encode(first + at, from, of_both);
+        good = look(quick, &block, records);
+    } else {
+        for (at, (to, (from, ends))) in records.iter_mut().zip(from).enumerate() {
+            *to = encode(first + at, from, ends);
+        }
     }
-    let good = quick.is_none_or(|quick| look(quick, &block, records));
     stage.deal(collisions.len(), integers, dealer);
     good
 }
@@ -230,20 +243,19 @@ const REFUSED: [u32; 2] = [u32::MAX; 2];
 /// were made and has none now would shift all bodies behind it: it is sent as one to be refused.
 #[inline(always)]
 pub(super) fn relative_record(
-    [a, b]: [End; 2],
+    ends: [End; 2],
     words: Option<&[[u32; 2]]>,
     index: usize,
     collision: &Collision,
 ) -> [Beat; relative::ROWS] {
-    let moves = [!a.is_static(), !b.is_static()];
-    let [a, b] = record::relative::anchors([a.position, b.position], moves);
-    let Some(words) = words else { return record::relative::encode(collision, a, b) };
+    let ends = record::relative::anchors(ends, ends.map(|end| !end.is_static()));
+    let Some(words) = words else { return record::relative::encode(collision, ends) };
     let (mut collision, mut words) = (*collision, words[index]);
     if collision.count == 0 && words != [0; 2] {
         (collision.count, words) = (1, REFUSED);
     }
     [collision.body_a, collision.body_b] = words;
-    record::relative::encode(&collision, a, b)
+    record::relative::encode(&collision, ends)
 }
 
 /// Some of the bodies, in an order of their own: a view of what is packed.
@@ -301,11 +313,11 @@ fn read<'a, B: Bodies + ?Sized>(
 }
 
 impl Target<'_> {
-    /// Remembers the ends of a block of bodies; whether validation refuses none.
+    /// Remembers a block of bodies; whether validation refuses none.
     #[inline]
-    fn survey(&self, first: usize, bodies: &[Body], ends: &mut Vec<End>) -> bool {
-        ends.extend(bodies.iter().map(|body| End::of(body, self.shapes)));
-        self.quick.is_none_or(|quick| quick.bodies(first, bodies, &ends[first..]))
+    fn survey(&self, first: usize, bodies: &[Body], into: &mut Survey<'_>) -> bool {
+        let ends = into.add(bodies, self.shapes);
+        self.quick.is_none_or(|quick| quick.bodies(first, bodies, ends))
     }
 }
 

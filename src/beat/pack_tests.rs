@@ -10,7 +10,7 @@ use crate::interface::profile::{
     FLOAT, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,
 };
 use crate::interface::record::Beat;
-use crate::record::end::Ends;
+use crate::record::end::{Ends, Survey};
 use crate::scene::{
     Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
     Velocity,
@@ -251,8 +251,9 @@ fn entries(
     words: Option<&[[u32; 2]]>,
 ) -> Vec<Vec<Beat>> {
     let count = collisions.len();
-    let mut ends = Vec::new();
-    survey(target(spec), bodies, bodies.len(), &mut ends);
+    let (mut ends, mut statics) = (Vec::new(), Vec::new());
+    let into = Survey { ends: &mut ends, statics: &mut statics };
+    survey(target(spec), bodies, bodies.len(), into);
     let entries = Entries { collisions, count, scheduled: false, words };
     packed(spec, Segment::Collisions, count, |views| {
         pack_collisions(target(spec), Ends(&ends), &entries, views).0

@@ -159,6 +159,11 @@ impl Deal {
         self.group
     }
 
+    /// Whether a group is one beat for each of its channels, in their order.
+    pub(super) fn one_a_channel(&self) -> bool {
+        (0..).zip(self.group).all(|(channel, stream)| channel == *stream)
+    }
+
     /// Takes the next slots of one channel. The caller does so for all channels, and whole groups.
     #[inline]
     pub(super) fn take(&mut self, channel: usize, slots: usize) -> Range<usize> {

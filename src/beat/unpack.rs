@@ -3,84 +3,81 @@
 //! The memory may be slow to read, so each beat is read once: a block of records is collected from
 //! the channels, one after the other, and the sum of what was read is taken on the way.
 
-use bitstream_model::interface::record::{Beat, LANES, result};
+use bitstream_model::interface::record::{Beat, result};
 
-use super::deal::{BLOCK, places};
+pub(crate) use super::deal::BLOCK;
+use super::deal::places;
 use super::stripe::{Deal, Layout, Place};
-use crate::record;
-use crate::record::sixteen::{Row, Sixteen};
-use crate::scene::{Pose, Velocity};
+use crate::platform::Lanes;
+use crate::record::largest::{Largest, MAGNITUDE};
+use crate::record::sixteen::Sixteen;
 
 /// A record of results, in f32.
 pub(crate) type Record = [Beat; result::ROWS];
 
-/// Reads the results of `count` bodies, a block at a time, from the result segments, one a channel;
-/// returns the sum of all their 32-bit words, modulo 2^32: what the accelerator counts of what it
-/// sent.
+/// Reads results, a block at a time, from the result segments, one a channel.
 ///
 /// A number that the accelerator could not hold is not finite.
-///
-/// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
-pub(crate) fn for_each_block(
-    layout: &Layout,
-    channels: &[&[Beat]],
-    count: usize,
-    mut take: impl FnMut(&[Record]),
-) -> u32 {
-    let mut collector = Collector::new(layout, channels);
-    let mut wide = [Record::default(); BLOCK];
-    let mut narrow = [[Beat::default(); result::ROWS]; BLOCK / 2];
-    for first in (0..count).step_by(BLOCK) {
-        let records = &mut wide[..(count - first).min(BLOCK)];
-        match Sixteen::of(layout.format) {
-            None => collector.read(records.as_flattened_mut()),
-            Some(format) => {
-                // Two beats a record: an even number of rows.
-                let beats = &mut narrow.as_flattened_mut()[..records.len() * (result::ROWS / 2)];
-                collector.read(beats);
-                let rows: &[Row] = bytemuck::cast_slice(beats);
-                format.widen(rows, records.as_flattened_mut());
-            }
+pub(crate) struct Reader<'a> {
+    collector: Collector<'a>,
+    format: Option<Sixteen>,
+    narrow: [[Beat; result::ROWS]; BLOCK / 2],
+}
+
+impl<'a> Reader<'a> {
+    /// From the first record on.
+    ///
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+    pub(crate) fn new(layout: &Layout, channels: &'a [&'a [Beat]]) -> Self {
+        Self {
+            collector: Collector::new(layout, channels),
+            format: Sixteen::of(layout.format),
+            narrow: [[Beat::default(); result::ROWS]; BLOCK / 2],
         }
-        take(records);
     }
-    collector.finish()
+
+    /// Reads the next records, at most [`BLOCK`]; only the last may be fewer.
+    #[inline]
+    pub(crate) fn read(&mut self, records: &mut [Record]) {
+        let Some(format) = self.format else {
+            return self.collector.read(records.as_flattened_mut());
+        };
+        // Two beats a record: an even number of rows.
+        let beats = &mut self.narrow.as_flattened_mut()[..records.len() * (result::ROWS / 2)];
+        self.collector.read(beats);
+        format.widen(bytemuck::cast_slice(beats), records.as_flattened_mut());
+    }
+
+    /// The sum of all 32-bit words of the segments, modulo 2^32: what the accelerator counts of what
+    /// it sent.
+    pub(crate) fn finish(self) -> u32 {
+        self.collector.finish()
+    }
 }
 
-/// The new state of a body.
-#[inline]
-pub(crate) fn state(record: &Record) -> (Pose, Velocity) {
-    record::result::decode(record)
-}
-
-/// Whether all numbers of these records are finite. Without a branch per number.
+/// Whether all numbers of these records are finite.
 #[inline]
 pub(crate) fn finite(records: &[Record]) -> bool {
-    const INFINITE: u32 = f32::INFINITY.to_bits();
-    let mut infinite = [false; LANES];
-    for record in records {
-        for (row, Beat(words)) in record.iter().enumerate() {
-            // What lies beside a vec3 is nobody's.
-            let numbers = if row == result::ORIENTATION { LANES } else { LANES - 1 };
-            for (infinite, word) in infinite.iter_mut().zip(words).take(numbers) {
-                *infinite |= word & INFINITE == INFINITE;
-            }
-        }
-    }
-    infinite == [false; LANES]
+    const LARGEST: Largest<{ result::ROWS }> = {
+        let mut beside = [MAGNITUDE; result::ROWS];
+        beside[result::ORIENTATION] = f32::MAX.to_bits();
+        // What lies beside a vec3 is nobody's.
+        Largest::new(f32::MAX, beside)
+    };
+    LARGEST.bound(records)
 }
 
 /// Reads beats in their order.
 struct Collector<'a> {
     channels: &'a [&'a [Beat]],
     deal: Deal,
-    lanes: [u32; LANES],
+    sum: Lanes,
 }
 
 impl<'a> Collector<'a> {
     /// From the first beat on.
     fn new(layout: &Layout, channels: &'a [&'a [Beat]]) -> Self {
-        Self { channels, deal: Deal::new(layout.stripe), lanes: [0; LANES] }
+        Self { channels, deal: Deal::new(layout.stripe), sum: Lanes::all(0) }
     }
 
     /// Reads the next beats.
@@ -98,7 +95,7 @@ impl<'a> Collector<'a> {
         for beat in rest {
             let Place { channel, slot } = self.deal.next();
             *beat = self.channels[channel][slot];
-            add(&mut self.lanes, *beat);
+            self.sum = self.sum.plus(Lanes::from(*beat));
         }
     }
 
@@ -106,19 +103,26 @@ impl<'a> Collector<'a> {
     #[inline]
     fn groups<'c, const G: usize>(&mut self, beats: &'c mut [Beat]) -> &'c mut [Beat] {
         let (groups, rest) = beats.as_chunks_mut::<G>();
+        if self.deal.one_a_channel() && self.channels.len() == G {
+            let from = std::array::from_fn(|channel| {
+                &self.channels[channel][self.deal.take(channel, groups.len())]
+            });
+            one_each(from, groups, &mut self.sum);
+            return rest;
+        }
         for (channel, from) in self.channels.iter().enumerate() {
             let (places, share) = places::<G>(self.deal.group(), channel);
             let from = &from[self.deal.take(channel, groups.len() * share)];
-            let lanes = &mut self.lanes;
+            let sum = &mut self.sum;
             match share {
                 0 => {}
-                1 => run::<G, 1>(from, places, groups, lanes),
-                2 => run::<G, 2>(from, places, groups, lanes),
+                1 => run::<G, 1>(from, places, groups, sum),
+                2 => run::<G, 2>(from, places, groups, sum),
                 _ => {
                     for (from, group) in from.chunks_exact(share).zip(groups.iter_mut()) {
                         for (from, place) in from.iter().zip(places) {
                             group[place] = *from;
-                            add(lanes, *from);
+                            *sum = sum.plus(Lanes::from(*from));
                         }
                     }
                 }
@@ -131,10 +135,26 @@ impl<'a> Collector<'a> {
     fn finish(mut self) -> u32 {
         for (channel, beats) in self.channels.iter().enumerate() {
             let used = self.deal.take(channel, 0).start;
-            beats[used..].iter().for_each(|beat| add(&mut self.lanes, *beat));
+            self.sum =
+                beats[used..].iter().fold(self.sum, |sum, beat| sum.plus(Lanes::from(*beat)));
         }
-        total(self.lanes)
+        total(self.sum)
     }
+}
+
+/// Reads groups of which each channel has one beat, in the order of the channels.
+#[inline]
+fn one_each<const G: usize>(from: [&[Beat]; G], groups: &mut [[Beat; G]], sum: &mut Lanes) {
+    // Said once here, so that it is not asked of every beat.
+    let from = from.map(|beats| &beats[..groups.len()]);
+    let mut total = *sum;
+    for (at, group) in groups.iter_mut().enumerate() {
+        for (beat, from) in group.iter_mut().zip(from) {
+            *beat = from[at];
+            total = total.plus(Lanes::from(from[at]));
+        }
+    }
+    *sum = total;
 }
 
 /// Reads the `S` beats of each group that one channel has, and adds them up.
@@ -143,38 +163,28 @@ fn run<const G: usize, const S: usize>(
     from: &[Beat],
     places: [usize; G],
     groups: &mut [[Beat; G]],
-    lanes: &mut [u32; LANES],
+    sum: &mut Lanes,
 ) {
     // Said once here, so that it is not asked of every beat.
     let places: [usize; S] = std::array::from_fn(|at| places[at % G].min(G - 1));
-    let mut sum = *lanes;
+    let mut total = *sum;
     for (group, from) in groups.iter_mut().zip(from.as_chunks::<S>().0) {
         for (beat, place) in from.iter().zip(places) {
             group[place] = *beat;
-            add(&mut sum, *beat);
+            total = total.plus(Lanes::from(*beat));
         }
     }
-    *lanes = sum;
+    *sum = total;
 }
 
 /// Sum of all 32-bit words, modulo 2^32.
 pub(crate) fn sum_of_words(beats: &[Beat]) -> u32 {
-    let mut lanes = [0_u32; LANES];
-    beats.iter().for_each(|beat| add(&mut lanes, *beat));
-    total(lanes)
-}
-
-/// Adds each word of a beat to its lane's sum.
-#[inline]
-pub(super) fn add(lanes: &mut [u32; LANES], beat: Beat) {
-    for (sum, word) in lanes.iter_mut().zip(beat.0) {
-        *sum = sum.wrapping_add(word);
-    }
+    total(beats.iter().fold(Lanes::all(0), |sum, beat| sum.plus(Lanes::from(*beat))))
 }
 
 /// The lanes' sums in one.
-pub(super) fn total(lanes: [u32; LANES]) -> u32 {
-    lanes.into_iter().fold(0, u32::wrapping_add)
+pub(super) fn total(sum: Lanes) -> u32 {
+    sum.words().into_iter().fold(0, u32::wrapping_add)
 }
 
 #[cfg(test)]
@@ -183,16 +193,16 @@ mod tests {
     use super::*;
     use crate::interface::number::{Numbers, StreamFormat};
     use crate::interface::profile::{HALF, PROFILES, Variant};
+    use crate::record::result::decode;
+    use crate::scene::{Pose, Velocity};
     use proptest::prelude::*;
 
     /// Everything that is read, and the sum.
     fn read(layout: &Layout, channels: &[&[Beat]], count: usize) -> (Vec<(Pose, Velocity)>, u32) {
-        let mut states = Vec::new();
-        let sum = for_each_block(layout, channels, count, |records| {
-            states.extend(records.iter().map(state));
-        });
-        assert_eq!(states.len(), count);
-        (states, sum)
+        let mut reader = Reader::new(layout, channels);
+        let mut records = vec![Record::default(); count];
+        records.chunks_mut(BLOCK).for_each(|block| reader.read(block));
+        (records.iter().map(decode).collect(), reader.finish())
     }
 
     /// Word by word, in 64 bits.

@@ -137,7 +137,7 @@ impl<'a> Writer<'a> {
                 block(),
                 &record::collision::INTEGERS,
                 (stage, dealer),
-                |_, it, [a, b]| record::collision::encode(it, a.position, b.position),
+                |_, it, ends| record::collision::encode(it, ends),
                 |quick, block, records| quick.absolute(block, records),
             ),
             EntryStage::Relative(stage) => pack_block(

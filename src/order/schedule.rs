@@ -42,6 +42,7 @@ impl Schedule {
 
     /// The collision in an entry; `None` if the entry is empty or not there.
     #[must_use]
+    #[inline]
     pub fn get(&self, entry: usize) -> Option<usize> {
         let index = *self.entries.get(entry)?;
         if index == EMPTY { None } else { usize::try_from(index).ok() }

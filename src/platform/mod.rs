@@ -33,6 +33,7 @@
 
 mod access_log;
 mod buffer;
+mod convert;
 mod copy;
 mod dev_mem;
 mod device_tree;
@@ -42,14 +43,15 @@ mod error;
 mod fence;
 mod fpga;
 mod hardware;
+mod lanes;
 mod lock;
 mod mapped;
 mod memory;
 mod pool;
+mod prefetch;
 #[cfg(feature = "emulation")]
 mod remote;
 mod reserved;
-mod stream;
 mod sync_mode;
 mod sysfs;
 mod system;
@@ -65,6 +67,7 @@ use std::time::Duration;
 
 pub use access_log::{AccessKind, RegisterAccess};
 pub(crate) use buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
+pub(crate) use convert::{from_binary16, to_binary16};
 pub use dev_mem::DevMemWindows;
 #[cfg(feature = "emulation")]
 pub(crate) use emulated::EmulatedPlatform;
@@ -73,11 +76,12 @@ pub(crate) use fence::{acquire_from_device, release_to_device};
 pub use fpga::require_bitstream;
 pub use hardware::MemoryChoice;
 pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
+pub(crate) use lanes::Lanes;
 pub(crate) use memory::{DmaMemory, SharedMemory};
+pub(crate) use prefetch::{fetch, prefetch};
 #[cfg(feature = "emulation")]
 pub(crate) use remote::{RemotePlatform, memory_beside};
 pub use reserved::ReservedMemory;
-pub(crate) use stream::{Slots, Streamed, prefetch};
 pub use system::{System, UIO_CLASS};
 pub use u_dma_buf::{Caching, u_dma_buf_names};
 pub use uio::{UioMap, UioNode, uio_nodes};

@@ -1,7 +1,9 @@
 //! This file makes the record of a collision in world coordinates.
 
-use super::vec3_and_word;
+use super::end::End;
+use super::{USED, contact_beat, of_count, vec3_and_word};
 use crate::interface::record::{Beat, CONTACT_POINTS, collision};
+use crate::platform::Lanes;
 use crate::scene::Collision;
 
 /// Rows whose word is an unsigned integer: count and indices.
@@ -22,22 +24,14 @@ pub(crate) const INTEGERS: [bool; collision::ROWS] = {
 ///
 /// Source: interface specification, record table.
 #[inline]
-pub(crate) fn encode(
-    from: &Collision,
-    position_a: [f32; 3],
-    position_b: [f32; 3],
-) -> [Beat; collision::ROWS] {
+pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Beat; collision::ROWS] {
     let mut beats = [Beat::default(); collision::ROWS];
     beats[collision::NORMAL] = vec3_and_word(from.normal, from.count);
-    beats[collision::BODY_A] = vec3_and_word(position_a, from.body_a);
-    beats[collision::BODY_B] = vec3_and_word(position_b, from.body_b);
-    for (ordinal, (contact, beat)) in
-        (0_u32..).zip(from.contacts.iter().zip(&mut beats[collision::CONTACTS..]))
-    {
-        // A mask, not a branch: counts follow no pattern that could be predicted.
-        let used = if ordinal < from.count { u32::MAX } else { 0 };
-        let filled = vec3_and_word(contact.point, contact.distance.to_bits());
-        *beat = Beat(filled.0.map(|word| word & used));
+    beats[collision::BODY_A] = a.with_word(from.body_a);
+    beats[collision::BODY_B] = b.with_word(from.body_b);
+    let contacts = from.contacts.iter().zip(&mut beats[collision::CONTACTS..]);
+    for ((contact, beat), used) in contacts.zip(of_count(&USED, from.count)) {
+        *beat = Lanes::from(contact_beat(contact)).and(used).into();
     }
     beats
 }
@@ -93,7 +87,7 @@ mod tests {
             0x00, 0x00, 0x00, 0x00, // unused
             0x00, 0x00, 0x00, 0x00, // unused
         ];
-        let beats = encode(&collision, [10.0, 11.0, 12.0], [13.0, 14.0, 15.0]);
+        let beats = encode(&collision, [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]].map(End::at));
         assert_eq!(bytemuck::bytes_of(&beats), bytes);
     }
 
@@ -108,7 +102,7 @@ mod tests {
                 count,
                 contacts: [contact; 4],
             };
-            let beats = encode(&collision, [0.0; 3], [0.0; 3]);
+            let beats = encode(&collision, [End::MISSING; 2]);
             for (ordinal, beat) in (0..).zip(&beats[3..]) {
                 assert_eq!(*beat == Beat([0; 4]), ordinal >= count, "count {count}: {ordinal}");
             }

@@ -1,9 +1,14 @@
 //! This file says what the record of a collision takes from either of its bodies.
 
+use bytemuck::{Pod, Zeroable};
+
+use super::beside;
+use crate::interface::record::Beat;
+use crate::platform::{Lanes, fetch};
 use crate::scene::{Body, Shape};
 
 /// A body as a collision's end: sixteen bytes, so that those of a whole scene lie in a cache.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub(crate) struct End {
     /// Centre of mass, m.
@@ -19,6 +24,12 @@ impl End {
     /// Stands in for a body that does not exist.
     pub(crate) const MISSING: Self = Self { position: [0.0; 3], tag: NO_SHAPE };
 
+    /// At a position, without a shape.
+    #[cfg(test)]
+    pub(crate) const fn at(position: [f32; 3]) -> Self {
+        Self { position, ..Self::MISSING }
+    }
+
     /// That of a body. Without a shape it is static.
     #[inline]
     pub(crate) fn of(body: &Body, shapes: &[Shape]) -> Self {
@@ -28,6 +39,14 @@ impl End {
             None => NO_SHAPE,
         };
         Self { position: body.pose.position, tag }
+    }
+
+    /// Its position beside a word.
+    #[inline]
+    pub(crate) fn with_word(self, word: u32) -> Beat {
+        let whole: Beat = bytemuck::cast(self);
+        let vec3 = Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]);
+        Lanes::from(whole).and(vec3).or(beside(word)).into()
     }
 
     /// Whether it never moves.
@@ -50,15 +69,53 @@ impl End {
     }
 }
 
+/// What is remembered of the bodies of a step while they are packed. Kept, so that a step allocates
+/// nothing.
+#[derive(Debug)]
+pub(crate) struct Survey<'a> {
+    /// What the records of collisions take of each.
+    pub(crate) ends: &'a mut Vec<End>,
+    /// Indices of those that never move, upwards.
+    pub(crate) statics: &'a mut Vec<u32>,
+}
+
+impl Survey<'_> {
+    /// Nothing yet.
+    pub(crate) fn clear(&mut self) {
+        self.ends.clear();
+        self.statics.clear();
+    }
+
+    /// Adds the next bodies; returns their ends.
+    #[inline]
+    pub(crate) fn add(&mut self, bodies: &[Body], shapes: &[Shape]) -> &[End] {
+        let first = self.ends.len();
+        self.ends.extend(bodies.iter().map(|body| End::of(body, shapes)));
+        let added = &self.ends[first..];
+        // No bitstream has more bodies than u32 counts.
+        let still = (first..).zip(added).filter(|(_, end)| end.is_static());
+        self.statics.extend(still.filter_map(|(at, _)| u32::try_from(at).ok()));
+        added
+    }
+}
+
 /// The ends of all bodies of a step, to look up.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ends<'a>(pub(crate) &'a [End]);
 
 impl Ends<'_> {
+    /// Says that those of these bodies are asked for soon.
+    #[inline]
+    pub(crate) fn soon(self, bodies: [u32; 2]) {
+        for body in bodies {
+            fetch(self.0.as_ptr().wrapping_add(body as usize));
+        }
+    }
+
     /// That of one body.
     #[inline]
     pub(crate) fn get(self, body: u32) -> End {
         let end = usize::try_from(body).ok().and_then(|body| self.0.get(body));
-        end.copied().unwrap_or(End::MISSING)
+        *end.unwrap_or(&End::MISSING)
     }
 }

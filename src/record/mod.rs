@@ -8,6 +8,7 @@
 pub(crate) mod collision;
 pub(crate) mod end;
 pub(crate) mod inertia;
+pub(crate) mod largest;
 pub(crate) mod pose;
 pub(crate) mod relative;
 pub(crate) mod result;
@@ -15,24 +16,73 @@ pub(crate) mod sixteen;
 mod thesis16;
 pub(crate) mod velocity;
 
-use crate::interface::record::{Beat, WORD_LANE};
+use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
+use crate::platform::Lanes;
+use crate::scene::Contact;
 
 /// A vec3 and the word beside it.
+#[inline]
 fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Beat {
     Beat([x.to_bits(), y.to_bits(), z.to_bits(), word])
 }
 
 /// Four numbers, one a lane.
+#[inline]
 fn vec4(value: [f32; 4]) -> Beat {
     Beat(value.map(f32::to_bits))
 }
 
+/// A contact point beside its distance.
+#[inline]
+fn contact_beat(contact: &Contact) -> Beat {
+    vec3_and_word(contact.point, contact.distance.to_bits())
+}
+
+/// What stands for the contact points of a collision: where one is used, else where it is not.
+///
+/// A table by the number of points that are used, not a branch: counts follow no pattern that could
+/// be predicted.
+const fn by_count(used: Beat, unused: Beat) -> [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] {
+    let mut rows = [[unused; CONTACT_POINTS]; CONTACT_POINTS + 1];
+    let mut count = 0;
+    while count <= CONTACT_POINTS {
+        let mut ordinal = 0;
+        while ordinal < count {
+            rows[count][ordinal] = used;
+            ordinal += 1;
+        }
+        count += 1;
+    }
+    rows
+}
+
+/// The bits of the contact points that are used.
+static USED: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
+    by_count(Beat([u32::MAX; LANES]), Beat([0; LANES]));
+
+/// The row of such a table.
+#[inline]
+fn of_count(
+    table: &[[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1],
+    count: u32,
+) -> [Lanes; CONTACT_POINTS] {
+    table[(count as usize).min(CONTACT_POINTS)].map(Lanes::from)
+}
+
+/// Zeros, and the word beside them.
+#[inline]
+fn beside(word: u32) -> Lanes {
+    Lanes::new([0, 0, 0, word])
+}
+
 /// The vec3 of a beat, whatever the word beside it.
+#[inline]
 fn to_vec3(Beat([x, y, z, _]): Beat) -> [f32; 3] {
     [f32::from_bits(x), f32::from_bits(y), f32::from_bits(z)]
 }
 
 /// The four numbers of a beat.
+#[inline]
 fn to_vec4(beat: Beat) -> [f32; 4] {
     beat.0.map(f32::from_bits)
 }

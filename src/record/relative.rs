@@ -1,7 +1,9 @@
 //! This file makes the record of a collision relative to body A.
 
-use super::vec3_and_word;
-use crate::interface::record::{Beat, CONTACT_POINTS, relative};
+use super::end::End;
+use super::{USED, beside, by_count, contact_beat, of_count, vec3_and_word};
+use crate::interface::record::{Beat, CONTACT_POINTS, LANES, relative};
+use crate::platform::Lanes;
 use crate::scene::Collision;
 
 /// Rows whose word is an unsigned integer: the indices.
@@ -12,8 +14,9 @@ pub(crate) const INTEGERS: [bool; relative::ROWS] = {
     integers
 };
 
-/// The distance that marks a contact point which is not there.
-const UNUSED: u32 = f32::INFINITY.to_bits();
+/// The distance that marks a contact point which is not there, where one is not.
+static FAR: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
+    by_count(Beat([0; LANES]), Beat([0, 0, 0, f32::INFINITY.to_bits()]));
 
 /// The collision record: normal, offset from body A to body B, contact points from body A.
 ///
@@ -24,22 +27,18 @@ const UNUSED: u32 = f32::INFINITY.to_bits();
 ///
 /// Source: interface specification, record table.
 #[inline]
-pub(crate) fn encode(
-    from: &Collision,
-    position_a: [f32; 3],
-    position_b: [f32; 3],
-) -> [Beat; relative::ROWS] {
+pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Beat; relative::ROWS] {
     let mut beats = [Beat::default(); relative::ROWS];
+    let [a, b] = [a, b].map(|end| Lanes::from(end.with_word(0)));
     beats[relative::NORMAL] = vec3_and_word(from.normal, from.body_a);
-    beats[relative::OFFSET] = vec3_and_word(difference(position_b, position_a), from.body_b);
-    for (ordinal, (contact, beat)) in
-        (0_u32..).zip(from.contacts.iter().zip(&mut beats[relative::CONTACTS..]))
-    {
-        // A mask, not a branch: counts follow no pattern that could be predicted.
-        let used = if ordinal < from.count { u32::MAX } else { 0 };
-        let arm = difference(contact.point, position_a);
-        let Beat([x, y, z, distance]) = vec3_and_word(arm, contact.distance.to_bits());
-        *beat = Beat([x & used, y & used, z & used, (distance & used) | (UNUSED & !used)]);
+    let offset = b.minus_f32(a);
+    beats[relative::OFFSET] = offset.or(beside(from.body_b)).into();
+    let (used, unused) = (of_count(&USED, from.count), of_count(&FAR, from.count));
+    let contacts = from.contacts.iter().zip(&mut beats[relative::CONTACTS..]);
+    for ((contact, beat), (used, unused)) in contacts.zip(used.into_iter().zip(unused)) {
+        // Beside the position is a zero, which takes nothing from the distance.
+        let seen = Lanes::from(contact_beat(contact)).minus_f32(a);
+        *beat = seen.and(used).or(unused).into();
     }
     beats
 }
@@ -49,7 +48,7 @@ pub(crate) fn encode(
 /// A static body has no lever arm that anything comes of, and its centre may be far away, which
 /// sixteen bits pay for with every contact point on it: the other body's position stands in for its.
 #[inline]
-pub(crate) fn anchors([a, b]: [[f32; 3]; 2], moves: [bool; 2]) -> [[f32; 3]; 2] {
+pub(crate) fn anchors<T: Copy>([a, b]: [T; 2], moves: [bool; 2]) -> [T; 2] {
     match moves {
         [false, _] => [b, b],
         [true, false] => [a, a],
@@ -92,7 +91,7 @@ mod tests {
                 Contact { point: [7.0, 8.0, 9.0], distance: -1.0 },
             ],
         };
-        let rows = encode(&collision, [1.0, 1.0, 5.0], [3.0, 0.0, 5.0]);
+        let rows = encode(&collision, [[1.0, 1.0, 5.0], [3.0, 0.0, 5.0]].map(End::at));
         let expected = [
             [0x0000_0000, 0xBF80_0000, 0x0000_0000, 0x0102_0304], // n, bodyA
             [0x4000_0000, 0xBF80_0000, 0x0000_0000, 0x0506_0708], // (2, -1, 0), bodyB

@@ -1,6 +1,6 @@
-//! This file reads the result record of a body.
+//! This file reads the result record of a body, and makes that of one which stays as it is.
 
-use super::{to_vec3, to_vec4};
+use super::{to_vec3, to_vec4, vec3_and_word, vec4};
 use crate::interface::record::{Beat, result};
 use crate::scene::{Pose, Velocity};
 
@@ -20,6 +20,17 @@ pub(crate) fn decode(beats: &[Beat; result::ROWS]) -> (Pose, Velocity) {
         angular: to_vec3(beats[result::ANGULAR]),
     };
     (pose, velocity)
+}
+
+/// The record of which [`decode`] makes this state again.
+#[inline]
+pub(crate) fn of(pose: Pose, velocity: Velocity) -> [Beat; result::ROWS] {
+    let mut beats = [Beat::default(); result::ROWS];
+    beats[result::POSITION] = vec3_and_word(pose.position, 0);
+    beats[result::ORIENTATION] = vec4(pose.orientation);
+    beats[result::LINEAR] = vec3_and_word(velocity.linear, 0);
+    beats[result::ANGULAR] = vec3_and_word(velocity.angular, 0);
+    beats
 }
 
 #[cfg(test)]
@@ -50,5 +61,6 @@ mod tests {
         let (pose, velocity) = decode(&beats);
         assert_eq!(pose, Pose { position: [1.0, -2.0, 0.5], orientation: [0.5, -0.5, 0.25, 1.0] });
         assert_eq!(velocity, Velocity { linear: [3.0, 4.0, 5.0], angular: [6.0, 7.0, 8.0] });
+        assert_eq!(of(pose, velocity), beats);
     }
 }

@@ -2,10 +2,9 @@
 
 use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::record::{Beat, LANES, WORD_LANE};
-use half::f16;
-use half::slice::{HalfBitsSliceExt as _, HalfFloatSliceExt as _};
 
 use super::thesis16;
+use crate::platform::{from_binary16, to_binary16};
 
 /// A row in sixteen bits: half a beat.
 pub(crate) type Row = [u16; LANES];
@@ -40,16 +39,12 @@ impl Sixteen {
         integers: &[bool; ROWS],
         narrow: &mut [[Row; ROWS]],
     ) {
-        let wide: &[f32] = bytemuck::cast_slice(records.as_flattened());
-        let words = narrow.as_flattened_mut().as_flattened_mut();
+        let (wide, rows) = (records.as_flattened(), narrow.as_flattened_mut());
         match self {
-            Self::Binary16 => {
-                let numbers: &mut [f16] = words.reinterpret_cast_mut();
-                numbers.convert_from_f32_slice(wide);
-            }
+            Self::Binary16 => to_binary16(bytemuck::cast_slice(wide), rows),
             Self::Thesis16 => {
-                for (to, from) in words.iter_mut().zip(wide) {
-                    *to = thesis16::narrow(from.to_bits());
+                for (to, from) in rows.iter_mut().zip(wide) {
+                    *to = from.0.map(thesis16::narrow);
                 }
             }
         }
@@ -66,10 +61,7 @@ impl Sixteen {
     #[inline]
     pub(crate) fn widen(self, rows: &[Row], wide: &mut [Beat]) {
         match self {
-            Self::Binary16 => {
-                let numbers: &[f16] = rows.as_flattened().reinterpret_cast();
-                numbers.convert_to_f32_slice(bytemuck::cast_slice_mut(wide));
-            }
+            Self::Binary16 => from_binary16(rows, bytemuck::cast_slice_mut(wide)),
             Self::Thesis16 => {
                 for (to, from) in wide.iter_mut().zip(rows) {
                     *to = Beat(from.map(thesis16::widen));

@@ -73,6 +73,7 @@ impl Collisions for [Collision] {
         <[Collision]>::len(self)
     }
 
+    #[inline]
     fn collision(&self, index: usize) -> Collision {
         self[index]
     }
@@ -81,6 +82,7 @@ impl Collisions for [Collision] {
         Some(self)
     }
 
+    #[inline]
     fn soon(&self, index: usize) {
         self.get(index).into_iter().for_each(prefetch);
     }
@@ -91,6 +93,7 @@ impl Collisions for Vec<Collision> {
         self.as_slice().len()
     }
 
+    #[inline]
     fn collision(&self, index: usize) -> Collision {
         self[index]
     }
@@ -99,6 +102,7 @@ impl Collisions for Vec<Collision> {
         Some(self)
     }
 
+    #[inline]
     fn soon(&self, index: usize) {
         self.get(index).into_iter().for_each(prefetch);
     }

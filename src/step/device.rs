@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 
-use super::bank::Bank;
+use super::bank::{Bank, PerBank};
 use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
 use super::cancellation::Cancellation;
 use super::fault::Fault;
@@ -71,6 +71,8 @@ pub(crate) struct Device {
     pub(super) largest: u32,
     /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
     pub(super) ends: Vec<End>,
+    /// Those of the step in each bank that never move, by their indices, upwards.
+    pub(super) statics: PerBank<Vec<u32>>,
 }
 
 impl Device {
@@ -138,6 +140,7 @@ impl Device {
             cancellation: None,
             largest: largest_piece(capabilities.length_width),
             ends: Vec::new(),
+            statics: PerBank::default(),
         }
     }
 

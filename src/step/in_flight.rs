@@ -6,6 +6,7 @@ use super::fault::Fault;
 use super::load::Load;
 use super::locate::locate;
 use super::report::{HostTimes, StepCycles, StepReport};
+use super::results::commit;
 use super::solver::Accelerator;
 use super::symptom::Symptom;
 use crate::accelerator::Counters;
@@ -138,9 +139,7 @@ impl<'a> InFlight<'a> {
         bodies: &mut B,
     ) -> StepReport {
         let Self { accelerator, flight } = self;
-        for (index, (pose, velocity)) in accelerator.spare.drain(..).enumerate() {
-            bodies.commit(index, pose, velocity);
-        }
+        commit(&accelerator.spare, bodies);
         flight.load.host.commit = flight.watch.lap();
         let mut report = ended.report;
         report.host = flight.load.host;

@@ -59,7 +59,7 @@ pub use phase::Phase;
 pub use prepared::Prepared;
 pub use report::{HostTimes, Limit, StepCycles, StepReport};
 #[cfg(feature = "bench")]
-pub(crate) use results::Results;
+pub(crate) use results::{Results, commit};
 pub use solver::Accelerator;
 pub(crate) use {
     board::Found,

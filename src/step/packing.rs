@@ -12,7 +12,7 @@ use crate::beat::pack::{
 };
 use crate::beat::writer::Writer;
 use crate::order::Lives;
-use crate::record::end::Ends;
+use crate::record::end::{Ends, Survey};
 use crate::scene::validate::Quick;
 use crate::scene::{Bodies, Collisions, InputError, Shape};
 
@@ -52,11 +52,11 @@ impl Device {
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
         let target = Target { variant: &plan.variant, shapes, quick };
-        let ends = &mut self.ends;
+        let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, bodies_good) = match lives {
-            None => pack_bodies(target, bodies, plan.bodies, ends, velocities, poses),
+            None => pack_bodies(target, bodies, plan.bodies, into, velocities, poses),
             Some(lives) => {
-                let good = survey(target, bodies, bodies.len(), ends);
+                let good = survey(target, bodies, bodies.len(), into);
                 let chosen = Chosen { bodies, order: lives.velocities() };
                 let velocities = pack_velocities(target, &chosen, plan.bodies, velocities);
                 let chosen = Chosen { bodies, order: lives.results() };
@@ -70,7 +70,7 @@ impl Device {
             words: lives.map(Lives::words),
         };
         let (collisions, good) =
-            pack_collisions(target, Ends(ends), &of_entries, &mut entries[active]);
+            pack_collisions(target, Ends(&self.ends), &of_entries, &mut entries[active]);
         (Sent { velocities, collisions, poses }, bodies_good & good)
     }
 
@@ -88,13 +88,14 @@ impl Device {
         let Cut { mut velocities, mut poses, mut entries } = Cut::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
-        let ends = &mut self.ends;
+        let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, good) =
-            pack_bodies(target, bodies, plan.bodies, ends, velocities, poses);
+            pack_bodies(target, bodies, plan.bodies, into, velocities, poses);
         if !good {
             refuse()?;
         }
-        let mut writer = Writer::new(target, Ends(ends), plan.collisions, &mut entries[active]);
+        let (ends, entries) = (Ends(&self.ends), &mut entries[active]);
+        let mut writer = Writer::new(target, ends, plan.collisions, entries);
         narrow_phase(&mut writer);
         let (collisions, count) = writer.finish()?;
         Ok((Sent { velocities, collisions, poses }, count))

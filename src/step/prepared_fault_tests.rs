@@ -163,7 +163,8 @@ fn a_panic_while_results_are_stored_stops_the_next_step() {
         }
         reads += 1;
     }
-    assert!(reads > 2 * CUBES, "{reads} calls");
+    // Each is stored; read are only those that never move.
+    assert!(reads > CUBES, "{reads} calls");
     assert_works(&board, &mut accelerator, "panics");
 }
 

@@ -13,9 +13,10 @@ use super::solver::Accelerator;
 use crate::accelerator::Counters;
 use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
-use crate::beat::unpack::{finite, for_each_block, state};
+use crate::beat::unpack::{BLOCK, Reader, Record, finite};
 use crate::order::LiveReport;
-use crate::scene::{Bodies, Body, Pose, Shape, Velocity};
+use crate::record::result;
+use crate::scene::Bodies;
 
 impl Accelerator {
     /// The result beats of each channel, in a bank.
@@ -64,14 +65,16 @@ impl Accelerator {
     ) -> Result<(), Fault> {
         // A panic of the caller's loses it: the next step makes it anew.
         let mut spare = std::mem::take(&mut self.spare);
-        spare.clear();
         let mut channels = Default::default();
         self.results(plan, bank, &mut channels);
         let layout = Segment::Results.layout(&plan.variant);
         let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
         let (found, broken) = match live.map(|_| self.orderings[bank].lives()) {
             Some(lives) => results.scatter(lives.results(), bodies, &mut spare),
-            None => results.in_turn(plan.bodies, bodies, &self.shapes, &mut spare),
+            None => {
+                let statics = &self.device.statics[bank];
+                results.in_turn(plan.bodies, bodies, statics, &mut spare)
+            }
         };
         self.spare = spare;
         match (answered, broken) {
@@ -96,35 +99,33 @@ impl Results<'_> {
     /// Reads the results of `count` bodies in their order; the sum of the words that were read, and
     /// the first body that is not finite.
     ///
-    /// A static body does not move, whatever comes back for it.
+    /// A static body does not move, whatever comes back for it: `statics` are their indices, upwards.
     pub(crate) fn in_turn<B: Bodies + ?Sized>(
         self,
         count: usize,
         bodies: &B,
-        shapes: &[Shape],
-        spare: &mut Vec<(Pose, Velocity)>,
+        statics: &[u32],
+        spare: &mut Vec<Record>,
     ) -> (u32, Option<usize>) {
-        let is_static = |body: &Body| {
-            let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
-            shape.is_none_or(Shape::is_static)
-        };
         let mut broken = None;
-        spare.reserve(count);
-        let sum = for_each_block(self.layout, self.channels, count, |records| {
-            let first = spare.len();
-            spare.extend(records.iter().map(state));
+        // What is there from the last step is overwritten.
+        spare.resize(count, Record::default());
+        let mut reader = Reader::new(self.layout, self.channels);
+        for (first, records) in (0..).step_by(BLOCK).zip(spare.chunks_mut(BLOCK)) {
+            reader.read(records);
             if broken.is_none() && !finite(records) {
-                let wrong = (first..).zip(records).filter(|(_, it)| !finite(&[**it]));
-                broken = wrong.map(|(index, _)| index).find(|at| !is_static(&bodies.body(*at)));
+                let moves =
+                    |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
+                let wrong = (first..).zip(&*records).filter(|(_, it)| !finite(&[**it]));
+                broken = wrong.map(|(index, _)| index).find(moves);
             }
-            for (index, state) in (first..).zip(&mut spare[first..]) {
-                let own = bodies.body(index);
-                if is_static(&own) {
-                    *state = (own.pose, own.velocity);
-                }
+        }
+        for index in statics.iter().map(|index| *index as usize) {
+            if let Some(to) = spare.get_mut(index) {
+                *to = own(bodies, index);
             }
-        });
-        (sum, broken)
+        }
+        (reader.finish(), broken)
     }
 
     /// Reads results in the order of these bodies, and leaves all others as they are; otherwise as
@@ -133,17 +134,18 @@ impl Results<'_> {
         self,
         order: &[u32],
         bodies: &B,
-        spare: &mut Vec<(Pose, Velocity)>,
+        spare: &mut Vec<Record>,
     ) -> (u32, Option<usize>) {
-        spare.extend((0..bodies.len()).map(|index| {
-            let own = bodies.body(index);
-            (own.pose, own.velocity)
-        }));
+        spare.clear();
+        spare.extend((0..bodies.len()).map(|index| own(bodies, index)));
         let mut broken: Option<usize> = None;
-        let mut order_left = order.iter();
-        let sum = for_each_block(self.layout, self.channels, order.len(), |records| {
+        let mut reader = Reader::new(self.layout, self.channels);
+        let mut block = [Record::default(); BLOCK];
+        for order in order.chunks(BLOCK) {
+            let records = &mut block[..order.len()];
+            reader.read(records);
             let all_finite = finite(records);
-            for (record, body) in records.iter().zip(&mut order_left) {
+            for (record, body) in records.iter().zip(order) {
                 let index = *body as usize;
                 if !all_finite && !finite(&[*record]) {
                     broken = Some(broken.map_or(index, |lowest| lowest.min(index)));
@@ -151,10 +153,24 @@ impl Results<'_> {
                 // Should a caller's bodies have become fewer, there is nothing to be told of the
                 // others.
                 if let Some(to) = spare.get_mut(index) {
-                    *to = state(record);
+                    *to = *record;
                 }
             }
-        });
-        (sum, broken)
+        }
+        (reader.finish(), broken)
+    }
+}
+
+/// The record of a body's own state.
+fn own<B: Bodies + ?Sized>(bodies: &B, index: usize) -> Record {
+    let body = bodies.body(index);
+    result::of(body.pose, body.velocity)
+}
+
+/// Stores what was read with the bodies.
+pub(crate) fn commit<B: Bodies + ?Sized>(results: &[Record], bodies: &mut B) {
+    for (index, record) in results.iter().enumerate() {
+        let (pose, velocity) = result::decode(record);
+        bodies.commit(index, pose, velocity);
     }
 }

@@ -15,10 +15,11 @@ use super::ordering::Ordering;
 use super::report::StepReport;
 use super::retry::with_retries;
 use crate::accelerator::Capabilities;
+use crate::beat::unpack::Record;
 use crate::error::{Error, OpenError};
 use crate::platform::{Deadline, System};
 use crate::scene::validate::{Limits, validate_shapes};
-use crate::scene::{Bodies, Collisions, Pose, Shape, StepParameters, Velocity};
+use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 
 /// Finds the board that the options ask for.
 pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
@@ -43,7 +44,7 @@ pub struct Accelerator {
     /// How it was ordered.
     pub(super) orderings: PerBank<Ordering>,
     /// Results of a step until all are checked. Kept, so that a step allocates nothing.
-    pub(super) spare: Vec<(Pose, Velocity)>,
+    pub(super) spare: Vec<Record>,
 }
 
 impl Accelerator {

@@ -6,55 +6,22 @@
 
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::Geometry;
-use bitstream_model::interface::record::{
-    Beat, CONTACT_POINTS, LANES, WORD_LANE, collision, relative,
-};
+use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES, collision, relative};
 
 use super::body::check_body;
 use super::rows::{Ends as RowEnds, surely_fit};
 use super::{Scene, check_whole};
 use crate::record;
 use crate::record::end::{End, Ends};
+use crate::record::largest::{Largest, MAGNITUDE};
 use crate::scene::{Body, Collision, InputError};
 
 /// How far from 1 the square of a normal's length surely may be: the length itself is half as far.
 const NORMAL: f32 = InputError::NORMAL_TOLERANCE;
 /// Square of twice the length that an orientation must have.
 const ORIENTATION: f32 = 4.0 * InputError::SHORTEST_ORIENTATION * InputError::SHORTEST_ORIENTATION;
-/// An f32 without its sign.
-const MAGNITUDE: u32 = u32::MAX >> 1;
 #[expect(clippy::cast_possible_truncation, reason = "four")]
 const MOST_POINTS: u32 = CONTACT_POINTS as u32;
-
-/// Largest magnitudes of the words of a record, as bits: magnitudes are in the order of their bits,
-/// and infinity and NaN are beyond all numbers.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Largest<const ROWS: usize>([[u32; LANES]; ROWS]);
-
-impl<const ROWS: usize> Largest<ROWS> {
-    /// Numbers of at most `limit`, but what lies beside the vec3 of these rows.
-    fn new(limit: f32, beside: [u32; ROWS]) -> Self {
-        Self(beside.map(|word| {
-            let mut row = [limit.to_bits(); LANES];
-            row[WORD_LANE] = word;
-            row
-        }))
-    }
-
-    /// Whether all of these records are within.
-    #[inline]
-    fn bound(&self, records: &[[Beat; ROWS]]) -> bool {
-        let mut beyond = [false; LANES];
-        for record in records {
-            for (Beat(words), largest) in record.iter().zip(&self.0) {
-                for ((beyond, word), largest) in beyond.iter_mut().zip(words).zip(largest) {
-                    *beyond |= word & MAGNITUDE > *largest;
-                }
-            }
-        }
-        beyond == [false; LANES]
-    }
-}
 
 /// Looks at the bodies and collisions of one step.
 #[derive(Debug)]
@@ -70,7 +37,7 @@ impl<'a> Quick<'a> {
     /// For what passed [`preflight`](super::preflight).
     pub(crate) fn new(scene: Scene<'a>) -> Self {
         let held = scene.held;
-        let any = u32::MAX;
+        let any = MAGNITUDE;
         let [velocities, poses, limit] =
             [held.velocities, held.poses, held.collisions].map(StreamFormat::largest);
         let number = limit.to_bits();

@@ -7,6 +7,7 @@
 //! ```sh
 //! cargo bench --bench speed      # the emulated board beside a solver on the CPU
 //! cargo bench --bench order      # ordering beside packing
+//! cargo bench --bench pack       # packing beside memcpy
 //! ```
 
 #![forbid(unsafe_code)]
@@ -16,6 +17,8 @@ pub mod step;
 pub mod yardstick;
 
 use std::time::{Duration, Instant};
+
+use nix::time::{ClockId, clock_gettime};
 
 /// Something that is timed; its result is kept from being optimised away by the caller.
 pub type Run<'a> = Box<dyn FnMut() + 'a>;
@@ -28,6 +31,50 @@ pub fn medians(runs: usize, contestants: &mut [Run<'_>]) -> Vec<Duration> {
             let begin = Instant::now();
             run();
             times.push(begin.elapsed());
+        }
+    }
+    times.into_iter().map(median).collect()
+}
+
+/// Which time is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Clock {
+    /// That which passes.
+    Wall,
+    /// That for which this thread runs. Where others want the cores too, these are far apart.
+    Thread,
+}
+
+impl Clock {
+    fn now(self) -> Duration {
+        let id = match self {
+            Self::Wall => ClockId::CLOCK_MONOTONIC,
+            Self::Thread => ClockId::CLOCK_THREAD_CPUTIME_ID,
+        };
+        // Both are there on every Linux.
+        clock_gettime(id).map_or(Duration::ZERO, Duration::from)
+    }
+}
+
+/// Runs of a stretch that are not measured: they bring into the caches what the others left outside.
+const WARMING: usize = 2;
+/// Runs of a stretch that are measured.
+const MEASURED: usize = 3;
+
+/// Runs all in turn, in so many stretches each; the median time of each.
+///
+/// In a stretch one of them has the machine to itself: its memory is as warm as the caches can hold
+/// it, and of the others' nothing is left. A stretch is five runs, of which the last three count.
+pub fn warm_medians(stretches: usize, clock: Clock, contestants: &mut [Run<'_>]) -> Vec<Duration> {
+    let mut times = vec![Vec::with_capacity(stretches * MEASURED); contestants.len()];
+    for _ in 0..stretches {
+        for (run, times) in contestants.iter_mut().zip(&mut times) {
+            (0..WARMING).for_each(|_| run());
+            for _ in 0..MEASURED {
+                let begin = clock.now();
+                run();
+                times.push(clock.now().saturating_sub(begin));
+            }
         }
     }
     times.into_iter().map(median).collect()
@@ -68,6 +115,28 @@ mod tests {
         assert_eq!(medians(2, &mut contestants).len(), 2);
         drop(contestants);
         assert_eq!(order.into_inner(), ['a', 'b', 'a', 'b']);
+    }
+
+    #[test]
+    fn each_has_a_stretch_to_itself() {
+        let order = RefCell::new(String::new());
+        let mut contestants: Vec<Run<'_>> = vec![
+            Box::new(|| order.borrow_mut().push('a')),
+            Box::new(|| order.borrow_mut().push('b')),
+        ];
+        assert_eq!(warm_medians(2, Clock::Thread, &mut contestants).len(), 2);
+        drop(contestants);
+        let stretch = |it: &str| it.repeat(WARMING + MEASURED);
+        assert_eq!(order.into_inner(), (stretch("a") + &stretch("b")).repeat(2));
+    }
+
+    #[test]
+    fn both_clocks_run() {
+        for clock in [Clock::Wall, Clock::Thread] {
+            let begin = clock.now();
+            while clock.now() == begin {}
+            assert!(clock.now() > begin);
+        }
     }
 
     #[test]

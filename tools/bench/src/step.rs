@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use scene::{Scene, SceneOptions};
 use step_folder::folder::Folder;
-use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer};
+use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer, Schedule};
 use zynq_pgs::{
     Accelerator, BoardChoice, Body, Collision, OpenOptions, Shape, StepParameters, StepReport,
 };
@@ -75,17 +75,24 @@ impl Step {
         })
     }
 
+    /// The order without hazards for a board of that build.
+    ///
+    /// # Errors
+    /// If there is no such order.
+    pub fn schedule(&self, config: BoardConfig) -> Result<Schedule, Box<dyn Error>> {
+        let accelerator = open(config, &self.shapes)?;
+        let window = IssueWindow::of(accelerator.capabilities(), &self.parameters)?;
+        let mut buffers = InputBuffers::new();
+        let input = buffers.gather(&self.bodies, &self.collisions, &self.shapes);
+        Ok(Orderer::new().order(&input, Order::HazardFree, window)?.clone())
+    }
+
     /// The collisions in the order without hazards, as a board of that build is sent them.
     ///
     /// # Errors
     /// If there is no such order.
     pub fn in_order(&self, config: BoardConfig) -> Result<Vec<Collision>, Box<dyn Error>> {
-        let accelerator = open(config, &self.shapes)?;
-        let window = IssueWindow::of(accelerator.capabilities(), &self.parameters)?;
-        let mut buffers = InputBuffers::new();
-        let input = buffers.gather(&self.bodies, &self.collisions, &self.shapes);
-        let mut orderer = Orderer::new();
-        let schedule = orderer.order(&input, Order::HazardFree, window)?;
+        let schedule = self.schedule(config)?;
         let entries = (0..schedule.len()).filter_map(|entry| schedule.get(entry));
         Ok(entries.map(|index| self.collisions[index]).collect())
     }

@@ -1,0 +1,34 @@
+//! This file tells the processor what will be read soon.
+#![allow(unsafe_code, reason = "hints to the caches exist as intrinsics on raw pointers only")]
+
+/// Says that a value will be read soon.
+#[inline]
+pub(crate) fn prefetch<T>(value: &T) {
+    let first: *const i8 = std::ptr::from_ref(value).cast();
+    // The lines of its first byte, of every 64th after it, and of its last.
+    for line in 0..size_of::<T>().div_ceil(LINE) {
+        fetch(first.wrapping_add(line * LINE));
+    }
+    fetch(first.wrapping_add(size_of::<T>().saturating_sub(1)));
+}
+
+/// Bytes of a line of a cache.
+const LINE: usize = 64;
+
+/// Says that what lies at an address is read soon. Any address will do.
+#[inline]
+pub(crate) fn fetch<T>(at: *const T) {
+    let at: *const i8 = at.cast();
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: a prefetch neither reads nor faults, whatever the address.
+    unsafe {
+        core::arch::x86_64::_mm_prefetch::<{ core::arch::x86_64::_MM_HINT_T0 }>(at);
+    }
+    #[cfg(target_arch = "aarch64")]
+    // SAFETY: a prefetch neither faults nor changes registers, whatever the address.
+    unsafe {
+        core::arch::asm!("prfm pldl1keep, [{}]", in(reg) at, options(nostack, preserves_flags, readonly));
+    }
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+    let _ = at;
+}
