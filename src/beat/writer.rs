@@ -82,9 +82,12 @@ impl<'a> Writer<'a> {
     /// Writes the next collision. Its index is that of [`Self::len`] before.
     ///
     /// Whether it is right is looked at a little later: what is wrong with one is said when all are
-    /// written, and what comes after it is not written any more ([`Self::is_refused`]).
+    /// written, and what comes after it is left out ([`Self::is_refused`]): the length stands still.
     #[inline]
     pub fn push(&mut self, collision: &Collision) {
+        if self.is_refused() {
+            return;
+        }
         if self.written + self.held == self.room {
             self.overfull();
             return;
@@ -124,7 +127,7 @@ impl<'a> Writer<'a> {
     /// Makes the records of what is held.
     fn flush(&mut self) {
         let count = std::mem::take(&mut self.held);
-        if self.refused.is_some() || count == 0 {
+        if count == 0 {
             return;
         }
         let Self { target, ends, dealer, stage, written, .. } = self;

@@ -15,8 +15,9 @@ use half::slice::{HalfBitsSliceExt as _, HalfFloatSliceExt as _};
 #[inline]
 pub(crate) fn to_binary16(from: &[[f32; LANES]], to: &mut [[u16; LANES]]) {
     #[cfg(target_arch = "x86_64")]
-    let (from, to) = match std::arch::is_x86_feature_detected!("f16c") {
-        // SAFETY: the processor has the instructions that the function is compiled for.
+    let (from, to) = match x86::there() {
+        // SAFETY: the processor has the instructions that the function is compiled for, and the system
+        // keeps their registers.
         true => unsafe { x86::to_binary16(from, to) },
         false => (from, to),
     };
@@ -34,8 +35,9 @@ pub(crate) fn to_binary16(from: &[[f32; LANES]], to: &mut [[u16; LANES]]) {
 #[inline]
 pub(crate) fn from_binary16(from: &[[u16; LANES]], to: &mut [[f32; LANES]]) {
     #[cfg(target_arch = "x86_64")]
-    let (from, to) = match std::arch::is_x86_feature_detected!("f16c") {
-        // SAFETY: the processor has the instructions that the function is compiled for.
+    let (from, to) = match x86::there() {
+        // SAFETY: the processor has the instructions that the function is compiled for, and the system
+        // keeps their registers.
         true => unsafe { x86::from_binary16(from, to) },
         false => (from, to),
     };
@@ -58,6 +60,13 @@ mod x86 {
     };
 
     use super::{LANES, Rest};
+
+    /// Whether the processor has the instructions. They take the registers of AVX, which a system may
+    /// not keep, and whether it does is asked of AVX alone.
+    #[inline]
+    pub(super) fn there() -> bool {
+        std::arch::is_x86_feature_detected!("avx") && std::arch::is_x86_feature_detected!("f16c")
+    }
 
     #[target_feature(enable = "f16c")]
     pub(super) fn to_binary16<'a>(
@@ -122,5 +131,58 @@ mod aarch64 {
             *to = unsafe { std::mem::transmute::<float32x4_t, [f32; LANES]>(wide) };
         }
         (&[], &mut [])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers around every border of binary16, and others.
+    fn wide() -> Vec<f32> {
+        let mut all = vec![f32::MIN_POSITIVE, f32::from_bits(1), 65_519.9, 65_520.0, f32::MAX];
+        for word in 0..0x7C00 {
+            let low = f16::from_bits(word).to_f32_const();
+            let high = f16::from_bits(word + 1).to_f32_const();
+            let middle = if high.is_finite() { f32::midpoint(low, high) } else { 65_520.0 };
+            all.extend([low, middle.next_down(), middle, middle.next_up()]);
+        }
+        all.push(f32::INFINITY);
+        all.extend([0x7F80_0001, 0x7FC0_0000, 0x7FFF_FFFF, 0x7FA0_2000].map(f32::from_bits));
+        all.iter().flat_map(|number| [*number, -*number]).collect()
+    }
+
+    /// However many rows there are at once.
+    #[test]
+    fn numbers_are_rounded_as_by_integers() {
+        let wide = wide();
+        let rows = wide.as_chunks::<LANES>().0;
+        assert!(wide.len() - rows.as_flattened().len() < LANES);
+        for together in 1..=5 {
+            for rows in rows.chunks(together) {
+                let mut found = vec![[0; LANES]; rows.len()];
+                to_binary16(rows, &mut found);
+                let expected = rows.as_flattened().iter().map(|it| f16::from_f32_const(*it));
+                for (found, expected) in found.as_flattened().iter().zip(expected) {
+                    assert_eq!(*found, expected.to_bits(), "{expected} of {rows:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_word_is_widened_as_by_integers() {
+        let words: Vec<u16> = (0..=u16::MAX).collect();
+        let rows = words.as_chunks::<LANES>().0;
+        for together in 1..=5 {
+            for rows in rows.chunks(together) {
+                let mut found = vec![[0.0; LANES]; rows.len()];
+                from_binary16(rows, &mut found);
+                for (found, word) in found.as_flattened().iter().zip(rows.as_flattened()) {
+                    let expected = f16::from_bits(*word).to_f32_const();
+                    assert_eq!(found.to_bits(), expected.to_bits(), "{word:#06x}");
+                }
+            }
+        }
     }
 }

@@ -19,7 +19,8 @@ use crate::scene::{Bodies, Collisions, InputError, StepParameters};
 /// It may be started more than once, as after a fault: its records stay until other ones take their
 /// place. That is the next step [prepared](InFlight::prepare) before it was started, or the second
 /// after; and, once it was started, the next step that is [submitted](Accelerator::submit) without
-/// being prepared. Dropping it costs nothing and frees nothing.
+/// being prepared. One that was [written](Accelerator::write) with nothing on the board makes way for
+/// the next submitted step even if it was not started. Dropping it costs nothing and frees nothing.
 #[derive(Debug)]
 #[must_use = "a step that was prepared is not started by itself"]
 pub struct Prepared {
@@ -164,7 +165,8 @@ enum Memory {
 }
 
 impl Accelerator {
-    /// Starts a step that was [prepared](InFlight::prepare) while an earlier one was on the board.
+    /// Starts a step that was [prepared](InFlight::prepare) while an earlier one was on the board, or
+    /// [written](Self::write).
     ///
     /// # Errors
     /// [`Error::Input`]: [`InputError::NotPrepared`] if its records are not there any more, or never

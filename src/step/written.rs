@@ -22,9 +22,11 @@ impl Accelerator {
     ///
     /// They are solved in the order in which they are written, so that the parameters must ask for
     /// [`Order::AsGiven`], or for none on a bitstream that waits for its hazards, where that is what
-    /// a step takes by itself.
+    /// a step takes by itself. A design that keeps live bodies alone, and one that is asked to verify
+    /// its order, wants all of them at once.
     ///
-    /// The step takes the place of the one that was started last; [`Self::start`] starts it.
+    /// The step takes the place of the one that was started last; [`Self::start`] starts it. One that
+    /// is stepped or submitted before that takes its place in turn: it is refused then.
     /// [`StepReport::host`](crate::StepReport::host) counts the narrow phase as packing.
     ///
     /// ```
@@ -58,8 +60,8 @@ impl Accelerator {
     ///
     /// # Errors
     /// [`Error::Input`] as [`Self::step`], and [`InputError::WrittenInOrder`],
-    /// [`InputError::MoreThanAnnounced`]. [`Error::Step`] if there is no memory for so many;
-    /// [`Error::MustReopen`] after a fault that could not be cleared.
+    /// [`InputError::MoreThanAnnounced`]. [`Error::Step`] if there is no memory for so many, or the
+    /// step was cancelled; [`Error::MustReopen`] after a fault that could not be cleared.
     pub fn write<B: Bodies + ?Sized>(
         &mut self,
         bodies: &B,

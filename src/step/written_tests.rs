@@ -4,12 +4,14 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use bitstream_model::BoardConfig;
-use bitstream_model::interface::profile::{Flow, PROFILES};
+use bitstream_model::interface::profile::{Flow, PROFILES, Profile};
 
 use super::life_tests::windowed;
 use super::tests::{bits, open, scene};
 use crate::order::Order;
-use crate::{Accelerator, Body, Collision, Error, InputError, Prepared, StepParameters, Writer};
+use crate::{
+    Accelerator, Body, Collision, Error, InputError, Prepared, StepParameters, Velocity, Writer,
+};
 
 /// More than three blocks of records.
 const CUBES: u32 = 100;
@@ -206,4 +208,58 @@ fn a_panic_of_the_narrow_phase_leaves_no_step_behind() {
     }
     drop(accelerator);
     assert_eq!(board.violations(), []);
+}
+
+#[test]
+fn a_written_step_makes_way_for_one_that_is_given_at_once() {
+    let (board, mut accelerator) = open(BoardConfig::default());
+    let (bodies, collisions) = scene(CUBES);
+    let written = write(&mut accelerator, &bodies, &collisions).expect("written");
+    assert_works(&mut accelerator, "in its place");
+    let started = accelerator.start(&written).map(drop);
+    assert!(matches!(started, Err(Error::Input(InputError::NotPrepared))), "{started:?}");
+    drop(accelerator);
+    assert_eq!(board.violations(), []);
+}
+
+/// Which bodies are static is known of each step by itself.
+#[test]
+fn worlds_with_other_static_bodies_do_not_mix() {
+    for name in ["float", "half"] {
+        let profile = Profile::by_name(name).expect("a profile");
+        let (board, mut accelerator) = open(BoardConfig { profile, ..BoardConfig::default() });
+        let (left, collisions) = scene(40);
+        // What stands and what falls has changed places; sixteen bits do not hold these positions.
+        let mut right: Vec<Body> = left.iter().map(|body| Body { shape: 1, ..*body }).collect();
+        for body in &mut right {
+            body.pose.position = body.pose.position.map(|at| (at / 64.0) + 0.1);
+        }
+        for at in [3, 40] {
+            right[at] = Body { velocity: Velocity::default(), shape: 0, ..right[at] };
+        }
+        let none: [Collision; 0] = [];
+        let mut expected = [left.clone(), right.clone()];
+        accelerator.step(&mut expected[0], &collisions, &parameters()).expect("a step");
+        accelerator.step(&mut expected[1], &none[..], &parameters()).expect("a step");
+        for at in [3, 40] {
+            assert_eq!(expected[1][at], right[at], "it stands");
+        }
+        assert_ne!(expected[1][0], right[0], "it falls");
+
+        let mut found = [left.clone(), right.clone()];
+        let mut flight = accelerator.submit(&left, &collisions, &parameters()).expect("starts");
+        let next = flight.write(&right, 0, &parameters(), |_| {}).expect("written");
+        let (report, started) = flight.wait_and_start(&mut found[0], &next);
+        report.expect("a good step");
+        let mut flight = started.expect("starts");
+        let again = flight.prepare(&left, &collisions, &parameters()).expect("packed");
+        let (report, started) = flight.wait_and_start(&mut found[1], &again);
+        report.expect("a good step");
+        let mut third = left.clone();
+        started.expect("starts").wait(&mut third).expect("a good step");
+        assert_eq!(found.each_ref().map(|it| bits(it)), expected.each_ref().map(|it| bits(it)));
+        assert_eq!(bits(&third), bits(&expected[0]), "{name}");
+        drop(accelerator);
+        assert_eq!(board.violations(), []);
+    }
 }

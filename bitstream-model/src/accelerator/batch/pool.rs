@@ -82,9 +82,9 @@ impl Pool {
         let shared = Arc::<Shared>::default();
         let workers = (1..=workers).map_while(|number| {
             let shared = Arc::clone(&shared);
-            let thread = std::thread::Builder::new().name(format!("passes {number}"));
+            let thread = std::thread::Builder::new().name(format!("board {number}"));
             let worker = thread.spawn(move || shared.work(number));
-            worker.inspect_err(|error| log::warn!("no thread for the passes: {error}")).ok()
+            worker.inspect_err(|error| log::warn!("no thread to help the board: {error}")).ok()
         });
         let workers = workers.collect();
         Self { shared, workers }
