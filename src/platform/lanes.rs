@@ -2,7 +2,7 @@
 //!
 //! Every x86-64 and every aarch64 has the instructions. Written as loops over four words the compiler
 //! finds them only now and then.
-#![allow(unsafe_code, reason = "vectors of aarch64 are cast")]
+#![allow(unsafe_code, reason = "instructions of a processor, and vectors of aarch64 are cast")]
 
 use bitstream_model::interface::record::{Beat, LANES};
 

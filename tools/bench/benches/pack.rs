@@ -9,7 +9,7 @@
 //! The step is one of the thesis' cubes, standing on the ground, or the one in a folder of arrays
 //! (`--input`; or else `full_step186` of the folder that the environment variable `PGS_VECTORS`
 //! names). One thread does everything. Each thing is measured alone: it and a `memcpy` from warm
-//! memory to warm memory run in turn, five runs a stretch of which the last three count, so that its
+//! memory to warm memory run in turn, several runs a stretch of which the first do not count, so that its
 //! own buffers are as warm as the caches can hold them. Given are the bytes written (those read, for
 //! results), medians, GB/s of these bytes, and the throughput as a part of that of `memcpy`.
 //!

@@ -141,7 +141,7 @@ impl<'a> Intake<'a, '_> {
         };
         let records = self.records;
         for [_, body_a, body_b] in records.heads(self.at + LANES).take(LANES) {
-            self.places.expect([body_a, body_b]);
+            self.places.fetch([body_a, body_b]);
         }
         let heads = records.heads(self.at).take(most);
         let number = register(group.slot);

@@ -105,9 +105,9 @@ impl Places {
         used.map(|body| [body.first, body.behind - 1])
     }
 
-    /// Asks for bodies that are looked at soon.
+    /// Asks the cache for bodies that are looked at soon, be they there or not.
     #[inline(always)]
-    pub(super) fn expect(&self, bodies: [u32; 2]) {
+    pub(super) fn fetch(&self, bodies: [u32; 2]) {
         for body in bodies {
             prefetch(self.bodies.as_ptr().wrapping_add(body as usize));
         }
