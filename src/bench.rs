@@ -4,8 +4,10 @@ use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
-use crate::beat::pack::{Entries, Target, pack_bodies, pack_collisions, survey};
+use crate::beat::bodies::{pack_bodies, survey};
+use crate::beat::collisions::{Entries, pack_collisions};
 use crate::beat::stripe::Segment;
+use crate::beat::target::Target;
 use crate::beat::unpack::Record;
 use crate::record::end::{End, Ends, Survey};
 use crate::scene::validate::{Limits, Quick, preflight};
@@ -191,10 +193,10 @@ impl Unpacker {
         Self { variant, channels, statics, spare: Vec::new() }
     }
 
-    /// Bytes of the results.
+    /// Bytes of so many results, once they are read: f32, whatever the format of the stream.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.channels.iter().map(Vec::len).sum::<usize>() * BEAT_BYTES
+    pub const fn bytes(bodies: usize) -> usize {
+        bodies * size_of::<Record>()
     }
 
     /// Reads and checks the results of all bodies; returns the sum of their words, modulo 2^32, or

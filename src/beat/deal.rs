@@ -36,7 +36,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
     }
 
     /// Writes the next beats.
-    #[inline]
+    #[inline(always)]
     pub(super) fn write(&mut self, beats: &[Beat]) {
         let rest = match self.deal.group().len() {
             _ if !self.deal.at_end_of_group() => beats,
@@ -56,7 +56,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
     }
 
     /// Writes whole groups of `G` beats; what is left of the beats.
-    #[inline]
+    #[inline(always)]
     fn groups<'c, const G: usize>(&mut self, beats: &'c [Beat]) -> &'c [Beat] {
         let (groups, rest) = beats.as_chunks::<G>();
         for (channel, to) in self.channels.iter_mut().enumerate() {
@@ -82,6 +82,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
     }
 
     /// Fills the last group if the stripe says so; the sum of all words, modulo 2^32.
+    #[inline(always)]
     pub(super) fn finish(mut self) -> u32 {
         while self.padded && !self.deal.at_end_of_group() {
             self.write(&[Beat::default()]);
@@ -91,6 +92,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
 }
 
 /// Which beats of a group of `G` go to a channel, and how many they are.
+#[inline(always)]
 pub(super) fn places<const G: usize>(group: &[u8], channel: usize) -> ([usize; G], usize) {
     let (mut places, mut share) = ([0; G], 0);
     for (place, stream) in group.iter().enumerate().take(G) {
@@ -103,7 +105,7 @@ pub(super) fn places<const G: usize>(group: &[u8], channel: usize) -> ([usize; G
 }
 
 /// Writes the `S` beats of each group that go to one channel, and adds them up.
-#[inline]
+#[inline(always)]
 fn run<const G: usize, const S: usize>(
     groups: &[[Beat; G]],
     places: [usize; G],

@@ -2,8 +2,10 @@
 
 use proptest::prelude::*;
 
-use super::pack::{Entries, Target, pack_bodies, pack_collisions, survey};
+use super::bodies::{pack_bodies, survey};
+use super::collisions::{Entries, pack_collisions};
 use super::stripe::Segment;
+use super::target::Target;
 use crate::interface::number::{Numbers, Precision, StreamFormat};
 use crate::interface::profile::{
     FLOAT, Geometry, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,

@@ -1,12 +1,14 @@
 //! This folder lays records out over the channels of a board, and reads results back from them.
 
+pub(crate) mod bodies;
+pub(crate) mod collisions;
 mod deal;
 #[cfg(test)]
 mod look_tests;
-pub(crate) mod pack;
 #[cfg(test)]
 mod pack_tests;
 mod stage;
 pub(crate) mod stripe;
+pub(crate) mod target;
 pub(crate) mod unpack;
 pub(crate) mod writer;

@@ -3,8 +3,10 @@
 
 use proptest::prelude::*;
 
-use super::pack::{Chosen, Entries, Target, pack_collisions, pack_poses, pack_velocities, survey};
+use super::bodies::{Chosen, pack_poses, pack_velocities, survey};
+use super::collisions::{Entries, pack_collisions};
 use super::stripe::Segment;
+use super::target::Target;
 use crate::interface::number::{Numbers, StreamFormat};
 use crate::interface::profile::{
     FLOAT, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,

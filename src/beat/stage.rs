@@ -24,13 +24,13 @@ impl<const ROWS: usize> Stage<ROWS> {
     }
 
     /// The records of the block, to write.
-    #[inline]
+    #[inline(always)]
     pub(super) fn records(&mut self, count: usize) -> &mut [[Beat; ROWS]] {
         &mut self.wide[..count]
     }
 
     /// Sends the block to the channels, in the format of the stream.
-    #[inline]
+    #[inline(always)]
     pub(super) fn deal(
         &mut self,
         count: usize,

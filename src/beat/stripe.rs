@@ -142,7 +142,7 @@ impl Deal {
     }
 
     /// Where the next beat goes.
-    #[inline]
+    #[inline(always)]
     pub(super) fn next(&mut self) -> Place {
         let channel = usize::from(self.group[self.at]);
         self.at += 1;
@@ -165,7 +165,7 @@ impl Deal {
     }
 
     /// Takes the next slots of one channel. The caller does so for all channels, and whole groups.
-    #[inline]
+    #[inline(always)]
     pub(super) fn take(&mut self, channel: usize, slots: usize) -> Range<usize> {
         let first = self.slots[channel];
         self.slots[channel] += slots;
@@ -173,6 +173,7 @@ impl Deal {
     }
 
     /// Whether the group is whole.
+    #[inline(always)]
     pub(super) const fn at_end_of_group(&self) -> bool {
         self.at == 0
     }

@@ -3,14 +3,14 @@
 //! The memory may be slow to read, so each beat is read once: a block of records is collected from
 //! the channels, one after the other, and the sum of what was read is taken on the way.
 
-use bitstream_model::interface::record::{Beat, result};
+use bitstream_model::interface::record::{Beat, LANES, WORD_LANE, result};
 
 pub(crate) use super::deal::BLOCK;
 use super::deal::places;
 use super::stripe::{Deal, Layout, Place};
 use crate::platform::Lanes;
 use crate::record::largest::{Largest, MAGNITUDE};
-use crate::record::sixteen::Sixteen;
+use crate::record::sixteen::{self, Sixteen};
 
 /// A record of results, in f32.
 pub(crate) type Record = [Beat; result::ROWS];
@@ -36,16 +36,20 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads the next records, at most [`BLOCK`]; only the last may be fewer.
-    #[inline]
-    pub(crate) fn read(&mut self, records: &mut [Record]) {
+    /// Reads the next records, at most [`BLOCK`]; only the last may be fewer. Whether all their numbers
+    /// are finite.
+    #[inline(always)]
+    pub(crate) fn read(&mut self, records: &mut [Record]) -> bool {
         let Some(format) = self.format else {
-            return self.collector.read(records.as_flattened_mut());
+            self.collector.read(records.as_flattened_mut());
+            return finite(records);
         };
         // Two beats a record: an even number of rows.
         let beats = &mut self.narrow.as_flattened_mut()[..records.len() * (result::ROWS / 2)];
         self.collector.read(beats);
         format.widen(bytemuck::cast_slice(beats), records.as_flattened_mut());
+        const EXPONENTS: [Beat; result::ROWS / 2] = sixteen::exponents(&NUMBERS);
+        sixteen::finite(&EXPONENTS, beats)
     }
 
     /// The sum of all 32-bit words of the segments, modulo 2^32: what the accelerator counts of what
@@ -55,13 +59,27 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// Lanes of a record that are numbers: what lies beside a vec3 is nobody's.
+const NUMBERS: [[bool; LANES]; result::ROWS] = {
+    let mut numbers = [[true; LANES]; result::ROWS];
+    numbers[result::POSITION][WORD_LANE] = false;
+    numbers[result::LINEAR][WORD_LANE] = false;
+    numbers[result::ANGULAR][WORD_LANE] = false;
+    numbers
+};
+
 /// Whether all numbers of these records are finite.
-#[inline]
+#[inline(always)]
 pub(crate) fn finite(records: &[Record]) -> bool {
     const LARGEST: Largest<{ result::ROWS }> = {
-        let mut beside = [MAGNITUDE; result::ROWS];
-        beside[result::ORIENTATION] = f32::MAX.to_bits();
-        // What lies beside a vec3 is nobody's.
+        let mut beside = [f32::MAX.to_bits(); result::ROWS];
+        let mut row = 0;
+        while row < result::ROWS {
+            if !NUMBERS[row][WORD_LANE] {
+                beside[row] = MAGNITUDE;
+            }
+            row += 1;
+        }
         Largest::new(f32::MAX, beside)
     };
     LARGEST.bound(records)
@@ -81,7 +99,7 @@ impl<'a> Collector<'a> {
     }
 
     /// Reads the next beats.
-    #[inline]
+    #[inline(always)]
     fn read(&mut self, beats: &mut [Beat]) {
         let rest = match self.deal.group().len() {
             _ if !self.deal.at_end_of_group() => beats,
@@ -100,7 +118,7 @@ impl<'a> Collector<'a> {
     }
 
     /// Reads whole groups of `G` beats; what is left to read.
-    #[inline]
+    #[inline(always)]
     fn groups<'c, const G: usize>(&mut self, beats: &'c mut [Beat]) -> &'c mut [Beat] {
         let (groups, rest) = beats.as_chunks_mut::<G>();
         if self.deal.one_a_channel() && self.channels.len() == G {
@@ -143,7 +161,7 @@ impl<'a> Collector<'a> {
 }
 
 /// Reads groups of which each channel has one beat, in the order of the channels.
-#[inline]
+#[inline(always)]
 fn one_each<const G: usize>(from: [&[Beat]; G], groups: &mut [[Beat; G]], sum: &mut Lanes) {
     // Said once here, so that it is not asked of every beat.
     let from = from.map(|beats| &beats[..groups.len()]);
@@ -158,7 +176,7 @@ fn one_each<const G: usize>(from: [&[Beat]; G], groups: &mut [[Beat; G]], sum: &
 }
 
 /// Reads the `S` beats of each group that one channel has, and adds them up.
-#[inline]
+#[inline(always)]
 fn run<const G: usize, const S: usize>(
     from: &[Beat],
     places: [usize; G],
@@ -201,7 +219,10 @@ mod tests {
     fn read(layout: &Layout, channels: &[&[Beat]], count: usize) -> (Vec<(Pose, Velocity)>, u32) {
         let mut reader = Reader::new(layout, channels);
         let mut records = vec![Record::default(); count];
-        records.chunks_mut(BLOCK).for_each(|block| reader.read(block));
+        records.chunks_mut(BLOCK).for_each(|block| {
+            let good = reader.read(block);
+            assert_eq!(good, finite(block));
+        });
         (records.iter().map(decode).collect(), reader.finish())
     }
 

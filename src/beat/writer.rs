@@ -6,13 +6,14 @@ use std::fmt;
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, collision, relative};
 
+use super::collisions::{Absolute, Kind, NOTHING, Relative, pack_block};
 use super::deal::{BLOCK, Dealer};
-use super::pack::{NOTHING, Target, pack_block, relative_record};
 use super::stage::Stage;
 use super::stripe::Segment;
-use crate::record;
+use super::target::Target;
+use crate::platform::{Work, in_wide_vectors};
 use crate::record::end::Ends;
-use crate::scene::validate::Block;
+use crate::scene::validate::{Block, Quick};
 use crate::scene::{Collision, InputError};
 
 /// Takes the collisions of a step straight into the memory that the board reads.
@@ -131,26 +132,18 @@ impl<'a> Writer<'a> {
             return;
         }
         let Self { target, ends, dealer, stage, written, .. } = self;
-        let (quick, collisions) = (target.quick, &self.block[..count]);
+        let (quick, collisions) = (target.quick, self.block.each_ref());
+        let collisions = &collisions[..count];
         let block =
             || Block { first: *written, collisions, ends: *ends, scheduled: false, heads: true };
         let good = match stage {
-            EntryStage::Absolute(stage) => pack_block(
-                quick,
-                block(),
-                &record::collision::INTEGERS,
-                (stage, dealer),
-                |_, it, ends| record::collision::encode(it, ends),
-                |quick, block, records| quick.absolute(block, records),
-            ),
-            EntryStage::Relative(stage) => pack_block(
-                quick,
-                block(),
-                &record::relative::INTEGERS,
-                (stage, dealer),
-                |index, it, ends| relative_record(ends, None, index, it),
-                |quick, block, records| quick.relative(block, records),
-            ),
+            EntryStage::Absolute(stage) => {
+                in_wide_vectors(Flush { kind: Absolute, quick, block: block(), stage, dealer })
+            }
+            EntryStage::Relative(stage) => {
+                let kind = Relative { words: None };
+                in_wide_vectors(Flush { kind, quick, block: block(), stage, dealer })
+            }
         };
         if !good {
             self.refused = quick.and_then(|quick| quick.refusal(&block()).err());
@@ -169,5 +162,24 @@ impl<'a> Writer<'a> {
             Some(refused) => Err(refused),
             None => Ok((self.dealer.finish(), self.written)),
         }
+    }
+}
+
+/// A block of collisions, and where it goes.
+struct Flush<'a, 'b, K, const ROWS: usize> {
+    kind: K,
+    quick: Option<&'a Quick<'a>>,
+    block: Block<'a>,
+    stage: &'a mut Stage<ROWS>,
+    dealer: &'a mut Dealer<'b, 'b>,
+}
+
+impl<K: Kind<ROWS>, const ROWS: usize> Work for Flush<'_, '_, K, ROWS> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Self { kind, quick, block, stage, dealer } = self;
+        pack_block(&kind, quick, block, (stage, dealer), |_| {})
     }
 }

@@ -94,10 +94,20 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
         self.schedule.len()
     }
 
+    #[inline]
     fn collision(&self, index: usize) -> Collision {
         self.schedule.get(index).map_or(PADDING, |index| self.collisions.collision(index))
     }
 
+    #[inline]
+    fn structure(&self, index: usize) -> Option<&Collision> {
+        match self.schedule.get(index) {
+            Some(index) => self.collisions.structure(index),
+            None => Some(&PADDING),
+        }
+    }
+
+    #[inline]
     fn soon(&self, index: usize) {
         self.schedule.get(index).into_iter().for_each(|index| self.collisions.soon(index));
     }

@@ -18,7 +18,7 @@ type Vector = arch::uint32x4_t;
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 type Vector = [u32; LANES];
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-use std::ops::{BitAnd as _, BitOr as _};
+use std::ops::{Add as _, BitAnd as _, BitOr as _, Mul as _, Sub as _};
 
 /// One instruction for all four words, or the same word by word.
 macro_rules! each {
@@ -31,6 +31,31 @@ macro_rules! each {
         let vector = unsafe { arch::$arm($one.0, $other.0) };
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         let vector = std::array::from_fn(|k| $word($one.0[k], $other.0[k]));
+        Self(vector)
+    }};
+}
+
+/// The same of words that are f32.
+macro_rules! each_f32 {
+    ($x86:ident, $arm:ident, $number:expr, $one:expr, $other:expr) => {{
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: every x86-64 has the instructions, which compute or take one register for another.
+        let vector = unsafe {
+            let [one, other] = [$one.0, $other.0].map(|vector| arch::_mm_castsi128_ps(vector));
+            arch::_mm_castps_si128(arch::$x86(one, other))
+        };
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: every aarch64 that Linux runs on has the instructions, which compute or take one
+        // register for another.
+        let vector = unsafe {
+            let [one, other] = [$one.0, $other.0].map(|vector| arch::vreinterpretq_f32_u32(vector));
+            arch::vreinterpretq_u32_f32(arch::$arm(one, other))
+        };
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        let vector = {
+            let [one, other] = [$one, $other].map(|lanes| lanes.0.map(f32::from_bits));
+            std::array::from_fn(|k| $number(one[k], other[k]).to_bits())
+        };
         Self(vector)
     }};
 }
@@ -85,18 +110,41 @@ impl Lanes {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: every x86-64 has the instruction.
         return Self(unsafe { arch::_mm_cmpgt_epi32(self.0, other.0) });
-        #[cfg(not(target_arch = "x86_64"))]
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: every aarch64 that Linux runs on has the instructions.
+        return Self(unsafe {
+            let [one, other] = [self.0, other.0].map(|vector| arch::vreinterpretq_s32_u32(vector));
+            arch::vcgtq_s32(one, other)
+        });
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return Self::new(std::array::from_fn(|k| {
             let [one, other] = [self, other].map(|lanes| lanes.words()[k].cast_signed());
             if one > other { u32::MAX } else { 0 }
         }));
     }
 
+    /// Sums of f32, rounded to nearest even.
+    #[inline(always)]
+    pub(crate) fn plus_f32(self, other: Self) -> Self {
+        each_f32!(_mm_add_ps, vaddq_f32, f32::add, self, other)
+    }
+
     /// Differences of f32, rounded to nearest even.
     #[inline(always)]
     pub(crate) fn minus_f32(self, other: Self) -> Self {
-        let [one, other] = [self, other].map(|lanes| lanes.words().map(f32::from_bits));
-        Self::new(std::array::from_fn(|k| (one[k] - other[k]).to_bits()))
+        each_f32!(_mm_sub_ps, vsubq_f32, f32::sub, self, other)
+    }
+
+    /// Products of f32, rounded to nearest even.
+    #[inline(always)]
+    pub(crate) fn times_f32(self, other: Self) -> Self {
+        each_f32!(_mm_mul_ps, vmulq_f32, f32::mul, self, other)
+    }
+
+    /// The larger ones of f32 of which none is NaN.
+    #[inline(always)]
+    pub(crate) fn larger_f32(self, other: Self) -> Self {
+        each_f32!(_mm_max_ps, vmaxq_f32, f32::max, self, other)
     }
 
     /// The bits that either has.
@@ -117,5 +165,46 @@ impl From<Lanes> for Beat {
     #[inline(always)]
     fn from(lanes: Lanes) -> Self {
         Self(lanes.words())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn each(one: [u32; 4], other: [u32; 4], word: impl Fn(u32, u32) -> u32) -> [u32; 4] {
+        std::array::from_fn(|k| word(one[k], other[k]))
+    }
+
+    proptest! {
+        #[test]
+        fn every_word_is_computed_by_itself(one in any::<[u32; 4]>(), other in any::<[u32; 4]>()) {
+            let [a, b] = [one, other].map(Lanes::new);
+            prop_assert_eq!(a.plus(b).words(), each(one, other, u32::wrapping_add));
+            prop_assert_eq!(a.and(b).words(), each(one, other, |a, b| a & b));
+            prop_assert_eq!(a.or(b).words(), each(one, other, |a, b| a | b));
+            let above = |a: u32, b: u32| if a.cast_signed() > b.cast_signed() { u32::MAX } else { 0 };
+            prop_assert_eq!(a.above(b).words(), each(one, other, above));
+        }
+
+        #[test]
+        fn numbers_are_computed_as_one_by_one(
+            one in any::<[f32; 4]>(),
+            other in any::<[f32; 4]>(),
+        ) {
+            let [x, y] = [one, other].map(|numbers| numbers.map(f32::to_bits));
+            let [a, b] = [x, y].map(Lanes::new);
+            let of = |number: fn(f32, f32) -> f32| {
+                each(x, y, |a, b| number(f32::from_bits(a), f32::from_bits(b)).to_bits())
+            };
+            prop_assert_eq!(a.plus_f32(b).words(), of(|a, b| a + b));
+            prop_assert_eq!(a.minus_f32(b).words(), of(|a, b| a - b));
+            prop_assert_eq!(a.times_f32(b).words(), of(|a, b| a * b));
+            // Which of 0 and -0 is the larger is not said.
+            let larger = a.larger_f32(b).words().map(f32::from_bits);
+            prop_assert_eq!(larger, of(f32::max).map(f32::from_bits));
+        }
     }
 }

@@ -59,6 +59,7 @@ mod u_dma_buf;
 mod uio;
 mod uio_device;
 mod uio_window;
+mod vectors;
 mod wait;
 mod window;
 
@@ -87,6 +88,7 @@ pub use u_dma_buf::{Caching, u_dma_buf_names};
 pub use uio::{UioMap, UioNode, uio_nodes};
 pub use uio_device::UioDevice;
 pub use uio_window::UioWindow;
+pub(crate) use vectors::{Work, in_wide_vectors};
 pub(crate) use wait::{Deadline, poll_until};
 pub(crate) use window::{AccessCounts, Decoded, RegisterMap, RegisterWindow, Window, fields};
 #[cfg(test)]

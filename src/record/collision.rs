@@ -23,7 +23,7 @@ pub(crate) const INTEGERS: [bool; collision::ROWS] = {
 /// Shape: 7 rows. Units: metres, world frame; distance negative = penetrating.
 ///
 /// Source: interface specification, record table.
-#[inline]
+#[inline(always)]
 pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Beat; collision::ROWS] {
     let mut beats = [Beat::default(); collision::ROWS];
     beats[collision::NORMAL] = vec3_and_word(from.normal, from.count);

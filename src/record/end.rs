@@ -31,7 +31,7 @@ impl End {
     }
 
     /// That of a body. Without a shape it is static.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of(body: &Body, shapes: &[Shape]) -> Self {
         let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
         let tag = match shape {
@@ -42,7 +42,7 @@ impl End {
     }
 
     /// Its position beside a word.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn with_word(self, word: u32) -> Beat {
         let whole: Beat = bytemuck::cast(self);
         let vec3 = Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]);
@@ -50,13 +50,13 @@ impl End {
     }
 
     /// Whether it never moves.
-    #[inline]
+    #[inline(always)]
     pub(crate) const fn is_static(self) -> bool {
         self.tag & STATIC != 0
     }
 
     /// Whether it has a shape.
-    #[inline]
+    #[inline(always)]
     pub(crate) const fn has_shape(self) -> bool {
         self.tag != NO_SHAPE
     }
@@ -87,7 +87,7 @@ impl Survey<'_> {
     }
 
     /// Adds the next bodies; returns their ends.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn add(&mut self, bodies: &[Body], shapes: &[Shape]) -> &[End] {
         let first = self.ends.len();
         self.ends.extend(bodies.iter().map(|body| End::of(body, shapes)));
@@ -105,7 +105,7 @@ pub(crate) struct Ends<'a>(pub(crate) &'a [End]);
 
 impl Ends<'_> {
     /// Says that those of these bodies are asked for soon.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn soon(self, bodies: [u32; 2]) {
         for body in bodies {
             fetch(self.0.as_ptr().wrapping_add(body as usize));
@@ -113,7 +113,7 @@ impl Ends<'_> {
     }
 
     /// That of one body.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn get(self, body: u32) -> End {
         let end = usize::try_from(body).ok().and_then(|body| self.0.get(body));
         *end.unwrap_or(&End::MISSING)

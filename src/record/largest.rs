@@ -1,6 +1,7 @@
 //! This file finds out at once whether all numbers of many records are within their limits.
 
-use crate::interface::record::{Beat, LANES, WORD_LANE};
+use super::{USED, of_count};
+use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
 use crate::platform::Lanes;
 
 /// An f32 without its sign; as a limit, any word at all.
@@ -24,16 +25,38 @@ impl<const ROWS: usize> Largest<ROWS> {
     }
 
     /// Whether all of these records are within. Without a branch per number.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn bound(&self, records: &[[Beat; ROWS]]) -> bool {
-        let magnitude = Lanes::all(MAGNITUDE);
-        let mut beyond = Lanes::all(0);
-        for record in records {
-            for (beat, largest) in record.iter().zip(&self.0) {
-                let found = Lanes::from(*beat).and(magnitude);
-                beyond = beyond.or(found.above(Lanes::from(*largest)));
-            }
-        }
-        beyond.words() == [0; LANES]
+        let within = |beyond, record| self.beyond(record).fold(beyond, Lanes::or);
+        records.iter().fold(Lanes::all(0), within).words() == [0; LANES]
+    }
+
+    /// The same of collisions of so many contact points each: what is in the others does not matter.
+    ///
+    /// Shape: contact points are the last rows.
+    #[inline(always)]
+    pub(crate) fn bound_used(
+        &self,
+        records: &[[Beat; ROWS]],
+        counts: impl Iterator<Item = u32>,
+    ) -> bool {
+        let within = |beyond, (record, count)| {
+            let used = of_count(&USED, count);
+            let used = |row: usize| match row.checked_sub(ROWS - CONTACT_POINTS) {
+                Some(ordinal) => used[ordinal],
+                None => Lanes::all(u32::MAX),
+            };
+            let found = (0..).zip(self.beyond(record)).map(|(row, found)| found.and(used(row)));
+            found.fold(beyond, Lanes::or)
+        };
+        records.iter().zip(counts).fold(Lanes::all(0), within).words() == [0; LANES]
+    }
+
+    /// All bits of each word that is beyond its limit, row by row.
+    #[inline(always)]
+    fn beyond<'a>(&'a self, record: &'a [Beat; ROWS]) -> impl Iterator<Item = Lanes> + 'a {
+        record.iter().zip(&self.0).map(|(beat, largest)| {
+            Lanes::from(*beat).and(Lanes::all(MAGNITUDE)).above(Lanes::from(*largest))
+        })
     }
 }

@@ -21,19 +21,19 @@ use crate::platform::Lanes;
 use crate::scene::Contact;
 
 /// A vec3 and the word beside it.
-#[inline]
+#[inline(always)]
 fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Beat {
     Beat([x.to_bits(), y.to_bits(), z.to_bits(), word])
 }
 
 /// Four numbers, one a lane.
-#[inline]
+#[inline(always)]
 fn vec4(value: [f32; 4]) -> Beat {
     Beat(value.map(f32::to_bits))
 }
 
 /// A contact point beside its distance.
-#[inline]
+#[inline(always)]
 fn contact_beat(contact: &Contact) -> Beat {
     vec3_and_word(contact.point, contact.distance.to_bits())
 }
@@ -57,12 +57,12 @@ const fn by_count(used: Beat, unused: Beat) -> [[Beat; CONTACT_POINTS]; CONTACT_
 }
 
 /// The bits of the contact points that are used.
-static USED: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
+pub(crate) static USED: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
     by_count(Beat([u32::MAX; LANES]), Beat([0; LANES]));
 
 /// The row of such a table.
-#[inline]
-fn of_count(
+#[inline(always)]
+pub(crate) fn of_count(
     table: &[[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1],
     count: u32,
 ) -> [Lanes; CONTACT_POINTS] {
@@ -70,7 +70,7 @@ fn of_count(
 }
 
 /// Zeros, and the word beside them.
-#[inline]
+#[inline(always)]
 fn beside(word: u32) -> Lanes {
     Lanes::new([0, 0, 0, word])
 }

@@ -12,7 +12,7 @@ pub(crate) const INTEGERS: [bool; pose::ROWS] = [false; pose::ROWS];
 /// Shape: 2 rows. Units: metres, unit quaternion x, y, z, w, world frame.
 ///
 /// Source: interface specification, record table.
-#[inline]
+#[inline(always)]
 pub(crate) fn encode(body: &Body) -> [Beat; pose::ROWS] {
     let mut beats = [Beat::default(); pose::ROWS];
     beats[pose::POSITION] = vec3_and_word(body.pose.position, 0);

@@ -26,7 +26,7 @@ static FAR: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
 /// Shape: 6 rows. Units: metres, world axes; distance negative = penetrating.
 ///
 /// Source: interface specification, record table.
-#[inline]
+#[inline(always)]
 pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Beat; relative::ROWS] {
     let mut beats = [Beat::default(); relative::ROWS];
     let [a, b] = [a, b].map(|end| Lanes::from(end.with_word(0)));
@@ -47,7 +47,7 @@ pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Beat; relative::ROW
 ///
 /// A static body has no lever arm that anything comes of, and its centre may be far away, which
 /// sixteen bits pay for with every contact point on it: the other body's position stands in for its.
-#[inline]
+#[inline(always)]
 pub(crate) fn anchors<T: Copy>([a, b]: [T; 2], moves: [bool; 2]) -> [T; 2] {
     match moves {
         [false, _] => [b, b],

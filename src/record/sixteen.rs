@@ -4,7 +4,7 @@ use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::record::{Beat, LANES, WORD_LANE};
 
 use super::thesis16;
-use crate::platform::{from_binary16, to_binary16};
+use crate::platform::{Lanes, from_binary16, to_binary16};
 
 /// A row in sixteen bits: half a beat.
 pub(crate) type Row = [u16; LANES];
@@ -32,7 +32,7 @@ impl Sixteen {
     /// is an unsigned integer, which validation has found to fit.
     ///
     /// Many at once: how the machine converts is found out once a call.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn narrow<const ROWS: usize>(
         self,
         records: &[[Beat; ROWS]],
@@ -58,7 +58,7 @@ impl Sixteen {
     }
 
     /// Rows of f32 numbers from rows of this format. Many at once, as [`Self::narrow`].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn widen(self, rows: &[Row], wide: &mut [Beat]) {
         match self {
             Self::Binary16 => from_binary16(rows, bytemuck::cast_slice_mut(wide)),
@@ -69,6 +69,45 @@ impl Sixteen {
             }
         }
     }
+}
+
+/// The bits of the exponents of a row.
+const EXPONENT: u16 = 0x7C00;
+
+/// The bits of a record's exponents. `numbers` says which of its lanes are numbers.
+///
+/// Shape: `BEATS` beats hold `ROWS` rows.
+pub(crate) const fn exponents<const ROWS: usize, const BEATS: usize>(
+    numbers: &[[bool; LANES]; ROWS],
+) -> [Beat; BEATS] {
+    assert!(BEATS * 2 == ROWS, "two rows a beat");
+    let mut beats = [Beat([0; LANES]); BEATS];
+    let mut at = 0;
+    while at < ROWS * LANES {
+        if numbers[at / LANES][at % LANES] {
+            beats[at / 8].0[at % 8 / 2] |= (EXPONENT as u32) << (at % 2 * 16);
+        }
+        at += 1;
+    }
+    beats
+}
+
+/// Whether all numbers of these records are finite: in neither format are those whose exponent is
+/// all ones. Without a branch per number. `exponents` are the bits to look at ([`exponents`]).
+///
+/// Shape: whole records.
+#[inline(always)]
+pub(crate) fn finite<const BEATS: usize>(exponents: &[Beat; BEATS], beats: &[Beat]) -> bool {
+    // One more than the largest exponent is a carry into the sign, which is not looked at.
+    let one = Lanes::all(0x0400_0400);
+    let mut carries = Lanes::all(0);
+    for record in beats.as_chunks::<BEATS>().0 {
+        for (beat, exponents) in record.iter().zip(exponents) {
+            let exponents = Lanes::from(*beat).and(Lanes::from(*exponents));
+            carries = carries.or(exponents.plus(one));
+        }
+    }
+    carries.and(Lanes::all(0x8000_8000)).words() == [0; LANES]
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ pub(crate) const WORLD_INTEGERS: [bool; velocity::WORLD_ROWS] = {
 /// Shape: 2 rows. Units: m/s, rad/s, world frame.
 ///
 /// Source: interface specification, record table.
-#[inline]
+#[inline(always)]
 pub(crate) fn encode(body: &Body) -> [Beat; velocity::ROWS] {
     let mut beats = [Beat::default(); velocity::ROWS];
     beats[velocity::LINEAR] = vec3_and_word(body.velocity.linear, body.shape);
@@ -37,7 +37,7 @@ pub(crate) fn encode(body: &Body) -> [Beat; velocity::ROWS] {
 /// Shape: 4 rows. Units: m/s, rad/s, 1/(kg m²), world frame.
 ///
 /// Source: interface specification, record table.
-#[inline]
+#[inline(always)]
 pub(crate) fn encode_world(body: &Body, inertia: &Inverse) -> [Beat; velocity::WORLD_ROWS] {
     let [linear, angular] = encode(body);
     let mut beats = [Beat::default(); velocity::WORLD_ROWS];

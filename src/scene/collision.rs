@@ -41,11 +41,13 @@ pub trait Collisions {
     /// Collision `index`, which is below [`len`](Self::len).
     fn collision(&self, index: usize) -> Collision;
 
-    /// All of them, where they lie in an array of structures: they are read there, without a copy.
+    /// Collision `index`, which is below [`len`](Self::len), where it lies, if it lies there as this
+    /// structure: it is read without a copy.
     ///
-    /// They are what [`collision`](Self::collision) gives for every index. A view that changes
-    /// anything leaves it as it is.
-    fn structures(&self) -> Option<&[Collision]> {
+    /// It is what [`collision`](Self::collision) gives. A view that changes anything leaves this as it
+    /// is.
+    fn structure(&self, index: usize) -> Option<&Collision> {
+        let _ = index;
         None
     }
 
@@ -78,8 +80,9 @@ impl Collisions for [Collision] {
         self[index]
     }
 
-    fn structures(&self) -> Option<&[Collision]> {
-        Some(self)
+    #[inline]
+    fn structure(&self, index: usize) -> Option<&Collision> {
+        self.get(index)
     }
 
     #[inline]
@@ -98,8 +101,9 @@ impl Collisions for Vec<Collision> {
         self[index]
     }
 
-    fn structures(&self) -> Option<&[Collision]> {
-        Some(self)
+    #[inline]
+    fn structure(&self, index: usize) -> Option<&Collision> {
+        self.get(index)
     }
 
     #[inline]

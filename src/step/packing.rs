@@ -7,9 +7,9 @@ use super::bank::Bank;
 use super::device::Device;
 use super::lane::Lane;
 use super::plan::Plan;
-use crate::beat::pack::{
-    Chosen, Entries, Target, pack_bodies, pack_collisions, pack_poses, pack_velocities, survey,
-};
+use crate::beat::bodies::{Chosen, pack_bodies, pack_poses, pack_velocities, survey};
+use crate::beat::collisions::{Entries, pack_collisions};
+use crate::beat::target::Target;
 use crate::beat::writer::Writer;
 use crate::order::Lives;
 use crate::record::end::{Ends, Survey};

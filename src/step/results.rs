@@ -15,6 +15,7 @@ use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
 use crate::beat::unpack::{BLOCK, Reader, Record, finite};
 use crate::order::LiveReport;
+use crate::platform::{Work, in_wide_vectors};
 use crate::record::result;
 use crate::scene::Bodies;
 
@@ -107,25 +108,16 @@ impl Results<'_> {
         statics: &[u32],
         spare: &mut Vec<Record>,
     ) -> (u32, Option<usize>) {
-        let mut broken = None;
         // What is there from the last step is overwritten.
         spare.resize(count, Record::default());
-        let mut reader = Reader::new(self.layout, self.channels);
-        for (first, records) in (0..).step_by(BLOCK).zip(spare.chunks_mut(BLOCK)) {
-            reader.read(records);
-            if broken.is_none() && !finite(records) {
-                let moves =
-                    |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
-                let wrong = (first..).zip(&*records).filter(|(_, it)| !finite(&[**it]));
-                broken = wrong.map(|(index, _)| index).find(moves);
-            }
-        }
+        let reader = Reader::new(self.layout, self.channels);
+        let (sum, broken) = in_wide_vectors(InTurn { reader, statics, into: spare });
         for index in statics.iter().map(|index| *index as usize) {
             if let Some(to) = spare.get_mut(index) {
                 *to = own(bodies, index);
             }
         }
-        (reader.finish(), broken)
+        (sum, broken)
     }
 
     /// Reads results in the order of these bodies, and leaves all others as they are; otherwise as
@@ -143,8 +135,7 @@ impl Results<'_> {
         let mut block = [Record::default(); BLOCK];
         for order in order.chunks(BLOCK) {
             let records = &mut block[..order.len()];
-            reader.read(records);
-            let all_finite = finite(records);
+            let all_finite = reader.read(records);
             for (record, body) in records.iter().zip(order) {
                 let index = *body as usize;
                 if !all_finite && !finite(&[*record]) {
@@ -155,6 +146,33 @@ impl Results<'_> {
                 if let Some(to) = spare.get_mut(index) {
                     *to = *record;
                 }
+            }
+        }
+        (reader.finish(), broken)
+    }
+}
+
+/// Results in the order of the bodies.
+struct InTurn<'a> {
+    reader: Reader<'a>,
+    statics: &'a [u32],
+    into: &'a mut [Record],
+}
+
+impl Work for InTurn<'_> {
+    type Output = (u32, Option<usize>);
+
+    /// The sum of the words that were read, and the first body that moves and is not finite.
+    #[inline(always)]
+    fn run(self) -> (u32, Option<usize>) {
+        let Self { mut reader, statics, into } = self;
+        let mut broken = None;
+        for (first, records) in (0..).step_by(BLOCK).zip(into.chunks_mut(BLOCK)) {
+            if !reader.read(records) && broken.is_none() {
+                let moves =
+                    |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
+                let wrong = (first..).zip(&*records).filter(|(_, it)| !finite(&[**it]));
+                broken = wrong.map(|(index, _)| index).find(moves);
             }
         }
         (reader.finish(), broken)

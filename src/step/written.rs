@@ -8,7 +8,7 @@ use super::plan::Plan;
 use super::prepared::Prepared;
 use super::report::HostTimes;
 use super::solver::Accelerator;
-use crate::beat::pack::Target;
+use crate::beat::target::Target;
 use crate::beat::writer::Writer;
 use crate::error::Error;
 use crate::order::Order;
@@ -159,6 +159,6 @@ impl Collisions for Announced {
     }
 
     fn collision(&self, _: usize) -> Collision {
-        crate::beat::pack::NOTHING
+        crate::beat::collisions::NOTHING
     }
 }

@@ -41,8 +41,6 @@ impl<'a> Quick<'a> {
         let [velocities, poses, limit] =
             [held.velocities, held.poses, held.collisions].map(StreamFormat::largest);
         let number = limit.to_bits();
-        // That of a point which is not there is infinite; one that is there is looked at.
-        let distance = f32::INFINITY.to_bits();
         let Largest([linear, angular]) = Largest::new(velocities, [any; 2]);
         let Largest([position, orientation]) = Largest::new(poses, [any, poses.to_bits()]);
         let geometry = scene.variant.profile.geometry;
@@ -51,14 +49,14 @@ impl<'a> Quick<'a> {
                 && !(held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute),
             bodies: Largest([linear, angular, position, orientation]),
             absolute: Largest::new(limit, [any, any, any, number, number, number, number]),
-            relative: Largest::new(limit, [any, any, distance, distance, distance, distance]),
+            relative: Largest::new(limit, [any, any, number, number, number, number]),
             scene,
         }
     }
 
     /// Whether validation refuses nothing of these bodies, the first of which has the index `first`;
     /// `ends` are theirs.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn bodies(&self, first: usize, bodies: &[Body], ends: &[End]) -> bool {
         let mut good = true;
         for (body, end) in bodies.iter().zip(ends) {
@@ -77,7 +75,7 @@ impl<'a> Quick<'a> {
 
     /// Whether validation refuses nothing of these collisions, whose records in world coordinates
     /// these are.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn absolute(&self, block: &Block<'_>, records: &[[Beat; collision::ROWS]]) -> bool {
         let mut good = block.heads & self.absolute.bound(records);
         if self.short_rows {
@@ -90,15 +88,12 @@ impl<'a> Quick<'a> {
     }
 
     /// As [`Self::absolute`], of records relative to body A.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn relative(&self, block: &Block<'_>, records: &[[Beat; relative::ROWS]]) -> bool {
-        let mut good = block.heads & self.relative.bound(records);
-        let limit = self.scene.held.collisions.largest();
-        for (rows, collision) in records.iter().zip(block.collisions) {
-            for (ordinal, contact) in (0..).zip(&collision.contacts) {
-                good &= (contact.distance.abs() <= limit) | (ordinal >= collision.count);
-            }
-            if self.short_rows {
+        let counts = block.collisions.iter().map(|collision| collision.count);
+        let mut good = block.heads & self.relative.bound_used(records, counts);
+        if self.short_rows {
+            for (rows, collision) in records.iter().zip(block.collisions) {
                 let [_, offset, points @ ..] = rows;
                 good &= self.rows(block, collision, [&Beat([0; LANES]), offset], points);
             }
@@ -107,7 +102,7 @@ impl<'a> Quick<'a> {
     }
 
     /// Whether a bitstream that computes rows in sixteen bits surely computes these.
-    #[inline]
+    #[inline(always)]
     fn rows(
         &self,
         block: &Block<'_>,
@@ -151,7 +146,7 @@ impl<'a> Quick<'a> {
 pub(crate) struct Block<'a> {
     /// Index of the first.
     pub(crate) first: usize,
-    pub(crate) collisions: &'a [Collision],
+    pub(crate) collisions: &'a [&'a Collision],
     /// Of all bodies.
     pub(crate) ends: Ends<'a>,
     /// Whether they are in an order that was made for them. One without contact points may be of
@@ -162,7 +157,7 @@ pub(crate) struct Block<'a> {
 }
 
 /// Whether normal, count and bodies of a collision are surely right.
-#[inline]
+#[inline(always)]
 pub(crate) fn head(collision: &Collision, [a, b]: [End; 2], scheduled: bool) -> bool {
     let [x, y, z] = collision.normal;
     let square = x * x + y * y + z * z;
@@ -176,7 +171,7 @@ pub(crate) fn head(collision: &Collision, [a, b]: [End; 2], scheduled: bool) -> 
 }
 
 /// Whether an order may have made it.
-#[inline]
+#[inline(always)]
 fn is_padding(collision: &Collision) -> bool {
     (collision.count == 0) & (collision.body_a == collision.body_b)
 }

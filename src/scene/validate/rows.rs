@@ -10,7 +10,10 @@ use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES};
 
 use super::Scene;
 use super::range::{fits, origin, used};
+use crate::platform::Lanes;
+use crate::record::largest::MAGNITUDE;
 use crate::record::relative::difference;
+use crate::record::{USED, of_count};
 use crate::scene::{Collision, Contact, InputError, Shape};
 
 /// A component of a moment is two products of the lever arm with a unit normal: at most sqrt(2)
@@ -154,53 +157,54 @@ pub(super) struct Ends<'a> {
 }
 
 /// Whether a bitstream that computes rows in binary16 surely computes these: the longest arms of all
-/// contact points, whose numbers are in range, are taken together.
+/// contact points in use, whose numbers are in range, are taken together.
 ///
 /// What is longer in any component is no shorter after any of the roundings, so that what is found
 /// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
 /// left out at the end.
-#[inline]
+#[inline(always)]
 pub(super) fn surely_fit(
     ends: &Ends<'_>,
     points: &[Beat; CONTACT_POINTS],
     count: u32,
     flush: bool,
 ) -> bool {
-    let positions = ends.positions.map(|beat| beat.0.map(f32::from_bits));
-    let mut longest = [[0.0_f32; LANES]; 2];
-    let mut furthest = [0.0_f32; LANES];
-    let first = points[0].0.map(f32::from_bits);
-    for (ordinal, point) in (0..).zip(points) {
-        // One that is not in use counts as the first does.
-        let used = ordinal < count;
-        let point: [f32; LANES] =
-            std::array::from_fn(|k| if used { f32::from_bits(point.0[k]) } else { first[k] });
-        for k in 0..LANES {
-            furthest[k] = larger(furthest[k], point[k].abs());
-        }
-        for (longest, position) in longest.iter_mut().zip(&positions) {
-            for k in 0..LANES {
-                let (x, p) = (point[k], position[k]);
-                longest[k] = larger(longest[k], (x - p).abs() + (x.abs() + p.abs()) * LOSS);
-            }
+    let magnitude = |lanes: Lanes| lanes.and(Lanes::all(MAGNITUDE));
+    let loss = Lanes::all(LOSS.to_bits());
+    let positions = ends.positions.map(|beat| Lanes::from(*beat));
+    let distances = positions.map(magnitude);
+    let mut longest = [Lanes::all(0); 2];
+    let mut furthest = Lanes::all(0);
+    for (point, used) in points.iter().zip(of_count(&USED, count)) {
+        let point = Lanes::from(*point);
+        let far = magnitude(point);
+        furthest = furthest.larger_f32(far.and(used));
+        for ((longest, position), distance) in longest.iter_mut().zip(positions).zip(distances) {
+            let arm = magnitude(point.minus_f32(position));
+            let arm = arm.plus_f32(far.plus_f32(distance).times_f32(loss));
+            *longest = longest.larger_f32(arm.and(used));
         }
     }
+    // Four of them, and a little for the roundings of their sum.
+    let limit =
+        |limit: f32| Lanes::new([limit.to_bits(), limit.to_bits(), limit.to_bits(), u32::MAX >> 1]);
+    let beyond = furthest.above(limit(LARGEST / 4.01));
+    let beyond =
+        longest.map(|arm| arm.above(limit(LONGEST_ARM))).into_iter().fold(beyond, Lanes::or);
     let [a, b] = ends.shapes;
     let mass = a.inverse_mass + b.inverse_mass;
-    let mut fit = mass >= 1.0 / LARGEST;
     let mut turning = [0.0; 2];
-    for ((turning, shape), [rx, ry, rz, _]) in turning.iter_mut().zip(ends.shapes).zip(longest) {
+    for ((turning, shape), arm) in turning.iter_mut().zip(ends.shapes).zip(longest) {
         let [x, y, z] = shape.inverse_inertia;
-        *turning = x.max(y).max(z) * (rx * rx + ry * ry + rz * rz);
-        fit &= (rx <= LONGEST_ARM) & (ry <= LONGEST_ARM) & (rz <= LONGEST_ARM);
+        let [rx, ry, rz, _] = arm.times_f32(arm).words().map(f32::from_bits);
+        *turning = larger(larger(x, y), z) * (rx + ry + rz);
     }
-    fit &= mass + turning[0] + turning[1] <= largest(flush);
-    // Four of them, and a little for the roundings of their sum.
-    let [x, y, z, _] = furthest;
-    fit & (x <= LARGEST / 4.01) & (y <= LARGEST / 4.01) & (z <= LARGEST / 4.01)
+    (beyond.words() == [0; LANES])
+        & (mass >= 1.0 / LARGEST)
+        & (mass + turning[0] + turning[1] <= largest(flush))
 }
 
-#[inline]
+#[inline(always)]
 fn larger(one: f32, other: f32) -> f32 {
     if one > other { one } else { other }
 }
