@@ -10,13 +10,14 @@
 //! (`--input`; or else `full_step186` of the folder that the environment variable `PGS_VECTORS`
 //! names). One thread does everything. Each thing is measured alone: it and a `memcpy` from warm
 //! memory to warm memory run in turn, several runs a stretch of which the first do not count, so that its
-//! own buffers are as warm as the caches can hold them. Given are the bytes written (those read, for
-//! results), medians, GB/s of these bytes, and the throughput as a part of that of `memcpy`.
+//! own buffers are as warm as the caches can hold them. Given are the bytes written, medians, GB/s of
+//! these bytes, and the throughput as a part of that of `memcpy`.
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
 //! - `as given`, `in order`: collisions alone, in array order and in the order without hazards
-//! - `all, ...`: bodies and collisions with the validation of everything
-//! - `unpack`: results with their checks, into the driver's own memory
+//! - `step, ...`: bodies, then collisions
+//! - `checked, ...`: the same with the validation of everything on the way, as a step does it
+//! - `unpack`: results with their checks, into the driver's own memory, where they are f32
 //! - `commit`: from there to the caller's bodies
 //!
 //! `--cpu-time` counts the time that the thread runs instead of the time that passes: where others
@@ -84,19 +85,23 @@ enum Thing {
     Bodies,
     AsGiven,
     InOrder,
-    AllAsGiven,
-    AllInOrder,
+    StepAsGiven,
+    StepInOrder,
+    CheckedAsGiven,
+    CheckedInOrder,
     Unpack,
     Commit,
 }
 
 impl Thing {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 9] = [
         Self::Bodies,
         Self::AsGiven,
         Self::InOrder,
-        Self::AllAsGiven,
-        Self::AllInOrder,
+        Self::StepAsGiven,
+        Self::StepInOrder,
+        Self::CheckedAsGiven,
+        Self::CheckedInOrder,
         Self::Unpack,
         Self::Commit,
     ];
@@ -106,8 +111,10 @@ impl Thing {
             Self::Bodies => "bodies",
             Self::AsGiven => "as given",
             Self::InOrder => "in order",
-            Self::AllAsGiven => "all, as given",
-            Self::AllInOrder => "all, in order",
+            Self::StepAsGiven => "step, as given",
+            Self::StepInOrder => "step, in order",
+            Self::CheckedAsGiven => "checked, as given",
+            Self::CheckedInOrder => "checked, in order",
             Self::Unpack => "unpack",
             Self::Commit => "commit",
         }
@@ -130,7 +137,7 @@ impl Row {
 
     fn print(&self) {
         println!(
-            "{:<8} {:<14} {:>6.2} {:>8.3} {:>6.2} {:>8.3} {:>6.2} {:>7.2}",
+            "{:<8} {:<17} {:>6.2} {:>8.3} {:>6.2} {:>8.3} {:>6.2} {:>7.2}",
             self.profile.name,
             self.thing.name(),
             self.bytes as f64 / 1e6,
@@ -178,7 +185,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             schedule.empty(),
             options.common.runs(),
         );
-        println!("{:<24}{:>6} {:>8} {:>6} {:>15} {:>7}", "", "MB", "ms", "GB/s", "memcpy", "of it");
+        println!("{:<27}{:>6} {:>8} {:>6} {:>15} {:>7}", "", "MB", "ms", "GB/s", "memcpy", "of it");
     }
     let mut profiles = Vec::new();
     for profile in [&FLOAT, &HALF, &MIXED] {
@@ -194,7 +201,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     if options.common.json {
         let document = json!({
-            "schema": 2,
+            "schema": 3,
             "bench": "pack",
             "step": step.name,
             "bodies": step.bodies.len(),
@@ -228,8 +235,8 @@ fn measure(
     packer.pack_bodies(bodies, shapes);
     unpacker.unpack(bodies).ok_or("the results are refused")?;
     match thing {
-        Thing::AllAsGiven => packer.pack(bodies, collisions, shapes, false)?,
-        Thing::AllInOrder => packer.pack(bodies, &ordered, shapes, true)?,
+        Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, false)?,
+        Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, true)?,
         _ => Some(0),
     }
     .ok_or("the step is refused")?;
@@ -239,9 +246,9 @@ fn measure(
         Thing::Bodies => of_bodies,
         Thing::AsGiven => of_collisions,
         Thing::InOrder => of_entries,
-        Thing::AllAsGiven => of_bodies + of_collisions,
-        Thing::AllInOrder => of_bodies + of_entries,
-        Thing::Unpack | Thing::Commit => unpacker.bytes(),
+        Thing::StepAsGiven | Thing::CheckedAsGiven => of_bodies + of_collisions,
+        Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
+        Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
     };
     let it: Run<'_> = match thing {
         Thing::Bodies => Box::new(|| {
@@ -253,10 +260,18 @@ fn measure(
         Thing::InOrder => Box::new(|| {
             black_box(packer.pack_collisions(black_box(&ordered), shapes, true));
         }),
-        Thing::AllAsGiven => Box::new(|| {
+        Thing::StepAsGiven => Box::new(|| {
+            black_box(packer.pack_bodies(black_box(bodies), shapes));
+            black_box(packer.pack_collisions(black_box(collisions), shapes, false));
+        }),
+        Thing::StepInOrder => Box::new(|| {
+            black_box(packer.pack_bodies(black_box(bodies), shapes));
+            black_box(packer.pack_collisions(black_box(&ordered), shapes, true));
+        }),
+        Thing::CheckedAsGiven => Box::new(|| {
             let _ = black_box(packer.pack(bodies, black_box(collisions), shapes, false));
         }),
-        Thing::AllInOrder => Box::new(|| {
+        Thing::CheckedInOrder => Box::new(|| {
             let _ = black_box(packer.pack(bodies, black_box(&ordered), shapes, true));
         }),
         Thing::Unpack => Box::new(|| {
