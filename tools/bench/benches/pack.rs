@@ -4,6 +4,7 @@
 //! cargo bench --bench pack
 //! cargo bench --bench pack -- --input FOLDER --cpu-time
 //! cargo bench --bench pack -- --grid 10x10x10 --runs 31 --json
+//! cargo bench --bench pack -- --profile half --thing in-order
 //! ```
 //!
 //! The step is one of the thesis' cubes, standing on the ground, or the one in a folder of arrays
@@ -38,7 +39,7 @@ use bench::{Clock, Run, milliseconds, ratio, warm_medians};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, Profile};
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use scene::Grid;
 use serde_json::{Map, Value, json};
 use zynq_pgs::bench::{StepPacker, Unpacker};
@@ -57,11 +58,32 @@ struct Options {
     /// Time for which the thread runs, not that which passes
     #[arg(long)]
     cpu_time: bool,
+    /// Of this profile alone: float, half or mixed
+    #[arg(long, value_name = "NAME")]
+    profile: Option<String>,
+    /// This thing alone
+    #[arg(long, value_enum)]
+    thing: Option<Thing>,
     #[command(flatten)]
     common: Common,
 }
 
+/// The profiles whose formats differ.
+const MEASURED: [&Profile; 3] = [&FLOAT, &HALF, &MIXED];
+
 impl Options {
+    fn profiles(&self) -> Result<Vec<&'static Profile>, String> {
+        let wanted = |profile: &&Profile| self.profile.as_ref().is_none_or(|it| it == profile.name);
+        let profiles: Vec<_> = MEASURED.into_iter().filter(wanted).collect();
+        if profiles.is_empty() {
+            return Err(format!(
+                "--profile is one of {}",
+                MEASURED.map(|profile| profile.name).join(", ")
+            ));
+        }
+        Ok(profiles)
+    }
+
     fn step(&self) -> Result<Step, Box<dyn Error>> {
         let vectors = std::env::var_os("PGS_VECTORS").filter(|_| self.grid.is_none());
         let vectors = || vectors.map(|root| PathBuf::from(root).join("full_step186"));
@@ -80,7 +102,7 @@ impl Options {
 }
 
 /// What is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Thing {
     Bodies,
     AsGiven,
@@ -94,18 +116,6 @@ enum Thing {
 }
 
 impl Thing {
-    const ALL: [Self; 9] = [
-        Self::Bodies,
-        Self::AsGiven,
-        Self::InOrder,
-        Self::StepAsGiven,
-        Self::StepInOrder,
-        Self::CheckedAsGiven,
-        Self::CheckedInOrder,
-        Self::Unpack,
-        Self::Commit,
-    ];
-
     const fn name(self) -> &'static str {
         match self {
             Self::Bodies => "bodies",
@@ -172,6 +182,7 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    let chosen = options.profiles()?;
     let step = options.step()?;
     let schedule = step.schedule(BoardConfig::default())?;
     let clock = if options.cpu_time { "the thread's time" } else { "time that passes" };
@@ -188,9 +199,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         println!("{:<27}{:>6} {:>8} {:>6} {:>15} {:>7}", "", "MB", "ms", "GB/s", "memcpy", "of it");
     }
     let mut profiles = Vec::new();
-    for profile in [&FLOAT, &HALF, &MIXED] {
+    for profile in chosen {
         let mut measured = Map::new();
-        for thing in Thing::ALL {
+        let things = Thing::value_variants().iter().copied();
+        for thing in things.filter(|it| options.thing.is_none_or(|thing| thing == *it)) {
             let row = measure(profile, thing, &step, &schedule, options)?;
             if !options.common.json {
                 row.print();
