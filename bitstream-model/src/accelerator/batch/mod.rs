@@ -43,9 +43,6 @@ use width::Width;
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
 
-/// Things that a thread makes at once.
-const TOGETHER: usize = 512;
-
 /// What a pass is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Stage {
@@ -155,19 +152,13 @@ impl Batch {
         self.slots.len()
     }
 
-    /// Whether there are threads beside the caller's.
-    pub(super) fn has_threads(&self) -> bool {
-        !self.pool.is_empty()
-    }
-
-    /// Makes something of each of many things on all threads.
-    pub(super) fn make<T: Sync, R: Send>(
+    /// Does something with each of some things on all threads, in no particular order.
+    pub(super) fn share<T>(
         &mut self,
-        from: &[T],
-        to: &mut [R],
-        make: impl Fn(&T) -> R + Sync,
+        things: impl Iterator<Item = T> + Send,
+        with: impl Fn(T) + Sync,
     ) {
-        self.pool.each(TOGETHER, (from, to), make);
+        self.pool.share(things, with);
     }
 
     /// Block and lane of a collision, or `None` for a padding entry.
