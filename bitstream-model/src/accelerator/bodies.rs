@@ -2,13 +2,13 @@
 //! `float`: two rows of a body on streams 0 and 1, of the next one on 2 and 3; of a result a row on each
 //! stream.
 
-use std::ops::Range;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
+use super::array::Row;
+use super::batch::ResultPlaces;
 use super::control::Arguments;
 use super::decode;
-use super::integrate::{Integration, integrate};
-use super::number::Single;
+use super::replay::Replay;
 use super::results::Results;
 use super::segment::{PacketError, Segment};
 use super::solver::{Mass, Velocity};
@@ -18,84 +18,64 @@ use crate::body_pace::{BodyPace, BodyPhase, beats_of};
 use crate::cast::register;
 use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
-use crate::interface::record::{Beat, WORD_LANE, velocity};
+use crate::interface::record::{Beat, LANES, WORD_LANE, velocity};
 use crate::memory::{Memory, Source};
 use crate::stream::Stream;
 
 /// The beats of some bodies on each stream, where they are.
 pub(super) type Views<'a> = [&'a [Beat]; STREAMS_MAX];
 
-/// Room for the results of some bodies, for each stream.
-type Places<'a> = [&'a mut [Beat]; STREAMS_MAX];
+/// Bodies that a thread loads at once.
+const TOGETHER: usize = 2048;
 
-/// Bodies that a thread integrates at once.
-const TOGETHER: usize = 256;
-
-/// Two rows of each of those bodies, of which the views begin with body `first`.
-fn rows_of(
-    views: Views<'_>,
-    first: usize,
-    bodies: Range<usize>,
-) -> impl Iterator<Item = [[u32; 4]; 2]> {
-    let before = beats_of(first);
-    bodies.map(move |body| {
-        let stream = 2 * (body % 2);
-        let row = |k: usize| views[k][body / 2 - before[k]].0;
-        [row(stream), row(stream + 1)]
-    })
-}
-
-/// The sum of all words.
-fn sum(views: Views<'_>) -> u32 {
-    let mut lanes = [0_u32; 4];
-    for beat in views.into_iter().flatten() {
-        for (lane, word) in lanes.iter_mut().zip(beat.0) {
-            *lane = lane.wrapping_add(word);
-        }
-    }
-    lanes.into_iter().fold(0, u32::wrapping_add)
-}
-
-/// Bodies that are integrated.
+/// Two rows of each of some bodies, of which the views begin with body `first`.
 #[derive(Debug, Clone, Copy)]
-struct Bodies<'a> {
-    velocities: &'a [Velocity],
-    shape_of: &'a [u8],
-    masses: &'a [Mass],
-    /// Where bodies move at all.
-    integration: Option<&'a Integration>,
-    /// The poses from body `first` on.
-    poses: Views<'a>,
-    first: usize,
+pub(super) struct BodyRows<'a> {
+    pub(super) views: Views<'a>,
+    pub(super) first: usize,
 }
 
-impl Bodies<'_> {
-    /// The results of bodies, from one on as many as there are places; the sum of their words.
-    fn results(&self, first: usize, places: Places<'_>) -> u32 {
-        let mut sum = [0_u32; 4];
-        let bodies = first..first + places[0].len();
-        let [positions, orientations, linears, angulars] = places;
-        let poses = rows_of(self.poses, self.first, bodies.clone());
-        let states = self.velocities[bodies.clone()].iter().zip(&self.shape_of[bodies]);
-        let places = positions.iter_mut().zip(orientations).zip(linears.iter_mut().zip(angulars));
-        for (((velocity, shape), pose), ((position, orientation), (linear, angular))) in
-            states.zip(poses).zip(places)
-        {
-            let (mut pose, mut velocity) = (decode::pose(StreamFormat::F32, &pose), *velocity);
-            if let Some(integration) = self.integration
-                && self.masses[usize::from(*shape)].inverse_mass != 0.0
-            {
-                (pose, velocity) = integrate::<Single>(integration, &pose, &velocity);
-            }
-            let rows = decode::result(StreamFormat::F32, &pose, &velocity);
-            for row in rows {
-                for (sum, word) in sum.iter_mut().zip(row) {
-                    *sum = sum.wrapping_add(word);
+impl BodyRows<'_> {
+    /// The rows of a body.
+    pub(super) fn of(&self, body: usize) -> [Row; 2] {
+        let before = beats_of(self.first);
+        let stream = 2 * (body % 2);
+        [stream, stream + 1].map(|k| self.views[k][body / 2 - before[k]].0)
+    }
+
+    /// Loads bodies from `first` on; the sum of the words of their rows, and the first body that has no
+    /// shape.
+    fn load(
+        &self,
+        first: usize,
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+        shape_of: &mut [u8],
+    ) -> (u32, Option<usize>) {
+        let before = beats_of(self.first);
+        let (mut sum, mut wrong) = ([0_u32; LANES], None);
+        for begin in [first, first + 1] {
+            let k = 2 * (begin % 2);
+            let rows = |k: usize| self.views[k].iter().skip(begin / 2 - before[k]);
+            let kept = velocities.iter_mut().zip(&mut *shape_of).skip(begin - first).step_by(2);
+            let bodies = (begin..).step_by(2).zip(rows(k).zip(rows(k + 1)));
+            for ((velocity, kept_shape), (body, (linear, angular))) in kept.zip(bodies) {
+                for (sum, words) in sum.iter_mut().zip(linear.0.into_iter().zip(angular.0)) {
+                    *sum = sum.wrapping_add(words.0).wrapping_add(words.1);
                 }
+                let (loaded, shape) = decode::velocity(StreamFormat::F32, &[linear.0, angular.0]);
+                let (Some(mass), Ok(shape)) = (masses.get(shape as usize), u8::try_from(shape))
+                else {
+                    wrong = wrong.into_iter().chain([body]).min();
+                    continue;
+                };
+                // A static body's words are not looked at.
+                let moves = mass.inverse_mass != 0.0;
+                *velocity = if moves { loaded } else { Velocity::default() };
+                *kept_shape = shape;
             }
-            [position.0, orientation.0, linear.0, angular.0] = rows;
         }
-        sum.into_iter().fold(0, u32::wrapping_add)
+        (sum.into_iter().fold(0, u32::wrapping_add), wrong)
     }
 }
 
@@ -130,23 +110,25 @@ impl Accelerator {
         records: usize,
         views: Views<'_>,
     ) -> Result<u32, PacketError> {
-        let masses = self.replay.masses.as_slice();
         let bodies = segment.done..segment.done + records;
-        let kept = self.velocities[bodies.clone()].iter_mut();
-        let kept = kept.zip(&mut self.shape_of[bodies.clone()]);
-        let rows = rows_of(views, segment.done, bodies.clone());
-        for (body, (rows, (kept, kept_shape))) in bodies.zip(rows.zip(kept)) {
-            let (velocity, shape) = decode::velocity(StreamFormat::F32, &rows);
-            let mass = masses.get(shape as usize);
-            let (Some(mass), Ok(shape)) = (mass, u8::try_from(shape)) else {
+        let rows = BodyRows { views, first: segment.done };
+        let Replay { batch, masses, .. } = &mut self.replay;
+        let velocities = self.velocities[bodies.clone()].chunks_mut(TOGETHER);
+        let shapes = self.shape_of[bodies.clone()].chunks_mut(TOGETHER);
+        let (sum, wrong) = (AtomicU32::new(0), AtomicUsize::new(usize::MAX));
+        let parts = bodies.step_by(TOGETHER).zip(velocities.zip(shapes));
+        batch.share(parts, |(first, (velocities, shapes))| {
+            let (of_part, wrong_body) = rows.load(first, masses, velocities, shapes);
+            sum.fetch_add(of_part, Ordering::Relaxed);
+            wrong.fetch_min(wrong_body.unwrap_or(usize::MAX), Ordering::Relaxed);
+        });
+        match wrong.into_inner() {
+            usize::MAX => Ok(sum.into_inner()),
+            body => {
                 let beat = register(body);
-                return Err(PacketError { code: ErrorCode::ShapeIndex, channel: 0, beat });
-            };
-            // A static body's words are not looked at.
-            *kept = if mass.inverse_mass == 0.0 { Velocity::default() } else { velocity };
-            *kept_shape = shape;
+                Err(PacketError { code: ErrorCode::ShapeIndex, channel: 0, beat })
+            }
         }
-        Ok(sum(views))
     }
 
     /// Integrates the next bodies and sends their results; the sums of what has come and gone.
@@ -162,19 +144,19 @@ impl Accelerator {
         let mut rows = std::mem::take(&mut self.rows);
         rows.iter_mut().for_each(|rows| rows.resize(records, Beat::default()));
         let places = rows.each_mut().map(Vec::as_mut_slice);
-        let Arguments { integrate, integration, .. } = &self.arguments;
-        let bodies = Bodies {
-            velocities: &self.velocities,
-            shape_of: &self.shape_of,
-            masses: &self.replay.masses,
-            integration: integrate.then_some(integration),
-            poses: views,
-            first,
-        };
-        let sent = bodies.results(first, places);
+        let sums = self.results(first, BodyRows { views, first }, places);
         results.send_rows(records, &rows, outputs);
         self.rows = rows;
-        [sum(views), sent]
+        sums
+    }
+
+    /// Makes the results of bodies from `first` on, one for each place. Returns the sums of what has
+    /// come and gone.
+    fn results(&mut self, first: usize, poses: BodyRows<'_>, places: ResultPlaces<'_>) -> [u32; 2] {
+        let Replay { batch, masses, .. } = &mut self.replay;
+        batch.enter(&self.velocities, &self.shape_of, masses);
+        let Arguments { integrate, integration, .. } = &self.arguments;
+        batch.integrate(integrate.then_some(integration), first, poses, places)
     }
 
     /// What happens to the bodies, if nothing else can be next for it.
@@ -234,7 +216,7 @@ impl Accelerator {
         &mut self,
         pace: &BodyPace,
         views: Views<'_>,
-        places: Places<'_>,
+        places: ResultPlaces<'_>,
         inputs: &mut [Stream],
         outputs: &mut [Stream],
     ) {
@@ -252,8 +234,9 @@ impl Accelerator {
                 Phase::Load(segment)
             }
             Phase::Integrate { mut poses, mut results } => {
-                self.received(sum(views));
-                let sent = self.flowed_results(poses.done, records, views, places, outputs);
+                let poses_there = BodyRows { views, first: poses.done };
+                let [received, sent] = self.flowed_results(poses_there, records, places, outputs);
+                self.received(received);
                 self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sent);
                 poses.skip(records, inputs);
                 results.pass(records);
@@ -263,16 +246,15 @@ impl Accelerator {
         };
     }
 
-    /// Integrates bodies from `first` on. The results go where there is place for them, behind those
-    /// that wait on the streams, and the last ones onto the streams. Returns the sum of their words.
+    /// Integrates bodies. The results go where there is place for them, behind those that wait on the
+    /// streams, and the last ones onto the streams. Returns the sums of what has come and gone.
     fn flowed_results(
         &mut self,
-        first: usize,
+        poses: BodyRows<'_>,
         records: usize,
-        poses: Views<'_>,
-        mut places: Places<'_>,
+        mut places: ResultPlaces<'_>,
         outputs: &mut [Stream],
-    ) -> u32 {
+    ) -> [u32; 2] {
         let mut direct = records;
         for (place, stream) in places.iter_mut().zip(&mut *outputs) {
             let waiting = stream.len().min(place.len());
@@ -281,35 +263,22 @@ impl Accelerator {
             direct = direct.min(behind.len());
             *place = behind;
         }
-        let Arguments { integrate, integration, .. } = &self.arguments;
-        let bodies = Bodies {
-            velocities: &self.velocities,
-            shape_of: &self.shape_of,
-            masses: &self.replay.masses,
-            integration: integrate.then_some(integration),
-            poses,
-            first,
-        };
-        let mut now = Places::default();
-        for (now, place) in now.iter_mut().zip(&mut places) {
-            (*now, *place) = std::mem::take(place).split_at_mut(direct);
-        }
-        let sent = AtomicU32::new(0);
-        let [a, b, c, d] = now.map(|beats| beats.chunks_mut(TOGETHER));
-        let parts = a.zip(b).zip(c.zip(d)).enumerate();
-        self.replay.batch.share(parts, |(part, ((a, b), (c, d)))| {
-            let sum = bodies.results(first + part * TOGETHER, [a, b, c, d]);
-            sent.fetch_add(sum, Ordering::Relaxed);
+        let now = places.each_mut().map(|place| {
+            let (now, behind) = std::mem::take(place).split_at_mut(direct);
+            *place = behind;
+            now
         });
+        let first = poses.first;
+        let before = self.results(first, poses, now);
         let mut rows = std::mem::take(&mut self.rows);
         rows.iter_mut().for_each(|rows| rows.resize(records - direct, Beat::default()));
-        let sum = bodies.results(first + direct, rows.each_mut().map(Vec::as_mut_slice));
+        let behind = self.results(first + direct, poses, rows.each_mut().map(Vec::as_mut_slice));
         for ((rows, place), stream) in rows.iter().zip(places).zip(outputs) {
             let (leaving, staying) = rows.split_at(place.len());
             place.copy_from_slice(leaving);
             stream.push(staying);
         }
         self.rows = rows;
-        sent.into_inner().wrapping_add(sum)
+        [before[0].wrapping_add(behind[0]), before[1].wrapping_add(behind[1])]
     }
 }

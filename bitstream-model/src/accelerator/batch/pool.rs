@@ -95,12 +95,17 @@ impl Pool {
         self.workers.is_empty()
     }
 
-    /// Does something with each of some things on all threads, in no particular order.
+    /// Does something with each of some things on all threads, in no particular order. For a single
+    /// one nobody is woken.
     pub(super) fn share<T>(
         &mut self,
         things: impl Iterator<Item = T> + Send,
         with: impl Fn(T) + Sync,
     ) {
+        if self.is_empty() || things.size_hint().1.is_some_and(|things| things < 2) {
+            things.for_each(with);
+            return;
+        }
         let things = Mutex::new(things);
         self.run(&|_| {
             loop {
