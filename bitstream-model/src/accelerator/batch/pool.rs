@@ -1,5 +1,5 @@
-//! This file keeps the threads that help with decoding, passes and integration. They wait in between;
-//! nothing is started and nothing allocated from one step to the next.
+//! This file keeps the threads that help with loading, decoding, passes and integration. They wait in
+//! between; nothing is started and nothing allocated from one step to the next.
 //!
 //! Nobody waits for a thread that has not begun: one that comes late finds nothing to do.
 
