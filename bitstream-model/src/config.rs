@@ -130,7 +130,8 @@ pub struct BoardConfig {
     /// Threads of the host that the arithmetic may take, the caller's among them. Like the next two
     /// without any influence on results, counters and cycles.
     pub threads: usize,
-    /// Whether collisions that have no body in common are computed side by side, where the host can.
+    /// Whether collisions that have no body in common, and bodies, are computed side by side, where the
+    /// host can.
     pub lanes: bool,
     /// Whether collisions are decoded once and replayed in the other passes, where the design allows
     /// for it and the bytes are the same.

@@ -13,6 +13,8 @@ mod axi_dma;
 #[cfg(feature = "emulation")]
 mod board;
 #[cfg(feature = "emulation")]
+mod body_pace;
+#[cfg(feature = "emulation")]
 mod bus;
 #[cfg(feature = "emulation")]
 mod cast;

@@ -7,6 +7,8 @@
 //!
 //! A board can be built on memory outside instead (`outside.rs`); then it allocates none.
 
+mod lend;
+
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -79,8 +81,8 @@ pub enum Denied {
 }
 
 /// Beats in a buffer that the device reads. While it owns the buffer they stay as they are, so that
-/// beats of equal sources are equal: each hand-over makes sources of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// beats of equal sources are equal: each hand-over makes sources of its own. The default is none's.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Source {
     /// Where the first one is.
     address: u64,
@@ -362,6 +364,17 @@ impl Memory {
                 beats[..end].get_mut(first..first + count).ok_or(Denied::PastEnd)
             }
         }
+    }
+
+    /// Whether the device may write those beats in a buffer that it owns.
+    pub(crate) fn may_write(&self, address: u64, count: usize) -> bool {
+        let Ok((region, offset)) = self.find(address, (count * BEAT_BYTES) as u64) else {
+            return false;
+        };
+        let Content::Device(beats, DeviceAccess::Write, granted) = &region.content else {
+            return false;
+        };
+        index(offset / BEAT_BYTES as u64) + count <= beats.len().min(*granted)
     }
 
     /// Whether the device may write those beats.

@@ -21,6 +21,36 @@ pub(crate) struct Supply {
     pub(crate) reserve: u64,
 }
 
+/// A count for each engine, in their order: MM2S and S2MM of each core.
+pub(crate) type PerEngine = [usize; 2 * STREAMS_MAX];
+
+impl Supply {
+    /// Gives every engine a burst in turn, for that many cycles, until the memory has no more. Each can
+    /// move so many beats; those that it moves are taken from them.
+    #[inline]
+    pub(crate) fn share(
+        &self,
+        engines: usize,
+        (credit, turn): (&mut u64, &mut usize),
+        cycles: u64,
+        beats: &mut PerEngine,
+    ) {
+        let Self { income, beat_cost, reserve } = *self;
+        *credit = (*credit).min(reserve).saturating_add(cycles.saturating_mul(income));
+        let mut without_beats = 0;
+        while without_beats < engines && *credit >= beat_cost {
+            let burst =
+                if *credit >= BURST_BEATS * beat_cost { BURST_BEATS } else { *credit / beat_cost };
+            let left = &mut beats[*turn];
+            let moved = index(burst).min(*left);
+            *left -= moved;
+            *credit -= moved as u64 * beat_cost;
+            *turn = if *turn + 1 == engines { 0 } else { *turn + 1 };
+            without_beats = if moved == 0 { without_beats + 1 } else { 0 };
+        }
+    }
+}
+
 /// What stays the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Rules {
@@ -169,41 +199,21 @@ impl Pace {
         let Standing { held, credit, turn } = &mut self.standing;
         // An engine moves a beat a cycle.
         let most = usize::try_from(cycles).unwrap_or(usize::MAX);
-        let mut room = [0; STREAMS_MAX];
+        let mut room = PerEngine::default();
         for k in 0..STREAMS_MAX {
             if share[k] > 0 {
-                room[k] = most.min(depth - held[k]);
+                room[2 * k] = most.min(depth - held[k]);
             }
         }
-        let mut put = |k: usize, beats: usize| {
-            held[k] += beats;
-            self.flowed.beats[k] += beats;
-        };
-        let Some(Supply { income, beat_cost, reserve }) = supply else {
-            for (k, beats) in room.into_iter().enumerate() {
-                put(k, beats);
-            }
-            return;
-        };
-        *credit = (*credit).min(reserve).saturating_add(cycles.saturating_mul(income));
-        let mut without_beats = 0;
-        while without_beats < engines && *credit >= beat_cost {
-            let moved = if turn.is_multiple_of(2) {
-                let burst = if *credit >= BURST_BEATS * beat_cost {
-                    BURST_BEATS
-                } else {
-                    *credit / beat_cost
-                };
-                let moved = index(burst).min(room[*turn / 2]);
-                room[*turn / 2] -= moved;
-                put(*turn / 2, moved);
-                *credit -= moved as u64 * beat_cost;
-                moved
-            } else {
-                0
-            };
-            *turn = if *turn + 1 == engines { 0 } else { *turn + 1 };
-            without_beats = if moved == 0 { without_beats + 1 } else { 0 };
+        let mut left = PerEngine::default();
+        if let Some(supply) = supply {
+            left = room;
+            supply.share(engines, (credit, turn), cycles, &mut left);
+        }
+        for k in 0..STREAMS_MAX {
+            let moved = room[2 * k] - left[2 * k];
+            held[k] += moved;
+            self.flowed.beats[k] += moved;
         }
     }
 }

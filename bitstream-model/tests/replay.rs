@@ -218,6 +218,30 @@ proptest! {
     }
 
     #[test]
+    fn a_step_of_many_bodies_is_the_same_with_and_without(
+        config in config(),
+        (bodies, collisions, seed) in (300..1500_u32, 0..40_u32, any::<u64>()),
+        integrate in prop::bool::weighted(0.8),
+        spoilt in prop::option::weighted(0.3, (any::<u64>(), 3..600_u32)),
+        pauses in prop::collection::vec(1..9000_u64, 0..4),
+    ) {
+        let mut step = Step { integrate, ..scene(bodies, collisions, seed, true) };
+        if let Some((at, shape)) = spoilt {
+            step.bodies[below(at, bodies) as usize].shape = shape;
+        }
+        let config = BoardConfig { length_width: config.length_width.max(14), ..config };
+        same(config, None, 2, |machine| {
+            let (flight, _) = begin(machine, &step, |_, _, _| {});
+            for nanoseconds in &pauses {
+                machine.host.port.pause(std::time::Duration::from_nanos(*nanoseconds));
+                machine.host.status(1, common::BOTH[1]);
+            }
+            machine.wait(&flight, 40 * LONG)?;
+            Ok(machine.collect(&flight, step.bodies.len()))
+        });
+    }
+
+    #[test]
     fn a_step_with_faults_is_the_same_with_and_without(
         config in config(),
         (bodies, collisions, seed, apart) in (9..100_u32, 1..400_u32, any::<u64>(), any::<bool>()),

@@ -22,63 +22,40 @@ pub(super) struct Integration {
     pub(super) gravity: [f32; 3],
 }
 
-/// What a moving body's velocity makes of its pose, whatever that is.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Turn<U> {
-    /// The displacement, and the rotation as a quaternion.
-    moved: Vec3<U>,
-    rotation: Vec3<U>,
-    cosine: Number<U>,
-    /// One time step later.
-    velocity: Velocity,
-}
-
-impl<U: Format> Turn<U> {
-    pub(super) fn new(parameters: &Integration, velocity: &Velocity) -> Self {
-        let n = Number::<U>::new;
-        let dt = n(parameters.time_step);
-        let half = n(0.5);
-        let v = Vec3::<U>::new(velocity.linear);
-        let w = Vec3::<U>::new(velocity.angular) * n(parameters.angular_damping);
-
-        let mut speed = w.dot(w).sqrt();
-        if (speed * dt).above(n(ROTATION_LIMIT)) {
-            speed = n(ROTATION_LIMIT) / dt;
-        }
-        let rotation = if n(SERIES_BELOW).above(speed) {
-            w * (half * dt - ((((dt * dt) * dt) * n(SERIES_TERM)) * speed) * speed)
-        } else {
-            w * (n(libm::sinf(((half * speed) * dt).value())) / speed)
-        };
-        let cosine = n(libm::cosf(((speed * dt) * half).value()));
-        let linear = v + Vec3::<U>::new(parameters.gravity) * dt;
-        let velocity = Velocity { linear: linear.values(), angular: w.values() };
-        Self { moved: v * dt, rotation, cosine, velocity }
-    }
-
-    /// The state one time step later.
-    pub(super) fn of(&self, pose: &Pose) -> (Pose, Velocity) {
-        let n = Number::<U>::new;
-        let (Vec3(x, y, z), c) = (self.rotation, self.cosine);
-        let [qx, qy, qz, qw] = pose.orientation.map(n);
-        let rx = ((c * qx + x * qw) + y * qz) - z * qy;
-        let ry = ((c * qy + y * qw) + z * qx) - x * qz;
-        let rz = ((c * qz + z * qw) + x * qy) - y * qx;
-        let rw = ((c * qw - x * qx) - y * qy) - z * qz;
-        let scale = n(1.0) / (((rx * rx + ry * ry) + rz * rz) + rw * rw).sqrt();
-        let position = Vec3::<U>::new(pose.position) + self.moved;
-        let orientation = [rx, ry, rz, rw].map(|r| (r * scale).value());
-        (Pose { position: position.values(), orientation }, self.velocity)
-    }
-}
-
 /// The state of a moving body one time step later.
 pub(super) fn integrate<U: Format>(
     parameters: &Integration,
     pose: &Pose,
     velocity: &Velocity,
 ) -> (Pose, Velocity) {
-    Turn::<U>::new(parameters, velocity).of(pose)
+    let n = Number::<U>::new;
+    let dt = n(parameters.time_step);
+    let half = n(0.5);
+    let v = Vec3::<U>::new(velocity.linear);
+    let w = Vec3::<U>::new(velocity.angular) * n(parameters.angular_damping);
+    let position = Vec3::<U>::new(pose.position) + v * dt;
+
+    let mut speed = w.dot(w).sqrt();
+    if (speed * dt).above(n(ROTATION_LIMIT)) {
+        speed = n(ROTATION_LIMIT) / dt;
+    }
+    let rotation = if n(SERIES_BELOW).above(speed) {
+        w * (half * dt - ((((dt * dt) * dt) * n(SERIES_TERM)) * speed) * speed)
+    } else {
+        w * (n(libm::sinf(((half * speed) * dt).value())) / speed)
+    };
+    let (Vec3(x, y, z), c) = (rotation, n(libm::cosf(((speed * dt) * half).value())));
+    let [qx, qy, qz, qw] = pose.orientation.map(n);
+    let rx = ((c * qx + x * qw) + y * qz) - z * qy;
+    let ry = ((c * qy + y * qw) + z * qx) - x * qz;
+    let rz = ((c * qz + z * qw) + x * qy) - y * qx;
+    let rw = ((c * qw - x * qx) - y * qy) - z * qz;
+    let scale = n(1.0) / (((rx * rx + ry * ry) + rz * rz) + rw * rw).sqrt();
+    let orientation = [rx, ry, rz, rw].map(|r| (r * scale).value());
+
+    let linear = v + Vec3::<U>::new(parameters.gravity) * dt;
+    let velocity = Velocity { linear: linear.values(), angular: w.values() };
+    (Pose { position: position.values(), orientation }, velocity)
 }
 
 #[cfg(test)]

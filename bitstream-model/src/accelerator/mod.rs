@@ -49,8 +49,6 @@ use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
 
 use control::{Arguments, Counters, Registers, Request};
-use integrate::Turn;
-use number::Single;
 use pipeline::Pipeline;
 use replay::Replay;
 use results::Results;
@@ -113,9 +111,6 @@ pub(crate) struct Accelerator {
     inertias: Vec<inertia::Stored>,
     impulses: Vec<Impulses>,
     replay: Replay,
-    /// What becomes of the bodies, and whether that is known before their poses come.
-    turns: Vec<Turn<Single>>,
-    turned: bool,
     /// Rows of results on their way to each stream.
     rows: [Vec<Beat>; striping::STREAMS_MAX],
     window: Option<Box<window::Windowed>>,
@@ -147,8 +142,6 @@ impl Accelerator {
             inertias: Vec::new(),
             impulses: Vec::new(),
             replay: Replay::new(config),
-            turns: Vec::new(),
-            turned: false,
             rows: Default::default(),
             window: None,
         }
@@ -411,7 +404,6 @@ impl Accelerator {
         }
         let collisions = arguments.collisions as usize;
         self.replay.begin(collisions, self.registers.shapes());
-        self.turned = false;
         self.impulses.clear();
         if !self.replay.on {
             self.impulses.resize(collisions, [0.0; CONTACT_POINTS]);

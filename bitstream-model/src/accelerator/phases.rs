@@ -125,7 +125,6 @@ impl Accelerator {
     pub(super) fn start_pass(&mut self, number: u32) {
         if number == self.passes() {
             self.compute_to(number, 0);
-            self.turn_ahead();
             let (poses, results) = (self.poses_in(), self.results_out());
             self.phase = Phase::Integrate { poses, results };
             return;

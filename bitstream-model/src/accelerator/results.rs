@@ -77,6 +77,13 @@ impl Results {
         self.beats += records * result::ROWS;
     }
 
+    /// So many records have been sent, fewer than there are.
+    pub(super) fn pass(&mut self, records: usize) {
+        self.done += records;
+        self.beats += records * self.array.rows / self.array.rows_per_beat;
+        self.sent = self.array.striping.counts(self.beats);
+    }
+
     fn push(&mut self, beat: Beat, streams: &mut [Stream]) -> u32 {
         let (k, number) = self.array.striping.places(self.beats).take();
         streams[k].push(&[beat]);

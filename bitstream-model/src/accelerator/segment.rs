@@ -128,11 +128,6 @@ impl Segment {
         sum
     }
 
-    /// Beats taken so far from one stream.
-    pub(super) fn taken_from(&self, stream: usize) -> usize {
-        self.taken[stream]
-    }
-
     /// Beats of the next `records` records on each stream.
     pub(super) fn beats_of_next(&self, records: usize) -> PerStream {
         let mut beats = self.array.striping.counts(self.array.beats_of(self.done + records));

@@ -33,14 +33,18 @@ impl Channel {
 }
 
 impl Core {
-    /// MM2S: where the rest of the descriptor's data is that it moves, and how many beats.
-    pub(crate) fn flows(&self, now: u64) -> Option<(u64, usize)> {
-        let Work::Descriptor(bd) = self.mm2s.work else { return None };
+    /// Where the rest of the descriptor's data is, or goes, that a channel moves, and how many beats.
+    pub(crate) fn flows(&self, direction: Direction, now: u64) -> Option<(u64, usize)> {
+        let (channel, beat_shift) = match direction {
+            Direction::Mm2s => (&self.mm2s, self.build.mm2s_beat_shift),
+            Direction::S2mm => (&self.s2mm, self.build.s2mm_beat_shift),
+        };
+        let Work::Descriptor(bd) = channel.work else { return None };
         let at = bd.buffer + u64::from(bd.moved);
         let left = bd.length - bd.moved;
         let whole = at.is_multiple_of(BEAT.into()) && self.reset_until.is_none();
         let beats = (left / BEAT) as usize;
-        (whole && self.mm2s.in_order(now) && self.build.mm2s_beat_shift == 0).then_some((at, beats))
+        (whole && channel.in_order(now) && beat_shift == 0).then_some((at, beats))
     }
 
     /// S2MM: whether it does nothing as long as nothing comes.
@@ -49,15 +53,16 @@ impl Core {
         self.reset_until.is_none() && !fetches && self.s2mm.in_order(now)
     }
 
-    /// MM2S: so many beats have been moved, fewer than the descriptor had.
-    pub(crate) fn flowed(&mut self, beats: usize) {
-        if let Work::Descriptor(bd) = &mut self.mm2s.work
+    /// So many beats of a channel have been moved, fewer than the descriptor had.
+    pub(crate) fn flowed(&mut self, direction: Direction, beats: usize) {
+        let channel = self.channel(direction);
+        if let Work::Descriptor(bd) = &mut channel.work
             && beats > 0
         {
             bd.moved += register(beats * BEAT_BYTES);
-            bd.rxsof |= !self.mm2s.in_packet;
-            self.mm2s.in_packet = true;
-            self.mm2s.beats += beats as u64;
+            bd.rxsof |= !channel.in_packet;
+            channel.in_packet = true;
+            channel.beats += beats as u64;
         }
     }
 }

@@ -16,6 +16,8 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
+use bytemuck::{Pod, Zeroable};
+
 use super::super::number::Single;
 use super::super::solver::{Mass, SolverParameters, Velocity};
 use super::super::turn::fixed_impulse;
@@ -113,7 +115,7 @@ impl Fronts {
 
 /// Rows of velocities: two to a cache line. A row is the linear velocity and the inverse mass, then
 /// the angular velocity and the inverse inertia.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Line([Quad; 4]);
 
@@ -129,6 +131,11 @@ impl Line {
         let at = 2 * usize::from(second);
         let ([x, y, z, _], [p, q, r, _]) = (self.0[at], self.0[at + 1]);
         Velocity { linear: [x, y, z], angular: [p, q, r] }
+    }
+
+    /// Whether a body moves.
+    pub(super) fn moves(&self, second: bool) -> bool {
+        self.0[2 * usize::from(second)][3] != 0.0
     }
 }
 

@@ -22,6 +22,8 @@ use crate::interface::record::Beat;
 
 /// Blocks that a thread fills at once.
 const RUN: usize = 16;
+/// Records that one thread takes in alone.
+const FEW: usize = 2 * RUN * LANES;
 /// Runs that wait for a thread, at most.
 const WAITING: usize = 8;
 /// Groups that are put off until the threads have ended, at most.
@@ -255,9 +257,9 @@ impl Batch {
     }
 }
 
-/// Lets all threads of a pool do what is to do.
+/// Lets all threads of a pool do what is to do, if it is worth waking them.
 fn share(intake: &mut Intake<'_, '_>, pool: &mut Pool) {
-    if pool.is_empty() {
+    if pool.is_empty() || intake.count - intake.at <= FEW {
         intake.work(Some);
         return;
     }

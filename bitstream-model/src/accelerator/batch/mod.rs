@@ -13,6 +13,7 @@ mod front;
 mod intake;
 mod kernel;
 mod lanes;
+mod motion;
 mod order;
 mod place;
 mod pool;
@@ -40,11 +41,13 @@ use place::Places;
 use pool::Pool;
 use width::Width;
 
+pub(super) use motion::Places as ResultPlaces;
+
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
 
-/// Things that a thread makes at once.
-const TOGETHER: usize = 512;
+/// Bodies that a thread copies at once.
+const TOGETHER: usize = 2048;
 
 /// What a pass is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,6 +112,8 @@ pub(super) struct Batch {
     /// Bodies that the collisions are about.
     bodies: usize,
     lines: Vec<Line>,
+    /// Whether the lines have the velocities of all bodies.
+    entered: bool,
     /// Records that wait for their blocks while these are filled.
     put_off: Vec<Group>,
 }
@@ -132,6 +137,7 @@ impl Batch {
             spins: false,
             bodies: 0,
             lines: Vec::new(),
+            entered: false,
             put_off: Vec::with_capacity(PUT_OFF),
         }
     }
@@ -148,6 +154,7 @@ impl Batch {
         self.measured = false;
         self.spins = false;
         self.bodies = 0;
+        self.entered = false;
     }
 
     /// Collisions decoded, padding entries among them.
@@ -155,19 +162,35 @@ impl Batch {
         self.slots.len()
     }
 
-    /// Whether there are threads beside the caller's.
-    pub(super) fn has_threads(&self) -> bool {
-        !self.pool.is_empty()
+    /// Takes the velocities of all bodies, unless it has them.
+    pub(super) fn enter(&mut self, velocities: &[Velocity], shape_of: &[u8], masses: &[Mass]) {
+        if self.entered {
+            return;
+        }
+        let lines = (ROWS_APART as usize + self.bodies.max(velocities.len())).div_ceil(2);
+        if self.lines.len() < lines {
+            self.lines.resize(lines, Line::default());
+        }
+        let own = &mut self.lines[ROWS_APART as usize / 2..];
+        let bodies = velocities.chunks(TOGETHER).zip(shape_of.chunks(TOGETHER));
+        self.pool.share(
+            bodies.zip(own.chunks_mut(TOGETHER / 2)),
+            |((velocities, shapes), lines)| {
+                for (body, (velocity, shape)) in velocities.iter().zip(shapes).enumerate() {
+                    lines[body / 2].put(body % 2 == 1, velocity, &masses[usize::from(*shape)]);
+                }
+            },
+        );
+        self.entered = true;
     }
 
-    /// Makes something of each of many things on all threads.
-    pub(super) fn make<T: Sync, R: Send>(
+    /// Does something with each of some things on all threads, in no particular order.
+    pub(super) fn share<T>(
         &mut self,
-        from: &[T],
-        to: &mut [R],
-        make: impl Fn(&T) -> R + Sync,
+        things: impl Iterator<Item = T> + Send,
+        with: impl Fn(T) + Sync,
     ) {
-        self.pool.each(TOGETHER, (from, to), make);
+        self.pool.share(things, with);
     }
 
     /// Block and lane of a collision, or `None` for a padding entry.
@@ -204,14 +227,7 @@ impl Batch {
             self.fronts.measure(&self.places);
             self.measured = true;
         }
-        let lines = (ROWS_APART as usize + self.bodies.max(velocities.len())).div_ceil(2);
-        if self.lines.len() < lines {
-            self.lines.resize(lines, Line::default());
-        }
-        let own = &mut self.lines[ROWS_APART as usize / 2..];
-        for (body, (velocity, shape)) in velocities.iter().zip(shape_of).enumerate() {
-            own[body / 2].put(body % 2 == 1, velocity, &masses[usize::from(*shape)]);
-        }
+        self.enter(velocities, shape_of, masses);
         let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
         let run = Passes { numbers: &passes, contact, finding, parameters, width: self.width };
         let blocks = &mut self.blocks[..self.places.blocks()];
@@ -219,9 +235,12 @@ impl Batch {
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
         self.spins |= finding.is_some();
         let own = &self.lines[ROWS_APART as usize / 2..];
-        for (body, velocity) in velocities.iter_mut().enumerate() {
-            *velocity = own[body / 2].velocity(body % 2 == 1);
-        }
+        let bodies = velocities.chunks_mut(TOGETHER).zip(own.chunks(TOGETHER / 2));
+        self.pool.share(bodies, |(velocities, lines)| {
+            for (body, velocity) in velocities.iter_mut().enumerate() {
+                *velocity = lines[body / 2].velocity(body % 2 == 1);
+            }
+        });
     }
 
     /// Runs a part of one pass, one collision after the other in the order received.
@@ -237,6 +256,7 @@ impl Batch {
         velocities: &mut [Velocity],
     ) {
         let stage = Stage::new(pass, contact);
+        self.entered = false;
         for index in part {
             let Some((block, lane)) = self.slot(index) else { continue };
             let block = &mut self.blocks[block];

@@ -1,5 +1,5 @@
-//! This file keeps the threads that help with decoding, passes and integration. They wait in between;
-//! nothing is started and nothing allocated from one step to the next.
+//! This file keeps the threads that help with loading, decoding, passes and integration. They wait in
+//! between; nothing is started and nothing allocated from one step to the next.
 //!
 //! Nobody waits for a thread that has not begun: one that comes late finds nothing to do.
 
@@ -95,21 +95,23 @@ impl Pool {
         self.workers.is_empty()
     }
 
-    /// Does something to each item on all threads, on so many neighbours at once.
-    pub(super) fn each<T: Sync, R: Send>(
+    /// Does something with each of some things on all threads, in no particular order. For a single
+    /// one nobody is woken.
+    pub(super) fn share<T>(
         &mut self,
-        together: usize,
-        (from, to): (&[T], &mut [R]),
-        make: impl Fn(&T) -> R + Sync,
+        things: impl Iterator<Item = T> + Send,
+        with: impl Fn(T) + Sync,
     ) {
-        let parts = Mutex::new(from.chunks(together).zip(to.chunks_mut(together)));
+        if self.is_empty() || things.size_hint().1.is_some_and(|things| things < 2) {
+            things.for_each(with);
+            return;
+        }
+        let things = Mutex::new(things);
         self.run(&|_| {
             loop {
-                let part = parts.lock().unwrap_or_else(PoisonError::into_inner).next();
-                let Some((from, to)) = part else { break };
-                for (from, to) in from.iter().zip(to) {
-                    *to = make(from);
-                }
+                let thing = things.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some(thing) = thing else { break };
+                with(thing);
             }
         });
     }
@@ -189,17 +191,16 @@ mod tests {
     }
 
     #[test]
-    fn each_thing_is_made_once_and_in_its_place() {
+    fn each_thing_is_for_one_thread() {
         let mut pool = Pool::new(2);
         for count in [0, 1, 7, 8, 9, 1000] {
-            let from: Vec<usize> = (0..count).collect();
             let (mut to, made) = (vec![usize::MAX; count], AtomicUsize::new(0));
-            pool.each(8, (&from, &mut to), |from| {
+            pool.share(to.iter_mut().enumerate(), |(number, to)| {
                 made.fetch_add(1, Ordering::AcqRel);
-                3 * from
+                *to = 3 * number;
             });
             assert_eq!(made.into_inner(), count);
-            assert!(to.iter().zip(&from).all(|(to, from)| *to == 3 * from));
+            assert!((0..).zip(&to).all(|(number, to)| *to == 3 * number));
         }
     }
 

@@ -319,6 +319,22 @@ impl Lanes for Avx2 {
         let [a, b, c, d] = unsafe { transposed(rows) };
         [Eight(a), Eight(b), Eight(c), Eight(d)]
     }
+
+    #[inline(always)]
+    fn spread(self, [a, b, c, d]: [Eight; 4], quads: &mut [Quad], stride: usize) {
+        assert!(quads.len() > (Self::WIDTH - 1) * stride, "a quad for each lane");
+        // SAFETY: there is an `Avx2` only where the processor has it.
+        let rows = unsafe { transposed([a.0, b.0, c.0, d.0]) };
+        for (group, row) in rows.into_iter().enumerate() {
+            // SAFETY: there is an `Avx2` only where the processor has it.
+            let pair = unsafe { apart(row) };
+            for (part, pair) in pair.into_iter().enumerate() {
+                let quad = &mut quads[(4 * part + group) * stride];
+                // SAFETY: a quad is four numbers.
+                unsafe { _mm_storeu_ps(quad.as_mut_ptr(), pair) };
+            }
+        }
+    }
 }
 
 impl Avx2 {

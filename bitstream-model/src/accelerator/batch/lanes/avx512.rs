@@ -316,6 +316,22 @@ impl Lanes for Avx512 {
         let [a, b, c, d] = unsafe { transposed(rows) };
         [Sixteen(a), Sixteen(b), Sixteen(c), Sixteen(d)]
     }
+
+    #[inline(always)]
+    fn spread(self, [a, b, c, d]: [Sixteen; 4], quads: &mut [Quad], stride: usize) {
+        assert!(quads.len() > (Self::WIDTH - 1) * stride, "a quad for each lane");
+        // SAFETY: there is an `Avx512` only where the processor has it.
+        let rows = unsafe { transposed([a.0, b.0, c.0, d.0]) };
+        for (group, row) in rows.into_iter().enumerate() {
+            // SAFETY: there is an `Avx512` only where the processor has it.
+            let four = unsafe { apart(row) };
+            for (quarter, four) in four.into_iter().enumerate() {
+                let quad = &mut quads[(4 * quarter + group) * stride];
+                // SAFETY: a quad is four numbers.
+                unsafe { _mm_storeu_ps(quad.as_mut_ptr(), four) };
+            }
+        }
+    }
 }
 
 impl Avx512 {

@@ -137,6 +137,9 @@ pub(super) trait Lanes: Copy + Debug {
     /// The numbers of one quad for each lane, `stride` quads apart, by their place in it.
     /// `quads` reaches to the last lane's.
     fn transposed(self, quads: &[Quad], stride: usize) -> [Self::Numbers; 4];
+
+    /// Sets one quad for each lane, `stride` quads apart. `quads` reaches to the last lane's.
+    fn spread(self, numbers: [Self::Numbers; 4], quads: &mut [Quad], stride: usize);
 }
 
 /// Where the quad of a lane is.

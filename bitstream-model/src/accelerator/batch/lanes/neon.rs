@@ -258,4 +258,14 @@ impl Lanes for Neon {
         // SAFETY: the target has NEON, asserted above.
         unsafe { transposed(rows) }
     }
+
+    #[inline(always)]
+    fn spread(self, [a, b, c, d]: [Four; 4], quads: &mut [Quad], stride: usize) {
+        // SAFETY: the target has NEON, asserted above.
+        let rows = unsafe { transposed([a.0, b.0, c.0, d.0]) };
+        for (lane, row) in rows.into_iter().enumerate() {
+            // SAFETY: a quad is four numbers.
+            unsafe { vst1q_f32(quads[lane * stride].as_mut_ptr(), row.0) };
+        }
+    }
 }

@@ -209,4 +209,12 @@ impl Lanes for Portable {
     fn transposed(self, quads: &[Quad], stride: usize) -> [Four; 4] {
         transposed(std::array::from_fn(|lane| quads[lane * stride]))
     }
+
+    #[inline(always)]
+    fn spread(self, numbers: [Four; 4], quads: &mut [Quad], stride: usize) {
+        let rows = transposed(numbers.map(|numbers| numbers.0));
+        for (lane, row) in rows.into_iter().enumerate() {
+            quads[lane * stride] = row.0;
+        }
+    }
 }

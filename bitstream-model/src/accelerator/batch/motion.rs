@@ -1,0 +1,350 @@
+//! This file integrates bodies side by side: the formulae and the order of evaluation of
+//! `integrate.rs`, lane by lane.
+//!
+//! The bodies come and go in the layout of `float`: the poses of even bodies on streams 0 and 1, of odd
+//! ones on 2 and 3; of a result a row on each stream.
+
+use std::mem;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use super::super::array::Row;
+use super::super::bodies::BodyRows;
+use super::super::decode;
+use super::super::integrate::{Integration, integrate};
+use super::super::number::Single;
+use super::Batch;
+use super::block::{LANES, ROWS_APART, Words};
+use super::front::Line;
+use super::lanes::{Lanes, Mask, Numbers, Quad, Work};
+use super::width::Width;
+use crate::body_pace::beats_of;
+use crate::interface::number::StreamFormat;
+use crate::interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
+use crate::interface::record::Beat;
+
+/// Bodies that a thread integrates at once.
+const TOGETHER: usize = 512;
+/// Bodies of which those of even and those of odd numbers fill the widest lanes.
+const GROUP: usize = 2 * LANES;
+
+/// Room for results, on each stream.
+pub(in super::super) type Places<'a> = [&'a mut [Beat]; 4];
+
+fn added(rows: &[Row]) -> u32 {
+    rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
+}
+
+/// Bodies and what becomes of them, if anything does.
+#[derive(Clone, Copy)]
+struct Bodies<'a> {
+    integration: Option<&'a Integration>,
+    /// Their rows of velocities, two to a line, from body 0 on.
+    lines: &'a [Line],
+    poses: BodyRows<'a>,
+    width: Width,
+}
+
+/// Takes room for so many results.
+fn take<'a>(places: &mut Places<'a>, count: usize) -> Places<'a> {
+    places.each_mut().map(|place| {
+        let (taken, rest) = mem::take(place).split_at_mut(count);
+        *place = rest;
+        taken
+    })
+}
+
+impl Bodies<'_> {
+    /// The results of bodies; the sums of the words of their poses and of their results.
+    fn results(&self, bodies: Range<usize>, mut places: Places<'_>) -> [u32; 2] {
+        let mut sums = [0; 2];
+        let Range { start, end } = bodies;
+        let mut last = start;
+        if let Some(integration) = self.integration
+            && !matches!(self.width, Width::One)
+        {
+            let first = start.next_multiple_of(2).min(end);
+            last = first + (end - first) / GROUP * GROUP;
+            self.one_by_one(start..first, take(&mut places, first - start), &mut sums);
+            let places = take(&mut places, last - first);
+            let _ = self.width.run(self.groups(integration, first..last, places, &mut sums));
+        }
+        self.one_by_one(last..end, places, &mut sums);
+        sums
+    }
+
+    /// Whole groups of bodies, of which the first one is even.
+    fn groups<'a>(
+        &'a self,
+        integration: &'a Integration,
+        bodies: Range<usize>,
+        places: Places<'a>,
+        sums: &'a mut [u32; 2],
+    ) -> Groups<'a> {
+        let pairs = bodies.start / 2..bodies.end / 2;
+        let before = beats_of(self.poses.first);
+        let poses = std::array::from_fn(|k| {
+            let view = &self.poses.views[k];
+            bytemuck::cast_slice(&view[pairs.start - before[k]..pairs.end - before[k]])
+        });
+        let rows = bytemuck::cast_slice(&self.lines[pairs]);
+        let places = places.map(bytemuck::cast_slice_mut);
+        Groups { integration, rows, poses, places, sums }
+    }
+
+    /// The same, one body after the other.
+    fn one_by_one(&self, bodies: Range<usize>, places: Places<'_>, sums: &mut [u32; 2]) {
+        let [positions, orientations, linears, angulars] = places;
+        let places = positions.iter_mut().zip(orientations).zip(linears.iter_mut().zip(angulars));
+        for (body, ((position, orientation), (linear, angular))) in bodies.zip(places) {
+            let rows = self.poses.of(body);
+            let mut pose = decode::pose(StreamFormat::F32, &rows);
+            let (line, second) = (&self.lines[body / 2], body % 2 == 1);
+            let mut velocity = line.velocity(second);
+            if let Some(integration) = self.integration.filter(|_| line.moves(second)) {
+                (pose, velocity) = integrate::<Single>(integration, &pose, &velocity);
+            }
+            let result = decode::result(StreamFormat::F32, &pose, &velocity);
+            sums[0] = sums[0].wrapping_add(added(&rows));
+            sums[1] = sums[1].wrapping_add(added(&result));
+            [position.0, orientation.0, linear.0, angular.0] = result;
+        }
+    }
+}
+
+/// Bodies side by side: pairs of an even one and the next, as many as fill the lanes.
+struct Groups<'a> {
+    integration: &'a Integration,
+    /// Four quads of a pair.
+    rows: &'a [Quad],
+    /// A quad of a pair.
+    poses: [&'a [Quad]; 4],
+    /// Two quads of a pair.
+    places: [&'a mut [Quad]; 4],
+    sums: &'a mut [u32; 2],
+}
+
+/// What is the same for all bodies.
+#[derive(Clone, Copy)]
+struct Constants<N> {
+    zero: N,
+    one: N,
+    half: N,
+    time_step: N,
+    damping: N,
+    /// What gravity adds to the velocity.
+    fall: [N; 3],
+    rotation_limit: N,
+    speed_limit: N,
+    series_below: N,
+    series_first: N,
+    series_second: N,
+}
+
+impl<N: Numbers> Constants<N> {
+    #[inline(always)]
+    fn new<L: Lanes<Numbers = N>>(lanes: L, integration: &Integration) -> Self {
+        let Integration { time_step: dt, angular_damping, gravity } = *integration;
+        let n = |number| lanes.splat(number);
+        Self {
+            zero: n(0.0),
+            one: n(1.0),
+            half: n(0.5),
+            time_step: n(dt),
+            damping: n(angular_damping),
+            fall: gravity.map(|gravity| n(gravity) * n(dt)),
+            rotation_limit: n(ROTATION_LIMIT),
+            speed_limit: n(ROTATION_LIMIT) / n(dt),
+            series_below: n(SERIES_BELOW),
+            series_first: n(0.5) * n(dt),
+            series_second: ((n(dt) * n(dt)) * n(dt)) * n(SERIES_TERM),
+        }
+    }
+
+    /// By what the angular velocity is multiplied to give the rotation, and the cosine of half its
+    /// angle.
+    #[inline(always)]
+    fn rotation<L: Lanes<Numbers = N>>(&self, lanes: L, w: [N; 3]) -> [N; 2] {
+        let Self { half, time_step, .. } = *self;
+        let speed = ((w[0] * w[0] + w[1] * w[1]) + w[2] * w[2]).sqrt();
+        let fast = (speed * time_step).above(self.rotation_limit);
+        let speed = self.speed_limit.or(fast, speed);
+        let slow = self.series_below.above(speed);
+        let series = self.series_first - (self.series_second * speed) * speed;
+        let (mut sines, mut cosines): (Words, Words) = ([0.0; LANES], [0.0; LANES]);
+        lanes.store((half * speed) * time_step, &mut sines, 0);
+        lanes.store((speed * time_step) * half, &mut cosines, 0);
+        let lacking = slow.bits();
+        for (lane, (sine, cosine)) in sines.iter_mut().zip(&mut cosines).take(L::WIDTH).enumerate()
+        {
+            if lacking & (1 << lane) == 0 {
+                *sine = libm::sinf(*sine);
+            }
+            *cosine = libm::cosf(*cosine);
+        }
+        let factor = series.or(slow, lanes.load(&sines, 0) / speed);
+        [factor, lanes.load(&cosines, 0)]
+    }
+}
+
+impl Work for Groups<'_> {
+    #[inline(always)]
+    fn with<L: Lanes>(self, lanes: L) {
+        let Self { integration, rows, poses, mut places, sums } = self;
+        let constants = Constants::new(lanes, integration);
+        let Constants { zero, one, time_step: dt, damping, fall, .. } = constants;
+        let mut totals = [zero; 2];
+        for (pair, odd) in (0..poses[0].len()).step_by(L::WIDTH).flat_map(|at| [(at, 0), (at, 1)]) {
+            let [px, py, pz, unused] = lanes.transposed(&poses[2 * odd][pair..], 1);
+            let [qx, qy, qz, qw] = lanes.transposed(&poses[2 * odd + 1][pair..], 1);
+            let [vx, vy, vz, m] = lanes.transposed(&rows[4 * pair + 2 * odd..], 4);
+            let before = lanes.transposed(&rows[4 * pair + 2 * odd + 1..], 4);
+            let [wx, wy, wz] = [before[0] * damping, before[1] * damping, before[2] * damping];
+
+            let [factor, c] = constants.rotation(lanes, [wx, wy, wz]);
+            let (x, y, z) = (wx * factor, wy * factor, wz * factor);
+            let rx = ((c * qx + x * qw) + y * qz) - z * qy;
+            let ry = ((c * qy + y * qw) + z * qx) - x * qz;
+            let rz = ((c * qz + z * qw) + x * qy) - y * qx;
+            let rw = ((c * qw - x * qx) - y * qy) - z * qz;
+            let scale = one / (((rx * rx + ry * ry) + rz * rz) + rw * rw).sqrt();
+
+            let rests = m.is_zero();
+            let results = [
+                [
+                    px.or(rests, px + vx * dt),
+                    py.or(rests, py + vy * dt),
+                    pz.or(rests, pz + vz * dt),
+                    zero,
+                ],
+                [
+                    qx.or(rests, rx * scale),
+                    qy.or(rests, ry * scale),
+                    qz.or(rests, rz * scale),
+                    qw.or(rests, rw * scale),
+                ],
+                [
+                    vx.or(rests, vx + fall[0]),
+                    vy.or(rests, vy + fall[1]),
+                    vz.or(rests, vz + fall[2]),
+                    zero,
+                ],
+                [before[0].or(rests, wx), before[1].or(rests, wy), before[2].or(rests, wz), zero],
+            ];
+            for row in [[px, py, pz, unused], [qx, qy, qz, qw]] {
+                totals[0] = row.into_iter().fold(totals[0], Numbers::with_words);
+            }
+            for (row, place) in results.into_iter().zip(&mut places) {
+                totals[1] = row.into_iter().fold(totals[1], Numbers::with_words);
+                lanes.spread(row, &mut place[2 * pair + odd..], 2);
+            }
+        }
+        for (sum, total) in sums.iter_mut().zip(totals) {
+            let mut words: Words<u32> = [0; LANES];
+            lanes.store(total, bytemuck::cast_mut(&mut words), 0);
+            *sum = words.into_iter().fold(*sum, u32::wrapping_add);
+        }
+    }
+}
+
+impl Batch {
+    /// Integrates bodies from `first` on, or only sends them back, one for each place. The velocities
+    /// are those that were entered or that passes have left. Returns the sums of the words of their
+    /// poses and of their results.
+    pub(in super::super) fn integrate(
+        &mut self,
+        integration: Option<&Integration>,
+        first: usize,
+        poses: BodyRows<'_>,
+        places: Places<'_>,
+    ) -> [u32; 2] {
+        let bodies = Bodies {
+            integration,
+            lines: &self.lines[ROWS_APART as usize / 2..],
+            poses,
+            width: self.width,
+        };
+        let end = first + places[0].len();
+        let sums = [const { AtomicU32::new(0) }; 2];
+        let [a, b, c, d] = places.map(|place| place.chunks_mut(TOGETHER));
+        let parts = (first..end).step_by(TOGETHER).zip(a.zip(b).zip(c.zip(d)));
+        self.pool.share(parts, |(first, ((a, b), (c, d)))| {
+            let found = bodies.results(first..first + a.len(), [a, b, c, d]);
+            for (sum, found) in sums.iter().zip(found) {
+                sum.fetch_add(found, Ordering::Relaxed);
+            }
+        });
+        sums.map(AtomicU32::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::solver::{Mass, Velocity};
+    use super::*;
+
+    /// A zero, a very small number, or one between 2^-12 and 16 of either sign.
+    fn number(seed: &mut u64) -> f32 {
+        *seed = seed.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
+        let bits = (*seed >> 32) as u32;
+        match bits % 8 {
+            0 => 0.0,
+            1 => f32::from_bits(bits >> 3),
+            _ => f32::from_bits((bits & 0x807F_FFFF) | ((115 + (bits >> 23) % 16) << 23)),
+        }
+    }
+
+    /// The results of bodies from `first` on, of poses that begin with body `from`.
+    fn results(
+        width: Width,
+        threads: usize,
+        (from, first, count): (usize, usize, usize),
+        integration: Option<&Integration>,
+    ) -> ([u32; 2], [Vec<Beat>; 4]) {
+        let mut seed = 7;
+        let bodies = first + count;
+        let masses =
+            [0.0, -0.0, 2.0, f32::NAN].map(|inverse_mass| Mass { inverse_mass, ..Mass::default() });
+        let shape_of: Vec<u8> = (0..bodies).map(|body| [2, 2, 0, 2, 1, 3][body % 6]).collect();
+        let mut vector = || std::array::from_fn(|_| number(&mut seed));
+        let velocities: Vec<Velocity> =
+            (0..bodies).map(|_| Velocity { linear: vector(), angular: vector() }).collect();
+        let mut poses = [const { Vec::new() }; 4];
+        for body in 0..bodies {
+            for row in 0..2 {
+                let beat = Beat(std::array::from_fn(|_| number(&mut seed).to_bits()));
+                if body >= from {
+                    poses[2 * (body % 2) + row].push(beat);
+                }
+            }
+        }
+        let mut batch = Batch::with_width(threads, width);
+        batch.begin(0);
+        batch.enter(&velocities, &shape_of, &masses);
+        let mut places = [const { Vec::new() }; 4];
+        places.iter_mut().for_each(|place| place.resize(count, Beat::default()));
+        let poses = BodyRows { views: poses.each_ref().map(Vec::as_slice), first: from };
+        let sums =
+            batch.integrate(integration, first, poses, places.each_mut().map(Vec::as_mut_slice));
+        (sums, places)
+    }
+
+    #[test]
+    fn bodies_side_by_side_move_as_one_by_one() {
+        let integration =
+            Integration { time_step: 1.0 / 60.0, angular_damping: 0.99, gravity: [0.0, -9.8, 0.1] };
+        let parts =
+            [(0, 0, 1600), (1, 1, 70), (3, 4, 100), (2, 2, 32), (5, 5, 33), (0, 1, 1), (1, 2, 0)];
+        for part in parts {
+            for integration in [Some(&integration), None] {
+                let expected = results(Width::One, 1, part, integration);
+                for width in Width::all() {
+                    for threads in [1, 3] {
+                        let found = results(width, threads, part, integration);
+                        assert_eq!(found, expected, "{width:?} {part:?}");
+                    }
+                }
+            }
+        }
+    }
+}
