@@ -141,6 +141,12 @@ impl Scene {
         (&mut self.bodies, &self.collisions)
     }
 
+    /// How many threads may find collisions, the caller's among them; no result depends on it. As long
+    /// as it is not said: as many as the machine has.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.detector = Detector::with_threads(threads.max(1));
+    }
+
     /// Finds the collisions of the current poses, sorted by body A, then body B.
     ///
     /// Pairs up to [`MARGIN`](crate::MARGIN) apart are collisions too. The ground is always body A,

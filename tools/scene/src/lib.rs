@@ -23,8 +23,6 @@
 //! arithmetic is f32 in a written order, parry3d is built with `enhanced-determinism`, and threads
 //! never decide an order.
 
-#![forbid(unsafe_code)]
-
 mod build;
 mod detect;
 mod error;

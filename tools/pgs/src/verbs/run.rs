@@ -154,7 +154,7 @@ pub(crate) fn run(
 ) -> Result<Verdict, Failure> {
     let mut opened = board::open(common, &args.build)?;
     args.scene.check_size(&opened)?;
-    let mut scene = args.scene.build()?;
+    let mut scene = args.scene.build(&args.build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
 
     let interrupt = Interrupt::install();
