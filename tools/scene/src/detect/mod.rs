@@ -10,7 +10,9 @@ mod broad;
 mod cells;
 mod crew;
 mod ground;
+mod lanes;
 mod narrow;
+mod parry;
 mod points;
 mod reduce;
 
@@ -188,10 +190,9 @@ impl Worker {
         bounds: &[Bounds],
         candidates: &[(u32, u32)],
     ) {
-        let narrow = &mut self.narrow;
-        let near = |&&(a, b): &&(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
-        let near = candidates.iter().filter(near);
-        self.found.extend(near.filter_map(|&pair| narrow.collide(bodies, geometries, pair)));
+        let near = |&(a, b): &(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
+        let near = candidates.iter().copied().filter(near);
+        self.narrow.collide(bodies, geometries, near, &mut self.found);
     }
 }
 

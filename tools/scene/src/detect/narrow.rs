@@ -1,173 +1,273 @@
 //! This file finds where two bodies touch.
 //!
-//! parry3d computes the contact manifold in the frame of its first shape, which is our body A. Its
-//! normal points from A to B, ours from B to A; its distances mean the same. Of two boxes the manifold
-//! is computed [here](super::boxes), with the same bits.
+//! Pairs are taken a few at a time, one in each lane. Those of boxes are computed [here](super::boxes),
+//! with the bits of [parry](super::parry), which is asked about all others; the choice of points and
+//! their way into the world is the same for both.
 
-use parry3d::math::{Pose, Rotation, Vector};
-use parry3d::query::details::contact_manifold_cuboid_cuboid;
-use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
-use parry3d::shape::{Ball, Capsule, Cuboid, PackedFeatureId, Shape};
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
 
-use super::boxes::{self, Touch};
+use super::Geometries;
+use super::boxes::{self, Placed};
+use super::lanes::{self, LANES_MAX, Lanes, Mask, Numbers, Rotation, Row, Vector, Work};
+use super::parry::Parry;
 use super::points::Points;
 use super::reduce::reduce;
-use super::{Geometries, MARGIN};
 use crate::Geometry;
 
 /// How far from 1 the length of a normal may be: rounding is far below, a broken pose above.
 const NORMAL_TOLERANCE: f32 = 5e-4;
 
-/// Points nearer to each other than this are one, m². Pieces of a line are cut off in equal points
-/// where only one is left.
-const SAME_POINT: f32 = 1e-8;
-
-/// What rounding may make of two equal distances, m.
-const SAME_DEPTH: f32 = 1e-4;
-
 /// The narrow phase, with its buffers.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Narrow {
-    manifold: ContactManifold<(), ()>,
-    points: Points,
-}
-
-/// Whose frame a point is in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Frame {
-    A,
-    B,
-}
-
-impl Default for Narrow {
-    fn default() -> Self {
-        Self { manifold: ContactManifold::new(), points: Points::default() }
-    }
+    parry: Parry,
 }
 
 impl Narrow {
-    /// The collision of the bodies `a` and `b` of `bodies`, if there is one.
+    /// Adds the collisions of those pairs of `bodies` that have one, in their order.
     pub(super) fn collide(
         &mut self,
         bodies: &[Body],
         geometries: Geometries<'_>,
-        (a, b): (u32, u32),
-    ) -> Option<Collision> {
-        let body_a = bodies.get(usize::try_from(a).ok()?)?;
-        let body_b = bodies.get(usize::try_from(b).ok()?)?;
-        let (pose_a, pose_b) = (pose(body_a), pose(body_b));
-        let (geometry_a, geometry_b) = (geometries.of(body_a)?, geometries.of(body_b)?);
-        let b_in_a = pose_a.inv_mul(&pose_b);
-        self.points.clear();
-        let (axis, frame) = match self.touch_boxes(&b_in_a, geometry_a, geometry_b) {
-            Touch::Apart => return None,
-            Touch::Along(axis) => (axis, Frame::A),
-            Touch::Unknown => (self.ask_parry(&b_in_a, geometry_a, geometry_b)?, Frame::B),
-        };
-        let candidates = self.points.candidates();
-        if candidates.is_empty() {
-            return None;
-        }
-        let normal = -(pose_a.rotation * Vector::from_array(axis));
-        let error = (normal.length() - 1.0).abs();
-        if error > NORMAL_TOLERANCE || error.is_nan() {
-            return None;
-        }
-
-        let (chosen, count) = reduce(candidates, axis);
-        let on_b = self.points.on_b();
-        let mut on_b = chosen.map(|index| on_b.get(index).copied().unwrap_or_default());
-        if frame == Frame::A {
-            on_b = boxes::in_b(&b_in_a, on_b);
-        }
-        let mut contacts = [Contact::default(); CONTACT_POINTS];
-        for (place, contact) in contacts.iter_mut().enumerate().take(count) {
-            let point = pose_b * Vector::from_array(on_b[place]);
-            if !point.is_finite() {
-                return None;
-            }
-            let distance = candidates[chosen[place]].distance;
-            *contact = Contact { point: point.to_array(), distance };
-        }
-        // At most four.
-        let count = u32::try_from(count).ok()?;
-        Some(Collision { body_a: a, body_b: b, normal: normal.to_array(), count, contacts })
+        pairs: impl Iterator<Item = (u32, u32)>,
+        found: &mut Vec<Collision>,
+    ) {
+        lanes::run(Collide { narrow: self, bodies, geometries, pairs, found });
     }
 }
 
-impl Narrow {
-    /// Takes the points of two boxes, on B in the frame of A.
-    fn touch_boxes(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Touch {
-        let (Geometry::Box { half_extents: a }, Geometry::Box { half_extents: b }) = (a, b) else {
-            return Touch::Unknown;
+/// What is done, with whatever lanes.
+struct Collide<'a, I> {
+    narrow: &'a mut Narrow,
+    bodies: &'a [Body],
+    geometries: Geometries<'a>,
+    pairs: I,
+    found: &'a mut Vec<Collision>,
+}
+
+impl<I: Iterator<Item = (u32, u32)>> Work for Collide<'_, I> {
+    #[inline(always)]
+    fn with<L: Lanes>(mut self, lanes: L) {
+        let mut batch = Batch::default();
+        let mut points = Points::none(lanes.load(&Row::default()));
+        loop {
+            batch.take(L::WIDTH, &mut self.pairs, self.bodies, self.geometries);
+            if batch.count == 0 {
+                break;
+            }
+            batch.collide(lanes, &mut self.narrow.parry, &mut points, self.bodies, self.found);
+        }
+    }
+}
+
+/// One body of the pairs of a batch.
+#[derive(Debug, Default)]
+struct Side {
+    position: [Row; 3],
+    orientation: [Row; 4],
+    half_extents: [Row; 3],
+}
+
+impl Side {
+    #[inline(always)]
+    fn set(&mut self, lane: usize, body: &Body, geometry: Geometry) -> bool {
+        for (row, number) in self.position.iter_mut().zip(body.pose.position) {
+            row.0[lane] = number;
+        }
+        for (row, number) in self.orientation.iter_mut().zip(body.pose.orientation) {
+            row.0[lane] = number;
+        }
+        // What is no box is given to the lanes as one without a size; nothing is made of it.
+        let (half_extents, is_box) = match geometry {
+            Geometry::Box { half_extents } => (half_extents, true),
+            _ => ([0.0; 3], false),
         };
-        boxes::touch(b_in_a, a, b, &mut self.points)
+        for (row, number) in self.half_extents.iter_mut().zip(half_extents) {
+            row.0[lane] = number;
+        }
+        is_box
     }
 
-    /// Takes the points of two geometries from parry, on B in its own frame; the axis, from A to B in the
-    /// frame of A. `None` if parry does not know the pair.
-    fn ask_parry(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<[f32; 3]> {
-        let curved = self.parry(b_in_a, a, b)?;
-        let Self { manifold, points } = self;
-        for point in &manifold.points {
-            let same = |other: &[f32; 3]| {
-                Vector::from_array(*other).distance_squared(point.local_p2) < SAME_POINT
-            };
-            if curved && points.on_b().iter().any(same) {
+    #[inline(always)]
+    fn load<L: Lanes>(&self, lanes: L) -> Loaded<L::Numbers> {
+        let ([px, py, pz], [hx, hy, hz]) = (&self.position, &self.half_extents);
+        let [x, y, z, w] = &self.orientation;
+        Loaded {
+            position: Vector { x: lanes.load(px), y: lanes.load(py), z: lanes.load(pz) },
+            axis: Vector { x: lanes.load(x), y: lanes.load(y), z: lanes.load(z) },
+            w: lanes.load(w),
+            half_extents: Vector { x: lanes.load(hx), y: lanes.load(hy), z: lanes.load(hz) },
+        }
+    }
+}
+
+/// The same in lanes; the orientation as a quaternion's axis and w.
+struct Loaded<N> {
+    position: Vector<N>,
+    axis: Vector<N>,
+    w: N,
+    half_extents: Vector<N>,
+}
+
+/// Pairs, one in each lane.
+#[derive(Debug, Default)]
+struct Batch {
+    pairs: [(u32, u32); LANES_MAX],
+    geometries: [Option<[Geometry; 2]>; LANES_MAX],
+    count: usize,
+    /// In which lanes both are boxes.
+    boxes: u32,
+    a: Side,
+    b: Side,
+}
+
+impl Batch {
+    /// Takes the next pairs, as many as there are lanes or left.
+    #[inline(always)]
+    fn take(
+        &mut self,
+        lanes: usize,
+        pairs: &mut impl Iterator<Item = (u32, u32)>,
+        bodies: &[Body],
+        geometries: Geometries<'_>,
+    ) {
+        (self.count, self.boxes) = (0, 0);
+        while self.count < lanes.min(LANES_MAX) {
+            let Some((a, b)) = pairs.next() else { break };
+            let (Some(body_a), Some(body_b)) = (bodies.get(a as usize), bodies.get(b as usize))
+            else {
                 continue;
+            };
+            let (Some(of_a), Some(of_b)) = (geometries.of(body_a), geometries.of(body_b)) else {
+                continue;
+            };
+            let lane = self.count;
+            let are_boxes = self.a.set(lane, body_a, of_a) & self.b.set(lane, body_b, of_b);
+            self.boxes |= u32::from(are_boxes) << lane;
+            self.pairs[lane] = (a, b);
+            self.geometries[lane] = Some([of_a, of_b]);
+            self.count += 1;
+        }
+    }
+
+    /// Adds the collisions of the pairs.
+    #[inline(always)]
+    fn collide<L: Lanes>(
+        &self,
+        lanes: L,
+        parry: &mut Parry,
+        points: &mut Points<L::Numbers>,
+        bodies: &[Body],
+        found: &mut Vec<Collision>,
+    ) {
+        let (a, b) = (self.a.load(lanes), self.b.load(lanes));
+        let (turn_a, turn_b) = (Rotation::new(a.axis, a.w), Rotation::new(b.axis, b.w));
+        // As glam does it: the inverse of A's pose, times B's.
+        let (axis, w) = product((a.axis.negated(), a.w), (b.axis, b.w));
+        let b_in_a = Rotation::new(axis, w);
+        let placed = Placed {
+            half_a: a.half_extents,
+            half_b: b.half_extents,
+            b_in_a,
+            a_in_b: b_in_a.inverse(),
+            translation: turn_a.inverse().turn(b.position.minus(a.position)),
+        };
+
+        points.clear();
+        let zero = w.all(0.0);
+        let mut axis = Vector::all(zero, [0.0; 3]);
+        let mut by_parry = (1 << self.count) - 1;
+        if self.boxes != 0 {
+            let boxes = lanes::mask(zero, self.boxes);
+            let touch = boxes::touch(&placed, boxes, points);
+            axis = touch.axis;
+            by_parry &= !(self.boxes & !touch.unknown.bits());
+        }
+        if by_parry != 0 {
+            axis = self.ask_parry(by_parry, parry, bodies, axis, points);
+        }
+
+        let normal = turn_a.turn(axis).negated();
+        let error = (normal.dot(normal).sqrt() - zero.all(1.0)).abs();
+        let mut valid = zero.all(NORMAL_TOLERANCE).at_least(error);
+        let chosen = reduce(points, axis);
+        let nothing = Vector::all(zero, [0.0; 3]);
+        let mut contacts = [[Row::default(); 4]; CONTACT_POINTS];
+        for (slot, contact) in chosen.iter().zip(&mut contacts) {
+            let mut on_b = placed.in_b(slot.on_b);
+            if by_parry != 0 {
+                on_b = slot.on_b.or(lanes::mask(zero, by_parry), on_b);
             }
-            points.take(point.local_p1.to_array(), point.local_p2.to_array(), point.dist);
+            let point = turn_b.turn(on_b).plus(b.position);
+            valid = valid.without(slot.taken.without(point.is_finite()));
+            let Vector { x, y, z } = point.or(slot.taken, nothing);
+            let distance = slot.distance.or(slot.taken, zero);
+            *contact = [x.row(), y.row(), z.row(), distance.row()];
         }
-        Some(manifold.local_n1.to_array())
+        let [first, second, third, fourth] = &chosen;
+        let taken =
+            [first.taken.bits(), second.taken.bits(), third.taken.bits(), fourth.taken.bits()];
+        let normal = normal.rows();
+        let valid = valid.bits() & taken[0];
+        for (lane, &(body_a, body_b)) in self.pairs.iter().enumerate().take(self.count) {
+            if valid >> lane & 1 != 0 {
+                let contact = |[x, y, z, distance]: &[Row; 4]| Contact {
+                    point: [x.0[lane], y.0[lane], z.0[lane]],
+                    distance: distance.0[lane],
+                };
+                found.push(Collision {
+                    body_a,
+                    body_b,
+                    normal: [normal[0].0[lane], normal[1].0[lane], normal[2].0[lane]],
+                    count: taken.iter().map(|taken| taken >> lane & 1).sum(),
+                    contacts: contacts.each_ref().map(contact),
+                });
+            }
+        }
     }
 
-    /// Has parry compute the manifold of two geometries; whether one has a curved side.
-    fn parry(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<bool> {
-        // Without points and normals of an earlier pair parry starts afresh, so that a result
-        // depends on the two poses alone.
-        let manifold = &mut self.manifold;
-        manifold.clear();
-        manifold.local_n1 = Vector::ZERO;
-        manifold.local_n2 = Vector::ZERO;
-        if let (Geometry::Box { half_extents: a }, Geometry::Box { half_extents: b }) = (a, b) {
-            let (a, b) = (Cuboid::new(Vector::from_array(a)), Cuboid::new(Vector::from_array(b)));
-            contact_manifold_cuboid_cuboid(b_in_a, &a, &b, MARGIN, manifold);
-            return Some(false);
+    /// Takes the points that parry finds of the pairs in these lanes, on B in its own frame; the axes
+    /// with theirs among them.
+    #[inline(never)]
+    fn ask_parry<N: Numbers>(
+        &self,
+        lanes: u32,
+        parry: &mut Parry,
+        bodies: &[Body],
+        axis: Vector<N>,
+        points: &mut Points<N>,
+    ) -> Vector<N> {
+        let mut rows = axis.rows();
+        for (lane, &(a, b)) in self.pairs.iter().enumerate().take(self.count) {
+            let Some(geometries) = self.geometries[lane].filter(|_| lanes >> lane & 1 != 0) else {
+                continue;
+            };
+            let pair = [&bodies[a as usize], &bodies[b as usize]];
+            let Some((axis, places)) = parry.ask(pair, geometries) else { continue };
+            for (row, number) in rows.iter_mut().zip(axis) {
+                row.0[lane] = number;
+            }
+            for (index, place) in places.iter().enumerate() {
+                points.put(index, lane, place.on_a, place.on_b, place.distance);
+            }
         }
-        with_shape(a, |a| {
-            with_shape(b, |b| {
-                let parry = DefaultQueryDispatcher;
-                parry.contact_manifold_convex_convex(b_in_a, a, b, None, None, MARGIN, manifold)
-            })
-        })
-        .ok()?;
-        // To the points of two features parry adds the nearest one, last and without a feature.
-        // Where a capsule lies flat that is any point of a line whose ends are there already.
-        if let [others @ .., nearest] = &self.manifold.points[..]
-            && nearest.fid1 == PackedFeatureId::UNKNOWN
-            && others.iter().any(|other| other.dist <= nearest.dist + SAME_DEPTH)
-        {
-            self.manifold.points.pop();
-        }
-        Some(true)
+        let [x, y, z] = &rows;
+        Vector { x: axis.x.of_row(x), y: axis.x.of_row(y), z: axis.x.of_row(z) }
     }
 }
 
-/// Hands parry's shape of that geometry to `then`.
-fn with_shape<R>(geometry: Geometry, then: impl FnOnce(&dyn Shape) -> R) -> R {
-    match geometry {
-        Geometry::Box { half_extents } => then(&Cuboid::new(Vector::from_array(half_extents))),
-        Geometry::Sphere { radius } => then(&Ball::new(radius)),
-        Geometry::Capsule { half_height, radius } => then(&Capsule::new_y(half_height, radius)),
-    }
-}
-
-fn pose(body: &Body) -> Pose {
-    Pose::from_parts(
-        Vector::from_array(body.pose.position),
-        Rotation::from_array(body.pose.orientation),
-    )
+/// The product of two quaternions, as axis and w.
+#[inline(always)]
+fn product<N: Numbers>(
+    (Vector { x: x0, y: y0, z: z0 }, w0): (Vector<N>, N),
+    (Vector { x: x1, y: y1, z: z1 }, w1): (Vector<N>, N),
+) -> (Vector<N>, N) {
+    let axis = Vector {
+        x: w0 * x1 + x0 * w1 + y0 * z1 - z0 * y1,
+        y: w0 * y1 - x0 * z1 + y0 * w1 + z0 * x1,
+        z: w0 * z1 + x0 * y1 - y0 * x1 + z0 * w1,
+    };
+    (axis, w0 * w1 - x0 * x1 - y0 * y1 - z0 * z1)
 }
 
 #[cfg(test)]
@@ -175,6 +275,7 @@ fn pose(body: &Body) -> Pose {
 mod tests {
     use zynq_pgs::{Pose, Velocity};
 
+    use super::super::MARGIN;
     use super::*;
 
     const LEVEL: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
@@ -183,9 +284,22 @@ mod tests {
         Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
     }
 
+    /// The collision of one pair.
+    fn one(
+        narrow: &mut Narrow,
+        bodies: &[Body],
+        geometries: Geometries<'_>,
+        pair: (u32, u32),
+    ) -> Option<Collision> {
+        let mut found = Vec::new();
+        narrow.collide(bodies, geometries, std::iter::once(pair), &mut found);
+        assert!(found.len() < 2, "{found:?}");
+        found.pop()
+    }
+
     fn collide(a: Body, b: Body) -> Option<Collision> {
         let cubes = Geometries(&[None, Some(Geometry::CUBE)]);
-        Narrow::default().collide(&[a, b], cubes, (0, 1))
+        one(&mut Narrow::default(), &[a, b], cubes, (0, 1))
     }
 
     #[test]
@@ -308,7 +422,7 @@ mod tests {
         let bodies = [shaped(a, 0), shaped(b, 1)];
         let outlines = [Some(a.0), Some(b.0)];
         let mut narrow = Narrow::default();
-        let mut of = |pair| narrow.collide(&bodies, Geometries(&outlines), pair);
+        let mut of = |pair| one(&mut narrow, &bodies, Geometries(&outlines), pair);
         match (of((0, 1)), of((1, 0))) {
             (Some(found), Some(reverse)) => Some([found, reverse]),
             (None, None) => None,
