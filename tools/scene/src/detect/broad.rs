@@ -12,7 +12,7 @@ use super::crew::Crew;
 use super::shares;
 
 /// How much farther apart than a pair candidates may be, m.
-const SKIN: f32 = 0.3;
+const SKIN: f32 = 0.35;
 /// Up to where candidates are kept: the rest is for rounding.
 const KEPT: f32 = SKIN - 1e-3;
 /// Up to where bodies may have moved, m: rounding of that is far below what is left for it.

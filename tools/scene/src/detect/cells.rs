@@ -15,10 +15,10 @@ use super::bounds::Bounds;
 
 /// Width of a cell, m: above the diagonal of a cube (3.4641 m) and [`GAP_MAX`]. No body of any scene is
 /// larger.
-const CELL: f32 = 3.8;
+const CELL: f32 = 3.85;
 
 /// Largest gap between two boxes for which the cells are wide enough, m.
-pub(super) const GAP_MAX: f32 = 0.33;
+pub(super) const GAP_MAX: f32 = 0.38;
 
 /// Cells on either side of the origin. Beyond it bodies share the outermost cell, which costs time but
 /// loses no pair. 20 bits, less the neighbours' 1.
