@@ -1,8 +1,10 @@
 //! This file gathers the points at which two bodies touch, before four of them are chosen, of a pair in
 //! each lane.
 
+use zynq_pgs::CONTACT_POINTS;
+
 use super::MARGIN;
-use super::lanes::{Mask, Numbers, Vector, mask};
+use super::lanes::{Mask, Numbers, Vector};
 
 /// Points that two faces have in common at most: four corners of each, and each edge of one with each
 /// of the other.
@@ -18,8 +20,22 @@ pub(super) struct Slot<N: Numbers> {
     pub(super) distance: N,
 }
 
-/// Points near enough, of each pair in the order in which they were found.
+impl<N: Numbers> Slot<N> {
+    /// This point for the pairs in the mask, and the other for the rest.
+    #[inline(always)]
+    pub(super) fn or(&self, mask: N::Mask, other: &Self) -> Self {
+        Self {
+            taken: self.taken.and(mask).either(other.taken.without(mask)),
+            on_a: self.on_a.or(mask, other.on_a),
+            on_b: self.on_b.or(mask, other.on_b),
+            distance: self.distance.or(mask, other.distance),
+        }
+    }
+}
+
+/// Points near enough, of each pair in the order in which they were found and without gaps.
 pub(super) struct Points<N: Numbers> {
+    /// Beyond the count none is taken.
     slots: [Slot<N>; MOST],
     count: usize,
 }
@@ -33,12 +49,24 @@ impl<N: Numbers> Points<N> {
         Self { slots: [slot; MOST], count: 0 }
     }
 
+    #[inline(always)]
     pub(super) fn clear(&mut self) {
+        for slot in &mut self.slots[..self.count] {
+            slot.taken = slot.taken.without(slot.taken);
+        }
         self.count = 0;
     }
 
+    /// Those that some pair has.
     pub(super) fn slots(&self) -> &[Slot<N>] {
         &self.slots[..self.count]
+    }
+
+    /// The first ones, and of which pairs there are more.
+    #[inline(always)]
+    pub(super) fn first(&self) -> ([Slot<N>; CONTACT_POINTS], N::Mask) {
+        let [a, b, c, d, fifth, ..] = &self.slots;
+        ([*a, *b, *c, *d], fifth.taken)
     }
 
     /// Takes a point of those pairs of which it is near enough; of more than two faces can have, the
@@ -49,32 +77,19 @@ impl<N: Numbers> Points<N> {
         let near = distance.all(MARGIN).at_least(distance);
         let finite = distance.all(f32::INFINITY).above(distance.abs()).and(on_b.is_finite());
         let taken = pairs.and(near).and(finite);
-        if taken.bits() != 0 && self.count < MOST {
-            self.slots[self.count] = Slot { taken, on_a, on_b, distance };
-            self.count += 1;
-        }
-    }
-
-    /// Sets the point of one lane's pair in the slot of that number.
-    pub(super) fn put(
-        &mut self,
-        number: usize,
-        lane: usize,
-        on_a: [f32; 3],
-        on_b: [f32; 3],
-        distance: f32,
-    ) {
-        while self.count <= number && self.count < MOST {
-            let slot = &mut self.slots[self.count];
-            slot.taken = slot.taken.without(slot.taken);
-            self.count += 1;
-        }
-        if let Some(slot) = self.slots.get_mut(number) {
-            let only = mask(slot.distance, 1 << lane);
-            slot.taken = slot.taken.either(only);
-            slot.on_a = Vector::all(slot.distance, on_a).or(only, slot.on_a);
-            slot.on_b = Vector::all(slot.distance, on_b).or(only, slot.on_b);
-            slot.distance = slot.distance.all(distance).or(only, slot.distance);
+        let point = Slot { taken, on_a, on_b, distance };
+        let mut left = taken;
+        for (number, slot) in self.slots.iter_mut().enumerate() {
+            if left.bits() == 0 {
+                break;
+            }
+            // Those to which this slot is the next one.
+            let free = left.without(slot.taken);
+            left = left.and(slot.taken);
+            if free.bits() != 0 {
+                *slot = point.or(free, slot);
+                self.count = self.count.max(number + 1);
+            }
         }
     }
 }

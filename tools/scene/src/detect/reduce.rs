@@ -27,54 +27,14 @@ pub(super) type Chosen<N> = [Slot<N>; CONTACT_POINTS];
 /// kept, in their order.
 #[inline(always)]
 pub(super) fn reduce<N: Numbers>(points: &Points<N>, normal: Vector<N>) -> Chosen<N> {
-    let (all, many) = up_to_four(points, normal.x);
-    if many.bits() == 0 {
-        return all;
-    }
-    let chosen = choose(points.slots(), normal, many);
-    let mut result = all;
-    for (all, chosen) in result.iter_mut().zip(chosen) {
-        *all = Slot {
-            taken: chosen.taken.either(all.taken.without(many)),
-            ..merged(many, &chosen, all)
-        };
+    let (mut result, many) = points.first();
+    if many.bits() != 0 {
+        let chosen = choose(points.slots(), normal, many);
+        for (result, chosen) in result.iter_mut().zip(chosen) {
+            *result = chosen.or(many, result);
+        }
     }
     result
-}
-
-/// The first four, and which pairs have more.
-#[inline(always)]
-fn up_to_four<N: Numbers>(points: &Points<N>, any: N) -> (Chosen<N>, N::Mask) {
-    let zero = any.all(0.0);
-    let none = zero.above(zero);
-    let nowhere = Vector::all(zero, [0.0; 3]);
-    let mut first = [Slot { taken: none, on_a: nowhere, on_b: nowhere, distance: zero }; 4];
-    let mut many = none;
-    for slot in points.slots() {
-        // Into the first place that a pair has free.
-        let mut left = slot.taken;
-        for place in &mut first {
-            let (free, taken) = (left.without(place.taken), place.taken);
-            *place = Slot { taken: taken.either(left), ..merged(free, slot, place) };
-            left = left.and(taken);
-            if left.bits() == 0 {
-                break;
-            }
-        }
-        many = many.either(left);
-    }
-    (first, many)
-}
-
-/// One point for the pairs in the mask, and another for the rest.
-#[inline(always)]
-fn merged<N: Numbers>(mask: N::Mask, one: &Slot<N>, other: &Slot<N>) -> Slot<N> {
-    Slot {
-        taken: one.taken,
-        on_a: one.on_a.or(mask, other.on_a),
-        on_b: one.on_b.or(mask, other.on_b),
-        distance: one.distance.or(mask, other.distance),
-    }
 }
 
 /// Four of each pair in the mask, by the rule.
@@ -149,7 +109,7 @@ fn largest<N: Numbers>(
     for slot in slots {
         let value = measure(slot);
         let larger = value.above(most).and(slot.taken);
-        best = merged(larger, slot, &best);
+        best = slot.or(larger, &best);
         most = value.or(larger, most);
     }
     (best, most)
@@ -171,7 +131,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::MARGIN;
-    use super::super::lanes::{Lanes, Portable, Row, Work, run};
+    use super::super::lanes::{Lanes, Portable, Row, Work, mask, run};
     use super::*;
 
     const UP: [f32; 3] = [0.0, 1.0, 0.0];
@@ -209,7 +169,12 @@ mod tests {
                     let count = self.0.len().saturating_sub(skipped / 2);
                     for (number, candidate) in candidates.take(count).enumerate() {
                         let on_b = [number as f32, 0.0, 0.0];
-                        points.put(number, lane, candidate.point, on_b, candidate.distance);
+                        points.take(
+                            mask(any, 1 << lane),
+                            Vector::all(any, candidate.point),
+                            Vector::all(any, on_b),
+                            any.all(candidate.distance),
+                        );
                     }
                 }
                 let chosen = reduce(&points, Vector::all(any, UP));

@@ -201,12 +201,14 @@ impl Batch {
                 continue;
             };
             let pair = [&bodies[a as usize], &bodies[b as usize]];
-            let Some((axis, places)) = parry.ask(pair, geometries) else { continue };
-            for (row, number) in rows.iter_mut().zip(axis) {
+            let Some((along, places)) = parry.ask(pair, geometries) else { continue };
+            for (row, number) in rows.iter_mut().zip(along) {
                 row.0[lane] = number;
             }
-            for (index, place) in places.iter().enumerate() {
-                points.put(index, lane, place.on_a, place.on_b, place.distance);
+            let (any, lane) = (axis.x, lanes::mask(axis.x, 1 << lane));
+            for place in places {
+                let (on_a, on_b) = (Vector::all(any, place.on_a), Vector::all(any, place.on_b));
+                points.take(lane, on_a, on_b, any.all(place.distance));
             }
         }
         let [x, y, z] = &rows;
