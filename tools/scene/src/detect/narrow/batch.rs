@@ -186,7 +186,7 @@ impl Batch {
 
     /// Takes the points that parry finds of the pairs in these lanes, on B in its own frame; the axes
     /// with theirs among them.
-    #[inline(never)]
+    #[inline(always)]
     fn ask_parry<N: Numbers>(
         &self,
         lanes: u32,
