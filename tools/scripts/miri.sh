@@ -20,3 +20,6 @@ export MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-strict-provenance ${MIRIFLAGS:
 attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs --lib -- \
 	platform::mapped::tests::words_and_beats platform::mapped::tests::pieces_of \
 	platform::copy:: platform::fence:: platform::buffer:: axi_dma::ring::
+# Threads that outlive what they borrow.
+attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs-scene --lib -- \
+	detect::crew::

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::board::Opened;
 use crate::failure::Failure;
+use crate::options::BuildArgs;
 use crate::verbs::table::grouped;
 
 /// Which scene, and how large.
@@ -60,8 +61,8 @@ fn drop_height(text: &str) -> Result<f32, String> {
 }
 
 impl SceneArgs {
-    /// Builds the scene.
-    pub(crate) fn build(&self) -> Result<Scene, Failure> {
+    /// Builds the scene. It takes as many threads as the emulated board may.
+    pub(crate) fn build(&self, board: &BuildArgs) -> Result<Scene, Failure> {
         let Self { grid, drop, .. } = *self;
         let built = match self.scene {
             SceneName::Cubes if self.seed.is_some() => {
@@ -75,7 +76,9 @@ impl SceneArgs {
             }
             SceneName::Shapes => Scene::of_shapes(&ShapesOptions { grid, drop, seed: self.seed() }),
         };
-        built.map_err(Failure::input)
+        let mut scene = built.map_err(Failure::input)?;
+        scene.set_threads(board.config().threads);
+        Ok(scene)
     }
 
     fn inertia(&self) -> Inertia {

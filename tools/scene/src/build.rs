@@ -3,7 +3,7 @@
 use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
 
 use crate::detect::{Detector, Geometries};
-use crate::{CUBE_HALF_EXTENT, GROUND_HALF_EXTENT, Geometry, Grid, SceneError};
+use crate::{CUBE_HALF_EXTENT, GROUND, GROUND_HALF_EXTENT, Geometry, Grid, SceneError};
 
 /// Largest drop, m.
 pub const DROP_MAX: f32 = 1000.0;
@@ -135,10 +135,22 @@ impl Scene {
         &self.collisions
     }
 
+    /// How many of those are with the ground: the first ones.
+    #[must_use]
+    pub fn ground_pairs(&self) -> usize {
+        self.collisions.partition_point(|collision| collision.body_a == GROUND)
+    }
+
     /// What a step takes: the bodies, and the collisions that [`detect`](Self::detect) found last.
     #[must_use]
     pub fn parts_mut(&mut self) -> (&mut [Body], &[Collision]) {
         (&mut self.bodies, &self.collisions)
+    }
+
+    /// How many threads may find collisions, the caller's among them; no result depends on it. As long
+    /// as it is not said: as many as the machine has.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.detector = Detector::with_threads(threads.max(1));
     }
 
     /// Finds the collisions of the current poses, sorted by body A, then body B.
@@ -224,7 +236,10 @@ mod tests {
             assert_eq!(scene(grid, 5.0).detect().len(), expected, "{grid}");
         }
         // Without a drop the lowest layer lies on the ground.
-        assert_eq!(scene("5x4x3", 0.0).detect().len(), 15 + pairs_of_the_lattice(5, 4, 3));
+        let mut scene = scene("5x4x3", 0.0);
+        assert_eq!(scene.detect().len(), 15 + pairs_of_the_lattice(5, 4, 3));
+        assert_eq!(scene.ground_pairs(), 15);
+        assert_eq!(crate::ground_pairs(scene.collisions()), 15);
     }
 
     #[test]

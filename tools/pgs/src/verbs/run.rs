@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use scene::{Scene, ground_pairs, kinetic_energy};
+use scene::{Scene, kinetic_energy};
 use serde_json::{Value, json};
 use zynq_pgs::{Limit, StepParameters, StepReport};
 
@@ -154,7 +154,7 @@ pub(crate) fn run(
 ) -> Result<Verdict, Failure> {
     let mut opened = board::open(common, &args.build)?;
     args.scene.check_size(&opened)?;
-    let mut scene = args.scene.build()?;
+    let mut scene = args.scene.build(&args.build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
 
     let interrupt = Interrupt::install();
@@ -249,8 +249,9 @@ fn step(
     scene: &mut Scene,
 ) -> Result<Option<Row>, zynq_pgs::Error> {
     let begin = Instant::now();
-    let ground_pairs = ground_pairs(scene.detect());
+    scene.detect();
     let detect = begin.elapsed();
+    let ground_pairs = scene.ground_pairs();
     let (bodies, collisions) = scene.parts_mut();
     let report = match opened.accelerator.step(bodies, collisions, parameters) {
         Ok(report) => report,

@@ -1,13 +1,18 @@
 //! This file detects the collisions of a scene: ground, broad phase, narrow phase.
 //!
-//! The pairs of the broad phase are sorted; the narrow phase looks at each by itself. So it is
-//! shared out among threads in ranges of pairs, whose results are joined in their order: the number
-//! of threads changes nothing but the time.
+//! Bodies and pairs are shared out among threads in ranges, whose results are joined in their order;
+//! the narrow phase looks at each pair by itself. What is kept from one time to the next changes what
+//! is computed, not what comes out. So neither threads nor earlier poses change anything but the time.
 
+mod bounds;
 mod boxes;
 mod broad;
+mod cells;
+mod crew;
 mod ground;
+mod lanes;
 mod narrow;
+mod parry;
 mod points;
 mod reduce;
 
@@ -16,7 +21,9 @@ use std::thread;
 
 use zynq_pgs::{Body, Collision};
 
-use broad::Broad;
+use bounds::{Bounds, GAP};
+use broad::{Broad, Drift};
+use crew::Crew;
 use narrow::Narrow;
 
 use crate::Geometry;
@@ -24,8 +31,11 @@ use crate::Geometry;
 /// Distance up to which two bodies collide, m (Bullet's contact threshold).
 pub const MARGIN: f32 = 0.02;
 
-/// Fewest pairs for which a further thread pays.
+/// Fewest bodies to be placed, and fewest candidates, for which a further thread pays.
+const BODIES_PER_THREAD: usize = 4096;
 const PAIRS_PER_THREAD: usize = 4096;
+/// Fewest bodies for which threads are started.
+const BODIES_FOR_THREADS: usize = 1024;
 
 /// What bodies look like, by their index into the shape table; nothing for the ground.
 #[derive(Debug, Clone, Copy)]
@@ -38,21 +48,34 @@ impl Geometries<'_> {
     }
 }
 
-/// Finds collisions, keeping its buffers from one time to the next.
+/// Finds collisions, keeping its threads and buffers from one time to the next.
 #[derive(Debug)]
 pub(crate) struct Detector {
+    /// Threads that it may take.
     threads: usize,
+    crew: Crew,
+    bounds: Vec<Bounds>,
     broad: Broad,
-    pairs: Vec<(u32, u32)>,
     workers: Vec<Worker>,
 }
 
-/// What one thread needs. Aligned so that no two threads write to the same pair of cache lines.
-#[derive(Debug, Default)]
+/// What one share of the work needs. Aligned so that no two threads write to the same pair of cache
+/// lines.
+#[derive(Debug)]
 #[repr(align(128))]
 struct Worker {
+    drift: Drift,
+    /// Collisions with the ground.
+    ground: Vec<Collision>,
     narrow: Narrow,
     found: Vec<Collision>,
+}
+
+impl Default for Worker {
+    fn default() -> Self {
+        let (ground, found) = Default::default();
+        Self { drift: Drift::NONE, ground, narrow: Narrow::default(), found }
+    }
 }
 
 impl Default for Detector {
@@ -62,56 +85,122 @@ impl Default for Detector {
 }
 
 impl Detector {
-    fn with_threads(threads: usize) -> Self {
-        Self { threads, broad: Broad::default(), pairs: Vec::new(), workers: Vec::new() }
+    /// May take so many threads, of which one is the caller's.
+    pub(crate) fn with_threads(threads: usize) -> Self {
+        Self {
+            threads,
+            crew: Crew::default(),
+            bounds: Vec::new(),
+            broad: Broad::default(),
+            workers: Vec::new(),
+        }
     }
 
-    /// Replaces `collisions` by those of `bodies`, sorted by body A, then body B.
+    /// Replaces `collisions` by those of `bodies`, sorted by body A, then body B. Body 0 is the ground
+    /// and takes no part in pairs.
     pub(crate) fn detect(
         &mut self,
         bodies: &[Body],
         geometries: Geometries<'_>,
         collisions: &mut Vec<Collision>,
     ) {
+        if self.crew.threads() < self.threads && bodies.len() >= BODIES_FOR_THREADS {
+            self.crew = Crew::new(self.threads - 1);
+            // Not again where the system gives no more.
+            self.threads = self.crew.threads();
+        }
+        self.workers.resize_with(self.crew.threads(), Worker::default);
+        let drift = self.place(bodies, geometries);
         collisions.clear();
-        let placed = (0..).zip(bodies).skip(1);
-        collisions.extend(placed.filter_map(|(i, b)| ground::collide(i, b, geometries.of(b)?)));
+        for worker in &self.workers {
+            collisions.extend_from_slice(&worker.ground);
+        }
 
-        self.broad.pairs(bodies, geometries, &mut self.pairs);
-        let threads = self.threads.min(self.pairs.len() / PAIRS_PER_THREAD).max(1);
-        let share = self.pairs.len().div_ceil(threads).max(1);
-        if self.workers.len() < threads {
-            self.workers.resize_with(threads, Worker::default);
+        let Self { crew, bounds, broad, workers, .. } = self;
+        let candidates = broad.candidates(bounds, &drift, crew);
+        let (count, share) = shares(candidates.len(), crew, PAIRS_PER_THREAD);
+        let workers = &mut workers[..count];
+        for worker in &mut *workers {
+            worker.found.clear();
         }
-        let mut work = self.workers.iter_mut().zip(self.pairs.chunks(share));
-        let own = work.next();
-        // A scope takes memory even without threads.
-        if threads > 1 {
-            thread::scope(|scope| {
-                for (worker, pairs) in work {
-                    scope.spawn(|| worker.collide(bodies, geometries, pairs));
-                }
-                if let Some((worker, pairs)) = own {
-                    worker.collide(bodies, geometries, pairs);
-                }
-            });
-        } else if let Some((worker, pairs)) = own {
-            worker.collide(bodies, geometries, pairs);
+        // The first share is added where it belongs.
+        if let [first, ..] = workers {
+            std::mem::swap(&mut first.found, collisions);
         }
-        let used = self.pairs.chunks(share).len();
-        for worker in &self.workers[..used] {
-            collisions.extend_from_slice(&worker.found);
+        crew.each(workers.iter_mut().zip(candidates.chunks(share)), |(worker, candidates)| {
+            worker.collide(bodies, geometries, bounds, candidates);
+        });
+        if let [first, others @ ..] = workers {
+            std::mem::swap(&mut first.found, collisions);
+            for worker in others {
+                collisions.extend_from_slice(&worker.found);
+            }
         }
+    }
+
+    /// Puts bounds around all bodies and finds those that touch the ground; says how far they have
+    /// moved since they were searched for pairs.
+    fn place(&mut self, bodies: &[Body], geometries: Geometries<'_>) -> Drift {
+        let Self { crew, bounds, broad, workers, .. } = self;
+        bounds.resize(bodies.len(), Bounds::NONE);
+        let then = broad.then(bodies.len());
+        let (count, share) = shares(bodies.len(), crew, BODIES_PER_THREAD);
+        for worker in &mut *workers {
+            worker.drift = Drift::NONE;
+            worker.ground.clear();
+        }
+        let work = (0..).step_by(share).zip(bounds.chunks_mut(share)).zip(&mut workers[..count]);
+        crew.each(work, |((first, bounds), worker)| {
+            let range = first..first + bounds.len();
+            let placed = (first..).zip(&bodies[range.clone()]).zip(&then[range]).zip(bounds);
+            for (((index, body), then), bounds) in placed {
+                *bounds = worker.place(index, body, geometries.of(body), then);
+            }
+        });
+        workers.iter().fold(Drift::NONE, |drift, worker| drift.and(&worker.drift))
     }
 }
 
 impl Worker {
-    fn collide(&mut self, bodies: &[Body], geometries: Geometries<'_>, pairs: &[(u32, u32)]) {
-        self.found.clear();
-        let narrow = &mut self.narrow;
-        self.found
-            .extend(pairs.iter().filter_map(|&pair| narrow.collide(bodies, geometries, pair)));
+    /// The bounds of a body, whose collision with the ground is added if there is one.
+    #[inline]
+    fn place(
+        &mut self,
+        index: usize,
+        body: &Body,
+        geometry: Option<Geometry>,
+        then: &Bounds,
+    ) -> Bounds {
+        let (Some(geometry), Ok(number @ 1..)) = (geometry, u32::try_from(index)) else {
+            return Bounds::NONE;
+        };
+        let bounds = Bounds::of(body, geometry);
+        self.drift.add(then, &bounds);
+        if !bounds.off_the_ground() {
+            self.ground.extend(ground::collide(number, body, geometry));
+        }
+        bounds
     }
+
+    /// Adds the collisions of candidates.
+    fn collide(
+        &mut self,
+        bodies: &[Body],
+        geometries: Geometries<'_>,
+        bounds: &[Bounds],
+        candidates: &[(u32, u32)],
+    ) {
+        let near = |&(a, b): &(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
+        let near = candidates.iter().copied().filter(near);
+        self.narrow.collide(bodies, geometries, near, &mut self.found);
+    }
+}
+
+/// Into how many shares so many things are cut, and how many are in each: one for each thread, but
+/// no small ones.
+fn shares(things: usize, crew: &Crew, least: usize) -> (usize, usize) {
+    let count = crew.threads().min(things / least).max(1);
+    (count, things.div_ceil(count).max(1))
 }
 
 #[cfg(test)]
@@ -185,7 +274,8 @@ mod tests {
         let mut one = Detector::with_threads(1);
         let mut found = Vec::new();
         one.detect(&bodies, CUBES, &mut found);
-        assert!(one.pairs.len() > 3 * PAIRS_PER_THREAD, "{} pairs", one.pairs.len());
+        let candidates = one.broad.candidates(&one.bounds, &Drift::NONE, &mut one.crew).len();
+        assert!(candidates > 3 * PAIRS_PER_THREAD, "{candidates} pairs");
         let expected = bits(&found);
 
         for threads in [1, 2, 3, 7] {

@@ -1,51 +1,95 @@
-//! This file gathers the points at which two bodies touch, before four of them are chosen.
+//! This file gathers the points at which two bodies touch, before four of them are chosen, of a pair in
+//! each lane.
+
+use zynq_pgs::CONTACT_POINTS;
 
 use super::MARGIN;
-use super::reduce::Candidate;
+use super::lanes::{Mask, Numbers, Vector};
 
 /// Points that two faces have in common at most: four corners of each, and each edge of one with each
 /// of the other.
-const MOST: usize = 4 + 4 + 16;
+pub(super) const MOST: usize = 4 + 4 + 16;
 
-/// Points near enough, in the order in which they were found.
-#[derive(Debug)]
-pub(super) struct Points {
-    candidates: [Candidate; MOST],
-    on_b: [[f32; 3]; MOST],
+/// A point of some of the pairs.
+#[derive(Clone, Copy)]
+pub(super) struct Slot<N: Numbers> {
+    /// Of which pairs it is one.
+    pub(super) taken: N::Mask,
+    pub(super) on_a: Vector<N>,
+    pub(super) on_b: Vector<N>,
+    pub(super) distance: N,
+}
+
+impl<N: Numbers> Slot<N> {
+    /// This point for the pairs in the mask, and the other for the rest.
+    #[inline(always)]
+    pub(super) fn or(&self, mask: N::Mask, other: &Self) -> Self {
+        Self {
+            taken: self.taken.and(mask).either(other.taken.without(mask)),
+            on_a: self.on_a.or(mask, other.on_a),
+            on_b: self.on_b.or(mask, other.on_b),
+            distance: self.distance.or(mask, other.distance),
+        }
+    }
+}
+
+/// Points near enough, of each pair in the order in which they were found and without gaps.
+pub(super) struct Points<N: Numbers> {
+    /// Beyond the count none is taken.
+    slots: [Slot<N>; MOST],
     count: usize,
 }
 
-impl Default for Points {
-    fn default() -> Self {
-        let none = Candidate { point: [0.0; 3], distance: 0.0 };
-        Self { candidates: [none; MOST], on_b: [[0.0; 3]; MOST], count: 0 }
+impl<N: Numbers> Points<N> {
+    /// None, whatever number `any` is.
+    pub(super) fn none(any: N) -> Self {
+        let (zero, nowhere) = (any.all(0.0), Vector::all(any, [0.0; 3]));
+        let taken = zero.above(zero);
+        let slot = Slot { taken, on_a: nowhere, on_b: nowhere, distance: zero };
+        Self { slots: [slot; MOST], count: 0 }
     }
-}
 
-impl Points {
+    #[inline(always)]
     pub(super) fn clear(&mut self) {
+        for slot in &mut self.slots[..self.count] {
+            slot.taken = slot.taken.without(slot.taken);
+        }
         self.count = 0;
     }
 
-    /// What the choice sees: where they are on A, and how far apart.
-    pub(super) fn candidates(&self) -> &[Candidate] {
-        &self.candidates[..self.count]
+    /// Those that some pair has.
+    pub(super) fn slots(&self) -> &[Slot<N>] {
+        &self.slots[..self.count]
     }
 
-    /// Where they are on B.
-    pub(super) fn on_b(&self) -> &[[f32; 3]] {
-        &self.on_b[..self.count]
+    /// The first ones, and of which pairs there are more.
+    #[inline(always)]
+    pub(super) fn first(&self) -> ([Slot<N>; CONTACT_POINTS], N::Mask) {
+        let [a, b, c, d, fifth, ..] = &self.slots;
+        ([*a, *b, *c, *d], fifth.taken)
     }
 
-    /// Takes a point if it is near enough; of more than two faces can have, the first.
-    #[inline]
-    pub(super) fn take(&mut self, on_a: [f32; 3], on_b: [f32; 3], distance: f32) {
+    /// Takes a point of those pairs of which it is near enough; of more than two faces can have, the
+    /// first.
+    #[inline(always)]
+    pub(super) fn take(&mut self, pairs: N::Mask, on_a: Vector<N>, on_b: Vector<N>, distance: N) {
         // Written so that a NaN is no contact.
-        let near = distance <= MARGIN && distance.is_finite();
-        if near && on_b.iter().all(|value| value.is_finite()) && self.count < MOST {
-            self.candidates[self.count] = Candidate { point: on_a, distance };
-            self.on_b[self.count] = on_b;
-            self.count += 1;
+        let near = distance.all(MARGIN).at_least(distance);
+        let finite = distance.all(f32::INFINITY).above(distance.abs()).and(on_b.is_finite());
+        let taken = pairs.and(near).and(finite);
+        let point = Slot { taken, on_a, on_b, distance };
+        let mut left = taken;
+        for (number, slot) in self.slots.iter_mut().enumerate() {
+            if left.bits() == 0 {
+                break;
+            }
+            // Those to which this slot is the next one.
+            let free = left.without(slot.taken);
+            left = left.and(slot.taken);
+            if free.bits() != 0 {
+                *slot = point.or(free, slot);
+                self.count = self.count.max(number + 1);
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! This file chooses four of many contact points.
+//! This file chooses four of many contact points, of a pair in each lane.
 //!
 //! The rule, every tie going to the lowest index:
 //! 1. the deepest point;
@@ -11,114 +11,200 @@
 
 use zynq_pgs::CONTACT_POINTS;
 
-/// A point as the choice sees it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Candidate {
-    /// Where it is; any frame, m.
-    pub point: [f32; 3],
-    /// Signed distance, m.
-    pub distance: f32,
-}
+use super::lanes::{Mask, Numbers, Vector};
+use super::points::{Points, Slot};
 
 /// Area below which two spans count as the same, m²: a hundred steps of an f32 at the size of a
 /// cube.
 const NO_AREA: f32 = 1e-5;
 
-/// Indices of the points chosen, in the order of the choice, and how many they are.
+/// The points chosen, in the order of the choice; a pair has those in which it is taken.
+pub(super) type Chosen<N> = [Slot<N>; CONTACT_POINTS];
+
+/// Chooses.
 ///
-/// `normal` is the unit normal of the plane in which the points lie, in the frame of the points.
-/// Up to four points are all kept, in their order.
-pub(super) fn reduce(points: &[Candidate], normal: [f32; 3]) -> ([usize; CONTACT_POINTS], usize) {
-    let mut chosen = [0; CONTACT_POINTS];
-    if points.len() <= CONTACT_POINTS {
-        for (index, slot) in chosen.iter_mut().enumerate() {
-            *slot = index;
+/// `normal` is the unit normal of the plane in which the points lie on A. Up to four points are all
+/// kept, in their order.
+#[inline(always)]
+pub(super) fn reduce<N: Numbers>(points: &Points<N>, normal: Vector<N>) -> Chosen<N> {
+    let (mut result, many) = points.first();
+    if many.bits() != 0 {
+        let chosen = choose(points.slots(), normal, many);
+        for (result, chosen) in result.iter_mut().zip(chosen) {
+            *result = chosen.or(many, result);
         }
-        return (chosen, points.len());
     }
+    result
+}
 
-    let at = |index: usize| points[index].point;
-    let (first, _) = largest(points, |c| -c.distance);
-    chosen[0] = first;
+/// Four of each pair in the mask, by the rule.
+#[inline(always)]
+fn choose<N: Numbers>(slots: &[Slot<N>], normal: Vector<N>, pairs: N::Mask) -> Chosen<N> {
+    let (zero, one) = (normal.x.all(0.0), normal.x.all(1.0));
+    let some = zero.all(NO_AREA);
 
-    let (second, length) = largest(points, |c| squared(difference(c.point, at(first))));
-    if length <= NO_AREA * NO_AREA {
-        return (chosen, 1);
-    }
-    chosen[1] = second;
+    let (first, _) = largest(
+        slots,
+        pairs,
+        zero,
+        #[inline(always)]
+        |slot| -slot.distance,
+    );
+    let at = first.on_a;
+    let (second, length) = largest(
+        slots,
+        pairs,
+        zero,
+        #[inline(always)]
+        |slot| squared(slot.on_a.minus(at)),
+    );
+    let pairs_of_two = pairs.without(zero.all(NO_AREA * NO_AREA).at_least(length));
 
-    let area = |a, b, c| dot(normal, cross(difference(b, a), difference(c, a)));
-    let (third, span) = largest(points, |c| area(at(first), at(second), c.point).abs());
-    if span <= NO_AREA {
-        return (chosen, 2);
-    }
-    chosen[2] = third;
+    let (third, span) = largest(
+        slots,
+        pairs,
+        zero,
+        #[inline(always)]
+        |slot| area(normal, first.on_a, second.on_a, slot.on_a).abs(),
+    );
+    let pairs_of_three = pairs_of_two.without(some.at_least(span));
 
     // Outside of an edge the area has the opposite sign of the triangle's.
-    let side = if area(at(first), at(second), at(third)) > 0.0 { 1.0 } else { -1.0 };
-    let (fourth, added) = largest(points, |c| {
-        let outside = |a, b| -side * area(at(a), at(b), c.point);
-        let edges = [outside(first, second), outside(second, third), outside(third, first)];
-        let [mut most, others @ ..] = edges;
-        for other in others {
-            if other > most {
-                most = other;
-            }
-        }
-        most
-    });
-    if added <= NO_AREA {
-        return (chosen, 3);
+    let side = area(normal, first.on_a, second.on_a, third.on_a);
+    let side = one.or(side.above(zero), -one);
+    let (fourth, added) = largest(
+        slots,
+        pairs,
+        zero,
+        #[inline(always)]
+        |slot| {
+            // Outside of the edge from the first to the second, and so on.
+            let most = -side * area(normal, first.on_a, second.on_a, slot.on_a);
+            let other = -side * area(normal, second.on_a, third.on_a, slot.on_a);
+            let most = other.or(other.above(most), most);
+            let other = -side * area(normal, third.on_a, first.on_a, slot.on_a);
+            other.or(other.above(most), most)
+        },
+    );
+    let pairs_of_four = pairs_of_three.without(some.at_least(added));
+    [
+        Slot { taken: pairs, ..first },
+        Slot { taken: pairs_of_two, ..second },
+        Slot { taken: pairs_of_three, ..third },
+        Slot { taken: pairs_of_four, ..fourth },
+    ]
+}
+
+/// Of each pair the point of the largest measure and that measure; of equals the first.
+#[inline(always)]
+fn largest<N: Numbers>(
+    slots: &[Slot<N>],
+    pairs: N::Mask,
+    zero: N,
+    measure: impl Fn(&Slot<N>) -> N,
+) -> (Slot<N>, N) {
+    let nowhere = Vector::all(zero, [0.0; 3]);
+    let mut best = Slot { taken: pairs, on_a: nowhere, on_b: nowhere, distance: zero };
+    let mut most = zero.all(f32::NEG_INFINITY);
+    for slot in slots {
+        let value = measure(slot);
+        let larger = value.above(most).and(slot.taken);
+        best = slot.or(larger, &best);
+        most = value.or(larger, most);
     }
-    chosen[3] = fourth;
-    (chosen, 4)
+    (best, most)
 }
 
-/// Index of the largest measure and that measure; of equals the first.
-fn largest(points: &[Candidate], measure: impl Fn(&Candidate) -> f32) -> (usize, f32) {
-    let mut best = (0, f32::NEG_INFINITY);
-    for (index, candidate) in points.iter().enumerate() {
-        let value = measure(candidate);
-        if value > best.1 {
-            best = (index, value);
-        }
-    }
-    best
+/// Twice the area of a triangle, of that sign that it has seen along the normal.
+#[inline(always)]
+fn area<N: Numbers>(normal: Vector<N>, a: Vector<N>, b: Vector<N>, c: Vector<N>) -> N {
+    normal.dot(b.minus(a).cross(c.minus(a)))
 }
 
-fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
-}
-
-fn squared(a: [f32; 3]) -> f32 {
-    dot(a, a)
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+#[inline(always)]
+fn squared<N: Numbers>(a: Vector<N>) -> N {
+    a.dot(a)
 }
 
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::MARGIN;
+    use super::super::lanes::{Lanes, Portable, Row, Work, mask, run};
     use super::*;
 
     const UP: [f32; 3] = [0.0, 1.0, 0.0];
+
+    /// A point, and how far it is from the other body.
+    #[derive(Debug, Clone, Copy)]
+    struct Candidate {
+        point: [f32; 3],
+        distance: f32,
+    }
 
     fn flat(points: &[[f32; 2]]) -> Vec<Candidate> {
         points.iter().map(|&[x, z]| Candidate { point: [x, 0.0, z], distance: 0.0 }).collect()
     }
 
+    /// The choice among the candidates of one lane, beside others of which it must know nothing.
+    struct Choose<'a>(&'a [Candidate], &'a mut Vec<(Vec<usize>, usize)>);
+
+    impl Work for Choose<'_> {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "small numbers"
+        )]
+        fn with<L: Lanes>(self, lanes: L) {
+            let any = lanes.load(&Row::default());
+            let mut points = Points::none(any);
+            for own in 0..L::WIDTH {
+                points.clear();
+                for lane in 0..L::WIDTH {
+                    // The others have other points, and some of them fewer.
+                    let skipped = if lane == own { 0 } else { lane + 1 };
+                    let candidates = self.0.iter().cycle().skip(skipped);
+                    let count = self.0.len().saturating_sub(skipped / 2);
+                    for (number, candidate) in candidates.take(count).enumerate() {
+                        let on_b = [number as f32, 0.0, 0.0];
+                        points.take(
+                            mask(any, 1 << lane),
+                            Vector::all(any, candidate.point),
+                            Vector::all(any, on_b),
+                            any.all(candidate.distance),
+                        );
+                    }
+                }
+                let chosen = reduce(&points, Vector::all(any, UP));
+                let taken = |slot: &&Slot<L::Numbers>| slot.taken.bits() >> own & 1 != 0;
+                let numbers: Vec<usize> = chosen
+                    .iter()
+                    .filter(taken)
+                    .map(|slot| slot.on_b.x.row().0[own] as usize)
+                    .collect();
+                let count = numbers.len();
+                self.1.push((numbers, count));
+            }
+        }
+    }
+
+    /// Indices of the points chosen, and how many they are.
+    fn chosen(points: &[Candidate]) -> (Vec<usize>, usize) {
+        assert!(points.iter().all(|point| point.distance <= MARGIN));
+        let mut found = Vec::new();
+        Portable.run(Choose(points, &mut found));
+        run(Choose(points, &mut found));
+        assert!(found.iter().all(|other| *other == found[0]), "{found:?}");
+        found.swap_remove(0)
+    }
+
     #[test]
     fn four_points_stay_as_they_are() {
         let points = flat(&[[1.0, 1.0], [0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]);
-        assert_eq!(reduce(&points, UP), ([0, 1, 2, 3], 4));
-        assert_eq!(reduce(&points[..2], UP).1, 2);
+        assert_eq!(chosen(&points), (vec![0, 1, 2, 3], 4));
+        assert_eq!(chosen(&points[..2]).1, 2);
     }
 
     #[test]
@@ -134,24 +220,22 @@ mod tests {
             [1.0, -0.4],
         ]);
         // All equally deep: the first, its opposite, and the two corners across.
-        assert_eq!(reduce(&points, UP), ([0, 4, 2, 6], 4));
+        assert_eq!(chosen(&points), (vec![0, 4, 2, 6], 4));
         points[3].distance = -0.01;
-        assert_eq!(reduce(&points, UP).0[..2], [3, 7]);
+        assert_eq!(chosen(&points).0[..2], [3, 7]);
     }
 
     #[test]
     fn a_corner_that_is_there_twice_is_taken_once() {
         let square = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
         let twice: Vec<[f32; 2]> = square.iter().chain(&square).copied().collect();
-        let (chosen, count) = reduce(&flat(&twice), UP);
-        assert_eq!((chosen, count), ([0, 2, 1, 3], 4));
+        assert_eq!(chosen(&flat(&twice)), (vec![0, 2, 1, 3], 4));
     }
 
     #[test]
     fn points_on_a_line_leave_its_ends() {
         let points = flat(&[[0.0, 0.0], [0.1, 0.0], [0.2, 0.0], [0.3, 0.0], [0.4, 0.0]]);
-        let (chosen, count) = reduce(&points, UP);
-        assert_eq!((&chosen[..count], count), (&[0, 4][..], 2));
+        assert_eq!(chosen(&points), (vec![0, 4], 2));
     }
 
     proptest! {
@@ -163,8 +247,7 @@ mod tests {
                 .into_iter()
                 .map(|(x, z, distance)| Candidate { point: [x, 0.0, z], distance })
                 .collect();
-            let (chosen, count) = reduce(&points, UP);
-            let chosen = &chosen[..count];
+            let (chosen, count) = chosen(&points);
             prop_assert!((1..=4).contains(&count));
             for (n, index) in chosen.iter().enumerate() {
                 prop_assert!(*index < points.len());

@@ -193,7 +193,7 @@ pub(crate) fn run(
     };
     let mut parameters = args.deadline.apply(parameters);
     parameters.verify_order |= args.verify;
-    let open = |name, side| {
+    let open = |name, side: Side| {
         let world = |opened: &_| match &folder {
             Some(folder) => {
                 let capacity = board_shapes(opened);
@@ -202,7 +202,7 @@ pub(crate) fn run(
             }
             None => {
                 args.scene.check_size(opened)?;
-                args.scene.build().map(Box::new).map(World::Scene)
+                args.scene.build(&side.build).map(Box::new).map(World::Scene)
             }
         };
         Lane::open(name, side, common, world, parameters.gravity)

@@ -128,7 +128,7 @@ pub(crate) fn run(
 fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Failure> {
     let mut opened = board::open(common, &args.build)?;
     args.scene.check_size(&opened)?;
-    let mut scene = args.scene.build()?;
+    let mut scene = args.scene.build(&args.build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let parameters = args.deadline.apply(StepParameters::default());
     let interrupt = Interrupt::install();

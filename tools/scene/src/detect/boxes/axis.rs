@@ -1,134 +1,147 @@
 //! This file finds the axis along which two boxes are farthest apart: the six normals of their faces,
 //! and the nine directions across an edge of each.
 
-use wide::f32x4;
-
-use super::Placed;
-use super::lanes::{Four, Rotation, Vec3, negate, with_sign};
+use super::super::lanes::{Mask, Numbers, Rotation, Vector};
+use super::{Placed, Touch};
 
 /// Where two boxes are farthest apart.
 #[derive(Debug, Clone, Copy)]
-struct Separation {
-    distance: f32,
-    direction: Vec3,
+struct Separation<N> {
+    distance: N,
+    direction: Vector<N>,
 }
 
-impl Separation {
-    const NONE: Self = Self { distance: f32::MIN, direction: [0.0; 3] };
+impl<N: Numbers> Separation<N> {
+    fn none(any: N) -> Self {
+        Self { distance: any.all(f32::MIN), direction: Vector::all(any, [0.0; 3]) }
+    }
 
     /// The farther one; of equals the first.
-    #[inline]
-    fn keep_larger(&mut self, distance: f32, direction: Vec3) {
-        if distance > self.distance {
-            *self = Self { distance, direction };
-        }
+    #[inline(always)]
+    fn keep_larger(&mut self, distance: N, direction: Vector<N>) {
+        self.keep(distance.above(self.distance), distance, direction);
     }
-}
 
-/// What the search comes to.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Found {
-    /// They are farther apart than the margin.
-    Apart,
-    /// The unit vector of that axis, from A to B, in the frame of A.
-    Axis(Vec3),
-    /// They are apart along two normals of one box at once.
-    Corner,
+    #[inline(always)]
+    fn keep(&mut self, larger: N::Mask, distance: N, direction: Vector<N>) {
+        self.distance = distance.or(larger, self.distance);
+        self.direction = direction.or(larger, self.direction);
+    }
 }
 
 /// The axis of the largest separation of B from A; in a tie the order is faces of A, of B, edges.
-pub(super) fn find(placed: &Placed, margin: f32) -> Found {
+#[inline(always)]
+pub(super) fn find<N: Numbers>(placed: &Placed<N>, margin: f32) -> Touch<N> {
     let Placed { half_a, half_b, b_in_a, a_in_b, translation } = *placed;
-    let Some(of_a) = faces(half_a, half_b, b_in_a, translation) else { return Found::Corner };
-    if of_a.distance > margin {
-        return Found::Apart;
-    }
-    let back = a_in_b.turn(negate(translation));
-    let Some(of_b) = faces(half_b, half_a, a_in_b, back) else { return Found::Corner };
-    if of_b.distance > margin {
-        return Found::Apart;
-    }
+    let margin = translation.x.all(margin);
+    let (of_a, unknown) = faces(half_a, half_b, b_in_a, translation);
+    let apart = of_a.distance.above(margin).without(unknown);
+    let back = a_in_b.turn(translation.negated());
+    let (of_b, corner) = faces(half_b, half_a, a_in_b, back);
+    let unknown = unknown.either(corner.without(apart));
+    let apart = apart.either(of_b.distance.above(margin).without(unknown));
     let across = edges(placed);
-    if across.distance > margin {
-        return Found::Apart;
-    }
-    if of_b.distance > of_a.distance && of_b.distance > across.distance {
-        Found::Axis(b_in_a.turn(negate(of_b.direction)))
-    } else if across.distance > of_a.distance {
-        Found::Axis(across.direction)
-    } else {
-        Found::Axis(of_a.direction)
-    }
+    let apart = apart.either(across.distance.above(margin).without(unknown));
+
+    let by_b = of_b.distance.above(of_a.distance).and(of_b.distance.above(across.distance));
+    let by_edges = across.distance.above(of_a.distance);
+    let axis = across.direction.or(by_edges, of_a.direction);
+    let axis = b_in_a.turn(of_b.direction.negated()).or(by_b, axis);
+    Touch { axis, apart, unknown }
 }
 
 /// Along the normals of one box; the other is turned by `rotation` and moved by `translation` in its
-/// frame. `None` if they are apart along more than one.
-#[inline]
-fn faces(own: Vec3, other: Vec3, rotation: Rotation, translation: Vec3) -> Option<Separation> {
-    let [x, y, z] = translation.map(|along| 1.0_f32.copysign(along));
-    // The normals that look at the other box, the last one twice.
-    let normals = [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]];
-    let outward = Four::new([normals[0], normals[1], normals[2], normals[2]]);
-    let towards = rotation.inverse().turn_four(outward.negated());
-    let nearest = rotation.turn_four(Four::corners_of(other, towards));
-    let nearest = nearest.plus(Four::splat(translation)).vectors();
-    let mut best = Separation::NONE;
-    let mut apart = 0;
-    for (k, sign) in [x, y, z].into_iter().enumerate() {
-        let distance = nearest[k][k] * sign - own[k];
-        best.keep_larger(distance, normals[k]);
-        apart += u32::from(distance >= 0.0);
+/// frame. Also whether they are apart along more than one.
+#[inline(always)]
+fn faces<N: Numbers>(
+    own: Vector<N>,
+    other: Vector<N>,
+    rotation: Rotation<N>,
+    translation: Vector<N>,
+) -> (Separation<N>, N::Mask) {
+    let (zero, one) = (own.x.all(0.0), own.x.all(1.0));
+    let signs = Vector { x: one, y: one, z: one }.with_signs(translation);
+    let inverse = rotation.inverse();
+    let mut best = Separation::none(zero);
+    let mut once = zero.above(zero);
+    let mut twice = once;
+    // The normals that look at the other box.
+    let normals = [
+        Vector { x: signs.x, y: zero, z: zero },
+        Vector { x: zero, y: signs.y, z: zero },
+        Vector { x: zero, y: zero, z: signs.z },
+    ];
+    let (own, signs) = (own.parts(), signs.parts());
+    for (k, outward) in normals.into_iter().enumerate() {
+        let towards = inverse.turn(outward.negated());
+        let nearest = rotation.turn(other.with_signs(towards)).plus(translation);
+        let distance = nearest.parts()[k] * signs[k] - own[k];
+        best.keep_larger(distance, outward);
+        let apart = distance.at_least(zero);
+        twice = twice.either(once.and(apart));
+        once = once.either(apart);
     }
-    if apart > 1 { None } else { Some(best) }
+    (best, twice)
 }
 
 /// Along the directions that are across an edge of each.
-#[inline]
-fn edges(placed: &Placed) -> Separation {
+#[inline(always)]
+fn edges<N: Numbers>(placed: &Placed<N>) -> Separation<N> {
     let Placed { half_a, half_b, b_in_a, a_in_b, translation } = *placed;
-    let mut best = Separation::NONE;
-    let t = Four::splat(translation);
+    let (zero, one) = (half_a.x.all(0.0), half_a.x.all(1.0));
+    let mut best = Separation::none(zero);
     for edge in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
-        let [x, y, z] = b_in_a.turn(edge);
-        // Across x, y and z of A, the last one twice.
-        let raw = Four {
-            x: f32x4::new([0.0, z, -y, -y]),
-            y: f32x4::new([-z, 0.0, x, x]),
-            z: f32x4::new([y, -x, 0.0, 0.0]),
-        };
-        let length = raw.dot(raw).sqrt();
-        let unit = Four { x: raw.x / length, y: raw.y / length, z: raw.z / length };
-        let direction = unit.times(with_sign(f32x4::splat(1.0), t.dot(unit)));
-        let on_a = Four::corners_of(half_a, direction);
-        let towards = a_in_b.turn_four(direction.negated());
-        let on_b = b_in_a.turn_four(Four::corners_of(half_b, towards)).plus(t);
-        let distances = on_b.minus(on_a).dot(direction).to_array();
-        // What is parallel to an edge of A has no direction across it.
-        let lengths = length.to_array();
-        for (lane, direction) in direction.vectors().into_iter().enumerate().take(3) {
-            if lengths[lane] > f32::EPSILON {
-                best.keep_larger(distances[lane], direction);
-            }
+        let Vector { x, y, z } = b_in_a.turn(Vector::all(zero, edge));
+        let across = [
+            Vector { x: zero, y: -z, z: y },
+            Vector { x: z, y: zero, z: -x },
+            Vector { x: -y, y: x, z: zero },
+        ];
+        for raw in across {
+            let length = raw.dot(raw).sqrt();
+            let unit = Vector { x: raw.x / length, y: raw.y / length, z: raw.z / length };
+            let direction = unit.times(one.with_sign(translation.dot(unit)));
+            let on_a = half_a.with_signs(direction);
+            let towards = a_in_b.turn(direction.negated());
+            let on_b = b_in_a.turn(half_b.with_signs(towards)).plus(translation);
+            let distance = on_b.minus(on_a).dot(direction);
+            // What is parallel to an edge of A has no direction across it.
+            let some = length.above(zero.all(f32::EPSILON));
+            best.keep(distance.above(best.distance).and(some), distance, direction);
         }
     }
     best
 }
 
 /// Two unit vectors across a unit vector and each other.
-pub(super) fn basis([x, y, z]: Vec3) -> [Vec3; 2] {
-    let sign = 1.0_f32.copysign(z);
-    let a = -1.0 / (sign + z);
+#[inline(always)]
+pub(super) fn basis<N: Numbers>(direction: Vector<N>) -> [Vector<N>; 2] {
+    let Vector { x, y, z } = direction;
+    let one = x.all(1.0);
+    let sign = one.with_sign(z);
+    let a = x.all(-1.0) / (sign + z);
     let b = x * y * a;
-    [[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]]
+    [
+        Vector { x: one + sign * x * x * a, y: sign * b, z: -sign * x },
+        Vector { x: b, y: sign + y * y * a, z: -y },
+    ]
 }
 
-/// Index of the largest magnitude, of equals the first, and the sign there.
-pub(super) fn steepest(direction: Vec3) -> (usize, f32) {
-    let mut at = 0;
-    for k in 1..3 {
-        if direction[k].abs() > direction[at].abs() {
-            at = k;
-        }
-    }
-    (at, 1.0_f32.copysign(direction[at]))
+/// Along which axis the magnitude is the largest, of equals the first, and the sign there.
+#[derive(Clone, Copy)]
+pub(super) struct Steepest<N: Numbers> {
+    pub(super) along_x: N::Mask,
+    pub(super) along_z: N::Mask,
+    pub(super) sign: N,
+}
+
+#[inline(always)]
+pub(super) fn steepest<N: Numbers>(direction: Vector<N>) -> Steepest<N> {
+    let Vector { x, y, z } = direction;
+    let by_y = y.abs().above(x.abs());
+    let larger = y.or(by_y, x);
+    let along_z = z.abs().above(larger.abs());
+    let sign = x.all(1.0).with_sign(z.or(along_z, larger));
+    let all = x.all(0.0).is(x.all(0.0));
+    Steepest { along_x: all.without(by_y).without(along_z), along_z, sign }
 }

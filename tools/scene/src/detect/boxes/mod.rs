@@ -1,110 +1,86 @@
 //! This folder finds where two boxes touch, with the bits of parry3d's and in less of its time.
 //!
 //! Nearly all pairs of a pile are boxes. parry computes their manifold in `contact_manifold_cuboid_cuboid`
-//! one axis and one point at a time; here the same operations are done on four at once, in the same
-//! order, so that not a bit differs: see the tests, which compare. What parry keeps for its own callers
-//! (features, manifolds of earlier steps) is left away. Where two boxes are apart along two normals of one
-//! at once, which pairs of a pile hardly ever are, parry is asked.
+//! pair by pair, one axis and one point at a time; here the same operations are done of a pair in each
+//! lane, in the same order, so that not a bit differs: see the tests, which compare. What parry keeps for
+//! its own callers (features, manifolds of earlier steps) is left away. Where two boxes are apart along
+//! two normals of one at once, which pairs of a pile hardly ever are, parry is asked.
 
 mod axis;
 mod clip;
-mod lanes;
-
-use parry3d::math::Pose;
-use wide::f32x4;
-
-use axis::Found;
-use lanes::{Four, Rotation, Vec3};
 
 use super::MARGIN;
+use super::lanes::{Mask, Numbers, Rotation, Vector};
 use super::points::Points;
 
 /// Two boxes, one in the frame of the other.
 #[derive(Debug, Clone, Copy)]
-struct Placed {
-    half_a: Vec3,
-    half_b: Vec3,
-    b_in_a: Rotation,
-    a_in_b: Rotation,
+pub(super) struct Placed<N> {
+    pub(super) half_a: Vector<N>,
+    pub(super) half_b: Vector<N>,
+    pub(super) b_in_a: Rotation<N>,
+    pub(super) a_in_b: Rotation<N>,
     /// From the centre of A to that of B, in the frame of A.
-    translation: Vec3,
+    pub(super) translation: Vector<N>,
 }
 
 /// What two boxes have in common.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Touch {
-    /// They are farther apart than the margin.
-    Apart,
+#[derive(Clone, Copy)]
+pub(super) struct Touch<N: Numbers> {
     /// They touch along this unit vector from A to B, in the frame of A.
-    Along(Vec3),
+    pub(super) axis: Vector<N>,
+    /// They do not: they are farther apart than the margin.
+    pub(super) apart: N::Mask,
     /// parry must say it.
-    Unknown,
+    pub(super) unknown: N::Mask,
 }
 
-/// Where boxes of these half extents touch, B placed in the frame of A.
-///
-/// The points are taken on B too in the frame of A.
-pub(super) fn touch(b_in_a: &Pose, half_a: Vec3, half_b: Vec3, points: &mut Points) -> Touch {
-    let rotation = Rotation::new(b_in_a.rotation.to_array());
-    let placed = Placed {
-        half_a,
-        half_b,
-        b_in_a: rotation,
-        a_in_b: rotation.inverse(),
-        translation: b_in_a.translation.to_array(),
-    };
-    match axis::find(&placed, MARGIN) {
-        Found::Apart => Touch::Apart,
-        Found::Corner => Touch::Unknown,
-        Found::Axis(axis) => {
-            clip::points(&placed, axis, points);
-            Touch::Along(axis)
-        }
+/// Where the boxes of some pairs touch, of which the points are taken, on B too in the frame of A.
+#[inline(always)]
+pub(super) fn touch<N: Numbers>(
+    placed: &Placed<N>,
+    pairs: N::Mask,
+    points: &mut Points<N>,
+) -> Touch<N> {
+    let touch = axis::find(placed, MARGIN);
+    let pairs = pairs.without(touch.apart).without(touch.unknown);
+    if pairs.bits() != 0 {
+        clip::points(placed, touch.axis, pairs, points);
     }
+    touch
 }
 
-/// Points of the frame of A in that of B.
-pub(super) fn in_b(b_in_a: &Pose, points: [Vec3; 4]) -> [Vec3; 4] {
-    let translation = Four::splat(b_in_a.translation.to_array());
-    let back = Rotation::new(b_in_a.rotation.to_array()).inverse();
-    back.turn_four(Four::new(points).minus(translation)).vectors()
-}
-
-impl Points {
-    /// Takes the points in some lanes, given as bits.
-    // Once in the program, and not at each place that has points.
-    #[inline(never)]
-    fn take_lanes(&mut self, mut lanes: u32, on_a: Four, on_b: Four, distances: f32x4) {
-        let a = [on_a.x, on_a.y, on_a.z].map(f32x4::to_array);
-        let b = [on_b.x, on_b.y, on_b.z].map(f32x4::to_array);
-        let distances = distances.to_array();
-        while lanes != 0 {
-            let lane = (lanes.trailing_zeros() & 3) as usize;
-            lanes &= lanes - 1;
-            self.take(a.map(|lanes| lanes[lane]), b.map(|lanes| lanes[lane]), distances[lane]);
-        }
+impl<N: Numbers> Placed<N> {
+    /// Points of the frame of A in that of B.
+    #[inline(always)]
+    pub(super) fn in_b(&self, point: Vector<N>) -> Vector<N> {
+        self.a_in_b.turn(point.minus(self.translation))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use parry3d::math::{Rotation as Quaternion, Vector};
+    use parry3d::math::{Pose, Rotation as Quaternion, Vector as Vec3};
     use parry3d::query::ContactManifold;
     use parry3d::query::details::contact_manifold_cuboid_cuboid;
     use parry3d::shape::Cuboid;
 
+    use super::super::lanes::{Lanes, Portable, Row, Work, run};
     use super::*;
     use crate::random::SplitMix64;
+
+    /// Two boxes: where B is in the frame of A, and their half extents.
+    type Pair = (Pose, [f32; 3], [f32; 3]);
 
     /// Bits of an axis and of points.
     type Manifold = (Vec<u32>, Vec<u32>);
 
     /// The bits of everything that parry computes of two boxes: the axis and the points, near enough or
     /// not.
-    fn by_parry(b_in_a: &Pose, half_a: Vec3, half_b: Vec3) -> Option<Manifold> {
-        let boxes = [half_a, half_b].map(|half| Cuboid::new(Vector::from_array(half)));
+    fn by_parry((b_in_a, half_a, half_b): Pair) -> Option<Manifold> {
+        let boxes = [half_a, half_b].map(|half| Cuboid::new(Vec3::from_array(half)));
         let mut manifold = ContactManifold::<(), ()>::new();
-        contact_manifold_cuboid_cuboid(b_in_a, &boxes[0], &boxes[1], MARGIN, &mut manifold);
+        contact_manifold_cuboid_cuboid(&b_in_a, &boxes[0], &boxes[1], MARGIN, &mut manifold);
         if manifold.points.is_empty() {
             return None;
         }
@@ -116,23 +92,84 @@ mod tests {
         Some((manifold.local_n1.to_array().map(f32::to_bits).to_vec(), points.collect()))
     }
 
-    /// The same by this module; `None` too where parry is to be asked.
-    fn by_lanes(b_in_a: &Pose, half_a: Vec3, half_b: Vec3) -> (Touch, Option<Manifold>) {
-        let mut points = Points::default();
-        let touch = touch(b_in_a, half_a, half_b, &mut points);
-        let Touch::Along(axis) = touch else { return (touch, None) };
-        let mut bits = Vec::new();
-        for (candidate, on_b) in points.candidates().iter().zip(points.on_b()) {
-            let [on_b, ..] = in_b(b_in_a, [*on_b; 4]);
-            let numbers = candidate.point.into_iter().chain(on_b).chain([candidate.distance]);
-            bits.extend(numbers.map(f32::to_bits));
+    /// What lanes find of a pair.
+    #[derive(Debug, Clone, PartialEq)]
+    enum Found {
+        Apart,
+        Touching(Manifold),
+        /// parry is to be asked.
+        Unknown,
+    }
+
+    /// Computes pairs, as many at once as there are lanes.
+    struct Compute<'a>(&'a [Pair], &'a mut Vec<Found>);
+
+    impl Work for Compute<'_> {
+        fn with<L: Lanes>(self, lanes: L) {
+            let any = lanes.load(&Row::default());
+            let mut points = Points::none(any);
+            for pairs in self.0.chunks(L::WIDTH) {
+                points.clear();
+                let vector = |of: &dyn Fn(&Pair) -> [f32; 3]| {
+                    let mut rows = [Row::default(); 3];
+                    for (lane, pair) in pairs.iter().enumerate() {
+                        for (row, number) in rows.iter_mut().zip(of(pair)) {
+                            row.0[lane] = number;
+                        }
+                    }
+                    Vector {
+                        x: any.of_row(&rows[0]),
+                        y: any.of_row(&rows[1]),
+                        z: any.of_row(&rows[2]),
+                    }
+                };
+                let mut w = Row::default();
+                for (lane, (pose, ..)) in pairs.iter().enumerate() {
+                    w.0[lane] = pose.rotation.w;
+                }
+                let axis =
+                    vector(&|(pose, ..)| [pose.rotation.x, pose.rotation.y, pose.rotation.z]);
+                let b_in_a = Rotation::new(axis, any.of_row(&w));
+                let placed = Placed {
+                    half_a: vector(&|(_, half, _)| *half),
+                    half_b: vector(&|(.., half)| *half),
+                    b_in_a,
+                    a_in_b: b_in_a.inverse(),
+                    translation: vector(&|(pose, ..)| pose.translation.to_array()),
+                };
+                let touch = touch(&placed, any.is(any), &mut points);
+                for lane in 0..pairs.len() {
+                    self.1.push(found(&placed, &touch, &points, lane));
+                }
+            }
         }
-        (touch, Some((axis.map(f32::to_bits).to_vec(), bits)))
+    }
+
+    fn found<N: Numbers>(
+        placed: &Placed<N>,
+        touch: &Touch<N>,
+        points: &Points<N>,
+        lane: usize,
+    ) -> Found {
+        let is = |mask: N::Mask| mask.bits() >> lane & 1 != 0;
+        let bits = |vector: Vector<N>| vector.rows().map(|row| row.0[lane].to_bits());
+        assert!(!is(touch.apart.and(touch.unknown)));
+        if is(touch.apart) || is(touch.unknown) {
+            assert!(points.slots().iter().all(|slot| !is(slot.taken)));
+            return if is(touch.apart) { Found::Apart } else { Found::Unknown };
+        }
+        let mut numbers = Vec::new();
+        for slot in points.slots().iter().filter(|slot| is(slot.taken)) {
+            numbers.extend(bits(slot.on_a));
+            numbers.extend(bits(placed.in_b(slot.on_b)));
+            numbers.push(slot.distance.row().0[lane].to_bits());
+        }
+        Found::Touching((bits(touch.axis).to_vec(), numbers))
     }
 
     /// How pairs lie: at random, stacked and tilted by little, turned about the vertical only, along the
     /// axes, and on edges.
-    fn pair(random: &mut SplitMix64, kind: u32) -> (Pose, Vec3, Vec3) {
+    fn pair(random: &mut SplitMix64, kind: u32) -> Pair {
         let mut sign = || random.sign();
         let tilt = match kind {
             0 => 1.0,
@@ -156,33 +193,36 @@ mod tests {
             _ => [1.5 * sign(), above, 1.5 * sign()],
         };
         let rotation = Quaternion::from_array(q.map(|value| value / length));
-        (Pose::from_parts(Vector::from_array(translation), rotation), half_a, half_b)
+        (Pose::from_parts(Vec3::from_array(translation), rotation), half_a, half_b)
     }
 
     #[test]
     fn not_a_bit_differs_from_what_parry_computes() {
         let mut random = SplitMix64::new(7);
         for kind in 0..5 {
+            // No multiple of the lanes, so that some stay empty.
+            let pairs: Vec<Pair> = (0..4001).map(|_| pair(&mut random, kind)).collect();
+            let (mut portable, mut widest) = (Vec::new(), Vec::new());
+            Portable.run(Compute(&pairs, &mut portable));
+            run(Compute(&pairs, &mut widest));
+            assert!(portable == widest, "kind {kind}");
+            assert_eq!(portable.len(), pairs.len());
+
             let (mut touching, mut apart, mut unknown) = (0, 0, 0);
-            for _ in 0..4000 {
-                let (b_in_a, half_a, half_b) = pair(&mut random, kind);
-                let expected = by_parry(&b_in_a, half_a, half_b);
-                let (touch, found) = by_lanes(&b_in_a, half_a, half_b);
-                match touch {
-                    Touch::Along(_) => {
+            for (pair, found) in pairs.into_iter().zip(portable) {
+                let expected = by_parry(pair);
+                match found {
+                    Found::Touching(found) => {
                         touching += 1;
-                        let points = found.as_ref().map_or(0, |(_, points)| points.len());
                         // parry has no axis where it has no point at all.
-                        assert!(
-                            found == expected || expected.is_none() && points == 0,
-                            "{b_in_a:?}"
-                        );
+                        let none = expected.is_none() && found.1.is_empty();
+                        assert!(none || expected == Some(found), "{pair:?}");
                     }
-                    Touch::Apart => {
+                    Found::Apart => {
                         apart += 1;
-                        assert_eq!(expected, None, "{b_in_a:?}");
+                        assert_eq!(expected, None, "{pair:?}");
                     }
-                    Touch::Unknown => unknown += 1,
+                    Found::Unknown => unknown += 1,
                 }
             }
             assert!(touching > 800, "kind {kind}: {touching}, {apart}, {unknown}");
@@ -192,8 +232,9 @@ mod tests {
 
     #[test]
     fn boxes_apart_along_two_normals_are_left_to_parry() {
-        let pose = Pose::from_parts(Vector::new(2.005, 2.005, 0.0), Quaternion::IDENTITY);
-        let mut points = Points::default();
-        assert_eq!(touch(&pose, [1.0; 3], [1.0; 3], &mut points), Touch::Unknown);
+        let pose = Pose::from_parts(Vec3::new(2.005, 2.005, 0.0), Quaternion::IDENTITY);
+        let mut found = Vec::new();
+        run(Compute(&[(pose, [1.0; 3], [1.0; 3])], &mut found));
+        assert_eq!(found, [Found::Unknown]);
     }
 }

@@ -1,0 +1,121 @@
+//! This file asks parry3d where two bodies touch that are not both boxes, or that boxes' own arithmetic
+//! leaves to it.
+//!
+//! parry computes the contact manifold in the frame of its first shape, which is our body A. Its normal
+//! points from A to B, ours from B to A; its distances mean the same.
+
+use parry3d::math::{Pose, Rotation, Vector};
+use parry3d::query::details::contact_manifold_cuboid_cuboid;
+use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use parry3d::shape::{Ball, Capsule, Cuboid, PackedFeatureId, Shape};
+use zynq_pgs::Body;
+
+use super::MARGIN;
+use super::points::MOST;
+use crate::Geometry;
+
+/// Points nearer to each other than this are one, m². Pieces of a line are cut off in equal points
+/// where only one is left.
+const SAME_POINT: f32 = 1e-8;
+
+/// What rounding may make of two equal distances, m.
+const SAME_DEPTH: f32 = 1e-4;
+
+/// Where two bodies touch, each in its own frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Place {
+    pub(super) on_a: [f32; 3],
+    pub(super) on_b: [f32; 3],
+    pub(super) distance: f32,
+}
+
+/// parry, with its buffer.
+#[derive(Debug)]
+pub(super) struct Parry {
+    manifold: ContactManifold<(), ()>,
+    places: [Place; MOST],
+}
+
+impl Default for Parry {
+    fn default() -> Self {
+        Self { manifold: ContactManifold::new(), places: [Place::default(); MOST] }
+    }
+}
+
+impl Parry {
+    /// Where two bodies of these geometries touch, and the unit vector along which they do, from A to B
+    /// in the frame of A. `None` if parry does not know the pair.
+    pub(super) fn ask(
+        &mut self,
+        [a, b]: [&Body; 2],
+        [geometry_a, geometry_b]: [Geometry; 2],
+    ) -> Option<([f32; 3], &[Place])> {
+        let b_in_a = pose(a).inv_mul(&pose(b));
+        let curved = self.parry(&b_in_a, geometry_a, geometry_b)?;
+        let mut count = 0;
+        for point in &self.manifold.points {
+            let same = |other: &Place| {
+                Vector::from_array(other.on_b).distance_squared(point.local_p2) < SAME_POINT
+            };
+            // Written so that a NaN is no contact.
+            let near = point.dist <= MARGIN && point.dist.is_finite() && point.local_p2.is_finite();
+            let known = curved && self.places[..count].iter().any(same);
+            if near && !known && count < MOST {
+                self.places[count] = Place {
+                    on_a: point.local_p1.to_array(),
+                    on_b: point.local_p2.to_array(),
+                    distance: point.dist,
+                };
+                count += 1;
+            }
+        }
+        Some((self.manifold.local_n1.to_array(), &self.places[..count]))
+    }
+
+    /// Has parry compute the manifold of two geometries; whether one has a curved side.
+    fn parry(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<bool> {
+        // Without points and normals of an earlier pair parry starts afresh, so that a result
+        // depends on the two poses alone.
+        let manifold = &mut self.manifold;
+        manifold.clear();
+        manifold.local_n1 = Vector::ZERO;
+        manifold.local_n2 = Vector::ZERO;
+        if let (Geometry::Box { half_extents: a }, Geometry::Box { half_extents: b }) = (a, b) {
+            let (a, b) = (Cuboid::new(Vector::from_array(a)), Cuboid::new(Vector::from_array(b)));
+            contact_manifold_cuboid_cuboid(b_in_a, &a, &b, MARGIN, manifold);
+            return Some(false);
+        }
+        with_shape(a, |a| {
+            with_shape(b, |b| {
+                let parry = DefaultQueryDispatcher;
+                parry.contact_manifold_convex_convex(b_in_a, a, b, None, None, MARGIN, manifold)
+            })
+        })
+        .ok()?;
+        // To the points of two features parry adds the nearest one, last and without a feature.
+        // Where a capsule lies flat that is any point of a line whose ends are there already.
+        if let [others @ .., nearest] = &self.manifold.points[..]
+            && nearest.fid1 == PackedFeatureId::UNKNOWN
+            && others.iter().any(|other| other.dist <= nearest.dist + SAME_DEPTH)
+        {
+            self.manifold.points.pop();
+        }
+        Some(true)
+    }
+}
+
+/// Hands parry's shape of that geometry to `then`.
+fn with_shape<R>(geometry: Geometry, then: impl FnOnce(&dyn Shape) -> R) -> R {
+    match geometry {
+        Geometry::Box { half_extents } => then(&Cuboid::new(Vector::from_array(half_extents))),
+        Geometry::Sphere { radius } => then(&Ball::new(radius)),
+        Geometry::Capsule { half_height, radius } => then(&Capsule::new_y(half_height, radius)),
+    }
+}
+
+fn pose(body: &Body) -> Pose {
+    Pose::from_parts(
+        Vector::from_array(body.pose.position),
+        Rotation::from_array(body.pose.orientation),
+    )
+}
