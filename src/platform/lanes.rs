@@ -203,8 +203,9 @@ mod tests {
             prop_assert_eq!(a.minus_f32(b).words(), of(|a, b| a - b));
             prop_assert_eq!(a.times_f32(b).words(), of(|a, b| a * b));
             // Which of 0 and -0 is the larger is not said.
-            let larger = a.larger_f32(b).words().map(f32::from_bits);
-            prop_assert_eq!(larger, of(f32::max).map(f32::from_bits));
+            let unsigned_zero = |word| (f32::from_bits(word) + 0.0).to_bits();
+            let larger = a.larger_f32(b).words().map(unsigned_zero);
+            prop_assert_eq!(larger, of(f32::max).map(unsigned_zero));
         }
     }
 }
