@@ -155,11 +155,12 @@ fn known() -> String {
 }
 
 impl BuildArgs {
-    /// The first option that was given.
+    /// The first option that was given of those that describe a board. `--threads` does not: it is for
+    /// finding collisions too, whatever the board.
     pub(crate) fn given(&self) -> Option<&'static str> {
         let part = || PARTS.iter().find(|part| (part.get)(self).is_some()).map(|part| part.option);
         // How it is computed is no part of what it is, and of no text.
-        let host = || self.threads.map(|_| "--threads").or_else(|| self.lanes.map(|_| "--lanes"));
+        let host = || self.lanes.map(|_| "--lanes");
         self.profile.map(|_| "--profile").or_else(part).or_else(host)
     }
 }
@@ -244,6 +245,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::options::LanesName;
 
     fn build(text: &str) -> Result<BuildArgs, BuildError> {
         text.parse()
@@ -358,6 +360,10 @@ mod tests {
             assert_eq!(given.given(), Some(option));
         }
         assert_eq!(build("float").expect("a build").given(), Some("--profile"));
+        let lanes = Some(LanesName::Off);
+        assert_eq!(BuildArgs { lanes, ..BuildArgs::default() }.given(), Some("--lanes"));
+        // Detection takes them on a real board, too.
+        assert_eq!(BuildArgs { threads: Some(1), ..BuildArgs::default() }.given(), None);
     }
 
     fn any_of<T: ValueEnum + fmt::Debug + 'static>() -> impl Strategy<Value = Option<T>> {
