@@ -146,6 +146,7 @@ const NOBODY: Body = Body {
     velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] },
     shape: 0,
 };
+
 /// Reads the next block of `count` bodies.
 #[inline(always)]
 fn read<'a, B: Bodies + ?Sized>(
@@ -246,6 +247,7 @@ impl<'a, 'b> Poses<'a, 'b> {
 }
 
 /// The velocity record of a body with its inertia.
+#[inline(always)]
 fn world_velocity(body: &Body, shapes: &[Shape]) -> [Beat; velocity::WORLD_ROWS] {
     let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
     let shape = shape.unwrap_or(&Shape::STATIC);

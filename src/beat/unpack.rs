@@ -262,6 +262,34 @@ mod tests {
         }
     }
 
+    /// So many others stand beside the one that all of a block but it are finite.
+    #[test]
+    fn what_is_not_finite_in_sixteen_bits_is_found_wherever_it_is_and_nothing_else_is() {
+        for poses in [StreamFormat::Binary16, StreamFormat::Thesis16] {
+            let numbers = Numbers { poses, ..HALF.numbers };
+            let layout = Segment::Results.layout(&Variant { numbers, ..HALF.default_variant() });
+            let good = |at: usize, word: u16| {
+                let largest = 0x7BFF_7BFF;
+                // Three records fill six beats of ten: 0 0 1 1 2, 0.
+                let mut beats = [Beat([largest; 4]); 6];
+                let half = &mut bytemuck::cast_slice_mut::<_, u16>(&mut beats)[16 + at];
+                *half = word;
+                let [a, b, c, d, e, f] = beats;
+                let channels = [[a, b, f], [c, d, Beat::default()], [e; 3]];
+                let views = [&channels[0][..], &channels[1][..2], &channels[2][..1]];
+                let mut records = [Record::default(); 3];
+                Reader::new(&layout, &views).read(&mut records)
+            };
+            assert!(good(0, 0x7BFF) && good(0, 0xFBFF));
+            for word in [0x7C00, 0xFC00, 0x7C01, 0x7FFF, 0xFFFF] {
+                for at in 0..16 {
+                    let beside = [3, 11, 15].contains(&at);
+                    assert_eq!(good(at, word), beside, "{poses:?} {word:#x} {at}");
+                }
+            }
+        }
+    }
+
     /// Numbers of a record in the order of its rows.
     fn numbers(pose: Pose, velocity: Velocity) -> Vec<u32> {
         let Velocity { linear, angular } = velocity;

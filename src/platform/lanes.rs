@@ -141,7 +141,7 @@ impl Lanes {
         each_f32!(_mm_mul_ps, vmulq_f32, f32::mul, self, other)
     }
 
-    /// The larger ones of f32 of which none is NaN.
+    /// The larger ones of f32. Beside a NaN it is not said which.
     #[inline(always)]
     pub(crate) fn larger_f32(self, other: Self) -> Self {
         each_f32!(_mm_max_ps, vmaxq_f32, f32::max, self, other)

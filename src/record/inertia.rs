@@ -21,7 +21,7 @@ pub(crate) struct Inverse {
 ///
 /// Source: Bullet 2.87, `b3Matrix3x3::setRotation` and `b3UpdateInvInertiaTensor`, in this order of
 /// operations; interface specification, world inertia.
-#[inline]
+#[inline(always)]
 pub(crate) fn about_world_axes(shape: &Shape, orientation: [f32; 4]) -> Inverse {
     let k = shape.inverse_inertia;
     if shape.is_isotropic() {

@@ -24,7 +24,7 @@ const SMALLEST: u32 = LOWEST << 23;
 const OVERFLOW: u32 = (LOWEST + 31) << 23;
 
 /// The word of a number, given and made as bits.
-#[inline]
+#[inline(always)]
 pub(super) fn narrow(bits: u32) -> u16 {
     // Clamped as integers: the order of magnitudes is that of their bits, and infinity and NaN are
     // beyond all of them.
@@ -39,7 +39,7 @@ pub(super) fn narrow(bits: u32) -> u16 {
 }
 
 /// The number of a word, as the bits of an f32.
-#[inline]
+#[inline(always)]
 pub(super) fn widen(word: u16) -> u32 {
     let word = u32::from(word);
     let sign = (word & 0x8000) << 16;

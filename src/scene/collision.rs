@@ -51,9 +51,9 @@ pub trait Collisions {
         None
     }
 
-    /// Says that collision `index`, which is below [`len`](Self::len), is asked for soon. Where
-    /// collisions are read in an order of their own, a layout that can have it fetched gains by
-    /// that; nothing else comes of it.
+    /// Says that collision `index`, which is below [`len`](Self::len), is asked for soon. A layout that
+    /// can have it fetched gains by that, above all where collisions are read in an order of their own;
+    /// nothing else comes of it.
     fn soon(&self, index: usize) {
         let _ = index;
     }

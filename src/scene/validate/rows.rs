@@ -161,7 +161,7 @@ pub(super) struct Ends<'a> {
 ///
 /// What is longer in any component is no shorter after any of the roundings, so that what is found
 /// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
-/// left out at the end.
+/// left out at the end. What NaN makes of it does not matter: the bound on numbers refuses that.
 #[inline(always)]
 pub(super) fn surely_fit(
     ends: &Ends<'_>,
@@ -187,7 +187,7 @@ pub(super) fn surely_fit(
     }
     // Four of them, and a little for the roundings of their sum.
     let limit =
-        |limit: f32| Lanes::new([limit.to_bits(), limit.to_bits(), limit.to_bits(), u32::MAX >> 1]);
+        |limit: f32| Lanes::new([limit.to_bits(), limit.to_bits(), limit.to_bits(), MAGNITUDE]);
     let beyond = furthest.above(limit(LARGEST / 4.01));
     let beyond =
         longest.map(|arm| arm.above(limit(LONGEST_ARM))).into_iter().fold(beyond, Lanes::or);
