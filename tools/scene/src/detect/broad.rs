@@ -126,8 +126,9 @@ impl Broad {
         {
             self.searches += 1;
         }
+        // Until there are candidates, no bodies are known: a panic leaves nothing half done.
         self.then.clear();
-        self.then.extend_from_slice(bounds);
+        self.candidates.clear();
         self.cells.sort(bounds);
         let (cells, bodies) = (&self.cells, self.cells.len());
         let (count, share) = shares(bodies, crew, SEARCHED_PER_THREAD);
@@ -139,6 +140,7 @@ impl Broad {
         });
         let found = self.found.get(..count).unwrap_or_default();
         sort(found, &mut self.ends, bounds.len(), &mut self.candidates);
+        self.then.extend_from_slice(bounds);
     }
 }
 
