@@ -233,7 +233,7 @@ mod tests {
         bodies
     }
 
-    fn bits(collisions: &[Collision]) -> Vec<u32> {
+    pub(super) fn bits(collisions: &[Collision]) -> Vec<u32> {
         let mut bits = Vec::new();
         for c in collisions {
             bits.extend([c.body_a, c.body_b, c.count]);
