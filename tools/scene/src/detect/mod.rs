@@ -34,6 +34,9 @@ pub const MARGIN: f32 = 0.02;
 /// Fewest bodies to be placed, and fewest candidates, for which a further thread pays.
 const PLACED_PER_THREAD: usize = 4096;
 const PAIRS_PER_THREAD: usize = 4096;
+/// Most threads that are taken unasked: what is left on the calling thread, such as the sorting of
+/// candidates, gives more of them little to do.
+const THREADS_UNASKED: usize = 8;
 /// Fewest bodies for which threads are started.
 const BODIES_FOR_THREADS: usize = 1024;
 
@@ -80,7 +83,8 @@ impl Default for Worker {
 
 impl Default for Detector {
     fn default() -> Self {
-        Self::with_threads(thread::available_parallelism().map_or(1, NonZero::get))
+        let threads = thread::available_parallelism().map_or(1, NonZero::get);
+        Self::with_threads(threads.min(THREADS_UNASKED))
     }
 }
 
