@@ -148,7 +148,7 @@ impl Scene {
     }
 
     /// How many threads may find collisions, the caller's among them; no result depends on it. As long
-    /// as it is not said: as many as the machine has.
+    /// as it is not said: as many as the machine has, up to eight.
     pub fn set_threads(&mut self, threads: usize) {
         self.detector = Detector::with_threads(threads.max(1));
     }

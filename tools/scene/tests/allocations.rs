@@ -71,7 +71,7 @@ fn detect(grid: &str, threads: usize) -> (Vec<usize>, Vec<u64>) {
 
 fn main() {
     for (grid, threads, least) in
-        [("8x8x8", 1, 800), ("20x20x20", 1, 15_000), ("20x20x20", 3, 15_000)]
+        [("8x8x8", 1, 800), ("21x20x21", 1, 15_000), ("21x20x21", 3, 15_000)]
     {
         let (found, counted) = detect(grid, threads);
         assert!(found.iter().all(|found| *found > least), "{grid}: {found:?}");

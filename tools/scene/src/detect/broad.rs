@@ -20,8 +20,8 @@ const WAY: f32 = 100.0;
 
 const _: () = assert!(GAP + SKIN <= GAP_MAX, "candidates are in neighbouring cells");
 
-/// Fewest bodies for which a further thread pays.
-const BODIES_PER_THREAD: usize = 2048;
+/// Fewest bodies to be searched for which a further thread pays.
+const SEARCHED_PER_THREAD: usize = 2048;
 
 /// By how much bodies have moved and grown, along each axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,7 +90,8 @@ pub(super) struct Broad {
     /// Where the candidates of each body end.
     ends: Vec<usize>,
     /// How often bodies were searched.
-    searches: u64,
+    #[cfg(test)]
+    pub(super) searches: u64,
 }
 
 impl Broad {
@@ -121,12 +122,16 @@ impl Broad {
 
     /// Finds the candidates anew.
     fn search(&mut self, bounds: &[Bounds], crew: &mut Crew) {
-        self.searches += 1;
+        #[cfg(test)]
+        {
+            self.searches += 1;
+        }
+        // Until there are candidates, no bodies are known: a panic leaves nothing half done.
         self.then.clear();
-        self.then.extend_from_slice(bounds);
+        self.candidates.clear();
         self.cells.sort(bounds);
         let (cells, bodies) = (&self.cells, self.cells.len());
-        let (count, share) = shares(bodies, crew, BODIES_PER_THREAD);
+        let (count, share) = shares(bodies, crew, SEARCHED_PER_THREAD);
         self.found.resize_with(count.max(self.found.len()), Vec::new);
         let work = (0..).step_by(share).zip(&mut self.found);
         crew.each(work.take(count), |(begin, found)| {
@@ -135,6 +140,7 @@ impl Broad {
         });
         let found = self.found.get(..count).unwrap_or_default();
         sort(found, &mut self.ends, bounds.len(), &mut self.candidates);
+        self.then.extend_from_slice(bounds);
     }
 }
 

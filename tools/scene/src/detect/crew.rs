@@ -162,9 +162,28 @@ impl Drop for Crew {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::{Barrier, mpsc};
+    use std::thread;
+    use std::time::Duration;
 
     use super::*;
+
+    /// Does something that never ends if a thread stays away, which is a failure.
+    fn in_time(work: impl FnOnce() + Send + 'static) {
+        let (done, ended) = mpsc::channel::<()>();
+        let worker = thread::spawn(move || {
+            // Gone on return and on panic.
+            let _done = done;
+            work();
+        });
+        // Miri, which runs one thread at a time, is slow.
+        let limit = Duration::from_secs(if cfg!(miri) { 600 } else { 60 });
+        let ended = ended.recv_timeout(limit);
+        assert_eq!(ended, Err(mpsc::RecvTimeoutError::Disconnected), "a thread stayed away");
+        if let Err(panic) = worker.join() {
+            resume_unwind(panic);
+        }
+    }
 
     #[test]
     fn each_share_is_worked_on_once_and_all_are_done_on_return() {
@@ -181,22 +200,75 @@ mod tests {
     }
 
     #[test]
+    fn every_thread_takes_a_share_while_the_others_are_at_theirs() {
+        in_time(|| {
+            let times = if cfg!(miri) { 5 } else { 100 };
+            for helpers in [0, 1, 3] {
+                let mut crew = Crew::new(helpers);
+                let all = Barrier::new(crew.threads());
+                for _ in 0..times {
+                    let mut shares = vec![None; crew.threads()];
+                    crew.each(shares.iter_mut(), |share| {
+                        all.wait();
+                        *share = Some(thread::current().id());
+                    });
+                    for (number, id) in shares.iter().enumerate() {
+                        assert!(id.is_some() && !shares[..number].contains(id), "{shares:?}");
+                    }
+                }
+            }
+        });
+    }
+
+    /// What a crew's work panicked with, which is the number of a share or of a time.
+    fn panic_of(work: impl FnOnce()) -> usize {
+        let panic = catch_unwind(AssertUnwindSafe(work)).expect_err("a panic");
+        *panic.downcast().expect("a number")
+    }
+
+    #[test]
     fn a_panic_of_a_share_is_the_callers_and_the_crew_works_on() {
         let mut crew = Crew::new(2);
         for culprit in 0..20 {
-            let done = AtomicUsize::new(0);
             let mut shares: Vec<usize> = (0..20).collect();
-            let panic = catch_unwind(AssertUnwindSafe(|| {
+            let panic = panic_of(|| {
                 crew.each(shares.iter_mut(), |share| {
-                    assert_ne!(*share, culprit);
-                    done.fetch_add(1, Ordering::AcqRel);
+                    if *share == culprit {
+                        resume_unwind(Box::new(culprit));
+                    }
                 });
-            }));
-            assert!(panic.is_err(), "{culprit}");
-            assert!(done.into_inner() < 20);
+            });
+            assert_eq!(panic, culprit);
         }
         let mut shares = [1; 20];
         crew.each(shares.iter_mut(), |share| *share = 2);
         assert_eq!(shares, [2; 20]);
+    }
+
+    #[test]
+    fn a_panic_of_a_helper_is_the_callers_at_once_and_never_again() {
+        in_time(|| {
+            let mut crew = Crew::new(2);
+            let all = Barrier::new(crew.threads());
+            // Either helper, then all threads: of those the caller has a panic of its own.
+            let culprits = [Some("scene 1"), Some("scene 2"), None];
+            for (time, culprit) in culprits.into_iter().cycle().enumerate().take(12) {
+                let mut shares = [0; 3];
+                let panic = panic_of(|| {
+                    crew.each(shares.iter_mut(), |share| {
+                        all.wait();
+                        if culprit.is_none() || thread::current().name() == culprit {
+                            resume_unwind(Box::new(time));
+                        }
+                        *share = 1;
+                    });
+                });
+                assert_eq!(panic, time);
+                let done: usize = shares.iter().sum();
+                assert_eq!(done, if culprit.is_some() { 2 } else { 0 });
+                crew.each(shares.iter_mut(), |share| *share = 2);
+                assert_eq!(shares, [2; 3]);
+            }
+        });
     }
 }

@@ -32,8 +32,11 @@ use crate::Geometry;
 pub const MARGIN: f32 = 0.02;
 
 /// Fewest bodies to be placed, and fewest candidates, for which a further thread pays.
-const BODIES_PER_THREAD: usize = 4096;
+const PLACED_PER_THREAD: usize = 4096;
 const PAIRS_PER_THREAD: usize = 4096;
+/// Most threads that are taken unasked: what is left on the calling thread, such as the sorting of
+/// candidates, gives more of them little to do.
+const THREADS_UNASKED: usize = 8;
 /// Fewest bodies for which threads are started.
 const BODIES_FOR_THREADS: usize = 1024;
 
@@ -80,7 +83,8 @@ impl Default for Worker {
 
 impl Default for Detector {
     fn default() -> Self {
-        Self::with_threads(thread::available_parallelism().map_or(1, NonZero::get))
+        let threads = thread::available_parallelism().map_or(1, NonZero::get);
+        Self::with_threads(threads.min(THREADS_UNASKED))
     }
 }
 
@@ -144,7 +148,7 @@ impl Detector {
         let Self { crew, bounds, broad, workers, .. } = self;
         bounds.resize(bodies.len(), Bounds::NONE);
         let then = broad.then(bodies.len());
-        let (count, share) = shares(bodies.len(), crew, BODIES_PER_THREAD);
+        let (count, share) = shares(bodies.len(), crew, PLACED_PER_THREAD);
         for worker in &mut *workers {
             worker.drift = Drift::NONE;
             worker.ground.clear();
@@ -233,7 +237,7 @@ mod tests {
         bodies
     }
 
-    fn bits(collisions: &[Collision]) -> Vec<u32> {
+    pub(super) fn bits(collisions: &[Collision]) -> Vec<u32> {
         let mut bits = Vec::new();
         for c in collisions {
             bits.extend([c.body_a, c.body_b, c.count]);
@@ -286,6 +290,64 @@ mod tests {
                 detector.detect(&bodies[..cubes], CUBES, &mut found);
             }
             assert_eq!(bits(&found), expected, "{threads} threads");
+        }
+    }
+
+    /// Cubes by twos, half of them on the ground: no cube touches another, some of the partners are near
+    /// enough to be candidates, and all others are far.
+    fn couples(count: u16) -> Vec<Body> {
+        let mut bodies = heap(0);
+        for couple in 0..count {
+            let (x, z) = (8.0 * f32::from(couple % 80), 8.0 * f32::from(couple / 80));
+            let y = if couple % 2 == 0 { 1.0 } else { 1.1 };
+            let way = if couple % 4 < 2 { 2.1 } else { 2.6 };
+            for x in [x, x + way] {
+                bodies.push(Body {
+                    pose: Pose { position: [x, y, z], orientation: [0.0, 0.0, 0.0, 1.0] },
+                    velocity: Velocity::default(),
+                    shape: 1,
+                });
+            }
+        }
+        bodies
+    }
+
+    #[test]
+    fn what_moves_in_one_share_alone_is_found_in_kept_candidates_and_anew() {
+        let start = couples(6300);
+        // Of two and of three shares these are in the last.
+        let moved = start.len() - 4000..start.len();
+        // Where they are in each step: nearer to their partners by less than candidates are kept for,
+        // then by more, which those meet that were none; on the ground and off it.
+        let ways =
+            [[0.0, 0.0], [-0.15, 0.0], [-0.15, -0.1], [-0.65, -0.1], [-0.6, 0.1], [0.0, 0.0]];
+        let steps = ways.map(|[x, y]| {
+            let mut bodies = start.clone();
+            for body in bodies[moved.clone()].iter_mut().skip(1).step_by(2) {
+                body.pose.position[0] += x;
+                body.pose.position[1] += y;
+            }
+            let mut found = Vec::new();
+            Detector::with_threads(1).detect(&bodies, CUBES, &mut found);
+            (bodies, crate::ground_pairs(&found), bits(&found))
+        });
+        assert!(steps.windows(2).all(|two| two[0].2 != two[1].2), "a step without a change");
+
+        for threads in [1, 2, 3, 7] {
+            let mut detector = Detector::with_threads(threads);
+            let mut found = Vec::new();
+            for (step, (bodies, grounded, expected)) in steps.iter().enumerate() {
+                detector.detect(bodies, CUBES, &mut found);
+                assert_eq!(
+                    crate::ground_pairs(&found),
+                    *grounded,
+                    "{threads} threads, step {step}"
+                );
+                assert!(bits(&found) == *expected, "{threads} threads, step {step}");
+            }
+            let (count, _) = shares(start.len(), &detector.crew, PLACED_PER_THREAD);
+            assert_eq!(count, threads.min(3));
+            assert_eq!(detector.broad.searches, 3, "{threads} threads");
         }
     }
 

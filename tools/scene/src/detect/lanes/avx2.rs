@@ -1,5 +1,7 @@
 //! This file is the eight lanes of AVX2.
 
+#![allow(unsafe_code, reason = "instructions beyond those of the target are asked for")]
+
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -4,8 +4,6 @@
 //! Numbers are made of numbers, and the first ones by a value of a [`Lanes`] type, which there is only
 //! where the processor has its instructions.
 
-#![allow(unsafe_code, reason = "instructions beyond those of the target are asked for")]
-
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod portable;

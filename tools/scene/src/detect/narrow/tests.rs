@@ -5,6 +5,8 @@
 use zynq_pgs::{Contact, Pose, Velocity};
 
 use super::super::MARGIN;
+use super::super::lanes::Portable;
+use super::super::tests::bits;
 use super::*;
 use crate::Geometry;
 use crate::random::SplitMix64;
@@ -15,6 +17,20 @@ fn cube(position: [f32; 3], orientation: [f32; 4]) -> Body {
     Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
 }
 
+/// The collisions of pairs, which the lanes that every processor has find with the same bits.
+fn all(
+    narrow: &mut Narrow,
+    bodies: &[Body],
+    geometries: Geometries<'_>,
+    pairs: impl Iterator<Item = (u32, u32)> + Clone,
+) -> Vec<Collision> {
+    let (mut found, mut portable) = (Vec::new(), Vec::new());
+    narrow.collide(bodies, geometries, pairs.clone(), &mut found);
+    Portable.run(Collide { narrow, bodies, geometries, pairs, found: &mut portable });
+    assert_eq!(bits(&found), bits(&portable));
+    found
+}
+
 /// The collision of one pair.
 fn one(
     narrow: &mut Narrow,
@@ -22,8 +38,7 @@ fn one(
     geometries: Geometries<'_>,
     pair: (u32, u32),
 ) -> Option<Collision> {
-    let mut found = Vec::new();
-    narrow.collide(bodies, geometries, std::iter::once(pair), &mut found);
+    let mut found = all(narrow, bodies, geometries, std::iter::once(pair));
     assert!(found.len() < 2, "{found:?}");
     found.pop()
 }
@@ -228,7 +243,6 @@ fn capsules_and_spheres_touch_where_they_are_nearest() {
 
 #[test]
 fn pairs_of_all_kinds_side_by_side_are_as_each_alone() {
-    let outlines = [Some(Geometry::CUBE), Some(SPHERE), None, Some(CAPSULE)];
     let mut random = SplitMix64::new(3);
     let mut bodies = Vec::new();
     for shape in (0..4).cycle().take(200) {
@@ -239,12 +253,13 @@ fn pairs_of_all_kinds_side_by_side_are_as_each_alone() {
     }
     bodies[7].pose.position[1] = f32::NAN;
     let pairs = || (0..200).flat_map(|a| (a + 1..a + 9).map(move |b| (a, b)));
-    let (mut all, mut single, mut narrow) = (Vec::new(), Vec::new(), Narrow::default());
-    narrow.collide(&bodies, Geometries(&outlines), pairs(), &mut all);
-    for pair in pairs() {
+    let kinds = [Some(Geometry::CUBE), Some(SPHERE), None, Some(CAPSULE)];
+    for outlines in [kinds, [Some(Geometry::CUBE); 4]] {
+        let (geometries, mut narrow) = (Geometries(&outlines), Narrow::default());
+        let found = all(&mut narrow, &bodies, geometries, pairs());
         // The last ones have no such body.
-        single.extend(one(&mut narrow, &bodies, Geometries(&outlines), pair));
+        let single = pairs().filter_map(|pair| one(&mut narrow, &bodies, geometries, pair));
+        assert!(found.len() > 100, "{}", found.len());
+        assert_eq!(bits(&found), bits(&single.collect::<Vec<_>>()));
     }
-    assert!(all.len() > 100, "{}", all.len());
-    assert_eq!(all, single);
 }
