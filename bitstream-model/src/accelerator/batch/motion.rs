@@ -294,6 +294,33 @@ mod tests {
         }
     }
 
+    /// A vector of such numbers.
+    fn vector(seed: &mut u64) -> [f32; 3] {
+        std::array::from_fn(|_| number(seed))
+    }
+
+    /// The shape and the velocity of each body.
+    fn moving(bodies: usize) -> (Vec<u8>, Vec<Velocity>) {
+        let mut seed = 3;
+        let shape_of = (0..bodies).map(|body| [2, 2, 0, 2, 1, 3][body % 6]).collect();
+        let velocities = (0..bodies)
+            .map(|_| Velocity { linear: vector(&mut seed), angular: vector(&mut seed) })
+            .collect();
+        (shape_of, velocities)
+    }
+
+    /// How many of the bodies of shape 2 turn too fast in one step, and how many do not.
+    fn fast(integration: &Integration, bodies: Range<usize>) -> [usize; 2] {
+        let (shape_of, velocities) = moving(bodies.end);
+        let mut counts = [0; 2];
+        for body in bodies.filter(|body| shape_of[*body] == 2) {
+            let [x, y, z] = velocities[body].angular.map(|w| w * integration.angular_damping);
+            let angle = (x * x + y * y + z * z).sqrt() * integration.time_step;
+            counts[usize::from(angle <= ROTATION_LIMIT)] += 1;
+        }
+        counts
+    }
+
     /// The results of bodies from `first` on, of poses that begin with body `from`.
     fn results(
         width: Width,
@@ -305,10 +332,7 @@ mod tests {
         let bodies = first + count;
         let masses =
             [0.0, -0.0, 2.0, f32::NAN].map(|inverse_mass| Mass { inverse_mass, ..Mass::default() });
-        let shape_of: Vec<u8> = (0..bodies).map(|body| [2, 2, 0, 2, 1, 3][body % 6]).collect();
-        let mut vector = || std::array::from_fn(|_| number(&mut seed));
-        let velocities: Vec<Velocity> =
-            (0..bodies).map(|_| Velocity { linear: vector(), angular: vector() }).collect();
+        let (shape_of, velocities) = moving(bodies);
         let mut poses = [const { Vec::new() }; 4];
         for body in 0..bodies {
             for row in 0..2 {
@@ -331,17 +355,32 @@ mod tests {
 
     #[test]
     fn bodies_side_by_side_move_as_one_by_one() {
-        let integration =
+        let slow =
             Integration { time_step: 1.0 / 60.0, angular_damping: 0.99, gravity: [0.0, -9.8, 0.1] };
-        let parts =
-            [(0, 0, 1600), (1, 1, 70), (3, 4, 100), (2, 2, 32), (5, 5, 33), (0, 1, 1), (1, 2, 0)];
+        // A step so long that many bodies turn further than a step may turn them.
+        let long = Integration { time_step: 0.5, ..slow };
+        // Parts of one chunk and of several, from even and odd bodies on.
+        let parts = [
+            (0, 0, 1600),
+            (3, 5, 1300),
+            (1, 1, 70),
+            (3, 4, 100),
+            (2, 2, 32),
+            (5, 5, 33),
+            (0, 1, 1),
+            (1, 2, 0),
+        ];
+        for (from, first, count) in parts.into_iter().filter(|(.., count)| *count > 1) {
+            let bodies = first..first + count;
+            assert!(fast(&long, bodies).into_iter().all(|some| some > 0), "{from} {first} {count}");
+        }
         for part in parts {
-            for integration in [Some(&integration), None] {
+            for integration in [Some(&slow), Some(&long), None] {
                 let expected = results(Width::One, 1, part, integration);
                 for width in Width::all() {
                     for threads in [1, 3] {
                         let found = results(width, threads, part, integration);
-                        assert_eq!(found, expected, "{width:?} {part:?}");
+                        assert_eq!(found, expected, "{width:?} {part:?} {integration:?}");
                     }
                 }
             }
