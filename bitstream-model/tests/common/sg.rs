@@ -63,6 +63,11 @@ impl Flight {
         self.inputs.push(address);
     }
 
+    /// The result buffer of each channel.
+    pub(crate) fn outputs(&self) -> &[u64] {
+        &self.outputs
+    }
+
     pub(crate) fn is_without_results(&self) -> bool {
         self.outputs.is_empty()
     }
