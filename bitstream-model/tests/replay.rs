@@ -495,7 +495,8 @@ fn a_buffer_of_bodies_that_is_gone_or_shorter_is_noticed() {
                 let address = moment.buffer(&flight, &addresses);
                 let beats = machine.host.take(address);
                 if !gone {
-                    let (granted, port) = (beats.len() - 100, &machine.host.port);
+                    // More are missing than a FIFO holds.
+                    let (granted, port) = (beats.len() - 700, &machine.host.port);
                     port.hand_over_first(address, beats, granted, moment.access())
                         .expect("the CPU owns it");
                 }
