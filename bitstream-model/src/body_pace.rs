@@ -1,7 +1,7 @@
 //! This file counts beats instead of moving them while nothing but bodies flows, to be loaded or to be
 //! integrated: `pace.rs` for what comes and goes once in a step.
 
-use crate::accelerator::striping::STREAMS_MAX;
+use crate::accelerator::striping::beats_of_bodies;
 use crate::board::STARVED_CYCLES;
 use crate::pace::{PerEngine, Rules};
 
@@ -55,13 +55,6 @@ pub(crate) struct BodyPace {
     pub(crate) flowed: BodyFlowed,
 }
 
-/// How many of the first `beats` bodies' beats each stream carries: two of a body on streams 0 and 1, of
-/// the next one on 2 and 3.
-pub(crate) fn beats_of(bodies: usize) -> [usize; STREAMS_MAX] {
-    let (even, odd) = (bodies.div_ceil(2), bodies / 2);
-    [even, even, odd, odd]
-}
-
 impl BodyPace {
     /// Goes on for whole slices, as far as no limit can be reached.
     pub(crate) fn run(&mut self) {
@@ -94,7 +87,8 @@ impl BodyPace {
             flowed.waits += STARVED_CYCLES;
             STARVED_CYCLES
         } else {
-            let (before, after) = (beats_of(standing.body), beats_of(standing.body + there));
+            let (before, after) =
+                (beats_of_bodies(standing.body), beats_of_bodies(standing.body + there));
             standing.body += there;
             for ((held, before), after) in
                 standing.held.iter_mut().step_by(2).zip(before).zip(after)

@@ -1,11 +1,11 @@
 //! This file lets a long stretch of time pass in which nothing but collisions flows, or bodies: it is
 //! counted in `pace.rs` or `body_pace.rs`, and then has happened.
 
-use crate::accelerator::striping::STREAMS_MAX;
+use crate::accelerator::striping::{STREAMS_MAX, beats_of_bodies};
 use crate::accelerator::{Coming, SHARE};
 use crate::axi_dma::Direction;
 use crate::board::{BURST_BEATS, Board};
-use crate::body_pace::{BodyFlowed, BodyLimits, BodyPace, BodyPhase, BodyStanding, beats_of};
+use crate::body_pace::{BodyFlowed, BodyLimits, BodyPace, BodyPhase, BodyStanding};
 use crate::config::Bandwidth;
 use crate::interface::record::BEAT_BYTES;
 use crate::memory::Source;
@@ -118,7 +118,7 @@ impl Board {
             return;
         }
         let first = pace.standing.body - records;
-        let (before, after) = (beats_of(first), beats_of(first + records));
+        let (before, after) = (beats_of_bodies(first), beats_of_bodies(first + records));
         let mut reads = sources;
         let mut writes = [(0, 0); STREAMS_MAX];
         for (k, core) in self.cores.iter().enumerate() {

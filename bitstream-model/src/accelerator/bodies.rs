@@ -12,9 +12,9 @@ use super::replay::Replay;
 use super::results::Results;
 use super::segment::{PacketError, Segment};
 use super::solver::{Mass, Velocity};
-use super::striping::STREAMS_MAX;
+use super::striping::{STREAMS_MAX, beats_of_bodies};
 use super::{Accelerator, Phase};
-use crate::body_pace::{BodyPace, BodyPhase, beats_of};
+use crate::body_pace::{BodyPace, BodyPhase};
 use crate::cast::register;
 use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
@@ -38,7 +38,7 @@ pub(super) struct BodyRows<'a> {
 impl BodyRows<'_> {
     /// The rows of a body.
     pub(super) fn of(&self, body: usize) -> [Row; 2] {
-        let before = beats_of(self.first);
+        let before = beats_of_bodies(self.first);
         let stream = 2 * (body % 2);
         [stream, stream + 1].map(|k| self.views[k][body / 2 - before[k]].0)
     }
@@ -52,7 +52,7 @@ impl BodyRows<'_> {
         velocities: &mut [Velocity],
         shape_of: &mut [u8],
     ) -> (u32, Option<usize>) {
-        let before = beats_of(self.first);
+        let before = beats_of_bodies(self.first);
         let (mut sum, mut wrong) = ([0_u32; LANES], None);
         for begin in [first, first + 1] {
             let k = 2 * (begin % 2);
@@ -188,7 +188,7 @@ impl Accelerator {
         // The last two end packets.
         let mut records = segment.left().saturating_sub(1);
         if load {
-            let before = beats_of(first);
+            let before = beats_of_bodies(first);
             // Two a cycle, if there are that many.
             let most = usize::try_from(cycles).unwrap_or(usize::MAX).saturating_mul(2);
             records = records.min(most.saturating_add(1));

@@ -13,12 +13,12 @@ use super::super::bodies::BodyRows;
 use super::super::decode;
 use super::super::integrate::{Integration, integrate};
 use super::super::number::Single;
+use super::super::striping::beats_of_bodies;
 use super::Batch;
 use super::block::{LANES, ROWS_APART, Words};
 use super::front::Line;
 use super::lanes::{Lanes, Mask, Numbers, Quad, Work};
 use super::width::Width;
-use crate::body_pace::beats_of;
 use crate::interface::number::StreamFormat;
 use crate::interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
 use crate::interface::record::Beat;
@@ -82,7 +82,7 @@ impl Bodies<'_> {
         sums: &'a mut [u32; 2],
     ) -> Groups<'a> {
         let pairs = bodies.start / 2..bodies.end / 2;
-        let before = beats_of(self.poses.first);
+        let before = beats_of_bodies(self.poses.first);
         let poses = std::array::from_fn(|k| {
             let view = &self.poses.views[k];
             bytemuck::cast_slice(&view[pairs.start - before[k]..pairs.end - before[k]])
