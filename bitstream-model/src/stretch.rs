@@ -90,23 +90,30 @@ impl Board {
         })
     }
 
-    fn rules(&self, interval_max: u64) -> Rules {
+    /// MM2S and S2MM of each core.
+    fn engines(&self) -> usize {
+        2 * self.cores.len()
+    }
+
+    fn supply(&self) -> Option<Supply> {
         let beat_cost = BEAT_BYTES as u64 * u64::from(self.config.profile.clock_khz);
-        let engines = 2 * self.cores.len();
-        let supply = match self.config.bandwidth {
+        match self.config.bandwidth {
             Bandwidth::Unlimited => None,
             Bandwidth::BytesPerSecond(bytes) => {
-                let reserve = BURST_BEATS * engines as u64 * beat_cost;
+                let reserve = BURST_BEATS * self.engines() as u64 * beat_cost;
                 Some(Supply { income: bytes / 1000, beat_cost, reserve })
             }
-        };
+        }
+    }
+
+    fn rules(&self, interval_max: u64) -> Rules {
         Rules {
             share: SHARE,
             depth: self.config.delays.fifo_beats,
-            engines,
+            engines: self.engines(),
             interval: self.config.profile.initiation_interval.into(),
             interval_max,
-            supply,
+            supply: self.supply(),
         }
     }
 
@@ -182,7 +189,9 @@ impl Board {
         }
         let pace = BodyPace {
             phase,
-            rules: self.rules(0),
+            depth: self.config.delays.fifo_beats,
+            engines: self.engines(),
+            supply: self.supply(),
             limits: BodyLimits { cycles, records, beats: left },
             standing,
             flowed: BodyFlowed::default(),
