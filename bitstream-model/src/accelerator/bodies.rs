@@ -16,6 +16,7 @@ use super::striping::{STREAMS_MAX, beats_of_bodies};
 use super::{Accelerator, Phase};
 use crate::body_pace::{BodyPace, BodyPhase};
 use crate::cast::register;
+use crate::config::SHAPES_MAX;
 use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::{Beat, LANES, WORD_LANE, velocity};
@@ -27,6 +28,9 @@ pub(super) type Views<'a> = [&'a [Beat]; STREAMS_MAX];
 
 /// Bodies that a thread loads at once.
 const TOGETHER: usize = 2048;
+
+// Whatever shape the table has fits, so that a body is refused only if `bodies_known` has found it.
+const _: () = assert!(SHAPES_MAX <= 1 << u8::BITS);
 
 /// Two rows of each of some bodies, of which the views begin with body `first`.
 #[derive(Debug, Clone, Copy)]
