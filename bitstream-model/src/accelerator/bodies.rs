@@ -27,7 +27,7 @@ use crate::stream::Stream;
 pub(super) type Views<'a> = [&'a [Beat]; STREAMS_MAX];
 
 /// Bodies that a thread loads at once.
-const TOGETHER: usize = 2048;
+const LOADED_TOGETHER: usize = 2048;
 
 // Whatever shape the table has fits, so that a body is refused only if `bodies_known` has found it.
 const _: () = assert!(SHAPES_MAX <= 1 << u8::BITS);
@@ -117,10 +117,10 @@ impl Accelerator {
         let bodies = segment.done..segment.done + records;
         let rows = BodyRows { views, first: segment.done };
         let Replay { batch, masses, .. } = &mut self.replay;
-        let velocities = self.velocities[bodies.clone()].chunks_mut(TOGETHER);
-        let shapes = self.shape_of[bodies.clone()].chunks_mut(TOGETHER);
+        let velocities = self.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
+        let shapes = self.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
         let (sum, wrong) = (AtomicU32::new(0), AtomicUsize::new(usize::MAX));
-        let parts = bodies.step_by(TOGETHER).zip(velocities.zip(shapes));
+        let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes));
         batch.share(parts, |(first, (velocities, shapes))| {
             let (of_part, wrong_body) = rows.load(first, masses, velocities, shapes);
             sum.fetch_add(of_part, Ordering::Relaxed);

@@ -24,12 +24,12 @@ use crate::interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TER
 use crate::interface::record::Beat;
 
 /// Bodies that a thread integrates at once.
-const TOGETHER: usize = 512;
+const INTEGRATED_TOGETHER: usize = 512;
 /// Bodies of which those of even and those of odd numbers fill the widest lanes.
 const GROUP: usize = 2 * LANES;
 
 /// Room for results, on each stream.
-pub(in super::super) type Places<'a> = [&'a mut [Beat]; 4];
+pub(in super::super) type ResultPlaces<'a> = [&'a mut [Beat]; 4];
 
 fn added(rows: &[Row]) -> u32 {
     rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
@@ -46,7 +46,7 @@ struct Bodies<'a> {
 }
 
 /// Takes room for so many results.
-fn take<'a>(places: &mut Places<'a>, count: usize) -> Places<'a> {
+fn take<'a>(places: &mut ResultPlaces<'a>, count: usize) -> ResultPlaces<'a> {
     places.each_mut().map(|place| {
         let (taken, rest) = mem::take(place).split_at_mut(count);
         *place = rest;
@@ -56,7 +56,7 @@ fn take<'a>(places: &mut Places<'a>, count: usize) -> Places<'a> {
 
 impl Bodies<'_> {
     /// The results of bodies; the sums of the words of their poses and of their results.
-    fn results(&self, bodies: Range<usize>, mut places: Places<'_>) -> [u32; 2] {
+    fn results(&self, bodies: Range<usize>, mut places: ResultPlaces<'_>) -> [u32; 2] {
         let mut sums = [0; 2];
         let Range { start, end } = bodies;
         let mut last = start;
@@ -78,7 +78,7 @@ impl Bodies<'_> {
         &'a self,
         integration: &'a Integration,
         bodies: Range<usize>,
-        places: Places<'a>,
+        places: ResultPlaces<'a>,
         sums: &'a mut [u32; 2],
     ) -> Groups<'a> {
         let pairs = bodies.start / 2..bodies.end / 2;
@@ -93,7 +93,7 @@ impl Bodies<'_> {
     }
 
     /// The same, one body after the other.
-    fn one_by_one(&self, bodies: Range<usize>, places: Places<'_>, sums: &mut [u32; 2]) {
+    fn one_by_one(&self, bodies: Range<usize>, places: ResultPlaces<'_>, sums: &mut [u32; 2]) {
         let [positions, orientations, linears, angulars] = places;
         let places = positions.iter_mut().zip(orientations).zip(linears.iter_mut().zip(angulars));
         for (body, ((position, orientation), (linear, angular))) in bodies.zip(places) {
@@ -256,7 +256,7 @@ impl Batch {
         integration: Option<&Integration>,
         first: usize,
         poses: BodyRows<'_>,
-        places: Places<'_>,
+        places: ResultPlaces<'_>,
     ) -> [u32; 2] {
         let bodies = Bodies {
             integration,
@@ -266,8 +266,8 @@ impl Batch {
         };
         let end = first + places[0].len();
         let sums = [const { AtomicU32::new(0) }; 2];
-        let [a, b, c, d] = places.map(|place| place.chunks_mut(TOGETHER));
-        let parts = (first..end).step_by(TOGETHER).zip(a.zip(b).zip(c.zip(d)));
+        let [a, b, c, d] = places.map(|place| place.chunks_mut(INTEGRATED_TOGETHER));
+        let parts = (first..end).step_by(INTEGRATED_TOGETHER).zip(a.zip(b).zip(c.zip(d)));
         self.pool.share(parts, |(first, ((a, b), (c, d)))| {
             let found = bodies.results(first..first + a.len(), [a, b, c, d]);
             for (sum, found) in sums.iter().zip(found) {
