@@ -63,6 +63,11 @@ impl Flight {
         self.inputs.push(address);
     }
 
+    /// The buffers with input, those of one stream after those of another.
+    pub(crate) fn inputs(&self) -> &[u64] {
+        &self.inputs
+    }
+
     /// The result buffer of each channel.
     pub(crate) fn outputs(&self) -> &[u64] {
         &self.outputs
