@@ -1,9 +1,9 @@
 //! This file counts beats instead of moving them while nothing but bodies flows, to be loaded or to be
 //! integrated: `pace.rs` for what comes and goes once in a step.
 
-use crate::accelerator::striping::STREAMS_MAX;
+use crate::accelerator::striping::beats_of_bodies;
 use crate::board::STARVED_CYCLES;
-use crate::pace::{PerEngine, Rules};
+use crate::pace::{PerEngine, Supply};
 
 /// What happens to the bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,17 +49,15 @@ pub(crate) struct BodyStanding {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyPace {
     pub(crate) phase: BodyPhase,
-    pub(crate) rules: Rules,
+    /// Beats that a FIFO holds.
+    pub(crate) depth: usize,
+    /// Engines that have their turns: MM2S and S2MM of each core.
+    pub(crate) engines: usize,
+    /// Nothing, where the bandwidth has no limit.
+    pub(crate) supply: Option<Supply>,
     pub(crate) limits: BodyLimits,
     pub(crate) standing: BodyStanding,
     pub(crate) flowed: BodyFlowed,
-}
-
-/// How many of the first `beats` bodies' beats each stream carries: two of a body on streams 0 and 1, of
-/// the next one on 2 and 3.
-pub(crate) fn beats_of(bodies: usize) -> [usize; STREAMS_MAX] {
-    let (even, odd) = (bodies.div_ceil(2), bodies / 2);
-    [even, even, odd, odd]
 }
 
 impl BodyPace {
@@ -78,23 +76,22 @@ impl BodyPace {
         let there = if next <= other { 2 * next } else { 2 * other + 1 };
         match self.phase {
             BodyPhase::Load => there,
-            BodyPhase::Integrate => {
-                there.min(self.rules.depth - to_a.max(to_b).max(to_c).max(to_d))
-            }
+            BodyPhase::Integrate => there.min(self.depth - to_a.max(to_b).max(to_c).max(to_d)),
         }
     }
 
     /// What a slice leaves behind: the accelerator works on what is there, then the engines go on for as
     /// long as that took. Nothing if a limit could be reached in it, or nothing happens.
     fn slice(&self) -> Option<(BodyStanding, BodyFlowed)> {
-        let (Rules { depth, engines, supply, .. }, limits) = (&self.rules, &self.limits);
+        let Self { depth, engines, supply, limits, .. } = self;
         let (mut standing, mut flowed) = (self.standing, self.flowed);
         let there = self.there();
         let slice = if there == 0 {
             flowed.waits += STARVED_CYCLES;
             STARVED_CYCLES
         } else {
-            let (before, after) = (beats_of(standing.body), beats_of(standing.body + there));
+            let (before, after) =
+                (beats_of_bodies(standing.body), beats_of_bodies(standing.body + there));
             standing.body += there;
             for ((held, before), after) in
                 standing.held.iter_mut().step_by(2).zip(before).zip(after)

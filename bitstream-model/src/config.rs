@@ -90,7 +90,7 @@ pub(crate) fn cycles_of(ns: u64, clock_khz: u32) -> u64 {
 /// Copies, clocks and collisions of an issue that a profile may have.
 const SIZE_MAX: u32 = 16;
 /// Shapes that the control block has room for.
-const SHAPES_MAX: u32 = (CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE;
+pub(crate) const SHAPES_MAX: u32 = (CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE;
 /// 32-bit words of a beat.
 const BEAT_WORDS: u32 = 4;
 

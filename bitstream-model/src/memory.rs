@@ -118,6 +118,14 @@ struct Region {
 /// Ranges are kept apart by this much, so that running off an end meets nothing.
 const GUARD: u64 = 4096;
 
+/// Which beats of a buffer `count` of them are, from that offset in bytes on, if they are among the
+/// first `granted`.
+fn part(beats: &[Beat], granted: usize, offset: u64, count: usize) -> Option<Range<usize>> {
+    let first = index(offset / BEAT_BYTES as u64);
+    let end = first + count;
+    (end <= beats.len().min(granted)).then_some(first..end)
+}
+
 /// Physical memory.
 #[derive(Debug)]
 pub(crate) struct Memory {
@@ -344,10 +352,8 @@ impl Memory {
             Content::Words(_) => Err(Denied::Kind),
             Content::Device(_, DeviceAccess::Write, _) => Err(Denied::Direction),
             Content::Device(beats, DeviceAccess::Read, granted) => {
-                let first = index(offset / BEAT_BYTES as u64);
-                let beats = beats.get(..*granted).unwrap_or(beats);
-                let beats = beats.get(first..first + count).ok_or(Denied::PastEnd)?;
-                Ok((region, beats))
+                let part = part(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
+                Ok((region, &beats[part]))
             }
         }
     }
@@ -359,9 +365,8 @@ impl Memory {
             Content::Words(_) => Err(Denied::Kind),
             Content::Device(_, DeviceAccess::Read, _) => Err(Denied::Direction),
             Content::Device(beats, DeviceAccess::Write, granted) => {
-                let first = index(offset / BEAT_BYTES as u64);
-                let end = beats.len().min(*granted);
-                beats[..end].get_mut(first..first + count).ok_or(Denied::PastEnd)
+                let part = part(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
+                Ok(&mut beats[part])
             }
         }
     }
@@ -374,7 +379,7 @@ impl Memory {
         let Content::Device(beats, DeviceAccess::Write, granted) = &region.content else {
             return false;
         };
-        index(offset / BEAT_BYTES as u64) + count <= beats.len().min(*granted)
+        part(beats, *granted, offset, count).is_some()
     }
 
     /// Whether the device may write those beats.

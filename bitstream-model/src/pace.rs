@@ -58,7 +58,7 @@ pub(crate) struct Rules {
     pub(crate) share: [usize; STREAMS_MAX],
     /// Beats that a FIFO holds.
     pub(crate) depth: usize,
-    /// Engines that have their turns: two for each core, of which the first one flows.
+    /// Engines that have their turns: two for each core, of which only the MM2S flows.
     pub(crate) engines: usize,
     /// Cycles from one collision to the next, unless it waits for its bodies, and then at most.
     pub(crate) interval: u64,

@@ -1,11 +1,11 @@
 //! This file lets a long stretch of time pass in which nothing but collisions flows, or bodies: it is
 //! counted in `pace.rs` or `body_pace.rs`, and then has happened.
 
-use crate::accelerator::striping::STREAMS_MAX;
+use crate::accelerator::striping::{STREAMS_MAX, beats_of_bodies};
 use crate::accelerator::{Coming, SHARE};
 use crate::axi_dma::Direction;
 use crate::board::{BURST_BEATS, Board};
-use crate::body_pace::{BodyFlowed, BodyLimits, BodyPace, BodyPhase, BodyStanding, beats_of};
+use crate::body_pace::{BodyFlowed, BodyLimits, BodyPace, BodyPhase, BodyStanding};
 use crate::config::Bandwidth;
 use crate::interface::record::BEAT_BYTES;
 use crate::memory::Source;
@@ -90,23 +90,30 @@ impl Board {
         })
     }
 
-    fn rules(&self, interval_max: u64) -> Rules {
+    /// MM2S and S2MM of each core.
+    fn engines(&self) -> usize {
+        2 * self.cores.len()
+    }
+
+    fn supply(&self) -> Option<Supply> {
         let beat_cost = BEAT_BYTES as u64 * u64::from(self.config.profile.clock_khz);
-        let engines = 2 * self.cores.len();
-        let supply = match self.config.bandwidth {
+        match self.config.bandwidth {
             Bandwidth::Unlimited => None,
             Bandwidth::BytesPerSecond(bytes) => {
-                let reserve = BURST_BEATS * engines as u64 * beat_cost;
+                let reserve = BURST_BEATS * self.engines() as u64 * beat_cost;
                 Some(Supply { income: bytes / 1000, beat_cost, reserve })
             }
-        };
+        }
+    }
+
+    fn rules(&self, interval_max: u64) -> Rules {
         Rules {
             share: SHARE,
             depth: self.config.delays.fifo_beats,
-            engines,
+            engines: self.engines(),
             interval: self.config.profile.initiation_interval.into(),
             interval_max,
-            supply,
+            supply: self.supply(),
         }
     }
 
@@ -118,7 +125,7 @@ impl Board {
             return;
         }
         let first = pace.standing.body - records;
-        let (before, after) = (beats_of(first), beats_of(first + records));
+        let (before, after) = (beats_of_bodies(first), beats_of_bodies(first + records));
         let mut reads = sources;
         let mut writes = [(0, 0); STREAMS_MAX];
         for (k, core) in self.cores.iter().enumerate() {
@@ -182,7 +189,9 @@ impl Board {
         }
         let pace = BodyPace {
             phase,
-            rules: self.rules(0),
+            depth: self.config.delays.fifo_beats,
+            engines: self.engines(),
+            supply: self.supply(),
             limits: BodyLimits { cycles, records, beats: left },
             standing,
             flowed: BodyFlowed::default(),

@@ -6,8 +6,8 @@ mod common;
 use bitstream_model::interface::control;
 use bitstream_model::interface::record::Beat;
 use bitstream_model::{
-    Bandwidth, BoardConfig, Counts, Delays, DeviceAccess, FaultPlan, PacketCount, RegisterAccess,
-    ViolationKind,
+    Bandwidth, BoardConfig, Counts, Delays, DeviceAccess, Direction, FaultPlan, PacketCount,
+    RegisterAccess, ViolationKind,
 };
 use proptest::prelude::*;
 
@@ -231,7 +231,7 @@ proptest! {
         }
         let config = BoardConfig { length_width: config.length_width.max(14), ..config };
         same(config, None, 2, |machine| {
-            let (flight, _) = begin(machine, &step, |_, _, _| {});
+            let flight = begin_once(machine, &step);
             for nanoseconds in &pauses {
                 machine.host.port.pause(std::time::Duration::from_nanos(*nanoseconds));
                 machine.host.status(1, common::BOTH[1]);
@@ -409,6 +409,121 @@ fn a_buffer_that_changes_hands_in_the_middle_of_a_pass_is_noticed() {
             Ok(machine.collect(&flight, step.bodies.len()))
         });
         assert!(seen.steps[0].is_ok(), "{seen:?}");
+    }
+}
+
+/// Begins a step of which every pass takes the same buffers, so that it is replayed to its end.
+fn begin_once(machine: &mut Machine, step: &Step) -> Flight {
+    step.write_arguments(&machine.host);
+    let mut flight = Flight::default();
+    machine.arm(&mut flight, &result_beats(step.bodies.len()));
+    machine.start();
+    machine.send(&mut flight, &step.lanes());
+    flight
+}
+
+/// How far a step of many bodies has come, by the buffers of stream 2.
+#[derive(Debug, Clone, Copy)]
+enum Moment {
+    /// Velocities are loaded.
+    Load,
+    /// Poses come.
+    Poses,
+    /// Results go.
+    Results,
+}
+
+impl Moment {
+    fn access(self) -> DeviceAccess {
+        match self {
+            Self::Load | Self::Poses => DeviceAccess::Read,
+            Self::Results => DeviceAccess::Write,
+        }
+    }
+
+    /// The buffer that is at work then.
+    fn buffer(self, flight: &Flight) -> u64 {
+        match self {
+            // Velocities, collisions and poses of each stream.
+            Self::Load => flight.inputs()[3 * 2],
+            Self::Poses => flight.inputs()[3 * 2 + 2],
+            Self::Results => flight.outputs()[2],
+        }
+    }
+}
+
+/// When each moment is for a step of 3000 bodies and 40 collisions, microseconds from its start.
+const MOMENTS: [(Moment, &[u64]); 3] = [
+    (Moment::Load, &[1, 3, 6]),
+    (Moment::Poses, &[20, 44, 49]),
+    (Moment::Results, &[44, 49, 51, 57]),
+];
+
+#[test]
+fn a_buffer_of_bodies_that_changes_hands_is_noticed() {
+    let step = scene(3000, 40, 7, true);
+    // One word of each beat is another when the device gets the buffer back, if `other` says so.
+    let run = |moment: Moment, pause, other: bool| {
+        let mut seen = same(whole_length(), None, 1, |machine| {
+            let flight = begin_once(machine, &step);
+            machine.host.pause(pause);
+            let address = moment.buffer(&flight);
+            let mut beats = machine.host.take(address);
+            for beat in beats.iter_mut().filter(|_| other) {
+                beat.0[0] = 0.75_f32.to_bits();
+            }
+            let port = &machine.host.port;
+            port.hand_over(address, beats, moment.access()).expect("the CPU owns it");
+            machine.wait(&flight, LONG)?;
+            Ok(machine.collect(&flight, step.bodies.len()))
+        });
+        seen.steps.remove(0).expect("no fault").0
+    };
+    for (moment, pauses) in MOMENTS {
+        // The stream brings odd bodies, and takes a row of each away.
+        let all = match moment {
+            Moment::Load | Moment::Poses => 1500,
+            Moment::Results => 3000,
+        };
+        for pause in pauses {
+            let [usual, changed] = [false, true].map(|other| run(moment, *pause, other));
+            let others = usual.iter().zip(&changed).filter(|(usual, changed)| usual != changed);
+            // It was in the middle.
+            let others = others.count();
+            assert!((1..all).contains(&others), "{moment:?} {pause}: {others}");
+        }
+    }
+}
+
+#[test]
+fn a_buffer_of_bodies_that_is_gone_or_shorter_is_noticed() {
+    let step = scene(3000, 40, 7, true);
+    for (moment, pauses) in MOMENTS {
+        for (pause, gone) in pauses.iter().flat_map(|pause| [(pause, false), (pause, true)]) {
+            let seen = same(whole_length(), None, 1, |machine| {
+                let flight = begin_once(machine, &step);
+                machine.host.pause(*pause);
+                let address = moment.buffer(&flight);
+                let beats = machine.host.take(address);
+                if !gone {
+                    // More are missing than a FIFO holds.
+                    let (granted, port) = (beats.len() - 700, &machine.host.port);
+                    port.hand_over_first(address, beats, granted, moment.access())
+                        .expect("the CPU owns it");
+                }
+                machine.wait(&flight, LONG)?;
+                Ok(machine.collect(&flight, step.bodies.len()))
+            });
+            let direction = match moment.access() {
+                DeviceAccess::Read => Direction::Mm2s,
+                DeviceAccess::Write => Direction::S2mm,
+            };
+            let met = match seen.steps[0] {
+                Err(Failure::Dma { core, direction, .. }) => Some((core, direction)),
+                _ => None,
+            };
+            assert_eq!(met, Some((2, direction)), "{moment:?} {pause} {gone}");
+        }
     }
 }
 

@@ -12,10 +12,11 @@ use super::replay::Replay;
 use super::results::Results;
 use super::segment::{PacketError, Segment};
 use super::solver::{Mass, Velocity};
-use super::striping::STREAMS_MAX;
+use super::striping::{STREAMS_MAX, beats_of_bodies};
 use super::{Accelerator, Phase};
-use crate::body_pace::{BodyPace, BodyPhase, beats_of};
+use crate::body_pace::{BodyPace, BodyPhase};
 use crate::cast::register;
+use crate::config::SHAPES_MAX;
 use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::{Beat, LANES, WORD_LANE, velocity};
@@ -26,7 +27,10 @@ use crate::stream::Stream;
 pub(super) type Views<'a> = [&'a [Beat]; STREAMS_MAX];
 
 /// Bodies that a thread loads at once.
-const TOGETHER: usize = 2048;
+const LOADED_TOGETHER: usize = 2048;
+
+// Whatever shape the table has fits, so that a body is refused only if `bodies_known` has found it.
+const _: () = assert!(SHAPES_MAX <= 1 << u8::BITS);
 
 /// Two rows of each of some bodies, of which the views begin with body `first`.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +42,7 @@ pub(super) struct BodyRows<'a> {
 impl BodyRows<'_> {
     /// The rows of a body.
     pub(super) fn of(&self, body: usize) -> [Row; 2] {
-        let before = beats_of(self.first);
+        let before = beats_of_bodies(self.first);
         let stream = 2 * (body % 2);
         [stream, stream + 1].map(|k| self.views[k][body / 2 - before[k]].0)
     }
@@ -52,7 +56,7 @@ impl BodyRows<'_> {
         velocities: &mut [Velocity],
         shape_of: &mut [u8],
     ) -> (u32, Option<usize>) {
-        let before = beats_of(self.first);
+        let before = beats_of_bodies(self.first);
         let (mut sum, mut wrong) = ([0_u32; LANES], None);
         for begin in [first, first + 1] {
             let k = 2 * (begin % 2);
@@ -113,10 +117,10 @@ impl Accelerator {
         let bodies = segment.done..segment.done + records;
         let rows = BodyRows { views, first: segment.done };
         let Replay { batch, masses, .. } = &mut self.replay;
-        let velocities = self.velocities[bodies.clone()].chunks_mut(TOGETHER);
-        let shapes = self.shape_of[bodies.clone()].chunks_mut(TOGETHER);
+        let velocities = self.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
+        let shapes = self.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
         let (sum, wrong) = (AtomicU32::new(0), AtomicUsize::new(usize::MAX));
-        let parts = bodies.step_by(TOGETHER).zip(velocities.zip(shapes));
+        let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes));
         batch.share(parts, |(first, (velocities, shapes))| {
             let (of_part, wrong_body) = rows.load(first, masses, velocities, shapes);
             sum.fetch_add(of_part, Ordering::Relaxed);
@@ -188,7 +192,7 @@ impl Accelerator {
         // The last two end packets.
         let mut records = segment.left().saturating_sub(1);
         if load {
-            let before = beats_of(first);
+            let before = beats_of_bodies(first);
             // Two a cycle, if there are that many.
             let most = usize::try_from(cycles).unwrap_or(usize::MAX).saturating_mul(2);
             records = records.min(most.saturating_add(1));

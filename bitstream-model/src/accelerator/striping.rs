@@ -16,7 +16,14 @@ pub(crate) const fn beat_cycles(width: u32) -> u64 {
 }
 
 /// A count for each stream.
-pub(super) type PerStream = [usize; STREAMS_MAX];
+pub(crate) type PerStream = [usize; STREAMS_MAX];
+
+/// How many beats of the first `bodies` bodies are on each stream in the layout of `float`, of their
+/// velocities as of their poses: two of a body on streams 0 and 1, of the next one on 2 and 3.
+pub(crate) fn beats_of_bodies(bodies: usize) -> PerStream {
+    let (even, odd) = (bodies.div_ceil(2), bodies / 2);
+    [even, even, odd, odd]
+}
 
 /// A stripe over streams of known widths.
 #[derive(Debug, Clone, Copy)]
@@ -134,6 +141,8 @@ impl Places<'_> {
 mod tests {
     use super::*;
     use crate::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
+    use crate::interface::record::{pose, velocity};
+    use crate::interface::stripe::Stripes;
 
     fn collisions(profile: &Profile) -> Striping {
         Striping::new(&profile.stripes.collisions, profile.mm2s_widths)
@@ -182,6 +191,17 @@ mod tests {
                     }
                     counts[stream] += 1;
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn bodies_of_float_lie_as_its_stripes_say() {
+        let Stripes { velocities, poses, .. } = FLOAT.stripes;
+        for (stripe, rows) in [(velocities, velocity::ROWS), (poses, pose::ROWS)] {
+            let striping = Striping::new(&stripe, FLOAT.mm2s_widths);
+            for bodies in 0..20 {
+                assert_eq!(beats_of_bodies(bodies), striping.counts(rows * bodies), "{bodies}");
             }
         }
     }

@@ -1,6 +1,6 @@
 //! This file lends beats of several buffers at once: some to read, some to write.
 
-use super::{Content, DeviceAccess, Memory, Source};
+use super::{Content, DeviceAccess, Memory, Source, part};
 use crate::cast::index;
 use crate::interface::record::{BEAT_BYTES, Beat};
 
@@ -28,11 +28,9 @@ impl Memory {
             let within = |address: u64| (start..end).contains(&address);
             match &mut region.content {
                 Content::Device(beats, DeviceAccess::Read, granted) => {
-                    let beats = &beats[..beats.len().min(*granted)];
                     for (view, (from, count)) in views.iter_mut().zip(reads) {
                         if count > 0 && within(from.address) && from.grant == region.grant {
-                            let first = index((from.address - start) / BEAT_BYTES as u64);
-                            *view = beats.get(first..first + count)?;
+                            *view = &beats[part(beats, *granted, from.address - start, count)?];
                         }
                     }
                 }

@@ -63,6 +63,16 @@ impl Flight {
         self.inputs.push(address);
     }
 
+    /// The buffers with input, those of one stream after those of another.
+    pub(crate) fn inputs(&self) -> &[u64] {
+        &self.inputs
+    }
+
+    /// The result buffer of each channel.
+    pub(crate) fn outputs(&self) -> &[u64] {
+        &self.outputs
+    }
+
     pub(crate) fn is_without_results(&self) -> bool {
         self.outputs.is_empty()
     }

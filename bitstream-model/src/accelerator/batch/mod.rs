@@ -41,13 +41,13 @@ use place::Places;
 use pool::Pool;
 use width::Width;
 
-pub(super) use motion::Places as ResultPlaces;
+pub(super) use motion::ResultPlaces;
 
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
 
 /// Bodies that a thread copies at once.
-const TOGETHER: usize = 2048;
+const COPIED_TOGETHER: usize = 2048;
 
 /// What a pass is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,9 +172,9 @@ impl Batch {
             self.lines.resize(lines, Line::default());
         }
         let own = &mut self.lines[ROWS_APART as usize / 2..];
-        let bodies = velocities.chunks(TOGETHER).zip(shape_of.chunks(TOGETHER));
+        let bodies = velocities.chunks(COPIED_TOGETHER).zip(shape_of.chunks(COPIED_TOGETHER));
         self.pool.share(
-            bodies.zip(own.chunks_mut(TOGETHER / 2)),
+            bodies.zip(own.chunks_mut(COPIED_TOGETHER / 2)),
             |((velocities, shapes), lines)| {
                 for (body, (velocity, shape)) in velocities.iter().zip(shapes).enumerate() {
                     lines[body / 2].put(body % 2 == 1, velocity, &masses[usize::from(*shape)]);
@@ -235,7 +235,7 @@ impl Batch {
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
         self.spins |= finding.is_some();
         let own = &self.lines[ROWS_APART as usize / 2..];
-        let bodies = velocities.chunks_mut(TOGETHER).zip(own.chunks(TOGETHER / 2));
+        let bodies = velocities.chunks_mut(COPIED_TOGETHER).zip(own.chunks(COPIED_TOGETHER / 2));
         self.pool.share(bodies, |(velocities, lines)| {
             for (body, velocity) in velocities.iter_mut().enumerate() {
                 *velocity = lines[body / 2].velocity(body % 2 == 1);

@@ -13,23 +13,23 @@ use super::super::bodies::BodyRows;
 use super::super::decode;
 use super::super::integrate::{Integration, integrate};
 use super::super::number::Single;
+use super::super::striping::beats_of_bodies;
 use super::Batch;
 use super::block::{LANES, ROWS_APART, Words};
 use super::front::Line;
 use super::lanes::{Lanes, Mask, Numbers, Quad, Work};
 use super::width::Width;
-use crate::body_pace::beats_of;
 use crate::interface::number::StreamFormat;
 use crate::interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
 use crate::interface::record::Beat;
 
 /// Bodies that a thread integrates at once.
-const TOGETHER: usize = 512;
+const INTEGRATED_TOGETHER: usize = 512;
 /// Bodies of which those of even and those of odd numbers fill the widest lanes.
 const GROUP: usize = 2 * LANES;
 
 /// Room for results, on each stream.
-pub(in super::super) type Places<'a> = [&'a mut [Beat]; 4];
+pub(in super::super) type ResultPlaces<'a> = [&'a mut [Beat]; 4];
 
 fn added(rows: &[Row]) -> u32 {
     rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
@@ -46,7 +46,7 @@ struct Bodies<'a> {
 }
 
 /// Takes room for so many results.
-fn take<'a>(places: &mut Places<'a>, count: usize) -> Places<'a> {
+fn take<'a>(places: &mut ResultPlaces<'a>, count: usize) -> ResultPlaces<'a> {
     places.each_mut().map(|place| {
         let (taken, rest) = mem::take(place).split_at_mut(count);
         *place = rest;
@@ -56,7 +56,7 @@ fn take<'a>(places: &mut Places<'a>, count: usize) -> Places<'a> {
 
 impl Bodies<'_> {
     /// The results of bodies; the sums of the words of their poses and of their results.
-    fn results(&self, bodies: Range<usize>, mut places: Places<'_>) -> [u32; 2] {
+    fn results(&self, bodies: Range<usize>, mut places: ResultPlaces<'_>) -> [u32; 2] {
         let mut sums = [0; 2];
         let Range { start, end } = bodies;
         let mut last = start;
@@ -78,11 +78,11 @@ impl Bodies<'_> {
         &'a self,
         integration: &'a Integration,
         bodies: Range<usize>,
-        places: Places<'a>,
+        places: ResultPlaces<'a>,
         sums: &'a mut [u32; 2],
     ) -> Groups<'a> {
         let pairs = bodies.start / 2..bodies.end / 2;
-        let before = beats_of(self.poses.first);
+        let before = beats_of_bodies(self.poses.first);
         let poses = std::array::from_fn(|k| {
             let view = &self.poses.views[k];
             bytemuck::cast_slice(&view[pairs.start - before[k]..pairs.end - before[k]])
@@ -93,7 +93,7 @@ impl Bodies<'_> {
     }
 
     /// The same, one body after the other.
-    fn one_by_one(&self, bodies: Range<usize>, places: Places<'_>, sums: &mut [u32; 2]) {
+    fn one_by_one(&self, bodies: Range<usize>, places: ResultPlaces<'_>, sums: &mut [u32; 2]) {
         let [positions, orientations, linears, angulars] = places;
         let places = positions.iter_mut().zip(orientations).zip(linears.iter_mut().zip(angulars));
         for (body, ((position, orientation), (linear, angular))) in bodies.zip(places) {
@@ -256,7 +256,7 @@ impl Batch {
         integration: Option<&Integration>,
         first: usize,
         poses: BodyRows<'_>,
-        places: Places<'_>,
+        places: ResultPlaces<'_>,
     ) -> [u32; 2] {
         let bodies = Bodies {
             integration,
@@ -266,8 +266,8 @@ impl Batch {
         };
         let end = first + places[0].len();
         let sums = [const { AtomicU32::new(0) }; 2];
-        let [a, b, c, d] = places.map(|place| place.chunks_mut(TOGETHER));
-        let parts = (first..end).step_by(TOGETHER).zip(a.zip(b).zip(c.zip(d)));
+        let [a, b, c, d] = places.map(|place| place.chunks_mut(INTEGRATED_TOGETHER));
+        let parts = (first..end).step_by(INTEGRATED_TOGETHER).zip(a.zip(b).zip(c.zip(d)));
         self.pool.share(parts, |(first, ((a, b), (c, d)))| {
             let found = bodies.results(first..first + a.len(), [a, b, c, d]);
             for (sum, found) in sums.iter().zip(found) {
@@ -294,6 +294,33 @@ mod tests {
         }
     }
 
+    /// A vector of such numbers.
+    fn vector(seed: &mut u64) -> [f32; 3] {
+        std::array::from_fn(|_| number(seed))
+    }
+
+    /// The shape and the velocity of each body.
+    fn moving(bodies: usize) -> (Vec<u8>, Vec<Velocity>) {
+        let mut seed = 3;
+        let shape_of = (0..bodies).map(|body| [2, 2, 0, 2, 1, 3][body % 6]).collect();
+        let velocities = (0..bodies)
+            .map(|_| Velocity { linear: vector(&mut seed), angular: vector(&mut seed) })
+            .collect();
+        (shape_of, velocities)
+    }
+
+    /// How many of the bodies of shape 2 turn too fast in one step, and how many do not.
+    fn fast(integration: &Integration, bodies: Range<usize>) -> [usize; 2] {
+        let (shape_of, velocities) = moving(bodies.end);
+        let mut counts = [0; 2];
+        for body in bodies.filter(|body| shape_of[*body] == 2) {
+            let [x, y, z] = velocities[body].angular.map(|w| w * integration.angular_damping);
+            let angle = (x * x + y * y + z * z).sqrt() * integration.time_step;
+            counts[usize::from(angle <= ROTATION_LIMIT)] += 1;
+        }
+        counts
+    }
+
     /// The results of bodies from `first` on, of poses that begin with body `from`.
     fn results(
         width: Width,
@@ -305,10 +332,7 @@ mod tests {
         let bodies = first + count;
         let masses =
             [0.0, -0.0, 2.0, f32::NAN].map(|inverse_mass| Mass { inverse_mass, ..Mass::default() });
-        let shape_of: Vec<u8> = (0..bodies).map(|body| [2, 2, 0, 2, 1, 3][body % 6]).collect();
-        let mut vector = || std::array::from_fn(|_| number(&mut seed));
-        let velocities: Vec<Velocity> =
-            (0..bodies).map(|_| Velocity { linear: vector(), angular: vector() }).collect();
+        let (shape_of, velocities) = moving(bodies);
         let mut poses = [const { Vec::new() }; 4];
         for body in 0..bodies {
             for row in 0..2 {
@@ -331,17 +355,32 @@ mod tests {
 
     #[test]
     fn bodies_side_by_side_move_as_one_by_one() {
-        let integration =
+        let slow =
             Integration { time_step: 1.0 / 60.0, angular_damping: 0.99, gravity: [0.0, -9.8, 0.1] };
-        let parts =
-            [(0, 0, 1600), (1, 1, 70), (3, 4, 100), (2, 2, 32), (5, 5, 33), (0, 1, 1), (1, 2, 0)];
+        // A step so long that many bodies turn further than a step may turn them.
+        let long = Integration { time_step: 0.5, ..slow };
+        // Parts of one chunk and of several, from even and odd bodies on.
+        let parts = [
+            (0, 0, 1600),
+            (3, 5, 1300),
+            (1, 1, 70),
+            (3, 4, 100),
+            (2, 2, 32),
+            (5, 5, 33),
+            (0, 1, 1),
+            (1, 2, 0),
+        ];
+        for (from, first, count) in parts.into_iter().filter(|(.., count)| *count > 1) {
+            let bodies = first..first + count;
+            assert!(fast(&long, bodies).into_iter().all(|some| some > 0), "{from} {first} {count}");
+        }
         for part in parts {
-            for integration in [Some(&integration), None] {
+            for integration in [Some(&slow), Some(&long), None] {
                 let expected = results(Width::One, 1, part, integration);
                 for width in Width::all() {
                     for threads in [1, 3] {
                         let found = results(width, threads, part, integration);
-                        assert_eq!(found, expected, "{width:?} {part:?}");
+                        assert_eq!(found, expected, "{width:?} {part:?} {integration:?}");
                     }
                 }
             }
