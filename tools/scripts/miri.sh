@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# Runs the modules with unsafe code, and those that build on them, under Miri: it finds reads and
-# writes outside an allocation, references that overlap, and data races.
+# Runs the driver's buffers and windows with what builds on them, and the threads of the scene's
+# detection, under Miri: it finds reads and writes outside an allocation, references that overlap, and
+# data races.
 #
-# Not under Miri, which maps no files: what goes through a device file. valgrind.sh runs whole steps.
+# Not under Miri: what goes through a device file, as it maps none, the vectors of a processor, and the
+# threads of the emulated board. valgrind.sh runs whole steps.
 # Needs a nightly toolchain with the components miri and rust-src; the first run builds its own
 # standard library.
 # Exit code: 0 done, 1 something was found, 77 skipped: not on this machine.
