@@ -2,8 +2,6 @@
 //!
 //! As [`bodies`](super::bodies) writes theirs: block by block, once, upwards, never read back.
 
-use std::ops::Range;
-
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, collision, relative};
 
@@ -111,39 +109,46 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     let mut good = true;
     let mut copies = [NOTHING; BLOCK];
     let mut next = [None; BLOCK];
-    let mut found = find(collisions, 0..count.min(BLOCK), &mut next);
+    find(collisions, 0, &mut next[..count.min(BLOCK)]);
     for first in (0..count).step_by(BLOCK) {
-        let mut block = [&NOTHING; BLOCK];
-        let block = &mut block[..found];
-        let here = (first..).zip(&next).zip(&mut copies);
-        for (to, ((index, lies), copy)) in block.iter_mut().zip(here) {
-            *to = lies.unwrap_or_else(|| {
-                *copy = collisions.collision(index);
-                copy
-            });
+        let (mut block, length) = ([&NOTHING; BLOCK], (count - first).min(BLOCK));
+        let block = &mut block[..length];
+        let mut elsewhere = false;
+        for (to, lies) in block.iter_mut().zip(&next) {
+            elsewhere |= lies.is_none();
+            *to = lies.unwrap_or(&NOTHING);
         }
-        let behind = first + found;
-        found = find(collisions, behind..count.min(behind + BLOCK), &mut next);
-        good &= packer.write(block, &next[..found]);
+        if elsewhere {
+            let here = (first..).zip(&next).zip(&mut copies);
+            for (to, ((index, _), copy)) in
+                block.iter_mut().zip(here).filter(|(_, ((_, lies), _))| lies.is_none())
+            {
+                *copy = collisions.collision(index);
+                *to = copy;
+            }
+        }
+        let behind = first + length;
+        let next = &mut next[..(count - behind).min(BLOCK)];
+        find(collisions, behind, next);
+        good &= packer.write(block, next);
     }
     (packer.finish(), good)
 }
 
-/// Where the collisions of a block lie; how many there are. One that does not lie there as it is will
-/// be asked for soon.
+/// Where the next collisions lie, the first of which has the index `first`. One that does not lie
+/// there as it is will be asked for soon.
+#[inline]
 fn find<'a, C: Collisions + ?Sized>(
     collisions: &'a C,
-    block: Range<usize>,
-    to: &mut [Option<&'a Collision>; BLOCK],
-) -> usize {
-    let count = block.len();
-    for (to, index) in to.iter_mut().zip(block) {
+    first: usize,
+    to: &mut [Option<&'a Collision>],
+) {
+    for (to, index) in to.iter_mut().zip(first..) {
         *to = collisions.structure(index);
         if to.is_none() {
             collisions.soon(index);
         }
     }
-    count
 }
 
 /// What is said of collisions beside what they hold.

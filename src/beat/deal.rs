@@ -60,7 +60,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
     fn groups<'c, const G: usize>(&mut self, beats: &'c [Beat]) -> &'c [Beat] {
         let (groups, rest) = beats.as_chunks::<G>();
         for (channel, to) in self.channels.iter_mut().enumerate() {
-            let (places, share) = places::<G>(self.deal.group(), channel);
+            let (places, share) = self.deal.places::<G>(channel);
             let to = &mut to[self.deal.take(channel, groups.len() * share)];
             let sum = &mut self.sum;
             match share {
@@ -89,19 +89,6 @@ impl<'a, 'b> Dealer<'a, 'b> {
         }
         total(self.sum)
     }
-}
-
-/// Which beats of a group of `G` go to a channel, and how many they are.
-#[inline(always)]
-pub(super) fn places<const G: usize>(group: &[u8], channel: usize) -> ([usize; G], usize) {
-    let (mut places, mut share) = ([0; G], 0);
-    for (place, stream) in group.iter().enumerate().take(G) {
-        if usize::from(*stream) == channel {
-            places[share] = place;
-            share += 1;
-        }
-    }
-    (places, share)
 }
 
 /// Writes the `S` beats of each group that go to one channel, and adds them up.
