@@ -2,6 +2,8 @@
 //!
 //! As [`bodies`](super::bodies) writes theirs: block by block, once, upwards, never read back.
 
+use std::{mem, ptr};
+
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, collision, relative};
 
@@ -107,49 +109,54 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     let Entries { collisions, count, scheduled, words } = *entries;
     let mut packer = CollisionPacker::new(target, ends, Marks { scheduled, words }, channels);
     let mut good = true;
+    let (mut here, mut next) = (&mut [&ELSEWHERE; BLOCK], &mut [&ELSEWHERE; BLOCK]);
     let mut copies = [NOTHING; BLOCK];
-    let mut next = [None; BLOCK];
-    find(collisions, 0, &mut next[..count.min(BLOCK)]);
+    let mut all_lie = find(collisions, 0, &mut here[..count.min(BLOCK)]);
     for first in (0..count).step_by(BLOCK) {
-        let (mut block, length) = ([&NOTHING; BLOCK], (count - first).min(BLOCK));
-        let block = &mut block[..length];
-        let mut elsewhere = false;
-        for (to, lies) in block.iter_mut().zip(&next) {
-            elsewhere |= lies.is_none();
-            *to = lies.unwrap_or(&NOTHING);
-        }
-        if elsewhere {
-            let here = (first..).zip(&next).zip(&mut copies);
-            for (to, ((index, _), copy)) in
-                block.iter_mut().zip(here).filter(|(_, ((_, lies), _))| lies.is_none())
+        let here_lie = all_lie;
+        let behind = count.min(first + BLOCK);
+        let ahead = &mut next[..(count - behind).min(BLOCK)];
+        all_lie = find(collisions, behind, ahead);
+        let block = &here[..behind - first];
+        good &= if here_lie {
+            packer.write(block, ahead)
+        } else {
+            let mut block = *here;
+            let elsewhere = (first..behind).zip(block.iter_mut().zip(&mut copies));
+            for (index, (to, copy)) in
+                elsewhere.filter(|(_, (to, _))| ptr::eq::<Collision>(**to, &raw const ELSEWHERE))
             {
                 *copy = collisions.collision(index);
                 *to = copy;
             }
-        }
-        let behind = first + length;
-        let next = &mut next[..(count - behind).min(BLOCK)];
-        find(collisions, behind, next);
-        good &= packer.write(block, next);
+            packer.write(&block[..behind - first], ahead)
+        };
+        mem::swap(&mut here, &mut next);
     }
     (packer.finish(), good)
 }
 
-/// Where the next collisions lie, the first of which has the index `first`. One that does not lie
-/// there as it is will be asked for soon.
+/// Where the next collisions lie, the first of which has the index `first`; whether all do. One that
+/// does not lie there as it is ([`ELSEWHERE`]) will be asked for soon.
 #[inline]
 fn find<'a, C: Collisions + ?Sized>(
     collisions: &'a C,
     first: usize,
-    to: &mut [Option<&'a Collision>],
-) {
+    to: &mut [&'a Collision],
+) -> bool {
+    let mut all_lie = true;
     for (to, index) in to.iter_mut().zip(first..) {
-        *to = collisions.structure(index);
-        if to.is_none() {
+        *to = collisions.structure(index).unwrap_or_else(|| {
+            all_lie = false;
             collisions.soon(index);
-        }
+            &ELSEWHERE
+        });
     }
+    all_lie
 }
+
+/// Stands for a collision that does not lie anywhere as it is.
+static ELSEWHERE: Collision = NOTHING;
 
 /// What is said of collisions beside what they hold.
 #[derive(Debug, Clone, Copy)]
@@ -200,11 +207,7 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
 
     /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Whether validation
     /// refuses none. Those `ahead` are asked for next, and are on their way meanwhile.
-    pub(super) fn write(
-        &mut self,
-        collisions: &[&Collision],
-        ahead: &[Option<&Collision>],
-    ) -> bool {
+    pub(super) fn write(&mut self, collisions: &[&Collision], ahead: &[&Collision]) -> bool {
         let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, written } = self;
         let (quick, first) = (*quick, *written);
         *written += collisions.len();
@@ -236,7 +239,7 @@ struct Writing<'p, 'a, 'b, K, const ROWS: usize> {
     kind: K,
     quick: Option<&'p Quick<'p>>,
     block: Block<'p>,
-    ahead: &'p [Option<&'p Collision>],
+    ahead: &'p [&'p Collision],
     stage: &'p mut Stage<ROWS>,
     dealer: &'p mut Dealer<'a, 'b>,
 }
@@ -252,22 +255,23 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
         for collision in collisions {
             ends.soon([collision.body_a, collision.body_b]);
         }
+        // Those of a last block that is not whole come by themselves.
+        let ahead = ahead.get(..collisions.len()).unwrap_or(collisions);
         let records = stage.records(collisions.len());
-        let each = records.iter_mut().zip((first..).zip(collisions)).enumerate();
+        let each = records.iter_mut().zip(collisions).zip(ahead).zip(first..);
         let of = |from: &Collision| [from.body_a, from.body_b].map(|body| ends.get(body));
-        let fetch_next = |at: usize| prefetch(ahead.get(at).copied().flatten());
         let mut good = true;
         if let Some(quick) = quick {
-            for (at, (to, (index, from))) in each {
-                fetch_next(at);
+            for (((to, from), ahead), index) in each {
+                prefetch::<Collision>(ahead);
                 let ends = of(from);
                 block.heads &= head(from, ends, scheduled);
                 *to = kind.encode(index, from, ends);
             }
             good = K::look(quick, &block, records);
         } else {
-            for (at, (to, (index, from))) in each {
-                fetch_next(at);
+            for (((to, from), ahead), index) in each {
+                prefetch::<Collision>(ahead);
                 *to = kind.encode(index, from, of(from));
             }
         }

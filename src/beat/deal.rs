@@ -4,11 +4,11 @@
 //! the other, each a run of whole beats upwards, as memory that combines writes wants them. Nothing
 //! is read back: the sum that the accelerator is checked with is taken on the way.
 
-use bitstream_model::interface::record::Beat;
+use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
 use super::stripe::{Deal, Layout, Place};
 use super::unpack::total;
-use crate::platform::Lanes;
+use crate::platform::{LINE, Lanes, fetch_to_write};
 
 /// Records of a block. Divisible by the records of a group of every stripe, so that each block
 /// begins with a group; and so few that a block, read and written, lies in the innermost cache.
@@ -61,7 +61,10 @@ impl<'a, 'b> Dealer<'a, 'b> {
         let (groups, rest) = beats.as_chunks::<G>();
         for (channel, to) in self.channels.iter_mut().enumerate() {
             let (places, share) = self.deal.places::<G>(channel);
-            let to = &mut to[self.deal.take(channel, groups.len() * share)];
+            let place = self.deal.take(channel, groups.len() * share);
+            // Those of the next block.
+            soon_written(to, place.end, place.len());
+            let to = &mut to[place];
             let sum = &mut self.sum;
             match share {
                 0 => {}
@@ -88,6 +91,16 @@ impl<'a, 'b> Dealer<'a, 'b> {
             self.write(&[Beat::default()]);
         }
         total(self.sum)
+    }
+}
+
+/// Says that beats will be written soon: of memory that is cached, a line that is written in part
+/// comes into the cache first.
+#[inline(always)]
+fn soon_written(to: &[Beat], first: usize, count: usize) {
+    let first = to.as_ptr().wrapping_add(first);
+    for beat in (0..count).step_by(LINE / BEAT_BYTES) {
+        fetch_to_write(first.wrapping_add(beat));
     }
 }
 
