@@ -505,13 +505,20 @@ fn a_buffer_of_bodies_that_is_gone_or_shorter_is_noticed() {
                 machine.host.pause(*pause);
                 let address = moment.buffer(&flight);
                 let beats = machine.host.take(address);
+                // More are missing than a FIFO holds.
+                let granted = beats.len() - 700;
+                let kept = (!gone).then(|| beats[granted..].to_vec());
                 if !gone {
-                    // More are missing than a FIFO holds.
-                    let (granted, port) = (beats.len() - 700, &machine.host.port);
+                    let port = &machine.host.port;
                     port.hand_over_first(address, beats, granted, moment.access())
                         .expect("the CPU owns it");
                 }
-                machine.wait(&flight, LONG)?;
+                let waited = machine.wait(&flight, LONG);
+                if let Some(kept) = kept {
+                    // Whoever notices it, and when: nothing was written where nothing was granted.
+                    assert_eq!(machine.host.take(address)[granted..], kept, "{moment:?} {pause}");
+                }
+                waited?;
                 Ok(machine.collect(&flight, step.bodies.len()))
             });
             let direction = match moment.access() {
