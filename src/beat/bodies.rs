@@ -30,13 +30,8 @@ pub(crate) fn survey<B: Bodies + ?Sized>(
     mut into: Survey<'_>,
 ) -> bool {
     into.clear();
-    let mut block = [NOBODY; BLOCK];
-    let mut good = true;
-    for first in (0..count).step_by(BLOCK) {
-        let bodies = read(bodies, first, count, &mut block);
-        good &= target.survey(first, bodies, &mut into);
-    }
-    good
+    let mut packer = BodyPacker { target, into: Some(into), velocities: None, poses: None };
+    packer.write_all(bodies, count)
 }
 
 /// Surveys `count` bodies and writes their velocity and pose records, the first with their inertia
@@ -48,42 +43,17 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
     count: usize,
-    into: Survey<'_>,
+    mut into: Survey<'_>,
     velocities: &mut [&mut [Beat]],
     poses: &mut [&mut [Beat]],
 ) -> (u32, u32, bool) {
-    let velocities = Velocities::new(target, velocities);
-    let poses = Poses::new(target, poses);
-    in_wide_vectors(Packing { target, bodies, count, into, velocities, poses })
-}
-
-/// All bodies of a step, and where they go.
-struct Packing<'a, 'b, 'c, B: ?Sized> {
-    target: Target<'a>,
-    bodies: &'a B,
-    count: usize,
-    into: Survey<'a>,
-    velocities: Velocities<'a, 'b>,
-    poses: Poses<'a, 'c>,
-}
-
-impl<B: Bodies + ?Sized> Work for Packing<'_, '_, '_, B> {
-    type Output = (u32, u32, bool);
-
-    #[inline(always)]
-    fn run(self) -> (u32, u32, bool) {
-        let Self { target, bodies, count, mut into, mut velocities, mut poses } = self;
-        into.clear();
-        let mut block = [NOBODY; BLOCK];
-        let mut good = true;
-        for first in (0..count).step_by(BLOCK) {
-            let bodies = read(bodies, first, count, &mut block);
-            good &= target.survey(first, bodies, &mut into);
-            velocities.write(bodies);
-            poses.write(bodies);
-        }
-        (velocities.finish(), poses.finish(), good)
-    }
+    into.clear();
+    let velocities = Some(Velocities::new(target, velocities));
+    let poses = Some(Poses::new(target, poses));
+    let mut packer = BodyPacker { target, into: Some(into), velocities, poses };
+    let good = packer.write_all(bodies, count);
+    let [velocities, poses] = packer.finish();
+    (velocities, poses, good)
 }
 
 /// Writes the velocity records of `count` bodies, and their inertia where the bitstream wants it;
@@ -96,12 +66,10 @@ pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
     count: usize,
     channels: &mut [&mut [Beat]],
 ) -> u32 {
-    let mut velocities = Velocities::new(target, channels);
-    let mut block = [NOBODY; BLOCK];
-    for first in (0..count).step_by(BLOCK) {
-        velocities.write(read(bodies, first, count, &mut block));
-    }
-    velocities.finish()
+    let velocities = Some(Velocities::new(target, channels));
+    let mut packer = BodyPacker { target, into: None, velocities, poses: None };
+    packer.write_all(bodies, count);
+    packer.finish()[0]
 }
 
 /// Writes the pose records of `count` bodies; otherwise as [`pack_velocities`].
@@ -111,12 +79,81 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
     count: usize,
     channels: &mut [&mut [Beat]],
 ) -> u32 {
-    let mut poses = Poses::new(target, channels);
-    let mut block = [NOBODY; BLOCK];
-    for first in (0..count).step_by(BLOCK) {
-        poses.write(read(bodies, first, count, &mut block));
+    let poses = Some(Poses::new(target, channels));
+    let mut packer = BodyPacker { target, into: None, velocities: None, poses };
+    packer.write_all(bodies, count);
+    packer.finish()[1]
+}
+
+/// Surveys bodies and writes their records, whatever of it is wanted, a block at a time.
+struct BodyPacker<'a, 'b, 'c> {
+    target: Target<'a>,
+    into: Option<Survey<'a>>,
+    velocities: Option<Velocities<'a, 'b>>,
+    poses: Option<Poses<'a, 'c>>,
+}
+
+impl BodyPacker<'_, '_, '_> {
+    /// Goes through `count` bodies; whether validation refuses none of those that are surveyed.
+    ///
+    /// Here is only what depends on the caller's container: where the bodies of a block lie.
+    fn write_all<B: Bodies + ?Sized>(&mut self, bodies: &B, count: usize) -> bool {
+        let mut copies = [NOBODY; BLOCK];
+        let mut good = true;
+        for first in (0..count).step_by(BLOCK) {
+            let block = &mut copies[..(count - first).min(BLOCK)];
+            let lie = bodies.structures().and_then(|all| all.get(first..first + block.len()));
+            let block = lie.unwrap_or_else(|| {
+                for (at, to) in block.iter_mut().enumerate() {
+                    *to = bodies.body(first + at);
+                }
+                block
+            });
+            good &= self.write(first, block);
+        }
+        good
     }
-    poses.finish()
+
+    /// Does it with the next bodies, at most [`BLOCK`], the first of which has the index `first`;
+    /// whether validation refuses none that is surveyed.
+    fn write(&mut self, first: usize, bodies: &[Body]) -> bool {
+        in_wide_vectors(Writing { packer: self, first, bodies })
+    }
+
+    /// Ends the segments; the sums of the words written, modulo 2^32.
+    fn finish(self) -> [u32; 2] {
+        let Self { velocities, poses, .. } = self;
+        [velocities.map(Velocities::finish), poses.map(Poses::finish)]
+            .map(Option::unwrap_or_default)
+    }
+}
+
+/// A block of bodies, and where it goes.
+struct Writing<'p, 'a, 'b, 'c> {
+    packer: &'p mut BodyPacker<'a, 'b, 'c>,
+    first: usize,
+    bodies: &'p [Body],
+}
+
+impl Work for Writing<'_, '_, '_, '_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Self { packer: BodyPacker { target, into, velocities, poses }, first, bodies } = self;
+        let mut good = true;
+        if let Some(into) = into {
+            let ends = into.add(bodies, target.shapes);
+            good = target.quick.is_none_or(|quick| quick.bodies(first, bodies, ends));
+        }
+        if let Some(velocities) = velocities {
+            velocities.write(bodies);
+        }
+        if let Some(poses) = poses {
+            poses.write(bodies);
+        }
+        good
+    }
 }
 
 /// Some of the bodies, in an order of their own: a view of what is packed.
@@ -146,33 +183,6 @@ const NOBODY: Body = Body {
     velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] },
     shape: 0,
 };
-
-/// Reads the next block of `count` bodies.
-#[inline(always)]
-fn read<'a, B: Bodies + ?Sized>(
-    bodies: &'a B,
-    first: usize,
-    count: usize,
-    block: &'a mut [Body; BLOCK],
-) -> &'a [Body] {
-    let block = &mut block[..(count - first).min(BLOCK)];
-    if let Some(block) = bodies.structures().and_then(|all| all.get(first..first + block.len())) {
-        return block;
-    }
-    for (at, to) in block.iter_mut().enumerate() {
-        *to = bodies.body(first + at);
-    }
-    block
-}
-
-impl Target<'_> {
-    /// Remembers a block of bodies; whether validation refuses none.
-    #[inline(always)]
-    fn survey(&self, first: usize, bodies: &[Body], into: &mut Survey<'_>) -> bool {
-        let ends = into.add(bodies, self.shapes);
-        self.quick.is_none_or(|quick| quick.bodies(first, bodies, ends))
-    }
-}
 
 /// Writes velocity records, a block at a time.
 struct Velocities<'a, 'b> {

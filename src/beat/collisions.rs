@@ -2,14 +2,16 @@
 //!
 //! As [`bodies`](super::bodies) writes theirs: block by block, once, upwards, never read back.
 
+use std::ops::Range;
+
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, collision, relative};
 
 use super::deal::{BLOCK, Dealer};
 use super::stage::Stage;
-use super::stripe::{Layout, Segment};
+use super::stripe::Segment;
 use super::target::Target;
-use crate::platform::{Work, in_wide_vectors};
+use crate::platform::{Work, in_wide_vectors, prefetch};
 use crate::record;
 use crate::record::end::{End, Ends};
 use crate::scene::validate::{Block, Quick, head};
@@ -29,7 +31,7 @@ pub(crate) struct Entries<'a, C: ?Sized> {
 }
 
 /// A kind of collision record of `ROWS` rows.
-pub(super) trait Kind<const ROWS: usize> {
+trait Kind<const ROWS: usize> {
     /// Rows whose word is an unsigned integer.
     const INTEGERS: [bool; ROWS];
 
@@ -41,7 +43,7 @@ pub(super) trait Kind<const ROWS: usize> {
 }
 
 /// Records in world coordinates.
-pub(super) struct Absolute;
+struct Absolute;
 
 impl Kind<{ collision::ROWS }> for Absolute {
     const INTEGERS: [bool; collision::ROWS] = record::collision::INTEGERS;
@@ -58,8 +60,8 @@ impl Kind<{ collision::ROWS }> for Absolute {
 }
 
 /// Records relative to body A, and what stands in place of the bodies' indices.
-pub(super) struct Relative<'a> {
-    pub(super) words: Option<&'a [[u32; 2]]>,
+struct Relative<'a> {
+    words: Option<&'a [[u32; 2]]>,
 }
 
 impl Kind<{ relative::ROWS }> for Relative<'_> {
@@ -95,102 +97,178 @@ const REFUSED: [u32; 2] = [u32::MAX; 2];
 /// A body that does not exist has its position written as zeros, and one without a shape is static.
 /// Should a caller's [`Collisions`] answer differently from one look to the next, the accelerator
 /// refuses the index.
+///
+/// Here is only what depends on the caller's container: where each collision of a block lies. They
+/// may lie anywhere, and those of the next block are on their way while a block is written.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
     entries: &Entries<'_, C>,
     channels: &mut [&mut [Beat]],
 ) -> (u32, bool) {
-    let layout = Segment::Collisions.layout(target.variant);
-    let dealer = Dealer::new(&layout, channels);
-    let (quick, words) = (target.quick, entries.words);
-    match target.variant.profile.geometry {
-        Geometry::Absolute => {
-            in_wide_vectors(Packing { quick, layout, ends, entries, dealer, kind: Absolute })
-        }
-        Geometry::Relative => {
-            let kind = Relative { words };
-            in_wide_vectors(Packing { quick, layout, ends, entries, dealer, kind })
-        }
-    }
-}
-
-/// All collisions of a step, and where they go.
-struct Packing<'a, 'b, C: ?Sized, K, const ROWS: usize> {
-    quick: Option<&'a Quick<'a>>,
-    layout: Layout,
-    ends: Ends<'a>,
-    entries: &'a Entries<'a, C>,
-    dealer: Dealer<'a, 'b>,
-    kind: K,
-}
-
-impl<C: Collisions + ?Sized, K: Kind<ROWS>, const ROWS: usize> Work
-    for Packing<'_, '_, C, K, ROWS>
-{
-    type Output = (u32, bool);
-
-    #[inline(always)]
-    fn run(self) -> (u32, bool) {
-        let Self { quick, layout, ends, entries, mut dealer, kind } = self;
-        let Entries { collisions, count, scheduled, .. } = *entries;
-        let mut stage = Stage::new(&layout);
-        let mut copies = [NOTHING; BLOCK];
-        let mut good = true;
-        for first in (0..count).step_by(BLOCK) {
-            let mut block = [&NOTHING; BLOCK];
-            let block = &mut block[..(count - first).min(BLOCK)];
-            for (index, (to, copy)) in (first..).zip(block.iter_mut().zip(&mut copies)) {
-                *to = collisions.structure(index).unwrap_or_else(|| {
-                    *copy = collisions.collision(index);
-                    copy
-                });
-                ends.soon([to.body_a, to.body_b]);
-            }
-            // They may lie anywhere: on their way while those before them are dealt with.
-            let ahead = |index: usize| {
-                if index + BLOCK < count {
-                    collisions.soon(index + BLOCK);
-                }
-            };
-            let block = Block { first, collisions: block, ends, scheduled, heads: true };
-            good &= pack_block(&kind, quick, block, (&mut stage, &mut dealer), ahead);
-        }
-        (dealer.finish(), good)
-    }
-}
-
-/// Encodes, looks at and deals out a block of collisions; whether validation refuses none. `each` is
-/// told the index of each on the way.
-#[inline(always)]
-pub(super) fn pack_block<K: Kind<ROWS>, const ROWS: usize>(
-    kind: &K,
-    quick: Option<&Quick<'_>>,
-    mut block: Block<'_>,
-    (stage, dealer): (&mut Stage<ROWS>, &mut Dealer<'_, '_>),
-    each: impl Fn(usize),
-) -> bool {
-    let Block { first, collisions, ends, scheduled, .. } = block;
-    let records = stage.records(collisions.len());
-    let from = (first..).zip(collisions);
-    let ends = |from: &Collision| [from.body_a, from.body_b].map(|body| ends.get(body));
+    let Entries { collisions, count, scheduled, words } = *entries;
+    let mut packer = CollisionPacker::new(target, ends, Marks { scheduled, words }, channels);
     let mut good = true;
-    if let Some(quick) = quick {
-        for (to, (index, from)) in records.iter_mut().zip(from) {
-            each(index);
-            let ends = ends(from);
-            block.heads &= head(from, ends, scheduled);
-            *to = kind.encode(index, from, ends);
+    let mut copies = [NOTHING; BLOCK];
+    let mut next = [None; BLOCK];
+    let mut found = find(collisions, 0..count.min(BLOCK), &mut next);
+    for first in (0..count).step_by(BLOCK) {
+        let mut block = [&NOTHING; BLOCK];
+        let block = &mut block[..found];
+        let here = (first..).zip(&next).zip(&mut copies);
+        for (to, ((index, lies), copy)) in block.iter_mut().zip(here) {
+            *to = lies.unwrap_or_else(|| {
+                *copy = collisions.collision(index);
+                copy
+            });
         }
-        good = K::look(quick, &block, records);
-    } else {
-        for (to, (index, from)) in records.iter_mut().zip(from) {
-            each(index);
-            *to = kind.encode(index, from, ends(from));
+        let behind = first + found;
+        found = find(collisions, behind..count.min(behind + BLOCK), &mut next);
+        good &= packer.write(block, &next[..found]);
+    }
+    (packer.finish(), good)
+}
+
+/// Where the collisions of a block lie; how many there are. One that does not lie there as it is will
+/// be asked for soon.
+fn find<'a, C: Collisions + ?Sized>(
+    collisions: &'a C,
+    block: Range<usize>,
+    to: &mut [Option<&'a Collision>; BLOCK],
+) -> usize {
+    let count = block.len();
+    for (to, index) in to.iter_mut().zip(block) {
+        *to = collisions.structure(index);
+        if to.is_none() {
+            collisions.soon(index);
         }
     }
-    stage.deal(collisions.len(), &K::INTEGERS, dealer);
-    good
+    count
+}
+
+/// What is said of collisions beside what they hold.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Marks<'a> {
+    /// As in [`Entries`].
+    pub(super) scheduled: bool,
+    /// As in [`Entries`].
+    pub(super) words: Option<&'a [[u32; 2]]>,
+}
+
+/// Writes collisions, a block at a time.
+///
+/// It knows nothing of the caller's container, so that it is compiled once, with the driver.
+pub(super) struct CollisionPacker<'a, 'b> {
+    quick: Option<&'a Quick<'a>>,
+    ends: Ends<'a>,
+    marks: Marks<'a>,
+    dealer: Dealer<'a, 'b>,
+    stage: EntryStage,
+    written: usize,
+}
+
+/// Of either kind of record.
+#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
+enum EntryStage {
+    Absolute(Stage<{ collision::ROWS }>),
+    Relative(Stage<{ relative::ROWS }>),
+}
+
+impl<'a, 'b> CollisionPacker<'a, 'b> {
+    /// From the first collision on.
+    ///
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says.
+    pub(super) fn new(
+        target: Target<'a>,
+        ends: Ends<'a>,
+        marks: Marks<'a>,
+        channels: &'a mut [&'b mut [Beat]],
+    ) -> Self {
+        let layout = Segment::Collisions.layout(target.variant);
+        let stage = match target.variant.profile.geometry {
+            Geometry::Absolute => EntryStage::Absolute(Stage::new(&layout)),
+            Geometry::Relative => EntryStage::Relative(Stage::new(&layout)),
+        };
+        let dealer = Dealer::new(&layout, channels);
+        Self { quick: target.quick, ends, marks, dealer, stage, written: 0 }
+    }
+
+    /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Whether validation
+    /// refuses none. Those `ahead` are asked for next, and are on their way meanwhile.
+    pub(super) fn write(
+        &mut self,
+        collisions: &[&Collision],
+        ahead: &[Option<&Collision>],
+    ) -> bool {
+        let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, written } = self;
+        let (quick, first) = (*quick, *written);
+        *written += collisions.len();
+        let block = Block { first, collisions, ends: *ends, scheduled: *scheduled, heads: true };
+        match stage {
+            EntryStage::Absolute(stage) => {
+                in_wide_vectors(Writing { kind: Absolute, quick, block, ahead, stage, dealer })
+            }
+            EntryStage::Relative(stage) => {
+                let kind = Relative { words: *words };
+                in_wide_vectors(Writing { kind, quick, block, ahead, stage, dealer })
+            }
+        }
+    }
+
+    /// Collisions written so far.
+    pub(super) const fn written(&self) -> usize {
+        self.written
+    }
+
+    /// Ends the segment; the sum of the words written, modulo 2^32.
+    pub(super) fn finish(self) -> u32 {
+        self.dealer.finish()
+    }
+}
+
+/// A block of collisions, and where it goes.
+struct Writing<'p, 'a, 'b, K, const ROWS: usize> {
+    kind: K,
+    quick: Option<&'p Quick<'p>>,
+    block: Block<'p>,
+    ahead: &'p [Option<&'p Collision>],
+    stage: &'p mut Stage<ROWS>,
+    dealer: &'p mut Dealer<'a, 'b>,
+}
+
+impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
+    type Output = bool;
+
+    /// Encodes, looks at and deals out; whether validation refuses none.
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Self { kind, quick, mut block, ahead, stage, dealer } = self;
+        let Block { first, collisions, ends, scheduled, .. } = block;
+        for collision in collisions {
+            ends.soon([collision.body_a, collision.body_b]);
+        }
+        let records = stage.records(collisions.len());
+        let each = records.iter_mut().zip((first..).zip(collisions)).enumerate();
+        let of = |from: &Collision| [from.body_a, from.body_b].map(|body| ends.get(body));
+        let fetch_next = |at: usize| prefetch(ahead.get(at).copied().flatten());
+        let mut good = true;
+        if let Some(quick) = quick {
+            for (at, (to, (index, from))) in each {
+                fetch_next(at);
+                let ends = of(from);
+                block.heads &= head(from, ends, scheduled);
+                *to = kind.encode(index, from, ends);
+            }
+            good = K::look(quick, &block, records);
+        } else {
+            for (at, (to, (index, from))) in each {
+                fetch_next(at);
+                *to = kind.encode(index, from, of(from));
+            }
+        }
+        stage.deal(collisions.len(), &K::INTEGERS, dealer);
+        good
+    }
 }
 
 /// What a block of collisions holds before it is read.

@@ -3,15 +3,11 @@
 
 use std::fmt;
 
-use bitstream_model::interface::profile::Geometry;
-use bitstream_model::interface::record::{Beat, collision, relative};
+use bitstream_model::interface::record::Beat;
 
-use super::collisions::{Absolute, Kind, NOTHING, Relative, pack_block};
-use super::deal::{BLOCK, Dealer};
-use super::stage::Stage;
-use super::stripe::Segment;
+use super::collisions::{CollisionPacker, Marks, NOTHING};
+use super::deal::BLOCK;
 use super::target::Target;
-use crate::platform::{Work, in_wide_vectors};
 use crate::record::end::Ends;
 use crate::scene::validate::{Block, Quick};
 use crate::scene::{Collision, InputError};
@@ -20,31 +16,21 @@ use crate::scene::{Collision, InputError};
 ///
 /// A few of them lie in the cache until their records are made; no copy of the others is kept.
 pub struct Writer<'a> {
-    target: Target<'a>,
+    quick: Option<&'a Quick<'a>>,
     ends: Ends<'a>,
-    dealer: Dealer<'a, 'a>,
-    stage: EntryStage,
+    packer: CollisionPacker<'a, 'a>,
     /// Collisions whose records are not made yet.
     block: [Collision; BLOCK],
     held: usize,
-    /// Records written.
-    written: usize,
     room: usize,
     refused: Option<InputError>,
 }
 
-/// Of either kind of record.
-#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
-enum EntryStage {
-    Absolute(Stage<{ collision::ROWS }>),
-    Relative(Stage<{ relative::ROWS }>),
-}
-
 impl fmt::Debug for Writer<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { written, held, room, refused, .. } = self;
+        let Self { room, refused, .. } = self;
         f.debug_struct("Writer")
-            .field("len", &(written + held))
+            .field("len", &self.len())
             .field("room", room)
             .field("refused", refused)
             .finish_non_exhaustive()
@@ -62,19 +48,13 @@ impl<'a> Writer<'a> {
         room: usize,
         channels: &'a mut [&'a mut [Beat]],
     ) -> Self {
-        let layout = Segment::Collisions.layout(target.variant);
-        let stage = match target.variant.profile.geometry {
-            Geometry::Absolute => EntryStage::Absolute(Stage::new(&layout)),
-            Geometry::Relative => EntryStage::Relative(Stage::new(&layout)),
-        };
+        let marks = Marks { scheduled: false, words: None };
         Self {
-            target,
+            quick: target.quick,
             ends,
-            dealer: Dealer::new(&layout, channels),
-            stage,
+            packer: CollisionPacker::new(target, ends, marks, channels),
             block: [NOTHING; BLOCK],
             held: 0,
-            written: 0,
             room,
             refused: None,
         }
@@ -89,7 +69,7 @@ impl<'a> Writer<'a> {
         if self.is_refused() {
             return;
         }
-        if self.written + self.held == self.room {
+        if self.len() == self.room {
             self.overfull();
             return;
         }
@@ -103,7 +83,7 @@ impl<'a> Writer<'a> {
     /// Number of collisions written so far.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.written + self.held
+        self.packer.written() + self.held
     }
 
     /// Whether there are none so far.
@@ -131,24 +111,13 @@ impl<'a> Writer<'a> {
         if count == 0 {
             return;
         }
-        let Self { target, ends, dealer, stage, written, .. } = self;
-        let (quick, collisions) = (target.quick, self.block.each_ref());
+        let (first, collisions) = (self.packer.written(), self.block.each_ref());
         let collisions = &collisions[..count];
-        let block =
-            || Block { first: *written, collisions, ends: *ends, scheduled: false, heads: true };
-        let good = match stage {
-            EntryStage::Absolute(stage) => {
-                in_wide_vectors(Flush { kind: Absolute, quick, block: block(), stage, dealer })
-            }
-            EntryStage::Relative(stage) => {
-                let kind = Relative { words: None };
-                in_wide_vectors(Flush { kind, quick, block: block(), stage, dealer })
-            }
-        };
-        if !good {
-            self.refused = quick.and_then(|quick| quick.refusal(&block()).err());
+        if !self.packer.write(collisions, &[]) {
+            let ends = self.ends;
+            let block = Block { first, collisions, ends, scheduled: false, heads: true };
+            self.refused = self.quick.and_then(|quick| quick.refusal(&block).err());
         }
-        self.written += count;
     }
 
     /// Ends the segment; the sum of the words written, modulo 2^32, and how many collisions there are.
@@ -160,26 +129,10 @@ impl<'a> Writer<'a> {
         self.flush();
         match self.refused {
             Some(refused) => Err(refused),
-            None => Ok((self.dealer.finish(), self.written)),
+            None => {
+                let written = self.packer.written();
+                Ok((self.packer.finish(), written))
+            }
         }
-    }
-}
-
-/// A block of collisions, and where it goes.
-struct Flush<'a, 'b, K, const ROWS: usize> {
-    kind: K,
-    quick: Option<&'a Quick<'a>>,
-    block: Block<'a>,
-    stage: &'a mut Stage<ROWS>,
-    dealer: &'a mut Dealer<'b, 'b>,
-}
-
-impl<K: Kind<ROWS>, const ROWS: usize> Work for Flush<'_, '_, K, ROWS> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        let Self { kind, quick, block, stage, dealer } = self;
-        pack_block(&kind, quick, block, (stage, dealer), |_| {})
     }
 }

@@ -1,10 +1,10 @@
 //! This file tells the processor what will be read soon.
 #![allow(unsafe_code, reason = "hints to the caches exist as intrinsics on raw pointers only")]
 
-/// Says that a value will be read soon.
-#[inline]
-pub(crate) fn prefetch<T>(value: &T) {
-    let first: *const i8 = std::ptr::from_ref(value).cast();
+/// Says that a value, if there is one, will be read soon. Without a branch.
+#[inline(always)]
+pub(crate) fn prefetch<T>(value: Option<&T>) {
+    let first: *const i8 = value.map_or(std::ptr::null(), std::ptr::from_ref).cast();
     // The lines of its first byte, of every 64th after it, and of its last.
     for line in 0..size_of::<T>().div_ceil(LINE) {
         fetch(first.wrapping_add(line * LINE));
@@ -16,7 +16,7 @@ pub(crate) fn prefetch<T>(value: &T) {
 const LINE: usize = 64;
 
 /// Says that what lies at an address is read soon. Any address will do.
-#[inline]
+#[inline(always)]
 pub(crate) fn fetch<T>(at: *const T) {
     let at: *const i8 = at.cast();
     #[cfg(target_arch = "x86_64")]

@@ -51,9 +51,9 @@ pub trait Collisions {
         None
     }
 
-    /// Says that collision `index`, which is below [`len`](Self::len), is asked for soon. A layout that
-    /// can have it fetched gains by that, above all where collisions are read in an order of their own;
-    /// nothing else comes of it.
+    /// Says that collision `index`, which is below [`len`](Self::len) and does not lie there as a
+    /// [`structure`](Self::structure), is asked for soon. A layout that can have it fetched gains by
+    /// that, above all where collisions are read in an order of their own; nothing else comes of it.
     fn soon(&self, index: usize) {
         let _ = index;
     }
@@ -84,11 +84,6 @@ impl Collisions for [Collision] {
     fn structure(&self, index: usize) -> Option<&Collision> {
         self.get(index)
     }
-
-    #[inline]
-    fn soon(&self, index: usize) {
-        self.get(index).into_iter().for_each(prefetch);
-    }
 }
 
 impl Collisions for Vec<Collision> {
@@ -104,11 +99,6 @@ impl Collisions for Vec<Collision> {
     #[inline]
     fn structure(&self, index: usize) -> Option<&Collision> {
         self.get(index)
-    }
-
-    #[inline]
-    fn soon(&self, index: usize) {
-        self.get(index).into_iter().for_each(prefetch);
     }
 }
 
@@ -137,10 +127,10 @@ impl Collisions for CollisionArrays<'_> {
     }
 
     fn soon(&self, index: usize) {
-        self.bodies.get(index).into_iter().for_each(prefetch);
-        self.normals.get(index).into_iter().for_each(prefetch);
-        self.counts.get(index).into_iter().for_each(prefetch);
-        self.contacts.get(index).into_iter().for_each(prefetch);
+        prefetch(self.bodies.get(index));
+        prefetch(self.normals.get(index));
+        prefetch(self.counts.get(index));
+        prefetch(self.contacts.get(index));
     }
 
     fn collision(&self, index: usize) -> Collision {

@@ -110,14 +110,19 @@ impl Results<'_> {
     ) -> (u32, Option<usize>) {
         // What is there from the last step is overwritten.
         spare.resize(count, Record::default());
-        let reader = Reader::new(self.layout, self.channels);
-        let (sum, broken) = in_wide_vectors(InTurn { reader, statics, into: spare });
+        let (sum, broken) = self.read_in_turn(statics, spare);
         for index in statics.iter().map(|index| *index as usize) {
             if let Some(to) = spare.get_mut(index) {
                 *to = own(bodies, index);
             }
         }
         (sum, broken)
+    }
+
+    /// What of it does not depend on the caller's container: it is compiled once, with the driver.
+    fn read_in_turn(self, statics: &[u32], into: &mut [Record]) -> (u32, Option<usize>) {
+        let reader = Reader::new(self.layout, self.channels);
+        in_wide_vectors(InTurn { reader, statics, into })
     }
 
     /// Reads results in the order of these bodies, and leaves all others as they are; otherwise as
