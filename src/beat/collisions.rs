@@ -8,6 +8,7 @@ use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, collision, relative};
 
 use super::deal::{BLOCK, Dealer};
+use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stage::Stage;
 use super::stripe::Segment;
 use super::target::Target;
@@ -97,22 +98,47 @@ const REFUSED: [u32; 2] = [u32::MAX; 2];
 /// A body that does not exist has its position written as zeros, and one without a shape is static.
 /// Should a caller's [`Collisions`] answer differently from one look to the next, the accelerator
 /// refuses the index.
-///
-/// Here is only what depends on the caller's container: where each collision of a block lies. They
-/// may lie anywhere, and those of the next block are on their way while a block is written.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
     entries: &Entries<'_, C>,
     channels: &mut [&mut [Beat]],
+    packers: &mut Packers,
 ) -> (u32, bool) {
-    let Entries { collisions, count, scheduled, words } = *entries;
-    let mut packer = CollisionPacker::new(target, ends, Marks { scheduled, words }, channels);
+    let layout = Segment::Collisions.layout(target.variant);
+    let (mut sum, mut good) = (0_u32, true);
+    let channels = whole(channels);
+    let cut = |size| {
+        let mut pieces = Pieces::new(&layout, size, channels);
+        ranges(entries.count, size).map(move |range| (range, pieces.cut()))
+    };
+    let work = |part: (Range<usize>, Piece<'_>)| pack_range(target, ends, entries, part);
+    packers.each(entries.count, cut, work, |(of_range, range_good): (u32, bool)| {
+        sum = sum.wrapping_add(of_range);
+        good &= range_good;
+    });
+    (sum, good)
+}
+
+/// Writes the records of a range of collisions, otherwise as [`pack_collisions`].
+///
+/// Here is only what depends on the caller's container: where each collision of a block lies. They
+/// may lie anywhere, and those of the next block are on their way while a block is written.
+fn pack_range<C: Collisions + ?Sized>(
+    target: Target<'_>,
+    ends: Ends<'_>,
+    entries: &Entries<'_, C>,
+    (range, mut channels): (Range<usize>, Piece<'_>),
+) -> (u32, bool) {
+    let Entries { collisions, scheduled, words, .. } = *entries;
+    let marks = Marks { scheduled, words };
+    let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
     let mut good = true;
     let mut copies = [NOTHING; BLOCK];
     let mut next = [None; BLOCK];
-    let mut found = find(collisions, 0..count.min(BLOCK), &mut next);
-    for first in (0..count).step_by(BLOCK) {
+    let until = range.end;
+    let mut found = find(collisions, range.start..until.min(range.start + BLOCK), &mut next);
+    for first in range.step_by(BLOCK) {
         let mut block = [&NOTHING; BLOCK];
         let block = &mut block[..found];
         let here = (first..).zip(&next).zip(&mut copies);
@@ -123,7 +149,7 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
             });
         }
         let behind = first + found;
-        found = find(collisions, behind..count.min(behind + BLOCK), &mut next);
+        found = find(collisions, behind..until.min(behind + BLOCK), &mut next);
         good &= packer.write(block, &next[..found]);
     }
     (packer.finish(), good)
@@ -164,7 +190,8 @@ pub(super) struct CollisionPacker<'a, 'b> {
     marks: Marks<'a>,
     dealer: Dealer<'a, 'b>,
     stage: EntryStage,
-    written: usize,
+    /// The index of the next.
+    next: usize,
 }
 
 /// Of either kind of record.
@@ -175,13 +202,15 @@ enum EntryStage {
 }
 
 impl<'a, 'b> CollisionPacker<'a, 'b> {
-    /// From the first collision on.
+    /// From collision `first` on, with which a group begins.
     ///
-    /// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says.
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel)
+    /// says of what is written.
     pub(super) fn new(
         target: Target<'a>,
         ends: Ends<'a>,
         marks: Marks<'a>,
+        first: usize,
         channels: &'a mut [&'b mut [Beat]],
     ) -> Self {
         let layout = Segment::Collisions.layout(target.variant);
@@ -190,7 +219,7 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
             Geometry::Relative => EntryStage::Relative(Stage::new(&layout)),
         };
         let dealer = Dealer::new(&layout, channels);
-        Self { quick: target.quick, ends, marks, dealer, stage, written: 0 }
+        Self { quick: target.quick, ends, marks, dealer, stage, next: first }
     }
 
     /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Whether validation
@@ -200,9 +229,9 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         collisions: &[&Collision],
         ahead: &[Option<&Collision>],
     ) -> bool {
-        let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, written } = self;
-        let (quick, first) = (*quick, *written);
-        *written += collisions.len();
+        let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, next } = self;
+        let (quick, first) = (*quick, *next);
+        *next += collisions.len();
         let block = Block { first, collisions, ends: *ends, scheduled: *scheduled, heads: true };
         match stage {
             EntryStage::Absolute(stage) => {
@@ -215,9 +244,9 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         }
     }
 
-    /// Collisions written so far.
-    pub(super) const fn written(&self) -> usize {
-        self.written
+    /// The index of the next collision.
+    pub(super) const fn next(&self) -> usize {
+        self.next
     }
 
     /// Ends the segment; the sum of the words written, modulo 2^32.
