@@ -3,6 +3,7 @@
 //! As [`bodies`](super::bodies) writes theirs: block by block, once, upwards, never read back.
 
 use std::ops::Range;
+use std::{mem, ptr};
 
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, collision, relative};
@@ -134,43 +135,55 @@ fn pack_range<C: Collisions + ?Sized>(
     let marks = Marks { scheduled, words };
     let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
     let mut good = true;
+    let (mut here, mut next) = (&mut [&ELSEWHERE; BLOCK], &mut [&ELSEWHERE; BLOCK]);
     let mut copies = [NOTHING; BLOCK];
-    let mut next = [None; BLOCK];
     let until = range.end;
-    let mut found = find(collisions, range.start..until.min(range.start + BLOCK), &mut next);
+    let mut all_lie = find(collisions, range.start, &mut here[..range.len().min(BLOCK)]);
     for first in range.step_by(BLOCK) {
-        let mut block = [&NOTHING; BLOCK];
-        let block = &mut block[..found];
-        let here = (first..).zip(&next).zip(&mut copies);
-        for (to, ((index, lies), copy)) in block.iter_mut().zip(here) {
-            *to = lies.unwrap_or_else(|| {
+        let here_lie = all_lie;
+        let behind = until.min(first + BLOCK);
+        let ahead = &mut next[..(until - behind).min(BLOCK)];
+        all_lie = find(collisions, behind, ahead);
+        let block = &here[..behind - first];
+        good &= if here_lie {
+            packer.write(block, ahead)
+        } else {
+            let mut block = *here;
+            let elsewhere = (first..behind).zip(block.iter_mut().zip(&mut copies));
+            for (index, (to, copy)) in
+                elsewhere.filter(|(_, (to, _))| ptr::eq::<Collision>(**to, &raw const ELSEWHERE))
+            {
                 *copy = collisions.collision(index);
-                copy
-            });
-        }
-        let behind = first + found;
-        found = find(collisions, behind..until.min(behind + BLOCK), &mut next);
-        good &= packer.write(block, &next[..found]);
+                *to = copy;
+            }
+            packer.write(&block[..behind - first], ahead)
+        };
+        mem::swap(&mut here, &mut next);
     }
     (packer.finish(), good)
 }
 
-/// Where the collisions of a block lie; how many there are. One that does not lie there as it is will
-/// be asked for soon.
+/// Where the next collisions lie, the first of which has the index `first`; whether all do. One that
+/// does not lie there as it is ([`ELSEWHERE`]) will be asked for soon.
+#[inline]
 fn find<'a, C: Collisions + ?Sized>(
     collisions: &'a C,
-    block: Range<usize>,
-    to: &mut [Option<&'a Collision>; BLOCK],
-) -> usize {
-    let count = block.len();
-    for (to, index) in to.iter_mut().zip(block) {
-        *to = collisions.structure(index);
-        if to.is_none() {
+    first: usize,
+    to: &mut [&'a Collision],
+) -> bool {
+    let mut all_lie = true;
+    for (to, index) in to.iter_mut().zip(first..) {
+        *to = collisions.structure(index).unwrap_or_else(|| {
+            all_lie = false;
             collisions.soon(index);
-        }
+            &ELSEWHERE
+        });
     }
-    count
+    all_lie
 }
+
+/// Stands for a collision that does not lie anywhere as it is.
+static ELSEWHERE: Collision = NOTHING;
 
 /// What is said of collisions beside what they hold.
 #[derive(Debug, Clone, Copy)]
@@ -224,11 +237,7 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
 
     /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Whether validation
     /// refuses none. Those `ahead` are asked for next, and are on their way meanwhile.
-    pub(super) fn write(
-        &mut self,
-        collisions: &[&Collision],
-        ahead: &[Option<&Collision>],
-    ) -> bool {
+    pub(super) fn write(&mut self, collisions: &[&Collision], ahead: &[&Collision]) -> bool {
         let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, next } = self;
         let (quick, first) = (*quick, *next);
         *next += collisions.len();
@@ -260,7 +269,7 @@ struct Writing<'p, 'a, 'b, K, const ROWS: usize> {
     kind: K,
     quick: Option<&'p Quick<'p>>,
     block: Block<'p>,
-    ahead: &'p [Option<&'p Collision>],
+    ahead: &'p [&'p Collision],
     stage: &'p mut Stage<ROWS>,
     dealer: &'p mut Dealer<'a, 'b>,
 }
@@ -276,22 +285,23 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
         for collision in collisions {
             ends.soon([collision.body_a, collision.body_b]);
         }
+        // Those of a last block that is not whole come by themselves.
+        let ahead = ahead.get(..collisions.len()).unwrap_or(collisions);
         let records = stage.records(collisions.len());
-        let each = records.iter_mut().zip((first..).zip(collisions)).enumerate();
+        let each = records.iter_mut().zip(collisions).zip(ahead).zip(first..);
         let of = |from: &Collision| [from.body_a, from.body_b].map(|body| ends.get(body));
-        let fetch_next = |at: usize| prefetch(ahead.get(at).copied().flatten());
         let mut good = true;
         if let Some(quick) = quick {
-            for (at, (to, (index, from))) in each {
-                fetch_next(at);
+            for (((to, from), ahead), index) in each {
+                prefetch::<Collision>(ahead);
                 let ends = of(from);
                 block.heads &= head(from, ends, scheduled);
                 *to = kind.encode(index, from, ends);
             }
             good = K::look(quick, &block, records);
         } else {
-            for (at, (to, (index, from))) in each {
-                fetch_next(at);
+            for (((to, from), ahead), index) in each {
+                prefetch::<Collision>(ahead);
                 *to = kind.encode(index, from, of(from));
             }
         }

@@ -4,11 +4,11 @@
 //! the other, each a run of whole beats upwards, as memory that combines writes wants them. Nothing
 //! is read back: the sum that the accelerator is checked with is taken on the way.
 
-use bitstream_model::interface::record::Beat;
+use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
 use super::stripe::{Deal, Layout, Place};
 use super::unpack::total;
-use crate::platform::Lanes;
+use crate::platform::{LINE, Lanes, fetch_to_write};
 
 /// Records of a block. Divisible by the records of a group of every stripe, so that each block
 /// begins with a group; and so few that a block, read and written, lies in the innermost cache.
@@ -60,8 +60,11 @@ impl<'a, 'b> Dealer<'a, 'b> {
     fn groups<'c, const G: usize>(&mut self, beats: &'c [Beat]) -> &'c [Beat] {
         let (groups, rest) = beats.as_chunks::<G>();
         for (channel, to) in self.channels.iter_mut().enumerate() {
-            let (places, share) = places::<G>(self.deal.group(), channel);
-            let to = &mut to[self.deal.take(channel, groups.len() * share)];
+            let (places, share) = self.deal.places::<G>(channel);
+            let place = self.deal.take(channel, groups.len() * share);
+            // Those of the next block.
+            soon_written(to, place.end, place.len());
+            let to = &mut to[place];
             let sum = &mut self.sum;
             match share {
                 0 => {}
@@ -91,17 +94,14 @@ impl<'a, 'b> Dealer<'a, 'b> {
     }
 }
 
-/// Which beats of a group of `G` go to a channel, and how many they are.
+/// Says that beats will be written soon: of memory that is cached, a line that is written in part
+/// comes into the cache first.
 #[inline(always)]
-pub(super) fn places<const G: usize>(group: &[u8], channel: usize) -> ([usize; G], usize) {
-    let (mut places, mut share) = ([0; G], 0);
-    for (place, stream) in group.iter().enumerate().take(G) {
-        if usize::from(*stream) == channel {
-            places[share] = place;
-            share += 1;
-        }
+fn soon_written(to: &[Beat], first: usize, count: usize) {
+    let first = to.as_ptr().wrapping_add(first);
+    for beat in (0..count).step_by(LINE / BEAT_BYTES) {
+        fetch_to_write(first.wrapping_add(beat));
     }
-    (places, share)
 }
 
 /// Writes the `S` beats of each group that go to one channel, and adds them up.

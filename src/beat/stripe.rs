@@ -130,15 +130,34 @@ pub(super) struct Deal {
     group: &'static [u8],
     at: usize,
     slots: [usize; CHANNELS],
+    /// What goes to each channel.
+    shares: [Share; CHANNELS],
 }
+
+/// The beats of a group that go to one channel.
+#[derive(Debug, Clone, Copy, Default)]
+struct Share {
+    /// Which they are; the first `count` of these.
+    places: [usize; GROUP],
+    count: usize,
+}
+
+/// Beats of a group at most, for [`Deal::places`].
+const GROUP: usize = 8;
 
 /// Channels at most.
 const CHANNELS: usize = bitstream_model::interface::address_map::DMA_COUNT_MAX;
 
 impl Deal {
     /// From the first beat on.
-    pub(super) const fn new(stripe: Stripe) -> Self {
-        Self { group: stripe.streams, at: 0, slots: [0; CHANNELS] }
+    pub(super) fn new(stripe: Stripe) -> Self {
+        let mut shares = [Share::default(); CHANNELS];
+        for (place, stream) in stripe.streams.iter().enumerate().take(GROUP) {
+            let share = &mut shares[usize::from(*stream)];
+            share.places[share.count] = place;
+            share.count += 1;
+        }
+        Self { group: stripe.streams, at: 0, slots: [0; CHANNELS], shares }
     }
 
     /// Where the next beat goes.
@@ -162,6 +181,14 @@ impl Deal {
     /// Whether a group is one beat for each of its channels, in their order.
     pub(super) fn one_a_channel(&self) -> bool {
         (0..).zip(self.group).all(|(channel, stream)| channel == *stream)
+    }
+
+    /// Which beats of a group of `G` go to a channel, and how many they are.
+    #[inline(always)]
+    pub(super) fn places<const G: usize>(&self, channel: usize) -> ([usize; G], usize) {
+        const { assert!(G <= GROUP, "they are kept") };
+        let Share { places, count } = self.shares[channel];
+        (std::array::from_fn(|at| places[at]), count)
     }
 
     /// Takes the next slots of one channel. The caller does so for all channels, and whole groups.

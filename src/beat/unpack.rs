@@ -6,7 +6,6 @@
 use bitstream_model::interface::record::{Beat, LANES, WORD_LANE, result};
 
 pub(crate) use super::deal::BLOCK;
-use super::deal::places;
 use super::stripe::{Deal, Layout, Place};
 use crate::platform::Lanes;
 use crate::record::largest::{Largest, MAGNITUDE};
@@ -129,7 +128,7 @@ impl<'a> Collector<'a> {
             return rest;
         }
         for (channel, from) in self.channels.iter().enumerate() {
-            let (places, share) = places::<G>(self.deal.group(), channel);
+            let (places, share) = self.deal.places::<G>(channel);
             let from = &from[self.deal.take(channel, groups.len() * share)];
             let sum = &mut self.sum;
             match share {

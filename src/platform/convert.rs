@@ -5,35 +5,52 @@
 //! integers. It does what is left over, and everything where there are no such instructions.
 #![allow(unsafe_code, reason = "not every processor has the instructions, and vectors are cast")]
 
-use bitstream_model::interface::record::LANES;
+use bitstream_model::interface::record::{LANES, WORD_LANE};
 use half::f16;
 use half::slice::{HalfBitsSliceExt as _, HalfFloatSliceExt as _};
 
-/// Rounds numbers to binary16, to nearest even.
+/// Rounds the numbers of records to binary16, to nearest even. Of the rows that `integers` says, the
+/// last word is an unsigned integer, whose lower half is taken.
 ///
-/// Shape: as many rows of either.
-#[inline]
-pub(crate) fn to_binary16(from: &[[f32; LANES]], to: &mut [[u16; LANES]]) {
+/// Shape: as many records of either.
+#[inline(always)]
+pub(crate) fn to_binary16<const ROWS: usize>(
+    from: &[[Wide; ROWS]],
+    integers: &[bool; ROWS],
+    to: &mut [[Narrow; ROWS]],
+) {
     #[cfg(target_arch = "x86_64")]
-    let (from, to) = match x86::there() {
+    if x86::there() {
         // SAFETY: the processor has the instructions that the function is compiled for, and the system
         // keeps their registers.
-        true => unsafe { x86::to_binary16(from, to) },
-        false => (from, to),
-    };
-    #[cfg(target_arch = "aarch64")]
-    let (from, to) = aarch64::to_binary16(from, to);
-    if !from.is_empty() {
-        let to: &mut [f16] = to.as_flattened_mut().reinterpret_cast_mut();
-        to.convert_from_f32_slice(from.as_flattened());
+        return unsafe { x86::to_binary16(from, integers, to) };
     }
+    for (from, to) in from.iter().zip(to) {
+        for ((from, to), integer) in from.iter().zip(to).zip(integers) {
+            *to = row(from, *integer);
+        }
+    }
+}
+
+/// One row.
+#[inline(always)]
+fn row(from: &Wide, integer: bool) -> Narrow {
+    #[cfg(target_arch = "aarch64")]
+    let mut to = aarch64::to_binary16(from);
+    #[cfg(not(target_arch = "aarch64"))]
+    let mut to = from.map(|bits| f16::from_f32_const(f32::from_bits(bits)).to_bits());
+    if integer {
+        let [low, high, ..] = from[WORD_LANE].to_le_bytes();
+        to[WORD_LANE] = u16::from_le_bytes([low, high]);
+    }
+    to
 }
 
 /// Numbers from binary16.
 ///
 /// Shape: as many rows of either.
 #[inline]
-pub(crate) fn from_binary16(from: &[[u16; LANES]], to: &mut [[f32; LANES]]) {
+pub(crate) fn from_binary16(from: &[Narrow], to: &mut [[f32; LANES]]) {
     #[cfg(target_arch = "x86_64")]
     let (from, to) = match x86::there() {
         // SAFETY: the processor has the instructions that the function is compiled for, and the system
@@ -49,6 +66,11 @@ pub(crate) fn from_binary16(from: &[[u16; LANES]], to: &mut [[f32; LANES]]) {
     }
 }
 
+/// A row of words of 32 bits.
+type Wide = [u32; LANES];
+/// A row of words of sixteen bits.
+type Narrow = [u16; LANES];
+
 /// What is left to do.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 type Rest<'a, From, To> = (&'a [[From; LANES]], &'a mut [[To; LANES]]);
@@ -56,10 +78,12 @@ type Rest<'a, From, To> = (&'a [[From; LANES]], &'a mut [[To; LANES]]);
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use core::arch::x86_64::{
-        __m128i, __m256, _MM_FROUND_TO_NEAREST_INT, _mm256_cvtph_ps, _mm256_cvtps_ph,
+        __m128i, __m256, _MM_FROUND_TO_NEAREST_INT, _mm_or_si128, _mm_packus_epi32, _mm256_and_ps,
+        _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_si128, _mm256_cvtph_ps,
+        _mm256_cvtps_ph, _mm256_extractf128_si256,
     };
 
-    use super::{LANES, Rest};
+    use super::{LANES, Narrow, Rest, Wide};
 
     /// Whether the processor has the instructions. They take the registers of AVX, which a system may
     /// not keep, and whether it does is asked of AVX alone.
@@ -68,18 +92,47 @@ mod x86 {
         std::arch::is_x86_feature_detected!("avx") && std::arch::is_x86_feature_detected!("f16c")
     }
 
-    #[target_feature(enable = "f16c")]
-    pub(super) fn to_binary16<'a>(
-        from: &'a [[f32; LANES]],
-        to: &'a mut [[u16; LANES]],
-    ) -> Rest<'a, f32, u16> {
-        let (pairs, rest) = from.as_chunks::<2>();
-        let (to_pairs, to_rest) = to.as_chunks_mut::<2>();
-        for (from, to) in pairs.iter().zip(to_pairs) {
-            let wide: __m256 = bytemuck::cast(*from);
-            *to = bytemuck::cast(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(wide));
+    #[target_feature(enable = "avx,f16c")]
+    #[inline]
+    pub(super) fn to_binary16<const ROWS: usize>(
+        from: &[[Wide; ROWS]],
+        integers: &[bool; ROWS],
+        to: &mut [[Narrow; ROWS]],
+    ) {
+        // Two records are pairs of rows, however many rows one has.
+        let ((twos, rest), (to_twos, to_rest)) = (from.as_chunks(), to.as_chunks_mut());
+        for (from, to) in twos.iter().zip(to_twos) {
+            let (from, to): (&[[_; ROWS]; 2], &mut [[_; ROWS]; 2]) = (from, to);
+            let pairs = from.as_flattened().as_chunks::<2>().0;
+            let to_pairs = to.as_flattened_mut().as_chunks_mut::<2>().0;
+            for (at, (from, to)) in pairs.iter().zip(to_pairs).enumerate() {
+                *to = pair(from, [integers[2 * at % ROWS], integers[(2 * at + 1) % ROWS]]);
+            }
         }
-        (rest, to_rest)
+        for (from, to) in rest.iter().zip(to_rest) {
+            for ((from, to), integer) in from.iter().zip(to).zip(integers) {
+                [*to, _] = pair(&[*from, [0; LANES]], [*integer, false]);
+            }
+        }
+    }
+
+    /// Two rows.
+    #[target_feature(enable = "avx,f16c")]
+    #[inline]
+    fn pair(rows: &[Wide; 2], integers: [bool; 2]) -> [Narrow; 2] {
+        let wide: __m256 = bytemuck::cast(*rows);
+        if integers == [false; 2] {
+            return bytemuck::cast(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(wide));
+        }
+        // An integer is no number: as one it would be subnormal, or none.
+        let [first, second] = integers.map(|integer| if integer { u32::MAX } else { 0 });
+        let all: __m256 = bytemuck::cast([0, 0, 0, first, 0, 0, 0, second]);
+        let low: __m256 = bytemuck::cast([0, 0, 0, first & 0xFFFF, 0, 0, 0, second & 0xFFFF]);
+        let numbers = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(_mm256_andnot_ps(all, wide));
+        let words = _mm256_castps_si256(_mm256_and_ps(low, wide));
+        let high = _mm256_extractf128_si256::<1>(words);
+        let words = _mm_packus_epi32(_mm256_castsi256_si128(words), high);
+        bytemuck::cast(_mm_or_si128(numbers, words))
     }
 
     #[target_feature(enable = "f16c")]
@@ -101,21 +154,16 @@ mod x86 {
 mod aarch64 {
     use core::arch::aarch64::{float16x4_t, float32x4_t, vcvt_f16_f32, vcvt_f32_f16};
 
-    use super::{LANES, Rest};
+    use super::{LANES, Narrow, Rest, Wide};
 
-    pub(super) fn to_binary16<'a>(
-        from: &'a [[f32; LANES]],
-        to: &'a mut [[u16; LANES]],
-    ) -> Rest<'a, f32, u16> {
-        for (from, to) in from.iter().zip(&mut *to) {
-            // SAFETY: the vector is four f32, of any bits.
-            let wide = unsafe { std::mem::transmute::<[f32; LANES], float32x4_t>(*from) };
-            // SAFETY: every aarch64 that Linux runs on has the instruction.
-            let narrow = unsafe { vcvt_f16_f32(wide) };
-            // SAFETY: the vector is four words of sixteen bits.
-            *to = unsafe { std::mem::transmute::<float16x4_t, [u16; LANES]>(narrow) };
-        }
-        (&[], &mut [])
+    #[inline(always)]
+    pub(super) fn to_binary16(from: &Wide) -> Narrow {
+        // SAFETY: the vector is four f32, of any bits.
+        let wide = unsafe { std::mem::transmute::<Wide, float32x4_t>(*from) };
+        // SAFETY: every aarch64 that Linux runs on has the instruction.
+        let narrow = unsafe { vcvt_f16_f32(wide) };
+        // SAFETY: the vector is four words of sixteen bits.
+        unsafe { std::mem::transmute::<float16x4_t, Narrow>(narrow) }
     }
 
     pub(super) fn from_binary16<'a>(
@@ -152,19 +200,32 @@ mod tests {
         all.iter().flat_map(|number| [*number, -*number]).collect()
     }
 
-    /// However many rows there are at once.
+    /// However many records there are at once, of however many rows, integers beside them or not.
     #[test]
-    fn numbers_are_rounded_as_by_integers() {
-        let wide = wide();
-        let rows = wide.as_chunks::<LANES>().0;
-        assert!(wide.len() - rows.as_flattened().len() < LANES);
+    fn numbers_are_rounded_as_by_integers_and_integers_are_cut() {
+        let wide: Vec<u32> = wide().into_iter().map(f32::to_bits).collect();
+        rounded(&wide, [false; 1]);
+        rounded(&wide, [true, false]);
+        rounded(&wide, [true, true, false]);
+        rounded(&wide, [false, true, false, false, false, true, true]);
+    }
+
+    fn rounded<const ROWS: usize>(wide: &[u32], integers: [bool; ROWS]) {
+        let records = wide.as_chunks::<LANES>().0.as_chunks::<ROWS>().0;
+        assert!(wide.len() - records.as_flattened().as_flattened().len() < LANES * ROWS);
         for together in 1..=5 {
-            for rows in rows.chunks(together) {
-                let mut found = vec![[0; LANES]; rows.len()];
-                to_binary16(rows, &mut found);
-                let expected = rows.as_flattened().iter().map(|it| f16::from_f32_const(*it));
-                for (found, expected) in found.as_flattened().iter().zip(expected) {
-                    assert_eq!(*found, expected.to_bits(), "{expected} of {rows:?}");
+            for records in records.chunks(together) {
+                let mut found = vec![[[0; LANES]; ROWS]; records.len()];
+                to_binary16(records, &integers, &mut found);
+                let rows = records.as_flattened().iter().zip(integers.iter().cycle());
+                for (found, (wide, integer)) in found.as_flattened().iter().zip(rows) {
+                    let number = |bits| f16::from_f32_const(f32::from_bits(bits)).to_bits();
+                    let mut expected = wide.map(number);
+                    if *integer {
+                        expected[WORD_LANE] =
+                            u16::try_from(wide[WORD_LANE] & 0xFFFF).expect("sixteen bits");
+                    }
+                    assert_eq!(*found, expected, "{wide:x?}, {integer}");
                 }
             }
         }

@@ -79,7 +79,7 @@ pub use hardware::MemoryChoice;
 pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
 pub(crate) use lanes::Lanes;
 pub(crate) use memory::{DmaMemory, SharedMemory};
-pub(crate) use prefetch::{fetch, prefetch};
+pub(crate) use prefetch::{LINE, fetch, fetch_to_write, prefetch};
 #[cfg(feature = "emulation")]
 pub(crate) use remote::{RemotePlatform, memory_beside};
 pub use reserved::ReservedMemory;

@@ -1,10 +1,10 @@
 //! This file tells the processor what will be read soon.
 #![allow(unsafe_code, reason = "hints to the caches exist as intrinsics on raw pointers only")]
 
-/// Says that a value, if there is one, will be read soon. Without a branch.
+/// Says that a value will be read soon.
 #[inline(always)]
-pub(crate) fn prefetch<T>(value: Option<&T>) {
-    let first: *const i8 = value.map_or(std::ptr::null(), std::ptr::from_ref).cast();
+pub(crate) fn prefetch<T>(value: &T) {
+    let first: *const i8 = std::ptr::from_ref(value).cast();
     // The lines of its first byte, of every 64th after it, and of its last.
     for line in 0..size_of::<T>().div_ceil(LINE) {
         fetch(first.wrapping_add(line * LINE));
@@ -12,8 +12,26 @@ pub(crate) fn prefetch<T>(value: Option<&T>) {
     fetch(first.wrapping_add(size_of::<T>().saturating_sub(1)));
 }
 
+/// Says that what lies at an address is written soon. Any address will do.
+#[inline(always)]
+pub(crate) fn fetch_to_write<T>(at: *const T) {
+    let at: *const i8 = at.cast();
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: a prefetch neither reads nor faults, whatever the address.
+    unsafe {
+        core::arch::x86_64::_mm_prefetch::<{ core::arch::x86_64::_MM_HINT_ET0 }>(at);
+    }
+    #[cfg(target_arch = "aarch64")]
+    // SAFETY: a prefetch neither faults nor changes registers, whatever the address.
+    unsafe {
+        core::arch::asm!("prfm pstl1keep, [{}]", in(reg) at, options(nostack, preserves_flags, readonly));
+    }
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+    let _ = at;
+}
+
 /// Bytes of a line of a cache.
-const LINE: usize = 64;
+pub(crate) const LINE: usize = 64;
 
 /// Says that what lies at an address is read soon. Any address will do.
 #[inline(always)]

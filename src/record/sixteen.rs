@@ -39,20 +39,22 @@ impl Sixteen {
         integers: &[bool; ROWS],
         narrow: &mut [[Row; ROWS]],
     ) {
-        let (wide, rows) = (records.as_flattened(), narrow.as_flattened_mut());
         match self {
-            Self::Binary16 => to_binary16(bytemuck::cast_slice(wide), rows),
-            Self::Thesis16 => {
-                for (to, from) in rows.iter_mut().zip(wide) {
-                    *to = from.0.map(thesis16::narrow);
-                }
+            Self::Binary16 => {
+                let wide = bytemuck::cast_slice(records.as_flattened()).as_chunks().0;
+                to_binary16(wide, integers, narrow);
             }
-        }
-        for (row, _) in integers.iter().enumerate().filter(|(_, integer)| **integer) {
-            for (to, from) in narrow.iter_mut().zip(records) {
-                #[expect(clippy::cast_possible_truncation, reason = "validated to fit")]
-                let word = from[row].0[WORD_LANE] as u16;
-                to[row][WORD_LANE] = word;
+            Self::Thesis16 => {
+                for (to, from) in narrow.iter_mut().zip(records) {
+                    for ((to, from), integer) in to.iter_mut().zip(from).zip(integers) {
+                        *to = from.0.map(thesis16::narrow);
+                        if *integer {
+                            #[expect(clippy::cast_possible_truncation, reason = "validated to fit")]
+                            let word = from.0[WORD_LANE] as u16;
+                            to[WORD_LANE] = word;
+                        }
+                    }
+                }
             }
         }
     }

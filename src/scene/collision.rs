@@ -131,10 +131,10 @@ impl Collisions for CollisionArrays<'_> {
     }
 
     fn soon(&self, index: usize) {
-        prefetch(self.bodies.get(index));
-        prefetch(self.normals.get(index));
-        prefetch(self.counts.get(index));
-        prefetch(self.contacts.get(index));
+        self.bodies.get(index).into_iter().for_each(prefetch);
+        self.normals.get(index).into_iter().for_each(prefetch);
+        self.counts.get(index).into_iter().for_each(prefetch);
+        self.contacts.get(index).into_iter().for_each(prefetch);
     }
 
     fn collision(&self, index: usize) -> Collision {
