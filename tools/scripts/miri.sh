@@ -21,5 +21,6 @@ export MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-strict-provenance ${MIRIFLAGS:
 attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs --lib -- \
 	platform::mapped::tests::words_and_beats platform::mapped::tests::pieces_of \
 	platform::copy:: platform::fence:: platform::buffer:: axi_dma::ring::
-# Threads of the emulated board, of the scene's detection: they outlive what they borrow.
+# The threads that packing, detection and the emulated board share their work among: they outlive what
+# they borrow.
 attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs-crew --lib
