@@ -3,12 +3,14 @@
 //! is as it was.
 #![cfg(feature = "emulation")]
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, Profile, WINDOWED};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Collision, Contact, OpenOptions, Pose, Shape, StepParameters,
-    Velocity,
+    Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, Contact, Error, InputError,
+    OpenOptions, Pose, Shape, StepParameters, Velocity,
 };
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
@@ -103,6 +105,89 @@ fn a_refusal_is_the_same_before_packing_and_while_packing() {
             // Nothing of it is left.
             let mut state = bodies.clone();
             warm.step(&mut state, &collisions, &parameters).expect("a step");
+            assert_eq!(state, expected);
+        }
+    }
+}
+
+/// What a caller keeps; one of it is wrong at one look, and right at all others.
+struct Unsteady<T> {
+    list: Vec<T>,
+    which: usize,
+    wrong: T,
+    /// The first is 1.
+    at_look: usize,
+    looks: AtomicUsize,
+}
+
+impl<T: Copy> Unsteady<T> {
+    fn look(&self, index: usize) -> T {
+        let wrong =
+            index == self.which && self.looks.fetch_add(1, Ordering::Relaxed) + 1 == self.at_look;
+        if wrong { self.wrong } else { self.list[index] }
+    }
+}
+
+impl Collisions for Unsteady<Collision> {
+    fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        self.look(index)
+    }
+}
+
+impl Bodies for Unsteady<Body> {
+    fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    fn body(&self, index: usize) -> Body {
+        self.look(index)
+    }
+
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        self.list.commit(index, pose, velocity);
+    }
+}
+
+/// What is wrong only while it is packed must not be sent, though nothing is wrong with it later.
+#[test]
+fn what_is_wrong_at_one_look_alone_is_never_sent() {
+    let (bodies, collisions) = scene();
+    for profile in [&FLOAT, &HALF, &MIXED] {
+        // In an order each is looked at once more, before.
+        for (order, at_look) in [(Order::AsGiven, 1), (Order::HazardFree, 2)] {
+            let mut parameters = StepParameters::default();
+            parameters.order = Some(order);
+            let mut board = open(profile);
+            let mut expected = bodies.clone();
+            board.step(&mut expected, &collisions, &parameters).expect("a step");
+
+            let wrong = Collision { count: 0, ..collisions[42] };
+            let (list, looks) = (collisions.clone(), AtomicUsize::new(0));
+            let fickle = Unsteady { list, which: 42, wrong, at_look, looks };
+            let mut state = bodies.clone();
+            let found = board.step(&mut state, &fickle, &parameters).expect_err("one is wrong");
+            assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
+            assert_eq!(state, bodies);
+
+            let wrong = Body { shape: 9, ..bodies[42] };
+            let (list, looks) = (bodies.clone(), AtomicUsize::new(0));
+            let mut fickle = Unsteady { list, which: 42, wrong, at_look, looks };
+            let found =
+                board.step(&mut fickle, &collisions, &parameters).expect_err("one is wrong");
+            assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
+            assert_eq!(fickle.list, bodies);
+            if order == Order::AsGiven {
+                // The same where the caller writes its collisions.
+                fickle.looks = AtomicUsize::new(0);
+                let found = board.write(&fickle, 0, &parameters, |_| ()).expect_err("one is wrong");
+                assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
+            }
+
+            board.step(&mut state, &collisions, &parameters).expect("a step");
             assert_eq!(state, expected);
         }
     }

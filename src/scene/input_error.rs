@@ -62,6 +62,13 @@ pub enum InputError {
     )]
     NotPrepared,
 
+    /// What was refused while it was packed was right when it was looked at again.
+    #[error(
+        "bodies or collisions were wrong when they were packed, and right when they were looked at \
+         again: what is given must stay as it is until the call returns"
+    )]
+    Unsteady,
+
     /// More collisions were written than room was made for.
     #[error("more than the {announced} collisions that were announced were written: announce more")]
     MoreThanAnnounced {

@@ -117,6 +117,8 @@ impl Accelerator {
                 self.pack_in_order(&plan, bank, arranged, (bodies, collisions), parameters)?;
             if !good {
                 self.validate(bodies, collisions, parameters)?;
+                // What was packed is not what was looked at now.
+                return Err(InputError::Unsteady.into());
             }
             sent = Some(packed);
         }

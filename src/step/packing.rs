@@ -94,6 +94,7 @@ impl Device {
             pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), &mut self.packers);
         if !good {
             refuse()?;
+            return Err(InputError::Unsteady);
         }
         let (ends, entries) = (Ends(&self.ends), &mut entries[active]);
         let mut writer = Writer::new(target, ends, plan.collisions, entries);
