@@ -1,10 +1,10 @@
 //! This file writes the velocity and pose segments of a step into the channels' buffers.
 //!
-//! The buffers may be write-combining memory of a board, so they are written once, upwards, in
-//! whole beats, and never read: the sum that the accelerator is checked with is taken from the
-//! values on their way.
+//! The buffers may be write-combining memory of a board, so they are written once, each thread's range
+//! of them upwards, in whole beats, and never read: the sum that the accelerator is checked with is
+//! taken from the values on their way.
 //!
-//! It goes by blocks of records that lie in the cache: what the caller has is read into one, looked
+//! A range goes by blocks of records that lie in the cache: what the caller has is read into one, looked
 //! at, made rows of ([`record`]) and, where the stream has sixteen bits, narrowed; then the block is
 //! dealt out to the channels ([`Dealer`]). What is wrong with the input is not said here, only that
 //! something is.

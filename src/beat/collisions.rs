@@ -1,6 +1,7 @@
 //! This file writes the collision segments of a step into the channels' buffers.
 //!
-//! As [`bodies`](super::bodies) writes theirs: block by block, once, upwards, never read back.
+//! As [`bodies`](super::bodies) writes theirs: by ranges for several threads, and in these block by block,
+//! once, upwards, never read back.
 
 use std::ops::Range;
 use std::{mem, ptr};
