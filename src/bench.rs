@@ -6,6 +6,7 @@ use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
 use crate::beat::bodies::{pack_bodies, survey};
 use crate::beat::collisions::{Entries, pack_collisions};
+use crate::beat::ranges::Packers;
 use crate::beat::stripe::Segment;
 use crate::beat::target::Target;
 use crate::beat::unpack::Record;
@@ -49,9 +50,9 @@ impl CollisionPacker {
         let channels = &mut channels[..streams];
         let target = Target { variant: &self.variant, shapes, quick: None };
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
-        survey(target, bodies, bodies.len(), into);
+        survey(target, bodies, bodies.len(), into, &mut Packers::alone());
         let entries = Entries { collisions, count, scheduled: false, words: None };
-        pack_collisions(target, Ends(&self.ends), &entries, channels).0
+        pack_collisions(target, Ends(&self.ends), &entries, channels, &mut Packers::alone()).0
     }
 }
 
@@ -64,12 +65,14 @@ pub struct StepPacker {
     poses: [Vec<Beat>; DMA_COUNT_MAX],
     ends: Vec<End>,
     statics: Vec<u32>,
+    packers: Packers,
 }
 
 impl StepPacker {
-    /// For one bitstream, of the capacities of its profile; without memory of its own yet.
+    /// For one bitstream, of the capacities of its profile; without memory of its own yet. As many
+    /// threads write as [`OpenOptions::pack_threads`](crate::OpenOptions::pack_threads) says.
     #[must_use]
-    pub fn new(variant: Variant) -> Self {
+    pub fn new(variant: Variant, threads: Option<usize>) -> Self {
         Self {
             limits: Limits {
                 variant,
@@ -86,6 +89,7 @@ impl StepPacker {
             poses: Default::default(),
             ends: Vec::new(),
             statics: Vec::new(),
+            packers: Packers::new(threads),
         }
     }
 
@@ -146,8 +150,14 @@ impl StepPacker {
         let poses = &mut channels(&mut self.poses, Segment::Poses, count, target);
         let active = ..target.variant.profile.mm2s_widths.len();
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
-        let (velocities, poses, good) =
-            pack_bodies(target, bodies, count, into, &mut velocities[active], &mut poses[active]);
+        let (velocities, poses, good) = pack_bodies(
+            target,
+            bodies,
+            count,
+            into,
+            (&mut velocities[active], &mut poses[active]),
+            &mut self.packers,
+        );
         (velocities.wrapping_add(poses), good)
     }
 
@@ -161,7 +171,13 @@ impl StepPacker {
         let channels = &mut channels(&mut self.collisions, Segment::Collisions, count, target);
         let active = ..target.variant.profile.mm2s_widths.len();
         let entries = Entries { collisions, count, scheduled, words: None };
-        pack_collisions(target, Ends(&self.ends), &entries, &mut channels[active])
+        pack_collisions(
+            target,
+            Ends(&self.ends),
+            &entries,
+            &mut channels[active],
+            &mut self.packers,
+        )
     }
 }
 
@@ -189,7 +205,7 @@ impl Unpacker {
         let (mut ends, mut statics) = (Vec::new(), Vec::new());
         let target = Target { variant: &variant, shapes, quick: None };
         let into = Survey { ends: &mut ends, statics: &mut statics };
-        survey(target, bodies, bodies.len(), into);
+        survey(target, bodies, bodies.len(), into, &mut Packers::alone());
         Self { variant, channels, statics, spare: Vec::new() }
     }
 

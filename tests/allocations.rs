@@ -7,18 +7,24 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, EmulatedBoard, Hazards};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Collision, Contact, OpenOptions, Pose, Shape, StepParameters,
-    Velocity,
+    Accelerator, BoardChoice, Body, Collision, Collisions, Contact, OpenOptions, Pose, Shape,
+    StepParameters, Velocity,
 };
 
 thread_local! {
     static COUNTED: Cell<u64> = const { Cell::new(0) };
+    /// Whether this thread has read a [`Watching`] container.
+    static WATCHED: Cell<bool> = const { Cell::new(false) };
 }
+
+/// Calls of all threads that have read a [`Watching`] container, from then on.
+static OF_WATCHED: AtomicU64 = AtomicU64::new(0);
 
 /// The system's allocator, counting the calls of each thread.
 struct Counting;
@@ -26,6 +32,9 @@ struct Counting;
 fn count() {
     // A thread that is ending has no counter any more.
     let _ = COUNTED.try_with(|counted| counted.set(counted.get() + 1));
+    if WATCHED.try_with(Cell::get) == Ok(true) {
+        OF_WATCHED.fetch_add(1, Ordering::Relaxed);
+    }
 }
 
 // SAFETY: every call goes to the system's allocator with the arguments as they came; counting
@@ -76,9 +85,13 @@ fn scene() -> (Vec<Body>, Vec<Collision>) {
 }
 
 fn open(config: BoardConfig) -> Accelerator {
+    open_for(config, None)
+}
+
+fn open_for(config: BoardConfig, pack_threads: Option<usize>) -> Accelerator {
     let board = EmulatedBoard::new(config).expect("a board that can be built");
-    let options =
-        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
+    let board = BoardChoice::Emulated(board.cpu_port());
+    let options = OpenOptions { board, pack_threads, ..OpenOptions::default() };
     let mut accelerator = Accelerator::open(options).expect("the emulated board");
     accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("they fit");
     accelerator
@@ -215,4 +228,51 @@ fn preparing_allocates_nothing_on_a_design_that_keeps_live_bodies_alone() {
     }
     assert!(counted[0] > 0, "the second bank is made: does the allocator count?");
     assert_eq!(counted[6..], [0; 4], "{counted:?}");
+}
+
+/// Collisions over and over, which mark the threads that read them; how many these are.
+struct Watching<'a> {
+    list: &'a [Collision],
+    count: usize,
+    readers: &'a AtomicU64,
+}
+
+impl Collisions for Watching<'_> {
+    fn len(&self) -> usize {
+        self.count
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        if !WATCHED.replace(true) {
+            self.readers.fetch_add(1, Ordering::Relaxed);
+        }
+        self.list[index % self.list.len()]
+    }
+}
+
+/// Neither on the caller's thread nor on those that help it with writing records.
+#[test]
+fn steps_that_several_threads_pack_allocate_nothing_on_any_of_them() {
+    // Which thread comes in time is the system's to say: bounded, as it would never say it of one that
+    // does not exist.
+    const PATIENCE: usize = 10_000;
+    let mut accelerator = open_for(BoardConfig::default(), Some(2));
+    let (mut bodies, list) = scene();
+    let readers = AtomicU64::new(0);
+    let parameters = StepParameters::default();
+    let mut step = |count| {
+        let before = OF_WATCHED.load(Ordering::Relaxed);
+        let of_step = Watching { list: &list, count, readers: &readers };
+        accelerator.step(&mut bodies, &of_step, &parameters).expect("nothing disturbs it");
+        OF_WATCHED.load(Ordering::Relaxed) - before
+    };
+    let steps = (0..PATIENCE).find(|_| {
+        step(9000);
+        readers.load(Ordering::Relaxed) == 2
+    });
+    assert!(steps.is_some(), "nobody helps");
+    let counted = [9000, 8000, 9000, 7000, 6500, 9000].map(&mut step);
+    assert_eq!(counted, [0; 6]);
+    // Or it would hold of nothing.
+    assert!(step(90_000) > 0, "larger buffers are made: does the allocator count?");
 }

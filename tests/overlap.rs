@@ -7,7 +7,7 @@
 //! are to take.
 #![cfg(feature = "emulation")]
 
-use std::cell::Cell;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use bitstream_model::{BoardConfig, CpuPort, EmulatedBoard};
@@ -33,12 +33,17 @@ const PIECES: u32 = 100;
 #[derive(Debug)]
 struct Packing<'a> {
     world: &'a World,
-    left: Cell<u32>,
+    left: AtomicU32,
+}
+
+/// Takes one of what is left; whether there was one.
+fn take(left: &AtomicU32) -> bool {
+    left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok()
 }
 
 impl Drop for Packing<'_> {
     fn drop(&mut self) {
-        assert_eq!(self.left.get(), 0, "all of its time has passed");
+        assert_eq!(self.left.load(Ordering::Relaxed), 0, "all of its time has passed");
     }
 }
 
@@ -48,9 +53,7 @@ impl Collisions for Packing<'_> {
     }
 
     fn collision(&self, index: usize) -> Collision {
-        let left = self.left.get();
-        if left > 0 && index.is_multiple_of(self.len().div_ceil(2 * PIECES as usize)) {
-            self.left.set(left - 1);
+        if index.is_multiple_of(self.len().div_ceil(2 * PIECES as usize)) && take(&self.left) {
             self.world.port.pause(self.world.packing / PIECES);
         }
         self.world.collisions[index]
@@ -108,7 +111,7 @@ impl World {
     }
 
     fn packing(&self) -> Packing<'_> {
-        Packing { world: self, left: Cell::new(PIECES) }
+        Packing { world: self, left: AtomicU32::new(PIECES) }
     }
 
     /// Its bits.

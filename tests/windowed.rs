@@ -9,8 +9,8 @@
 mod common;
 mod vectors;
 
-use std::cell::Cell;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bitstream_model::interface::profile::{
     FLOAT, Flow, HALF, Inertia, MIXED, Profile, WINDOWED, WINDOWED16, Window,
@@ -289,7 +289,7 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
 struct Fickle<'a> {
     list: &'a [Collision],
     which: usize,
-    looks: Cell<usize>,
+    looks: AtomicUsize,
     firm: usize,
     once: bool,
     /// Whether nothing tells it from what an order makes to fill a gap.
@@ -304,9 +304,9 @@ impl Collisions for Fickle<'_> {
     fn collision(&self, index: usize) -> Collision {
         let mut collision = self.list[index];
         if index == self.which {
-            self.looks.set(self.looks.get() + 1);
-            let lost = self.looks.get() > self.firm;
-            if lost && !(self.once && self.looks.get() > self.firm + 1) {
+            let looks = self.looks.fetch_add(1, Ordering::Relaxed) + 1;
+            let lost = looks > self.firm;
+            if lost && !(self.once && looks > self.firm + 1) {
                 collision.count = 0;
                 if self.like_padding {
                     collision.body_b = collision.body_a;
@@ -338,7 +338,8 @@ fn a_collision_that_loses_its_points_on_the_way_fails_the_step() {
         let mut expected = start.clone();
         windowed.step(&mut expected, &list, &parameters).expect("a step");
         let mut bodies = start.clone();
-        let fickle = Fickle { list: &list, which, looks: Cell::new(0), firm, once, like_padding };
+        let fickle =
+            Fickle { list: &list, which, looks: AtomicUsize::new(0), firm, once, like_padding };
         match windowed.step(&mut bodies, &fickle, &parameters) {
             // It was looked at no more.
             Ok(_) => assert_eq!(differing(&bodies, &expected), 0, "{which} after {firm}"),

@@ -1,24 +1,28 @@
 //! This file writes the velocity and pose segments of a step into the channels' buffers.
 //!
-//! The buffers may be write-combining memory of a board, so they are written once, upwards, in
-//! whole beats, and never read: the sum that the accelerator is checked with is taken from the
-//! values on their way.
+//! The buffers may be write-combining memory of a board, so they are written once, each thread's range
+//! of them upwards, in whole beats, and never read: the sum that the accelerator is checked with is
+//! taken from the values on their way.
 //!
-//! It goes by blocks of records that lie in the cache: what the caller has is read into one, looked
+//! A range goes by blocks of records that lie in the cache: what the caller has is read into one, looked
 //! at, made rows of ([`record`]) and, where the stream has sixteen bits, narrowed; then the block is
 //! dealt out to the channels ([`Dealer`]). What is wrong with the input is not said here, only that
 //! something is.
+
+use std::mem;
+use std::ops::Range;
 
 use bitstream_model::interface::profile::Inertia;
 use bitstream_model::interface::record::{Beat, pose, velocity};
 
 use super::deal::{BLOCK, Dealer};
+use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stage::Stage;
 use super::stripe::Segment;
 use super::target::Target;
 use crate::platform::{Work, in_wide_vectors};
 use crate::record;
-use crate::record::end::Survey;
+use crate::record::end::{End, Survey};
 use crate::scene::{Bodies, Body, Pose, Shape, Velocity};
 
 /// Looks at all bodies and remembers what their collisions' records are made from, and which never
@@ -27,11 +31,12 @@ pub(crate) fn survey<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
     count: usize,
-    mut into: Survey<'_>,
+    into: Survey<'_>,
+    packers: &mut Packers,
 ) -> bool {
-    into.clear();
-    let mut packer = BodyPacker { target, into: Some(into), velocities: None, poses: None };
-    packer.write_all(bodies, count)
+    let wanted = Wanted { into: Some(into), velocities: None, poses: None };
+    let (.., good) = pack(target, bodies, count, wanted, packers);
+    good
 }
 
 /// Surveys `count` bodies and writes their velocity and pose records, the first with their inertia
@@ -43,17 +48,13 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
     count: usize,
-    mut into: Survey<'_>,
-    velocities: &mut [&mut [Beat]],
-    poses: &mut [&mut [Beat]],
+    into: Survey<'_>,
+    (velocities, poses): (&mut [&mut [Beat]], &mut [&mut [Beat]]),
+    packers: &mut Packers,
 ) -> (u32, u32, bool) {
-    into.clear();
-    let velocities = Some(Velocities::new(target, velocities));
-    let poses = Some(Poses::new(target, poses));
-    let mut packer = BodyPacker { target, into: Some(into), velocities, poses };
-    let good = packer.write_all(bodies, count);
-    let [velocities, poses] = packer.finish();
-    (velocities, poses, good)
+    let wanted =
+        Wanted { into: Some(into), velocities: Some(whole(velocities)), poses: Some(whole(poses)) };
+    pack(target, bodies, count, wanted, packers)
 }
 
 /// Writes the velocity records of `count` bodies, and their inertia where the bitstream wants it;
@@ -65,11 +66,11 @@ pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
     bodies: &B,
     count: usize,
     channels: &mut [&mut [Beat]],
+    packers: &mut Packers,
 ) -> u32 {
-    let velocities = Some(Velocities::new(target, channels));
-    let mut packer = BodyPacker { target, into: None, velocities, poses: None };
-    packer.write_all(bodies, count);
-    packer.finish()[0]
+    let wanted = Wanted { into: None, velocities: Some(whole(channels)), poses: None };
+    let (sum, ..) = pack(target, bodies, count, wanted, packers);
+    sum
 }
 
 /// Writes the pose records of `count` bodies; otherwise as [`pack_velocities`].
@@ -78,73 +79,194 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
     bodies: &B,
     count: usize,
     channels: &mut [&mut [Beat]],
+    packers: &mut Packers,
 ) -> u32 {
-    let poses = Some(Poses::new(target, channels));
-    let mut packer = BodyPacker { target, into: None, velocities: None, poses };
-    packer.write_all(bodies, count);
-    packer.finish()[1]
+    let wanted = Wanted { into: None, velocities: None, poses: Some(whole(channels)) };
+    let (_, sum, _) = pack(target, bodies, count, wanted, packers);
+    sum
+}
+
+/// What is wanted of bodies.
+struct Wanted<'a> {
+    into: Option<Survey<'a>>,
+    velocities: Option<Piece<'a>>,
+    poses: Option<Piece<'a>>,
+}
+
+/// Surveys `count` bodies and writes their records, whatever of it is wanted; the sums of velocity and
+/// of pose records, and whether validation refuses none of those that are surveyed.
+fn pack<B: Bodies + ?Sized>(
+    target: Target<'_>,
+    bodies: &B,
+    count: usize,
+    wanted: Wanted<'_>,
+    packers: &mut Packers,
+) -> (u32, u32, bool) {
+    let Wanted { mut into, velocities, poses } = wanted;
+    let ends = into.as_mut().map(|into| into.ends(count));
+    let cut = |size| parts(target, (count, size), ends, velocities, poses);
+    let mut all = Outcome::default();
+    let work = |part| pack_part(target, bodies, part);
+    packers.each(count, cut, work, |of_part| all.join(of_part));
+    let Outcome { velocities, poses, good, still } = all;
+    if let Some(into) = &mut into {
+        into.settle(still);
+    }
+    (velocities, poses, good)
+}
+
+/// A range of bodies, and where that goes which is wanted of them.
+struct Part<'a> {
+    range: Range<usize>,
+    ends: Option<&'a mut [End]>,
+    velocities: Option<Piece<'a>>,
+    poses: Option<Piece<'a>>,
+}
+
+/// Cuts `count` bodies into parts of `size`.
+fn parts<'a>(
+    target: Target<'_>,
+    (count, size): (usize, usize),
+    ends: Option<&'a mut [End]>,
+    velocities: Option<Piece<'a>>,
+    poses: Option<Piece<'a>>,
+) -> impl Iterator<Item = Part<'a>> + Send {
+    let [of_velocities, of_poses] =
+        [Segment::Velocities, Segment::Poses].map(|segment| segment.layout(target.variant));
+    let mut ends = ends.map(|ends| ends.chunks_mut(size));
+    let mut velocities = velocities.map(|channels| Pieces::new(&of_velocities, size, channels));
+    let mut poses = poses.map(|channels| Pieces::new(&of_poses, size, channels));
+    ranges(count, size).map(move |range| Part {
+        range,
+        ends: ends.as_mut().map(|ends| ends.next().unwrap_or_default()),
+        velocities: velocities.as_mut().map(Pieces::cut),
+        poses: poses.as_mut().map(Pieces::cut),
+    })
+}
+
+/// What comes of bodies: the sums of the words written, whether validation refuses none, and between
+/// which indices those are that never move.
+struct Outcome {
+    velocities: u32,
+    poses: u32,
+    good: bool,
+    still: Range<usize>,
+}
+
+/// Around it and another range is the other.
+const NONE: Range<usize> = Range { start: usize::MAX, end: 0 };
+
+impl Default for Outcome {
+    fn default() -> Self {
+        Self { velocities: 0, poses: 0, good: true, still: NONE }
+    }
+}
+
+impl Outcome {
+    fn join(&mut self, other: Self) {
+        self.velocities = self.velocities.wrapping_add(other.velocities);
+        self.poses = self.poses.wrapping_add(other.poses);
+        self.good &= other.good;
+        self.still = around(&self.still, &other.still);
+    }
+}
+
+/// The least range with both in it.
+fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
+    one.start.min(other.start)..one.end.max(other.end)
+}
+
+/// Does with one part what is wanted.
+///
+/// Here is only what depends on the caller's container: where the bodies of a block lie.
+fn pack_part<B: Bodies + ?Sized>(target: Target<'_>, bodies: &B, mut part: Part<'_>) -> Outcome {
+    let Part { range, .. } = &part;
+    let (first, until) = (range.start, range.end);
+    let mut packer = BodyPacker::new(target, &mut part);
+    let mut copies = [NOBODY; BLOCK];
+    for first in (first..until).step_by(BLOCK) {
+        let block = &mut copies[..(until - first).min(BLOCK)];
+        let lie = bodies.structures().and_then(|all| all.get(first..first + block.len()));
+        let block = lie.unwrap_or_else(|| {
+            for (at, to) in block.iter_mut().enumerate() {
+                *to = bodies.body(first + at);
+            }
+            block
+        });
+        packer.write(block);
+    }
+    packer.finish()
 }
 
 /// Surveys bodies and writes their records, whatever of it is wanted, a block at a time.
-struct BodyPacker<'a, 'b, 'c> {
+struct BodyPacker<'a, 'b> {
     target: Target<'a>,
-    into: Option<Survey<'a>>,
+    /// The index of the next.
+    next: usize,
+    /// The ends that are not written yet.
+    ends: Option<&'a mut [End]>,
     velocities: Option<Velocities<'a, 'b>>,
-    poses: Option<Poses<'a, 'c>>,
+    poses: Option<Poses<'a, 'b>>,
+    good: bool,
+    still: Range<usize>,
 }
 
-impl BodyPacker<'_, '_, '_> {
-    /// Goes through `count` bodies; whether validation refuses none of those that are surveyed.
-    ///
-    /// Here is only what depends on the caller's container: where the bodies of a block lie.
-    fn write_all<B: Bodies + ?Sized>(&mut self, bodies: &B, count: usize) -> bool {
-        let mut copies = [NOBODY; BLOCK];
-        let mut good = true;
-        for first in (0..count).step_by(BLOCK) {
-            let block = &mut copies[..(count - first).min(BLOCK)];
-            let lie = bodies.structures().and_then(|all| all.get(first..first + block.len()));
-            let block = lie.unwrap_or_else(|| {
-                for (at, to) in block.iter_mut().enumerate() {
-                    *to = bodies.body(first + at);
-                }
-                block
-            });
-            good &= self.write(first, block);
+impl<'a, 'b> BodyPacker<'a, 'b> {
+    fn new(target: Target<'a>, part: &'a mut Part<'b>) -> Self {
+        let Part { range, ends, velocities, poses } = part;
+        let Outcome { good, still, .. } = Outcome::default();
+        Self {
+            target,
+            next: range.start,
+            ends: ends.as_deref_mut(),
+            velocities: velocities.as_mut().map(|channels| Velocities::new(target, channels)),
+            poses: poses.as_mut().map(|channels| Poses::new(target, channels)),
+            good,
+            still,
         }
-        good
     }
 
-    /// Does it with the next bodies, at most [`BLOCK`], the first of which has the index `first`;
-    /// whether validation refuses none that is surveyed.
-    fn write(&mut self, first: usize, bodies: &[Body]) -> bool {
-        in_wide_vectors(Writing { packer: self, first, bodies })
+    /// Does it with the next bodies, at most [`BLOCK`].
+    fn write(&mut self, bodies: &[Body]) {
+        in_wide_vectors(Writing { packer: self, bodies });
     }
 
-    /// Ends the segments; the sums of the words written, modulo 2^32.
-    fn finish(self) -> [u32; 2] {
-        let Self { velocities, poses, .. } = self;
-        [velocities.map(Velocities::finish), poses.map(Poses::finish)]
-            .map(Option::unwrap_or_default)
+    /// Ends the segments.
+    fn finish(self) -> Outcome {
+        let Self { velocities, poses, good, still, .. } = self;
+        let [velocities, poses] = [velocities.map(Velocities::finish), poses.map(Poses::finish)]
+            .map(Option::unwrap_or_default);
+        Outcome { velocities, poses, good, still }
     }
 }
 
 /// A block of bodies, and where it goes.
-struct Writing<'p, 'a, 'b, 'c> {
-    packer: &'p mut BodyPacker<'a, 'b, 'c>,
-    first: usize,
+struct Writing<'p, 'a, 'b> {
+    packer: &'p mut BodyPacker<'a, 'b>,
     bodies: &'p [Body],
 }
 
-impl Work for Writing<'_, '_, '_, '_> {
-    type Output = bool;
+impl Work for Writing<'_, '_, '_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run(self) -> bool {
-        let Self { packer: BodyPacker { target, into, velocities, poses }, first, bodies } = self;
-        let mut good = true;
-        if let Some(into) = into {
-            let ends = into.add(bodies, target.shapes);
-            good = target.quick.is_none_or(|quick| quick.bodies(first, bodies, ends));
+    fn run(self) {
+        let Self { packer, bodies } = self;
+        let BodyPacker { target, next, ends, velocities, poses, good, still } = packer;
+        let range = *next..*next + bodies.len();
+        *next = range.end;
+        if let Some(rest) = ends {
+            let (ends, behind) = mem::take(rest).split_at_mut(bodies.len());
+            *rest = behind;
+            let mut any_still = false;
+            for (end, body) in ends.iter_mut().zip(bodies) {
+                *end = End::of(body, target.shapes);
+                any_still |= end.is_static();
+            }
+            *good &= target.quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends));
+            if any_still {
+                *still = around(still, &range);
+            }
         }
         if let Some(velocities) = velocities {
             velocities.write(bodies);
@@ -152,7 +274,6 @@ impl Work for Writing<'_, '_, '_, '_> {
         if let Some(poses) = poses {
             poses.write(bodies);
         }
-        good
     }
 }
 

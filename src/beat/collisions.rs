@@ -1,13 +1,16 @@
 //! This file writes the collision segments of a step into the channels' buffers.
 //!
-//! As [`bodies`](super::bodies) writes theirs: block by block, once, upwards, never read back.
+//! As [`bodies`](super::bodies) writes theirs: by ranges for several threads, and in these block by block,
+//! once, upwards, never read back.
 
+use std::ops::Range;
 use std::{mem, ptr};
 
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, collision, relative};
 
 use super::deal::{BLOCK, Dealer};
+use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stage::Stage;
 use super::stripe::Segment;
 use super::target::Target;
@@ -97,25 +100,50 @@ const REFUSED: [u32; 2] = [u32::MAX; 2];
 /// A body that does not exist has its position written as zeros, and one without a shape is static.
 /// Should a caller's [`Collisions`] answer differently from one look to the next, the accelerator
 /// refuses the index.
-///
-/// Here is only what depends on the caller's container: where each collision of a block lies. They
-/// may lie anywhere, and those of the next block are on their way while a block is written.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
     entries: &Entries<'_, C>,
     channels: &mut [&mut [Beat]],
+    packers: &mut Packers,
 ) -> (u32, bool) {
-    let Entries { collisions, count, scheduled, words } = *entries;
-    let mut packer = CollisionPacker::new(target, ends, Marks { scheduled, words }, channels);
+    let layout = Segment::Collisions.layout(target.variant);
+    let (mut sum, mut good) = (0_u32, true);
+    let channels = whole(channels);
+    let cut = |size| {
+        let mut pieces = Pieces::new(&layout, size, channels);
+        ranges(entries.count, size).map(move |range| (range, pieces.cut()))
+    };
+    let work = |part: (Range<usize>, Piece<'_>)| pack_range(target, ends, entries, part);
+    packers.each(entries.count, cut, work, |(of_range, range_good): (u32, bool)| {
+        sum = sum.wrapping_add(of_range);
+        good &= range_good;
+    });
+    (sum, good)
+}
+
+/// Writes the records of a range of collisions, otherwise as [`pack_collisions`].
+///
+/// Here is only what depends on the caller's container: where each collision of a block lies. They
+/// may lie anywhere, and those of the next block are on their way while a block is written.
+fn pack_range<C: Collisions + ?Sized>(
+    target: Target<'_>,
+    ends: Ends<'_>,
+    entries: &Entries<'_, C>,
+    (range, mut channels): (Range<usize>, Piece<'_>),
+) -> (u32, bool) {
+    let Entries { collisions, scheduled, words, .. } = *entries;
+    let marks = Marks { scheduled, words };
+    let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
     let mut good = true;
     let (mut here, mut next) = (&mut [&ELSEWHERE; BLOCK], &mut [&ELSEWHERE; BLOCK]);
     let mut copies = [NOTHING; BLOCK];
-    let mut all_lie = find(collisions, 0, &mut here[..count.min(BLOCK)]);
-    for first in (0..count).step_by(BLOCK) {
+    let until = range.end;
+    let mut all_lie = find(collisions, range.start, &mut here[..range.len().min(BLOCK)]);
+    for first in range.step_by(BLOCK) {
         let here_lie = all_lie;
-        let behind = count.min(first + BLOCK);
-        let ahead = &mut next[..(count - behind).min(BLOCK)];
+        let behind = until.min(first + BLOCK);
+        let ahead = &mut next[..(until - behind).min(BLOCK)];
         all_lie = find(collisions, behind, ahead);
         let block = &here[..behind - first];
         good &= if here_lie {
@@ -176,7 +204,8 @@ pub(super) struct CollisionPacker<'a, 'b> {
     marks: Marks<'a>,
     dealer: Dealer<'a, 'b>,
     stage: EntryStage,
-    written: usize,
+    /// The index of the next.
+    next: usize,
 }
 
 /// Of either kind of record.
@@ -187,13 +216,15 @@ enum EntryStage {
 }
 
 impl<'a, 'b> CollisionPacker<'a, 'b> {
-    /// From the first collision on.
+    /// From collision `first` on, with which a group begins.
     ///
-    /// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says.
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel)
+    /// says of what is written.
     pub(super) fn new(
         target: Target<'a>,
         ends: Ends<'a>,
         marks: Marks<'a>,
+        first: usize,
         channels: &'a mut [&'b mut [Beat]],
     ) -> Self {
         let layout = Segment::Collisions.layout(target.variant);
@@ -202,15 +233,15 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
             Geometry::Relative => EntryStage::Relative(Stage::new(&layout)),
         };
         let dealer = Dealer::new(&layout, channels);
-        Self { quick: target.quick, ends, marks, dealer, stage, written: 0 }
+        Self { quick: target.quick, ends, marks, dealer, stage, next: first }
     }
 
     /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Whether validation
     /// refuses none. Those `ahead` are asked for next, and are on their way meanwhile.
     pub(super) fn write(&mut self, collisions: &[&Collision], ahead: &[&Collision]) -> bool {
-        let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, written } = self;
-        let (quick, first) = (*quick, *written);
-        *written += collisions.len();
+        let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, next } = self;
+        let (quick, first) = (*quick, *next);
+        *next += collisions.len();
         let block = Block { first, collisions, ends: *ends, scheduled: *scheduled, heads: true };
         match stage {
             EntryStage::Absolute(stage) => {
@@ -223,9 +254,9 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         }
     }
 
-    /// Collisions written so far.
-    pub(super) const fn written(&self) -> usize {
-        self.written
+    /// The index of the next collision.
+    pub(super) const fn next(&self) -> usize {
+        self.next
     }
 
     /// Ends the segment; the sum of the words written, modulo 2^32.

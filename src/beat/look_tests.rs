@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::bodies::{pack_bodies, survey};
 use super::collisions::{Entries, pack_collisions};
+use super::ranges::Packers;
 use super::stripe::Segment;
 use super::target::Target;
 use crate::interface::number::{Numbers, Precision, StreamFormat};
@@ -180,8 +181,8 @@ fn said(
         bodies,
         count,
         Survey { ends: &mut ends, statics: &mut statics },
-        &mut views(&mut velocities),
-        &mut views(&mut poses),
+        (&mut views(&mut velocities), &mut views(&mut poses)),
+        &mut Packers::alone(),
     );
     let moves =
         |body: &Body| shapes.get(body.shape as usize).is_some_and(|shape| !shape.is_static());
@@ -189,20 +190,34 @@ fn said(
     assert_eq!(statics, still.collect::<Vec<u32>>());
     let (mut other_ends, mut other_statics) = (vec![End::MISSING], vec![7]);
     let into = Survey { ends: &mut other_ends, statics: &mut other_statics };
-    assert_eq!(survey(target, bodies, count, into), bodies_good);
+    assert_eq!(survey(target, bodies, count, into, &mut Packers::alone()), bodies_good);
     assert_eq!((other_ends.len(), other_statics), (ends.len(), statics));
     let good = match schedule {
         None => {
             let count = collisions.len();
             let entries = Entries { collisions, count, scheduled: false, words: None };
             let mut channels = buffers(variant, Segment::Collisions, count);
-            pack_collisions(target, Ends(&ends), &entries, &mut views(&mut channels)).1
+            pack_collisions(
+                target,
+                Ends(&ends),
+                &entries,
+                &mut views(&mut channels),
+                &mut Packers::alone(),
+            )
+            .1
         }
         Some(schedule) => {
             let (ordered, count) = (Ordered { collisions, schedule }, schedule.len());
             let entries = Entries { collisions: &ordered, count, scheduled: true, words: None };
             let mut channels = buffers(variant, Segment::Collisions, count);
-            pack_collisions(target, Ends(&ends), &entries, &mut views(&mut channels)).1
+            pack_collisions(
+                target,
+                Ends(&ends),
+                &entries,
+                &mut views(&mut channels),
+                &mut Packers::alone(),
+            )
+            .1
         }
     };
     Some((bodies_good & good, validate(bodies, collisions, shapes, &parameters, limits)))

@@ -7,6 +7,9 @@ mod deal;
 mod look_tests;
 #[cfg(test)]
 mod pack_tests;
+#[cfg(test)]
+mod range_tests;
+pub(crate) mod ranges;
 mod stage;
 pub(crate) mod stripe;
 pub(crate) mod target;

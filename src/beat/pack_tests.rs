@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::bodies::{Chosen, pack_poses, pack_velocities, survey};
 use super::collisions::{Entries, pack_collisions};
+use super::ranges::Packers;
 use super::stripe::Segment;
 use super::target::Target;
 use crate::interface::number::{Numbers, StreamFormat};
@@ -232,13 +233,15 @@ const SHAPES: [Shape; 3] = [
 fn velocities(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     let count = bodies.len();
     packed(spec, Segment::Velocities, count, |views| {
-        pack_velocities(target(spec), bodies, count, views)
+        pack_velocities(target(spec), bodies, count, views, &mut Packers::alone())
     })
 }
 
 fn poses(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     let count = bodies.len();
-    packed(spec, Segment::Poses, count, |views| pack_poses(target(spec), bodies, count, views))
+    packed(spec, Segment::Poses, count, |views| {
+        pack_poses(target(spec), bodies, count, views, &mut Packers::alone())
+    })
 }
 
 fn target(spec: &Spec) -> Target<'_> {
@@ -255,10 +258,10 @@ fn entries(
     let count = collisions.len();
     let (mut ends, mut statics) = (Vec::new(), Vec::new());
     let into = Survey { ends: &mut ends, statics: &mut statics };
-    survey(target(spec), bodies, bodies.len(), into);
+    survey(target(spec), bodies, bodies.len(), into, &mut Packers::alone());
     let entries = Entries { collisions, count, scheduled: false, words };
     packed(spec, Segment::Collisions, count, |views| {
-        pack_collisions(target(spec), Ends(&ends), &entries, views).0
+        pack_collisions(target(spec), Ends(&ends), &entries, views, &mut Packers::alone()).0
     })
 }
 

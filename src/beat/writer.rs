@@ -52,7 +52,7 @@ impl<'a> Writer<'a> {
         Self {
             quick: target.quick,
             ends,
-            packer: CollisionPacker::new(target, ends, marks, channels),
+            packer: CollisionPacker::new(target, ends, marks, 0, channels),
             block: [NOTHING; BLOCK],
             held: 0,
             room,
@@ -83,7 +83,7 @@ impl<'a> Writer<'a> {
     /// Number of collisions written so far.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.packer.written() + self.held
+        self.packer.next() + self.held
     }
 
     /// Whether there are none so far.
@@ -111,7 +111,7 @@ impl<'a> Writer<'a> {
         if count == 0 {
             return;
         }
-        let (first, collisions) = (self.packer.written(), self.block.each_ref());
+        let (first, collisions) = (self.packer.next(), self.block.each_ref());
         let collisions = &collisions[..count];
         if !self.packer.write(collisions, &[]) {
             let ends = self.ends;
@@ -130,7 +130,7 @@ impl<'a> Writer<'a> {
         match self.refused {
             Some(refused) => Err(refused),
             None => {
-                let written = self.packer.written();
+                let written = self.packer.next();
                 Ok((self.packer.finish(), written))
             }
         }

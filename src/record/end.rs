@@ -1,5 +1,7 @@
 //! This file says what the record of a collision takes from either of its bodies.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 
 use super::beside;
@@ -80,22 +82,19 @@ pub(crate) struct Survey<'a> {
 }
 
 impl Survey<'_> {
-    /// Nothing yet.
-    pub(crate) fn clear(&mut self) {
-        self.ends.clear();
+    /// The ends of so many bodies, all of which are written before [`Self::settle`].
+    pub(crate) fn ends(&mut self, count: usize) -> &mut [End] {
         self.statics.clear();
+        self.ends.resize(count, End::MISSING);
+        self.ends
     }
 
-    /// Adds the next bodies; returns their ends.
-    #[inline(always)]
-    pub(crate) fn add(&mut self, bodies: &[Body], shapes: &[Shape]) -> &[End] {
-        let first = self.ends.len();
-        self.ends.extend(bodies.iter().map(|body| End::of(body, shapes)));
-        let added = &self.ends[first..];
+    /// Finds those that never move, which are all among these.
+    pub(crate) fn settle(&mut self, among: Range<usize>) {
+        let ends = self.ends.get(among.clone()).unwrap_or_default();
         // No bitstream has more bodies than u32 counts.
-        let still = (first..).zip(added).filter(|(_, end)| end.is_static());
+        let still = among.zip(ends).filter(|(_, end)| end.is_static());
         self.statics.extend(still.filter_map(|(at, _)| u32::try_from(at).ok()));
-        added
     }
 }
 

@@ -36,8 +36,12 @@ pub struct Body {
 /// The bodies of a step, in whatever layout the caller keeps them.
 ///
 /// A step calls [`body`](Self::body) for every index below [`len`](Self::len), any number of
-/// times, and, only when it has succeeded, [`commit`](Self::commit) once for each.
-pub trait Bodies {
+/// times, and, only when it has succeeded, [`commit`](Self::commit) once for each. Several threads may
+/// ask at the same time, each for bodies of its own ([`OpenOptions::pack_threads`]), and for that a
+/// container must be [`Sync`]; [`commit`](Self::commit) is the caller's thread alone.
+///
+/// [`OpenOptions::pack_threads`]: crate::OpenOptions::pack_threads
+pub trait Bodies: Sync {
     /// Number of bodies.
     fn len(&self) -> usize;
 

@@ -33,8 +33,12 @@ pub struct Collision {
 ///
 /// `[Collision]` and `Vec<Collision>` implement it, [`CollisionArrays`] implements it over separate
 /// arrays. The solver takes the collisions in the order that
-/// [`StepParameters::order`](crate::StepParameters::order) says.
-pub trait Collisions {
+/// [`StepParameters::order`](crate::StepParameters::order) says. Several threads may ask at the same
+/// time, each for collisions of its own ([`OpenOptions::pack_threads`]), and for that a container must be
+/// [`Sync`].
+///
+/// [`OpenOptions::pack_threads`]: crate::OpenOptions::pack_threads
+pub trait Collisions: Sync {
     /// Number of collisions.
     fn len(&self) -> usize;
 

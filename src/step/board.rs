@@ -21,6 +21,10 @@ pub struct OpenOptions {
     /// Width of the DMA cores' length registers, bits; `None` believes the bitstream. Either is
     /// checked against the cores themselves.
     pub length_width: Option<u32>,
+    /// Threads that write the records of a step, the caller's among them; `None` takes as many as
+    /// the machine has processors, at most four. What is written does not depend on it. Up to about
+    /// 2,000 bodies or collisions are the caller's alone; the others are started when there are more.
+    pub pack_threads: Option<usize>,
 }
 
 /// Which board to open.

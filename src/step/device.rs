@@ -16,6 +16,7 @@ use super::plan::{Plan, bytes};
 use super::symptom::Symptom;
 use crate::accelerator::{Capabilities, Control, Fingerprint, identify};
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
+use crate::beat::ranges::Packers;
 use crate::error::OpenError;
 use crate::platform::{
     Access, AccessCounts, Platform, PlatformError, RegisterMap, Window, release_to_device,
@@ -69,6 +70,8 @@ pub(crate) struct Device {
     pub(super) cancellation: Option<Cancellation>,
     /// The longest piece that a descriptor carries, bytes.
     pub(super) largest: u32,
+    /// Who writes the records.
+    pub(super) packers: Packers,
     /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
     pub(super) ends: Vec<End>,
     /// Those of the step in each bank that never move, by their indices, upwards.
@@ -139,6 +142,7 @@ impl Device {
             activity: Activity::Idle,
             cancellation: None,
             largest: largest_piece(capabilities.length_width),
+            packers: Packers::new(None),
             ends: Vec::new(),
             statics: PerBank::default(),
         }

@@ -4,7 +4,7 @@
 use std::cell::Cell;
 use std::mem::ManuallyDrop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use bitstream_model::interface::control;
@@ -163,15 +163,16 @@ fn results_are_not_put_into_other_bodies() {
 #[derive(Debug)]
 pub(super) struct Panicking<'a, T> {
     pub(super) inner: T,
-    pub(super) left: &'a Cell<u32>,
+    pub(super) left: &'a AtomicU32,
     pub(super) commits: u32,
 }
 
 impl<T> Panicking<'_, T> {
     fn ask(&self) {
-        let left = self.left.get();
-        assert!(left > 0, "a panic in the caller's container");
-        self.left.set(left - 1);
+        let allowed = self
+            .left
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+        assert!(allowed.is_ok(), "a panic in the caller's container");
     }
 }
 
@@ -207,7 +208,7 @@ impl Collisions for Panicking<'_, Vec<Collision>> {
 
 /// The step of a small scene whose containers panic at the call of that number; whether they did.
 fn panics_at(accelerator: &mut Accelerator, call: u32, order: Option<Order>) -> bool {
-    let left = Cell::new(call);
+    let left = AtomicU32::new(call);
     let (bodies, collisions) = scene(3);
     let before = bits(&bodies);
     let mut bodies = Panicking { inner: bodies, left: &left, commits: 0 };

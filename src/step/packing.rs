@@ -52,15 +52,16 @@ impl Device {
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
         let target = Target { variant: &plan.variant, shapes, quick };
+        let packers = &mut self.packers;
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, bodies_good) = match lives {
-            None => pack_bodies(target, bodies, plan.bodies, into, velocities, poses),
+            None => pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), packers),
             Some(lives) => {
-                let good = survey(target, bodies, bodies.len(), into);
+                let good = survey(target, bodies, bodies.len(), into, packers);
                 let chosen = Chosen { bodies, order: lives.velocities() };
-                let velocities = pack_velocities(target, &chosen, plan.bodies, velocities);
+                let velocities = pack_velocities(target, &chosen, plan.bodies, velocities, packers);
                 let chosen = Chosen { bodies, order: lives.results() };
-                (velocities, pack_poses(target, &chosen, plan.bodies, poses), good)
+                (velocities, pack_poses(target, &chosen, plan.bodies, poses, packers), good)
             }
         };
         let of_entries = Entries {
@@ -70,7 +71,7 @@ impl Device {
             words: lives.map(Lives::words),
         };
         let (collisions, good) =
-            pack_collisions(target, Ends(&self.ends), &of_entries, &mut entries[active]);
+            pack_collisions(target, Ends(&self.ends), &of_entries, &mut entries[active], packers);
         (Sent { velocities, collisions, poses }, bodies_good & good)
     }
 
@@ -90,7 +91,7 @@ impl Device {
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, good) =
-            pack_bodies(target, bodies, plan.bodies, into, velocities, poses);
+            pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), &mut self.packers);
         if !good {
             refuse()?;
             return Err(InputError::Unsteady);

@@ -1,7 +1,7 @@
 //! This file tests prepared steps where something fails: the board, the results, the caller's code.
 
-use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::AtomicU32;
 
 use bitstream_model::{BoardConfig, Direction, Fault as Injected, FaultKind, FaultPlan};
 
@@ -109,7 +109,7 @@ fn a_panic_in_any_call_while_preparing_leaves_the_step_in_flight() {
             let (mut bodies, collisions) = scene(CUBES);
             let mut flight = accelerator.submit(&bodies, &collisions, &parameters).expect("starts");
             let kept = flight.prepare(&bodies, &collisions, &parameters).expect("packed");
-            let left = Cell::new(calls);
+            let left = AtomicU32::new(calls);
             let (others, touching) = scene(3);
             let others = Panicking { inner: others, left: &left, commits: 0 };
             let touching = Panicking { inner: touching, left: &left, commits: 0 };
@@ -150,7 +150,7 @@ fn a_panic_while_results_are_stored_stops_the_next_step() {
     loop {
         let mut flight = submit(&mut accelerator, CUBES);
         let prepared = prepare(&mut flight, OTHER);
-        let left = Cell::new(reads);
+        let left = AtomicU32::new(reads);
         let mut bodies = Panicking { inner: inner.clone(), left: &left, commits: 0 };
         let stored = catch_unwind(AssertUnwindSafe(|| {
             let (ended, _started) = flight.wait_and_start(&mut bodies, &prepared);

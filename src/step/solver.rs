@@ -15,6 +15,7 @@ use super::ordering::Ordering;
 use super::report::StepReport;
 use super::retry::with_retries;
 use crate::accelerator::Capabilities;
+use crate::beat::ranges::Packers;
 use crate::beat::unpack::Record;
 use crate::error::{Error, OpenError};
 use crate::platform::{Deadline, System};
@@ -54,7 +55,9 @@ impl Accelerator {
     /// [`Error::Open`]: no such board, not a bitstream that this driver knows, or DMA cores that
     /// do not behave as they should.
     pub fn open(options: OpenOptions) -> Result<Self, Error> {
-        Self::on(find(&options)?, options.length_width)
+        let mut accelerator = Self::on(find(&options)?, options.length_width)?;
+        accelerator.device.packers = Packers::new(options.pack_threads);
+        Ok(accelerator)
     }
 
     /// Opens the accelerator of a board that was found.

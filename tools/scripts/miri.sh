@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
-# Runs the driver's buffers and windows with what builds on them, and the threads of the scene's
-# detection, under Miri: it finds reads and writes outside an allocation, references that overlap, and
-# data races.
+# Runs the driver's buffers and windows with what builds on them, and the threads that share work, under
+# Miri: it finds reads and writes outside an allocation, references that overlap, and data races.
 #
-# Not under Miri: what goes through a device file, as it maps none, the vectors of a processor, and the
-# threads of the emulated board. valgrind.sh runs whole steps.
+# Not under Miri: what goes through a device file, as it maps none, the vectors of a processor, and what
+# the emulated board's threads share by themselves. valgrind.sh runs whole steps.
 # Needs a nightly toolchain with the components miri and rust-src; the first run builds its own
 # standard library.
 # Exit code: 0 done, 1 something was found, 77 skipped: not on this machine.
@@ -22,6 +21,6 @@ export MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-strict-provenance ${MIRIFLAGS:
 attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs --lib -- \
 	platform::mapped::tests::words_and_beats platform::mapped::tests::pieces_of \
 	platform::copy:: platform::fence:: platform::buffer:: axi_dma::ring::
-# Threads that outlive what they borrow.
-attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs-scene --lib -- \
-	detect::crew::
+# The threads that packing, detection and the emulated board share their work among: they outlive what
+# they borrow.
+attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs-crew --lib

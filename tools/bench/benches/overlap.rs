@@ -19,10 +19,10 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
 
-use std::cell::Cell;
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use bench::options::{Common, Pile};
@@ -89,19 +89,20 @@ struct Timed<'a, T: ?Sized> {
     inner: &'a T,
     port: &'a CpuPort,
     time: Duration,
-    left: Cell<u32>,
+    left: AtomicU32,
 }
 
 impl<'a, T: ?Sized> Timed<'a, T> {
     fn new(inner: &'a T, port: &'a CpuPort, time: Duration) -> Self {
-        Self { inner, port, time, left: Cell::new(PIECES) }
+        Self { inner, port, time, left: AtomicU32::new(PIECES) }
     }
 
     /// Lets a piece of the time pass, `PIECES` times in the first `count` indices.
     fn pass(&self, index: usize, count: usize) {
-        let left = self.left.get();
-        if left > 0 && index.is_multiple_of((count / PIECES as usize).max(1)) {
-            self.left.set(left - 1);
+        let take = |left: u32| left.checked_sub(1);
+        if index.is_multiple_of((count / PIECES as usize).max(1))
+            && self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok()
+        {
             self.port.pause(self.time / PIECES);
         }
     }

@@ -5,11 +5,12 @@
 //! cargo bench --bench pack -- --input FOLDER --cpu-time
 //! cargo bench --bench pack -- --grid 10x10x10 --runs 31 --json
 //! cargo bench --bench pack -- --profile half --thing in-order
+//! cargo bench --bench pack -- --threads 2
 //! ```
 //!
 //! The step is one of the thesis' cubes, standing on the ground, or the one in a folder of arrays
 //! (`--input`; or else `full_step186` of the folder that the environment variable `PGS_VECTORS`
-//! names). One thread does everything. Each thing is measured alone: it and a `memcpy` from warm
+//! names). One thread does everything, if `--threads` does not say otherwise. Each thing is measured alone: it and a `memcpy` from warm
 //! memory to warm memory run in turn, several runs a stretch of which the first do not count, so that its
 //! own buffers are as warm as the caches can hold them. Given are the bytes written, medians, GB/s of
 //! these bytes, and the throughput as a part of that of `memcpy`.
@@ -20,6 +21,9 @@
 //! - `checked, ...`: the same with the validation of everything on the way, as a step does it
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
 //! - `commit`: from there to the caller's bodies
+//!
+//! With `--threads` packing is measured beside packing on one thread, too, in the same turns; `memcpy` and
+//! what follows packing stay on one, which is why the latter is left out.
 //!
 //! `--cpu-time` counts the time that the thread runs instead of the time that passes: where others
 //! want the cores too, these are far apart.
@@ -42,6 +46,7 @@ use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use clap::{Parser, ValueEnum};
 use scene::Grid;
 use serde_json::{Map, Value, json};
+use zynq_pgs::Collision;
 use zynq_pgs::bench::{StepPacker, Unpacker};
 use zynq_pgs::order::{Ordered, Schedule};
 
@@ -55,8 +60,11 @@ struct Options {
     /// The step in this folder of arrays instead of a pile
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
+    /// Threads that pack; more than one are held against one, too
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    threads: u16,
     /// Time for which the thread runs, not that which passes
-    #[arg(long)]
+    #[arg(long, conflicts_with = "threads")]
     cpu_time: bool,
     /// Of this profile alone: float, half or mixed
     #[arg(long, value_name = "NAME")]
@@ -96,6 +104,12 @@ impl Options {
         }
     }
 
+    fn things(&self) -> impl Iterator<Item = Thing> {
+        let wanted = |thing: &Thing| self.thing.is_none_or(|wanted| wanted == *thing);
+        let several = |thing: &Thing| self.threads == 1 || thing.is_packing();
+        Thing::value_variants().iter().copied().filter(wanted).filter(several)
+    }
+
     fn clock(&self) -> Clock {
         if self.cpu_time { Clock::Thread } else { Clock::Wall }
     }
@@ -116,6 +130,10 @@ enum Thing {
 }
 
 impl Thing {
+    const fn is_packing(self) -> bool {
+        !matches!(self, Self::Unpack | Self::Commit)
+    }
+
     const fn name(self) -> &'static str {
         match self {
             Self::Bodies => "bodies",
@@ -131,13 +149,14 @@ impl Thing {
     }
 }
 
-/// One thing's bytes, its time and that of `memcpy`.
+/// One thing's bytes, its time and that of `memcpy`, and its time on one thread if there are several.
 struct Row {
     profile: &'static Profile,
     thing: Thing,
     bytes: usize,
     time: Duration,
     copy: Duration,
+    alone: Option<Duration>,
 }
 
 impl Row {
@@ -146,7 +165,7 @@ impl Row {
     }
 
     fn print(&self) {
-        println!(
+        print!(
             "{:<8} {:<17} {:>6.2} {:>8.3} {:>6.2} {:>8.3} {:>6.2} {:>7.2}",
             self.profile.name,
             self.thing.name(),
@@ -157,6 +176,10 @@ impl Row {
             self.rate(self.copy),
             ratio(self.copy, self.time),
         );
+        if let Some(alone) = self.alone {
+            print!(" {:>8.3} {:>7.2}", milliseconds(alone), ratio(alone, self.time));
+        }
+        println!();
     }
 
     fn to_json(&self) -> Value {
@@ -167,6 +190,8 @@ impl Row {
             "memcpy_ms": milliseconds(self.copy),
             "memcpy_gb_per_s": self.rate(self.copy),
             "of_memcpy": ratio(self.copy, self.time),
+            "one_thread_ms": self.alone.map(milliseconds),
+            "times_as_fast_as_one_thread": self.alone.map(|alone| ratio(alone, self.time)),
         })
     }
 }
@@ -189,27 +214,36 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if !options.common.json {
         println!(
             "{}: {} bodies, {} collisions, {} empty entries in order; medians of {} stretches in \
-             turn, {clock}\n",
+             turn, {clock}; {} packing\n",
             step.name,
             step.bodies.len(),
             step.collisions.len(),
             schedule.empty(),
             options.common.runs(),
+            match options.threads {
+                1 => "one thread".to_owned(),
+                threads => format!("{threads} threads"),
+            },
         );
-        println!("{:<27}{:>6} {:>8} {:>6} {:>15} {:>7}", "", "MB", "ms", "GB/s", "memcpy", "of it");
+        print!("{:<27}{:>6} {:>8} {:>6} {:>15} {:>7}", "", "MB", "ms", "GB/s", "memcpy", "of it");
+        if options.threads > 1 {
+            print!(" {:>8} {:>7}", "1 thread", "as fast");
+        }
+        println!();
     }
     let mut profiles = Vec::new();
     for profile in chosen {
         let mut measured = Map::new();
-        let things = Thing::value_variants().iter().copied();
-        for thing in things.filter(|it| options.thing.is_none_or(|thing| thing == *it)) {
+        for thing in options.things() {
             let row = measure(profile, thing, &step, &schedule, options)?;
             if !options.common.json {
                 row.print();
             }
             measured.insert(thing.name().to_owned(), row.to_json());
         }
-        profiles.push(json!({ "profile": profile.name, "threads": 1, "measured": measured }));
+        profiles.push(
+            json!({ "profile": profile.name, "threads": options.threads, "measured": measured }),
+        );
     }
     if options.common.json {
         let document = json!({
@@ -239,21 +273,27 @@ fn measure(
     let Step { bodies, collisions, shapes, .. } = step;
     let ordered = Ordered { collisions, schedule };
     let variant = profile.default_variant();
-    let mut packer = StepPacker::new(variant);
+    let packer = |threads: u16| StepPacker::new(variant, Some(threads.into()));
+    let mut packers = vec![packer(options.threads)];
+    if options.threads > 1 {
+        packers.push(packer(1));
+    }
     let mut unpacker = Unpacker::new(variant, bodies, shapes);
     let mut moved = bodies.clone();
     // What a collision needs of its bodies, what is committed, and what one cannot say something of:
     // it is refused, and would be measured as it is refused.
-    packer.pack_bodies(bodies, shapes);
     unpacker.unpack(bodies).ok_or("the results are refused")?;
-    match thing {
-        Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, false)?,
-        Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, true)?,
-        _ => Some(0),
+    for packer in &mut packers {
+        packer.pack_bodies(bodies, shapes);
+        match thing {
+            Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, false)?,
+            Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, true)?,
+            _ => Some(0),
+        }
+        .ok_or("the step is refused")?;
     }
-    .ok_or("the step is refused")?;
-    let [of_bodies, of_collisions] = packer.bytes(bodies.len(), collisions.len());
-    let [_, of_entries] = packer.bytes(bodies.len(), schedule.len());
+    let [of_bodies, of_collisions] = packers[0].bytes(bodies.len(), collisions.len());
+    let [_, of_entries] = packers[0].bytes(bodies.len(), schedule.len());
     let bytes = match thing {
         Thing::Bodies => of_bodies,
         Thing::AsGiven => of_collisions,
@@ -262,45 +302,55 @@ fn measure(
         Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
         Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
     };
-    let it: Run<'_> = match thing {
-        Thing::Bodies => Box::new(|| {
-            black_box(packer.pack_bodies(black_box(bodies), shapes));
-        }),
-        Thing::AsGiven => Box::new(|| {
-            black_box(packer.pack_collisions(black_box(collisions), shapes, false));
-        }),
-        Thing::InOrder => Box::new(|| {
-            black_box(packer.pack_collisions(black_box(&ordered), shapes, true));
-        }),
-        Thing::StepAsGiven => Box::new(|| {
-            black_box(packer.pack_bodies(black_box(bodies), shapes));
-            black_box(packer.pack_collisions(black_box(collisions), shapes, false));
-        }),
-        Thing::StepInOrder => Box::new(|| {
-            black_box(packer.pack_bodies(black_box(bodies), shapes));
-            black_box(packer.pack_collisions(black_box(&ordered), shapes, true));
-        }),
-        Thing::CheckedAsGiven => Box::new(|| {
-            let _ = black_box(packer.pack(bodies, black_box(collisions), shapes, false));
-        }),
-        Thing::CheckedInOrder => Box::new(|| {
-            let _ = black_box(packer.pack(bodies, black_box(&ordered), shapes, true));
-        }),
-        Thing::Unpack => Box::new(|| {
-            black_box(unpacker.unpack(black_box(bodies)));
-        }),
-        Thing::Commit => Box::new(|| {
-            unpacker.commit(&mut moved);
-            black_box(&moved);
-        }),
-    };
     let buffer = || vec![Beat([1; 4]); bytes / BEAT_BYTES];
     let (from, mut to) = (buffer(), buffer());
-    let copy: Run<'_> = Box::new(|| {
+    let mut contestants: Vec<Run<'_>> = vec![Box::new(|| {
         to.copy_from_slice(black_box(&from));
         black_box(&to);
-    });
-    let times = warm_medians(options.common.runs(), options.clock(), &mut [it, copy]);
-    let [time, copy] = times[..] else { return Err("a time for each".into()) };
-    Ok(Row { profile, thing, bytes, time, copy })
+    })];
+    match thing {
+        Thing::Unpack => contestants.push(Box::new(|| {
+            black_box(unpacker.unpack(black_box(bodies)));
+        })),
+        Thing::Commit => contestants.push(Box::new(|| {
+            unpacker.commit(&mut moved);
+            black_box(&moved);
+        })),
+        _ => contestants
+            .extend(packers.iter_mut().map(|packer| packing(thing, packer, step, &ordered))),
+    }
+    let times = warm_medians(options.common.runs(), options.clock(), &mut contestants);
+    let [copy, time, alone @ ..] = &times[..] else { return Err("a time for each".into()) };
+    let (copy, time, alone) = (*copy, *time, alone.first().copied());
+    Ok(Row { profile, thing, bytes, time, copy, alone })
+}
+
+/// Packs that thing; nothing, if it is none that is packed.
+fn packing<'a>(
+    thing: Thing,
+    packer: &'a mut StepPacker,
+    step: &'a Step,
+    ordered: &'a Ordered<'a, Vec<Collision>>,
+) -> Run<'a> {
+    let Step { bodies, collisions, shapes, .. } = step;
+    Box::new(move || {
+        if matches!(thing, Thing::Bodies | Thing::StepAsGiven | Thing::StepInOrder) {
+            black_box(packer.pack_bodies(black_box(bodies), shapes));
+        }
+        match thing {
+            Thing::AsGiven | Thing::StepAsGiven => {
+                black_box(packer.pack_collisions(black_box(collisions), shapes, false));
+            }
+            Thing::InOrder | Thing::StepInOrder => {
+                black_box(packer.pack_collisions(black_box(ordered), shapes, true));
+            }
+            Thing::CheckedAsGiven => {
+                let _ = black_box(packer.pack(bodies, black_box(collisions), shapes, false));
+            }
+            Thing::CheckedInOrder => {
+                let _ = black_box(packer.pack(bodies, black_box(ordered), shapes, true));
+            }
+            Thing::Bodies | Thing::Unpack | Thing::Commit => {}
+        }
+    })
 }

@@ -30,10 +30,12 @@ pub struct Step {
     pub parameters: StepParameters,
 }
 
-/// Opens an emulated board.
+/// Opens an emulated board; as many threads as that may take write the records.
 fn open(config: BoardConfig, shapes: &[Shape]) -> Result<Accelerator, Box<dyn Error>> {
     let board = BoardChoice::Emulated(EmulatedBoard::new(config)?.cpu_port());
-    let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
+    let pack_threads = Some(config.threads);
+    let options = OpenOptions { board, pack_threads, ..Default::default() };
+    let mut accelerator = Accelerator::open(options)?;
     accelerator.set_shapes(shapes)?;
     Ok(accelerator)
 }

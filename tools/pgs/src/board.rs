@@ -113,7 +113,9 @@ pub(crate) fn find(
     } else {
         (BoardChoice::Uio { node: UIO_NODE.to_owned() }, None)
     };
-    let options = OpenOptions { board, memory: memory.clone(), ..OpenOptions::default() };
+    let pack_threads = Some(config.threads);
+    let options =
+        OpenOptions { board, memory: memory.clone(), pack_threads, ..OpenOptions::default() };
     Ok(Chosen { kind, options, observer, reason })
 }
 

@@ -156,7 +156,7 @@ fn known() -> String {
 
 impl BuildArgs {
     /// The first option that was given of those that describe a board. `--threads` does not: it is for
-    /// finding collisions too, whatever the board.
+    /// finding collisions and packing too, whatever the board.
     pub(crate) fn given(&self) -> Option<&'static str> {
         let part = || PARTS.iter().find(|part| (part.get)(self).is_some()).map(|part| part.option);
         // How it is computed is no part of what it is, and of no text.
@@ -362,7 +362,7 @@ mod tests {
         assert_eq!(build("float").expect("a build").given(), Some("--profile"));
         let lanes = Some(LanesName::Off);
         assert_eq!(BuildArgs { lanes, ..BuildArgs::default() }.given(), Some("--lanes"));
-        // Detection takes them on a real board, too.
+        // Detection and packing take them on a real board, too.
         assert_eq!(BuildArgs { threads: Some(1), ..BuildArgs::default() }.given(), None);
     }
 

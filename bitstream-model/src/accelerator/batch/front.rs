@@ -17,6 +17,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use bytemuck::{Pod, Zeroable};
+use crew::Crew;
 
 use super::super::number::Single;
 use super::super::solver::{Mass, SolverParameters, Velocity};
@@ -27,7 +28,6 @@ use super::kernel::{self, Pass};
 use super::lanes::{Lanes, Quad, Work, prefetch};
 use super::order::Order;
 use super::place::Places;
-use super::pool::Pool;
 use super::width::Width;
 use crate::cast::register;
 
@@ -87,7 +87,7 @@ impl Fronts {
         passes: Passes<'_>,
         blocks: &mut [Block],
         lines: &mut [Line],
-        pool: &mut Pool,
+        crew: &mut Crew,
     ) -> u64 {
         let count = passes.numbers.len();
         if self.progress.len() < count {
@@ -106,9 +106,9 @@ impl Fronts {
             next: AtomicUsize::new(0),
             sum: AtomicU64::new(0),
             broken: AtomicBool::new(false),
-            alone: pool.is_empty(),
+            alone: crew.is_alone(),
         };
-        pool.run(&|thread| field.work(thread));
+        crew.run(&|thread| field.work(thread));
         field.sum.into_inner()
     }
 }

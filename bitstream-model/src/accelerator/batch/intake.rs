@@ -8,11 +8,12 @@ use std::mem;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
+use crew::Crew;
+
 use super::super::segment::PacketError;
 use super::super::solver::Mass;
 use super::block::{self, Block, LANES, Words};
 use super::place::Places;
-use super::pool::Pool;
 use super::queue::Queue;
 use super::records::{Fill, Records, sum};
 use super::width::Width;
@@ -229,7 +230,7 @@ impl Batch {
                 run: (0, 0, 0),
                 kinds: [[0; LANES]; RUN],
             };
-            share(&mut intake, &mut self.pool);
+            share(&mut intake, &mut self.crew);
             let refused = intake.refused;
             at = intake.at;
             self.put(&records, sums);
@@ -257,16 +258,16 @@ impl Batch {
     }
 }
 
-/// Lets all threads of a pool do what is to do, if it is worth waking them.
-fn share(intake: &mut Intake<'_, '_>, pool: &mut Pool) {
-    if pool.is_empty() || intake.count - intake.at <= FEW {
+/// Lets all threads of a crew do what is to do, if it is worth waking them.
+fn share(intake: &mut Intake<'_, '_>, crew: &mut Crew) {
+    if crew.is_alone() || intake.count - intake.at <= FEW {
         intake.work(Some);
         return;
     }
     let (records, width) = (intake.records, intake.width);
     let queue = Queue::<Run<'_>, WAITING>::new();
     let intake = Mutex::new(intake);
-    pool.run(&|thread| {
+    crew.run(&|thread| {
         if thread == 0 {
             let _ends = queue.ends();
             // Nobody else locks it.

@@ -16,7 +16,6 @@ mod lanes;
 mod motion;
 mod order;
 mod place;
-mod pool;
 mod queue;
 mod records;
 #[cfg(test)]
@@ -24,6 +23,8 @@ mod tests;
 mod width;
 
 use std::ops::Range;
+
+use crew::Crew;
 
 use super::decode::Collision;
 use super::inertia::Isotropic;
@@ -38,7 +39,6 @@ use block::{Block, LANES, ROWS_APART};
 use front::{Fronts, Line, Passes};
 use intake::{Group, PUT_OFF};
 use place::Places;
-use pool::Pool;
 use width::Width;
 
 pub(super) use motion::ResultPlaces;
@@ -103,7 +103,7 @@ pub(super) struct Batch {
     slots: Vec<u32>,
     impulse_sum: u64,
     width: Width,
-    pool: Pool,
+    crew: Crew,
     fronts: Fronts,
     /// Whether the fronts know all that is decoded.
     measured: bool,
@@ -125,13 +125,17 @@ impl Batch {
     }
 
     fn with_width(threads: usize, width: Width) -> Self {
+        let crew = Crew::new("board", threads.clamp(1, THREADS_MAX) - 1);
+        if let Some(error) = crew.refused() {
+            log::warn!("no thread to help the board: {error}");
+        }
         Self {
             blocks: Vec::new(),
             places: Places::default(),
             slots: Vec::new(),
             impulse_sum: 0,
             width,
-            pool: Pool::new(threads.clamp(1, THREADS_MAX) - 1),
+            crew,
             fronts: Fronts::default(),
             measured: false,
             spins: false,
@@ -173,7 +177,7 @@ impl Batch {
         }
         let own = &mut self.lines[ROWS_APART as usize / 2..];
         let bodies = velocities.chunks(COPIED_TOGETHER).zip(shape_of.chunks(COPIED_TOGETHER));
-        self.pool.share(
+        self.crew.each(
             bodies.zip(own.chunks_mut(COPIED_TOGETHER / 2)),
             |((velocities, shapes), lines)| {
                 for (body, (velocity, shape)) in velocities.iter().zip(shapes).enumerate() {
@@ -190,7 +194,7 @@ impl Batch {
         things: impl Iterator<Item = T> + Send,
         with: impl Fn(T) + Sync,
     ) {
-        self.pool.share(things, with);
+        self.crew.each(things, with);
     }
 
     /// Block and lane of a collision, or `None` for a padding entry.
@@ -231,12 +235,12 @@ impl Batch {
         let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
         let run = Passes { numbers: &passes, contact, finding, parameters, width: self.width };
         let blocks = &mut self.blocks[..self.places.blocks()];
-        let sum = self.fronts.run(run, blocks, &mut self.lines, &mut self.pool);
+        let sum = self.fronts.run(run, blocks, &mut self.lines, &mut self.crew);
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
         self.spins |= finding.is_some();
         let own = &self.lines[ROWS_APART as usize / 2..];
         let bodies = velocities.chunks_mut(COPIED_TOGETHER).zip(own.chunks(COPIED_TOGETHER / 2));
-        self.pool.share(bodies, |(velocities, lines)| {
+        self.crew.each(bodies, |(velocities, lines)| {
             for (body, velocity) in velocities.iter_mut().enumerate() {
                 *velocity = lines[body / 2].velocity(body % 2 == 1);
             }

@@ -268,7 +268,7 @@ impl Batch {
         let sums = [const { AtomicU32::new(0) }; 2];
         let [a, b, c, d] = places.map(|place| place.chunks_mut(INTEGRATED_TOGETHER));
         let parts = (first..end).step_by(INTEGRATED_TOGETHER).zip(a.zip(b).zip(c.zip(d)));
-        self.pool.share(parts, |(first, ((a, b), (c, d)))| {
+        self.crew.each(parts, |(first, ((a, b), (c, d)))| {
             let found = bodies.results(first..first + a.len(), [a, b, c, d]);
             for (sum, found) in sums.iter().zip(found) {
                 sum.fetch_add(found, Ordering::Relaxed);

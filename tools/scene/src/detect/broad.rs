@@ -6,9 +6,10 @@
 //! is known without looking at pairs: each has moved by something between the least and the most that
 //! any has, and of a pile that falls as a whole these are the same.
 
+use crew::Crew;
+
 use super::bounds::{Bounds, GAP};
 use super::cells::{Cells, GAP_MAX};
-use super::crew::Crew;
 use super::shares;
 
 /// How much farther apart than a pair candidates may be, m.

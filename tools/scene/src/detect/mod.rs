@@ -8,7 +8,6 @@ mod bounds;
 mod boxes;
 mod broad;
 mod cells;
-mod crew;
 mod ground;
 mod lanes;
 mod narrow;
@@ -19,11 +18,11 @@ mod reduce;
 use std::num::NonZero;
 use std::thread;
 
+use crew::Crew;
 use zynq_pgs::{Body, Collision};
 
 use bounds::{Bounds, GAP};
 use broad::{Broad, Drift};
-use crew::Crew;
 use narrow::Narrow;
 
 use crate::Geometry;
@@ -109,7 +108,7 @@ impl Detector {
         collisions: &mut Vec<Collision>,
     ) {
         if self.crew.threads() < self.threads && bodies.len() >= BODIES_FOR_THREADS {
-            self.crew = Crew::new(self.threads - 1);
+            self.crew = Crew::new("scene", self.threads - 1);
             // Not again where the system gives no more.
             self.threads = self.crew.threads();
         }
