@@ -51,7 +51,7 @@ impl CollisionPacker {
         let target = Target { variant: &self.variant, shapes, quick: None };
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
         survey(target, bodies, bodies.len(), into, &mut Packers::alone());
-        let entries = Entries { collisions, count, scheduled: false, words: None };
+        let entries = Entries { collisions, count, added: None, words: None };
         pack_collisions(target, Ends(&self.ends), &entries, channels, &mut Packers::alone()).0
     }
 }
@@ -100,16 +100,16 @@ impl StepPacker {
     }
 
     /// Writes the records of all collisions of the bodies that were packed last, unchecked; returns
-    /// the sum of their words, modulo 2^32. `scheduled` says whether they are in an order that was
-    /// made for them.
+    /// the sum of their words, modulo 2^32. `added` is how many the order added that was made for
+    /// them, `None` if there is none.
     pub fn pack_collisions<C: Collisions + ?Sized>(
         &mut self,
         collisions: &C,
         shapes: &[Shape],
-        scheduled: bool,
+        added: Option<usize>,
     ) -> u32 {
         let variant = self.limits.variant;
-        self.entries(collisions, scheduled, Target { variant: &variant, shapes, quick: None }).0
+        self.entries(collisions, added, Target { variant: &variant, shapes, quick: None }).0
     }
 
     /// Writes and checks everything; returns the sum of all words, modulo 2^32, or `None` if
@@ -122,14 +122,14 @@ impl StepPacker {
         bodies: &B,
         collisions: &C,
         shapes: &[Shape],
-        scheduled: bool,
+        added: Option<usize>,
     ) -> Result<Option<u32>, InputError> {
         let limits = self.limits;
         let scene = preflight(bodies, collisions, shapes, &StepParameters::default(), &limits)?;
         let quick = Quick::new(scene);
         let target = Target { variant: &limits.variant, shapes, quick: Some(&quick) };
         let (of_bodies, bodies_good) = self.bodies(bodies, target);
-        let (of_collisions, good) = self.entries(collisions, scheduled, target);
+        let (of_collisions, good) = self.entries(collisions, added, target);
         Ok((bodies_good & good).then(|| of_bodies.wrapping_add(of_collisions)))
     }
 
@@ -164,13 +164,13 @@ impl StepPacker {
     fn entries<C: Collisions + ?Sized>(
         &mut self,
         collisions: &C,
-        scheduled: bool,
+        added: Option<usize>,
         target: Target<'_>,
     ) -> (u32, bool) {
         let count = collisions.len();
         let channels = &mut channels(&mut self.collisions, Segment::Collisions, count, target);
         let active = ..target.variant.profile.mm2s_widths.len();
-        let entries = Entries { collisions, count, scheduled, words: None };
+        let entries = Entries { collisions, count, added, words: None };
         pack_collisions(
             target,
             Ends(&self.ends),

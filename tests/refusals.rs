@@ -6,7 +6,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bitstream_model::{BoardConfig, EmulatedBoard};
-use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, Profile, WINDOWED};
+use zynq_pgs::interface::profile::{FLOAT, Flow, HALF, MIXED, Profile, WINDOWED, WINDOWED16};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, Contact, Error, InputError,
@@ -156,30 +156,41 @@ impl Bodies for Unsteady<Body> {
 #[test]
 fn what_is_wrong_at_one_look_alone_is_never_sent() {
     let (bodies, collisions) = scene();
-    for profile in [&FLOAT, &HALF, &MIXED] {
+    for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16] {
         // In an order each is looked at once more, before.
-        for (order, at_look) in [(Order::AsGiven, 1), (Order::HazardFree, 2)] {
+        let orders = [(Order::AsGiven, 1), (Order::HazardFree, 2)];
+        for (order, at_look) in orders.into_iter().skip(usize::from(profile.flow != Flow::Passes)) {
             let mut parameters = StepParameters::default();
             parameters.order = Some(order);
             let mut board = open(profile);
             let mut expected = bodies.clone();
             board.step(&mut expected, &collisions, &parameters).expect("a step");
 
-            let wrong = Collision { count: 0, ..collisions[42] };
-            let (list, looks) = (collisions.clone(), AtomicUsize::new(0));
-            let fickle = Unsteady { list, which: 42, wrong, at_look, looks };
             let mut state = bodies.clone();
-            let found = board.step(&mut state, &fickle, &parameters).expect_err("one is wrong");
-            assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
-            assert_eq!(state, bodies);
+            let right = collisions[42];
+            // The second looks like what fills a gap in an order.
+            for body_b in [right.body_b, right.body_a] {
+                let wrong = Collision { count: 0, body_b, ..right };
+                let (list, looks) = (collisions.clone(), AtomicUsize::new(0));
+                let fickle = Unsteady { list, which: 42, wrong, at_look, looks };
+                let found = board.step(&mut state, &fickle, &parameters).expect_err("one is wrong");
+                assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
+                assert_eq!(state, bodies);
+            }
 
             let wrong = Body { shape: 9, ..bodies[42] };
             let (list, looks) = (bodies.clone(), AtomicUsize::new(0));
             let mut fickle = Unsteady { list, which: 42, wrong, at_look, looks };
-            let found =
-                board.step(&mut fickle, &collisions, &parameters).expect_err("one is wrong");
-            assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
-            assert_eq!(fickle.list, bodies);
+            // Where live bodies alone are kept they are read once more for their velocities, and once
+            // more for their poses.
+            let again = if profile.flow == Flow::Passes { 0 } else { 2 };
+            for at_look in at_look..=at_look + again {
+                (fickle.at_look, fickle.looks) = (at_look, AtomicUsize::new(0));
+                let found = board.step(&mut fickle, &collisions, &parameters);
+                let found = found.expect_err("one is wrong");
+                assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
+                assert_eq!(fickle.list, bodies);
+            }
             if order == Order::AsGiven {
                 // The same where the caller writes its collisions.
                 fickle.looks = AtomicUsize::new(0);

@@ -57,8 +57,8 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     pack(target, bodies, count, wanted, packers)
 }
 
-/// Writes the velocity records of `count` bodies, and their inertia where the bitstream wants it;
-/// returns the sum of the words written, modulo 2^32.
+/// Writes the velocity records of `count` bodies, and their inertia where the bitstream wants it; the
+/// sum of the words written, modulo 2^32, and whether validation refuses none of what is read for it.
 ///
 /// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says.
 pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
@@ -67,10 +67,10 @@ pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
     count: usize,
     channels: &mut [&mut [Beat]],
     packers: &mut Packers,
-) -> u32 {
+) -> (u32, bool) {
     let wanted = Wanted { into: None, velocities: Some(whole(channels)), poses: None };
-    let (sum, ..) = pack(target, bodies, count, wanted, packers);
-    sum
+    let (sum, _, good) = pack(target, bodies, count, wanted, packers);
+    (sum, good)
 }
 
 /// Writes the pose records of `count` bodies; otherwise as [`pack_velocities`].
@@ -80,10 +80,10 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
     count: usize,
     channels: &mut [&mut [Beat]],
     packers: &mut Packers,
-) -> u32 {
+) -> (u32, bool) {
     let wanted = Wanted { into: None, velocities: None, poses: Some(whole(channels)) };
-    let (_, sum, _) = pack(target, bodies, count, wanted, packers);
-    sum
+    let (_, sum, good) = pack(target, bodies, count, wanted, packers);
+    (sum, good)
 }
 
 /// What is wanted of bodies.
@@ -94,7 +94,7 @@ struct Wanted<'a> {
 }
 
 /// Surveys `count` bodies and writes their records, whatever of it is wanted; the sums of velocity and
-/// of pose records, and whether validation refuses none of those that are surveyed.
+/// of pose records, and whether validation refuses none.
 fn pack<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
@@ -267,6 +267,13 @@ impl Work for Writing<'_, '_, '_> {
             if any_still {
                 *still = around(still, &range);
             }
+        } else if let Some(quick) = target.quick {
+            // Read anew they may be others.
+            let mut ends = [End::MISSING; BLOCK];
+            for (end, body) in ends.iter_mut().zip(bodies) {
+                *end = End::of(body, target.shapes);
+            }
+            *good &= quick.bodies(range.start, bodies, &ends);
         }
         if let Some(velocities) = velocities {
             velocities.write(bodies);

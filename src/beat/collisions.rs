@@ -17,7 +17,7 @@ use super::target::Target;
 use crate::platform::{Work, in_wide_vectors, prefetch};
 use crate::record;
 use crate::record::end::{End, Ends};
-use crate::scene::validate::{Block, Quick, head};
+use crate::scene::validate::{Block, Quick, head, is_padding};
 use crate::scene::{CONTACT_POINTS, Collision, Collisions, Contact};
 
 /// The collisions of a step, as they are sent.
@@ -26,8 +26,8 @@ pub(crate) struct Entries<'a, C: ?Sized> {
     pub(crate) collisions: &'a C,
     /// Records, those that an order added included.
     pub(crate) count: usize,
-    /// Whether they are in an order that was made for them, which may have added some.
-    pub(crate) scheduled: bool,
+    /// How many were added by the order that was made for them; `None` if there is none.
+    pub(crate) added: Option<usize>,
     /// What stands in place of the bodies' indices, of each record. Only for
     /// [`Geometry::Relative`].
     pub(crate) words: Option<&'a [[u32; 2]]>,
@@ -70,18 +70,12 @@ struct Relative<'a> {
 impl Kind<{ relative::ROWS }> for Relative<'_> {
     const INTEGERS: [bool; relative::ROWS] = record::relative::INTEGERS;
 
-    /// Nobody reads the marks of padding, so that a collision which had contact points when the
-    /// marks were made and has none now would shift all bodies behind it: it is sent as one to be
-    /// refused.
     #[inline(always)]
     fn encode(&self, index: usize, from: &Collision, ends: [End; 2]) -> [Beat; relative::ROWS] {
         let ends = record::relative::anchors(ends, ends.map(|end| !end.is_static()));
         let Some(words) = self.words else { return record::relative::encode(from, ends) };
-        let (mut collision, mut words) = (*from, words[index]);
-        if collision.count == 0 && words != [0; 2] {
-            (collision.count, words) = (1, REFUSED);
-        }
-        [collision.body_a, collision.body_b] = words;
+        let mut collision = *from;
+        [collision.body_a, collision.body_b] = words[index];
         record::relative::encode(&collision, ends)
     }
 
@@ -91,15 +85,12 @@ impl Kind<{ relative::ROWS }> for Relative<'_> {
     }
 }
 
-/// What no record of a live body holds; the accelerator refuses a collision of it with itself.
-const REFUSED: [u32; 2] = [u32::MAX; 2];
-
 /// Writes the records of collisions; the sum of the words written, modulo 2^32, and whether
 /// validation refuses none.
 ///
 /// A body that does not exist has its position written as zeros, and one without a shape is static.
-/// Should a caller's [`Collisions`] answer differently from one look to the next, the accelerator
-/// refuses the index.
+/// Should a caller's [`Collisions`] answer differently from one look to the next, validation looks at
+/// what is written; of what looks like padding it refuses more than the order added.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
@@ -108,18 +99,38 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     packers: &mut Packers,
 ) -> (u32, bool) {
     let layout = Segment::Collisions.layout(target.variant);
-    let (mut sum, mut good) = (0_u32, true);
+    let (mut sum, mut good, mut paddings) = (0_u32, true, 0);
     let channels = whole(channels);
     let cut = |size| {
         let mut pieces = Pieces::new(&layout, size, channels);
         ranges(entries.count, size).map(move |range| (range, pieces.cut()))
     };
     let work = |part: (Range<usize>, Piece<'_>)| pack_range(target, ends, entries, part);
-    packers.each(entries.count, cut, work, |(of_range, range_good): (u32, bool)| {
+    packers.each(entries.count, cut, work, |(of_range, seen): (u32, Seen)| {
         sum = sum.wrapping_add(of_range);
-        good &= range_good;
+        good &= seen.good;
+        paddings += seen.paddings;
     });
-    (sum, good)
+    let as_many = target.quick.is_none() || entries.added.is_none_or(|added| added == paddings);
+    (sum, good & as_many)
+}
+
+/// What was seen of collisions on their way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen {
+    /// Whether validation refuses none.
+    pub(super) good: bool,
+    /// How many look like padding, where an order may have added some.
+    paddings: usize,
+}
+
+impl Seen {
+    /// Of none.
+    const NOTHING: Self = Self { good: true, paddings: 0 };
+
+    fn and(self, other: Self) -> Self {
+        Self { good: self.good & other.good, paddings: self.paddings + other.paddings }
+    }
 }
 
 /// Writes the records of a range of collisions, otherwise as [`pack_collisions`].
@@ -131,11 +142,11 @@ fn pack_range<C: Collisions + ?Sized>(
     ends: Ends<'_>,
     entries: &Entries<'_, C>,
     (range, mut channels): (Range<usize>, Piece<'_>),
-) -> (u32, bool) {
-    let Entries { collisions, scheduled, words, .. } = *entries;
-    let marks = Marks { scheduled, words };
+) -> (u32, Seen) {
+    let Entries { collisions, added, words, .. } = *entries;
+    let marks = Marks { scheduled: added.is_some(), words };
     let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
-    let mut good = true;
+    let mut seen = Seen::NOTHING;
     let (mut here, mut next) = (&mut [&ELSEWHERE; BLOCK], &mut [&ELSEWHERE; BLOCK]);
     let mut copies = [NOTHING; BLOCK];
     let until = range.end;
@@ -146,7 +157,7 @@ fn pack_range<C: Collisions + ?Sized>(
         let ahead = &mut next[..(until - behind).min(BLOCK)];
         all_lie = find(collisions, behind, ahead);
         let block = &here[..behind - first];
-        good &= if here_lie {
+        seen = seen.and(if here_lie {
             packer.write(block, ahead)
         } else {
             let mut block = *here;
@@ -158,10 +169,10 @@ fn pack_range<C: Collisions + ?Sized>(
                 *to = copy;
             }
             packer.write(&block[..behind - first], ahead)
-        };
+        });
         mem::swap(&mut here, &mut next);
     }
-    (packer.finish(), good)
+    (packer.finish(), seen)
 }
 
 /// Where the next collisions lie, the first of which has the index `first`; whether all do. One that
@@ -183,13 +194,14 @@ fn find<'a, C: Collisions + ?Sized>(
     all_lie
 }
 
-/// Stands for a collision that does not lie anywhere as it is.
+/// Stands for a collision that does not lie anywhere as it is. Should a constant of the same value
+/// have its address, that one is asked for once more, and is what it is.
 static ELSEWHERE: Collision = NOTHING;
 
 /// What is said of collisions beside what they hold.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Marks<'a> {
-    /// As in [`Entries`].
+    /// Whether they are in an order that was made for them, which may have added some.
     pub(super) scheduled: bool,
     /// As in [`Entries`].
     pub(super) words: Option<&'a [[u32; 2]]>,
@@ -236,9 +248,9 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         Self { quick: target.quick, ends, marks, dealer, stage, next: first }
     }
 
-    /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Whether validation
-    /// refuses none. Those `ahead` are asked for next, and are on their way meanwhile.
-    pub(super) fn write(&mut self, collisions: &[&Collision], ahead: &[&Collision]) -> bool {
+    /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Those `ahead` are
+    /// asked for next, and are on their way meanwhile.
+    pub(super) fn write(&mut self, collisions: &[&Collision], ahead: &[&Collision]) -> Seen {
         let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, next } = self;
         let (quick, first) = (*quick, *next);
         *next += collisions.len();
@@ -276,11 +288,11 @@ struct Writing<'p, 'a, 'b, K, const ROWS: usize> {
 }
 
 impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
-    type Output = bool;
+    type Output = Seen;
 
-    /// Encodes, looks at and deals out; whether validation refuses none.
+    /// Encodes, looks at and deals out.
     #[inline(always)]
-    fn run(self) -> bool {
+    fn run(self) -> Seen {
         let Self { kind, quick, mut block, ahead, stage, dealer } = self;
         let Block { first, collisions, ends, scheduled, .. } = block;
         for collision in collisions {
@@ -291,15 +303,17 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
         let records = stage.records(collisions.len());
         let each = records.iter_mut().zip(collisions).zip(ahead).zip(first..);
         let of = |from: &Collision| [from.body_a, from.body_b].map(|body| ends.get(body));
-        let mut good = true;
+        let mut seen = Seen::NOTHING;
         if let Some(quick) = quick {
             for (((to, from), ahead), index) in each {
                 prefetch::<Collision>(ahead);
                 let ends = of(from);
-                block.heads &= head(from, ends, scheduled);
+                let padding = scheduled & is_padding(from);
+                block.heads &= head(from, ends) | padding;
+                seen.paddings += usize::from(padding);
                 *to = kind.encode(index, from, ends);
             }
-            good = K::look(quick, &block, records);
+            seen.good = K::look(quick, &block, records);
         } else {
             for (((to, from), ahead), index) in each {
                 prefetch::<Collision>(ahead);
@@ -307,7 +321,7 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
             }
         }
         stage.deal(collisions.len(), &K::INTEGERS, dealer);
-        good
+        seen
     }
 }
 

@@ -63,7 +63,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
             let (places, share) = self.deal.places::<G>(channel);
             let place = self.deal.take(channel, groups.len() * share);
             // Those of the next block.
-            soon_written(to, place.end, place.len());
+            soon_written(to.get(place.end..).unwrap_or_default(), place.len());
             let to = &mut to[place];
             let sum = &mut self.sum;
             match share {
@@ -94,13 +94,12 @@ impl<'a, 'b> Dealer<'a, 'b> {
     }
 }
 
-/// Says that beats will be written soon: of memory that is cached, a line that is written in part
+/// Says that the first of these beats will be written soon: of memory that is cached, a line that is written in part
 /// comes into the cache first.
 #[inline(always)]
-fn soon_written(to: &[Beat], first: usize, count: usize) {
-    let first = to.as_ptr().wrapping_add(first);
-    for beat in (0..count).step_by(LINE / BEAT_BYTES) {
-        fetch_to_write(first.wrapping_add(beat));
+fn soon_written(to: &[Beat], count: usize) {
+    for beat in (0..count.min(to.len())).step_by(LINE / BEAT_BYTES) {
+        fetch_to_write(&raw const to[beat]);
     }
 }
 

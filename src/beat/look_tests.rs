@@ -195,7 +195,7 @@ fn said(
     let good = match schedule {
         None => {
             let count = collisions.len();
-            let entries = Entries { collisions, count, scheduled: false, words: None };
+            let entries = Entries { collisions, count, added: None, words: None };
             let mut channels = buffers(variant, Segment::Collisions, count);
             pack_collisions(
                 target,
@@ -208,7 +208,8 @@ fn said(
         }
         Some(schedule) => {
             let (ordered, count) = (Ordered { collisions, schedule }, schedule.len());
-            let entries = Entries { collisions: &ordered, count, scheduled: true, words: None };
+            let entries =
+                Entries { collisions: &ordered, count, added: Some(schedule.empty()), words: None };
             let mut channels = buffers(variant, Segment::Collisions, count);
             pack_collisions(
                 target,

@@ -233,14 +233,14 @@ const SHAPES: [Shape; 3] = [
 fn velocities(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     let count = bodies.len();
     packed(spec, Segment::Velocities, count, |views| {
-        pack_velocities(target(spec), bodies, count, views, &mut Packers::alone())
+        pack_velocities(target(spec), bodies, count, views, &mut Packers::alone()).0
     })
 }
 
 fn poses(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     let count = bodies.len();
     packed(spec, Segment::Poses, count, |views| {
-        pack_poses(target(spec), bodies, count, views, &mut Packers::alone())
+        pack_poses(target(spec), bodies, count, views, &mut Packers::alone()).0
     })
 }
 
@@ -259,7 +259,7 @@ fn entries(
     let (mut ends, mut statics) = (Vec::new(), Vec::new());
     let into = Survey { ends: &mut ends, statics: &mut statics };
     survey(target(spec), bodies, bodies.len(), into, &mut Packers::alone());
-    let entries = Entries { collisions, count, scheduled: false, words };
+    let entries = Entries { collisions, count, added: None, words };
     packed(spec, Segment::Collisions, count, |views| {
         pack_collisions(target(spec), Ends(&ends), &entries, views, &mut Packers::alone()).0
     })

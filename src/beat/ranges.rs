@@ -14,6 +14,7 @@ use crew::Crew;
 
 use super::deal::BLOCK;
 use super::stripe::Layout;
+use crate::platform::release_to_device;
 
 /// Records of a range: so few that nobody waits long for a thread that took the last one, so many that
 /// taking one costs nothing beside it. As many are not worth waking a thread.
@@ -62,6 +63,8 @@ impl Packers {
         let join = Mutex::new(join);
         crew.each(cut(RANGE), |range| {
             let done = work(range);
+            // The caller's own barrier, before it tells the board, is of the caller's stores.
+            release_to_device();
             // After a panic nothing that was joined is used.
             join.lock().unwrap_or_else(PoisonError::into_inner)(done);
         });

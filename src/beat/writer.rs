@@ -113,7 +113,7 @@ impl<'a> Writer<'a> {
         }
         let (first, collisions) = (self.packer.next(), self.block.each_ref());
         let collisions = &collisions[..count];
-        if !self.packer.write(collisions, &[]) {
+        if !self.packer.write(collisions, &[]).good {
             let ends = self.ends;
             let block = Block { first, collisions, ends, scheduled: false, heads: true };
             self.refused = self.quick.and_then(|quick| quick.refusal(&block).err());

@@ -83,7 +83,7 @@ mod x86 {
         _mm256_cvtps_ph, _mm256_extractf128_si256,
     };
 
-    use super::{LANES, Narrow, Rest, Wide};
+    use super::{LANES, Narrow, Rest, WORD_LANE, Wide};
 
     /// Whether the processor has the instructions. They take the registers of AVX, which a system may
     /// not keep, and whether it does is asked of AVX alone.
@@ -124,6 +124,7 @@ mod x86 {
         if integers == [false; 2] {
             return bytemuck::cast(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(wide));
         }
+        const { assert!(WORD_LANE == 3 && LANES == 4, "so it stands here") };
         // An integer is no number: as one it would be subnormal, or none.
         let [first, second] = integers.map(|integer| if integer { u32::MAX } else { 0 });
         let all: __m256 = bytemuck::cast([0, 0, 0, first, 0, 0, 0, second]);

@@ -1,5 +1,8 @@
-//! This file tells the processor what will be read soon.
-#![allow(unsafe_code, reason = "hints to the caches exist as intrinsics on raw pointers only")]
+//! This file tells the processor what will be read or written soon.
+#![allow(
+    unsafe_code,
+    reason = "hints to the caches exist as intrinsics on raw pointers and as instructions only"
+)]
 
 /// Says that a value will be read soon.
 #[inline(always)]
@@ -18,8 +21,9 @@ pub(crate) fn fetch_to_write<T>(at: *const T) {
     let at: *const i8 = at.cast();
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a prefetch neither reads nor faults, whatever the address.
+    // The intrinsic gives one that only reads, unless the whole program is built for it.
     unsafe {
-        core::arch::x86_64::_mm_prefetch::<{ core::arch::x86_64::_MM_HINT_ET0 }>(at);
+        core::arch::asm!("prefetchw [{}]", in(reg) at, options(nostack, preserves_flags, readonly));
     }
     #[cfg(target_arch = "aarch64")]
     // SAFETY: a prefetch neither faults nor changes registers, whatever the address.

@@ -3,9 +3,8 @@
 
 /// Loops that are compiled anew for wider vectors.
 ///
-/// What is in them is so compiled only where it becomes a part of them: what of ours they call for
-/// every record is inlined always; what a caller's own containers do is up to the compiler. The bits
-/// are the same: nothing is fused and no sum of numbers reordered.
+/// What is in them is so compiled only where it becomes a part of them: what they call for every record
+/// is inlined always. The bits are the same: nothing is fused and no sum of numbers reordered.
 pub(crate) trait Work {
     type Output;
 

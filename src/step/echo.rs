@@ -92,7 +92,7 @@ impl Accelerator {
         let source = Source {
             bodies: echo.bodies,
             collisions: &padding,
-            scheduled: true,
+            added: Some(plan.collisions),
             lives: None,
             shapes: &self.shapes,
             quick: None,

@@ -214,11 +214,13 @@ impl Accelerator {
         let ordering = &orderings[bank];
         let (lives, quick) = (arranged.live.map(|_| ordering.lives()), Some(&quick));
         Ok(if arranged.scheduled {
-            let collisions = &Ordered { collisions, schedule: ordering.schedule() };
-            let source = Source { bodies, collisions, scheduled: true, lives, shapes, quick };
+            let schedule = ordering.schedule();
+            let added = Some(plan.collisions.saturating_sub(schedule.collisions()));
+            let collisions = &Ordered { collisions, schedule };
+            let source = Source { bodies, collisions, added, lives, shapes, quick };
             device.pack(plan, bank, &source)
         } else {
-            let source = Source { bodies, collisions, scheduled: false, lives, shapes, quick };
+            let source = Source { bodies, collisions, added: None, lives, shapes, quick };
             device.pack(plan, bank, &source)
         })
     }

@@ -30,8 +30,8 @@ pub(super) struct Source<'a, B: ?Sized, C: ?Sized> {
     pub(super) bodies: &'a B,
     /// In the order in which they are sent.
     pub(super) collisions: &'a C,
-    /// Whether that order was made for them.
-    pub(super) scheduled: bool,
+    /// How many that order added, which was made for them; `None` if there is none.
+    pub(super) added: Option<usize>,
     pub(super) lives: Option<&'a Lives>,
     pub(super) shapes: &'a [Shape],
     /// Looks at everything on its way.
@@ -47,7 +47,7 @@ impl Device {
         bank: Bank,
         source: &Source<'_, B, C>,
     ) -> (Sent, bool) {
-        let Source { bodies, collisions, scheduled, lives, shapes, quick } = *source;
+        let Source { bodies, collisions, added, lives, shapes, quick } = *source;
         let Cut { mut velocities, mut poses, mut entries } = Cut::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
@@ -58,18 +58,16 @@ impl Device {
             None => pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), packers),
             Some(lives) => {
                 let good = survey(target, bodies, bodies.len(), into, packers);
-                let chosen = Chosen { bodies, order: lives.velocities() };
-                let velocities = pack_velocities(target, &chosen, plan.bodies, velocities, packers);
-                let chosen = Chosen { bodies, order: lives.results() };
-                (velocities, pack_poses(target, &chosen, plan.bodies, poses, packers), good)
+                let (first, last) = (lives.velocities(), lives.results());
+                let [first, last] = [first, last].map(|order| Chosen { bodies, order });
+                let (velocities, first_good) =
+                    pack_velocities(target, &first, plan.bodies, velocities, packers);
+                let (poses, last_good) = pack_poses(target, &last, plan.bodies, poses, packers);
+                (velocities, poses, good & first_good & last_good)
             }
         };
-        let of_entries = Entries {
-            collisions,
-            count: plan.collisions,
-            scheduled,
-            words: lives.map(Lives::words),
-        };
+        let words = lives.map(Lives::words);
+        let of_entries = Entries { collisions, count: plan.collisions, added, words };
         let (collisions, good) =
             pack_collisions(target, Ends(&self.ends), &of_entries, &mut entries[active], packers);
         (Sent { velocities, collisions, poses }, bodies_good & good)

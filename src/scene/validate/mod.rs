@@ -12,7 +12,7 @@ mod range;
 mod rows;
 mod shape;
 
-pub(crate) use quick::{Block, Quick, head};
+pub(crate) use quick::{Block, Quick, head, is_padding};
 pub(crate) use shape::{needed, validate_shapes};
 
 use self::body::{check_body, shape_of};

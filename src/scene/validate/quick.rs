@@ -149,29 +149,28 @@ pub(crate) struct Block<'a> {
     pub(crate) collisions: &'a [&'a Collision],
     /// Of all bodies.
     pub(crate) ends: Ends<'a>,
-    /// Whether they are in an order that was made for them. One without contact points may be of
-    /// the order's making then: that none of the caller's is, ordering has found.
+    /// Whether they are in an order that was made for them. What looks like padding may be of the
+    /// order's making then: whoever looks at all of them counts it.
     pub(crate) scheduled: bool,
-    /// Whether [`head`] is right for all of them.
+    /// Whether [`head`] is right for all of them but padding.
     pub(crate) heads: bool,
 }
 
 /// Whether normal, count and bodies of a collision are surely right.
 #[inline(always)]
-pub(crate) fn head(collision: &Collision, [a, b]: [End; 2], scheduled: bool) -> bool {
+pub(crate) fn head(collision: &Collision, [a, b]: [End; 2]) -> bool {
     let [x, y, z] = collision.normal;
     let square = x * x + y * y + z * z;
-    let right = ((square - 1.0).abs() <= NORMAL)
+    ((square - 1.0).abs() <= NORMAL)
         & (collision.count.wrapping_sub(1) < MOST_POINTS)
         & (collision.body_a != collision.body_b)
         & a.has_shape()
         & b.has_shape()
-        & !(a.is_static() & b.is_static());
-    right | (scheduled & is_padding(collision))
+        & !(a.is_static() & b.is_static())
 }
 
 /// Whether an order may have made it.
 #[inline(always)]
-fn is_padding(collision: &Collision) -> bool {
+pub(crate) fn is_padding(collision: &Collision) -> bool {
     (collision.count == 0) & (collision.body_a == collision.body_b)
 }

@@ -286,8 +286,10 @@ fn measure(
     for packer in &mut packers {
         packer.pack_bodies(bodies, shapes);
         match thing {
-            Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, false)?,
-            Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, true)?,
+            Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, None)?,
+            Thing::CheckedInOrder => {
+                packer.pack(bodies, &ordered, shapes, Some(schedule.empty()))?
+            }
             _ => Some(0),
         }
         .ok_or("the step is refused")?;
@@ -333,22 +335,23 @@ fn packing<'a>(
     ordered: &'a Ordered<'a, Vec<Collision>>,
 ) -> Run<'a> {
     let Step { bodies, collisions, shapes, .. } = step;
+    let added = Some(ordered.schedule.empty());
     Box::new(move || {
         if matches!(thing, Thing::Bodies | Thing::StepAsGiven | Thing::StepInOrder) {
             black_box(packer.pack_bodies(black_box(bodies), shapes));
         }
         match thing {
             Thing::AsGiven | Thing::StepAsGiven => {
-                black_box(packer.pack_collisions(black_box(collisions), shapes, false));
+                black_box(packer.pack_collisions(black_box(collisions), shapes, None));
             }
             Thing::InOrder | Thing::StepInOrder => {
-                black_box(packer.pack_collisions(black_box(ordered), shapes, true));
+                black_box(packer.pack_collisions(black_box(ordered), shapes, added));
             }
             Thing::CheckedAsGiven => {
-                let _ = black_box(packer.pack(bodies, black_box(collisions), shapes, false));
+                let _ = black_box(packer.pack(bodies, black_box(collisions), shapes, None));
             }
             Thing::CheckedInOrder => {
-                let _ = black_box(packer.pack(bodies, black_box(ordered), shapes, true));
+                let _ = black_box(packer.pack(bodies, black_box(ordered), shapes, added));
             }
             Thing::Bodies | Thing::Unpack | Thing::Commit => {}
         }

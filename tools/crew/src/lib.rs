@@ -65,11 +65,22 @@ impl Shared {
             let done = catch_unwind(AssertUnwindSafe(|| work(number)));
             state = self.state();
             state.busy -= 1;
-            if let Err(panic) = done {
-                state.panic = Some(panic);
-            }
+            // The first is passed on.
+            let another = done.err().and_then(|panic| match &mut state.panic {
+                Some(_) => Some(panic),
+                none => {
+                    *none = Some(panic);
+                    None
+                }
+            });
             // Nobody but the caller waits for it.
             self.left.notify_one();
+            if another.is_some() {
+                drop(state);
+                // What it carried may panic, too.
+                let _ = catch_unwind(AssertUnwindSafe(|| drop(another)));
+                state = self.state();
+            }
         }
     }
 }
@@ -165,9 +176,10 @@ impl Crew {
         let mut state = self.shared.state();
         state.work = Some(lent);
         // One that nobody was told of, because the caller panicked too.
-        state.panic = None;
+        let untold = state.panic.take();
         state.times += 1;
         drop(state);
+        drop(untold);
         self.shared.begun.notify_all();
         work(0);
         drop(leave);

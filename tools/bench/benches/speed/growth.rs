@@ -72,7 +72,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
             wait: median(times),
         })
         .collect();
-    let growth = [&FLOAT, &WINDOWED].map(|profile| grown(&rows, profile.name));
+    let growth = [grown(&rows, FLOAT.name)?, grown(&rows, WINDOWED.name)?];
     if !options.common.json {
         println!("Time of a step by the size of the scene, beats to results");
         println!("  profile       cubes  collisions         ms  ns a collision");
@@ -86,7 +86,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
                 row.each()
             );
         }
-        for (profile, cubes, times) in growth.iter().flatten() {
+        for (profile, cubes, times) in &growth {
             println!(
                 "  {profile}: a collision takes {times:.3} times as long in {cubes} cubes as in {FROM}"
             );
@@ -107,7 +107,6 @@ pub(crate) fn measure(options: &Options) -> Outcome {
         .collect();
     let growth: Vec<Value> = growth
         .iter()
-        .flatten()
         .map(|(profile, cubes, times)| {
             json!({ "profile": profile, "from_cubes": FROM, "to_cubes": cubes, "times": times })
         })
@@ -116,9 +115,11 @@ pub(crate) fn measure(options: &Options) -> Outcome {
 }
 
 /// How many times as long a collision takes in a design's largest pile, and how large that is.
-fn grown(rows: &[Row], profile: &'static str) -> Option<(&'static str, u32, f64)> {
+fn grown(rows: &[Row], profile: &'static str) -> Result<(&'static str, u32, f64), String> {
+    let missing = || format!("a pile of {FROM} cubes, and a larger one, for {profile}");
     let of = || rows.iter().filter(|row| row.profile == profile);
-    let from = of().find(|row| row.cubes == FROM)?;
-    let last = of().max_by_key(|row| row.cubes)?;
-    Some((profile, last.cubes, last.each() / from.each()))
+    let from = of().find(|row| row.cubes == FROM).ok_or_else(missing)?;
+    let last = of().filter(|row| row.cubes > FROM).max_by_key(|row| row.cubes);
+    let last = last.ok_or_else(missing)?;
+    Ok((profile, last.cubes, last.each() / from.each()))
 }
