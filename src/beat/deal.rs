@@ -98,8 +98,9 @@ impl<'a, 'b> Dealer<'a, 'b> {
 /// comes into the cache first.
 #[inline(always)]
 fn soon_written(to: &[Beat], count: usize) {
+    let first = to.as_ptr();
     for beat in (0..count.min(to.len())).step_by(LINE / BEAT_BYTES) {
-        fetch_to_write(&raw const to[beat]);
+        fetch_to_write(first.wrapping_add(beat));
     }
 }
 

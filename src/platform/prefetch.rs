@@ -1,8 +1,5 @@
 //! This file tells the processor what will be read or written soon.
-#![allow(
-    unsafe_code,
-    reason = "hints to the caches exist as intrinsics on raw pointers and as instructions only"
-)]
+#![allow(unsafe_code, reason = "hints to the caches exist as intrinsics on raw pointers only")]
 
 /// Says that a value will be read soon.
 #[inline(always)]
@@ -21,14 +18,15 @@ pub(crate) fn fetch_to_write<T>(at: *const T) {
     let at: *const i8 = at.cast();
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a prefetch neither reads nor faults, whatever the address.
-    // The intrinsic gives one that only reads, unless the whole program is built for it.
+    // Not every processor can ask for a line to itself: unless the program is built for one that can,
+    // it is read, which is the same as long as nobody else has it.
     unsafe {
-        core::arch::asm!("prefetchw [{}]", in(reg) at, options(nostack, preserves_flags, readonly));
+        core::arch::x86_64::_mm_prefetch::<{ core::arch::x86_64::_MM_HINT_ET0 }>(at);
     }
     #[cfg(target_arch = "aarch64")]
     // SAFETY: a prefetch neither faults nor changes registers, whatever the address.
     unsafe {
-        core::arch::asm!("prfm pstl1keep, [{}]", in(reg) at, options(nostack, preserves_flags, readonly));
+        core::arch::asm!("prfm pstl1keep, [{}]", in(reg) at, options(nostack, preserves_flags, nomem));
     }
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     let _ = at;
@@ -49,7 +47,7 @@ pub(crate) fn fetch<T>(at: *const T) {
     #[cfg(target_arch = "aarch64")]
     // SAFETY: a prefetch neither faults nor changes registers, whatever the address.
     unsafe {
-        core::arch::asm!("prfm pldl1keep, [{}]", in(reg) at, options(nostack, preserves_flags, readonly));
+        core::arch::asm!("prfm pldl1keep, [{}]", in(reg) at, options(nostack, preserves_flags, nomem));
     }
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     let _ = at;
