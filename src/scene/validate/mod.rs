@@ -9,6 +9,7 @@ mod collision;
 mod parameters;
 mod quick;
 mod range;
+mod reach;
 mod rows;
 mod shape;
 

@@ -9,7 +9,7 @@ use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES, collision, relative};
 
 use super::body::check_body;
-use super::rows::{Ends as RowEnds, surely_fit};
+use super::reach::{Extremes, Furthest, Reach, surely_fit};
 use super::{Scene, check_whole};
 use crate::record;
 use crate::record::end::{End, Ends};
@@ -27,7 +27,8 @@ const MOST_POINTS: u32 = CONTACT_POINTS as u32;
 #[derive(Debug)]
 pub(crate) struct Quick<'a> {
     scene: Scene<'a>,
-    short_rows: bool,
+    /// What bounds the rows, where they are computed in sixteen bits.
+    short_rows: Option<Extremes>,
     bodies: Largest<4>,
     absolute: Largest<{ collision::ROWS }>,
     relative: Largest<{ relative::ROWS }>,
@@ -44,9 +45,10 @@ impl<'a> Quick<'a> {
         let Largest([linear, angular]) = Largest::new(velocities, [any; 2]);
         let Largest([position, orientation]) = Largest::new(poses, [any, poses.to_bits()]);
         let geometry = scene.variant.profile.geometry;
+        let short_rows = scene.variant.numbers.rows == Precision::Binary16
+            && !(held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute);
         Self {
-            short_rows: scene.variant.numbers.rows == Precision::Binary16
-                && !(held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute),
+            short_rows: short_rows.then(|| Extremes::new(scene.shapes, scene.flush_subnormals)),
             bodies: Largest([linear, angular, position, orientation]),
             absolute: Largest::new(limit, [any, any, any, number, number, number, number]),
             relative: Largest::new(limit, [any, any, number, number, number, number]),
@@ -78,11 +80,12 @@ impl<'a> Quick<'a> {
     #[inline(always)]
     pub(crate) fn absolute(&self, block: &Block<'_>, records: &[[Beat; collision::ROWS]]) -> bool {
         let mut good = block.heads & self.absolute.bound(records);
-        if self.short_rows {
-            for (rows, collision) in records.iter().zip(block.collisions) {
+        if let Some(shapes) = &self.short_rows {
+            let reach = |(rows, collision): (&[Beat; collision::ROWS], &Collision)| {
                 let [_, a, b, points @ ..] = rows;
-                good &= self.rows(block, collision, [a, b], points);
-            }
+                Reach::new([a, b], points, collision.count)
+            };
+            good &= self.rows(block, shapes, records, reach);
         }
         good || self.exactly(block)
     }
@@ -92,29 +95,41 @@ impl<'a> Quick<'a> {
     pub(crate) fn relative(&self, block: &Block<'_>, records: &[[Beat; relative::ROWS]]) -> bool {
         let counts = block.collisions.iter().map(|collision| collision.count);
         let mut good = block.heads & self.relative.bound_used(records, counts);
-        if self.short_rows {
-            for (rows, collision) in records.iter().zip(block.collisions) {
+        if let Some(shapes) = &self.short_rows {
+            let reach = |(rows, collision): (&[Beat; relative::ROWS], &Collision)| {
                 let [_, offset, points @ ..] = rows;
-                good &= self.rows(block, collision, [&Beat([0; LANES]), offset], points);
-            }
+                Reach::new([&Beat([0; LANES]), offset], points, collision.count)
+            };
+            good &= self.rows(block, shapes, records, reach);
         }
         good || self.exactly(block)
     }
 
-    /// Whether a bitstream that computes rows in sixteen bits surely computes these.
+    /// Whether a bitstream that computes rows in sixteen bits surely computes these: all of a block at
+    /// once, or else each by itself.
     #[inline(always)]
-    fn rows(
+    fn rows<const ROWS: usize>(
         &self,
         block: &Block<'_>,
-        collision: &Collision,
-        positions: [&Beat; 2],
-        points: &[Beat; CONTACT_POINTS],
+        shapes: &Extremes,
+        records: &[[Beat; ROWS]],
+        reach: impl Fn((&[Beat; ROWS], &Collision)) -> Reach,
     ) -> bool {
-        let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
-        let shapes = ends.map(|end| end.shape(self.scene.shapes));
-        let ends = RowEnds { positions, shapes };
-        surely_fit(&ends, points, collision.count, self.scene.flush_subnormals)
-            | (block.scheduled & is_padding(collision))
+        let ends = |collision: &Collision| {
+            [collision.body_a, collision.body_b].map(|body| block.ends.get(body))
+        };
+        let mut furthest = Furthest::new();
+        let all = records.iter().zip(block.collisions.iter().copied());
+        for one in all.clone() {
+            furthest.take(&reach(one), ends(one.1).map(|end| !end.is_static()));
+        }
+        furthest.surely_fit(shapes)
+            || all.into_iter().all(|one| {
+                let (_, collision) = one;
+                let shapes = ends(collision).map(|end| end.shape(self.scene.shapes));
+                surely_fit(&reach(one), shapes, self.scene.flush_subnormals)
+                    | (block.scheduled & is_padding(collision))
+            })
     }
 
     /// Looks at a block as validation does.

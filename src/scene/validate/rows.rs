@@ -6,26 +6,22 @@
 
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::Variant;
-use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES};
 
 use super::Scene;
 use super::range::{fits, origin, used};
-use crate::platform::Lanes;
-use crate::record::largest::MAGNITUDE;
 use crate::record::relative::difference;
-use crate::record::{USED, of_count};
 use crate::scene::{Collision, Contact, InputError, Shape};
 
 /// A component of a moment is two products of the lever arm with a unit normal: at most sqrt(2)
 /// times its longest component. 65504 less that, and less what the roundings add.
-const LONGEST_ARM: f32 = 43_000.0;
+pub(super) const LONGEST_ARM: f32 = 43_000.0;
 /// 65504 less what the roundings on the way add, 2 %: for effective inverse masses, their
 /// reciprocals, and the sum of the contact points.
-const LARGEST: f32 = 64_000.0;
+pub(super) const LARGEST: f32 = 64_000.0;
 /// The same of 2^14, whose reciprocal is the smallest that is not flushed.
 const LARGEST_FLUSHED: f32 = 16_000.0;
 /// The most that a coordinate loses on its way, as a share of it: cut off, or rounded twice.
-const LOSS: f32 = 1.0 / 1024.0;
+pub(super) const LOSS: f32 = 1.0 / 1024.0;
 
 /// What the rows of a collision are made of.
 pub(super) struct Rows<'a> {
@@ -51,7 +47,7 @@ impl Rows<'_> {
     }
 
     /// Whether a bitstream computes every row.
-    fn fit(&self, variant: &Variant, flush: bool) -> bool {
+    pub(super) fn fit(&self, variant: &Variant, flush: bool) -> bool {
         if variant.numbers.rows == Precision::F32 {
             return true;
         }
@@ -149,68 +145,8 @@ impl Rows<'_> {
     }
 }
 
-/// The bodies of a collision, as [`surely_fit`] looks at them.
-pub(super) struct Ends<'a> {
-    /// Rows that hold their positions, as they are streamed.
-    pub(super) positions: [&'a Beat; 2],
-    pub(super) shapes: [&'a Shape; 2],
-}
-
-/// Whether a bitstream that computes rows in binary16 surely computes these: the longest arms of all
-/// contact points in use, whose numbers are in range, are taken together.
-///
-/// What is longer in any component is no shorter after any of the roundings, so that what is found
-/// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
-/// left out at the end. What NaN makes of it does not matter: the bound on numbers refuses that.
-#[inline(always)]
-pub(super) fn surely_fit(
-    ends: &Ends<'_>,
-    points: &[Beat; CONTACT_POINTS],
-    count: u32,
-    flush: bool,
-) -> bool {
-    let magnitude = |lanes: Lanes| lanes.and(Lanes::all(MAGNITUDE));
-    let loss = Lanes::all(LOSS.to_bits());
-    let positions = ends.positions.map(|beat| Lanes::from(*beat));
-    let distances = positions.map(magnitude);
-    let mut longest = [Lanes::all(0); 2];
-    let mut furthest = Lanes::all(0);
-    for (point, used) in points.iter().zip(of_count(&USED, count)) {
-        let point = Lanes::from(*point);
-        let far = magnitude(point);
-        furthest = furthest.larger_f32(far.and(used));
-        for ((longest, position), distance) in longest.iter_mut().zip(positions).zip(distances) {
-            let arm = magnitude(point.minus_f32(position));
-            let arm = arm.plus_f32(far.plus_f32(distance).times_f32(loss));
-            *longest = longest.larger_f32(arm.and(used));
-        }
-    }
-    // Four of them, and a little for the roundings of their sum.
-    let limit =
-        |limit: f32| Lanes::new([limit.to_bits(), limit.to_bits(), limit.to_bits(), MAGNITUDE]);
-    let beyond = furthest.above(limit(LARGEST / 4.01));
-    let beyond =
-        longest.map(|arm| arm.above(limit(LONGEST_ARM))).into_iter().fold(beyond, Lanes::or);
-    let [a, b] = ends.shapes;
-    let mass = a.inverse_mass + b.inverse_mass;
-    let mut turning = [0.0; 2];
-    for ((turning, shape), arm) in turning.iter_mut().zip(ends.shapes).zip(longest) {
-        let [x, y, z] = shape.inverse_inertia;
-        let [rx, ry, rz, _] = arm.times_f32(arm).words().map(f32::from_bits);
-        *turning = larger(larger(x, y), z) * (rx + ry + rz);
-    }
-    (beyond.words() == [0; LANES])
-        & (mass >= 1.0 / LARGEST)
-        & (mass + turning[0] + turning[1] <= largest(flush))
-}
-
-#[inline(always)]
-fn larger(one: f32, other: f32) -> f32 {
-    if one > other { one } else { other }
-}
-
 /// The largest inverse effective mass whose reciprocal is not 0, 1/kg.
-const fn largest(flush: bool) -> f32 {
+pub(super) const fn largest(flush: bool) -> f32 {
     if flush { LARGEST_FLUSHED } else { LARGEST }
 }
 

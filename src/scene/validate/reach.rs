@@ -1,0 +1,287 @@
+//! This file finds out of many collisions at once whether the rows that a bitstream computes of them
+//! stay in binary16, as [`rows`](super::rows) finds out of each.
+
+use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES};
+
+use super::rows::{LARGEST, LONGEST_ARM, LOSS, largest};
+use crate::platform::Lanes;
+use crate::record::largest::MAGNITUDE;
+use crate::record::{USED, of_count};
+use crate::scene::Shape;
+
+/// How far the contact points of a collision are that are in use, whatever rounding does to them: the
+/// longest of each component, taken together.
+///
+/// What is longer in any component is no shorter after any of the roundings, so that what is found
+/// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
+/// left out at the end. What NaN makes of it does not matter: the bound on numbers refuses that.
+pub(super) struct Reach {
+    /// Lever arms about body A and body B, m.
+    arms: [Lanes; 2],
+    /// From the origin, m.
+    furthest: Lanes,
+}
+
+impl Reach {
+    /// Of rows that hold the positions of both bodies and contact points as they are streamed, `count` of
+    /// which are in use.
+    #[inline(always)]
+    pub(super) fn new(positions: [&Beat; 2], points: &[Beat; CONTACT_POINTS], count: u32) -> Self {
+        let magnitude = |lanes: Lanes| lanes.and(Lanes::all(MAGNITUDE));
+        let positions = positions.map(|beat| Lanes::from(*beat));
+        let mut arms = [Lanes::all(0); 2];
+        let mut furthest = Lanes::all(0);
+        for (point, used) in points.iter().zip(of_count(&USED, count)) {
+            let point = Lanes::from(*point);
+            furthest = furthest.larger_f32(magnitude(point).and(used));
+            for (arm, position) in arms.iter_mut().zip(positions) {
+                *arm = arm.larger_f32(magnitude(point.minus_f32(position)).and(used));
+            }
+        }
+        let loss = Lanes::all(LOSS.to_bits());
+        for (arm, position) in arms.iter_mut().zip(positions) {
+            *arm = arm.plus_f32(furthest.plus_f32(magnitude(position)).times_f32(loss));
+        }
+        Self { arms, furthest }
+    }
+}
+
+/// Whether arms and points are as near as a row needs them, whatever the masses.
+#[inline(always)]
+fn near(arms: Lanes, furthest: Lanes) -> bool {
+    let limit =
+        |limit: f32| Lanes::new([limit.to_bits(), limit.to_bits(), limit.to_bits(), MAGNITUDE]);
+    // Four of them, and a little for the roundings of their sum.
+    let beyond = furthest.above(limit(LARGEST / 4.01)).or(arms.above(limit(LONGEST_ARM)));
+    beyond.words() == [0; LANES]
+}
+
+/// The square of the length of a vec3.
+#[inline(always)]
+fn square(arm: Lanes) -> f32 {
+    let [x, y, z, _] = arm.times_f32(arm).words().map(f32::from_bits);
+    x + y + z
+}
+
+/// Whether a bitstream that computes rows in binary16 surely computes those of a collision of bodies
+/// of these shapes, whose numbers are in range.
+#[inline]
+pub(super) fn surely_fit(reach: &Reach, shapes: [&Shape; 2], flush: bool) -> bool {
+    let [a, b] = shapes;
+    let mass = a.inverse_mass + b.inverse_mass;
+    let mut turning = [0.0; 2];
+    for ((turning, shape), arm) in turning.iter_mut().zip(shapes).zip(reach.arms) {
+        *turning = largest_inertia(shape) * square(arm);
+    }
+    near(reach.arms[0].larger_f32(reach.arms[1]), reach.furthest)
+        & (mass >= 1.0 / LARGEST)
+        & (mass + turning[0] + turning[1] <= largest(flush))
+}
+
+/// The furthest that any of some collisions reaches.
+pub(super) struct Furthest {
+    arms: Lanes,
+    /// Those about bodies that move.
+    turning: Lanes,
+    points: Lanes,
+}
+
+impl Furthest {
+    /// Of none.
+    #[inline(always)]
+    pub(super) fn new() -> Self {
+        let none = Lanes::all(0);
+        Self { arms: none, turning: none, points: none }
+    }
+
+    /// Takes one more, of whose bodies those move.
+    #[inline(always)]
+    pub(super) fn take(&mut self, reach: &Reach, moves: [bool; 2]) {
+        for (arm, moves) in reach.arms.into_iter().zip(moves) {
+            self.arms = self.arms.larger_f32(arm);
+            let turning = arm.and(Lanes::all(if moves { u32::MAX } else { 0 }));
+            self.turning = self.turning.larger_f32(turning);
+        }
+        self.points = self.points.larger_f32(reach.furthest);
+    }
+
+    /// Whether a bitstream that computes rows in binary16 surely computes those of all of them, which
+    /// are of bodies of any of these shapes, not both static.
+    #[inline(always)]
+    pub(super) fn surely_fit(&self, shapes: &Extremes) -> bool {
+        let turning = shapes.inertia * square(self.turning);
+        near(self.arms, self.points)
+            & (shapes.smallest_mass >= 1.0 / LARGEST)
+            & (shapes.mass + turning + turning <= shapes.largest)
+    }
+}
+
+/// What two bodies can have between them of a table of shapes, and the bound on it.
+#[derive(Debug)]
+pub(super) struct Extremes {
+    /// Sums of the inverse masses, 1/kg.
+    smallest_mass: f32,
+    mass: f32,
+    /// Of a component of the inverse inertia, 1/(kg m²).
+    inertia: f32,
+    /// The largest inverse effective mass whose reciprocal is not 0, 1/kg.
+    largest: f32,
+}
+
+impl Extremes {
+    /// Of these shapes.
+    pub(super) fn new(shapes: &[Shape], flush: bool) -> Self {
+        let moving = shapes.iter().filter(|shape| !shape.is_static());
+        let start =
+            Self { smallest_mass: f32::INFINITY, mass: 0.0, inertia: 0.0, largest: largest(flush) };
+        moving.fold(start, |all, shape| Self {
+            smallest_mass: all.smallest_mass.min(shape.inverse_mass),
+            mass: all.mass.max(shape.inverse_mass + shape.inverse_mass),
+            inertia: all.inertia.max(largest_inertia(shape)),
+            ..all
+        })
+    }
+}
+
+#[inline(always)]
+fn largest_inertia(shape: &Shape) -> f32 {
+    let [x, y, z] = shape.inverse_inertia;
+    larger(larger(x, y), z)
+}
+
+#[inline(always)]
+fn larger(one: f32, other: f32) -> f32 {
+    if one > other { one } else { other }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::rows::Rows;
+    use super::*;
+    use crate::interface::profile::HALF;
+    use crate::scene::{Collision, Contact};
+
+    const GROUND: Shape = Shape::STATIC;
+    const CUBE: Shape = Shape::isotropic(1.0, 1.5);
+    const PEBBLE: Shape = Shape::isotropic(8_000.0, 30_000.0);
+
+    /// A collision, the positions of its bodies, and which of the shapes they have.
+    #[derive(Debug, Clone)]
+    struct One {
+        collision: Collision,
+        positions: [[f32; 3]; 2],
+        shapes: [usize; 2],
+    }
+
+    impl One {
+        fn reach(&self) -> Reach {
+            let beat = |[x, y, z]: [f32; 3], w: f32| Beat([x, y, z, w].map(f32::to_bits));
+            // Whatever stands beside a vec3.
+            let positions = self.positions.map(|position| beat(position, f32::NAN));
+            let points = self.collision.contacts.map(|contact| beat(contact.point, f32::INFINITY));
+            Reach::new(positions.each_ref(), &points, self.collision.count)
+        }
+
+        fn shapes<'a>(&self, table: &'a [Shape]) -> [&'a Shape; 2] {
+            self.shapes.map(|shape| &table[shape])
+        }
+
+        /// What validation says.
+        fn fits(&self, table: &[Shape], flush: bool) -> bool {
+            let (collision, positions) = (&self.collision, self.positions);
+            let rows = Rows { index: 0, collision, positions, shapes: self.shapes(table) };
+            rows.fit(&HALF.default_variant(), flush)
+        }
+    }
+
+    fn together(all: &[One], table: &[Shape], flush: bool) -> bool {
+        let mut furthest = Furthest::new();
+        for one in all {
+            furthest.take(&one.reach(), one.shapes(table).map(|shape| !shape.is_static()));
+        }
+        furthest.surely_fit(&Extremes::new(table, flush))
+    }
+
+    fn at(positions: [[f32; 3]; 2], point: [f32; 3], shapes: [usize; 2]) -> One {
+        let contacts = [Contact { point, distance: 0.0 }; CONTACT_POINTS];
+        let collision =
+            Collision { body_a: 0, body_b: 1, normal: [0.0, 1.0, 0.0], count: 4, contacts };
+        One { collision, positions, shapes }
+    }
+
+    #[test]
+    fn a_pile_on_its_ground_is_found_to_fit_at_once() {
+        let table = [GROUND, CUBE];
+        let on_ground = at([[0.0; 3], [100.0, 0.5, 90.0]], [100.5, 0.0, 90.5], [0, 1]);
+        let above = at([[100.0, 0.5, 90.0], [100.0, 1.5, 90.0]], [100.5, 1.0, 90.5], [1, 1]);
+        assert!(together(&[on_ground, above], &table, true));
+    }
+
+    /// A pebble on a boulder's arm would not fit; but there is none.
+    #[test]
+    fn bodies_of_different_size_are_found_to_fit_one_by_one() {
+        let table = [GROUND, CUBE, PEBBLE];
+        let cubes = at([[0.0; 3], [2.0, 0.0, 0.0]], [1.0, 0.0, 0.0], [1, 1]);
+        let pebbles = at([[5.0, 0.0, 0.0], [5.1, 0.0, 0.0]], [5.05, 0.0, 0.0], [2, 2]);
+        let all = [cubes, pebbles];
+        assert!(!together(&all, &table, false));
+        for one in &all {
+            assert!(surely_fit(&one.reach(), one.shapes(&table), false));
+        }
+    }
+
+    /// So that both sides of every limit are met.
+    fn length() -> impl Strategy<Value = f32> {
+        let magnitude = prop_oneof![
+            0.0_f32..4.0,
+            50.0_f32..300.0,
+            15_900.0_f32..16_100.0,
+            42_000.0_f32..44_000.0
+        ];
+        (magnitude, any::<bool>()).prop_map(|(length, minus)| if minus { -length } else { length })
+    }
+
+    fn any_one(shapes: usize) -> impl Strategy<Value = One> {
+        let near = prop::array::uniform3(prop_oneof![12 => Just(0.0), 1 => length()]);
+        let bodies = prop::array::uniform2(near.clone());
+        let points = prop::array::uniform4(near);
+        let kinds = (0..shapes, 1..shapes).prop_map(|(a, b)| [a, b]);
+        (bodies, points, 1..=4_u32, kinds).prop_map(|(positions, points, count, shapes)| {
+            let contacts = points.map(|point| Contact { point, distance: 0.0 });
+            let collision = Collision { body_a: 0, body_b: 1, normal: [0.0; 3], count, contacts };
+            One { collision, positions, shapes }
+        })
+    }
+
+    fn any_table() -> impl Strategy<Value = Vec<Shape>> {
+        let shape = (1e-5_f32..4e-5, prop_oneof![Just(0.0_f32), 1e-2_f32..1e4])
+            .prop_map(|(mass, inertia)| Shape::isotropic(mass, inertia));
+        let shape = prop_oneof![shape, Just(CUBE), Just(PEBBLE)];
+        prop::collection::vec(shape, 1..3).prop_map(|shapes| [vec![GROUND], shapes].concat())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        #[test]
+        fn what_surely_fits_is_not_refused(
+            (table, all) in any_table().prop_flat_map(|table| {
+                let one = any_one(table.len());
+                (Just(table), prop::collection::vec(one, 1..4))
+            }),
+            flush in any::<bool>(),
+        ) {
+            let fits = |one: &One| one.fits(&table, flush);
+            if together(&all, &table, flush) {
+                prop_assert!(all.iter().all(fits));
+            }
+            for one in &all {
+                if surely_fit(&one.reach(), one.shapes(&table), flush) {
+                    prop_assert!(fits(one));
+                }
+            }
+        }
+    }
+}
