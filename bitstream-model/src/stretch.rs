@@ -1,8 +1,8 @@
 //! This file lets a long stretch of time pass in which nothing but collisions flows, or bodies: it is
 //! counted in `pace.rs` or `body_pace.rs`, and then has happened.
 
+use crate::accelerator::Coming;
 use crate::accelerator::striping::{STREAMS_MAX, beats_of_bodies};
-use crate::accelerator::{Coming, SHARE};
 use crate::axi_dma::Direction;
 use crate::board::{BURST_BEATS, Board};
 use crate::body_pace::{BodyFlowed, BodyLimits, BodyPace, BodyPhase, BodyStanding};
@@ -108,7 +108,7 @@ impl Board {
 
     fn rules(&self, interval_max: u64) -> Rules {
         Rules {
-            share: SHARE,
+            share: self.accelerator.share(),
             depth: self.config.delays.fifo_beats,
             engines: self.engines(),
             interval: self.config.profile.initiation_interval.into(),

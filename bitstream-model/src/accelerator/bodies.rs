@@ -92,7 +92,7 @@ impl Accelerator {
         inputs: &[Stream],
         memory: &'a Memory,
     ) -> Option<Views<'a>> {
-        if !self.replay.on {
+        if !self.replay.takes_bodies() {
             return None;
         }
         let counts = segment.beats_of_next(records);
@@ -165,7 +165,7 @@ impl Accelerator {
 
     /// What happens to the bodies, if nothing else can be next for it.
     pub(crate) fn flowing_bodies(&self) -> Option<BodyPhase> {
-        if !self.replay.on || self.debt > 0 || self.hung {
+        if !self.replay.takes_bodies() || self.debt > 0 || self.hung {
             return None;
         }
         match self.phase {
