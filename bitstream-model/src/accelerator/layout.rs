@@ -14,9 +14,7 @@ pub(super) const BEATS_MAX: usize = collision::ROWS;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
     pub(super) format: StreamFormat,
-    pub(super) rows_per_beat: usize,
-    /// Beats of a collision, and on each stream; every stream of the design has some.
-    pub(super) beats: usize,
+    /// Beats of a collision on each stream; every stream of the design has some.
     pub(super) share: PerStream,
     /// The stream of each beat, and its number among the collision's there.
     pub(super) places: [(usize, usize); BEATS_MAX],
@@ -66,7 +64,7 @@ impl Layout {
             && profile.s2mm_widths.len() == STREAMS_MAX
             && [own.velocities, own.poses, own.results]
                 == [known.velocities, known.poses, known.results];
-        Some(Self { format, rows_per_beat, beats, share, places, in_place, bodies })
+        Some(Self { format, share, places, in_place, bodies })
     }
 }
 
@@ -87,7 +85,7 @@ mod tests {
         assert_eq!(float.share, [2, 2, 2, 1]);
         let mixed = layout(&MIXED).expect("it can be replayed");
         assert!(!mixed.in_place && !mixed.bodies);
-        assert_eq!((mixed.beats, mixed.share), (3, [1, 1, 1, 0]));
+        assert_eq!(mixed.share, [1, 1, 1, 0]);
         assert_eq!(mixed.places[..3], [(0, 0), (1, 0), (2, 0)]);
     }
 

@@ -40,7 +40,7 @@ pub(super) fn round(value: f32) -> f32 {
 }
 
 /// A binary16 word as a number. Without a branch, so that the compiler takes several at once.
-#[inline]
+#[inline(always)]
 pub(super) fn from_binary16(word: u32) -> f32 {
     const LARGEST: u32 = LARGEST_EXPONENT << MANTISSA_BITS;
     let magnitude = word & 0x7FFF;

@@ -3,17 +3,18 @@
 //!
 //! A record relative to body A is one whose body A stands at the origin.
 
-use super::super::array::{Row, half_of};
+use super::super::array::Row;
 use super::super::decode::Collision;
 use super::super::layout::Layout;
 use super::super::segment::PacketError;
 use super::super::solver::Mass;
 use super::super::striping::STREAMS_MAX;
 use super::Batch;
-use super::records::{BEATS, PLACES, STREAMS};
+use super::lanes::{Lanes, Work};
+use super::records::{BEATS, STREAMS};
 use crate::cast::register;
 use crate::interface::number::StreamFormat;
-use crate::interface::record::{Beat, collision, relative};
+use crate::interface::record::{Beat, LANES, collision, relative};
 
 /// Records that are translated at once.
 const TOGETHER: usize = 4096;
@@ -83,7 +84,7 @@ impl Translation {
         first: usize,
         count: usize,
     ) {
-        let layout = &self.layout;
+        let (layout, width) = (&self.layout, batch.width);
         let [a, b, c, d] = self.streams.each_mut().map(|stream| &mut stream[..]);
         let parts = a
             .chunks_mut(OF_THREAD * BEATS[0])
@@ -91,63 +92,85 @@ impl Translation {
             .zip(c.chunks_mut(OF_THREAD * BEATS[2]))
             .zip(d.chunks_mut(OF_THREAD * BEATS[3]))
             .zip(self.sums[..count].chunks_mut(OF_THREAD));
-        batch.crew.each(
-            (first..).step_by(OF_THREAD).zip(parts),
-            |(first, ((((a, b), c), d), sums))| {
-                let to = [a, b, c, d];
-                match layout.format {
-                    StreamFormat::Binary16 => {
-                        layout.translate(StreamFormat::Binary16, streams, first, to, sums);
-                    }
-                    format => layout.translate(format, streams, first, to, sums),
-                }
-            },
-        );
+        let parts = (first..).step_by(OF_THREAD).zip(parts);
+        batch.crew.each(parts, |(first, ((((a, b), c), d), sums))| {
+            let part = Part { layout, streams, first, to: [a, b, c, d], sums };
+            if let Err(part) = width.run(part) {
+                part.translate();
+            }
+        });
     }
 }
 
-impl Layout {
-    /// Translates as many records as there are sums.
+/// Records that one thread translates, as many as there are sums, and where they go.
+struct Part<'a> {
+    layout: &'a Layout,
+    streams: [&'a [Beat]; STREAMS_MAX],
+    /// The first record on the streams.
+    first: usize,
+    to: [&'a mut [Beat]; STREAMS],
+    sums: &'a mut [u32],
+}
+
+impl Work for Part<'_> {
+    /// The same instructions, of which the processor has more.
     #[inline(always)]
-    fn translate(
-        &self,
-        format: StreamFormat,
-        streams: [&[Beat]; STREAMS_MAX],
-        first: usize,
-        to: [&mut [Beat]; STREAMS],
-        sums: &mut [u32],
-    ) {
-        for (at, sum) in sums.iter_mut().enumerate() {
-            let (record, words) = self.record(streams, first + at);
-            *sum = words;
-            let rows = rows(&Collision::relative(format, &record));
-            for (row, (stream, number)) in rows.into_iter().zip(PLACES) {
-                to[stream][at * BEATS[stream] + number] = Beat(row);
+    fn with<L: Lanes>(self, _: L) {
+        self.translate();
+    }
+}
+
+impl Part<'_> {
+    #[inline(always)]
+    fn translate(self) {
+        match self.layout.format {
+            StreamFormat::F32 => self.translate_of::<{ relative::ROWS }>(StreamFormat::F32),
+            StreamFormat::Binary16 => {
+                self.translate_of::<{ relative::ROWS / 2 }>(StreamFormat::Binary16);
+            }
+            StreamFormat::Thesis16 => {
+                self.translate_of::<{ relative::ROWS / 2 }>(StreamFormat::Thesis16);
             }
         }
     }
 
-    /// The rows of a record, and the sum of the words of its beats.
+    /// The same of a format, in which a record takes so many beats.
     #[inline(always)]
-    fn record(
-        &self,
-        streams: [&[Beat]; STREAMS_MAX],
-        record: usize,
-    ) -> ([Row; relative::ROWS], u32) {
-        let mut rows = [[0; 4]; relative::ROWS];
-        let mut sum = 0_u32;
-        for (number, (stream, place)) in self.places[..self.beats].iter().enumerate() {
-            let beat = streams[*stream][record * self.share[*stream] + place];
-            sum = beat.0.into_iter().fold(sum, u32::wrapping_add);
-            if self.rows_per_beat == 1 {
-                rows[number] = beat.0;
-            } else {
-                rows[2 * number] = half_of(beat, 0);
-                rows[2 * number + 1] = half_of(beat, 1);
-            }
+    fn translate_of<const COUNT: usize>(self, format: StreamFormat) {
+        let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
+        let from: [_; COUNT] = std::array::from_fn(|beat| {
+            let (stream, number) = layout.places[beat];
+            let share = layout.share[stream];
+            (&streams[stream][first * share + number..], share)
+        });
+        const { assert!(BEATS[0] == 2 && BEATS[1] == 2 && BEATS[2] == 2 && BEATS[3] == 1) };
+        let pairs = a.as_chunks_mut::<2>().0.iter_mut().zip(b.as_chunks_mut::<2>().0);
+        let to = pairs.zip(c.as_chunks_mut::<2>().0.iter_mut().zip(d));
+        for (record, (sum, ((a, b), (c, d)))) in sums.iter_mut().zip(to).enumerate() {
+            let beats = from.map(|(beats, share)| beats[record * share]);
+            *sum = beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add);
+            let rows = rows(&Collision::relative(format, &rows_in(&beats)));
+            let [a0, b0, c0, d0, a1, b1, c1] = rows.map(Beat);
+            (*a, *b, *c, *d) = ([a0, a1], [b0, b1], [c0, c1], d0);
         }
-        (rows, sum)
     }
+}
+
+/// The rows in the beats of a record: of 32-bit words, or two in each of sixteen-bit words.
+#[inline(always)]
+fn rows_in<const COUNT: usize>(beats: &[Beat; COUNT]) -> [Row; relative::ROWS] {
+    let mut rows = [[0; LANES]; relative::ROWS];
+    if COUNT == relative::ROWS {
+        for (row, beat) in rows.iter_mut().zip(beats) {
+            *row = beat.0;
+        }
+    } else {
+        let words: &[u16] = bytemuck::cast_slice(beats);
+        for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
+            *to = u32::from(*word);
+        }
+    }
+    rows
 }
 
 #[cfg(test)]
@@ -193,8 +216,9 @@ mod tests {
     /// The beats of records on each stream.
     fn dealt(layout: &Layout, records: &[[Row; relative::ROWS]]) -> [Vec<Beat>; STREAMS_MAX] {
         let mut streams = [const { Vec::new() }; STREAMS_MAX];
+        let rows_per_beat = if layout.format == StreamFormat::F32 { 1 } else { 2 };
         for rows in records {
-            for (beat, rows) in rows.chunks(layout.rows_per_beat).enumerate() {
+            for (beat, rows) in rows.chunks(rows_per_beat).enumerate() {
                 let words = match rows {
                     [a, b] => [a, b].map(|[x, y, z, w]| [x | y << 16, z | w << 16]),
                     _ => [[rows[0][0], rows[0][1]], [rows[0][2], rows[0][3]]],
