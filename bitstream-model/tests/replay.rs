@@ -8,13 +8,13 @@ use bitstream_model::interface::profile::{FLOAT, MIXED};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
 use proptest::prelude::*;
 
-use common::replaying::{RELATIVE, begin, begin_once, below, same, scene, with_gaps};
+use common::replaying::{OTHERS, begin, begin_once, below, same, scene, with_gaps};
 use common::scene::Step;
 use common::sg::LONG;
 
 fn config() -> impl Strategy<Value = BoardConfig> {
     (
-        prop_oneof![3 => Just(&FLOAT), 3 => Just(&MIXED), 1 => Just(&RELATIVE)],
+        prop_oneof![3 => Just(&FLOAT), 3 => Just(&MIXED), 2 => prop::sample::select(&OTHERS[..])],
         prop::sample::select(&[16_usize, 48, 512][..]),
         prop::sample::select(&[10_u32, 14, 26][..]),
         prop::sample::select(

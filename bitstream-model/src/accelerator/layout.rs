@@ -1,11 +1,12 @@
 //! This file says which designs can be replayed, and how their collisions and bodies lie on the streams.
 
 use super::batch;
-use super::striping::{PerStream, STREAMS_MAX, Striping, beat_cycles};
+use super::striping::{PerStream, Striping, Turns, beat_cycles};
 use crate::config::{BoardConfig, Hazards, Subnormals};
 use crate::interface::number::{Numbers, StreamFormat};
-use crate::interface::profile::{FLOAT, Flow, Geometry, Inertia};
+use crate::interface::profile::{Flow, Geometry, Inertia};
 use crate::interface::record::collision;
+use crate::interface::stripe::{Stripe, Stripes};
 
 /// Beats of a collision, at most.
 pub(super) const BEATS_MAX: usize = collision::ROWS;
@@ -20,8 +21,8 @@ pub(super) struct Layout {
     pub(super) places: [(usize, usize); BEATS_MAX],
     /// Whether a batch takes the beats as they are.
     pub(super) in_place: bool,
-    /// Whether velocities, poses and results lie as `bodies.rs` knows them.
-    pub(super) bodies: bool,
+    /// How velocities, poses and results lie on the streams, if all of them in turn.
+    pub(super) bodies: Option<Turns>,
 }
 
 impl Layout {
@@ -59,11 +60,11 @@ impl Layout {
         if absolute && !in_place {
             return None;
         }
-        let (own, known) = (profile.stripes, FLOAT.stripes);
-        let bodies = widths.len() == STREAMS_MAX
-            && profile.s2mm_widths.len() == STREAMS_MAX
-            && [own.velocities, own.poses, own.results]
-                == [known.velocities, known.poses, known.results];
+        let Stripes { velocities, poses, results, .. } = profile.stripes;
+        let of = |stripe: &Stripe, widths: &[u32]| Turns::of(stripe, widths.len());
+        let bodies = of(&velocities, widths)
+            .filter(|turns| of(&poses, widths) == Some(*turns))
+            .filter(|turns| of(&results, profile.s2mm_widths) == Some(*turns));
         Some(Self { format, share, places, in_place, bodies })
     }
 }
@@ -71,8 +72,7 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile::{HALF, MIXED, NAIVE, Profile, WINDOWED, WINDOWED16};
-    use crate::interface::stripe::{Stripe, Stripes};
+    use crate::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED, WINDOWED16};
 
     fn layout(profile: &'static Profile) -> Option<Layout> {
         Layout::of(&BoardConfig { profile, ..BoardConfig::default() })
@@ -81,10 +81,12 @@ mod tests {
     #[test]
     fn collisions_of_float_are_taken_as_they_are_and_those_of_mixed_are_translated() {
         let float = layout(&FLOAT).expect("it can be replayed");
-        assert!(float.in_place && float.bodies);
+        assert!(float.in_place);
+        assert_eq!(float.bodies, Some(Turns { streams: 4 }));
         assert_eq!(float.share, [2, 2, 2, 1]);
         let mixed = layout(&MIXED).expect("it can be replayed");
-        assert!(!mixed.in_place && !mixed.bodies);
+        assert!(!mixed.in_place);
+        assert_eq!(mixed.bodies, Some(Turns { streams: 3 }));
         assert_eq!(mixed.share, [1, 1, 1, 0]);
         assert_eq!(mixed.places[..3], [(0, 0), (1, 0), (2, 0)]);
     }

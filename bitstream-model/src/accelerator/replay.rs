@@ -12,7 +12,7 @@ use super::layout::{BEATS_MAX, Layout};
 use super::pipeline::{Entry, Pipeline};
 use super::segment::{PacketError, Segment};
 use super::solver::Mass;
-use super::striping::{PerStream, STREAMS_MAX};
+use super::striping::{PerStream, STREAMS_MAX, Turns};
 use crate::config::BoardConfig;
 use crate::interface::record::Beat;
 use crate::memory::{Memory, Source};
@@ -106,9 +106,9 @@ impl Replay {
         self.refused = None;
     }
 
-    /// Whether bodies can be taken from their buffers and put into them.
-    pub(super) fn takes_bodies(&self) -> bool {
-        self.on && self.layout.is_some_and(|layout| layout.bodies)
+    /// How bodies lie on the streams, if they can be taken from their buffers and put into them.
+    pub(super) fn bodies(&self) -> Option<Turns> {
+        self.layout.filter(|_| self.on)?.bodies
     }
 
     /// The streams of the design, and the beats of a collision on each.

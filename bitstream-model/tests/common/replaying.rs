@@ -4,6 +4,7 @@ use bitstream_model::interface::control;
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{FLOAT, Geometry, MIXED, Profile};
 use bitstream_model::interface::record::Beat;
+use bitstream_model::interface::stripe::{Stripe, Stripes};
 use bitstream_model::{BoardConfig, Counts, FaultPlan, PacketCount, RegisterAccess, ViolationKind};
 
 use super::packing::result_beats;
@@ -14,8 +15,24 @@ use super::sg::{Failure, Flight, Machine, Outcome};
 /// The designs that are replayed.
 pub(crate) const PROFILES: [&Profile; 2] = [&FLOAT, &MIXED];
 
-/// And one of nobody's: two beats of a collision on each of three streams.
-pub(crate) static RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
+/// And nobody's: two, three and six beats of a collision on each of three, two and one streams.
+pub(crate) const OTHERS: [&Profile; 3] = [&ON_THREE, &ON_TWO, &ON_ONE];
+
+static ON_THREE: Profile = RELATIVE;
+static ON_TWO: Profile = Profile {
+    mm2s_widths: &[128; 2],
+    s2mm_widths: &[128; 2],
+    stripes: in_turn(&[0, 1]),
+    ..RELATIVE
+};
+static ON_ONE: Profile =
+    Profile { mm2s_widths: &[128], s2mm_widths: &[128], stripes: in_turn(&[0]), ..RELATIVE };
+const RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
+
+const fn in_turn(streams: &'static [u8]) -> Stripes {
+    let stripe = Stripe { streams, padded: false };
+    Stripes::new(stripe, stripe)
+}
 
 /// Bodies as bits; cycles, stalls, waits, impulse sum and hazards; sums of what was received and sent.
 pub(crate) type Visible = (Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2]);
