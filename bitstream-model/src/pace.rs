@@ -302,4 +302,24 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn what_settles_in_another_way_is_found_too() {
+        // As the first pass over a pile found it, which came with its descriptors, and the next ones.
+        let first = Standing { held: [215, 139, 64, 0], credit: 435_200_000, turn: 1 };
+        let next = Standing { held: [512, 503, 428, 0], credit: 994_400_000, turn: 5 };
+        let mut known = Recurrence::default();
+        for (standing, share) in [(first, 8), (next, 4), (next, 16), (first, 8), (next, 4)] {
+            let each = &mut pace(MIXED, Some(12_800_000_000), 512, standing);
+            let (mut slices, mut gone_through) = (0, 0);
+            each.run(|slice| {
+                slices += 1;
+                slice.records as u64
+            });
+            let even = &mut pace(MIXED, Some(12_800_000_000), 512, standing);
+            even.run_evenly(158, &mut known, |_| gone_through += 1);
+            assert_eq!((even.flowed, even.standing), (each.flowed, each.standing));
+            assert!(gone_through < slices / share, "{gone_through} of {slices}");
+        }
+    }
 }
