@@ -1,7 +1,7 @@
 //! This file counts beats instead of moving them while nothing but bodies flows, to be loaded or to be
 //! integrated: `pace.rs` for what comes and goes once in a step.
 
-use crate::accelerator::striping::beats_of_bodies;
+use crate::accelerator::striping::{ROWS_IN, ROWS_OUT, Turns};
 use crate::board::STARVED_CYCLES;
 use crate::pace::{PerEngine, Supply};
 
@@ -49,6 +49,8 @@ pub(crate) struct BodyStanding {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyPace {
     pub(crate) phase: BodyPhase,
+    /// How bodies lie on the streams.
+    pub(crate) turns: Turns,
     /// Beats that a FIFO holds.
     pub(crate) depth: usize,
     /// Engines that have their turns: MM2S and S2MM of each core.
@@ -70,40 +72,46 @@ impl BodyPace {
 
     /// Bodies of which all beats are there, and all beats of their results have room.
     fn there(&self) -> usize {
-        let BodyStanding { body, held: [a, to_a, b, to_b, c, to_c, d, to_d], .. } = self.standing;
-        let (even, odd) = (a.min(b), c.min(d));
-        let (next, other) = if body.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-        let there = if next <= other { 2 * next } else { 2 * other + 1 };
-        match self.phase {
+        let Self { phase, turns, depth, standing: BodyStanding { body, held, .. }, .. } = *self;
+        let came = turns.counts(ROWS_IN * body);
+        let there = turns.contiguous(|k| came[k] + held[2 * k]) / ROWS_IN - body;
+        match phase {
             BodyPhase::Load => there,
-            BodyPhase::Integrate => there.min(self.depth - to_a.max(to_b).max(to_c).max(to_d)),
+            BodyPhase::Integrate => {
+                let went = turns.counts(ROWS_OUT * body);
+                let room = turns.contiguous(|k| went[k] + depth - held[2 * k + 1]);
+                there.min(room / ROWS_OUT - body)
+            }
         }
     }
 
     /// What a slice leaves behind: the accelerator works on what is there, then the engines go on for as
     /// long as that took. Nothing if a limit could be reached in it, or nothing happens.
     fn slice(&self) -> Option<(BodyStanding, BodyFlowed)> {
-        let Self { depth, engines, supply, limits, .. } = self;
+        let Self { turns, depth, engines, supply, limits, .. } = self;
         let (mut standing, mut flowed) = (self.standing, self.flowed);
         let there = self.there();
         let slice = if there == 0 {
             flowed.waits += STARVED_CYCLES;
             STARVED_CYCLES
         } else {
-            let (before, after) =
-                (beats_of_bodies(standing.body), beats_of_bodies(standing.body + there));
-            standing.body += there;
-            for ((held, before), after) in
-                standing.held.iter_mut().step_by(2).zip(before).zip(after)
-            {
-                *held -= after - before;
+            let (body, after) = (standing.body, standing.body + there);
+            let beats = |rows: usize| {
+                let (before, after) = (turns.counts(rows * body), turns.counts(rows * after));
+                (0..turns.streams).map(move |k| after[k] - before[k])
+            };
+            let cycles = |rows: usize| turns.cycles(rows * after) - turns.cycles(rows * body);
+            standing.body = after;
+            for (held, beats) in standing.held.iter_mut().step_by(2).zip(beats(ROWS_IN)) {
+                *held -= beats;
             }
+            // A beat a cycle on each stream.
             match self.phase {
-                // A beat a cycle on each stream.
-                BodyPhase::Load => (after[0] - before[0]) as u64,
+                BodyPhase::Load => cycles(ROWS_IN),
                 BodyPhase::Integrate => {
-                    standing.held.iter_mut().skip(1).step_by(2).for_each(|held| *held += there);
-                    there as u64
+                    let held = standing.held.iter_mut().skip(1).step_by(2);
+                    held.zip(beats(ROWS_OUT)).for_each(|(held, beats)| *held += beats);
+                    cycles(ROWS_OUT)
                 }
             }
         };
@@ -115,7 +123,8 @@ impl BodyPace {
         // An engine moves a beat a cycle.
         let most = usize::try_from(slice).unwrap_or(usize::MAX);
         let mut room = standing.held.map(|held| held.min(most));
-        for (room, held) in room.iter_mut().zip(standing.held).step_by(2) {
+        let inputs = room.iter_mut().zip(standing.held).step_by(2).take(turns.streams);
+        for (room, held) in inputs {
             *room = most.min(depth - held);
         }
         let reached = |((room, flowed), limit)| room > 0 && flowed + room >= limit;

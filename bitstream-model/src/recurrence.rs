@@ -9,6 +9,9 @@ use crate::pace::{Flowed, Limits, Pace, Rules, Standing};
 /// The most slices of a period that are remembered.
 const SLICES_MAX: usize = 1 << 11;
 
+/// Slices in which a period may not be met, beside twice as many as it has, until it is forgotten.
+const MISSED_MAX: usize = 16;
+
 /// The slices of a period: how it stands at the beginning of each, and what has flowed until then.
 #[derive(Debug, Default)]
 pub(crate) struct Recurrence {
@@ -23,6 +26,8 @@ pub(crate) struct Recurrence {
     seen: Option<(Standing, Flowed)>,
     since: usize,
     patience: usize,
+    /// Slices of this run in which the known period was not met.
+    missed: usize,
 }
 
 impl Flowed {
@@ -73,12 +78,19 @@ impl Recurrence {
             self.places.reserve(SLICES_MAX);
         }
         self.seen = None;
+        self.missed = 0;
     }
 
-    /// Looks how it stands before a slice, until a period is known.
+    /// Looks how it stands before a slice, until a period is known. One that is not met is forgotten
+    /// for another: what flows may settle in several ways.
     pub(crate) fn look(&mut self, standing: &Standing, flowed: &Flowed) {
         if !self.places.is_empty() {
-            return;
+            self.missed += 1;
+            if self.missed <= 2 * self.slices.len() + MISSED_MAX {
+                return;
+            }
+            self.places.clear();
+            self.seen = None;
         }
         let here = (*standing, *flowed);
         let Some(seen) = self.seen else {

@@ -1,8 +1,8 @@
 //! This file lets a long stretch of time pass in which nothing but collisions flows, or bodies: it is
 //! counted in `pace.rs` or `body_pace.rs`, and then has happened.
 
-use crate::accelerator::striping::{STREAMS_MAX, beats_of_bodies};
-use crate::accelerator::{Coming, SHARE};
+use crate::accelerator::Coming;
+use crate::accelerator::striping::{ROWS_IN, STREAMS_MAX, Turns};
 use crate::axi_dma::Direction;
 use crate::board::{BURST_BEATS, Board};
 use crate::body_pace::{BodyFlowed, BodyLimits, BodyPace, BodyPhase, BodyStanding};
@@ -28,7 +28,7 @@ impl Board {
             return;
         }
         match self.accelerator.flowing_bodies() {
-            Some(phase) => self.stretch_of_bodies(phase, until),
+            Some((phase, turns)) => self.stretch_of_bodies(phase, turns, until),
             None => self.stretch_of_collisions(until),
         }
     }
@@ -108,7 +108,7 @@ impl Board {
 
     fn rules(&self, interval_max: u64) -> Rules {
         Rules {
-            share: SHARE,
+            share: self.accelerator.share(),
             depth: self.config.delays.fifo_beats,
             engines: self.engines(),
             interval: self.config.profile.initiation_interval.into(),
@@ -117,15 +117,15 @@ impl Board {
         }
     }
 
-    fn stretch_of_bodies(&mut self, phase: BodyPhase, until: u64) {
-        let Some((mut pace, sources)) = self.body_pace(phase, until) else { return };
+    fn stretch_of_bodies(&mut self, phase: BodyPhase, turns: Turns, until: u64) {
+        let Some((mut pace, sources)) = self.body_pace(phase, turns, until) else { return };
         pace.run();
         let BodyFlowed { cycles, records, beats, .. } = pace.flowed;
         if cycles == 0 {
             return;
         }
         let first = pace.standing.body - records;
-        let (before, after) = (beats_of_bodies(first), beats_of_bodies(first + records));
+        let [before, after] = [first, first + records].map(|bodies| turns.counts(ROWS_IN * bodies));
         let mut reads = sources;
         let mut writes = [(0, 0); STREAMS_MAX];
         for (k, core) in self.cores.iter().enumerate() {
@@ -152,7 +152,7 @@ impl Board {
     }
 
     /// What flows of the bodies, if nothing else can happen for some time, and where their beats are.
-    fn body_pace(&self, phase: BodyPhase, until: u64) -> Option<(BodyPace, Sources)> {
+    fn body_pace(&self, phase: BodyPhase, turns: Turns, until: u64) -> Option<(BodyPace, Sources)> {
         let (now, memory) = (self.now, &self.memory);
         let mut left = PerEngine::default();
         let mut sources = Sources::default();
@@ -189,6 +189,7 @@ impl Board {
         }
         let pace = BodyPace {
             phase,
+            turns,
             depth: self.config.delays.fifo_beats,
             engines: self.engines(),
             supply: self.supply(),

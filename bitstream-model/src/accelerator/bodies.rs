@@ -1,7 +1,14 @@
-//! This file loads and integrates bodies whose beats are still in their buffers, in the layout of
-//! `float`: two rows of a body on streams 0 and 1, of the next one on 2 and 3; of a result a row on each
-//! stream.
+//! This file loads and integrates bodies whose beats are still in their buffers, on streams that take
+//! turns.
+//!
+//! ```text
+//! four streams    0 1 | 2 3 |              two rows of a body, of the next one...
+//! three           0 1 | 2 0 | 1 2 |
+//! ```
+//!
+//! After a period of two bodies, or three, it begins again with stream 0.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
 use super::array::Row;
@@ -12,7 +19,7 @@ use super::replay::Replay;
 use super::results::Results;
 use super::segment::{PacketError, Segment};
 use super::solver::{Mass, Velocity};
-use super::striping::{STREAMS_MAX, beats_of_bodies};
+use super::striping::{PerStream, ROWS_IN, ROWS_OUT, STREAMS_MAX, Turns};
 use super::{Accelerator, Phase};
 use crate::body_pace::{BodyPace, BodyPhase};
 use crate::cast::register;
@@ -32,19 +39,38 @@ const LOADED_TOGETHER: usize = 2048;
 // Whatever shape the table has fits, so that a body is refused only if `bodies_known` has found it.
 const _: () = assert!(SHAPES_MAX <= 1 << u8::BITS);
 
+/// Beats of the results of bodies on each stream.
+pub(super) fn beats_of_results(turns: Turns, bodies: Range<usize>) -> PerStream {
+    let [before, after] = [bodies.start, bodies.end].map(|body| turns.counts(ROWS_OUT * body));
+    std::array::from_fn(|k| after[k] - before[k])
+}
+
+/// Bodies after which streams that take turns begin again.
+pub(super) const fn period(streams: usize) -> usize {
+    if streams.is_multiple_of(ROWS_IN) { streams / ROWS_IN } else { streams }
+}
+
 /// Two rows of each of some bodies, of which the views begin with body `first`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BodyRows<'a> {
     pub(super) views: Views<'a>,
+    pub(super) turns: Turns,
     pub(super) first: usize,
 }
 
 impl BodyRows<'_> {
+    /// Beats on each stream before those of the views.
+    pub(super) fn before(&self) -> PerStream {
+        self.turns.counts(ROWS_IN * self.first)
+    }
+
     /// The rows of a body.
-    pub(super) fn of(&self, body: usize) -> [Row; 2] {
-        let before = beats_of_bodies(self.first);
-        let stream = 2 * (body % 2);
-        [stream, stream + 1].map(|k| self.views[k][body / 2 - before[k]].0)
+    pub(super) fn of(&self, body: usize) -> [Row; ROWS_IN] {
+        let before = self.before();
+        std::array::from_fn(|row| {
+            let (k, number) = self.turns.place(ROWS_IN * body + row);
+            self.views[k][number - before[k]].0
+        })
     }
 
     /// Loads bodies from `first` on; the sum of the words of their rows, and the first body that has no
@@ -56,30 +82,65 @@ impl BodyRows<'_> {
         velocities: &mut [Velocity],
         shape_of: &mut [u8],
     ) -> (u32, Option<usize>) {
-        let before = beats_of_bodies(self.first);
+        match self.turns.streams {
+            4 => self.load_from::<4>(first, masses, velocities, shape_of),
+            3 => self.load_from::<3>(first, masses, velocities, shape_of),
+            2 => self.load_from::<2>(first, masses, velocities, shape_of),
+            _ => self.load_from::<1>(first, masses, velocities, shape_of),
+        }
+    }
+
+    /// The same from so many streams.
+    fn load_from<const STREAMS: usize>(
+        &self,
+        first: usize,
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+        shape_of: &mut [u8],
+    ) -> (u32, Option<usize>) {
+        let turns = Turns { streams: STREAMS };
+        let (period, stride) = const { (period(STREAMS), period(STREAMS) * ROWS_IN / STREAMS) };
+        let before = self.before();
         let (mut sum, mut wrong) = ([0_u32; LANES], None);
-        for begin in [first, first + 1] {
-            let k = 2 * (begin % 2);
-            let rows = |k: usize| self.views[k].iter().skip(begin / 2 - before[k]);
-            let kept = velocities.iter_mut().zip(&mut *shape_of).skip(begin - first).step_by(2);
-            let bodies = (begin..).step_by(2).zip(rows(k).zip(rows(k + 1)));
-            for ((velocity, kept_shape), (body, (linear, angular))) in kept.zip(bodies) {
+        for own in 0..period.min(velocities.len()) {
+            let rows = |row: usize| {
+                let (k, number) = turns.place(ROWS_IN * (first + own) + row);
+                &self.views[k][number - before[k]..]
+            };
+            let (linears, angulars) = (rows(0), rows(1));
+            for at in 0..(velocities.len() - own).div_ceil(period) {
+                let (linear, angular) = (&linears[at * stride], &angulars[at * stride]);
+                let body = own + at * period;
                 for (sum, words) in sum.iter_mut().zip(linear.0.into_iter().zip(angular.0)) {
                     *sum = sum.wrapping_add(words.0).wrapping_add(words.1);
                 }
                 let (loaded, shape) = decode::velocity(StreamFormat::F32, &[linear.0, angular.0]);
                 let (Some(mass), Ok(shape)) = (masses.get(shape as usize), u8::try_from(shape))
                 else {
-                    wrong = wrong.into_iter().chain([body]).min();
+                    wrong = wrong.into_iter().chain([first + body]).min();
                     continue;
                 };
                 // A static body's words are not looked at.
                 let moves = mass.inverse_mass != 0.0;
-                *velocity = if moves { loaded } else { Velocity::default() };
-                *kept_shape = shape;
+                velocities[body] = if moves { loaded } else { Velocity::default() };
+                shape_of[body] = shape;
             }
         }
         (sum.into_iter().fold(0, u32::wrapping_add), wrong)
+    }
+
+    /// The first of so many bodies from the first one on that has a shape which is not there.
+    fn without_shape(&self, bodies: usize, shapes: usize) -> Option<usize> {
+        let (period, before) = (period(self.turns.streams), self.before());
+        let stride = period * ROWS_IN / self.turns.streams;
+        let found = (self.first..self.first + period.min(bodies)).filter_map(|begin| {
+            let (k, number) = self.turns.place(ROWS_IN * begin + velocity::LINEAR);
+            let linear = self.views[k].iter().skip(number - before[k]).step_by(stride);
+            let most = (self.first + bodies - begin).div_ceil(period);
+            let unknown = |beat: &Beat| beat.0[WORD_LANE] as usize >= shapes;
+            linear.take(most).position(unknown).map(|at| begin + at * period)
+        });
+        found.min()
     }
 }
 
@@ -91,10 +152,8 @@ impl Accelerator {
         records: usize,
         inputs: &[Stream],
         memory: &'a Memory,
-    ) -> Option<Views<'a>> {
-        if !self.replay.on {
-            return None;
-        }
+    ) -> Option<BodyRows<'a>> {
+        let turns = self.replay.bodies()?;
         let counts = segment.beats_of_next(records);
         let mut views: Views<'a> = [&[]; STREAMS_MAX];
         for ((view, stream), count) in views.iter_mut().zip(inputs).zip(counts) {
@@ -104,18 +163,16 @@ impl Accelerator {
                 *view = memory.view(source?, count)?;
             }
         }
-        Some(views)
+        Some(BodyRows { views, turns, first: segment.done })
     }
 
     /// Loads the next bodies.
     pub(super) fn load_views(
         &mut self,
-        segment: &Segment,
         records: usize,
-        views: Views<'_>,
+        rows: BodyRows<'_>,
     ) -> Result<u32, PacketError> {
-        let bodies = segment.done..segment.done + records;
-        let rows = BodyRows { views, first: segment.done };
+        let bodies = rows.first..rows.first + records;
         let Replay { batch, masses, .. } = &mut self.replay;
         let velocities = self.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
         let shapes = self.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
@@ -138,39 +195,49 @@ impl Accelerator {
     /// Integrates the next bodies and sends their results; the sums of what has come and gone.
     pub(super) fn integrate_views(
         &mut self,
-        poses: &Segment,
         results: &mut Results,
         records: usize,
-        views: Views<'_>,
+        poses: BodyRows<'_>,
         outputs: &mut [Stream],
     ) -> [u32; 2] {
-        let first = poses.done;
-        let mut rows = std::mem::take(&mut self.rows);
-        rows.iter_mut().for_each(|rows| rows.resize(records, Beat::default()));
+        let first = poses.first;
+        let mut rows = self.room(poses.turns, first..first + records);
         let places = rows.each_mut().map(Vec::as_mut_slice);
-        let sums = self.results(first, BodyRows { views, first }, places);
+        let sums = self.results(first..first + records, poses, places);
         results.send_rows(records, &rows, outputs);
         self.rows = rows;
         sums
     }
 
-    /// Makes the results of bodies from `first` on, one for each place. Returns the sums of what has
-    /// come and gone.
-    fn results(&mut self, first: usize, poses: BodyRows<'_>, places: ResultPlaces<'_>) -> [u32; 2] {
+    /// Room for the results of bodies.
+    fn room(&mut self, turns: Turns, bodies: Range<usize>) -> [Vec<Beat>; STREAMS_MAX] {
+        let mut rows = std::mem::take(&mut self.rows);
+        for (rows, beats) in rows.iter_mut().zip(beats_of_results(turns, bodies)) {
+            rows.resize(beats, Beat::default());
+        }
+        rows
+    }
+
+    /// Makes the results of bodies, for which the places have room. Returns the sums of what has come
+    /// and gone.
+    fn results(
+        &mut self,
+        bodies: Range<usize>,
+        poses: BodyRows<'_>,
+        places: ResultPlaces<'_>,
+    ) -> [u32; 2] {
         let Replay { batch, masses, .. } = &mut self.replay;
         batch.enter(&self.velocities, &self.shape_of, masses);
         let Arguments { integrate, integration, .. } = &self.arguments;
-        batch.integrate(integrate.then_some(integration), first, poses, places)
+        batch.integrate(integrate.then_some(integration), bodies, poses, places)
     }
 
-    /// What happens to the bodies, if nothing else can be next for it.
-    pub(crate) fn flowing_bodies(&self) -> Option<BodyPhase> {
-        if !self.replay.on || self.debt > 0 || self.hung {
-            return None;
-        }
+    /// What happens to the bodies, if nothing else can be next for it, and how they lie on the streams.
+    pub(crate) fn flowing_bodies(&self) -> Option<(BodyPhase, Turns)> {
+        let turns = self.replay.bodies().filter(|_| self.debt == 0 && !self.hung)?;
         match self.phase {
-            Phase::Load(_) => Some(BodyPhase::Load),
-            Phase::Integrate { .. } => Some(BodyPhase::Integrate),
+            Phase::Load(_) => Some((BodyPhase::Load, turns)),
+            Phase::Integrate { .. } => Some((BodyPhase::Integrate, turns)),
             _ => None,
         }
     }
@@ -188,28 +255,22 @@ impl Accelerator {
             Phase::Integrate { poses, .. } => (poses, false),
             _ => return None,
         };
-        let first = segment.done;
-        // The last two end packets.
-        let mut records = segment.left().saturating_sub(1);
+        let (first, turns) = (segment.done, self.replay.bodies()?);
+        // The last ones end packets.
+        let ending = turns.streams.div_ceil(ROWS_IN);
+        let mut records = (segment.left() + 1).saturating_sub(ending);
         if load {
-            let before = beats_of_bodies(first);
-            // Two a cycle, if there are that many.
-            let most = usize::try_from(cycles).unwrap_or(usize::MAX).saturating_mul(2);
-            records = records.min(most.saturating_add(1));
-            for even in [true, false] {
-                let k = if even { 0 } else { 2 };
-                let (source, count) = sources[k + velocity::LINEAR];
-                let known = |beat: &Beat| (beat.0[WORD_LANE] as usize) < self.replay.masses.len();
-                let bad = memory
-                    .view(source, count)?
-                    .iter()
-                    .take(records / 2 + 1)
-                    .position(|b| !known(b));
-                if let Some(bad) = bad {
-                    let body = 2 * (before[k] + bad) + usize::from(!even);
-                    records = records.min(body - first);
-                }
+            // So many a cycle, if there are that many.
+            let most = usize::try_from(cycles).unwrap_or(usize::MAX).saturating_mul(turns.streams);
+            records = records.min((most / ROWS_IN).saturating_add(1));
+            let mut views: Views<'_> = [&[]; STREAMS_MAX];
+            for (view, (source, count)) in views.iter_mut().zip(sources).take(turns.streams) {
+                *view = memory.view(*source, *count)?;
             }
+            let rows = BodyRows { views, turns, first };
+            let shapes = self.replay.masses.len();
+            let bad = rows.without_shape(records, shapes);
+            records = bad.map_or(records, |body| body - first);
         }
         Some((first, records))
     }
@@ -224,12 +285,13 @@ impl Accelerator {
         inputs: &mut [Stream],
         outputs: &mut [Stream],
     ) {
-        let records = pace.flowed.records;
+        let (records, turns) = (pace.flowed.records, pace.turns);
         self.clock += pace.flowed.cycles;
         self.counters.waits += pace.flowed.waits;
         self.phase = match self.phase {
             Phase::Load(mut segment) => {
-                match self.load_views(&segment, records, views) {
+                let rows = BodyRows { views, turns, first: segment.done };
+                match self.load_views(records, rows) {
                     Ok(sum) => self.received(sum),
                     // They were looked at before.
                     Err(error) => return self.fail(error.code, error.channel, error.beat),
@@ -238,7 +300,7 @@ impl Accelerator {
                 Phase::Load(segment)
             }
             Phase::Integrate { mut poses, mut results } => {
-                let poses_there = BodyRows { views, first: poses.done };
+                let poses_there = BodyRows { views, turns, first: poses.done };
                 let [received, sent] = self.flowed_results(poses_there, records, places, outputs);
                 self.received(received);
                 self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sent);
@@ -259,24 +321,28 @@ impl Accelerator {
         mut places: ResultPlaces<'_>,
         outputs: &mut [Stream],
     ) -> [u32; 2] {
-        let mut direct = records;
         for (place, stream) in places.iter_mut().zip(&mut *outputs) {
             let waiting = stream.len().min(place.len());
             let (from_stream, behind) = std::mem::take(place).split_at_mut(waiting);
             stream.pop_into(from_stream);
-            direct = direct.min(behind.len());
             *place = behind;
         }
+        let (turns, bodies) = (poses.turns, poses.first..poses.first + records);
+        let went = turns.counts(ROWS_OUT * bodies.start);
+        let whole = turns.contiguous(|k| went[k] + places[k].len()) / ROWS_OUT;
+        let whole = whole.min(bodies.end);
+        let beats = beats_of_results(turns, bodies.start..whole);
+        let mut of = beats.into_iter();
         let now = places.each_mut().map(|place| {
-            let (now, behind) = std::mem::take(place).split_at_mut(direct);
+            let beats = of.next().unwrap_or(0);
+            let (now, behind) = std::mem::take(place).split_at_mut(beats);
             *place = behind;
             now
         });
-        let first = poses.first;
-        let before = self.results(first, poses, now);
-        let mut rows = std::mem::take(&mut self.rows);
-        rows.iter_mut().for_each(|rows| rows.resize(records - direct, Beat::default()));
-        let behind = self.results(first + direct, poses, rows.each_mut().map(Vec::as_mut_slice));
+        let before = self.results(bodies.start..whole, poses, now);
+        let mut rows = self.room(turns, whole..bodies.end);
+        let places_of_rows = rows.each_mut().map(Vec::as_mut_slice);
+        let behind = self.results(whole..bodies.end, poses, places_of_rows);
         for ((rows, place), stream) in rows.iter().zip(places).zip(outputs) {
             let (leaving, staying) = rows.split_at(place.len());
             place.copy_from_slice(leaving);

@@ -9,7 +9,7 @@ use super::sixteen;
 use super::solver::Velocity;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::{
-    CONTACT_POINTS, WORD_LANE, collision, pose, relative, result, velocity,
+    CONTACT_POINTS, LANES, WORD_LANE, collision, pose, relative, result, velocity,
 };
 
 /// A number in a word of that format.
@@ -75,22 +75,27 @@ impl Collision {
     /// +infinity are left out.
     #[inline(always)]
     pub(super) fn relative(format: StreamFormat, rows: &[Row; relative::ROWS]) -> Self {
+        // All words alike, for the compiler to take several at once; those that are none are not used.
+        let mut numbers = [[0.0_f32; LANES]; relative::ROWS];
+        for (to, word) in numbers.as_flattened_mut().iter_mut().zip(rows.as_flattened()) {
+            *to = number(format, *word);
+        }
         let mut contacts = [[0.0; 4]; CONTACT_POINTS];
         let mut count = 0;
-        for row in &rows[relative::CONTACTS..] {
-            let contact = vec4(format, *row);
+        for contact in &numbers[relative::CONTACTS..] {
             if contact[WORD_LANE].to_bits() != f32::INFINITY.to_bits() {
-                contacts[count] = contact;
+                contacts[count] = *contact;
                 count += 1;
             }
         }
+        let vec3 = |[x, y, z, _]: [f32; LANES]| [x, y, z];
         Self {
             body_a: rows[relative::NORMAL][WORD_LANE],
             body_b: rows[relative::OFFSET][WORD_LANE],
             count,
-            normal: vec3(format, rows[relative::NORMAL]),
+            normal: vec3(numbers[relative::NORMAL]),
             position_a: [0.0; 3],
-            position_b: vec3(format, rows[relative::OFFSET]),
+            position_b: vec3(numbers[relative::OFFSET]),
             contacts,
         }
     }

@@ -21,6 +21,7 @@ mod control;
 mod decode;
 mod inertia;
 mod integrate;
+mod layout;
 mod number;
 mod phases;
 mod pipeline;
@@ -55,7 +56,7 @@ use results::Results;
 use segment::Segment;
 use solver::{Impulses, Velocity};
 
-pub(crate) use replay::{Coming, SHARE};
+pub(crate) use replay::Coming;
 
 /// Where a step stands.
 #[derive(Debug, Clone, Copy)]

@@ -73,8 +73,8 @@ impl Accelerator {
         }
         segment.check(records, inputs)?;
         let before = segment.cycles();
-        let sum = if let Some(views) = self.views(&segment, records, inputs, memory) {
-            let sum = self.load_views(&segment, records, views)?;
+        let sum = if let Some(rows) = self.views(&segment, records, inputs, memory) {
+            let sum = self.load_views(records, rows)?;
             segment.skip(records, inputs);
             sum
         } else {
@@ -342,8 +342,8 @@ impl Accelerator {
         poses.check(records, inputs)?;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
-        let [received, sent] = if let Some(views) = self.views(&poses, records, inputs, memory) {
-            let sums = self.integrate_views(&poses, &mut results, records, views, outputs);
+        let [received, sent] = if let Some(rows) = self.views(&poses, records, inputs, memory) {
+            let sums = self.integrate_views(&mut results, records, rows, outputs);
             poses.skip(records, inputs);
             sums
         } else {

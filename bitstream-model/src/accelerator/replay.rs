@@ -6,24 +6,19 @@
 //! where they come from the same place of the same hand-over of a buffer: the device owns it, and
 //! nobody writes to it. Where a stream brings anything else, the rest of the step goes the long way.
 
-use super::batch::Batch;
+use super::batch::{Batch, Translation};
 use super::control::Shape;
+use super::layout::{BEATS_MAX, Layout};
 use super::pipeline::{Entry, Pipeline};
 use super::segment::{PacketError, Segment};
 use super::solver::Mass;
-use super::striping::STREAMS_MAX;
-use crate::config::{BoardConfig, Hazards, Subnormals};
-use crate::interface::number::Numbers;
-use crate::interface::profile::{FLOAT, Flow, Geometry, Inertia};
+use super::striping::{PerStream, STREAMS_MAX, Turns};
+use crate::config::BoardConfig;
 use crate::interface::record::Beat;
 use crate::memory::{Memory, Source};
 use crate::span::Spans;
 use crate::stream::Stream;
 
-/// Beats of a collision on each stream.
-pub(crate) const SHARE: [usize; STREAMS_MAX] = [2, 2, 2, 1];
-/// Beats of a collision on a stream, at most.
-const SHARE_MAX: usize = 2;
 /// Issue slots of a hazard window that are kept in mind.
 const SLOTS_MAX: usize = 512;
 
@@ -41,8 +36,12 @@ struct Entered {
 /// The collisions of a step.
 #[derive(Debug)]
 pub(super) struct Replay {
-    /// Whether the design is one of those that it knows.
-    possible: bool,
+    /// How collisions lie on the streams, if the design is one of those that it knows.
+    layout: Option<Layout>,
+    /// What makes of them what the batch takes in, unless it takes them as they are.
+    translation: Option<Translation>,
+    /// Beats of a collision on each stream.
+    pub(super) share: PerStream,
     /// Whether the step has brought nothing so far that it cannot replay.
     pub(super) on: bool,
     pub(super) batch: Batch,
@@ -67,22 +66,14 @@ pub(super) struct Replay {
 
 impl Replay {
     pub(super) fn new(config: &BoardConfig) -> Self {
-        let (profile, variant) = (config.profile, config.variant());
-        let possible = config.replay
-            && variant.numbers == Numbers::F32
-            && variant.inertia == Inertia::Isotropic
-            && profile.geometry == Geometry::Absolute
-            && profile.stripes == FLOAT.stripes
-            && profile.mm2s_widths == FLOAT.mm2s_widths
-            && profile.s2mm_widths == FLOAT.s2mm_widths
-            && profile.collisions_per_issue == 1
-            && matches!(profile.flow, Flow::Passes)
-            && config.subnormals == Subnormals::Keep
-            && config.hazards == Hazards::Interlocked;
+        let layout = if config.replay { Layout::of(config) } else { None };
+        let translated = layout.filter(|layout| !layout.in_place);
         Self {
-            possible,
-            on: possible,
-            batch: Batch::new(if possible { config.threads } else { 1 }, config.lanes),
+            layout,
+            translation: translated.map(Translation::new),
+            share: layout.map_or([0; STREAMS_MAX], |layout| layout.share),
+            on: layout.is_some(),
+            batch: Batch::new(if layout.is_some() { config.threads } else { 1 }, config.lanes),
             computed: 0,
             masses: Vec::new(),
             origin: std::array::from_fn(|_| Spans::with_capacity(64)),
@@ -97,7 +88,7 @@ impl Replay {
 
     /// A step begins.
     pub(super) fn begin(&mut self, collisions: usize, shapes: &[Shape]) {
-        self.on = self.possible;
+        self.on = self.layout.is_some();
         if !self.on {
             return;
         }
@@ -113,6 +104,16 @@ impl Replay {
             self.sums.resize(collisions + 1, 0);
         }
         self.refused = None;
+    }
+
+    /// How bodies lie on the streams, if they can be taken from their buffers and put into them.
+    pub(super) fn bodies(&self) -> Option<Turns> {
+        self.layout.filter(|_| self.on)?.bodies
+    }
+
+    /// The streams of the design, and the beats of a collision on each.
+    fn shares(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        self.share.into_iter().enumerate().filter(|(_, share)| *share > 0)
     }
 
     /// A pass begins, with a hazard window of so many issue slots.
@@ -163,19 +164,20 @@ impl Replay {
         };
         while self.refused.is_none() && self.known() < total {
             let known = self.known();
-            let ahead = |k: usize| (known - segment.done) * SHARE[k];
+            let share_of = self.share;
+            let ahead = |k: usize| (known - segment.done) * share_of[k];
             let mut records = total - known;
-            for (k, share) in SHARE.into_iter().enumerate() {
+            for (k, share) in self.shares() {
                 records = records.min(piece(k, ahead(k), records * share).0 / share);
             }
             // Where the beats of a collision are not together it is gathered.
             let apart = records == 0;
             let records = records.max(1);
-            let mut gathered = [[Beat::default(); SHARE_MAX]; STREAMS_MAX];
+            let mut gathered = [[Beat::default(); BEATS_MAX]; STREAMS_MAX];
             let mut streams: [&[Beat]; STREAMS_MAX] = [&[]; STREAMS_MAX];
-            let mut sources = [[None; SHARE_MAX]; STREAMS_MAX];
+            let mut sources = [[None; BEATS_MAX]; STREAMS_MAX];
             let step = |share: usize| if apart { 1 } else { records * share };
-            for (k, share) in SHARE.into_iter().enumerate() {
+            for (k, share) in self.shares() {
                 for at in (0..records * share).step_by(step(share)) {
                     let (count, source) = piece(k, ahead(k) + at, step(share));
                     let view = source.and_then(|source| memory.view(source, count));
@@ -188,7 +190,7 @@ impl Replay {
                     sources[k][at] = source;
                 }
             }
-            for (k, share) in SHARE.into_iter().enumerate() {
+            for (k, share) in self.shares() {
                 let first = (known * share) as u64;
                 for (at, source) in (0..).zip(sources[k].into_iter().flatten()) {
                     self.origin[k].push(first + at, step(share) as u64, source);
@@ -199,7 +201,13 @@ impl Replay {
             }
             let [before, sums @ ..] = &mut self.sums[known..=known + records] else { return };
             let (shapes, masses) = (shape_of, &self.masses);
-            self.refused = self.batch.decode(streams, records, shapes, masses, sums).err();
+            let decoded = match &mut self.translation {
+                Some(translation) => {
+                    translation.decode(&mut self.batch, streams, records, shapes, masses, sums)
+                }
+                None => self.batch.decode(streams, records, shapes, masses, sums),
+            };
+            self.refused = decoded.err();
             let mut sum = *before;
             for each in &mut sums[..self.batch.len() - known] {
                 sum = sum.wrapping_add(*each);
@@ -216,7 +224,7 @@ impl Replay {
     /// Whether the next `records` collisions on the streams are the decoded ones, as far as they have
     /// come: on some streams there may be more of them than on others.
     pub(super) fn same(&self, segment: &Segment, records: usize, inputs: &[Stream]) -> bool {
-        SHARE.into_iter().enumerate().all(|(k, share)| {
+        self.shares().all(|(k, share)| {
             let first = (segment.done * share) as u64;
             let most = (records * share).min(inputs[k].len());
             let mut at = 0;
@@ -235,7 +243,7 @@ impl Replay {
     /// Whether what is about to come to the streams goes on with the decoded collisions, as far as it
     /// belongs to the segment.
     pub(super) fn goes_on(&self, segment: &Segment, inputs: &[Stream], coming: &Coming) -> bool {
-        SHARE.into_iter().enumerate().all(|(k, share)| {
+        self.shares().all(|(k, share)| {
             let Some((source, count)) = coming[k] else { return false };
             let next = segment.done * share + inputs[k].len();
             let left = ((segment.done + segment.left()) * share).saturating_sub(next);

@@ -1,8 +1,9 @@
 //! This file goes through the passes over collisions that are replayed: which enter when, and what of
 //! it is computed at last.
 
-use super::replay::{Coming, SHARE};
+use super::replay::Coming;
 use super::segment::{PacketError, Segment};
+use super::striping::PerStream;
 use super::{Accelerator, Phase};
 use crate::interface::record::CONTACT_POINTS;
 use crate::memory::Memory;
@@ -157,6 +158,11 @@ impl Accelerator {
         }
     }
 
+    /// Beats of a collision on each stream.
+    pub(crate) fn share(&self) -> PerStream {
+        self.replay.share
+    }
+
     /// Whether the collisions flow that are on the streams and about to come: how many may, and how
     /// long each of them may take.
     pub(crate) fn flows(
@@ -166,8 +172,8 @@ impl Accelerator {
         memory: &Memory,
     ) -> Option<(usize, u64)> {
         let (number, segment) = self.flowing()?;
-        let within = |(k, stream): (usize, &Stream)| stream.len() <= segment.left() * SHARE[k];
-        if inputs.len() != SHARE.len() || !inputs.iter().enumerate().all(within) {
+        let within = |(stream, share): (&Stream, usize)| stream.len() <= segment.left() * share;
+        if !inputs.iter().zip(self.replay.share).all(within) {
             return None;
         }
         let coming = coming()?;

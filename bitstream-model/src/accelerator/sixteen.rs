@@ -39,19 +39,19 @@ pub(super) fn round(value: f32) -> f32 {
     f32::from_bits((bits + half + odd) & !((1 << EXTRA_BITS) - 1))
 }
 
-/// A binary16 word as a number.
-#[inline]
+/// A binary16 word as a number. Without a branch, so that the compiler takes several at once.
+#[inline(always)]
 pub(super) fn from_binary16(word: u32) -> f32 {
-    let sign = (word & 0x8000) << 16;
-    let exponent = (word >> MANTISSA_BITS) & LARGEST_EXPONENT;
-    let mantissa = word & MANTISSA;
-    let magnitude = match exponent {
-        // Ten bits in steps of 2^-24: exact.
-        0 => ((mantissa as f32) * f32::from_bits((127 - 24) << 23)).to_bits(),
-        LARGEST_EXPONENT => INFINITY | (mantissa << EXTRA_BITS),
-        _ => ((exponent + REBIAS) << 23) | (mantissa << EXTRA_BITS),
-    };
-    f32::from_bits(sign | magnitude)
+    const LARGEST: u32 = LARGEST_EXPONENT << MANTISSA_BITS;
+    let magnitude = word & 0x7FFF;
+    // Ten bits in steps of 2^-24: exact.
+    let steps = (magnitude & MANTISSA).cast_signed() as f32;
+    let subnormal = (steps * f32::from_bits((127 - 24) << 23)).to_bits();
+    let normal = (magnitude << EXTRA_BITS) + (REBIAS << 23);
+    // From the largest exponent to that of an f32.
+    let special = if magnitude >= LARGEST { REBIAS << 23 } else { 0 };
+    let bits = if magnitude > MANTISSA { normal + special } else { subnormal };
+    f32::from_bits(bits | ((word & 0x8000) << 16))
 }
 
 /// The word of the binary16 number nearest to a number.

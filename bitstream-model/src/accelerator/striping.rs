@@ -2,7 +2,7 @@
 //! each, how long they take.
 
 use crate::interface::address_map::DMA_COUNT_MAX;
-use crate::interface::record::BEAT_BYTES;
+use crate::interface::record::{BEAT_BYTES, pose, result, velocity};
 use crate::interface::stripe::Stripe;
 
 /// The most streams that a profile has.
@@ -18,11 +18,50 @@ pub(crate) const fn beat_cycles(width: u32) -> u64 {
 /// A count for each stream.
 pub(crate) type PerStream = [usize; STREAMS_MAX];
 
-/// How many beats of the first `bodies` bodies are on each stream in the layout of `float`, of their
-/// velocities as of their poses: two of a body on streams 0 and 1, of the next one on 2 and 3.
-pub(crate) fn beats_of_bodies(bodies: usize) -> PerStream {
-    let (even, odd) = (bodies.div_ceil(2), bodies / 2);
-    [even, even, odd, odd]
+/// Rows that come for a body at once, of its velocity as of its pose.
+pub(crate) const ROWS_IN: usize = 2;
+/// Rows of a result.
+pub(crate) const ROWS_OUT: usize = 4;
+const _: () = assert!(velocity::ROWS == ROWS_IN && pose::ROWS == ROWS_IN);
+const _: () = assert!(result::ROWS == ROWS_OUT);
+
+/// Streams that take turns, a beat each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Turns {
+    pub(crate) streams: usize,
+}
+
+impl Turns {
+    /// Those of a stripe over all of the streams, if they take turns on it.
+    pub(super) fn of(stripe: &Stripe, streams: usize) -> Option<Self> {
+        let all = stripe.streams.iter().map(|stream| usize::from(*stream)).eq(0..streams);
+        (all && !stripe.padded).then_some(Self { streams })
+    }
+
+    /// The stream of a beat, and its number there.
+    #[inline(always)]
+    pub(crate) const fn place(self, beat: usize) -> (usize, usize) {
+        (beat % self.streams, beat / self.streams)
+    }
+
+    /// How many of the first `beats` beats are on each stream.
+    #[inline(always)]
+    pub(crate) fn counts(self, beats: usize) -> PerStream {
+        let streams = self.streams;
+        std::array::from_fn(|k| if k < streams { (beats + streams - 1 - k) / streams } else { 0 })
+    }
+
+    /// How many beats in one piece, from the first one, there are when each stream has so many.
+    #[inline]
+    pub(crate) fn contiguous(self, on_stream: impl Fn(usize) -> usize) -> usize {
+        let missing = |k: usize| on_stream(k) * self.streams + k;
+        (0..self.streams).map(missing).min().unwrap_or(0)
+    }
+
+    /// Clock cycles that the first `beats` beats take, one on each stream.
+    pub(crate) fn cycles(self, beats: usize) -> u64 {
+        beats.div_ceil(self.streams) as u64
+    }
 }
 
 /// A stripe over streams of known widths.
@@ -141,7 +180,6 @@ impl Places<'_> {
 mod tests {
     use super::*;
     use crate::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
-    use crate::interface::record::{pose, velocity};
     use crate::interface::stripe::Stripes;
 
     fn collisions(profile: &Profile) -> Striping {
@@ -196,14 +234,27 @@ mod tests {
     }
 
     #[test]
-    fn bodies_of_float_lie_as_its_stripes_say() {
-        let Stripes { velocities, poses, .. } = FLOAT.stripes;
-        for (stripe, rows) in [(velocities, velocity::ROWS), (poses, pose::ROWS)] {
-            let striping = Striping::new(&stripe, FLOAT.mm2s_widths);
-            for bodies in 0..20 {
-                assert_eq!(beats_of_bodies(bodies), striping.counts(rows * bodies), "{bodies}");
+    fn streams_that_take_turns_lie_as_their_stripes_say() {
+        for profile in [&FLOAT, &MIXED] {
+            let Stripes { velocities, poses, results, .. } = profile.stripes;
+            for stripe in [velocities, poses, results] {
+                let streams = profile.mm2s_widths.len();
+                let turns = Turns::of(&stripe, streams).expect("they take turns");
+                let striping = Striping::new(&stripe, profile.mm2s_widths);
+                let mut places = striping.places(0);
+                for beats in 0..40 {
+                    assert_eq!(turns.counts(beats), striping.counts(beats), "{beats}");
+                    assert_eq!(turns.cycles(beats), striping.cycles(beats), "{beats}");
+                    assert_eq!(turns.place(beats), places.take(), "{beats}");
+                    let there = turns.counts(beats);
+                    assert_eq!(turns.contiguous(|k| there[k]), beats);
+                    let more = |k: usize| there[k] + k * beats % 3;
+                    assert_eq!(turns.contiguous(more), striping.contiguous(more), "{beats}");
+                }
             }
         }
+        let not = [&FLOAT.stripes.collisions, &HALF.stripes.velocities];
+        assert!(not.into_iter().all(|stripe| Turns::of(stripe, 3).is_none()));
     }
 
     #[test]

@@ -7,6 +7,7 @@
 
 pub(crate) mod clock;
 pub(crate) mod packing;
+pub(crate) mod replaying;
 pub(crate) mod ring;
 pub(crate) mod scene;
 pub(crate) mod sg;

@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! beats -> intake.rs: place.rs (which are independent), block.rs (side by side) -> passes
+//!   translation.rs, if they are those of another design
 //! ```
 //!
 //! Only collisions that share no moving body change places, so that every bit is that of
-//! `solver.rs` taking one after the other. It is for the layout of records in f32 with isotropic
-//! inertia and subnormals kept.
+//! `solver.rs` taking one after the other. It is for arithmetic in f32 with isotropic inertia and
+//! subnormals kept.
 
 mod block;
 mod front;
@@ -20,6 +21,7 @@ mod queue;
 mod records;
 #[cfg(test)]
 mod tests;
+mod translation;
 mod width;
 
 use std::ops::Range;
@@ -42,6 +44,8 @@ use place::Places;
 use width::Width;
 
 pub(super) use motion::ResultPlaces;
+pub(super) use records::PLACES;
+pub(super) use translation::Translation;
 
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
@@ -206,6 +210,12 @@ impl Batch {
     /// The bodies of a decoded collision and which of them move, or `None` for a padding entry.
     pub(super) fn entry(&self, index: usize) -> Option<Entry> {
         self.slot(index).map(|(block, lane)| self.blocks[block].entry(lane))
+    }
+
+    /// A decoded collision, or `None` for a padding entry.
+    #[cfg(test)]
+    pub(super) fn collision(&self, index: usize) -> Option<Collision> {
+        self.slot(index).map(|(block, lane)| self.blocks[block].collision(lane))
     }
 
     /// The smallest distance, in collisions, of two that share a moving body; `u32::MAX` without.

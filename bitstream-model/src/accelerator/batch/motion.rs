@@ -1,19 +1,19 @@
 //! This file integrates bodies side by side: the formulae and the order of evaluation of
 //! `integrate.rs`, lane by lane.
 //!
-//! The bodies come and go in the layout of `float`: the poses of even bodies on streams 0 and 1, of odd
-//! ones on 2 and 3; of a result a row on each stream.
+//! The bodies come and go on streams that take turns: the first body of each period is found at every
+//! so many beats of its streams, the next one likewise.
 
 use std::mem;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::super::array::Row;
-use super::super::bodies::BodyRows;
+use super::super::bodies::{BodyRows, beats_of_results, period};
 use super::super::decode;
 use super::super::integrate::{Integration, integrate};
 use super::super::number::Single;
-use super::super::striping::beats_of_bodies;
+use super::super::striping::{ROWS_IN, ROWS_OUT, STREAMS_MAX, Turns};
 use super::Batch;
 use super::block::{LANES, ROWS_APART, Words};
 use super::front::Line;
@@ -25,11 +25,9 @@ use crate::interface::record::Beat;
 
 /// Bodies that a thread integrates at once.
 const INTEGRATED_TOGETHER: usize = 512;
-/// Bodies of which those of even and those of odd numbers fill the widest lanes.
-const GROUP: usize = 2 * LANES;
 
 /// Room for results, on each stream.
-pub(in super::super) type ResultPlaces<'a> = [&'a mut [Beat]; 4];
+pub(in super::super) type ResultPlaces<'a> = [&'a mut [Beat]; STREAMS_MAX];
 
 fn added(rows: &[Row]) -> u32 {
     rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
@@ -45,10 +43,11 @@ struct Bodies<'a> {
     width: Width,
 }
 
-/// Takes room for so many results.
-fn take<'a>(places: &mut ResultPlaces<'a>, count: usize) -> ResultPlaces<'a> {
+/// Takes room for the results of bodies.
+fn take<'a>(places: &mut ResultPlaces<'a>, turns: Turns, bodies: Range<usize>) -> ResultPlaces<'a> {
+    let mut beats = beats_of_results(turns, bodies).into_iter();
     places.each_mut().map(|place| {
-        let (taken, rest) = mem::take(place).split_at_mut(count);
+        let (taken, rest) = mem::take(place).split_at_mut(beats.next().unwrap_or(0));
         *place = rest;
         taken
     })
@@ -56,47 +55,73 @@ fn take<'a>(places: &mut ResultPlaces<'a>, count: usize) -> ResultPlaces<'a> {
 
 impl Bodies<'_> {
     /// The results of bodies; the sums of the words of their poses and of their results.
-    fn results(&self, bodies: Range<usize>, mut places: ResultPlaces<'_>) -> [u32; 2] {
+    fn results(&self, bodies: Range<usize>, places: ResultPlaces<'_>) -> [u32; 2] {
+        match self.poses.turns.streams {
+            4 => self.results_on::<4>(bodies, places),
+            3 => self.results_on::<3>(bodies, places),
+            2 => self.results_on::<2>(bodies, places),
+            _ => self.results_on::<1>(bodies, places),
+        }
+    }
+
+    /// The same from and to so many streams.
+    fn results_on<const STREAMS: usize>(
+        &self,
+        bodies: Range<usize>,
+        mut places: ResultPlaces<'_>,
+    ) -> [u32; 2] {
+        let turns = Turns { streams: STREAMS };
+        let period = const { period(STREAMS) };
+        // Those of each place in a period fill the widest lanes.
+        let group = period * LANES;
         let mut sums = [0; 2];
         let Range { start, end } = bodies;
         let mut last = start;
         if let Some(integration) = self.integration
             && !matches!(self.width, Width::One)
         {
-            let first = start.next_multiple_of(2).min(end);
-            last = first + (end - first) / GROUP * GROUP;
-            self.one_by_one(start..first, take(&mut places, first - start), &mut sums);
-            let places = take(&mut places, last - first);
-            let _ = self.width.run(self.groups(integration, first..last, places, &mut sums));
+            let first = start.next_multiple_of(period).min(end);
+            last = first + (end - first) / group * group;
+            let places_before = take(&mut places, turns, start..first);
+            self.one_by_one::<STREAMS>(start..first, places_before, &mut sums);
+            let places = take(&mut places, turns, first..last);
+            let groups = self.groups::<STREAMS>(integration, first..last, places, &mut sums);
+            let _ = self.width.run(groups);
         }
-        self.one_by_one(last..end, places, &mut sums);
+        self.one_by_one::<STREAMS>(last..end, places, &mut sums);
         sums
     }
 
-    /// Whole groups of bodies, of which the first one is even.
-    fn groups<'a>(
+    /// Whole groups of bodies, of which the first one begins a period.
+    fn groups<'a, const STREAMS: usize>(
         &'a self,
         integration: &'a Integration,
         bodies: Range<usize>,
         places: ResultPlaces<'a>,
         sums: &'a mut [u32; 2],
-    ) -> Groups<'a> {
-        let pairs = bodies.start / 2..bodies.end / 2;
-        let before = beats_of_bodies(self.poses.first);
+    ) -> Groups<'a, STREAMS> {
+        let turns = self.poses.turns;
+        let [from, to] = [bodies.start, bodies.end].map(|body| turns.counts(ROWS_IN * body));
+        let before = self.poses.before();
         let poses = std::array::from_fn(|k| {
-            let view = &self.poses.views[k];
-            bytemuck::cast_slice(&view[pairs.start - before[k]..pairs.end - before[k]])
+            bytemuck::cast_slice(&self.poses.views[k][from[k] - before[k]..to[k] - before[k]])
         });
-        let rows = bytemuck::cast_slice(&self.lines[pairs]);
+        let rows = bytemuck::cast_slice(self.lines);
+        let rows = &rows[ROWS_IN * bodies.start..ROWS_IN * bodies.end];
         let places = places.map(bytemuck::cast_slice_mut);
         Groups { integration, rows, poses, places, sums }
     }
 
     /// The same, one body after the other.
-    fn one_by_one(&self, bodies: Range<usize>, places: ResultPlaces<'_>, sums: &mut [u32; 2]) {
-        let [positions, orientations, linears, angulars] = places;
-        let places = positions.iter_mut().zip(orientations).zip(linears.iter_mut().zip(angulars));
-        for (body, ((position, orientation), (linear, angular))) in bodies.zip(places) {
+    fn one_by_one<const STREAMS: usize>(
+        &self,
+        bodies: Range<usize>,
+        places: ResultPlaces<'_>,
+        sums: &mut [u32; 2],
+    ) {
+        let turns = Turns { streams: STREAMS };
+        let before = turns.counts(ROWS_OUT * bodies.start);
+        for body in bodies {
             let rows = self.poses.of(body);
             let mut pose = decode::pose(StreamFormat::F32, &rows);
             let (line, second) = (&self.lines[body / 2], body % 2 == 1);
@@ -107,20 +132,22 @@ impl Bodies<'_> {
             let result = decode::result(StreamFormat::F32, &pose, &velocity);
             sums[0] = sums[0].wrapping_add(added(&rows));
             sums[1] = sums[1].wrapping_add(added(&result));
-            [position.0, orientation.0, linear.0, angular.0] = result;
+            for (row, words) in result.into_iter().enumerate() {
+                let (k, number) = turns.place(ROWS_OUT * body + row);
+                places[k][number - before[k]] = Beat(words);
+            }
         }
     }
 }
 
-/// Bodies side by side: pairs of an even one and the next, as many as fill the lanes.
-struct Groups<'a> {
+/// Bodies side by side: those of the same place in a period, as many as fill the lanes.
+struct Groups<'a, const STREAMS: usize> {
     integration: &'a Integration,
-    /// Four quads of a pair.
+    /// Two quads of a body.
     rows: &'a [Quad],
-    /// A quad of a pair.
-    poses: [&'a [Quad]; 4],
-    /// Two quads of a pair.
-    places: [&'a mut [Quad]; 4],
+    /// The beats of whole periods on each stream.
+    poses: [&'a [Quad]; STREAMS_MAX],
+    places: [&'a mut [Quad]; STREAMS_MAX],
     sums: &'a mut [u32; 2],
 }
 
@@ -187,18 +214,28 @@ impl<N: Numbers> Constants<N> {
     }
 }
 
-impl Work for Groups<'_> {
+impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
     #[inline(always)]
     fn with<L: Lanes>(self, lanes: L) {
-        let Self { integration, rows, poses, mut places, sums } = self;
+        let Self { integration, rows, poses, places, sums } = self;
         let constants = Constants::new(lanes, integration);
         let Constants { zero, one, time_step: dt, damping, fall, .. } = constants;
+        let period = const { period(STREAMS) };
+        // Beats of a period on each stream.
+        let (came, goes) = (period * ROWS_IN / STREAMS, period * ROWS_OUT / STREAMS);
+        let turns = Turns { streams: STREAMS };
+        let periods = rows.len() / (ROWS_IN * period);
         let mut totals = [zero; 2];
-        for (pair, odd) in (0..poses[0].len()).step_by(L::WIDTH).flat_map(|at| [(at, 0), (at, 1)]) {
-            let [px, py, pz, unused] = lanes.transposed(&poses[2 * odd][pair..], 1);
-            let [qx, qy, qz, qw] = lanes.transposed(&poses[2 * odd + 1][pair..], 1);
-            let [vx, vy, vz, m] = lanes.transposed(&rows[4 * pair + 2 * odd..], 4);
-            let before = lanes.transposed(&rows[4 * pair + 2 * odd + 1..], 4);
+        for (at, body) in
+            (0..periods).step_by(L::WIDTH).flat_map(|at| (0..period).map(move |body| (at, body)))
+        {
+            let first = ROWS_IN * (period * at + body);
+            let [vx, vy, vz, m] = lanes.transposed(&rows[first..], ROWS_IN * period);
+            let before = lanes.transposed(&rows[first + 1..], ROWS_IN * period);
+            let (k, number) = turns.place(ROWS_IN * body);
+            let [px, py, pz, unused] = lanes.transposed(&poses[k][came * at + number..], came);
+            let (k, number) = turns.place(ROWS_IN * body + 1);
+            let [qx, qy, qz, qw] = lanes.transposed(&poses[k][came * at + number..], came);
             let [wx, wy, wz] = [before[0] * damping, before[1] * damping, before[2] * damping];
 
             let [factor, c] = constants.rotation(lanes, [wx, wy, wz]);
@@ -234,9 +271,10 @@ impl Work for Groups<'_> {
             for row in [[px, py, pz, unused], [qx, qy, qz, qw]] {
                 totals[0] = row.into_iter().fold(totals[0], Numbers::with_words);
             }
-            for (row, place) in results.into_iter().zip(&mut places) {
-                totals[1] = row.into_iter().fold(totals[1], Numbers::with_words);
-                lanes.spread(row, &mut place[2 * pair + odd..], 2);
+            for (row, words) in results.into_iter().enumerate() {
+                totals[1] = words.into_iter().fold(totals[1], Numbers::with_words);
+                let (k, number) = turns.place(ROWS_OUT * body + row);
+                lanes.spread(words, &mut places[k][goes * at + number..], goes);
             }
         }
         for (sum, total) in sums.iter_mut().zip(totals) {
@@ -248,28 +286,29 @@ impl Work for Groups<'_> {
 }
 
 impl Batch {
-    /// Integrates bodies from `first` on, or only sends them back, one for each place. The velocities
+    /// Integrates bodies, or only sends them back, where the places have room. The velocities
     /// are those that were entered or that passes have left. Returns the sums of the words of their
     /// poses and of their results.
     pub(in super::super) fn integrate(
         &mut self,
         integration: Option<&Integration>,
-        first: usize,
+        bodies: Range<usize>,
         poses: BodyRows<'_>,
-        places: ResultPlaces<'_>,
+        mut places: ResultPlaces<'_>,
     ) -> [u32; 2] {
-        let bodies = Bodies {
+        let own = Bodies {
             integration,
             lines: &self.lines[ROWS_APART as usize / 2..],
             poses,
             width: self.width,
         };
-        let end = first + places[0].len();
         let sums = [const { AtomicU32::new(0) }; 2];
-        let [a, b, c, d] = places.map(|place| place.chunks_mut(INTEGRATED_TOGETHER));
-        let parts = (first..end).step_by(INTEGRATED_TOGETHER).zip(a.zip(b).zip(c.zip(d)));
-        self.crew.each(parts, |(first, ((a, b), (c, d)))| {
-            let found = bodies.results(first..first + a.len(), [a, b, c, d]);
+        let parts = bodies.clone().step_by(INTEGRATED_TOGETHER).map(|first| {
+            let part = first..(first + INTEGRATED_TOGETHER).min(bodies.end);
+            (part.clone(), take(&mut places, poses.turns, part))
+        });
+        self.crew.each(parts, |(part, places)| {
+            let found = own.results(part, places);
             for (sum, found) in sums.iter().zip(found) {
                 sum.fetch_add(found, Ordering::Relaxed);
             }
@@ -279,111 +318,4 @@ impl Batch {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::super::solver::{Mass, Velocity};
-    use super::*;
-
-    /// A zero, a very small number, or one between 2^-12 and 16 of either sign.
-    fn number(seed: &mut u64) -> f32 {
-        *seed = seed.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
-        let bits = (*seed >> 32) as u32;
-        match bits % 8 {
-            0 => 0.0,
-            1 => f32::from_bits(bits >> 3),
-            _ => f32::from_bits((bits & 0x807F_FFFF) | ((115 + (bits >> 23) % 16) << 23)),
-        }
-    }
-
-    /// A vector of such numbers.
-    fn vector(seed: &mut u64) -> [f32; 3] {
-        std::array::from_fn(|_| number(seed))
-    }
-
-    /// The shape and the velocity of each body.
-    fn moving(bodies: usize) -> (Vec<u8>, Vec<Velocity>) {
-        let mut seed = 3;
-        let shape_of = (0..bodies).map(|body| [2, 2, 0, 2, 1, 3][body % 6]).collect();
-        let velocities = (0..bodies)
-            .map(|_| Velocity { linear: vector(&mut seed), angular: vector(&mut seed) })
-            .collect();
-        (shape_of, velocities)
-    }
-
-    /// How many of the bodies of shape 2 turn too fast in one step, and how many do not.
-    fn fast(integration: &Integration, bodies: Range<usize>) -> [usize; 2] {
-        let (shape_of, velocities) = moving(bodies.end);
-        let mut counts = [0; 2];
-        for body in bodies.filter(|body| shape_of[*body] == 2) {
-            let [x, y, z] = velocities[body].angular.map(|w| w * integration.angular_damping);
-            let angle = (x * x + y * y + z * z).sqrt() * integration.time_step;
-            counts[usize::from(angle <= ROTATION_LIMIT)] += 1;
-        }
-        counts
-    }
-
-    /// The results of bodies from `first` on, of poses that begin with body `from`.
-    fn results(
-        width: Width,
-        threads: usize,
-        (from, first, count): (usize, usize, usize),
-        integration: Option<&Integration>,
-    ) -> ([u32; 2], [Vec<Beat>; 4]) {
-        let mut seed = 7;
-        let bodies = first + count;
-        let masses =
-            [0.0, -0.0, 2.0, f32::NAN].map(|inverse_mass| Mass { inverse_mass, ..Mass::default() });
-        let (shape_of, velocities) = moving(bodies);
-        let mut poses = [const { Vec::new() }; 4];
-        for body in 0..bodies {
-            for row in 0..2 {
-                let beat = Beat(std::array::from_fn(|_| number(&mut seed).to_bits()));
-                if body >= from {
-                    poses[2 * (body % 2) + row].push(beat);
-                }
-            }
-        }
-        let mut batch = Batch::with_width(threads, width);
-        batch.begin(0);
-        batch.enter(&velocities, &shape_of, &masses);
-        let mut places = [const { Vec::new() }; 4];
-        places.iter_mut().for_each(|place| place.resize(count, Beat::default()));
-        let poses = BodyRows { views: poses.each_ref().map(Vec::as_slice), first: from };
-        let sums =
-            batch.integrate(integration, first, poses, places.each_mut().map(Vec::as_mut_slice));
-        (sums, places)
-    }
-
-    #[test]
-    fn bodies_side_by_side_move_as_one_by_one() {
-        let slow =
-            Integration { time_step: 1.0 / 60.0, angular_damping: 0.99, gravity: [0.0, -9.8, 0.1] };
-        // A step so long that many bodies turn further than a step may turn them.
-        let long = Integration { time_step: 0.5, ..slow };
-        // Parts of one chunk and of several, from even and odd bodies on.
-        let parts = [
-            (0, 0, 1600),
-            (3, 5, 1300),
-            (1, 1, 70),
-            (3, 4, 100),
-            (2, 2, 32),
-            (5, 5, 33),
-            (0, 1, 1),
-            (1, 2, 0),
-        ];
-        for (from, first, count) in parts.into_iter().filter(|(.., count)| *count > 1) {
-            let bodies = first..first + count;
-            assert!(fast(&long, bodies).into_iter().all(|some| some > 0), "{from} {first} {count}");
-        }
-        for part in parts {
-            for integration in [Some(&slow), Some(&long), None] {
-                let expected = results(Width::One, 1, part, integration);
-                for width in Width::all() {
-                    for threads in [1, 3] {
-                        let found = results(width, threads, part, integration);
-                        assert_eq!(found, expected, "{width:?} {part:?} {integration:?}");
-                    }
-                }
-            }
-        }
-    }
-}
+mod tests;

@@ -5,11 +5,14 @@ use super::block::{Block, LANES, ROWS_APART, Words};
 use super::lanes::{Lanes, Numbers, Quad, Work};
 use crate::interface::record::{Beat, WORD_LANE, collision};
 
+/// Streams that records come on.
+pub(super) const STREAMS: usize = 4;
 /// Beats of a record on each stream, which take turns.
-const BEATS: [usize; STREAMS] = [2, 2, 2, 1];
-const STREAMS: usize = 4;
+pub(super) const BEATS: [usize; STREAMS] = [2, 2, 2, 1];
 
-const _: () = assert!(collision::ROWS == 7, "what the streams carry of each record");
+/// The stream of each row of a record, and its number among the record's there.
+pub(in super::super) const PLACES: [(usize, usize); collision::ROWS] =
+    [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (2, 1)];
 
 /// Records that have arrived, on four streams.
 #[derive(Debug, Clone, Copy)]

@@ -1,0 +1,247 @@
+//! Steps that are seen with and without replaying, and what they are made of.
+
+use bitstream_model::interface::control;
+use bitstream_model::interface::number::Numbers;
+use bitstream_model::interface::profile::{FLOAT, Geometry, MIXED, Profile};
+use bitstream_model::interface::record::Beat;
+use bitstream_model::interface::stripe::{Stripe, Stripes};
+use bitstream_model::{BoardConfig, Counts, FaultPlan, PacketCount, RegisterAccess, ViolationKind};
+
+use super::packing::result_beats;
+use super::ring::WHOLE;
+use super::scene::{AT_REST, Body, Collision, Lane, STATIC, Step, bits};
+use super::sg::{Failure, Flight, Machine, Outcome};
+
+/// The designs that are replayed.
+pub(crate) const PROFILES: [&Profile; 2] = [&FLOAT, &MIXED];
+
+/// And nobody's: two, three and six beats of a collision on each of three, two and one streams.
+pub(crate) const OTHERS: [&Profile; 3] = [&ON_THREE, &ON_TWO, &ON_ONE];
+
+static ON_THREE: Profile = RELATIVE;
+static ON_TWO: Profile = Profile {
+    mm2s_widths: &[128; 2],
+    s2mm_widths: &[128; 2],
+    stripes: in_turn(&[0, 1]),
+    ..RELATIVE
+};
+static ON_ONE: Profile =
+    Profile { mm2s_widths: &[128], s2mm_widths: &[128], stripes: in_turn(&[0]), ..RELATIVE };
+const RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
+
+const fn in_turn(streams: &'static [u8]) -> Stripes {
+    let stripe = Stripe { streams, padded: false };
+    Stripes::new(stripe, stripe)
+}
+
+/// Bodies as bits; cycles, stalls, waits, impulse sum and hazards; sums of what was received and sent.
+pub(crate) type Visible = (Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2]);
+
+/// Everything that a host can see of some steps.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Seen {
+    pub(crate) steps: Vec<Result<Visible, Failure>>,
+    pub(crate) counters: Vec<Vec<u32>>,
+    pub(crate) counts: Counts,
+    pub(crate) packets: Vec<PacketCount>,
+    pub(crate) violations: Vec<ViolationKind>,
+    pub(crate) accesses: Vec<RegisterAccess>,
+    pub(crate) faults: u64,
+}
+
+/// What can be seen of an outcome.
+pub(crate) fn visible(outcome: &Outcome) -> Visible {
+    let Outcome { cycles, stalls, waits, impulse_sum, .. } = *outcome;
+    (
+        outcome.bodies.iter().map(bits).collect(),
+        [cycles, stalls, waits, impulse_sum, outcome.hazards.into()],
+        [outcome.sum_received, outcome.sum_sent],
+    )
+}
+
+/// Takes steps as `take` says, and resets everything after one that fails.
+pub(crate) fn see(
+    config: BoardConfig,
+    plan: Option<&FaultPlan>,
+    steps: usize,
+    mut take: impl FnMut(&mut Machine) -> Result<Outcome, Failure>,
+) -> Seen {
+    let mut machine = Machine::new(config);
+    if let Some(plan) = plan {
+        machine.host.board.inject(plan.clone());
+    }
+    let (mut taken, mut counters) = (Vec::new(), Vec::new());
+    for _ in 0..steps {
+        let outcome = take(&mut machine);
+        let registers = [
+            control::CYCLES_LO,
+            control::WORK_CYCLES,
+            control::WAIT_CYCLES,
+            control::HAZARDS,
+            control::SUM_RECEIVED,
+            control::SUM_SENT,
+            control::IMPULSE_SUM_LO,
+            control::IMPULSE_SUM_HI,
+            control::ERROR,
+            control::ERROR_DETAIL,
+        ];
+        counters.push(registers.map(|register| machine.host.control(register)).to_vec());
+        let failed = outcome.is_err();
+        taken.push(outcome.map(|outcome| visible(&outcome)));
+        if failed {
+            // A part may never come back from its reset.
+            break;
+        }
+    }
+    let board = &machine.host.board;
+    Seen {
+        steps: taken,
+        counters,
+        counts: board.counts(),
+        packets: board.packets(),
+        violations: machine.host.violations(),
+        accesses: board.register_accesses(),
+        faults: board.faults(),
+    }
+}
+
+/// The same with and without replaying, and on as many threads and lanes as there are.
+pub(crate) fn same(
+    config: BoardConfig,
+    plan: Option<&FaultPlan>,
+    steps: usize,
+    mut take: impl FnMut(&mut Machine) -> Result<Outcome, Failure>,
+) -> Seen {
+    let long = see(BoardConfig { replay: false, ..config }, plan, steps, &mut take);
+    for (threads, lanes) in [(1, false), (2, true)] {
+        let short = see(BoardConfig { threads, lanes, ..config }, plan, steps, &mut take);
+        assert_eq!(short, long);
+    }
+    long
+}
+
+/// A number that depends on another one in no simple way.
+pub(crate) fn scatter(seed: u64, number: u64) -> u64 {
+    let mut x = seed ^ number.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB)
+}
+
+/// A number between -1 and 1.
+pub(crate) fn unit(seed: u64, number: u64) -> f32 {
+    #[allow(clippy::cast_precision_loss, reason = "any number will do")]
+    let whole = (scatter(seed, number) >> 40) as f32;
+    whole / (1 << 23) as f32 - 1.0
+}
+
+/// Bodies of which every eighth is static, and collisions of any two that have one that moves: as they
+/// come, or so that a body comes again only after all others have.
+pub(crate) fn scene(bodies: u32, collisions: u32, seed: u64, apart: bool) -> Step {
+    let body = |k: u32| {
+        let of = |n: u64| unit(seed, 16 * u64::from(k) + n);
+        Body {
+            shape: if k.is_multiple_of(8) { STATIC } else { 1 + k % 2 },
+            position: [of(0) * 4.0, of(1) * 4.0, of(2) * 4.0],
+            linear: [of(3), of(4), of(5)],
+            angular: [of(6), of(7), of(8)],
+            ..AT_REST
+        }
+    };
+    let all: Vec<Body> = (0..bodies).map(body).collect();
+    let collision = |n: u32| {
+        let random = |k: u64| scatter(seed ^ 0x55, 8 * u64::from(n) + k);
+        let of = |k: u64| unit(seed ^ 0xAA, 32 * u64::from(n) + k);
+        let b = if apart { 1 + n % (bodies - 1) } else { 1 + below(random(0), bodies - 1) };
+        let b = if b.is_multiple_of(8) { b - 1 } else { b };
+        let a = if apart { 0 } else { below(random(1), bodies) };
+        let a = if a == b { 0 } else { a };
+        let count = if random(2).is_multiple_of(16) { 0 } else { 1 + below(random(3), 4) };
+        let length = (of(0).mul_add(of(0), of(1) * of(1)) + 0.01).sqrt();
+        Collision {
+            bodies: [a, b],
+            count,
+            normal: [of(0) / length, -of(1) / length, 0.1 / length],
+            positions: [all[a as usize].position, all[b as usize].position],
+            contacts: std::array::from_fn(|k| {
+                let k = 8 + 4 * k as u64;
+                [of(k), of(k + 1), of(k + 2), of(k + 3) * 0.01]
+            }),
+        }
+    };
+    Step {
+        shapes: vec![[0.0, 0.0], [1.0, 2.5], [0.25, 0.0]],
+        time_step: 0.02,
+        drift: 0.005,
+        coefficient: 0.2,
+        ..Step::new(all.clone(), (0..collisions).map(collision).collect())
+    }
+}
+
+/// The same with contact points missing anywhere, where a design has a word for that.
+pub(crate) fn with_gaps(mut step: Step, seed: u64, profile: &Profile) -> Step {
+    if profile.geometry == Geometry::Relative {
+        for (n, collision) in (0..).zip(&mut step.collisions) {
+            let random = scatter(seed ^ 0x77, n);
+            for (k, contact) in collision.contacts.iter_mut().enumerate() {
+                if random.is_multiple_of(3) && random >> (8 + k) & 1 == 1 {
+                    contact[3] = f32::INFINITY;
+                }
+            }
+        }
+    }
+    step
+}
+
+pub(crate) fn below(random: u64, end: u32) -> u32 {
+    u32::try_from(random % u64::from(end)).expect("less than the end")
+}
+/// Begins a step with a buffer for every packet, of which `change` may change the beats; returns the
+/// addresses of each stream's too.
+pub(crate) fn begin(
+    machine: &mut Machine,
+    step: &Step,
+    change: impl Fn(usize, usize, &mut Vec<Beat>),
+) -> (Flight, Vec<Vec<u64>>) {
+    let variant = machine.host.variant();
+    step.write_arguments(&machine.host);
+    let mut flight = Flight::default();
+    machine.arm(&mut flight, &result_beats(&variant, step.bodies.len()));
+    machine.start();
+    let mut addresses = Vec::new();
+    for (stream, Lane { segments, packets }) in step.packed(&variant).iter().enumerate() {
+        let mut of_stream = Vec::new();
+        let mut tail = 0;
+        for (packet, segment) in packets.iter().enumerate() {
+            let mut beats = segments[*segment].clone();
+            change(stream, packet, &mut beats);
+            let address = machine.host.readable(&beats);
+            flight.input(address);
+            of_stream.push(address);
+            let bytes = u32::try_from(beats.len() * 16).expect("some kilobytes");
+            tail = machine.mm2s[stream].push(address, bytes | WHOLE);
+        }
+        machine.mm2s[stream].doorbell(&machine.host, tail);
+        addresses.push(of_stream);
+    }
+    (flight, addresses)
+}
+
+/// Begins a step of which every pass takes the same buffers, so that it is replayed to its end.
+pub(crate) fn begin_once(machine: &mut Machine, step: &Step) -> Flight {
+    let variant = machine.host.variant();
+    step.write_arguments(&machine.host);
+    let mut flight = Flight::default();
+    machine.arm(&mut flight, &result_beats(&variant, step.bodies.len()));
+    machine.start();
+    machine.send(&mut flight, &step.packed(&variant));
+    flight
+}
+
+/// A scene of many collisions without hazards.
+pub(crate) fn large() -> Step {
+    scene(400, 800, 7, true)
+}
+
+pub(crate) fn whole_length() -> BoardConfig {
+    BoardConfig { strict: false, ..BoardConfig::default() }
+}
