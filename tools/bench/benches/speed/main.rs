@@ -18,6 +18,7 @@ mod a53;
 mod callgrind;
 mod growth;
 mod process;
+mod profiles;
 mod solver;
 
 use std::error::Error;
@@ -59,6 +60,8 @@ struct Options {
 enum Section {
     /// The time of a step beside the yardstick, and the driver's share of it
     Solver,
+    /// The time of a step in each design, the long way and as it is taken
+    Profiles,
     /// Instructions of the yardstick, counted by valgrind
     Instructions,
     /// What packing takes of a Cortex-A53, on paper (docs/a53-cost.md)
@@ -111,8 +114,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     document.insert("schema".to_owned(), 1.into());
     document.insert("bench".to_owned(), "speed".into());
     document.insert("runs".to_owned(), options.common.runs().into());
-    let sections: [(Section, &str, Measure); 6] = [
+    let sections: [(Section, &str, Measure); 7] = [
         (Section::Solver, "solver", solver::measure),
+        (Section::Profiles, "profiles", profiles::measure),
         (Section::Instructions, "instructions", callgrind::measure),
         (Section::A53, "a53", a53::measure),
         (Section::Growth, "growth", growth::measure),
