@@ -65,14 +65,26 @@ pub(crate) struct BodyPace {
 impl BodyPace {
     /// Goes on for whole slices, as far as no limit can be reached.
     pub(crate) fn run(&mut self) {
-        while let Some(next) = self.slice() {
+        match self.turns.streams {
+            4 => self.run_on::<4>(),
+            3 => self.run_on::<3>(),
+            2 => self.run_on::<2>(),
+            _ => self.run_on::<1>(),
+        }
+    }
+
+    /// The same on so many streams, which numbers of beats are divided by again and again.
+    fn run_on<const STREAMS: usize>(&mut self) {
+        self.turns = Turns { streams: STREAMS };
+        while let Some(next) = self.slice::<STREAMS>() {
             (self.standing, self.flowed) = next;
         }
     }
 
     /// Bodies of which all beats are there, and all beats of their results have room.
-    fn there(&self) -> usize {
-        let Self { phase, turns, depth, standing: BodyStanding { body, held, .. }, .. } = *self;
+    fn there<const STREAMS: usize>(&self) -> usize {
+        let Self { phase, depth, standing: BodyStanding { body, held, .. }, .. } = *self;
+        let turns = Turns { streams: STREAMS };
         let came = turns.counts(ROWS_IN * body);
         let there = turns.contiguous(|k| came[k] + held[2 * k]) / ROWS_IN - body;
         match phase {
@@ -87,10 +99,11 @@ impl BodyPace {
 
     /// What a slice leaves behind: the accelerator works on what is there, then the engines go on for as
     /// long as that took. Nothing if a limit could be reached in it, or nothing happens.
-    fn slice(&self) -> Option<(BodyStanding, BodyFlowed)> {
-        let Self { turns, depth, engines, supply, limits, .. } = self;
+    fn slice<const STREAMS: usize>(&self) -> Option<(BodyStanding, BodyFlowed)> {
+        let Self { depth, engines, supply, limits, .. } = self;
+        let turns = Turns { streams: STREAMS };
         let (mut standing, mut flowed) = (self.standing, self.flowed);
-        let there = self.there();
+        let there = self.there::<STREAMS>();
         let slice = if there == 0 {
             flowed.waits += STARVED_CYCLES;
             STARVED_CYCLES

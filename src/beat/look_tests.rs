@@ -25,9 +25,11 @@ const SHAPES: [Shape; 4] = [
 ];
 const BODIES: usize = 40;
 
-/// All that a bitstream takes: the last is too heavy for one that flushes.
+/// All that a bitstream takes: the last is too heavy for one that flushes. As long as it is in the table
+/// no block of rows in sixteen bits is found right at once.
 fn shapes(limits: &Limits) -> &'static [Shape] {
-    if limits.flush_subnormals { &SHAPES[..3] } else { &SHAPES }
+    let light = limits.flush_subnormals || limits.variant.inertia == Inertia::Isotropic;
+    if light { &SHAPES[..3] } else { &SHAPES }
 }
 
 fn limits(variant: Variant, flush_subnormals: bool) -> Limits {

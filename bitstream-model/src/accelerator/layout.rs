@@ -91,6 +91,29 @@ mod tests {
         assert_eq!(mixed.places[..3], [(0, 0), (1, 0), (2, 0)]);
     }
 
+    #[test]
+    fn bodies_that_lie_otherwise_go_the_long_way_alone() {
+        static APART: Profile = Profile {
+            stripes: Stripes {
+                velocities: Stripe { streams: &[2], padded: false },
+                ..MIXED.stripes
+            },
+            ..MIXED
+        };
+        static PADDED: Profile = Profile {
+            stripes: Stripes {
+                results: Stripe { streams: &[0, 1, 2], padded: true },
+                ..MIXED.stripes
+            },
+            ..MIXED
+        };
+        static FEWER_OUT: Profile = Profile { s2mm_widths: &[128; 2], ..MIXED };
+        for profile in [&APART, &PADDED, &FEWER_OUT] {
+            let layout = layout(profile).expect("its collisions can be replayed");
+            assert_eq!(layout.bodies, None, "{:?}", profile.stripes);
+        }
+    }
+
     /// What a design must have, one by one.
     #[test]
     fn others_go_the_long_way() {

@@ -59,7 +59,7 @@ impl Results {
         sum
     }
 
-    /// Sends `records` records, for which there must be room, of a row for each stream.
+    /// Sends `records` records, for which there must be room, whose beats on each stream these are.
     pub(super) fn send_rows(
         &mut self,
         records: usize,

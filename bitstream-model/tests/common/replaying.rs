@@ -15,8 +15,9 @@ use super::sg::{Failure, Flight, Machine, Outcome};
 /// The designs that are replayed.
 pub(crate) const PROFILES: [&Profile; 2] = [&FLOAT, &MIXED];
 
-/// And nobody's: two, three and six beats of a collision on each of three, two and one streams.
-pub(crate) const OTHERS: [&Profile; 3] = [&ON_THREE, &ON_TWO, &ON_ONE];
+/// And nobody's: two, three and six beats of a collision on each of three, two and one streams, and
+/// one of which the bodies take the long way.
+pub(crate) const OTHERS: [&Profile; 4] = [&ON_THREE, &ON_TWO, &ON_ONE, &BODIES_APART];
 
 static ON_THREE: Profile = RELATIVE;
 static ON_TWO: Profile = Profile {
@@ -27,6 +28,15 @@ static ON_TWO: Profile = Profile {
 };
 static ON_ONE: Profile =
     Profile { mm2s_widths: &[128], s2mm_widths: &[128], stripes: in_turn(&[0]), ..RELATIVE };
+static BODIES_APART: Profile = Profile {
+    stripes: Stripes {
+        collisions: Stripe { streams: &[2, 0, 1], padded: true },
+        velocities: Stripe { streams: &[2], padded: false },
+        poses: Stripe { streams: &[1], padded: false },
+        results: Stripe { streams: &[0, 1, 2], padded: true },
+    },
+    ..MIXED
+};
 const RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
 
 const fn in_turn(streams: &'static [u8]) -> Stripes {
@@ -195,6 +205,7 @@ pub(crate) fn with_gaps(mut step: Step, seed: u64, profile: &Profile) -> Step {
 pub(crate) fn below(random: u64, end: u32) -> u32 {
     u32::try_from(random % u64::from(end)).expect("less than the end")
 }
+
 /// Begins a step with a buffer for every packet, of which `change` may change the beats; returns the
 /// addresses of each stream's too.
 pub(crate) fn begin(

@@ -118,18 +118,23 @@ impl<'a> Quick<'a> {
         let ends = |collision: &Collision| {
             [collision.body_a, collision.body_b].map(|body| block.ends.get(body))
         };
-        let mut furthest = Furthest::new();
-        let all = records.iter().zip(block.collisions.iter().copied());
-        for one in all.clone() {
-            furthest.take(&reach(one), ends(one.1).map(|end| !end.is_static()));
+        let mut all = records.iter().zip(block.collisions.iter().copied());
+        // Where one shape of the table forbids it there is no need to look.
+        if shapes.allow() {
+            let mut furthest = Furthest::new();
+            for one in all.clone() {
+                furthest.take(&reach(one), ends(one.1).map(|end| !end.is_static()));
+            }
+            if furthest.all_surely_fit(shapes) {
+                return true;
+            }
         }
-        furthest.surely_fit(shapes)
-            || all.into_iter().all(|one| {
-                let (_, collision) = one;
-                let shapes = ends(collision).map(|end| end.shape(self.scene.shapes));
-                surely_fit(&reach(one), shapes, self.scene.flush_subnormals)
-                    | (block.scheduled & is_padding(collision))
-            })
+        all.all(|one| {
+            let (_, collision) = one;
+            let shapes = ends(collision).map(|end| end.shape(self.scene.shapes));
+            surely_fit(&reach(one), shapes, self.scene.flush_subnormals)
+                | (block.scheduled & is_padding(collision))
+        })
     }
 
     /// Looks at a block as validation does.

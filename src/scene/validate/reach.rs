@@ -106,12 +106,12 @@ impl Furthest {
     }
 
     /// Whether a bitstream that computes rows in binary16 surely computes those of all of them, which
-    /// are of bodies of any of these shapes, not both static.
+    /// are of bodies of any of these shapes, not both static. No if those do not [allow](Extremes::allow) it.
     #[inline(always)]
-    pub(super) fn surely_fit(&self, shapes: &Extremes) -> bool {
+    pub(super) fn all_surely_fit(&self, shapes: &Extremes) -> bool {
         let turning = shapes.inertia * square(self.turning);
         near(self.arms, self.points)
-            & (shapes.smallest_mass >= 1.0 / LARGEST)
+            & shapes.allow()
             & (shapes.mass + turning + turning <= shapes.largest)
     }
 }
@@ -141,6 +141,12 @@ impl Extremes {
             ..all
         })
     }
+
+    /// Whether the masses let all rows fit, however short the lever arms are.
+    #[inline(always)]
+    pub(super) fn allow(&self) -> bool {
+        (self.smallest_mass >= 1.0 / LARGEST) & (self.mass <= self.largest)
+    }
 }
 
 #[inline(always)]
@@ -158,14 +164,31 @@ fn larger(one: f32, other: f32) -> f32 {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::range::origin;
     use super::super::rows::Rows;
     use super::*;
-    use crate::interface::profile::HALF;
+    use crate::interface::number::{Numbers, Precision};
+    use crate::interface::profile::{Geometry, HALF, MIXED, Variant};
+    use crate::record::relative::difference;
     use crate::scene::{Collision, Contact};
 
     const GROUND: Shape = Shape::STATIC;
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
     const PEBBLE: Shape = Shape::isotropic(8_000.0, 30_000.0);
+    const POINT_MASS: Shape = Shape::isotropic(1.0, 0.0);
+
+    /// Rows in binary16 of records in world coordinates, and of those relative to body A.
+    fn variant(geometry: Geometry) -> Variant {
+        match geometry {
+            Geometry::Absolute => HALF.default_variant(),
+            Geometry::Relative => {
+                let numbers = Numbers { rows: Precision::Binary16, ..MIXED.numbers };
+                Variant { numbers, ..MIXED.default_variant() }
+            }
+        }
+    }
+
+    const GEOMETRIES: [Geometry; 2] = [Geometry::Absolute, Geometry::Relative];
 
     /// A collision, the positions of its bodies, and which of the shapes they have.
     #[derive(Debug, Clone)]
@@ -176,8 +199,12 @@ mod tests {
     }
 
     impl One {
-        fn reach(&self) -> Reach {
-            let beat = |[x, y, z]: [f32; 3], w: f32| Beat([x, y, z, w].map(f32::to_bits));
+        fn reach(&self, geometry: Geometry) -> Reach {
+            let origin = origin(geometry, self.positions);
+            let beat = |vec3: [f32; 3], w: f32| {
+                let [x, y, z] = difference(vec3, origin);
+                Beat([x, y, z, w].map(f32::to_bits))
+            };
             // Whatever stands beside a vec3.
             let positions = self.positions.map(|position| beat(position, f32::NAN));
             let points = self.collision.contacts.map(|contact| beat(contact.point, f32::INFINITY));
@@ -188,20 +215,25 @@ mod tests {
             self.shapes.map(|shape| &table[shape])
         }
 
+        fn surely_fits(&self, geometry: Geometry, table: &[Shape], flush: bool) -> bool {
+            surely_fit(&self.reach(geometry), self.shapes(table), flush)
+        }
+
         /// What validation says.
-        fn fits(&self, table: &[Shape], flush: bool) -> bool {
+        fn fits(&self, geometry: Geometry, table: &[Shape], flush: bool) -> bool {
             let (collision, positions) = (&self.collision, self.positions);
             let rows = Rows { index: 0, collision, positions, shapes: self.shapes(table) };
-            rows.fit(&HALF.default_variant(), flush)
+            rows.fit(&variant(geometry), flush)
         }
     }
 
-    fn together(all: &[One], table: &[Shape], flush: bool) -> bool {
+    fn together(all: &[One], geometry: Geometry, table: &[Shape], flush: bool) -> bool {
         let mut furthest = Furthest::new();
         for one in all {
-            furthest.take(&one.reach(), one.shapes(table).map(|shape| !shape.is_static()));
+            let moves = one.shapes(table).map(|shape| !shape.is_static());
+            furthest.take(&one.reach(geometry), moves);
         }
-        furthest.surely_fit(&Extremes::new(table, flush))
+        furthest.all_surely_fit(&Extremes::new(table, flush))
     }
 
     fn at(positions: [[f32; 3]; 2], point: [f32; 3], shapes: [usize; 2]) -> One {
@@ -216,7 +248,9 @@ mod tests {
         let table = [GROUND, CUBE];
         let on_ground = at([[0.0; 3], [100.0, 0.5, 90.0]], [100.5, 0.0, 90.5], [0, 1]);
         let above = at([[100.0, 0.5, 90.0], [100.0, 1.5, 90.0]], [100.5, 1.0, 90.5], [1, 1]);
-        assert!(together(&[on_ground, above], &table, true));
+        for geometry in GEOMETRIES {
+            assert!(together(&[on_ground.clone(), above.clone()], geometry, &table, true));
+        }
     }
 
     /// A pebble on a boulder's arm would not fit; but there is none.
@@ -226,9 +260,36 @@ mod tests {
         let cubes = at([[0.0; 3], [2.0, 0.0, 0.0]], [1.0, 0.0, 0.0], [1, 1]);
         let pebbles = at([[5.0, 0.0, 0.0], [5.1, 0.0, 0.0]], [5.05, 0.0, 0.0], [2, 2]);
         let all = [cubes, pebbles];
-        assert!(!together(&all, &table, false));
-        for one in &all {
-            assert!(surely_fit(&one.reach(), one.shapes(&table), false));
+        for geometry in GEOMETRIES {
+            assert!(!together(&all, geometry, &table, false));
+            assert!(all.iter().all(|one| one.surely_fits(geometry, &table, false)));
+        }
+    }
+
+    /// Four of them are added up; the lever arms are short.
+    #[test]
+    fn contact_points_far_out_are_found() {
+        let table = [GROUND, POINT_MASS];
+        for (x, fits) in [(15_900.0, true), (16_100.0, false), (-16_100.0, false)] {
+            let far = at([[x, 0.0, 0.0]; 2], [x, 0.0, 0.0], [1, 1]);
+            let near = at([[0.0; 3]; 2], [1.0, 0.0, 0.0], [0, 1]);
+            assert_eq!(far.fits(Geometry::Absolute, &table, false), fits);
+            assert_eq!(far.surely_fits(Geometry::Absolute, &table, false), fits);
+            assert_eq!(together(&[far, near], Geometry::Absolute, &table, false), fits);
+        }
+    }
+
+    /// Of shapes that would be too heavy or too light for each other nothing is found at once.
+    #[test]
+    fn shapes_may_forbid_it() {
+        let heavy = Shape::isotropic(1e-5, 0.0);
+        let light = Shape::isotropic(33_000.0, 0.0);
+        for (table, allowed) in [
+            (vec![GROUND, CUBE, PEBBLE], true),
+            (vec![GROUND, CUBE, heavy], false),
+            (vec![GROUND, CUBE, light], false),
+        ] {
+            assert_eq!(Extremes::new(&table, false).allow(), allowed);
         }
     }
 
@@ -246,19 +307,31 @@ mod tests {
     fn any_one(shapes: usize) -> impl Strategy<Value = One> {
         let near = prop::array::uniform3(prop_oneof![12 => Just(0.0), 1 => length()]);
         let bodies = prop::array::uniform2(near.clone());
-        let points = prop::array::uniform4(near);
-        let kinds = (0..shapes, 1..shapes).prop_map(|(a, b)| [a, b]);
-        (bodies, points, 1..=4_u32, kinds).prop_map(|(positions, points, count, shapes)| {
-            let contacts = points.map(|point| Contact { point, distance: 0.0 });
-            let collision = Collision { body_a: 0, body_b: 1, normal: [0.0; 3], count, contacts };
-            One { collision, positions, shapes }
-        })
+        let points = prop::array::uniform4(near.clone());
+        // All of it may be somewhere else.
+        let place = prop_oneof![3 => Just([0.0; 3]), 1 => near];
+        // Not both static.
+        let pair = (0..shapes, 1..shapes, any::<bool>());
+        let kinds = pair.prop_map(|(one, other, first)| match first {
+            true => [one, other],
+            false => [other, one],
+        });
+        (bodies, points, place, 1..=4_u32, kinds).prop_map(
+            |(bodies, points, place, count, shapes)| {
+                let there = |vec3: [f32; 3]| std::array::from_fn(|k| vec3[k] + place[k]);
+                let positions = bodies.map(there);
+                let contacts = points.map(|point| Contact { point: there(point), distance: 0.0 });
+                let collision =
+                    Collision { body_a: 0, body_b: 1, normal: [0.0; 3], count, contacts };
+                One { collision, positions, shapes }
+            },
+        )
     }
 
     fn any_table() -> impl Strategy<Value = Vec<Shape>> {
         let shape = (1e-5_f32..4e-5, prop_oneof![Just(0.0_f32), 1e-2_f32..1e4])
             .prop_map(|(mass, inertia)| Shape::isotropic(mass, inertia));
-        let shape = prop_oneof![shape, Just(CUBE), Just(PEBBLE)];
+        let shape = prop_oneof![shape, Just(CUBE), Just(PEBBLE), Just(POINT_MASS)];
         prop::collection::vec(shape, 1..3).prop_map(|shapes| [vec![GROUND], shapes].concat())
     }
 
@@ -273,13 +346,15 @@ mod tests {
             }),
             flush in any::<bool>(),
         ) {
-            let fits = |one: &One| one.fits(&table, flush);
-            if together(&all, &table, flush) {
-                prop_assert!(all.iter().all(fits));
-            }
-            for one in &all {
-                if surely_fit(&one.reach(), one.shapes(&table), flush) {
-                    prop_assert!(fits(one));
+            for geometry in GEOMETRIES {
+                let fits = |one: &One| one.fits(geometry, &table, flush);
+                if together(&all, geometry, &table, flush) {
+                    prop_assert!(all.iter().all(fits));
+                }
+                for one in &all {
+                    if one.surely_fits(geometry, &table, flush) {
+                        prop_assert!(fits(one));
+                    }
                 }
             }
         }

@@ -121,8 +121,9 @@ impl Bodies<'_> {
     ) {
         let turns = Turns { streams: STREAMS };
         let before = turns.counts(ROWS_OUT * bodies.start);
+        let poses = BodyRows { turns, ..self.poses };
         for body in bodies {
-            let rows = self.poses.of(body);
+            let rows = poses.of(body);
             let mut pose = decode::pose(StreamFormat::F32, &rows);
             let (line, second) = (&self.lines[body / 2], body % 2 == 1);
             let mut velocity = line.velocity(second);
