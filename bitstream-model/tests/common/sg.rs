@@ -250,10 +250,21 @@ impl Machine {
         // The widest window is 65,534 cycles, 0.24 ms.
         let stalls = u32::try_from(step.collisions.len()).expect("some thousands");
         self.wait(&flight, LONG + microseconds(300) * stalls)?;
-        match ap_ctrl::DONE.is_set(self.host.control(control::AP_CTRL)) {
+        match self.is_done() {
             true => Ok(self.collect(&flight, step.bodies.len())),
             false => Err(Failure::NotDone),
         }
+    }
+
+    /// Whether the accelerator says that it is done: it may a few cycles after its results are in memory.
+    fn is_done(&self) -> bool {
+        (0..16).any(|_| {
+            let done = ap_ctrl::DONE.is_set(self.host.control(control::AP_CTRL));
+            if !done {
+                let _ = self.host.port.wait_interrupt(microseconds(1));
+            }
+            done
+        })
     }
 
     pub(crate) fn step(&mut self, step: &Step) -> Result<Outcome, Failure> {
