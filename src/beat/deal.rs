@@ -94,8 +94,8 @@ impl<'a, 'b> Dealer<'a, 'b> {
     }
 }
 
-/// Says that the first of these beats will be written soon: of memory that is cached, a line that is written in part
-/// comes into the cache first.
+/// Says that the first of these beats will be written soon: of memory that is cached, a line that is
+/// written in part comes into the cache first.
 #[inline(always)]
 fn soon_written(to: &[Beat], count: usize) {
     let first = to.as_ptr();

@@ -40,8 +40,6 @@ pub(super) struct Replay {
     layout: Option<Layout>,
     /// What makes of them what the batch takes in, unless it takes them as they are.
     translation: Option<Translation>,
-    /// Beats of a collision on each stream.
-    pub(super) share: PerStream,
     /// Whether the step has brought nothing so far that it cannot replay.
     pub(super) on: bool,
     pub(super) batch: Batch,
@@ -71,7 +69,6 @@ impl Replay {
         Self {
             layout,
             translation: translated.map(Translation::new),
-            share: layout.map_or([0; STREAMS_MAX], |layout| layout.share),
             on: layout.is_some(),
             batch: Batch::new(if layout.is_some() { config.threads } else { 1 }, config.lanes),
             computed: 0,
@@ -111,9 +108,14 @@ impl Replay {
         self.layout.filter(|_| self.on)?.bodies
     }
 
+    /// Beats of a collision on each stream; none if the design cannot be replayed.
+    pub(super) fn share(&self) -> PerStream {
+        self.layout.map_or([0; STREAMS_MAX], |layout| layout.share)
+    }
+
     /// The streams of the design, and the beats of a collision on each.
     fn shares(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        self.share.into_iter().enumerate().filter(|(_, share)| *share > 0)
+        self.share().into_iter().enumerate().filter(|(_, share)| *share > 0)
     }
 
     /// A pass begins, with a hazard window of so many issue slots.
@@ -164,7 +166,7 @@ impl Replay {
         };
         while self.refused.is_none() && self.known() < total {
             let known = self.known();
-            let share_of = self.share;
+            let share_of = self.share();
             let ahead = |k: usize| (known - segment.done) * share_of[k];
             let mut records = total - known;
             for (k, share) in self.shares() {

@@ -160,7 +160,7 @@ impl Accelerator {
 
     /// Beats of a collision on each stream.
     pub(crate) fn share(&self) -> PerStream {
-        self.replay.share
+        self.replay.share()
     }
 
     /// Whether the collisions flow that are on the streams and about to come: how many may, and how
@@ -173,7 +173,7 @@ impl Accelerator {
     ) -> Option<(usize, u64)> {
         let (number, segment) = self.flowing()?;
         let within = |(stream, share): (&Stream, usize)| stream.len() <= segment.left() * share;
-        if !inputs.iter().zip(self.replay.share).all(within) {
+        if !inputs.iter().zip(self.replay.share()).all(within) {
             return None;
         }
         let coming = coming()?;
