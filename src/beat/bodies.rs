@@ -12,18 +12,16 @@
 use std::mem;
 use std::ops::Range;
 
-use bitstream_model::interface::profile::Inertia;
-use bitstream_model::interface::record::{Beat, pose, velocity};
+use bitstream_model::interface::record::Beat;
 
-use super::deal::{BLOCK, Dealer};
+use super::body_records::{Poses, Velocities};
+use super::deal::BLOCK;
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
-use super::stage::Stage;
 use super::stripe::Segment;
 use super::target::Target;
-use crate::platform::{Work, in_wide_vectors};
-use crate::record;
+use crate::platform::{Vectors, Work, in_wide_vectors, soon_read, soon_written};
 use crate::record::end::{End, Survey};
-use crate::scene::{Bodies, Body, Pose, Shape, Velocity};
+use crate::scene::{Bodies, Body, Pose, Velocity};
 
 /// Looks at all bodies and remembers what their collisions' records are made from, and which never
 /// move; whether validation refuses none.
@@ -186,14 +184,16 @@ fn pack_part<B: Bodies + ?Sized>(target: Target<'_>, bodies: &B, mut part: Part<
     let mut copies = [NOBODY; BLOCK];
     for first in (first..until).step_by(BLOCK) {
         let block = &mut copies[..(until - first).min(BLOCK)];
-        let lie = bodies.structures().and_then(|all| all.get(first..first + block.len()));
-        let block = lie.unwrap_or_else(|| {
+        let lying = |range: Range<usize>| bodies.structures().and_then(|all| all.get(range));
+        let behind = first + block.len();
+        let ahead = lying(behind..until.min(behind + BLOCK)).unwrap_or_default();
+        let block = lying(first..behind).unwrap_or_else(|| {
             for (at, to) in block.iter_mut().enumerate() {
                 *to = bodies.body(first + at);
             }
             block
         });
-        packer.write(block);
+        packer.write(block, ahead);
     }
     packer.finish()
 }
@@ -226,9 +226,10 @@ impl<'a, 'b> BodyPacker<'a, 'b> {
         }
     }
 
-    /// Does it with the next bodies, at most [`BLOCK`].
-    fn write(&mut self, bodies: &[Body]) {
-        in_wide_vectors(Writing { packer: self, bodies });
+    /// Does it with the next bodies, at most [`BLOCK`]. Those `ahead` are asked for next, and are on their
+    /// way meanwhile.
+    fn write(&mut self, bodies: &[Body], ahead: &[Body]) {
+        in_wide_vectors(Writing { packer: self, bodies, ahead });
     }
 
     /// Ends the segments.
@@ -244,19 +245,22 @@ impl<'a, 'b> BodyPacker<'a, 'b> {
 struct Writing<'p, 'a, 'b> {
     packer: &'p mut BodyPacker<'a, 'b>,
     bodies: &'p [Body],
+    ahead: &'p [Body],
 }
 
 impl Work for Writing<'_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
-        let Self { packer, bodies } = self;
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self { packer, bodies, ahead } = self;
+        soon_read(ahead);
         let BodyPacker { target, next, ends, velocities, poses, good, still } = packer;
         let range = *next..*next + bodies.len();
         *next = range.end;
         if let Some(rest) = ends {
             let (ends, behind) = mem::take(rest).split_at_mut(bodies.len());
+            soon_written(&behind[..ahead.len().min(behind.len())]);
             *rest = behind;
             let mut any_still = false;
             for (end, body) in ends.iter_mut().zip(bodies) {
@@ -276,10 +280,10 @@ impl Work for Writing<'_, '_, '_> {
             *good &= quick.bodies(range.start, bodies, &ends);
         }
         if let Some(velocities) = velocities {
-            velocities.write(bodies);
+            velocities.write(vectors, bodies);
         }
         if let Some(poses) = poses {
-            poses.write(bodies);
+            poses.write(vectors, bodies);
         }
     }
 }
@@ -311,84 +315,3 @@ const NOBODY: Body = Body {
     velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] },
     shape: 0,
 };
-
-/// Writes velocity records, a block at a time.
-struct Velocities<'a, 'b> {
-    shapes: &'a [Shape],
-    dealer: Dealer<'a, 'b>,
-    stage: VelocityStage,
-}
-
-/// With and without inertia.
-#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
-enum VelocityStage {
-    Isotropic(Stage<{ velocity::ROWS }>),
-    World(Stage<{ velocity::WORLD_ROWS }>),
-}
-
-impl<'a, 'b> Velocities<'a, 'b> {
-    fn new(target: Target<'a>, channels: &'a mut [&'b mut [Beat]]) -> Self {
-        let layout = Segment::Velocities.layout(target.variant);
-        let stage = match target.variant.inertia {
-            Inertia::Isotropic => VelocityStage::Isotropic(Stage::new(&layout)),
-            Inertia::World => VelocityStage::World(Stage::new(&layout)),
-        };
-        Self { shapes: target.shapes, dealer: Dealer::new(&layout, channels), stage }
-    }
-
-    #[inline(always)]
-    fn write(&mut self, bodies: &[Body]) {
-        match &mut self.stage {
-            VelocityStage::Isotropic(stage) => {
-                for (to, body) in stage.records(bodies.len()).iter_mut().zip(bodies) {
-                    *to = record::velocity::encode(body);
-                }
-                stage.deal(bodies.len(), &record::velocity::INTEGERS, &mut self.dealer);
-            }
-            VelocityStage::World(stage) => {
-                for (to, body) in stage.records(bodies.len()).iter_mut().zip(bodies) {
-                    *to = world_velocity(body, self.shapes);
-                }
-                stage.deal(bodies.len(), &record::velocity::WORLD_INTEGERS, &mut self.dealer);
-            }
-        }
-    }
-
-    fn finish(self) -> u32 {
-        self.dealer.finish()
-    }
-}
-
-/// Writes pose records, a block at a time.
-struct Poses<'a, 'b> {
-    dealer: Dealer<'a, 'b>,
-    stage: Stage<{ pose::ROWS }>,
-}
-
-impl<'a, 'b> Poses<'a, 'b> {
-    fn new(target: Target<'_>, channels: &'a mut [&'b mut [Beat]]) -> Self {
-        let layout = Segment::Poses.layout(target.variant);
-        Self { dealer: Dealer::new(&layout, channels), stage: Stage::new(&layout) }
-    }
-
-    #[inline(always)]
-    fn write(&mut self, bodies: &[Body]) {
-        for (to, body) in self.stage.records(bodies.len()).iter_mut().zip(bodies) {
-            *to = record::pose::encode(body);
-        }
-        self.stage.deal(bodies.len(), &record::pose::INTEGERS, &mut self.dealer);
-    }
-
-    fn finish(self) -> u32 {
-        self.dealer.finish()
-    }
-}
-
-/// The velocity record of a body with its inertia.
-#[inline(always)]
-fn world_velocity(body: &Body, shapes: &[Shape]) -> [Beat; velocity::WORLD_ROWS] {
-    let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
-    let shape = shape.unwrap_or(&Shape::STATIC);
-    let inertia = record::inertia::about_world_axes(shape, body.pose.orientation);
-    record::velocity::encode_world(body, &inertia)
-}

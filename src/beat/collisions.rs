@@ -9,15 +9,15 @@ use std::{mem, ptr};
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{Beat, collision, relative};
 
+use super::collision_records::{Absolute, Encoding, Kind, LookedAt, Relative};
 use super::deal::{BLOCK, Dealer};
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stage::Stage;
 use super::stripe::Segment;
 use super::target::Target;
-use crate::platform::{Work, in_wide_vectors, prefetch};
-use crate::record;
-use crate::record::end::{End, Ends};
-use crate::scene::validate::{Block, Quick, head, is_padding};
+use crate::platform::{Vectors, Work, in_wide_vectors};
+use crate::record::end::Ends;
+use crate::scene::validate::{Block, Quick};
 use crate::scene::{CONTACT_POINTS, Collision, Collisions, Contact};
 
 /// The collisions of a step, as they are sent.
@@ -31,58 +31,6 @@ pub(crate) struct Entries<'a, C: ?Sized> {
     /// What stands in place of the bodies' indices, of each record. Only for
     /// [`Geometry::Relative`].
     pub(crate) words: Option<&'a [[u32; 2]]>,
-}
-
-/// A kind of collision record of `ROWS` rows.
-trait Kind<const ROWS: usize> {
-    /// Rows whose word is an unsigned integer.
-    const INTEGERS: [bool; ROWS];
-
-    /// The record of collision `index`.
-    fn encode(&self, index: usize, from: &Collision, ends: [End; 2]) -> [Beat; ROWS];
-
-    /// Whether validation refuses nothing of a block, whose records these are.
-    fn look(quick: &Quick<'_>, block: &Block<'_>, records: &[[Beat; ROWS]]) -> bool;
-}
-
-/// Records in world coordinates.
-struct Absolute;
-
-impl Kind<{ collision::ROWS }> for Absolute {
-    const INTEGERS: [bool; collision::ROWS] = record::collision::INTEGERS;
-
-    #[inline(always)]
-    fn encode(&self, _: usize, from: &Collision, ends: [End; 2]) -> [Beat; collision::ROWS] {
-        record::collision::encode(from, ends)
-    }
-
-    #[inline(always)]
-    fn look(quick: &Quick<'_>, block: &Block<'_>, records: &[[Beat; collision::ROWS]]) -> bool {
-        quick.absolute(block, records)
-    }
-}
-
-/// Records relative to body A, and what stands in place of the bodies' indices.
-struct Relative<'a> {
-    words: Option<&'a [[u32; 2]]>,
-}
-
-impl Kind<{ relative::ROWS }> for Relative<'_> {
-    const INTEGERS: [bool; relative::ROWS] = record::relative::INTEGERS;
-
-    #[inline(always)]
-    fn encode(&self, index: usize, from: &Collision, ends: [End; 2]) -> [Beat; relative::ROWS] {
-        let ends = record::relative::anchors(ends, ends.map(|end| !end.is_static()));
-        let Some(words) = self.words else { return record::relative::encode(from, ends) };
-        let mut collision = *from;
-        [collision.body_a, collision.body_b] = words[index];
-        record::relative::encode(&collision, ends)
-    }
-
-    #[inline(always)]
-    fn look(quick: &Quick<'_>, block: &Block<'_>, records: &[[Beat; relative::ROWS]]) -> bool {
-        quick.relative(block, records)
-    }
 }
 
 /// Writes the records of collisions; the sum of the words written, modulo 2^32, and whether
@@ -254,7 +202,7 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, next } = self;
         let (quick, first) = (*quick, *next);
         *next += collisions.len();
-        let block = Block { first, collisions, ends: *ends, scheduled: *scheduled, heads: true };
+        let block = Block { first, collisions, ends: *ends, scheduled: *scheduled };
         match stage {
             EntryStage::Absolute(stage) => {
                 in_wide_vectors(Writing { kind: Absolute, quick, block, ahead, stage, dealer })
@@ -292,36 +240,19 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
 
     /// Encodes, looks at and deals out.
     #[inline(always)]
-    fn run(self) -> Seen {
-        let Self { kind, quick, mut block, ahead, stage, dealer } = self;
-        let Block { first, collisions, ends, scheduled, .. } = block;
-        for collision in collisions {
-            ends.soon([collision.body_a, collision.body_b]);
+    fn run<V: Vectors>(self, vectors: V) -> Seen {
+        let Self { kind, quick, block, ahead, stage, dealer } = self;
+        for collision in block.collisions {
+            block.ends.soon([collision.body_a, collision.body_b]);
         }
-        // Those of a last block that is not whole come by themselves.
-        let ahead = ahead.get(..collisions.len()).unwrap_or(collisions);
-        let records = stage.records(collisions.len());
-        let each = records.iter_mut().zip(collisions).zip(ahead).zip(first..);
-        let of = |from: &Collision| [from.body_a, from.body_b].map(|body| ends.get(body));
-        let mut seen = Seen::NOTHING;
-        if let Some(quick) = quick {
-            for (((to, from), ahead), index) in each {
-                prefetch::<Collision>(ahead);
-                let ends = of(from);
-                let padding = scheduled & is_padding(from);
-                block.heads &= head(from, ends) | padding;
-                seen.paddings += usize::from(padding);
-                *to = kind.encode(index, from, ends);
-            }
-            seen.good = K::look(quick, &block, records);
-        } else {
-            for (((to, from), ahead), index) in each {
-                prefetch::<Collision>(ahead);
-                *to = kind.encode(index, from, of(from));
-            }
-        }
-        stage.deal(collisions.len(), &K::INTEGERS, dealer);
-        seen
+        let mut records = Encoding::new(kind, &block, ahead);
+        let Some(quick) = quick else {
+            stage.send(vectors, &mut records, dealer);
+            return Seen::NOTHING;
+        };
+        let mut records = LookedAt::new(records, quick, block.scheduled);
+        stage.send(vectors, &mut records, dealer);
+        Seen { paddings: records.paddings(), good: records.good(&block) }
     }
 }
 

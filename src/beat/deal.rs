@@ -4,11 +4,11 @@
 //! the other, each a run of whole beats upwards, as memory that combines writes wants them. Nothing
 //! is read back: the sum that the accelerator is checked with is taken on the way.
 
-use bitstream_model::interface::record::{BEAT_BYTES, Beat};
+use bitstream_model::interface::record::Beat;
 
 use super::stripe::{Deal, Layout, Place};
 use super::unpack::total;
-use crate::platform::{LINE, Lanes, fetch_to_write};
+use crate::platform::{Lanes, soon_written};
 
 /// Records of a block. Divisible by the records of a group of every stripe, so that each block
 /// begins with a group; and so few that a block, read and written, lies in the innermost cache.
@@ -63,7 +63,8 @@ impl<'a, 'b> Dealer<'a, 'b> {
             let (places, share) = self.deal.places::<G>(channel);
             let place = self.deal.take(channel, groups.len() * share);
             // Those of the next block.
-            soon_written(to.get(place.end..).unwrap_or_default(), place.len());
+            let behind = &to[place.end.min(to.len())..];
+            soon_written(&behind[..place.len().min(behind.len())]);
             let to = &mut to[place];
             let sum = &mut self.sum;
             match share {
@@ -91,16 +92,6 @@ impl<'a, 'b> Dealer<'a, 'b> {
             self.write(&[Beat::default()]);
         }
         total(self.sum)
-    }
-}
-
-/// Says that the first of these beats will be written soon: of memory that is cached, a line that is
-/// written in part comes into the cache first.
-#[inline(always)]
-fn soon_written(to: &[Beat], count: usize) {
-    let first = to.as_ptr();
-    for beat in (0..count.min(to.len())).step_by(LINE / BEAT_BYTES) {
-        fetch_to_write(first.wrapping_add(beat));
     }
 }
 

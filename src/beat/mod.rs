@@ -1,6 +1,8 @@
 //! This folder lays records out over the channels of a board, and reads results back from them.
 
 pub(crate) mod bodies;
+mod body_records;
+mod collision_records;
 pub(crate) mod collisions;
 mod deal;
 #[cfg(test)]

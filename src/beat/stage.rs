@@ -4,49 +4,79 @@ use bitstream_model::interface::record::Beat;
 
 use super::deal::{BLOCK, Dealer};
 use super::stripe::Layout;
+use crate::platform::{Lanes, Vectors};
 use crate::record::sixteen::{Row, Sixteen};
 
-/// A block of records on its way.
+/// A block of records on its way, in the format of its stream.
 pub(super) struct Stage<const ROWS: usize> {
-    wide: [[Beat; ROWS]; BLOCK],
-    /// The same in sixteen bits: two rows a beat, without a gap between records.
-    narrow: [[Beat; ROWS]; BLOCK / 2],
+    /// Those in sixteen bits, two rows a beat, fill the first half, without a gap between records.
+    beats: [[Beat; ROWS]; BLOCK],
     format: Option<Sixteen>,
+}
+
+/// The records of a block, in f32.
+///
+/// `next` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
+pub(super) trait Records<const ROWS: usize> {
+    /// Rows whose word is an unsigned integer.
+    const INTEGERS: [bool; ROWS];
+
+    /// The next record, if there is one.
+    fn next(&mut self) -> Option<[Lanes; ROWS]>;
 }
 
 impl<const ROWS: usize> Stage<ROWS> {
     pub(super) fn new(layout: &Layout) -> Self {
-        Self {
-            wide: [[Beat::default(); ROWS]; BLOCK],
-            narrow: [[Beat::default(); ROWS]; BLOCK / 2],
-            format: Sixteen::of(layout.format),
-        }
+        Self { beats: [[Beat::default(); ROWS]; BLOCK], format: Sixteen::of(layout.format) }
     }
 
-    /// The records of the block, to write.
+    /// Takes the records of a block, at most [`BLOCK`], and sends them to the channels.
     #[inline(always)]
-    pub(super) fn records(&mut self, count: usize) -> &mut [[Beat; ROWS]] {
-        &mut self.wide[..count]
-    }
-
-    /// Sends the block to the channels, in the format of the stream.
-    #[inline(always)]
-    pub(super) fn deal(
+    pub(super) fn send<V: Vectors, R: Records<ROWS>>(
         &mut self,
-        count: usize,
-        integers: &[bool; ROWS],
+        vectors: V,
+        records: &mut R,
         dealer: &mut Dealer<'_, '_>,
     ) {
-        let records = &self.wide[..count];
-        let Some(format) = self.format else { return dealer.write(records.as_flattened()) };
-        let rows: &mut [Row] = bytemuck::cast_slice_mut(self.narrow.as_flattened_mut());
-        format.narrow(records, integers, &mut rows.as_chunks_mut().0[..count]);
-        let used = count * ROWS;
-        if !used.is_multiple_of(2) {
-            // The last beat of the segment.
-            rows[used] = Row::default();
+        let beats = match self.format {
+            None => {
+                let mut count = 0;
+                for to in &mut self.beats {
+                    let Some(record) = records.next() else { break };
+                    for (to, row) in to.iter_mut().zip(record) {
+                        *to = row.into();
+                    }
+                    count += ROWS;
+                }
+                count
+            }
+            // One loop each, in which nothing is asked of the format.
+            Some(Sixteen::Binary16) => self.narrow(vectors, records, Sixteen::Binary16),
+            Some(Sixteen::Thesis16) => self.narrow(vectors, records, Sixteen::Thesis16),
+        };
+        dealer.write(&self.beats.as_flattened()[..beats]);
+    }
+
+    /// Takes the records of a block; how many beats they are.
+    #[inline(always)]
+    fn narrow<V: Vectors, R: Records<ROWS>>(
+        &mut self,
+        vectors: V,
+        records: &mut R,
+        format: Sixteen,
+    ) -> usize {
+        let rows: &mut [Row] = bytemuck::cast_slice_mut(self.beats.as_flattened_mut());
+        let mut count = 0;
+        for to in &mut rows.as_chunks_mut::<ROWS>().0[..BLOCK] {
+            let Some(record) = records.next() else { break };
+            *to = format.narrow(vectors, record, &R::INTEGERS);
+            count += ROWS;
         }
-        dealer.write(&self.narrow.as_flattened()[..used.div_ceil(2)]);
+        if !count.is_multiple_of(2) {
+            // The last beat of the segment.
+            rows[count] = Row::default();
+        }
+        count.div_ceil(2)
     }
 }
 

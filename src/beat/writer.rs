@@ -115,7 +115,7 @@ impl<'a> Writer<'a> {
         let collisions = &collisions[..count];
         if !self.packer.write(collisions, &[]).good {
             let ends = self.ends;
-            let block = Block { first, collisions, ends, scheduled: false, heads: true };
+            let block = Block { first, collisions, ends, scheduled: false };
             self.refused = self.quick.and_then(|quick| quick.refusal(&block).err());
         }
     }

@@ -9,34 +9,21 @@ use bitstream_model::interface::record::{LANES, WORD_LANE};
 use half::f16;
 use half::slice::{HalfBitsSliceExt as _, HalfFloatSliceExt as _};
 
-/// Rounds the numbers of records to binary16, to nearest even. Of the rows that `integers` says, the
-/// last word is an unsigned integer, whose lower half is taken.
-///
-/// Shape: as many records of either.
+use super::lanes::Lanes;
+
+/// Rounds the numbers of two rows to binary16, to nearest even. Where `integers` says so the last word
+/// of a row is an unsigned integer, whose lower half is taken.
 #[inline(always)]
-pub(crate) fn to_binary16<const ROWS: usize>(
-    from: &[[Wide; ROWS]],
-    integers: &[bool; ROWS],
-    to: &mut [[Narrow; ROWS]],
-) {
-    #[cfg(target_arch = "x86_64")]
-    if x86::there() {
-        // SAFETY: the processor has the instructions that the function is compiled for, and the system
-        // keeps their registers.
-        return unsafe { x86::to_binary16(from, integers, to) };
-    }
-    for (from, to) in from.iter().zip(to) {
-        for ((from, to), integer) in from.iter().zip(to).zip(integers) {
-            *to = row(from, *integer);
-        }
-    }
+pub(super) fn to_binary16(rows: [Lanes; 2], integers: [bool; 2]) -> [Narrow; 2] {
+    let [first, second] = rows.map(Lanes::words);
+    [row(first, integers[0]), row(second, integers[1])]
 }
 
 /// One row.
 #[inline(always)]
-fn row(from: &Wide, integer: bool) -> Narrow {
+fn row(from: Wide, integer: bool) -> Narrow {
     #[cfg(target_arch = "aarch64")]
-    let mut to = aarch64::to_binary16(from);
+    let mut to = aarch64::to_binary16(&from);
     #[cfg(not(target_arch = "aarch64"))]
     let mut to = from.map(|bits| f16::from_f32_const(f32::from_bits(bits)).to_bits());
     if integer {
@@ -76,14 +63,14 @@ type Narrow = [u16; LANES];
 type Rest<'a, From, To> = (&'a [[From; LANES]], &'a mut [[To; LANES]]);
 
 #[cfg(target_arch = "x86_64")]
-mod x86 {
+pub(super) mod x86 {
     use core::arch::x86_64::{
-        __m128i, __m256, _MM_FROUND_TO_NEAREST_INT, _mm_or_si128, _mm_packus_epi32, _mm256_and_ps,
-        _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_si128, _mm256_cvtph_ps,
-        _mm256_cvtps_ph, _mm256_extractf128_si256,
+        __m128i, _MM_FROUND_TO_NEAREST_INT, _mm_blend_epi16, _mm_setr_epi8, _mm_shuffle_epi8,
+        _mm_unpackhi_epi32, _mm256_castsi256_ps, _mm256_cvtph_ps, _mm256_cvtps_ph,
+        _mm256_set_m128i,
     };
 
-    use super::{LANES, Narrow, Rest, WORD_LANE, Wide};
+    use super::{LANES, Lanes, Narrow, Rest, WORD_LANE};
 
     /// Whether the processor has the instructions. They take the registers of AVX, which a system may
     /// not keep, and whether it does is asked of AVX alone.
@@ -92,48 +79,27 @@ mod x86 {
         std::arch::is_x86_feature_detected!("avx") && std::arch::is_x86_feature_detected!("f16c")
     }
 
-    #[target_feature(enable = "avx,f16c")]
+    /// As [`to_binary16`](super::to_binary16).
+    #[target_feature(enable = "avx2,f16c")]
     #[inline]
-    pub(super) fn to_binary16<const ROWS: usize>(
-        from: &[[Wide; ROWS]],
-        integers: &[bool; ROWS],
-        to: &mut [[Narrow; ROWS]],
-    ) {
-        // Two records are pairs of rows, however many rows one has.
-        let ((twos, rest), (to_twos, to_rest)) = (from.as_chunks(), to.as_chunks_mut());
-        for (from, to) in twos.iter().zip(to_twos) {
-            let (from, to): (&[[_; ROWS]; 2], &mut [[_; ROWS]; 2]) = (from, to);
-            let pairs = from.as_flattened().as_chunks::<2>().0;
-            let to_pairs = to.as_flattened_mut().as_chunks_mut::<2>().0;
-            for (at, (from, to)) in pairs.iter().zip(to_pairs).enumerate() {
-                *to = pair(from, [integers[2 * at % ROWS], integers[(2 * at + 1) % ROWS]]);
-            }
-        }
-        for (from, to) in rest.iter().zip(to_rest) {
-            for ((from, to), integer) in from.iter().zip(to).zip(integers) {
-                [*to, _] = pair(&[*from, [0; LANES]], [*integer, false]);
-            }
-        }
-    }
-
-    /// Two rows.
-    #[target_feature(enable = "avx,f16c")]
-    #[inline]
-    fn pair(rows: &[Wide; 2], integers: [bool; 2]) -> [Narrow; 2] {
-        let wide: __m256 = bytemuck::cast(*rows);
-        if integers == [false; 2] {
-            return bytemuck::cast(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(wide));
-        }
-        const { assert!(WORD_LANE == 3 && LANES == 4, "so it stands here") };
-        // An integer is no number: as one it would be subnormal, or none.
-        let [first, second] = integers.map(|integer| if integer { u32::MAX } else { 0 });
-        let all: __m256 = bytemuck::cast([0, 0, 0, first, 0, 0, 0, second]);
-        let low: __m256 = bytemuck::cast([0, 0, 0, first & 0xFFFF, 0, 0, 0, second & 0xFFFF]);
-        let numbers = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(_mm256_andnot_ps(all, wide));
-        let words = _mm256_castps_si256(_mm256_and_ps(low, wide));
-        let high = _mm256_extractf128_si256::<1>(words);
-        let words = _mm_packus_epi32(_mm256_castsi256_si128(words), high);
-        bytemuck::cast(_mm_or_si128(numbers, words))
+    pub(in super::super) fn to_binary16(
+        [first, second]: [Lanes; 2],
+        integers: [bool; 2],
+    ) -> [Narrow; 2] {
+        const { assert!(WORD_LANE == 3 && LANES == 4, "so the bytes are counted") };
+        let both = _mm256_castsi256_ps(_mm256_set_m128i(second.0, first.0));
+        let numbers = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(both);
+        // The lower halves of the last words, where the integers belong: what became of these as
+        // numbers is nothing.
+        let last = _mm_unpackhi_epi32(first.0, second.0);
+        let places = _mm_setr_epi8(-1, -1, -1, -1, -1, -1, 8, 9, -1, -1, -1, -1, -1, -1, 12, 13);
+        let last = _mm_shuffle_epi8(last, places);
+        bytemuck::cast(match integers {
+            [false, false] => numbers,
+            [true, false] => _mm_blend_epi16::<0b0000_1000>(numbers, last),
+            [false, true] => _mm_blend_epi16::<0b1000_0000>(numbers, last),
+            [true, true] => _mm_blend_epi16::<0b1000_1000>(numbers, last),
+        })
     }
 
     #[target_feature(enable = "f16c")]
@@ -185,6 +151,7 @@ mod aarch64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::vectors::{Vectors, Work, in_wide_vectors};
     use super::*;
 
     /// Numbers around every border of binary16, and others.
@@ -201,32 +168,39 @@ mod tests {
         all.iter().flat_map(|number| [*number, -*number]).collect()
     }
 
-    /// However many records there are at once, of however many rows, integers beside them or not.
-    #[test]
-    fn numbers_are_rounded_as_by_integers_and_integers_are_cut() {
-        let wide: Vec<u32> = wide().into_iter().map(f32::to_bits).collect();
-        rounded(&wide, [false; 1]);
-        rounded(&wide, [true, false]);
-        rounded(&wide, [true, true, false]);
-        rounded(&wide, [false, true, false, false, false, true, true]);
+    /// Pairs of rows through the vectors of a loop.
+    struct Rounding<'a>(&'a [[Wide; 2]], [bool; 2]);
+
+    impl Work for Rounding<'_> {
+        type Output = Vec<[Narrow; 2]>;
+
+        #[inline(always)]
+        fn run<V: Vectors>(self, vectors: V) -> Vec<[Narrow; 2]> {
+            let Self(pairs, integers) = self;
+            pairs.iter().map(|rows| vectors.to_binary16(rows.map(Lanes::new), integers)).collect()
+        }
     }
 
-    fn rounded<const ROWS: usize>(wide: &[u32], integers: [bool; ROWS]) {
-        let records = wide.as_chunks::<LANES>().0.as_chunks::<ROWS>().0;
-        assert!(wide.len() - records.as_flattened().as_flattened().len() < LANES * ROWS);
-        for together in 1..=5 {
-            for records in records.chunks(together) {
-                let mut found = vec![[[0; LANES]; ROWS]; records.len()];
-                to_binary16(records, &integers, &mut found);
-                let rows = records.as_flattened().iter().zip(integers.iter().cycle());
-                for (found, (wide, integer)) in found.as_flattened().iter().zip(rows) {
+    /// In the widest vectors and in those that every processor has, integers beside them or not.
+    #[test]
+    fn numbers_are_rounded_as_by_integers_and_integers_are_cut() {
+        let mut wide: Vec<u32> = wide().into_iter().map(f32::to_bits).collect();
+        wide.resize(wide.len().next_multiple_of(2 * LANES), 0);
+        let pairs = wide.as_chunks::<LANES>().0.as_chunks::<2>().0;
+        for integers in [[false, false], [true, false], [false, true], [true, true]] {
+            let anywhere = pairs.iter().map(|rows| to_binary16(rows.map(Lanes::new), integers));
+            let here = in_wide_vectors(Rounding(pairs, integers));
+            assert_eq!(here.len(), pairs.len());
+            for ((here, anywhere), rows) in here.into_iter().zip(anywhere).zip(pairs) {
+                for (place, (wide, integer)) in rows.iter().zip(integers).enumerate() {
                     let number = |bits| f16::from_f32_const(f32::from_bits(bits)).to_bits();
                     let mut expected = wide.map(number);
-                    if *integer {
+                    if integer {
                         expected[WORD_LANE] =
                             u16::try_from(wide[WORD_LANE] & 0xFFFF).expect("sixteen bits");
                     }
-                    assert_eq!(*found, expected, "{wide:x?}, {integer}");
+                    assert_eq!(here[place], expected, "{wide:x?}, {integer}");
+                    assert_eq!(anywhere[place], expected, "{wide:x?}, {integer}");
                 }
             }
         }

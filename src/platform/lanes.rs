@@ -62,7 +62,7 @@ macro_rules! each_f32 {
 
 /// The four words of a beat.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Lanes(Vector);
+pub(crate) struct Lanes(pub(super) Vector);
 
 impl Lanes {
     /// These words.

@@ -68,7 +68,7 @@ use std::time::Duration;
 
 pub use access_log::{AccessKind, RegisterAccess};
 pub(crate) use buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
-pub(crate) use convert::{from_binary16, to_binary16};
+pub(crate) use convert::from_binary16;
 pub use dev_mem::DevMemWindows;
 #[cfg(feature = "emulation")]
 pub(crate) use emulated::EmulatedPlatform;
@@ -79,7 +79,7 @@ pub use hardware::MemoryChoice;
 pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
 pub(crate) use lanes::Lanes;
 pub(crate) use memory::{DmaMemory, SharedMemory};
-pub(crate) use prefetch::{LINE, fetch, fetch_to_write, prefetch};
+pub(crate) use prefetch::{fetch, prefetch, soon_read, soon_written};
 #[cfg(feature = "emulation")]
 pub(crate) use remote::{RemotePlatform, memory_beside};
 pub use reserved::ReservedMemory;
@@ -88,7 +88,7 @@ pub use u_dma_buf::{Caching, u_dma_buf_names};
 pub use uio::{UioMap, UioNode, uio_nodes};
 pub use uio_device::UioDevice;
 pub use uio_window::UioWindow;
-pub(crate) use vectors::{Work, in_wide_vectors};
+pub(crate) use vectors::{Vectors, Work, in_wide_vectors};
 pub(crate) use wait::{Deadline, poll_until};
 pub(crate) use window::{AccessCounts, Decoded, RegisterMap, RegisterWindow, Window, fields};
 #[cfg(test)]

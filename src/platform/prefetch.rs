@@ -12,9 +12,29 @@ pub(crate) fn prefetch<T>(value: &T) {
     fetch(first.wrapping_add(size_of::<T>().saturating_sub(1)));
 }
 
+/// Says that all of these will be read soon.
+#[inline(always)]
+pub(crate) fn soon_read<T>(values: &[T]) {
+    lines(values).for_each(fetch);
+}
+
+/// Says that all of these will be written soon: of memory that is cached, a line that is written in part
+/// comes into the cache first.
+#[inline(always)]
+pub(crate) fn soon_written<T>(values: &[T]) {
+    lines(values).for_each(fetch_to_write);
+}
+
+/// An address in every line of these, but perhaps the last.
+#[inline(always)]
+fn lines<T>(values: &[T]) -> impl Iterator<Item = *const u8> {
+    let first: *const u8 = values.as_ptr().cast();
+    (0..size_of_val(values)).step_by(LINE).map(move |at| first.wrapping_add(at))
+}
+
 /// Says that what lies at an address is written soon. Any address will do.
 #[inline(always)]
-pub(crate) fn fetch_to_write<T>(at: *const T) {
+fn fetch_to_write<T>(at: *const T) {
     let at: *const i8 = at.cast();
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a prefetch neither reads nor faults, whatever the address.
@@ -33,7 +53,7 @@ pub(crate) fn fetch_to_write<T>(at: *const T) {
 }
 
 /// Bytes of a line of a cache.
-pub(crate) const LINE: usize = 64;
+const LINE: usize = 64;
 
 /// Says that what lies at an address is read soon. Any address will do.
 #[inline(always)]

@@ -1,6 +1,11 @@
 //! This file runs loops in wider vectors than every processor has, where this one has them.
 #![allow(unsafe_code, reason = "not every processor has the instructions")]
 
+use bitstream_model::interface::record::LANES;
+
+use super::convert;
+use super::lanes::Lanes;
+
 /// Loops that are compiled anew for wider vectors.
 ///
 /// What is in them is so compiled only where it becomes a part of them: what they call for every record
@@ -9,7 +14,26 @@ pub(crate) trait Work {
     type Output;
 
     /// Does it. An `#[inline(always)]` belongs to every implementation.
-    fn run(self) -> Self::Output;
+    fn run<V: Vectors>(self, vectors: V) -> Self::Output;
+}
+
+/// What the vectors that a loop is compiled for can do. Whoever has one knows that the processor has
+/// them.
+pub(crate) trait Vectors: Copy {
+    /// Rounds the numbers of two rows to binary16, to nearest even. Where `integers` says so the last word
+    /// of a row is an unsigned integer, whose lower half is taken.
+    fn to_binary16(self, rows: [Lanes; 2], integers: [bool; 2]) -> [[u16; LANES]; 2];
+}
+
+/// Those that every processor has.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Baseline;
+
+impl Vectors for Baseline {
+    #[inline(always)]
+    fn to_binary16(self, rows: [Lanes; 2], integers: [bool; 2]) -> [[u16; LANES]; 2] {
+        convert::to_binary16(rows, integers)
+    }
 }
 
 /// Does it in the vectors of AVX2 and with the conversions of F16C, where there are both.
@@ -21,16 +45,29 @@ pub(crate) fn in_wide_vectors<W: Work>(work: W) -> W::Output {
         // system keeps their registers.
         return unsafe { x86::run(work) };
     }
-    work.run()
+    work.run(Baseline)
 }
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::Work;
+    use super::{LANES, Lanes, Vectors, Work, convert};
+
+    /// Those of AVX2, and the conversions of F16C. There is one in [`run`] alone.
+    #[derive(Debug, Clone, Copy)]
+    struct Wide(());
+
+    impl Vectors for Wide {
+        #[inline(always)]
+        fn to_binary16(self, rows: [Lanes; 2], integers: [bool; 2]) -> [[u16; LANES]; 2] {
+            // SAFETY: there is one of these only where the processor has the instructions that the
+            // function is compiled for.
+            unsafe { convert::x86::to_binary16(rows, integers) }
+        }
+    }
 
     #[target_feature(enable = "avx2,f16c")]
     pub(super) fn run<W: Work>(work: W) -> W::Output {
-        work.run()
+        work.run(Wide(()))
     }
 }
 
@@ -44,7 +81,7 @@ mod tests {
         type Output = u32;
 
         #[inline(always)]
-        fn run(self) -> u32 {
+        fn run<V: Vectors>(self, _: V) -> u32 {
             self.0.iter().sum()
         }
     }

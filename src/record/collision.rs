@@ -1,8 +1,8 @@
 //! This file makes the record of a collision in world coordinates.
 
 use super::end::End;
-use super::{USED, contact_beat, of_count, vec3_and_word};
-use crate::interface::record::{Beat, CONTACT_POINTS, collision};
+use super::{USED, contact_row, of_count, vec3_and_word};
+use crate::interface::record::{CONTACT_POINTS, collision};
 use crate::platform::Lanes;
 use crate::scene::Collision;
 
@@ -24,16 +24,16 @@ pub(crate) const INTEGERS: [bool; collision::ROWS] = {
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Beat; collision::ROWS] {
-    let mut beats = [Beat::default(); collision::ROWS];
-    beats[collision::NORMAL] = vec3_and_word(from.normal, from.count);
-    beats[collision::BODY_A] = a.with_word(from.body_a);
-    beats[collision::BODY_B] = b.with_word(from.body_b);
-    let contacts = from.contacts.iter().zip(&mut beats[collision::CONTACTS..]);
-    for ((contact, beat), used) in contacts.zip(of_count(&USED, from.count)) {
-        *beat = Lanes::from(contact_beat(contact)).and(used).into();
+pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Lanes; collision::ROWS] {
+    let mut rows = [Lanes::all(0); collision::ROWS];
+    rows[collision::NORMAL] = vec3_and_word(from.normal, from.count);
+    rows[collision::BODY_A] = a.with_word(from.body_a);
+    rows[collision::BODY_B] = b.with_word(from.body_b);
+    let contacts = from.contacts.iter().zip(&mut rows[collision::CONTACTS..]);
+    for ((contact, row), used) in contacts.zip(of_count(&USED, from.count)) {
+        *row = contact_row(contact).and(used);
     }
-    beats
+    rows
 }
 
 const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::ROWS);
@@ -41,6 +41,7 @@ const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::ROWS);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interface::record::Beat;
     use crate::scene::Contact;
 
     #[test]
@@ -87,7 +88,8 @@ mod tests {
             0x00, 0x00, 0x00, 0x00, // unused
             0x00, 0x00, 0x00, 0x00, // unused
         ];
-        let beats = encode(&collision, [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]].map(End::at));
+        let ends = [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]].map(End::at);
+        let beats = encode(&collision, ends).map(Beat::from);
         assert_eq!(bytemuck::bytes_of(&beats), bytes);
     }
 
@@ -102,7 +104,7 @@ mod tests {
                 count,
                 contacts: [contact; 4],
             };
-            let beats = encode(&collision, [End::MISSING; 2]);
+            let beats = encode(&collision, [End::MISSING; 2]).map(Beat::from);
             for (ordinal, beat) in (0..).zip(&beats[3..]) {
                 assert_eq!(*beat == Beat([0; 4]), ordinal >= count, "count {count}: {ordinal}");
             }

@@ -45,10 +45,10 @@ impl End {
 
     /// Its position beside a word.
     #[inline(always)]
-    pub(crate) fn with_word(self, word: u32) -> Beat {
+    pub(crate) fn with_word(self, word: u32) -> Lanes {
         let whole: Beat = bytemuck::cast(self);
         let vec3 = Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]);
-        Lanes::from(whole).and(vec3).or(beside(word)).into()
+        Lanes::from(whole).and(vec3).or(beside(word))
     }
 
     /// Whether it never moves.

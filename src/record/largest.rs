@@ -27,36 +27,38 @@ impl<const ROWS: usize> Largest<ROWS> {
     /// Whether all of these records are within. Without a branch per number.
     #[inline(always)]
     pub(crate) fn bound(&self, records: &[[Beat; ROWS]]) -> bool {
-        let within = |beyond, record| self.beyond(record).fold(beyond, Lanes::or);
+        let within = |beyond: Lanes, record: &[Beat; ROWS]| {
+            beyond.or(self.beyond(&std::array::from_fn(|row| Lanes::from(record[row]))))
+        };
         records.iter().fold(Lanes::all(0), within).words() == [0; LANES]
     }
 
-    /// The same of collisions of so many contact points each: what is in the others does not matter.
+    /// Bits where a word of any row of a record is beyond its limit, lane by lane; none if none is.
+    #[inline(always)]
+    pub(crate) fn beyond(&self, record: &[Lanes; ROWS]) -> Lanes {
+        self.beyond_each(record).fold(Lanes::all(0), Lanes::or)
+    }
+
+    /// The same of a collision of so many contact points: what is in the others does not matter.
     ///
     /// Shape: contact points are the last rows.
     #[inline(always)]
-    pub(crate) fn bound_used(
-        &self,
-        records: &[[Beat; ROWS]],
-        counts: impl Iterator<Item = u32>,
-    ) -> bool {
-        let within = |beyond, (record, count)| {
-            let used = of_count(&USED, count);
-            let used = |row: usize| match row.checked_sub(ROWS - CONTACT_POINTS) {
-                Some(ordinal) => used[ordinal],
-                None => Lanes::all(u32::MAX),
-            };
-            let found = (0..).zip(self.beyond(record)).map(|(row, found)| found.and(used(row)));
-            found.fold(beyond, Lanes::or)
+    pub(crate) fn beyond_used(&self, record: &[Lanes; ROWS], count: u32) -> Lanes {
+        let used = of_count(&USED, count);
+        let used = |row: usize| match row.checked_sub(ROWS - CONTACT_POINTS) {
+            Some(ordinal) => used[ordinal],
+            None => Lanes::all(u32::MAX),
         };
-        records.iter().zip(counts).fold(Lanes::all(0), within).words() == [0; LANES]
+        let found = (0..).zip(self.beyond_each(record)).map(|(row, found)| found.and(used(row)));
+        found.fold(Lanes::all(0), Lanes::or)
     }
 
     /// All bits of each word that is beyond its limit, row by row.
     #[inline(always)]
-    fn beyond<'a>(&'a self, record: &'a [Beat; ROWS]) -> impl Iterator<Item = Lanes> + 'a {
-        record.iter().zip(&self.0).map(|(beat, largest)| {
-            Lanes::from(*beat).and(Lanes::all(MAGNITUDE)).above(Lanes::from(*largest))
-        })
+    fn beyond_each<'a>(&'a self, record: &'a [Lanes; ROWS]) -> impl Iterator<Item = Lanes> + 'a {
+        record
+            .iter()
+            .zip(&self.0)
+            .map(|(row, largest)| row.and(Lanes::all(MAGNITUDE)).above(Lanes::from(*largest)))
     }
 }

@@ -22,19 +22,19 @@ use crate::scene::Contact;
 
 /// A vec3 and the word beside it.
 #[inline(always)]
-fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Beat {
-    Beat([x.to_bits(), y.to_bits(), z.to_bits(), word])
+fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Lanes {
+    Lanes::new([x.to_bits(), y.to_bits(), z.to_bits(), word])
 }
 
 /// Four numbers, one a lane.
 #[inline(always)]
-fn vec4(value: [f32; 4]) -> Beat {
-    Beat(value.map(f32::to_bits))
+fn vec4(value: [f32; 4]) -> Lanes {
+    Lanes::new(value.map(f32::to_bits))
 }
 
 /// A contact point beside its distance.
 #[inline(always)]
-fn contact_beat(contact: &Contact) -> Beat {
+fn contact_row(contact: &Contact) -> Lanes {
     vec3_and_word(contact.point, contact.distance.to_bits())
 }
 

@@ -1,7 +1,8 @@
 //! This file makes the pose record of a body.
 
 use super::{vec3_and_word, vec4};
-use crate::interface::record::{Beat, pose};
+use crate::interface::record::pose;
+use crate::platform::Lanes;
 use crate::scene::Body;
 
 /// Rows whose word is an unsigned integer: none.
@@ -13,16 +14,17 @@ pub(crate) const INTEGERS: [bool; pose::ROWS] = [false; pose::ROWS];
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(body: &Body) -> [Beat; pose::ROWS] {
-    let mut beats = [Beat::default(); pose::ROWS];
-    beats[pose::POSITION] = vec3_and_word(body.pose.position, 0);
-    beats[pose::ORIENTATION] = vec4(body.pose.orientation);
-    beats
+pub(crate) fn encode(body: &Body) -> [Lanes; pose::ROWS] {
+    let mut rows = [Lanes::all(0); pose::ROWS];
+    rows[pose::POSITION] = vec3_and_word(body.pose.position, 0);
+    rows[pose::ORIENTATION] = vec4(body.pose.orientation);
+    rows
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interface::record::Beat;
     use crate::scene::{Pose, Velocity};
 
     #[test]
@@ -42,6 +44,6 @@ mod tests {
             0x00, 0x00, 0x80, 0x3E, // q.z 0.25
             0x00, 0x00, 0x80, 0x3F, // q.w 1.0
         ];
-        assert_eq!(bytemuck::bytes_of(&encode(&body)), bytes);
+        assert_eq!(bytemuck::bytes_of(&encode(&body).map(Beat::from)), bytes);
     }
 }

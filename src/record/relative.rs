@@ -1,7 +1,7 @@
 //! This file makes the record of a collision relative to body A.
 
 use super::end::End;
-use super::{USED, beside, by_count, contact_beat, of_count, vec3_and_word};
+use super::{USED, beside, by_count, contact_row, of_count, vec3_and_word};
 use crate::interface::record::{Beat, CONTACT_POINTS, LANES, relative};
 use crate::platform::Lanes;
 use crate::scene::Collision;
@@ -27,20 +27,19 @@ static FAR: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Beat; relative::ROWS] {
-    let mut beats = [Beat::default(); relative::ROWS];
-    let [a, b] = [a, b].map(|end| Lanes::from(end.with_word(0)));
-    beats[relative::NORMAL] = vec3_and_word(from.normal, from.body_a);
-    let offset = b.minus_f32(a);
-    beats[relative::OFFSET] = offset.or(beside(from.body_b)).into();
+pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Lanes; relative::ROWS] {
+    let mut rows = [Lanes::all(0); relative::ROWS];
+    let [a, b] = [a, b].map(|end| end.with_word(0));
+    rows[relative::NORMAL] = vec3_and_word(from.normal, from.body_a);
+    rows[relative::OFFSET] = b.minus_f32(a).or(beside(from.body_b));
     let (used, unused) = (of_count(&USED, from.count), of_count(&FAR, from.count));
-    let contacts = from.contacts.iter().zip(&mut beats[relative::CONTACTS..]);
-    for ((contact, beat), (used, unused)) in contacts.zip(used.into_iter().zip(unused)) {
+    let contacts = from.contacts.iter().zip(&mut rows[relative::CONTACTS..]);
+    for ((contact, row), (used, unused)) in contacts.zip(used.into_iter().zip(unused)) {
         // Beside the position is a zero, which takes nothing from the distance.
-        let seen = Lanes::from(contact_beat(contact)).minus_f32(a);
-        *beat = seen.and(used).or(unused).into();
+        let seen = contact_row(contact).minus_f32(a);
+        *row = seen.and(used).or(unused);
     }
-    beats
+    rows
 }
 
 /// The positions of bodies A and B that a record is made from.
@@ -100,6 +99,6 @@ mod tests {
             [0x0000_0000, 0x0000_0000, 0x0000_0000, 0x7F80_0000], // not there
             [0x0000_0000, 0x0000_0000, 0x0000_0000, 0x7F80_0000], // not there
         ];
-        assert_eq!(rows, expected.map(Beat));
+        assert_eq!(rows.map(Beat::from), expected.map(Beat));
     }
 }

@@ -26,10 +26,10 @@ pub(crate) fn decode(beats: &[Beat; result::ROWS]) -> (Pose, Velocity) {
 #[inline]
 pub(crate) fn of(pose: Pose, velocity: Velocity) -> [Beat; result::ROWS] {
     let mut beats = [Beat::default(); result::ROWS];
-    beats[result::POSITION] = vec3_and_word(pose.position, 0);
-    beats[result::ORIENTATION] = vec4(pose.orientation);
-    beats[result::LINEAR] = vec3_and_word(velocity.linear, 0);
-    beats[result::ANGULAR] = vec3_and_word(velocity.angular, 0);
+    beats[result::POSITION] = vec3_and_word(pose.position, 0).into();
+    beats[result::ORIENTATION] = vec4(pose.orientation).into();
+    beats[result::LINEAR] = vec3_and_word(velocity.linear, 0).into();
+    beats[result::ANGULAR] = vec3_and_word(velocity.angular, 0).into();
     beats
 }
 

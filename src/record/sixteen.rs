@@ -4,7 +4,7 @@ use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::record::{Beat, LANES, WORD_LANE};
 
 use super::thesis16;
-use crate::platform::{Lanes, from_binary16, to_binary16};
+use crate::platform::{Lanes, Vectors, from_binary16};
 
 /// A row in sixteen bits: half a beat.
 pub(crate) type Row = [u16; LANES];
@@ -28,38 +28,46 @@ impl Sixteen {
         }
     }
 
-    /// Records of f32 as records of this format. Where `integers` says so the word beside the vec3
-    /// is an unsigned integer, which validation has found to fit.
-    ///
-    /// Many at once: how the machine converts is found out once a call.
+    /// A record of f32 as one of this format. Where `integers` says so the word beside the vec3 is an
+    /// unsigned integer, which validation has found to fit.
     #[inline(always)]
-    pub(crate) fn narrow<const ROWS: usize>(
+    pub(crate) fn narrow<V: Vectors, const ROWS: usize>(
         self,
-        records: &[[Beat; ROWS]],
+        vectors: V,
+        record: [Lanes; ROWS],
         integers: &[bool; ROWS],
-        narrow: &mut [[Row; ROWS]],
-    ) {
+    ) -> [Row; ROWS] {
+        let mut narrow = [Row::default(); ROWS];
         match self {
             Self::Binary16 => {
-                let wide = bytemuck::cast_slice(records.as_flattened()).as_chunks().0;
-                to_binary16(wide, integers, narrow);
+                // Contact points, the last rows, come in pairs.
+                let (first, pairs) = record.as_rchunks::<2>();
+                let (alone, integers) = integers.as_rchunks::<2>();
+                let (to_first, to_pairs) = narrow.as_rchunks_mut::<2>();
+                for ((to, row), integer) in to_first.iter_mut().zip(first).zip(alone) {
+                    [*to, _] = vectors.to_binary16([*row, Lanes::all(0)], [*integer, false]);
+                }
+                for ((to, rows), integers) in to_pairs.iter_mut().zip(pairs).zip(integers) {
+                    *to = vectors.to_binary16(*rows, *integers);
+                }
             }
             Self::Thesis16 => {
-                for (to, from) in narrow.iter_mut().zip(records) {
-                    for ((to, from), integer) in to.iter_mut().zip(from).zip(integers) {
-                        *to = from.0.map(thesis16::narrow);
-                        if *integer {
-                            #[expect(clippy::cast_possible_truncation, reason = "validated to fit")]
-                            let word = from.0[WORD_LANE] as u16;
-                            to[WORD_LANE] = word;
-                        }
+                for ((to, row), integer) in narrow.iter_mut().zip(record).zip(integers) {
+                    let words = row.words();
+                    *to = words.map(thesis16::narrow);
+                    if *integer {
+                        #[expect(clippy::cast_possible_truncation, reason = "validated to fit")]
+                        let word = words[WORD_LANE] as u16;
+                        to[WORD_LANE] = word;
                     }
                 }
             }
         }
+        narrow
     }
 
-    /// Rows of f32 numbers from rows of this format. Many at once, as [`Self::narrow`].
+    /// Rows of f32 numbers from rows of this format. Many at once: how the machine converts is found
+    /// out once a call.
     #[inline(always)]
     pub(crate) fn widen(self, rows: &[Row], wide: &mut [Beat]) {
         match self {
@@ -115,15 +123,29 @@ pub(crate) fn finite<const BEATS: usize>(exponents: &[Beat; BEATS], beats: &[Bea
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::platform::{Work, in_wide_vectors};
 
     fn narrowed_rows<const ROWS: usize>(
         format: Sixteen,
         rows: [Beat; ROWS],
         integers: [bool; ROWS],
     ) -> [Row; ROWS] {
-        let mut narrow = [[Row::default(); ROWS]];
-        format.narrow(&[rows], &integers, &mut narrow);
-        narrow[0]
+        in_wide_vectors(Narrowing { format, record: rows.map(Lanes::from), integers })
+    }
+
+    struct Narrowing<const ROWS: usize> {
+        format: Sixteen,
+        record: [Lanes; ROWS],
+        integers: [bool; ROWS],
+    }
+
+    impl<const ROWS: usize> Work for Narrowing<ROWS> {
+        type Output = [Row; ROWS];
+
+        #[inline(always)]
+        fn run<V: Vectors>(self, vectors: V) -> [Row; ROWS] {
+            self.format.narrow(vectors, self.record, &self.integers)
+        }
     }
 
     fn widened(format: Sixteen, row: Row) -> Beat {
@@ -148,10 +170,12 @@ mod tests {
     fn integers_are_integers_in_either_format() {
         for format in [Sixteen::Binary16, Sixteen::Thesis16] {
             let row = Beat([0x3F80_0000, 0xC000_0000, 0x4248_0000, 0xABCD]);
-            let [with, without] = narrowed_rows(format, [row; 2], [true, false]);
             // 1, -2, 50 are exact in both.
-            assert_eq!(with, [0x3C00, 0xC000, 0x5240, 0xABCD]);
-            assert_eq!(without, [0x3C00, 0xC000, 0x5240, 0x0000]);
+            let expected = |integer| [0x3C00, 0xC000, 0x5240, if integer { 0xABCD } else { 0 }];
+            let two = [true, false];
+            assert_eq!(narrowed_rows(format, [row; 2], two), two.map(expected));
+            let seven = [true, true, false, false, true, false, true];
+            assert_eq!(narrowed_rows(format, [row; 7], seven), seven.map(expected));
         }
     }
 

@@ -2,7 +2,8 @@
 
 use super::inertia::Inverse;
 use super::vec3_and_word;
-use crate::interface::record::{Beat, velocity};
+use crate::interface::record::velocity;
+use crate::platform::Lanes;
 use crate::scene::Body;
 
 /// Rows whose word is an unsigned integer: the shape.
@@ -25,11 +26,11 @@ pub(crate) const WORLD_INTEGERS: [bool; velocity::WORLD_ROWS] = {
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(body: &Body) -> [Beat; velocity::ROWS] {
-    let mut beats = [Beat::default(); velocity::ROWS];
-    beats[velocity::LINEAR] = vec3_and_word(body.velocity.linear, body.shape);
-    beats[velocity::ANGULAR] = vec3_and_word(body.velocity.angular, 0);
-    beats
+pub(crate) fn encode(body: &Body) -> [Lanes; velocity::ROWS] {
+    let mut rows = [Lanes::all(0); velocity::ROWS];
+    rows[velocity::LINEAR] = vec3_and_word(body.velocity.linear, body.shape);
+    rows[velocity::ANGULAR] = vec3_and_word(body.velocity.angular, 0);
+    rows
 }
 
 /// The velocity record with world inertia: the two rows above, and the inverse inertia of the body.
@@ -38,14 +39,14 @@ pub(crate) fn encode(body: &Body) -> [Beat; velocity::ROWS] {
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode_world(body: &Body, inertia: &Inverse) -> [Beat; velocity::WORLD_ROWS] {
+pub(crate) fn encode_world(body: &Body, inertia: &Inverse) -> [Lanes; velocity::WORLD_ROWS] {
     let [linear, angular] = encode(body);
-    let mut beats = [Beat::default(); velocity::WORLD_ROWS];
-    beats[velocity::LINEAR] = linear;
-    beats[velocity::ANGULAR] = angular;
-    beats[velocity::DIAGONAL] = vec3_and_word(inertia.diagonal, 0);
-    beats[velocity::OFF_DIAGONAL] = vec3_and_word(inertia.off_diagonal, 0);
-    beats
+    let mut rows = [Lanes::all(0); velocity::WORLD_ROWS];
+    rows[velocity::LINEAR] = linear;
+    rows[velocity::ANGULAR] = angular;
+    rows[velocity::DIAGONAL] = vec3_and_word(inertia.diagonal, 0);
+    rows[velocity::OFF_DIAGONAL] = vec3_and_word(inertia.off_diagonal, 0);
+    rows
 }
 
 const _: () = assert!(velocity::LINEAR == 0 && velocity::ANGULAR == 1);
@@ -53,6 +54,7 @@ const _: () = assert!(velocity::LINEAR == 0 && velocity::ANGULAR == 1);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interface::record::Beat;
     use crate::scene::{Pose, Velocity};
 
     #[test]
@@ -72,7 +74,7 @@ mod tests {
             0x00, 0x00, 0x00, 0x80, // w.z -0.0
             0x00, 0x00, 0x00, 0x00,
         ];
-        assert_eq!(bytemuck::bytes_of(&encode(&body)), bytes);
+        assert_eq!(bytemuck::bytes_of(&encode(&body).map(Beat::from)), bytes);
     }
     #[test]
     fn world_inertia_follows_the_velocities() {
@@ -82,8 +84,8 @@ mod tests {
             shape: 5,
         };
         let inertia = Inverse { diagonal: [1.0, 2.0, 3.0], off_diagonal: [-0.5, 0.25, 4.0] };
-        let rows = encode_world(&body, &inertia);
-        assert_eq!(rows[..2], encode(&body));
+        let rows = encode_world(&body, &inertia).map(Beat::from);
+        assert_eq!(rows[..2], encode(&body).map(Beat::from));
         assert_eq!(rows[2], Beat([0x3F80_0000, 0x4000_0000, 0x4040_0000, 0]));
         assert_eq!(rows[3], Beat([0xBF00_0000, 0x3E80_0000, 0x4080_0000, 0]));
     }

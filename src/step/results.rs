@@ -15,7 +15,7 @@ use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
 use crate::beat::unpack::{BLOCK, Reader, Record, finite};
 use crate::order::LiveReport;
-use crate::platform::{Work, in_wide_vectors};
+use crate::platform::{Vectors, Work, in_wide_vectors};
 use crate::record::result;
 use crate::scene::Bodies;
 
@@ -169,7 +169,7 @@ impl Work for InTurn<'_> {
 
     /// The sum of the words that were read, and the first body that moves and is not finite.
     #[inline(always)]
-    fn run(self) -> (u32, Option<usize>) {
+    fn run<V: Vectors>(self, _: V) -> (u32, Option<usize>) {
         let Self { mut reader, statics, into } = self;
         let mut broken = None;
         for (first, records) in (0..).step_by(BLOCK).zip(into.chunks_mut(BLOCK)) {

@@ -6,6 +6,7 @@
 
 mod body;
 mod collision;
+mod look;
 mod parameters;
 mod quick;
 mod range;
@@ -13,7 +14,9 @@ mod reach;
 mod rows;
 mod shape;
 
-pub(crate) use quick::{Block, Quick, head, is_padding};
+pub(crate) use look::Look;
+pub(crate) use quick::{Block, Quick};
+pub(crate) use reach::Reach;
 pub(crate) use shape::{needed, validate_shapes};
 
 use self::body::{check_body, shape_of};

@@ -6,11 +6,12 @@
 
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::Geometry;
-use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES, collision, relative};
+use bitstream_model::interface::record::{CONTACT_POINTS, LANES, collision, relative};
 
 use super::body::check_body;
-use super::reach::{Extremes, Furthest, Reach, surely_fit};
+use super::reach::{Extremes, Reach, surely_fit};
 use super::{Scene, check_whole};
+use crate::platform::Lanes;
 use crate::record;
 use crate::record::end::{End, Ends};
 use crate::record::largest::{Largest, MAGNITUDE};
@@ -64,7 +65,8 @@ impl<'a> Quick<'a> {
         for (body, end) in bodies.iter().zip(ends) {
             let [linear, angular] = record::velocity::encode(body);
             let [position, orientation] = record::pose::encode(body);
-            good &= self.bodies.bound(&[[linear, angular, position, orientation]]);
+            let beyond = self.bodies.beyond(&[linear, angular, position, orientation]);
+            good &= beyond.words() == [0; LANES];
             let [x, y, z, w] = body.pose.orientation;
             let square = x * x + y * y + z * z + w * w;
             good &= (ORIENTATION..=f32::MAX).contains(&square) & end.has_shape();
@@ -75,71 +77,39 @@ impl<'a> Quick<'a> {
         good || (first..).zip(bodies).all(|(at, body)| check_body(at, body, &self.scene).is_ok())
     }
 
-    /// Whether validation refuses nothing of these collisions, whose records in world coordinates
-    /// these are.
+    /// What bounds the rows, where they are computed in sixteen bits.
     #[inline(always)]
-    pub(crate) fn absolute(&self, block: &Block<'_>, records: &[[Beat; collision::ROWS]]) -> bool {
-        let mut good = block.heads & self.absolute.bound(records);
-        if let Some(shapes) = &self.short_rows {
-            let reach = |(rows, collision): (&[Beat; collision::ROWS], &Collision)| {
-                let [_, a, b, points @ ..] = rows;
-                Reach::new([a, b], points, collision.count)
-            };
-            good &= self.rows(block, shapes, records, reach);
-        }
-        good || self.exactly(block)
+    pub(super) const fn bounds_of_rows(&self) -> Option<&Extremes> {
+        self.short_rows.as_ref()
     }
 
-    /// As [`Self::absolute`], of records relative to body A.
+    /// Bits where a number of a record in world coordinates is beyond what the stream holds; none if none
+    /// is.
     #[inline(always)]
-    pub(crate) fn relative(&self, block: &Block<'_>, records: &[[Beat; relative::ROWS]]) -> bool {
-        let counts = block.collisions.iter().map(|collision| collision.count);
-        let mut good = block.heads & self.relative.bound_used(records, counts);
-        if let Some(shapes) = &self.short_rows {
-            let reach = |(rows, collision): (&[Beat; relative::ROWS], &Collision)| {
-                let [_, offset, points @ ..] = rows;
-                Reach::new([&Beat([0; LANES]), offset], points, collision.count)
-            };
-            good &= self.rows(block, shapes, records, reach);
-        }
-        good || self.exactly(block)
+    pub(crate) fn beyond_absolute(&self, record: &[Lanes; collision::ROWS]) -> Lanes {
+        self.absolute.beyond(record)
     }
 
-    /// Whether a bitstream that computes rows in sixteen bits surely computes these: all of a block at
-    /// once, or else each by itself.
+    /// As [`Self::beyond_absolute`], of a record relative to body A, of so many contact points.
     #[inline(always)]
-    fn rows<const ROWS: usize>(
-        &self,
-        block: &Block<'_>,
-        shapes: &Extremes,
-        records: &[[Beat; ROWS]],
-        reach: impl Fn((&[Beat; ROWS], &Collision)) -> Reach,
-    ) -> bool {
-        let ends = |collision: &Collision| {
-            [collision.body_a, collision.body_b].map(|body| block.ends.get(body))
-        };
-        let mut all = records.iter().zip(block.collisions.iter().copied());
-        // Where one shape of the table forbids it there is no need to look.
-        if shapes.allow() {
-            let mut furthest = Furthest::new();
-            for one in all.clone() {
-                furthest.take(&reach(one), ends(one.1).map(|end| !end.is_static()));
-            }
-            if furthest.all_surely_fit(shapes) {
-                return true;
-            }
-        }
-        all.all(|one| {
-            let (_, collision) = one;
-            let shapes = ends(collision).map(|end| end.shape(self.scene.shapes));
-            surely_fit(&reach(one), shapes, self.scene.flush_subnormals)
+    pub(crate) fn beyond_relative(&self, record: &[Lanes; relative::ROWS], count: u32) -> Lanes {
+        self.relative.beyond_used(record, count)
+    }
+
+    /// Whether a bitstream that computes rows in sixteen bits surely computes those of each collision of
+    /// a block, which reach as far as `reaches` say.
+    pub(super) fn rows_fit(&self, block: &Block<'_>, reaches: impl Iterator<Item = Reach>) -> bool {
+        block.collisions.iter().zip(reaches).all(|(collision, reach)| {
+            let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
+            let shapes = ends.map(|end| end.shape(self.scene.shapes));
+            surely_fit(&reach, shapes, self.scene.flush_subnormals)
                 | (block.scheduled & is_padding(collision))
         })
     }
 
     /// Looks at a block as validation does.
     #[cold]
-    fn exactly(&self, block: &Block<'_>) -> bool {
+    pub(super) fn exactly(&self, block: &Block<'_>) -> bool {
         self.refusal(block).is_ok()
     }
 
@@ -172,13 +142,11 @@ pub(crate) struct Block<'a> {
     /// Whether they are in an order that was made for them. What looks like padding may be of the
     /// order's making then: whoever looks at all of them counts it.
     pub(crate) scheduled: bool,
-    /// Whether [`head`] is right for all of them but padding.
-    pub(crate) heads: bool,
 }
 
 /// Whether normal, count and bodies of a collision are surely right.
 #[inline(always)]
-pub(crate) fn head(collision: &Collision, [a, b]: [End; 2]) -> bool {
+pub(super) fn head(collision: &Collision, [a, b]: [End; 2]) -> bool {
     let [x, y, z] = collision.normal;
     let square = x * x + y * y + z * z;
     ((square - 1.0).abs() <= NORMAL)
@@ -191,6 +159,6 @@ pub(crate) fn head(collision: &Collision, [a, b]: [End; 2]) -> bool {
 
 /// Whether an order may have made it.
 #[inline(always)]
-pub(crate) fn is_padding(collision: &Collision) -> bool {
+pub(super) fn is_padding(collision: &Collision) -> bool {
     (collision.count == 0) & (collision.body_a == collision.body_b)
 }

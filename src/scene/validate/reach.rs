@@ -1,7 +1,7 @@
 //! This file finds out of many collisions at once whether the rows that a bitstream computes of them
 //! stay in binary16, as [`rows`](super::rows) finds out of each.
 
-use bitstream_model::interface::record::{Beat, CONTACT_POINTS, LANES};
+use bitstream_model::interface::record::{CONTACT_POINTS, LANES};
 
 use super::rows::{LARGEST, LONGEST_ARM, LOSS, largest};
 use crate::platform::Lanes;
@@ -15,7 +15,7 @@ use crate::scene::Shape;
 /// What is longer in any component is no shorter after any of the roundings, so that what is found
 /// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
 /// left out at the end. What NaN makes of it does not matter: the bound on numbers refuses that.
-pub(super) struct Reach {
+pub(crate) struct Reach {
     /// Lever arms about body A and body B, m.
     arms: [Lanes; 2],
     /// From the origin, m.
@@ -26,13 +26,11 @@ impl Reach {
     /// Of rows that hold the positions of both bodies and contact points as they are streamed, `count` of
     /// which are in use.
     #[inline(always)]
-    pub(super) fn new(positions: [&Beat; 2], points: &[Beat; CONTACT_POINTS], count: u32) -> Self {
+    pub(crate) fn new(positions: [Lanes; 2], points: [Lanes; CONTACT_POINTS], count: u32) -> Self {
         let magnitude = |lanes: Lanes| lanes.and(Lanes::all(MAGNITUDE));
-        let positions = positions.map(|beat| Lanes::from(*beat));
         let mut arms = [Lanes::all(0); 2];
         let mut furthest = Lanes::all(0);
-        for (point, used) in points.iter().zip(of_count(&USED, count)) {
-            let point = Lanes::from(*point);
+        for (point, used) in points.into_iter().zip(of_count(&USED, count)) {
             furthest = furthest.larger_f32(magnitude(point).and(used));
             for (arm, position) in arms.iter_mut().zip(positions) {
                 *arm = arm.larger_f32(magnitude(point.minus_f32(position)).and(used));
@@ -201,14 +199,14 @@ mod tests {
     impl One {
         fn reach(&self, geometry: Geometry) -> Reach {
             let origin = origin(geometry, self.positions);
-            let beat = |vec3: [f32; 3], w: f32| {
+            let row = |vec3: [f32; 3], w: f32| {
                 let [x, y, z] = difference(vec3, origin);
-                Beat([x, y, z, w].map(f32::to_bits))
+                Lanes::new([x, y, z, w].map(f32::to_bits))
             };
             // Whatever stands beside a vec3.
-            let positions = self.positions.map(|position| beat(position, f32::NAN));
-            let points = self.collision.contacts.map(|contact| beat(contact.point, f32::INFINITY));
-            Reach::new(positions.each_ref(), &points, self.collision.count)
+            let positions = self.positions.map(|position| row(position, f32::NAN));
+            let points = self.collision.contacts.map(|contact| row(contact.point, f32::INFINITY));
+            Reach::new(positions, points, self.collision.count)
         }
 
         fn shapes<'a>(&self, table: &'a [Shape]) -> [&'a Shape; 2] {

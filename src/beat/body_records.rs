@@ -1,0 +1,132 @@
+//! This file writes velocity and pose records, a block at a time.
+
+use std::slice;
+
+use bitstream_model::interface::profile::Inertia;
+use bitstream_model::interface::record::{Beat, pose, velocity};
+
+use super::deal::Dealer;
+use super::stage::{Records, Stage};
+use super::stripe::Segment;
+use super::target::Target;
+use crate::platform::{Lanes, Vectors};
+use crate::record;
+use crate::scene::{Body, Shape};
+
+/// Writes velocity records.
+pub(super) struct Velocities<'a, 'b> {
+    shapes: &'a [Shape],
+    dealer: Dealer<'a, 'b>,
+    stage: VelocityStage,
+}
+
+/// With and without inertia.
+#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
+enum VelocityStage {
+    Isotropic(Stage<{ velocity::ROWS }>),
+    World(Stage<{ velocity::WORLD_ROWS }>),
+}
+
+impl<'a, 'b> Velocities<'a, 'b> {
+    /// From the first record of a group on.
+    pub(super) fn new(target: Target<'a>, channels: &'a mut [&'b mut [Beat]]) -> Self {
+        let layout = Segment::Velocities.layout(target.variant);
+        let stage = match target.variant.inertia {
+            Inertia::Isotropic => VelocityStage::Isotropic(Stage::new(&layout)),
+            Inertia::World => VelocityStage::World(Stage::new(&layout)),
+        };
+        Self { shapes: target.shapes, dealer: Dealer::new(&layout, channels), stage }
+    }
+
+    /// Writes those of the next bodies, at most [`BLOCK`](super::deal::BLOCK); only the last may be fewer.
+    #[inline(always)]
+    pub(super) fn write<V: Vectors>(&mut self, vectors: V, bodies: &[Body]) {
+        match &mut self.stage {
+            VelocityStage::Isotropic(stage) => {
+                stage.send(vectors, &mut Isotropic(bodies.iter()), &mut self.dealer);
+            }
+            VelocityStage::World(stage) => {
+                let mut records = World { bodies: bodies.iter(), shapes: self.shapes };
+                stage.send(vectors, &mut records, &mut self.dealer);
+            }
+        }
+    }
+
+    /// Ends the segment; the sum of the words written, modulo 2^32.
+    pub(super) fn finish(self) -> u32 {
+        self.dealer.finish()
+    }
+}
+
+/// Writes pose records.
+pub(super) struct Poses<'a, 'b> {
+    dealer: Dealer<'a, 'b>,
+    stage: Stage<{ pose::ROWS }>,
+}
+
+impl<'a, 'b> Poses<'a, 'b> {
+    /// From the first record of a group on.
+    pub(super) fn new(target: Target<'_>, channels: &'a mut [&'b mut [Beat]]) -> Self {
+        let layout = Segment::Poses.layout(target.variant);
+        Self { dealer: Dealer::new(&layout, channels), stage: Stage::new(&layout) }
+    }
+
+    /// Writes those of the next bodies, at most [`BLOCK`](super::deal::BLOCK); only the last may be fewer.
+    #[inline(always)]
+    pub(super) fn write<V: Vectors>(&mut self, vectors: V, bodies: &[Body]) {
+        self.stage.send(vectors, &mut OfPoses(bodies.iter()), &mut self.dealer);
+    }
+
+    /// Ends the segment; the sum of the words written, modulo 2^32.
+    pub(super) fn finish(self) -> u32 {
+        self.dealer.finish()
+    }
+}
+
+/// The velocity records of bodies.
+struct Isotropic<'a>(slice::Iter<'a, Body>);
+
+impl Records<{ velocity::ROWS }> for Isotropic<'_> {
+    const INTEGERS: [bool; velocity::ROWS] = record::velocity::INTEGERS;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[Lanes; velocity::ROWS]> {
+        self.0.next().map(record::velocity::encode)
+    }
+}
+
+/// The same, with their inertia.
+struct World<'a> {
+    bodies: slice::Iter<'a, Body>,
+    shapes: &'a [Shape],
+}
+
+impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
+    const INTEGERS: [bool; velocity::WORLD_ROWS] = record::velocity::WORLD_INTEGERS;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[Lanes; velocity::WORLD_ROWS]> {
+        self.bodies.next().map(|body| world_velocity(body, self.shapes))
+    }
+}
+
+/// The pose records of bodies.
+struct OfPoses<'a>(slice::Iter<'a, Body>);
+
+impl Records<{ pose::ROWS }> for OfPoses<'_> {
+    const INTEGERS: [bool; pose::ROWS] = record::pose::INTEGERS;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[Lanes; pose::ROWS]> {
+        self.0.next().map(record::pose::encode)
+    }
+}
+
+/// The velocity record of a body with its inertia.
+#[inline(always)]
+fn world_velocity(body: &Body, shapes: &[Shape]) -> [Lanes; velocity::WORLD_ROWS] {
+    let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
+    let shape = shape.unwrap_or(&Shape::STATIC);
+    let inertia = record::inertia::about_world_axes(shape, body.pose.orientation);
+    record::velocity::encode_world(body, &inertia)
+}

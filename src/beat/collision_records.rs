@@ -1,0 +1,179 @@
+//! This file makes the records of a block of collisions, and has them looked at on their way.
+
+use std::iter::Zip;
+use std::slice;
+
+use bitstream_model::interface::record::{collision, relative};
+
+use super::stage::Records;
+use crate::platform::{Lanes, prefetch};
+use crate::record;
+use crate::record::end::{End, Ends};
+use crate::scene::Collision;
+use crate::scene::validate::{Block, Look, Quick, Reach};
+
+/// A kind of collision record of `ROWS` rows.
+pub(super) trait Kind<const ROWS: usize>: Copy {
+    /// Rows whose word is an unsigned integer.
+    const INTEGERS: [bool; ROWS];
+
+    /// The record of collision `index`.
+    fn encode(self, index: usize, from: &Collision, ends: [End; 2]) -> [Lanes; ROWS];
+
+    /// Bits where a number is beyond what the stream holds.
+    fn beyond(quick: &Quick<'_>, record: &[Lanes; ROWS], count: u32) -> Lanes;
+
+    /// How far the contact points are.
+    fn reach(record: &[Lanes; ROWS], count: u32) -> Reach;
+}
+
+/// Records in world coordinates.
+#[derive(Clone, Copy)]
+pub(super) struct Absolute;
+
+impl Kind<{ collision::ROWS }> for Absolute {
+    const INTEGERS: [bool; collision::ROWS] = record::collision::INTEGERS;
+
+    #[inline(always)]
+    fn encode(self, _: usize, from: &Collision, ends: [End; 2]) -> [Lanes; collision::ROWS] {
+        record::collision::encode(from, ends)
+    }
+
+    #[inline(always)]
+    fn beyond(quick: &Quick<'_>, record: &[Lanes; collision::ROWS], _: u32) -> Lanes {
+        quick.beyond_absolute(record)
+    }
+
+    #[inline(always)]
+    fn reach([_, a, b, points @ ..]: &[Lanes; collision::ROWS], count: u32) -> Reach {
+        Reach::new([*a, *b], *points, count)
+    }
+}
+
+/// Records relative to body A, and what stands in place of the bodies' indices.
+#[derive(Clone, Copy)]
+pub(super) struct Relative<'a> {
+    pub(super) words: Option<&'a [[u32; 2]]>,
+}
+
+impl Kind<{ relative::ROWS }> for Relative<'_> {
+    const INTEGERS: [bool; relative::ROWS] = record::relative::INTEGERS;
+
+    #[inline(always)]
+    fn encode(self, index: usize, from: &Collision, ends: [End; 2]) -> [Lanes; relative::ROWS] {
+        let ends = record::relative::anchors(ends, ends.map(|end| !end.is_static()));
+        let Some(words) = self.words else { return record::relative::encode(from, ends) };
+        let mut collision = *from;
+        [collision.body_a, collision.body_b] = words[index];
+        record::relative::encode(&collision, ends)
+    }
+
+    #[inline(always)]
+    fn beyond(quick: &Quick<'_>, record: &[Lanes; relative::ROWS], count: u32) -> Lanes {
+        quick.beyond_relative(record, count)
+    }
+
+    #[inline(always)]
+    fn reach([_, offset, points @ ..]: &[Lanes; relative::ROWS], count: u32) -> Reach {
+        Reach::new([Lanes::all(0), *offset], *points, count)
+    }
+}
+
+/// The ends of a collision's bodies.
+#[inline(always)]
+fn both(ends: Ends<'_>, collision: &Collision) -> [End; 2] {
+    [collision.body_a, collision.body_b].map(|body| ends.get(body))
+}
+
+/// The records of a block of collisions. Those ahead are fetched meanwhile.
+pub(super) struct Encoding<'p, K> {
+    kind: K,
+    next: usize,
+    collisions: Zip<slice::Iter<'p, &'p Collision>, slice::Iter<'p, &'p Collision>>,
+    ends: Ends<'p>,
+}
+
+impl<'p, K> Encoding<'p, K> {
+    /// Those of a block. Of those `ahead` as many are fetched; if they are fewer, none.
+    #[inline(always)]
+    pub(super) fn new(kind: K, block: &Block<'p>, ahead: &'p [&'p Collision]) -> Self {
+        let collisions = block.collisions;
+        // Those of a last block that is not whole come by themselves.
+        let ahead = ahead.get(..collisions.len()).unwrap_or(collisions);
+        let collisions = collisions.iter().zip(ahead);
+        Self { kind, next: block.first, collisions, ends: block.ends }
+    }
+
+    /// The next record, with the collision and the ends that it is made of.
+    #[inline(always)]
+    fn take<const ROWS: usize>(&mut self) -> Option<([Lanes; ROWS], &'p Collision, [End; 2])>
+    where
+        K: Kind<ROWS>,
+    {
+        let (collision, ahead) = self.collisions.next()?;
+        prefetch::<Collision>(ahead);
+        let ends = both(self.ends, collision);
+        let record = self.kind.encode(self.next, collision, ends);
+        self.next += 1;
+        Some((record, collision, ends))
+    }
+}
+
+impl<K: Kind<ROWS>, const ROWS: usize> Records<ROWS> for Encoding<'_, K> {
+    const INTEGERS: [bool; ROWS] = K::INTEGERS;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[Lanes; ROWS]> {
+        self.take().map(|(record, ..)| record)
+    }
+}
+
+/// The same, looked at on their way.
+pub(super) struct LookedAt<'p, K> {
+    records: Encoding<'p, K>,
+    quick: &'p Quick<'p>,
+    look: Look<'p>,
+    scheduled: bool,
+}
+
+impl<'p, K: Copy> LookedAt<'p, K> {
+    #[inline(always)]
+    pub(super) fn new(records: Encoding<'p, K>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
+        Self { records, quick, look: Look::new(quick), scheduled }
+    }
+
+    /// How many of those taken look like padding.
+    #[inline(always)]
+    pub(super) fn paddings(&self) -> usize {
+        self.look.paddings()
+    }
+
+    /// Whether validation refuses none of the block, all of whose records were taken.
+    #[inline(always)]
+    pub(super) fn good<const ROWS: usize>(self, block: &Block<'_>) -> bool
+    where
+        K: Kind<ROWS>,
+    {
+        let Self { records: Encoding { kind, .. }, look, .. } = self;
+        let reaches = (block.first..).zip(block.collisions).map(|(index, collision)| {
+            let record = kind.encode(index, collision, both(block.ends, collision));
+            K::reach(&record, collision.count)
+        });
+        look.good(block, reaches)
+    }
+}
+
+impl<K: Kind<ROWS>, const ROWS: usize> Records<ROWS> for LookedAt<'_, K> {
+    const INTEGERS: [bool; ROWS] = K::INTEGERS;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[Lanes; ROWS]> {
+        let (record, collision, ends) = self.records.take()?;
+        self.look.head(collision, ends, self.scheduled);
+        self.look.numbers(K::beyond(self.quick, &record, collision.count));
+        if self.look.asks_how_far() {
+            self.look.reach(&K::reach(&record, collision.count), ends);
+        }
+        Some(record)
+    }
+}
