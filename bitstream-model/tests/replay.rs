@@ -4,7 +4,7 @@
 mod common;
 
 use bitstream_model::interface::control;
-use bitstream_model::interface::profile::{FLOAT, MIXED};
+use bitstream_model::interface::profile::{FLOAT, HALF, MIXED};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
 use proptest::prelude::*;
 
@@ -14,7 +14,12 @@ use common::sg::LONG;
 
 fn config() -> impl Strategy<Value = BoardConfig> {
     (
-        prop_oneof![3 => Just(&FLOAT), 3 => Just(&MIXED), 2 => prop::sample::select(&OTHERS[..])],
+        prop_oneof![
+            3 => Just(&FLOAT),
+            4 => Just(&HALF),
+            3 => Just(&MIXED),
+            2 => prop::sample::select(&OTHERS[..]),
+        ],
         prop::sample::select(&[16_usize, 48, 512][..]),
         prop::sample::select(&[10_u32, 14, 26][..]),
         prop::sample::select(
@@ -63,7 +68,7 @@ proptest! {
                 1 => collision.bodies[1] = bodies,
                 2 => collision.bodies[1] = collision.bodies[0],
                 3 => collision.bodies = [0, 8],
-                _ => collision.count = u32::MAX,
+                _ => collision.count = config.profile.numbers.collisions.largest_index(),
             }
         }
         same(config, None, 2, |machine| machine.step(&step));

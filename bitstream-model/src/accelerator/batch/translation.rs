@@ -1,10 +1,11 @@
 //! This file translates collisions of other designs into those that a batch takes in: f32, in world
 //! coordinates, on four streams. So many at a time that they stay in the cache.
 //!
-//! A record relative to body A is one whose body A stands at the origin.
+//! A record relative to body A is one whose body A stands at the origin. Of two records of three and a
+//! half beats the first takes the sum of the words of both, and what pads the last one up.
 
 use super::super::array::Row;
-use super::super::decode::Collision;
+use super::super::decode::{self, Collision};
 use super::super::layout::Layout;
 use super::super::segment::PacketError;
 use super::super::solver::Mass;
@@ -14,12 +15,16 @@ use super::lanes::{Lanes, Work};
 use super::records::{BEATS, STREAMS};
 use crate::cast::register;
 use crate::interface::number::StreamFormat;
-use crate::interface::record::{Beat, LANES, collision, relative};
+use crate::interface::record::{Beat, LANES, WORD_LANE, collision, relative};
 
 /// Records that are translated at once.
 const TOGETHER: usize = 4096;
 /// And by one thread.
 const OF_THREAD: usize = 512;
+
+/// Records that share a beat.
+const PAIR: usize = 2;
+const _: () = assert!(TOGETHER.is_multiple_of(PAIR) && OF_THREAD.is_multiple_of(PAIR));
 
 /// Records that have been translated.
 #[derive(Debug)]
@@ -123,6 +128,11 @@ impl Work for Part<'_> {
 impl Part<'_> {
     #[inline(always)]
     fn translate(self) {
+        if self.layout.together == PAIR {
+            let format = self.layout.format;
+            self.translate_pairs(format);
+            return;
+        }
         match self.layout.format {
             StreamFormat::F32 => self.translate_of::<{ relative::ROWS }>(StreamFormat::F32),
             StreamFormat::Binary16 => {
@@ -156,6 +166,45 @@ impl Part<'_> {
     }
 }
 
+impl Part<'_> {
+    /// The same of pairs of records in world coordinates of sixteen-bit words.
+    #[inline(always)]
+    fn translate_pairs(self, format: StreamFormat) {
+        let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
+        let from: [_; collision::ROWS] = std::array::from_fn(|beat| {
+            let (stream, number) = layout.places[beat];
+            let share = layout.share[stream];
+            (&streams[stream][first / PAIR * share + number..], share)
+        });
+        let pairs = a.as_chunks_mut::<2>().0.iter_mut().zip(b.as_chunks_mut::<2>().0);
+        let to = pairs.zip(c.as_chunks_mut::<2>().0.iter_mut().zip(d));
+        for (record, (sum, ((a, b), (c, d)))) in sums.iter_mut().zip(to).enumerate() {
+            let beats = from.map(|(beats, share)| beats[record / PAIR * share]);
+            let words: &[[u16; collision::ROWS * LANES]] = bytemuck::cast_slice(&beats);
+            *sum = match record % PAIR {
+                0 => beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add),
+                _ => 0,
+            };
+            let [a0, b0, c0, d0, a1, b1, c1] = widened(format, &words[record % PAIR]).map(Beat);
+            (*a, *b, *c, *d) = ([a0, a1], [b0, b1], [c0, c1], d0);
+        }
+    }
+}
+
+/// The rows of a record in world coordinates, from its sixteen-bit words.
+#[inline(always)]
+fn widened(format: StreamFormat, words: &[u16; collision::ROWS * LANES]) -> [Row; collision::ROWS] {
+    // All words alike, for the compiler to take several at once; then those that are no numbers.
+    let mut rows = [[0; LANES]; collision::ROWS];
+    for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
+        *to = decode::number(format, u32::from(*word)).to_bits();
+    }
+    for row in [collision::NORMAL, collision::BODY_A, collision::BODY_B] {
+        rows[row][WORD_LANE] = u32::from(words[row * LANES + WORD_LANE]);
+    }
+    rows
+}
+
 /// The rows in the beats of a record: of 32-bit words, or two in each of sixteen-bit words.
 #[inline(always)]
 fn rows_in<const COUNT: usize>(beats: &[Beat; COUNT]) -> [Row; relative::ROWS] {
@@ -180,7 +229,6 @@ mod tests {
     use crate::interface::control::ErrorCode;
     use crate::interface::number::Numbers;
     use crate::interface::profile::{MIXED, Profile};
-    use crate::interface::record::WORD_LANE;
 
     static RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
     /// Bodies, of which the first is static.
