@@ -195,3 +195,119 @@ impl<L: Lanes> Lanes for Rounded<L> {
         self.0.spread(numbers.map(|number| number.0), quads, stride);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::block::LANES;
+    use super::super::super::width::Width;
+    use super::super::Mask;
+    use super::*;
+    use crate::accelerator::sixteen;
+
+    /// All NaNs as one.
+    fn bits(number: f32) -> u32 {
+        if number.is_nan() { f32::NAN.to_bits() } else { number.to_bits() }
+    }
+
+    /// What is held against what `number.rs` says, sixteen pairs at a time.
+    struct Pairs<'a>(&'a [(f32, f32)]);
+
+    impl Work for Pairs<'_> {
+        fn with<L: Lanes>(self, lanes: L) {
+            let rounded = Half::of(lanes);
+            let read = |numbers: Sixteens<L::Numbers>| {
+                let mut words = [0.0; LANES];
+                rounded.store(numbers, &mut words, 0);
+                words
+            };
+            for pairs in self.0.chunks(L::WIDTH) {
+                let (mut a, mut b) = ([0.0; LANES], [0.0; LANES]);
+                for (lane, pair) in pairs.iter().enumerate() {
+                    (a[lane], b[lane]) = *pair;
+                }
+                let (p, q) = (rounded.load(&a, 0), rounded.load(&b, 0));
+                let [sums, differences] = [p + q, p - q].map(read);
+                let [products, quotients] = [p * q, p / q].map(read);
+                let [roots, opposites, absolutes] = [p.sqrt(), -p, p.abs()].map(read);
+                let [larger, smaller] = [p.larger(q), p.smaller(q)].map(read);
+                let [above, zero] = [p.above(q), p.is_zero()].map(Mask::bits);
+                for (lane, (x, y)) in pairs.iter().enumerate() {
+                    let (p, q) = (Number::<Half>::new(*x), Number::<Half>::new(*y));
+                    let case = format!("{lanes:?} {x:e} {y:e}");
+                    for (found, expected, what) in [
+                        (sums, p + q, "sum"),
+                        (differences, p - q, "difference"),
+                        (products, p * q, "product"),
+                        (quotients, p / q, "quotient"),
+                        (roots, p.sqrt(), "square root"),
+                        (opposites, -p, "opposite"),
+                        (larger, p.larger(q), "larger"),
+                        (smaller, p.smaller(q), "smaller"),
+                    ] {
+                        assert_eq!(bits(found[lane]), bits(expected.value()), "{what}: {case}");
+                    }
+                    assert_eq!(bits(absolutes[lane]), bits(x.abs()), "{case}");
+                    assert_eq!(above >> lane & 1 != 0, p.above(q), "{case}");
+                    assert_eq!(zero >> lane & 1 != 0, p.is_zero(), "{case}");
+                }
+            }
+        }
+    }
+
+    /// Of numbers in f32.
+    struct Conversions<'a>(&'a [f32]);
+
+    impl Work for Conversions<'_> {
+        fn with<L: Lanes>(self, lanes: L) {
+            let mut words = [0.0; LANES];
+            for numbers in self.0.chunks(L::WIDTH) {
+                words[..numbers.len()].copy_from_slice(numbers);
+                let converted = lanes.load(&words, 0).to_binary16();
+                let mut found = [0.0; LANES];
+                lanes.store(converted, &mut found, 0);
+                for (number, found) in numbers.iter().zip(found) {
+                    let expected = Number::<Half>::new(*number).value();
+                    assert_eq!(bits(found), bits(expected), "{lanes:?} {number:e}");
+                }
+            }
+            let splat = Half::of(lanes).splat(0.1);
+            Half::of(lanes).store(splat, &mut words, 0);
+            assert_eq!(words[0].to_bits(), Number::<Half>::new(0.1).value().to_bits());
+        }
+    }
+
+    fn number(word: u16) -> f32 {
+        sixteen::from_binary16(word.into())
+    }
+
+    #[test]
+    fn operations_have_the_bits_of_one_number_after_the_other() {
+        // Every number beside one that depends on it in no simple way, then few beside all of these.
+        let all = 0..=u16::MAX;
+        let scattered = |word: u16| word.wrapping_mul(40_503).rotate_left(7) ^ 0x1234;
+        let mut pairs: Vec<_> =
+            all.clone().map(|word| (number(word), number(scattered(word)))).collect();
+        let near = |word: u16| (number(word), number(word ^ 0x8000 ^ (word >> 3 & 7)));
+        pairs.extend(all.map(near));
+        let few: Vec<f32> = (0..64_u16)
+            .flat_map(|high| [0, 1, 0x155, 0x200, 0x3FE, 0x3FF].map(|low| high << 10 | low))
+            .map(number)
+            .collect();
+        pairs.extend(few.iter().flat_map(|a| few.iter().map(|b| (*a, *b))));
+        for width in Width::all() {
+            // One after the other there are no lanes.
+            let _ = width.run(Pairs(&pairs));
+        }
+    }
+
+    #[test]
+    fn all_kinds_of_numbers_are_rounded_to_the_nearest() {
+        const TAILS: [u32; 9] = [0, 1, 0xFFF, 0x1000, 0x1001, 0x1FFF, 0x2000, 0x3000, 0xFFFF];
+        let numbers: Vec<f32> = (0..=u16::MAX)
+            .flat_map(|high| TAILS.map(|tail| f32::from_bits(u32::from(high) << 16 | tail)))
+            .collect();
+        for width in Width::all() {
+            let _ = width.run(Conversions(&numbers));
+        }
+    }
+}
