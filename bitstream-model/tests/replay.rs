@@ -111,6 +111,28 @@ proptest! {
     }
 
     #[test]
+    fn a_host_that_looks_sees_a_collision_refused_at_the_same_time(
+        config in config(),
+        (bodies, seed, at) in (9..60_u32, any::<u64>(), 0..60_u32),
+        pause in 1..3000_u64,
+    ) {
+        let mut step = scene(bodies, 60, seed, false);
+        step.collisions[at as usize].bodies = [0, 8];
+        step.collisions[at as usize].count = 1;
+        let config = BoardConfig { length_width: 26, ..config };
+        let seen = same(config, None, 1, |machine| {
+            let flight = begin_once(machine, &step);
+            for _ in 0..20 {
+                machine.host.port.pause(std::time::Duration::from_nanos(pause));
+                machine.host.status(1, common::BOTH[0]);
+            }
+            machine.wait(&flight, LONG)?;
+            Ok(machine.collect(&flight, step.bodies.len()))
+        });
+        prop_assert!(seen.steps[0].is_err());
+    }
+
+    #[test]
     fn a_host_that_looks_all_the_time_sees_the_same(
         config in config(),
         (bodies, seed, apart) in (60..200_u32, any::<u64>(), any::<bool>()),
