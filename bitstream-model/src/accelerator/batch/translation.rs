@@ -4,7 +4,7 @@
 //! A record relative to body A is one whose body A stands at the origin. Of two records of three and a
 //! half beats the first takes the sum of the words of both, and what pads the last one up.
 
-use super::super::array::Row;
+use super::super::array::{Row, half_of};
 use super::super::decode::{self, Collision};
 use super::super::layout::Layout;
 use super::super::segment::PacketError;
@@ -176,31 +176,42 @@ impl Part<'_> {
             let share = layout.share[stream];
             (&streams[stream][first / PAIR * share + number..], share)
         });
-        let pairs = a.as_chunks_mut::<2>().0.iter_mut().zip(b.as_chunks_mut::<2>().0);
-        let to = pairs.zip(c.as_chunks_mut::<2>().0.iter_mut().zip(d));
-        for (record, (sum, ((a, b), (c, d)))) in sums.iter_mut().zip(to).enumerate() {
-            let beats = from.map(|(beats, share)| beats[record / PAIR * share]);
-            let words: &[[u16; collision::ROWS * LANES]] = bytemuck::cast_slice(&beats);
-            *sum = match record % PAIR {
-                0 => beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add),
-                _ => 0,
-            };
-            let [a0, b0, c0, d0, a1, b1, c1] = widened(format, &words[record % PAIR]).map(Beat);
-            (*a, *b, *c, *d) = ([a0, a1], [b0, b1], [c0, c1], d0);
+        let [a, b, c] = [a, b, c].map(|beats| beats.as_chunks_mut::<2>().0.chunks_mut(PAIR));
+        let to = a.zip(b).zip(c.zip(d.chunks_mut(PAIR)));
+        for (issue, (sums, ((a, b), (c, d)))) in sums.chunks_mut(PAIR).zip(to).enumerate() {
+            let beats = from.map(|(beats, share)| beats[issue * share]);
+            let rows = rows_of_pair(format, &beats);
+            sums.fill(0);
+            sums[0] = beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add);
+            let records = rows.as_chunks::<{ collision::ROWS }>().0;
+            let to = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
+            for (rows, ((a, b), (c, d))) in records.iter().zip(to) {
+                let [a0, b0, c0, d0, a1, b1, c1] = rows.map(Beat);
+                (*a, *b, *c, *d) = ([a0, a1], [b0, b1], [c0, c1], d0);
+            }
         }
     }
 }
 
-/// The rows of a record in world coordinates, from its sixteen-bit words.
+/// The rows of two records in world coordinates, which share their beats.
 #[inline(always)]
-fn widened(format: StreamFormat, words: &[u16; collision::ROWS * LANES]) -> [Row; collision::ROWS] {
+fn rows_of_pair(
+    format: StreamFormat,
+    beats: &[Beat; collision::ROWS],
+) -> [Row; PAIR * collision::ROWS] {
     // All words alike, for the compiler to take several at once; then those that are no numbers.
-    let mut rows = [[0; LANES]; collision::ROWS];
-    for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
-        *to = decode::number(format, u32::from(*word)).to_bits();
+    let mut rows = [[0; LANES]; PAIR * collision::ROWS];
+    for (rows, beat) in rows.as_chunks_mut::<2>().0.iter_mut().zip(beats) {
+        let words: [u16; 2 * LANES] = bytemuck::cast(*beat);
+        for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
+            *to = decode::number(format, u32::from(word)).to_bits();
+        }
     }
-    for row in [collision::NORMAL, collision::BODY_A, collision::BODY_B] {
-        rows[row][WORD_LANE] = u32::from(words[row * LANES + WORD_LANE]);
+    for record in 0..PAIR {
+        for row in [collision::NORMAL, collision::BODY_A, collision::BODY_B] {
+            let row = record * collision::ROWS + row;
+            rows[row][WORD_LANE] = half_of(beats[row / 2], row % 2)[WORD_LANE];
+        }
     }
     rows
 }
