@@ -206,9 +206,9 @@ impl Pace {
         for k in 0..STREAMS_MAX {
             if share[k] > 0 {
                 // An engine begins a beat as soon as it is through with the last one.
-                let cycles = cycles.saturating_sub(ahead[k]);
-                let most = cycles.div_ceil(1 << beat_shift[k]);
-                let most = usize::try_from(most).unwrap_or(usize::MAX);
+                let last = (1 << beat_shift[k]) - 1;
+                let cycles = cycles.saturating_sub(ahead[k]).saturating_add(last);
+                let most = usize::try_from(cycles >> beat_shift[k]).unwrap_or(usize::MAX);
                 room[2 * k] = most.min(depth - held[k]);
             }
         }
