@@ -200,15 +200,29 @@ impl Pace {
     /// memory has no more.
     #[inline]
     fn refill(&mut self, cycles: u64) {
+        if self.rules.beat_shift == [0; STREAMS_MAX] {
+            self.refill_of::<false>(cycles);
+        } else {
+            self.refill_of::<true>(cycles);
+        }
+    }
+
+    /// The same; without narrow streams every beat takes a cycle.
+    #[inline(always)]
+    fn refill_of<const NARROW: bool>(&mut self, cycles: u64) {
         let Rules { share, beat_shift, depth, engines, supply, .. } = self.rules;
         let Standing { held, ahead, credit, turn } = &mut self.standing;
         let mut room = PerEngine::default();
         for k in 0..STREAMS_MAX {
             if share[k] > 0 {
-                // An engine begins a beat as soon as it is through with the last one.
-                let last = (1 << beat_shift[k]) - 1;
-                let cycles = cycles.saturating_sub(ahead[k]).saturating_add(last);
-                let most = usize::try_from(cycles >> beat_shift[k]).unwrap_or(usize::MAX);
+                let most = if NARROW {
+                    // An engine begins a beat as soon as it is through with the last one.
+                    let last = (1 << beat_shift[k]) - 1;
+                    cycles.saturating_sub(ahead[k]).saturating_add(last) >> beat_shift[k]
+                } else {
+                    cycles
+                };
+                let most = usize::try_from(most).unwrap_or(usize::MAX);
                 room[2 * k] = most.min(depth - held[k]);
             }
         }
@@ -220,8 +234,10 @@ impl Pace {
         for k in 0..STREAMS_MAX {
             let moved = room[2 * k] - left[2 * k];
             held[k] += moved;
-            let busy = ahead[k] + ((moved as u64) << beat_shift[k]);
-            ahead[k] = busy.saturating_sub(cycles);
+            if NARROW {
+                let busy = ahead[k] + ((moved as u64) << beat_shift[k]);
+                ahead[k] = busy.saturating_sub(cycles);
+            }
             self.flowed.beats[k] += moved;
         }
     }
