@@ -1,4 +1,4 @@
-//! This file finds out what comes to the same again where every collision takes an interval, and leaps
+//! This file finds out what comes to the same again where every issue takes an interval, and leaps
 //! over it.
 
 use crate::accelerator::striping::STREAMS_MAX;
@@ -37,7 +37,7 @@ impl Flowed {
         Self {
             cycles: times * self.cycles + then.cycles,
             waits: times * self.waits + then.waits,
-            records: of * self.records + then.records,
+            issues: of * self.issues + then.issues,
             beats: std::array::from_fn(|k| of * self.beats[k] + then.beats[k]),
         }
     }
@@ -47,7 +47,7 @@ impl Flowed {
         Self {
             cycles: self.cycles - then.cycles,
             waits: self.waits - then.waits,
-            records: self.records - then.records,
+            issues: self.issues - then.issues,
             beats: std::array::from_fn(|k| self.beats[k] - then.beats[k]),
         }
     }
@@ -56,9 +56,9 @@ impl Flowed {
     fn fits_into(&self, room: &Limits) -> u64 {
         let of_beats =
             (0..STREAMS_MAX).map(|k| (room.beats[k] as u64).checked_div(self.beats[k] as u64));
-        let records = (room.records as u64).checked_div(self.records as u64);
+        let issues = (room.issues as u64).checked_div(self.issues as u64);
         let cycles = room.cycles.checked_div(self.cycles);
-        of_beats.chain([records, cycles]).flatten().min().unwrap_or(0)
+        of_beats.chain([issues, cycles]).flatten().min().unwrap_or(0)
     }
 }
 
@@ -117,7 +117,7 @@ impl Recurrence {
         }
     }
 
-    /// Leaps over what is known, but for the last `last` collisions before a limit; whether it is
+    /// Leaps over what is known, but for the last `last` issues before a limit; whether it is
     /// known.
     pub(crate) fn leap(&self, pace: &mut Pace, last: usize) -> bool {
         let place = self.places.binary_search_by_key(&pace.standing, |(standing, _)| *standing);
@@ -136,7 +136,7 @@ impl Recurrence {
             let slice = STARVED_CYCLES.max(rules.depth as u64 * rules.interval_max);
             let mut room = Limits {
                 cycles: left(limits.cycles, flowed.cycles, before.cycles, slice)?,
-                records: beats(limits.records, flowed.records, before.records)?,
+                issues: beats(limits.issues, flowed.issues, before.issues)?,
                 beats: [0; STREAMS_MAX],
             };
             for k in 0..STREAMS_MAX {
@@ -152,7 +152,7 @@ impl Recurrence {
             let fits = |flowed: &Flowed| {
                 let all = self.period.repeated(times, flowed);
                 let beats = all.beats.iter().zip(room.beats).all(|(flowed, room)| *flowed <= room);
-                beats && all.cycles <= room.cycles && all.records <= room.records
+                beats && all.cycles <= room.cycles && all.issues <= room.issues
             };
             let behind = self.slices.partition_point(|(_, flowed)| fits(flowed));
             let slice = behind.checked_sub(1)?;
@@ -161,7 +161,7 @@ impl Recurrence {
         let target = || {
             let mut room = room()?;
             let (_, _, flowed) = find(&room)?;
-            room.records = flowed.records.checked_sub(last)?;
+            room.issues = flowed.issues.checked_sub(last)?;
             find(&room)
         };
         let Some((times, slice, flowed)) = target() else { return true };

@@ -50,6 +50,9 @@ impl Board {
                 self.moved.beats_read += beats as u64;
             }
         }
+        for (core, ahead) in self.cores.iter_mut().zip(pace.standing.ahead) {
+            core.has_come_to(self.now + cycles, ahead);
+        }
         self.accelerator.flowed(&pace, &mut self.inputs);
         self.credit = pace.standing.credit;
         self.turn = pace.standing.turn;
@@ -77,15 +80,16 @@ impl Board {
             }
             Some(coming)
         };
-        let (records, interval_max) = self.accelerator.flows(&self.inputs, coming, memory)?;
-        let mut held = [0; STREAMS_MAX];
-        for (held, stream) in held.iter_mut().zip(&self.inputs) {
-            *held = stream.len();
+        let (issues, interval_max) = self.accelerator.flows(&self.inputs, coming, memory)?;
+        let (mut held, mut ahead) = ([0; STREAMS_MAX], [0; STREAMS_MAX]);
+        for (k, (core, stream)) in self.cores.iter().zip(&self.inputs).enumerate() {
+            held[k] = stream.len();
+            ahead[k] = core.ahead(now);
         }
         Some(Pace {
             rules: self.rules(interval_max),
-            limits: Limits { cycles: until - now, records, beats: left },
-            standing: Standing { held, credit: self.credit, turn: self.turn },
+            limits: Limits { cycles: until - now, issues, beats: left },
+            standing: Standing { held, ahead, credit: self.credit, turn: self.turn },
             flowed: Flowed::default(),
         })
     }
@@ -107,8 +111,13 @@ impl Board {
     }
 
     fn rules(&self, interval_max: u64) -> Rules {
+        let mut beat_shift = [0; STREAMS_MAX];
+        for (shift, core) in beat_shift.iter_mut().zip(&self.cores) {
+            *shift = core.beat_shift();
+        }
         Rules {
             share: self.accelerator.share(),
+            beat_shift,
             depth: self.config.delays.fifo_beats,
             engines: self.engines(),
             interval: self.config.profile.initiation_interval.into(),

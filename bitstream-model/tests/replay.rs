@@ -4,7 +4,7 @@
 mod common;
 
 use bitstream_model::interface::control;
-use bitstream_model::interface::profile::{FLOAT, MIXED};
+use bitstream_model::interface::profile::{FLOAT, HALF, MIXED};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
 use proptest::prelude::*;
 
@@ -14,7 +14,12 @@ use common::sg::LONG;
 
 fn config() -> impl Strategy<Value = BoardConfig> {
     (
-        prop_oneof![3 => Just(&FLOAT), 3 => Just(&MIXED), 2 => prop::sample::select(&OTHERS[..])],
+        prop_oneof![
+            3 => Just(&FLOAT),
+            4 => Just(&HALF),
+            3 => Just(&MIXED),
+            2 => prop::sample::select(&OTHERS[..]),
+        ],
         prop::sample::select(&[16_usize, 48, 512][..]),
         prop::sample::select(&[10_u32, 14, 26][..]),
         prop::sample::select(
@@ -63,7 +68,7 @@ proptest! {
                 1 => collision.bodies[1] = bodies,
                 2 => collision.bodies[1] = collision.bodies[0],
                 3 => collision.bodies = [0, 8],
-                _ => collision.count = u32::MAX,
+                _ => collision.count = config.profile.numbers.collisions.largest_index(),
             }
         }
         same(config, None, 2, |machine| machine.step(&step));
@@ -106,9 +111,31 @@ proptest! {
     }
 
     #[test]
+    fn a_host_that_looks_sees_a_collision_refused_at_the_same_time(
+        config in config(),
+        (bodies, seed, at) in (9..60_u32, any::<u64>(), 0..60_u32),
+        pause in 1..3000_u64,
+    ) {
+        let mut step = scene(bodies, 60, seed, false);
+        step.collisions[at as usize].bodies = [0, 8];
+        step.collisions[at as usize].count = 1;
+        let config = BoardConfig { length_width: 26, ..config };
+        let seen = same(config, None, 1, |machine| {
+            let flight = begin_once(machine, &step);
+            for _ in 0..20 {
+                machine.host.port.pause(std::time::Duration::from_nanos(pause));
+                machine.host.status(1, common::BOTH[0]);
+            }
+            machine.wait(&flight, LONG)?;
+            Ok(machine.collect(&flight, step.bodies.len()))
+        });
+        prop_assert!(seen.steps[0].is_err());
+    }
+
+    #[test]
     fn a_host_that_looks_all_the_time_sees_the_same(
         config in config(),
-        (bodies, seed, apart) in (60..200_u32, any::<u64>(), any::<bool>()),
+        (bodies, seed, apart) in (9..200_u32, any::<u64>(), any::<bool>()),
         pauses in prop::collection::vec(1..4000_u64, 1..20),
     ) {
         let step = with_gaps(scene(bodies, 500, seed, apart), seed, config.profile);

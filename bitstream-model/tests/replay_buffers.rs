@@ -4,7 +4,7 @@
 mod common;
 
 use bitstream_model::interface::control;
-use bitstream_model::interface::profile::{FLOAT, Geometry, MIXED, Profile};
+use bitstream_model::interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
 use bitstream_model::interface::record::Beat;
 use bitstream_model::{BoardConfig, DeviceAccess, Direction, FaultPlan};
 use half::f16;
@@ -15,37 +15,55 @@ use common::ring::WHOLE;
 use common::scene::Lane;
 use common::sg::{Failure, Flight, LONG};
 
-/// Where the first contact point of each collision is on the streams of a design.
+/// Where the first contact point of each collision is on the streams of a design, or of each issue.
 #[derive(Debug, Clone, Copy)]
 struct FirstContact {
     stream: usize,
-    relative: bool,
+    /// Collisions of an issue, its beats on the stream, and which of them it is.
+    together: usize,
+    share: usize,
+    beat: usize,
+    /// Of sixteen-bit words: which half of the beat.
+    half: Option<usize>,
 }
 
 impl FirstContact {
     fn of(profile: &Profile) -> Self {
-        match profile.geometry {
-            Geometry::Absolute => Self { stream: 3, relative: false },
-            Geometry::Relative => Self { stream: 1, relative: true },
+        match (profile.geometry, profile.collisions_per_issue) {
+            (Geometry::Absolute, 1) => {
+                Self { stream: 3, together: 1, share: 1, beat: 0, half: None }
+            }
+            (Geometry::Absolute, _) => {
+                Self { stream: 0, together: 2, share: 3, beat: 1, half: Some(1) }
+            }
+            (Geometry::Relative, _) => {
+                Self { stream: 1, together: 1, share: 1, beat: 0, half: Some(0) }
+            }
         }
     }
 
-    /// Puts it somewhere else, which is its stream's beat of the collision.
+    /// The beat of a collision, or of the first one of its issue.
+    fn among(self, beats: &mut [Beat], collision: usize) -> &mut Beat {
+        &mut beats[collision / self.together * self.share + self.beat]
+    }
+
+    /// Puts it somewhere else.
     fn moves(self, beat: &mut Beat) {
-        if self.relative {
-            beat.0[0] = u32::from(f16::from_f32(0.75).to_bits()) * 0x1_0001;
-        } else {
-            beat.0[1] = 0.75_f32.to_bits();
+        match self.half {
+            Some(half) => beat.0[2 * half] = u32::from(f16::from_f32(0.75).to_bits()) * 0x1_0001,
+            None => beat.0[1] = 0.75_f32.to_bits(),
         }
     }
 
     /// Lets it lie deep inside.
     fn sinks(self, beat: &mut Beat) {
-        if self.relative {
-            let distance = u32::from(f16::from_f32(-50.0).to_bits());
-            beat.0[1] = beat.0[1] & 0xFFFF | (distance << 16);
-        } else {
-            beat.0[3] = (-50.0_f32).to_bits();
+        match self.half {
+            Some(half) => {
+                let distance = u32::from(f16::from_f32(-50.0).to_bits());
+                let word = &mut beat.0[2 * half + 1];
+                *word = *word & 0xFFFF | (distance << 16);
+            }
+            None => beat.0[3] = (-50.0_f32).to_bits(),
         }
     }
 }
@@ -65,24 +83,25 @@ fn other_bytes_in_a_later_pass_are_noticed() {
         let contact = FirstContact::of(profile);
         // Packet 0 are the velocities, 1 to 4 the contact passes.
         for pass in 2..=4 {
-            for beat in [0, 1, 401, 799] {
+            for collision in [0, 1, 401, 799] {
                 let changed = run(&|stream, packet, beats| {
                     if stream == contact.stream && packet == pass {
-                        contact.sinks(&mut beats[beat]);
+                        contact.sinks(contact.among(beats, collision));
                     }
                 });
                 let bodies = |seen: &Seen| seen.steps[0].clone().expect("no fault").0;
-                let case = format!("{}: pass {pass}, beat {beat}", profile.name);
+                let case = format!("{}: pass {pass}, collision {collision}", profile.name);
                 assert_ne!(bodies(&changed), bodies(&usual), "{case}");
             }
         }
         // What the decoder refuses is refused in the pass that brings it.
         let refused = run(&|stream, packet, beats| {
             if stream == 0 && packet == 6 {
-                match profile.geometry {
-                    Geometry::Absolute => beats[2 * 300].0[3] = 5,
+                match (profile.geometry, contact.half) {
+                    (Geometry::Absolute, None) => beats[2 * 300].0[3] = 5,
+                    (Geometry::Absolute, Some(_)) => beats[3 * 150].0[1] |= 5 << 16,
                     // The index of body A.
-                    Geometry::Relative => beats[300].0[1] |= 0xFFFF_0000,
+                    (Geometry::Relative, _) => beats[300].0[1] |= 0xFFFF_0000,
                 }
             }
         });
@@ -100,9 +119,9 @@ fn a_packet_that_ends_too_early_or_too_late_is_noticed() {
     let step = large();
     for profile in PROFILES {
         for (stream, pass) in [(0, 1), (1, 1), (2, 3), (2, 8)] {
-            // Beats of a collision on the stream.
-            let share = if profile.geometry == Geometry::Absolute { 2 } else { 1 };
-            let all = 800 * share;
+            let of_stream = |on: &&u8| usize::from(**on) == stream;
+            let share = profile.stripes.collisions.streams.iter().filter(of_stream).count();
+            let all = 800 / profile.collisions_per_issue as usize * share;
             for length in [1, 333, all - 1, all + 1] {
                 let config = BoardConfig { profile, ..whole_length() };
                 let seen = same(config, None, 1, |machine| {
@@ -145,7 +164,11 @@ fn the_same_bytes_in_other_buffers_give_the_same() {
 #[test]
 fn a_corrupt_beat_in_a_later_pass_is_noticed() {
     let step = large();
-    for (profile, spoils) in [(&FLOAT, "0x00700000@dma3.mm2s"), (&MIXED, "0x04000000@dma1.mm2s")] {
+    for (profile, spoils) in [
+        (&FLOAT, "0x00700000@dma3.mm2s"),
+        (&HALF, "0x04000400@dma0.mm2s"),
+        (&MIXED, "0x04000000@dma1.mm2s"),
+    ] {
         let config = BoardConfig { profile, ..whole_length() };
         let usual = same(config, None, 1, |machine| machine.step(&step));
         for at in ["contact1", "contact3", "friction2"] {
@@ -163,7 +186,7 @@ fn a_buffer_that_changes_hands_in_the_middle_of_a_pass_is_noticed() {
     let step = large();
     for profile in PROFILES {
         let contact = FirstContact::of(profile);
-        // A pass takes some 1600 cycles of 3.6 ns, or 800 of 4 ns.
+        // A pass takes some 1600 cycles of 3.6 ns, or 1200 of 4 ns, or 800.
         for pause in [3, 5, 6, 8, 14, 21, 33] {
             let config = BoardConfig { profile, ..whole_length() };
             let seen = same(config, None, 1, |machine| {
@@ -189,7 +212,7 @@ fn a_buffer_that_changes_hands_in_the_middle_of_a_pass_is_noticed() {
                 // The contact points of the first half lie elsewhere from now on.
                 let address = addresses[contact.stream][1];
                 let mut beats = machine.host.take(address);
-                beats[..400].iter_mut().for_each(|beat| contact.moves(beat));
+                (0..400).for_each(|of| contact.moves(contact.among(&mut beats, of)));
                 let port = &machine.host.port;
                 port.hand_over(address, beats, DeviceAccess::Read).expect("the CPU owns it");
                 machine.wait(&flight, LONG)?;

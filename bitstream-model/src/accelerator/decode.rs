@@ -14,7 +14,7 @@ use crate::interface::record::{
 
 /// A number in a word of that format.
 #[inline(always)]
-fn number(format: StreamFormat, word: u32) -> f32 {
+pub(super) fn number(format: StreamFormat, word: u32) -> f32 {
     match format {
         StreamFormat::F32 => f32::from_bits(word),
         StreamFormat::Binary16 => sixteen::from_binary16(word),

@@ -25,7 +25,7 @@ const SLOTS_MAX: usize = 512;
 /// Beats that are about to come to a stream: where from, and how many.
 pub(crate) type Coming = [Option<(Source, usize)>; STREAMS_MAX];
 
-/// Collisions that entered one an interval.
+/// Collisions that entered, an issue an interval.
 #[derive(Debug, Clone, Copy, Default)]
 struct Entered {
     clock: u64,
@@ -66,11 +66,16 @@ impl Replay {
     pub(super) fn new(config: &BoardConfig) -> Self {
         let layout = if config.replay { Layout::of(config) } else { None };
         let translated = layout.filter(|layout| !layout.in_place);
+        let threads = if layout.is_some() { config.threads } else { 1 };
+        let mut batch = Batch::new(threads, config.lanes);
+        if let Some(Layout { precision, together, .. }) = layout {
+            batch = batch.of(precision, together);
+        }
         Self {
             layout,
             translation: translated.map(Translation::new),
             on: layout.is_some(),
-            batch: Batch::new(if layout.is_some() { config.threads } else { 1 }, config.lanes),
+            batch,
             computed: 0,
             masses: Vec::new(),
             origin: std::array::from_fn(|_| Spans::with_capacity(64)),
@@ -108,12 +113,22 @@ impl Replay {
         self.layout.filter(|_| self.on)?.bodies
     }
 
-    /// Beats of a collision on each stream; none if the design cannot be replayed.
+    /// Beats of an issue on each stream; none if the design cannot be replayed.
     pub(super) fn share(&self) -> PerStream {
         self.layout.map_or([0; STREAMS_MAX], |layout| layout.share)
     }
 
-    /// The streams of the design, and the beats of a collision on each.
+    /// Collisions that enter together.
+    pub(super) fn together(&self) -> usize {
+        self.layout.map_or(1, |layout| layout.together)
+    }
+
+    /// Issues of so many collisions, the last one with padding.
+    pub(super) fn issues(&self, collisions: usize) -> usize {
+        collisions.div_ceil(self.together())
+    }
+
+    /// The streams of the design, and the beats of an issue on each.
     fn shares(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
         self.share().into_iter().enumerate().filter(|(_, share)| *share > 0)
     }
@@ -165,22 +180,24 @@ impl Replay {
             }
         };
         while self.refused.is_none() && self.known() < total {
+            // All issues that are known are whole ones.
             let known = self.known();
+            let first = self.issues(known);
             let share_of = self.share();
-            let ahead = |k: usize| (known - segment.done) * share_of[k];
-            let mut records = total - known;
+            let ahead = |k: usize| (first - self.issues(segment.done)) * share_of[k];
+            let mut issues = self.issues(total) - first;
             for (k, share) in self.shares() {
-                records = records.min(piece(k, ahead(k), records * share).0 / share);
+                issues = issues.min(piece(k, ahead(k), issues * share).0 / share);
             }
-            // Where the beats of a collision are not together it is gathered.
-            let apart = records == 0;
-            let records = records.max(1);
+            // Where the beats of an issue are not together it is gathered.
+            let apart = issues == 0;
+            let issues = issues.max(1);
             let mut gathered = [[Beat::default(); BEATS_MAX]; STREAMS_MAX];
             let mut streams: [&[Beat]; STREAMS_MAX] = [&[]; STREAMS_MAX];
             let mut sources = [[None; BEATS_MAX]; STREAMS_MAX];
-            let step = |share: usize| if apart { 1 } else { records * share };
+            let step = |share: usize| if apart { 1 } else { issues * share };
             for (k, share) in self.shares() {
-                for at in (0..records * share).step_by(step(share)) {
+                for at in (0..issues * share).step_by(step(share)) {
                     let (count, source) = piece(k, ahead(k) + at, step(share));
                     let view = source.and_then(|source| memory.view(source, count));
                     let Some(view) = view.filter(|view| view.len() == step(share)) else { return };
@@ -193,7 +210,7 @@ impl Replay {
                 }
             }
             for (k, share) in self.shares() {
-                let first = (known * share) as u64;
+                let first = (first * share) as u64;
                 for (at, source) in (0..).zip(sources[k].into_iter().flatten()) {
                     self.origin[k].push(first + at, step(share) as u64, source);
                 }
@@ -201,6 +218,7 @@ impl Replay {
                     streams[k] = &gathered[k][..share];
                 }
             }
+            let records = (issues * self.together()).min(total - known);
             let [before, sums @ ..] = &mut self.sums[known..=known + records] else { return };
             let (shapes, masses) = (shape_of, &self.masses);
             let decoded = match &mut self.translation {
@@ -218,7 +236,7 @@ impl Replay {
         }
     }
 
-    /// The sum of all words of some collisions.
+    /// The sum of all words of some collisions, of which the first begins an issue.
     pub(super) fn sum(&self, first: usize, records: usize) -> u32 {
         self.sums[first + records].wrapping_sub(self.sums[first])
     }
@@ -227,8 +245,8 @@ impl Replay {
     /// come: on some streams there may be more of them than on others.
     pub(super) fn same(&self, segment: &Segment, records: usize, inputs: &[Stream]) -> bool {
         self.shares().all(|(k, share)| {
-            let first = (segment.done * share) as u64;
-            let most = (records * share).min(inputs[k].len());
+            let first = (self.issues(segment.done) * share) as u64;
+            let most = (self.issues(records) * share).min(inputs[k].len());
             let mut at = 0;
             while at < most {
                 let (count, source) = inputs[k].piece(at, most - at);
@@ -247,13 +265,14 @@ impl Replay {
     pub(super) fn goes_on(&self, segment: &Segment, inputs: &[Stream], coming: &Coming) -> bool {
         self.shares().all(|(k, share)| {
             let Some((source, count)) = coming[k] else { return false };
-            let next = segment.done * share + inputs[k].len();
-            let left = ((segment.done + segment.left()) * share).saturating_sub(next);
+            let next = self.issues(segment.done) * share + inputs[k].len();
+            let all = self.issues(segment.done + segment.left());
+            let left = (all * share).saturating_sub(next);
             self.origin[k].holds(next as u64, count.min(left), source)
         })
     }
 
-    /// Collisions enter one an interval from that clock on.
+    /// Collisions enter, an issue an interval from that clock on; the first one begins an issue.
     pub(super) fn enter(&mut self, clock: u64, first: usize, records: usize) {
         self.entered[self.next_entered] = Entered { clock, first, records };
         self.next_entered = (self.next_entered + 1) % SLOTS_MAX;
@@ -264,11 +283,12 @@ impl Replay {
         if !std::mem::replace(&mut self.even, false) {
             return;
         }
+        let together = self.together();
         let (newer, older) = self.entered.split_at(self.next_entered);
         for Entered { clock, first, records } in older.iter().chain(newer) {
             for (at, index) in (*first..first + records).enumerate() {
                 if let Some(entry) = self.batch.entry(index) {
-                    pipeline.entered(clock + at as u64 * interval, &entry);
+                    pipeline.entered(clock + (at / together) as u64 * interval, &entry);
                 }
             }
         }

@@ -31,7 +31,12 @@ impl Accelerator {
         inputs: &mut [Stream],
         memory: &Memory,
     ) -> Result<bool, PacketError> {
-        let available = segment.available(inputs);
+        let together = self.replay.together();
+        let mut available = segment.available(inputs);
+        if available < segment.left() {
+            // The collisions of an issue enter together.
+            available -= available % together;
+        }
         if available == 0 {
             return segment.check_waiting(inputs).map(|()| false);
         }
@@ -47,16 +52,19 @@ impl Accelerator {
         let (mut cycles, mut records) = (0, 0);
         if self.replay.even {
             let fit = usize::try_from(limit / interval).unwrap_or(usize::MAX);
-            records = known.min(fit.saturating_add(1));
-            cycles = records as u64 * interval;
+            records = known.min(fit.saturating_add(1).saturating_mul(together));
+            cycles = self.replay.issues(records) as u64 * interval;
             self.replay.enter(self.clock, segment.done, records);
         } else {
             while records < known && cycles <= limit {
-                cycles += self.wait(segment.done + records, self.clock + cycles) + interval;
-                records += 1;
+                let issue = (known - records).min(together);
+                cycles += self.issue_enters(segment.done + records, issue, self.clock + cycles);
+                records += issue;
             }
         }
-        if records == known && cycles <= limit && refused {
+        // In the middle of an issue that has entered, or before one that does.
+        let enters = !records.is_multiple_of(together) || cycles <= limit;
+        if records == known && enters && refused {
             self.compute_to(number, segment.done + records);
             self.replay.on = false;
             return self.replay.refused.map_or(Ok(true), Err);
@@ -95,6 +103,17 @@ impl Accelerator {
         self.counters.stalls += stall;
         self.counters.hazards += u64::from(stall > 0);
         stall
+    }
+
+    /// The collisions of an issue enter at that clock, or as soon as they can: the cycles until the next
+    /// one.
+    #[inline]
+    fn issue_enters(&mut self, first: usize, collisions: usize, now: u64) -> u64 {
+        let mut stalls = 0;
+        for index in first..first + collisions {
+            stalls += self.wait(index, now + stalls);
+        }
+        stalls + self.interval()
     }
 
     /// Takes the beats of collisions that have entered.
@@ -158,13 +177,13 @@ impl Accelerator {
         }
     }
 
-    /// Beats of a collision on each stream.
+    /// Beats of an issue on each stream.
     pub(crate) fn share(&self) -> PerStream {
         self.replay.share()
     }
 
-    /// Whether the collisions flow that are on the streams and about to come: how many may, and how
-    /// long each of them may take.
+    /// Whether the collisions flow that are on the streams and about to come: how many issues may, and
+    /// how long each of them may take.
     pub(crate) fn flows(
         &mut self,
         inputs: &[Stream],
@@ -172,36 +191,40 @@ impl Accelerator {
         memory: &Memory,
     ) -> Option<(usize, u64)> {
         let (number, segment) = self.flowing()?;
-        let within = |(stream, share): (&Stream, usize)| stream.len() <= segment.left() * share;
+        let left = self.replay.issues(segment.left());
+        let within = |(stream, share): (&Stream, usize)| stream.len() <= left * share;
         if !inputs.iter().zip(self.replay.share()).all(within) {
             return None;
         }
         let coming = coming()?;
         self.look_ahead(number, &segment, inputs, &coming, memory);
-        let there = segment.available(inputs);
+        let together = self.replay.together();
+        let there = segment.available(inputs) / together * together;
         let known = self.replay.known() - segment.done;
         let same = there <= known
             && self.replay.same(&segment, known, inputs)
             && self.replay.goes_on(&segment, inputs, &coming);
         let stall_max = if self.replay.even { 0 } else { u64::from(self.depth(number).window) };
-        same.then_some((known.min(segment.left()), self.interval() + stall_max))
+        let issues = self.replay.issues(known.min(segment.left()));
+        same.then_some((issues, self.interval() + together as u64 * stall_max))
     }
 
     /// Lets collisions flow.
     pub(crate) fn flow(&mut self, pace: &mut Pace, known: &mut Recurrence) {
         let Some((_, segment)) = self.flowing() else { return };
-        let (start, done) = (self.clock, segment.done);
+        let (start, done, together) = (self.clock, segment.done, self.replay.together());
         if self.replay.even {
             let last = self.replay.slots();
-            pace.run_evenly(last, known, |Slice { cycles, first, records }| {
-                self.replay.enter(start + cycles, done + first, records);
+            pace.run_evenly(last, known, |Slice { cycles, first, issues }| {
+                let (first, records) = (done + first * together, issues * together);
+                self.replay.enter(start + cycles, first, records);
             });
         } else {
-            let interval = self.interval();
-            pace.run(|Slice { cycles, first, records }| {
+            pace.run(|Slice { cycles, first, issues }| {
                 let mut taken = 0;
-                for index in done + first..done + first + records {
-                    taken += self.wait(index, start + cycles + taken) + interval;
+                for issue in first..first + issues {
+                    let now = start + cycles + taken;
+                    taken += self.issue_enters(done + issue * together, together, now);
                 }
                 taken
             });
@@ -211,7 +234,7 @@ impl Accelerator {
     /// Collisions have flowed, and the beats with them that are on the streams now.
     pub(crate) fn flowed(&mut self, pace: &Pace, inputs: &mut [Stream]) {
         let Some((number, mut segment)) = self.flowing() else { return };
-        self.take(&mut segment, pace.flowed.records, inputs);
+        self.take(&mut segment, pace.flowed.issues * self.replay.together(), inputs);
         self.phase = Phase::Pass { number, segment };
         self.clock += pace.flowed.cycles;
         self.counters.waits += pace.flowed.waits;

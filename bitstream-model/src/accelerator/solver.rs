@@ -22,6 +22,17 @@ pub(super) struct Mass {
     pub(super) inverse_inertia: Stored,
 }
 
+impl Mass {
+    /// The same in numbers of a format.
+    pub(super) fn rounded<F: Format>(&self) -> Self {
+        let round = |number| Number::<F>::new(number).value();
+        Self {
+            inverse_mass: round(self.inverse_mass),
+            inverse_inertia: self.inverse_inertia.map(round),
+        }
+    }
+}
+
 /// Velocities of a body, as they lie in block RAM.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Velocity {
@@ -40,6 +51,16 @@ pub(super) struct SolverParameters {
     pub(super) drift: f32,
     pub(super) coefficient: f32,
     pub(super) friction: f32,
+}
+
+impl SolverParameters {
+    /// The same in numbers of a format.
+    pub(super) fn rounded<F: Format>(&self) -> Self {
+        let Self { time_step, drift, coefficient, friction } = *self;
+        let [time_step, drift, coefficient, friction] = [time_step, drift, coefficient, friction]
+            .map(|number| Number::<F>::new(number).value());
+        Self { time_step, drift, coefficient, friction }
+    }
 }
 
 /// Inverse mass and inertia in numbers of a format.

@@ -25,9 +25,9 @@ impl Channel {
         !works && self.faulty.late.is_empty() && !self.faulty.extra && !self.faulty.discards
     }
 
-    /// Whether it works as it should, and its clock is not ahead.
-    fn in_order(&self, now: u64) -> bool {
-        let plain = !dmacr::KEYHOLE.is_set(self.control) && self.time <= now;
+    /// Whether it works as it should, and its clock is not ahead by more than a beat.
+    fn in_order(&self, now: u64, beat_shift: u32) -> bool {
+        let plain = !dmacr::KEYHOLE.is_set(self.control) && self.time < now + (1 << beat_shift);
         plain && self.next_event().is_none() && self.faulty.none()
     }
 }
@@ -44,13 +44,32 @@ impl Core {
         let left = bd.length - bd.moved;
         let whole = at.is_multiple_of(BEAT.into()) && self.reset_until.is_none();
         let beats = (left / BEAT) as usize;
-        (whole && channel.in_order(now) && beat_shift == 0).then_some((at, beats))
+        (whole && channel.in_order(now, beat_shift)).then_some((at, beats))
+    }
+
+    /// Binary logarithm of the clocks that a beat takes on the MM2S stream.
+    pub(crate) fn beat_shift(&self) -> u32 {
+        self.build.mm2s_beat_shift
+    }
+
+    /// MM2S: by how many clocks it is ahead with the last beat.
+    pub(crate) fn ahead(&self, now: u64) -> u64 {
+        self.mm2s.time.saturating_sub(now)
+    }
+
+    /// MM2S: it has moved beats up to that time, and the last one is through so many clocks later.
+    pub(crate) fn has_come_to(&mut self, now: u64, ahead: u64) {
+        if ahead > 0 {
+            self.mm2s.time = now + ahead;
+        }
     }
 
     /// S2MM: whether it does nothing as long as nothing comes.
     pub(crate) fn rests_without_beats(&self, now: u64) -> bool {
         let fetches = matches!(self.s2mm.work, Work::Fetch { .. });
-        self.reset_until.is_none() && !fetches && self.s2mm.in_order(now)
+        self.reset_until.is_none()
+            && !fetches
+            && self.s2mm.in_order(now, self.build.s2mm_beat_shift)
     }
 
     /// So many beats of a channel have been moved, fewer than the descriptor had.

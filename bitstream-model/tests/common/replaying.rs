@@ -2,7 +2,7 @@
 
 use bitstream_model::interface::control;
 use bitstream_model::interface::number::Numbers;
-use bitstream_model::interface::profile::{FLOAT, Geometry, MIXED, Profile};
+use bitstream_model::interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
 use bitstream_model::interface::record::Beat;
 use bitstream_model::interface::stripe::{Stripe, Stripes};
 use bitstream_model::{BoardConfig, Counts, FaultPlan, PacketCount, RegisterAccess, ViolationKind};
@@ -13,11 +13,12 @@ use super::scene::{AT_REST, Body, Collision, Lane, STATIC, Step, bits};
 use super::sg::{Failure, Flight, Machine, Outcome};
 
 /// The designs that are replayed.
-pub(crate) const PROFILES: [&Profile; 2] = [&FLOAT, &MIXED];
+pub(crate) const PROFILES: [&Profile; 3] = [&FLOAT, &HALF, &MIXED];
 
-/// And nobody's: two, three and six beats of a collision on each of three, two and one streams, and
-/// one of which the bodies take the long way.
-pub(crate) const OTHERS: [&Profile; 4] = [&ON_THREE, &ON_TWO, &ON_ONE, &BODIES_APART];
+/// And nobody's: two, three and six beats of a collision on each of three, two and one streams, one of
+/// which the bodies take the long way, one with narrow streams, and pairs of collisions otherwise.
+pub(crate) const OTHERS: [&Profile; 6] =
+    [&ON_THREE, &ON_TWO, &ON_ONE, &BODIES_APART, &NARROW, &PAIRS];
 
 static ON_THREE: Profile = RELATIVE;
 static ON_TWO: Profile = Profile {
@@ -36,6 +37,16 @@ static BODIES_APART: Profile = Profile {
         results: Stripe { streams: &[0, 1, 2], padded: true },
     },
     ..MIXED
+};
+static NARROW: Profile = Profile { mm2s_widths: &[128, 32, 64], ..MIXED };
+static PAIRS: Profile = Profile {
+    mm2s_widths: &[64, 128, 32],
+    stripes: Stripes {
+        collisions: Stripe { streams: &[2, 0, 1, 1, 0, 1, 1], padded: false },
+        ..HALF.stripes
+    },
+    initiation_interval: 2,
+    ..HALF
 };
 const RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
 

@@ -13,23 +13,25 @@
 
 #![allow(unsafe_code, reason = "threads share blocks and rows and take turns by passes")]
 
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use bytemuck::{Pod, Zeroable};
 use crew::Crew;
 
-use super::super::number::Single;
+use super::super::number::{Half, Single};
 use super::super::solver::{Mass, SolverParameters, Velocity};
 use super::super::turn::fixed_impulse;
 use super::Stage;
 use super::block::{Block, LANES, kind};
 use super::kernel::{self, Pass};
-use super::lanes::{Lanes, Quad, Work, prefetch};
+use super::lanes::{Computed, Lanes, Quad, Work, prefetch};
 use super::order::Order;
 use super::place::Places;
 use super::width::Width;
 use crate::cast::register;
+use crate::interface::number::Precision;
 
 /// Blocks of a chunk.
 const CHUNK: usize = 8;
@@ -65,6 +67,8 @@ pub(super) struct Passes<'a> {
     pub(super) finding: Option<u32>,
     pub(super) parameters: &'a SolverParameters,
     pub(super) width: Width,
+    /// Of the arithmetic.
+    pub(super) precision: Precision,
 }
 
 impl Fronts {
@@ -271,6 +275,14 @@ impl Field<'_> {
 
     /// Runs a pass over a chunk that the pass before has left behind.
     fn chunk(&self, pass: usize, chunk: usize, thread: usize) {
+        match self.passes.precision {
+            Precision::F32 => self.chunk_in::<Single>(pass, chunk, thread),
+            Precision::Binary16 => self.chunk_in::<Half>(pass, chunk, thread),
+        }
+    }
+
+    /// The same in a format.
+    fn chunk_in<F: Computed>(&self, pass: usize, chunk: usize, thread: usize) {
         let number = self.passes.numbers.start + register(pass);
         let stage = Stage::new(number, self.passes.contact);
         let pass = Pass {
@@ -281,7 +293,8 @@ impl Field<'_> {
         };
         let mut sum = 0;
         let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
-        let work = ChunkWork { field: self, pass, blocks, sum: &mut sum };
+        let format = PhantomData::<F>;
+        let work = ChunkWork { field: self, pass, blocks, sum: &mut sum, format };
         if let Err(work) = self.passes.width.run(work) {
             work.one_by_one();
         }
@@ -293,16 +306,18 @@ impl Field<'_> {
 }
 
 /// A pass over the blocks of a chunk.
-struct ChunkWork<'a> {
+struct ChunkWork<'a, F> {
     field: &'a Field<'a>,
     pass: Pass<'a>,
     blocks: &'a [u32],
     sum: &'a mut u64,
+    format: PhantomData<F>,
 }
 
-impl Work for ChunkWork<'_> {
+impl<F: Computed> Work for ChunkWork<'_, F> {
     #[inline(always)]
     fn with<L: Lanes>(self, lanes: L) {
+        let lanes = F::of(lanes);
         for (at, &index) in self.blocks.iter().enumerate() {
             if let Some(ahead) = self.blocks.get(at + 1) {
                 let ahead = self.field.blocks.wrapping_add(*ahead as usize);
@@ -314,20 +329,20 @@ impl Work for ChunkWork<'_> {
             let block = unsafe { &mut *block };
             if block.serial() {
                 // SAFETY: so are the rows of its bodies, and the spare one.
-                let sum = unsafe { one_by_one(&self.pass, block, self.field.quads) };
+                let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.quads) };
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
             }
             // SAFETY: the same.
             unsafe { kernel::solve(lanes, &self.pass, block, self.field.quads) };
             if self.pass.stage.contact && self.pass.stage.turning {
-                *self.sum = self.sum.saturating_add(counted(block));
+                *self.sum = self.sum.saturating_add(counted::<F>(block));
             }
         }
     }
 }
 
-impl ChunkWork<'_> {
+impl<F: Computed> ChunkWork<'_, F> {
     fn one_by_one(self) {
         for &index in self.blocks {
             // SAFETY: `order` has numbers of blocks.
@@ -335,7 +350,7 @@ impl ChunkWork<'_> {
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
             // SAFETY: so are the rows of its bodies.
-            let sum = unsafe { one_by_one(&self.pass, block, self.field.quads) };
+            let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.quads) };
             *self.sum = self.sum.saturating_add(sum);
         }
     }
@@ -343,9 +358,8 @@ impl ChunkWork<'_> {
 
 /// The impulses of a block after the last contact pass; empty lanes have none.
 #[inline(always)]
-fn counted(block: &Block) -> u64 {
-    (0..LANES)
-        .fold(0, |sum, lane| sum.saturating_add(fixed_impulse::<Single>(&block.impulses(lane))))
+fn counted<F: Computed>(block: &Block) -> u64 {
+    (0..LANES).fold(0, |sum, lane| sum.saturating_add(fixed_impulse::<F>(&block.impulses(lane))))
 }
 
 /// A pass over the collisions of a block, one after the other.
@@ -353,7 +367,7 @@ fn counted(block: &Block) -> u64 {
 /// # Safety
 ///
 /// The rows of the block exist. Nobody writes those while this runs, nor reads those of moving bodies.
-unsafe fn one_by_one(pass: &Pass<'_>, block: &mut Block, quads: *mut Quad) -> u64 {
+unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, quads: *mut Quad) -> u64 {
     let mut sum = 0_u64;
     for lane in 0..LANES {
         let collision = block.collision(lane);
@@ -371,8 +385,9 @@ unsafe fn one_by_one(pass: &Pass<'_>, block: &mut Block, quads: *mut Quad) -> u6
             masses[side] = Mass { inverse_mass: m, inverse_inertia: [k, 0.0, 0.0, 0.0, 0.0, 0.0] };
         }
         let mut impulses = block.impulses(lane);
+        let stage = pass.stage;
         let share =
-            pass.stage.solve(&collision, pass.parameters, &masses, &mut velocities, &mut impulses);
+            stage.solve::<F>(&collision, pass.parameters, &masses, &mut velocities, &mut impulses);
         sum = sum.saturating_add(share);
         block.put_impulses(lane, impulses);
         for side in 0..2 {

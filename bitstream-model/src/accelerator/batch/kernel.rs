@@ -222,8 +222,7 @@ pub(super) unsafe fn solve<L: Lanes>(
             if pass.stage.contact {
                 contact(lanes, pass, block, at, counts, &mut a, &mut b);
             } else {
-                let static_side = taken.without(moves[0].and(moves[1]));
-                friction(lanes, pass, block, at, counts, static_side, &mut a, &mut b);
+                friction(lanes, pass, block, at, counts, &mut a, &mut b);
             }
             let answers = [a, b];
             for each in 0..2 {
@@ -288,14 +287,12 @@ fn contact<L: Lanes>(
 }
 
 #[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "they are registers")]
 fn friction<L: Lanes>(
     lanes: L,
     pass: &Pass<'_>,
     block: &mut Block,
     at: usize,
     counts: L::Numbers,
-    static_side: L::Mask,
     a: &mut Side<L::Numbers>,
     b: &mut Side<L::Numbers>,
 ) {
@@ -346,6 +343,8 @@ fn friction<L: Lanes>(
     let spins = if pass.finds {
         let apart = unit(lanes, sub(position_b, position_a));
         let cosine = dot(apart, unit(lanes, arm_a));
+        // By the numbers that it computes with: a small inverse mass may be none in sixteen bits.
+        let static_side = taken.and(a.m.is_zero().either(b.m.is_zero()));
         let spins = cosine.above(lanes.splat(SPIN_COSINE)).either(static_side);
         let bits = spins.bits();
         for lane in 0..L::WIDTH {

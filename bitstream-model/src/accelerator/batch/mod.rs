@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Only collisions that share no moving body change places, so that every bit is that of
-//! `solver.rs` taking one after the other. It is for arithmetic in f32 with isotropic inertia and
-//! subnormals kept.
+//! `solver.rs` taking one after the other. It is for arithmetic in f32 or in binary16, with isotropic
+//! inertia and subnormals kept.
 
 mod block;
 mod front;
@@ -30,11 +30,12 @@ use crew::Crew;
 
 use super::decode::Collision;
 use super::inertia::Isotropic;
-use super::number::Single;
+use super::number::{Format, Half, Single};
 use super::pipeline::Entry;
 use super::solver::{self, Impulses, Mass, SolverParameters, Velocity};
 use super::turn::fixed_impulse;
 use crate::config::THREADS_MAX;
+use crate::interface::number::Precision;
 use crate::interface::record::CONTACT_POINTS;
 
 use block::{Block, LANES, ROWS_APART};
@@ -72,7 +73,7 @@ impl Stage {
     }
 
     /// The pass over one collision; returns its share of the impulse sum.
-    fn solve(
+    fn solve<F: Format>(
         self,
         collision: &Collision,
         parameters: &SolverParameters,
@@ -80,19 +81,14 @@ impl Stage {
         velocities: &mut [Velocity; 2],
         impulses: &mut Impulses,
     ) -> u64 {
-        type One = Single;
         if self.contact {
-            solver::contact::<One, One, Isotropic>(
-                collision, parameters, masses, velocities, impulses,
-            );
-            return if self.turning { fixed_impulse::<One>(impulses) } else { 0 };
+            solver::contact::<F, F, Isotropic>(collision, parameters, masses, velocities, impulses);
+            return if self.turning { fixed_impulse::<F>(impulses) } else { 0 };
         }
         if self.turning {
-            *impulses = [solver::normal_sum::<One>(impulses), 0.0, 0.0, 0.0];
+            *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
         }
-        solver::friction::<One, One, Isotropic>(
-            collision, parameters, masses, velocities, impulses,
-        );
+        solver::friction::<F, F, Isotropic>(collision, parameters, masses, velocities, impulses);
         0
     }
 }
@@ -107,6 +103,8 @@ pub(super) struct Batch {
     slots: Vec<u32>,
     impulse_sum: u64,
     width: Width,
+    /// Of the arithmetic.
+    precision: Precision,
     crew: Crew,
     fronts: Fronts,
     /// Whether the fronts know all that is decoded.
@@ -139,6 +137,7 @@ impl Batch {
             slots: Vec::new(),
             impulse_sum: 0,
             width,
+            precision: Precision::F32,
             crew,
             fronts: Fronts::default(),
             measured: false,
@@ -148,6 +147,13 @@ impl Batch {
             entered: false,
             put_off: Vec::with_capacity(PUT_OFF),
         }
+    }
+
+    /// The same in arithmetic of a precision, of collisions that enter so many together.
+    pub(super) fn of(mut self, precision: Precision, together: usize) -> Self {
+        self.precision = precision;
+        self.places = Places::of_issues(together);
+        self
     }
 
     /// Begins a step: forgets the last one's collisions and makes room for so many.
@@ -181,11 +187,18 @@ impl Batch {
         }
         let own = &mut self.lines[ROWS_APART as usize / 2..];
         let bodies = velocities.chunks(COPIED_TOGETHER).zip(shape_of.chunks(COPIED_TOGETHER));
+        let rounded = self.precision == Precision::Binary16;
         self.crew.each(
             bodies.zip(own.chunks_mut(COPIED_TOGETHER / 2)),
             |((velocities, shapes), lines)| {
                 for (body, (velocity, shape)) in velocities.iter().zip(shapes).enumerate() {
-                    lines[body / 2].put(body % 2 == 1, velocity, &masses[usize::from(*shape)]);
+                    let mass = &masses[usize::from(*shape)];
+                    let line = &mut lines[body / 2];
+                    if rounded {
+                        line.put(body % 2 == 1, velocity, &mass.rounded::<Half>());
+                    } else {
+                        line.put(body % 2 == 1, velocity, mass);
+                    }
                 }
             },
         );
@@ -218,7 +231,7 @@ impl Batch {
         self.slot(index).map(|(block, lane)| self.blocks[block].collision(lane))
     }
 
-    /// The smallest distance, in collisions, of two that share a moving body; `u32::MAX` without.
+    /// The smallest distance, in issues, of two that share a moving body; `u32::MAX` without.
     pub(super) fn distance(&self) -> u32 {
         self.places.distance()
     }
@@ -243,7 +256,16 @@ impl Batch {
         }
         self.enter(velocities, shape_of, masses);
         let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
-        let run = Passes { numbers: &passes, contact, finding, parameters, width: self.width };
+        let (width, precision) = (self.width, self.precision);
+        let rounded;
+        let parameters = match precision {
+            Precision::F32 => parameters,
+            Precision::Binary16 => {
+                rounded = parameters.rounded::<Half>();
+                &rounded
+            }
+        };
+        let run = Passes { numbers: &passes, contact, finding, parameters, width, precision };
         let blocks = &mut self.blocks[..self.places.blocks()];
         let sum = self.fronts.run(run, blocks, &mut self.lines, &mut self.crew);
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
@@ -280,7 +302,11 @@ impl Batch {
             let mut impulses = block.impulses(lane);
             let masses = sides.map(|body| masses[usize::from(shape_of[body])]);
             let collision = block.collision(lane);
-            let sum = stage.solve(&collision, parameters, &masses, &mut pair, &mut impulses);
+            let solve = match self.precision {
+                Precision::F32 => Stage::solve::<Single>,
+                Precision::Binary16 => Stage::solve::<Half>,
+            };
+            let sum = solve(stage, &collision, parameters, &masses, &mut pair, &mut impulses);
             self.impulse_sum = self.impulse_sum.saturating_add(sum);
             block.put_impulses(lane, impulses);
             for side in 0..2 {

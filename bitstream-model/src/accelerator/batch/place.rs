@@ -27,8 +27,8 @@ struct Body {
     first: u32,
     /// The block behind the last that uses it, 0 if none does.
     behind: u32,
-    /// The last collision.
-    collision: u32,
+    /// The issue of the last collision.
+    issue: u32,
     moves: bool,
 }
 
@@ -56,10 +56,17 @@ pub(super) struct Places {
     /// The first block with an empty lane, or the number of blocks.
     open: usize,
     collisions: usize,
+    /// Binary logarithm of the collisions that enter together.
+    together: u32,
     distance: u32,
 }
 
 impl Places {
+    /// Of collisions that enter so many together: a power of two.
+    pub(super) fn of_issues(together: usize) -> Self {
+        Self { together: together.ilog2(), ..Self::default() }
+    }
+
     /// Begins a step.
     pub(super) fn begin(&mut self, collisions: usize) {
         self.bodies.clear();
@@ -80,7 +87,7 @@ impl Places {
 
     /// Makes room for so many bodies, of which `moves` says which move.
     pub(super) fn bodies(&mut self, bodies: usize, moves: impl Fn(usize) -> bool) {
-        let body = |body| Body { first: NONE, behind: 0, collision: 0, moves: moves(body) };
+        let body = |body| Body { first: NONE, behind: 0, issue: 0, moves: moves(body) };
         self.bodies.extend((self.bodies.len()..bodies).map(body));
     }
 
@@ -94,7 +101,8 @@ impl Places {
         self.again.get(1..).unwrap_or(&[])
     }
 
-    /// The smallest distance of two collisions with a moving body in common; `u32::MAX` without.
+    /// The smallest distance, in issues, of two collisions with a moving body in common; `u32::MAX`
+    /// without.
     pub(super) fn distance(&self) -> u32 {
         self.distance
     }
@@ -151,6 +159,7 @@ impl Places {
         let after_firsts = self.firsts.last().is_some_and(|firsts| usize::from(*firsts) == LANES);
         let run = if after_firsts { 1 } else { RUN };
         let (mut lanes, mut firsts, mut distance) = (0_u8, 0_u8, self.distance);
+        let together = self.together;
         for ((number, [count, a, b]), kind) in (number..).zip(heads).zip(kinds) {
             let (Some(&body_a), Some(&body_b)) = (bodies.get(a as usize), bodies.get(b as usize))
             else {
@@ -164,15 +173,15 @@ impl Places {
             if wrong || static_pair || shared || elsewhere {
                 break;
             }
+            let issue = number >> together;
             for (at, body) in [(a, body_a), (b, body_b)] {
-                let since = if body.behind > 0 { number - body.collision } else { u32::MAX };
+                let since = if body.behind > 0 { issue - body.issue } else { u32::MAX };
                 distance = distance.min(since);
                 if body.moves {
                     let again = &mut again[body.behind as usize];
                     *again = (*again).min(block);
                     let first = body.first.min(block);
-                    bodies[at as usize] =
-                        Body { first, behind: block + 1, collision: number, moves: true };
+                    bodies[at as usize] = Body { first, behind: block + 1, issue, moves: true };
                 }
             }
             *kind = kind::of(count, [body_a.moves, body_b.moves], false);
@@ -196,11 +205,12 @@ impl Places {
     #[inline]
     pub(super) fn place(&mut self, number: u32, bodies: [u32; 2], moving: [bool; 2]) -> Place {
         let mut from = 0;
+        let issue = number >> self.together;
         for body in bodies {
             let body = &self.bodies[body as usize];
             if body.behind > 0 {
                 from = from.max(body.behind);
-                self.distance = self.distance.min(number - body.collision);
+                self.distance = self.distance.min(issue - body.issue);
             }
         }
         let first = from == 0 && moving != [true; 2];
@@ -246,7 +256,7 @@ impl Places {
                 }
                 body.first = body.first.min(register(block));
                 body.behind = behind;
-                body.collision = number;
+                body.issue = issue;
             }
         }
         Place { block, lane, serial }

@@ -3,12 +3,30 @@
 use proptest::prelude::*;
 
 use super::super::array::Row;
+use super::super::number::Number;
 use super::super::segment::PacketError;
 use super::*;
 use crate::cast::register;
 use crate::interface::control::ErrorCode;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::{Beat, WORD_LANE, collision};
+
+/// A format that a batch computes in, as a test wants it.
+pub(super) trait Tested: Format {
+    const PRECISION: Precision;
+}
+
+impl Tested for Single {
+    const PRECISION: Precision = Precision::F32;
+}
+
+impl Tested for Half {
+    const PRECISION: Precision = Precision::Binary16;
+}
+
+fn rounded<F: Format, const N: usize>(numbers: [f32; N]) -> [f32; N] {
+    numbers.map(|number| Number::<F>::new(number).value())
+}
 
 const PARAMETERS: SolverParameters =
     SolverParameters { time_step: 1.0 / 60.0, drift: 0.005, coefficient: 0.2, friction: 0.7 };
@@ -17,14 +35,15 @@ const fn mass(inverse_mass: f32, inverse_inertia: f32) -> Mass {
     Mass { inverse_mass, inverse_inertia: [inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0] }
 }
 
-/// Static, three that move, a static one of a negative zero, and one of infinite inverse inertia, of which
-/// rows have an effective mass of zero.
-pub(super) const MASSES: [Mass; 6] = [
+/// Static, three that move, a static one of a negative zero, one that moves although sixteen bits have
+/// no such number, and one of infinite inverse inertia, of which rows have an effective mass of zero.
+pub(super) const MASSES: [Mass; 7] = [
     mass(0.0, 0.0),
     mass(1.0, 6.0),
     mass(0.125, 0.4),
     mass(3.0, 0.0),
     mass(-0.0, 0.0),
+    mass(1e-9, 0.1),
     mass(1.0, f32::INFINITY),
 ];
 
@@ -47,6 +66,23 @@ impl Step {
         streams
     }
 
+    /// The same in numbers of a format.
+    fn in_format<F: Format>(mut self) -> Self {
+        for rows in &mut self.records {
+            for (number, row) in rows.iter_mut().enumerate() {
+                let word = row[WORD_LANE];
+                *row = rounded::<F, 4>(row.map(f32::from_bits)).map(f32::to_bits);
+                if number <= collision::BODY_B {
+                    row[WORD_LANE] = word;
+                }
+            }
+        }
+        for Velocity { linear, angular } in &mut self.velocities {
+            (*linear, *angular) = (rounded::<F, 3>(*linear), rounded::<F, 3>(*angular));
+        }
+        self
+    }
+
     fn decoded(&self, mut batch: Batch, cut: usize, masses: &[Mass]) -> Batch {
         batch.begin(self.records.len());
         for part in [0..cut, cut..self.records.len()] {
@@ -61,7 +97,7 @@ impl Step {
     }
 
     /// Velocities, impulses and impulse sum after the passes, one collision after the other.
-    pub(super) fn expected(
+    pub(super) fn expected<F: Format>(
         &self,
         contact: u32,
         passes: u32,
@@ -82,19 +118,19 @@ impl Step {
                 let arguments = (&collision, &PARAMETERS, &both);
                 let (collision, parameters, both) = arguments;
                 if pass < contact {
-                    solver::contact::<Single, Single, Isotropic>(
+                    solver::contact::<F, F, Isotropic>(
                         collision, parameters, both, &mut pair, impulses,
                     );
                 } else {
                     if pass == contact {
-                        *impulses = [solver::normal_sum::<Single>(impulses), 0.0, 0.0, 0.0];
+                        *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
                     }
-                    solver::friction::<Single, Single, Isotropic>(
+                    solver::friction::<F, F, Isotropic>(
                         collision, parameters, both, &mut pair, impulses,
                     );
                 }
                 if pass + 1 == contact {
-                    let share = f64::from(solver::normal_sum::<Single>(impulses)) * 1_048_576.0;
+                    let share = f64::from(solver::normal_sum::<F>(impulses)) * 1_048_576.0;
                     #[expect(
                         clippy::cast_possible_truncation,
                         clippy::cast_sign_loss,
@@ -180,7 +216,7 @@ fn numbers(special: bool) -> impl Strategy<Value = Numbers> {
 
 /// Steps of up to `collisions` collisions between few or many bodies.
 fn steps(collisions: usize, special: bool) -> impl Strategy<Value = Step> {
-    let shapes = if special { 6_u8 } else { 5 };
+    let shapes = if special { 7_u8 } else { 6 };
     let bodies = prop_oneof![2_usize..6, 6_usize..40, 40_usize..400];
     bodies
         .prop_flat_map(move |bodies| {
@@ -224,9 +260,10 @@ pub(super) fn batch(threads: usize, width: prop::sample::Index) -> Batch {
 }
 
 /// Runs a step in a batch, the passes in two calls, and compares.
-fn check(step: &Step, batch: Batch, contact: u32, passes: u32, halt: u32) -> Batch {
+fn check<F: Tested>(step: &Step, batch: Batch, contact: u32, passes: u32, halt: u32) -> Batch {
+    let batch = batch.of(F::PRECISION, 1);
     let mut batch = step.decoded(batch, step.records.len() / 3, &MASSES);
-    let (expected, impulses, sum) = step.expected(contact, passes, &MASSES);
+    let (expected, impulses, sum) = step.expected::<F>(contact, passes, &MASSES);
     let mut found = step.velocities.clone();
     let halt = halt.min(passes);
     for part in [0..halt, halt..passes] {
@@ -240,8 +277,26 @@ fn check(step: &Step, batch: Batch, contact: u32, passes: u32, halt: u32) -> Bat
     batch
 }
 
-/// The smallest distance of collisions with a moving body in common, by comparing all.
-fn distance(step: &Step) -> u32 {
+/// Runs two passes of a step, then a third one in two parts, and compares.
+fn check_parts<F: Tested>(step: &Step, batch: Batch, cut: usize) {
+    let mut batch = step.decoded(batch.of(F::PRECISION, 1), cut, &MASSES);
+    let mut velocities = step.velocities.clone();
+    let shapes = &step.shape_of;
+    batch.run(0..2, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
+    for part in [0..cut, cut..step.records.len()] {
+        batch.run_part(2, part, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
+    }
+    let (expected, impulses, sum) = step.expected::<F>(1, 3, &MASSES);
+    assert_eq!(velocity_bits(&velocities), velocity_bits(&expected));
+    for (index, expected) in impulses.iter().enumerate() {
+        assert_eq!(bits(batch.impulses(index)), bits(*expected), "collision {index}");
+    }
+    assert_eq!(batch.impulse_sum(), sum);
+}
+
+/// The smallest distance of collisions with a moving body in common, in issues of so many, by comparing
+/// all.
+fn distance(step: &Step, together: usize) -> u32 {
     let moving = |rows: &[Row; collision::ROWS]| {
         let bodies = if rows[0][WORD_LANE] == 0 { vec![] } else { vec![rows[1][3], rows[2][3]] };
         let moves =
@@ -251,7 +306,11 @@ fn distance(step: &Step) -> u32 {
     let bodies: Vec<Vec<u32>> = step.records.iter().map(moving).collect();
     let meets = |i: usize, j: usize| bodies[i].iter().any(|body| bodies[j].contains(body));
     let pairs = (0..bodies.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
-    pairs.filter(|(i, j)| meets(*i, *j)).map(|(i, j)| register(j - i)).min().unwrap_or(u32::MAX)
+    pairs
+        .filter(|(i, j)| meets(*i, *j))
+        .map(|(i, j)| register(j / together - i / together))
+        .min()
+        .unwrap_or(u32::MAX)
 }
 
 proptest! {
@@ -266,7 +325,9 @@ proptest! {
         width: prop::sample::Index,
         threads in 1_usize..4,
     ) {
-        check(&step, batch(threads, width), contact, contact + friction, halt);
+        let batch = || batch(threads, width);
+        check::<Single>(&step, batch(), contact, contact + friction, halt);
+        check::<Half>(&step.in_format::<Half>(), batch(), contact, contact + friction, halt);
     }
 
     #[test]
@@ -276,7 +337,9 @@ proptest! {
         friction in 0_u32..3,
         width: prop::sample::Index,
     ) {
-        check(&step, batch(1, width), contact, contact + friction, 1);
+        check::<Single>(&step, batch(1, width), contact, contact + friction, 1);
+        let step = step.in_format::<Half>();
+        check::<Half>(&step, batch(1, width), contact, contact + friction, 1);
     }
 
     #[test]
@@ -286,19 +349,8 @@ proptest! {
         width: prop::sample::Index,
     ) {
         let cut = cut.min(step.records.len());
-        let mut batch = step.decoded(batch(1, width), cut, &MASSES);
-        let mut velocities = step.velocities.clone();
-        let shapes = &step.shape_of;
-        batch.run(0..2, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
-        for part in [0..cut, cut..step.records.len()] {
-            batch.run_part(2, part, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
-        }
-        let (expected, impulses, sum) = step.expected(1, 3, &MASSES);
-        prop_assert_eq!(velocity_bits(&velocities), velocity_bits(&expected));
-        for (index, expected) in impulses.iter().enumerate() {
-            prop_assert_eq!(bits(batch.impulses(index)), bits(*expected));
-        }
-        prop_assert_eq!(batch.impulse_sum(), sum);
+        check_parts::<Single>(&step, batch(1, width), cut);
+        check_parts::<Half>(&step.in_format::<Half>(), batch(1, width), cut);
     }
 
     #[test]
@@ -306,7 +358,9 @@ proptest! {
         let cut = cut.min(step.records.len());
         let batch = step.decoded(Batch::new(1, true), cut, &MASSES);
         prop_assert_eq!(batch.len(), step.records.len());
-        prop_assert_eq!(batch.distance(), distance(&step));
+        prop_assert_eq!(batch.distance(), distance(&step, 1));
+        let pairs = step.decoded(Batch::new(1, true).of(Precision::F32, 2), cut, &MASSES);
+        prop_assert_eq!(pairs.distance(), distance(&step, 2));
         for (index, rows) in step.records.iter().enumerate() {
             let entry = batch.entry(index);
             prop_assert_eq!(entry.is_none(), rows[0][WORD_LANE] == 0);
@@ -357,7 +411,7 @@ fn independent_collisions_stay_in_their_order_in_full_blocks() {
     // Every 40th collision has the same bodies.
     let pairs: Vec<[u32; 2]> = (0..400).map(|i| [i % 40, 40 + i % 40]).collect();
     let step = chain(&pairs, 80, &[]);
-    let batch = check(&step, Batch::new(2, true), 2, 4, 4);
+    let batch = check::<Single>(&step, Batch::new(2, true), 2, 4, 4);
     assert_eq!(batch.slots, (0..400).collect::<Vec<u32>>());
     assert_eq!(batch.distance(), 40);
 }
@@ -366,7 +420,7 @@ fn independent_collisions_stay_in_their_order_in_full_blocks() {
 fn collisions_of_one_body_take_bounded_memory() {
     let pairs: Vec<[u32; 2]> = (0..6000).map(|i| [1 + i, 0]).collect();
     let step = chain(&pairs, 6001, &[]);
-    let batch = check(&step, Batch::new(2, true), 2, 4, 4);
+    let batch = check::<Single>(&step, Batch::new(2, true), 2, 4, 4);
     assert!(batch.blocks.len() <= 6000 * 3 / 2 / LANES + 66 + LANES, "{}", batch.blocks.len());
     assert!(batch.blocks.iter().any(Block::serial));
 }

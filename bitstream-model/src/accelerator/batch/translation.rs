@@ -1,10 +1,11 @@
 //! This file translates collisions of other designs into those that a batch takes in: f32, in world
 //! coordinates, on four streams. So many at a time that they stay in the cache.
 //!
-//! A record relative to body A is one whose body A stands at the origin.
+//! A record relative to body A is one whose body A stands at the origin. Of two records of three and a
+//! half beats the first takes the sum of the words of both, and what pads the last one up.
 
-use super::super::array::Row;
-use super::super::decode::Collision;
+use super::super::array::{Row, half_of};
+use super::super::decode::{self, Collision};
 use super::super::layout::Layout;
 use super::super::segment::PacketError;
 use super::super::solver::Mass;
@@ -14,12 +15,16 @@ use super::lanes::{Lanes, Work};
 use super::records::{BEATS, STREAMS};
 use crate::cast::register;
 use crate::interface::number::StreamFormat;
-use crate::interface::record::{Beat, LANES, collision, relative};
+use crate::interface::record::{Beat, LANES, WORD_LANE, collision, relative};
 
 /// Records that are translated at once.
 const TOGETHER: usize = 4096;
 /// And by one thread.
 const OF_THREAD: usize = 512;
+
+/// Records that share a beat.
+const PAIR: usize = 2;
+const _: () = assert!(TOGETHER.is_multiple_of(PAIR) && OF_THREAD.is_multiple_of(PAIR));
 
 /// Records that have been translated.
 #[derive(Debug)]
@@ -123,6 +128,11 @@ impl Work for Part<'_> {
 impl Part<'_> {
     #[inline(always)]
     fn translate(self) {
+        if self.layout.together == PAIR {
+            let format = self.layout.format;
+            self.translate_pairs(format);
+            return;
+        }
         match self.layout.format {
             StreamFormat::F32 => self.translate_of::<{ relative::ROWS }>(StreamFormat::F32),
             StreamFormat::Binary16 => {
@@ -156,6 +166,56 @@ impl Part<'_> {
     }
 }
 
+impl Part<'_> {
+    /// The same of pairs of records in world coordinates of sixteen-bit words.
+    #[inline(always)]
+    fn translate_pairs(self, format: StreamFormat) {
+        let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
+        let from: [_; collision::ROWS] = std::array::from_fn(|beat| {
+            let (stream, number) = layout.places[beat];
+            let share = layout.share[stream];
+            (&streams[stream][first / PAIR * share + number..], share)
+        });
+        let [a, b, c] = [a, b, c].map(|beats| beats.as_chunks_mut::<2>().0.chunks_mut(PAIR));
+        let to = a.zip(b).zip(c.zip(d.chunks_mut(PAIR)));
+        for (issue, (sums, ((a, b), (c, d)))) in sums.chunks_mut(PAIR).zip(to).enumerate() {
+            let beats = from.map(|(beats, share)| beats[issue * share]);
+            let rows = rows_of_pair(format, &beats);
+            sums.fill(0);
+            sums[0] = beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add);
+            let records = rows.as_chunks::<{ collision::ROWS }>().0;
+            let to = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
+            for (rows, ((a, b), (c, d))) in records.iter().zip(to) {
+                let [a0, b0, c0, d0, a1, b1, c1] = rows.map(Beat);
+                (*a, *b, *c, *d) = ([a0, a1], [b0, b1], [c0, c1], d0);
+            }
+        }
+    }
+}
+
+/// The rows of two records in world coordinates, which share their beats.
+#[inline(always)]
+fn rows_of_pair(
+    format: StreamFormat,
+    beats: &[Beat; collision::ROWS],
+) -> [Row; PAIR * collision::ROWS] {
+    // All words alike, for the compiler to take several at once; then those that are no numbers.
+    let mut rows = [[0; LANES]; PAIR * collision::ROWS];
+    for (rows, beat) in rows.as_chunks_mut::<2>().0.iter_mut().zip(beats) {
+        let words: [u16; 2 * LANES] = bytemuck::cast(*beat);
+        for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
+            *to = decode::number(format, u32::from(word)).to_bits();
+        }
+    }
+    for record in 0..PAIR {
+        for row in [collision::NORMAL, collision::BODY_A, collision::BODY_B] {
+            let row = record * collision::ROWS + row;
+            rows[row][WORD_LANE] = half_of(beats[row / 2], row % 2)[WORD_LANE];
+        }
+    }
+    rows
+}
+
 /// The rows in the beats of a record: of 32-bit words, or two in each of sixteen-bit words.
 #[inline(always)]
 fn rows_in<const COUNT: usize>(beats: &[Beat; COUNT]) -> [Row; relative::ROWS] {
@@ -174,144 +234,4 @@ fn rows_in<const COUNT: usize>(beats: &[Beat; COUNT]) -> [Row; relative::ROWS] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::config::BoardConfig;
-    use crate::interface::control::ErrorCode;
-    use crate::interface::number::Numbers;
-    use crate::interface::profile::{MIXED, Profile};
-    use crate::interface::record::WORD_LANE;
-
-    static RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
-    /// Bodies, of which the first is static.
-    const BODIES: u32 = 3000;
-
-    fn layout(profile: &'static Profile) -> Layout {
-        Layout::of(&BoardConfig { profile, ..BoardConfig::default() }).expect("it can be replayed")
-    }
-
-    /// A record of any words, every fourth distance +infinity, between bodies that exist.
-    fn record(format: StreamFormat, seed: &mut u64) -> [Row; relative::ROWS] {
-        let mut random = || {
-            *seed = seed.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
-            (*seed >> 32) as u32
-        };
-        let (mask, infinity) = match format {
-            StreamFormat::F32 => (u32::MAX, f32::INFINITY.to_bits()),
-            _ => (0xFFFF, 0x7C00),
-        };
-        let mut rows = [[0; 4]; relative::ROWS];
-        rows.as_flattened_mut().iter_mut().for_each(|word| *word = random() & mask);
-        for row in &mut rows[relative::CONTACTS..] {
-            if random().is_multiple_of(4) {
-                row[WORD_LANE] = infinity;
-            }
-        }
-        let a = random() % (BODIES - 1);
-        rows[relative::NORMAL][WORD_LANE] = a;
-        rows[relative::OFFSET][WORD_LANE] = a + 1;
-        rows
-    }
-
-    /// The beats of records on each stream.
-    fn dealt(layout: &Layout, records: &[[Row; relative::ROWS]]) -> [Vec<Beat>; STREAMS_MAX] {
-        let mut streams = [const { Vec::new() }; STREAMS_MAX];
-        let rows_per_beat = if layout.format == StreamFormat::F32 { 1 } else { 2 };
-        for rows in records {
-            for (beat, rows) in rows.chunks(rows_per_beat).enumerate() {
-                let words = match rows {
-                    [a, b] => [a, b].map(|[x, y, z, w]| [x | y << 16, z | w << 16]),
-                    _ => [[rows[0][0], rows[0][1]], [rows[0][2], rows[0][3]]],
-                };
-                let [[a, b], [c, d]] = words;
-                streams[layout.places[beat].0].push(Beat([a, b, c, d]));
-            }
-        }
-        streams
-    }
-
-    /// Bodies, contact points, and the bits of all numbers.
-    fn bits(collision: &Collision) -> ([u32; 2], usize, Vec<u32>) {
-        let Collision { body_a, body_b, count, normal, position_a, position_b, contacts } =
-            collision;
-        let vectors = [normal, position_a, position_b].into_iter().flatten();
-        let numbers = vectors.chain(contacts.as_flattened());
-        ([*body_a, *body_b], *count, numbers.map(|number| number.to_bits()).collect())
-    }
-
-    #[test]
-    fn what_is_taken_in_is_what_the_decoder_makes_of_each() {
-        for (profile, threads) in [(&MIXED, 1), (&MIXED, 3), (&RELATIVE, 2)] {
-            let layout = layout(profile);
-            let mut translation = Translation::new(layout);
-            let mut batch = Batch::new(threads, true);
-            let mut seed = 11;
-            for count in [1, OF_THREAD + 3, 2 * TOGETHER + 77] {
-                let records: Vec<_> =
-                    (0..count).map(|_| record(layout.format, &mut seed)).collect();
-                let dealt = dealt(&layout, &records);
-                let streams = dealt.each_ref().map(Vec::as_slice);
-                let mut shape_of = vec![1; BODIES as usize];
-                shape_of[0] = 0;
-                let masses = [0.0, 1.0].map(|mass| Mass { inverse_mass: mass, ..Mass::default() });
-                batch.begin(count);
-                let mut sums = vec![0; count];
-                let decoded =
-                    translation.decode(&mut batch, streams, count, &shape_of, &masses, &mut sums);
-                assert_eq!(decoded, Ok(()));
-                assert_eq!(batch.len(), count);
-                let mut left_out = [0; 5];
-                for (index, rows) in records.iter().enumerate() {
-                    let expected = Collision::relative(layout.format, rows);
-                    left_out[expected.count] += 1;
-                    let found = batch.collision(index);
-                    assert_eq!(found.is_none(), expected.count == 0);
-                    if let Some(found) = found {
-                        assert_eq!(bits(&found), bits(&expected), "{} {index}", profile.name);
-                    }
-                    let beats = |k: usize| {
-                        let share = layout.share[k];
-                        streams[k][index * share..][..share].iter().flat_map(|beat| beat.0)
-                    };
-                    let sum = (0..STREAMS_MAX).flat_map(beats).fold(0, u32::wrapping_add);
-                    assert_eq!(sums[index], sum, "{} {index}", profile.name);
-                }
-                assert!(count < 2000 || left_out.iter().all(|some| *some > 0), "{left_out:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn what_comes_before_a_refused_record_is_there() {
-        let layout = layout(&MIXED);
-        let mut translation = Translation::new(layout);
-        let masses = [0.0, 1.0].map(|mass| Mass { inverse_mass: mass, ..Mass::default() });
-        for bad in [0, 5, TOGETHER - 1, TOGETHER, TOGETHER + 700] {
-            let mut seed = 5;
-            let mut records: Vec<_> =
-                (0..TOGETHER + 1000).map(|_| record(layout.format, &mut seed)).collect();
-            records[bad][relative::CONTACTS][WORD_LANE] = 0;
-            records[bad][relative::OFFSET][WORD_LANE] = BODIES;
-            let dealt = dealt(&layout, &records);
-            let streams = dealt.each_ref().map(Vec::as_slice);
-            let mut batch = Batch::new(2, true);
-            batch.begin(records.len());
-            let mut sums = vec![0; records.len()];
-            let shape_of = vec![1; BODIES as usize];
-            let found = translation.decode(
-                &mut batch,
-                streams,
-                records.len(),
-                &shape_of,
-                &masses,
-                &mut sums,
-            );
-            let error = PacketError { code: ErrorCode::BodyIndex, channel: 0, beat: register(bad) };
-            assert_eq!((found, batch.len()), (Err(error), bad));
-            for (index, sum) in sums[..bad].iter().enumerate() {
-                let words = streams[..3].iter().flat_map(|beats| beats[index].0);
-                assert_eq!(*sum, words.fold(0, u32::wrapping_add), "{index}");
-            }
-        }
-    }
-}
+mod tests;

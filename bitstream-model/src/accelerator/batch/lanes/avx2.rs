@@ -6,7 +6,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use super::super::block::Words;
 use super::{Lanes, Mask, Numbers, Quad, Work, quad};
 
-/// AVX2, which the processor has.
+/// AVX2 and F16C, which the processor has.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Avx2(());
 
@@ -19,9 +19,10 @@ pub(in super::super) struct Eight(__m256);
 pub(in super::super) struct EightMask(__m256);
 
 impl Avx2 {
-    /// Where the processor has it.
+    /// Where the processor has both.
     pub(in super::super) fn found() -> Option<Self> {
-        std::arch::is_x86_feature_detected!("avx2").then_some(Self(()))
+        let [avx2, f16c] = [is_x86_feature_detected!("avx2"), is_x86_feature_detected!("f16c")];
+        (avx2 && f16c).then_some(Self(()))
     }
 }
 
@@ -62,6 +63,12 @@ fn positive(numbers: __m256) -> __m256 {
 #[target_feature(enable = "avx2")]
 fn zero(numbers: __m256) -> __m256 {
     _mm256_cmp_ps::<_CMP_EQ_OQ>(numbers, _mm256_setzero_ps())
+}
+
+#[inline]
+#[target_feature(enable = "avx2,f16c")]
+fn binary16(numbers: __m256) -> __m256 {
+    _mm256_cvtph_ps(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(numbers))
 }
 
 #[inline]
@@ -127,6 +134,12 @@ impl Numbers for Eight {
     }
 
     #[inline(always)]
+    fn to_binary16(self) -> Self {
+        // SAFETY: numbers are made where the processor has F16C, too.
+        Self(unsafe { binary16(self.0) })
+    }
+
+    #[inline(always)]
     fn with_words(self, other: Self) -> Self {
         // SAFETY: numbers are made where the processor has AVX2.
         Self(unsafe { words_added(self.0, other.0) })
@@ -187,7 +200,7 @@ fn apart(quads: __m256) -> [__m128; 2] {
     [_mm256_castps256_ps128(quads), _mm256_extractf128_ps::<1>(quads)]
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,f16c")]
 fn enabled<W: Work>(work: W) {
     work.with(Avx2(()));
 }

@@ -61,6 +61,12 @@ fn zero(numbers: __m512) -> __mmask16 {
 
 #[inline]
 #[target_feature(enable = "avx512f")]
+fn binary16(numbers: __m512) -> __m512 {
+    _mm512_cvtph_ps(_mm512_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(numbers))
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
 fn words_added(a: __m512, b: __m512) -> __m512 {
     _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)))
 }
@@ -119,6 +125,12 @@ impl Numbers for Sixteen {
     fn or(self, mask: SixteenMask, other: Self) -> Self {
         // SAFETY: numbers are made where the processor has AVX-512F.
         Self(unsafe { _mm512_mask_blend_ps(mask.0, other.0, self.0) })
+    }
+
+    #[inline(always)]
+    fn to_binary16(self) -> Self {
+        // SAFETY: numbers are made where the processor has AVX-512F.
+        Self(unsafe { binary16(self.0) })
     }
 
     #[inline(always)]

@@ -13,6 +13,7 @@ mod avx512;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod portable;
+mod rounded;
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -26,6 +27,7 @@ pub(super) use avx512::Avx512;
 #[cfg(target_arch = "aarch64")]
 pub(super) use neon::Neon;
 pub(super) use portable::Portable;
+pub(super) use rounded::Computed;
 
 /// Four numbers in memory: half a row of velocities, or a beat.
 pub(super) type Quad = [f32; 4];
@@ -61,6 +63,9 @@ pub(super) trait Numbers:
 
     /// These where the mask says yes, and `other` elsewhere.
     fn or(self, mask: Self::Mask, other: Self) -> Self;
+
+    /// The binary16 numbers nearest to them; of two the even one.
+    fn to_binary16(self) -> Self;
 
     /// Their words added as whole numbers that wrap.
     fn with_words(self, other: Self) -> Self;

@@ -92,6 +92,12 @@ impl Numbers for Four {
     }
 
     #[inline(always)]
+    fn to_binary16(self) -> Self {
+        // SAFETY: the target has NEON, asserted above.
+        Self(unsafe { vcvt_f32_f16(vcvt_f16_f32(self.0)) })
+    }
+
+    #[inline(always)]
     fn with_words(self, other: Self) -> Self {
         // SAFETY: the target has NEON, asserted above.
         Self(unsafe { words_added(self.0, other.0) })

@@ -2,6 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use super::super::super::sixteen;
 use super::super::block::Words;
 use super::{Lanes, Mask, Numbers, Quad, Work, quad};
 
@@ -93,6 +94,11 @@ impl Numbers for Four {
     fn or(self, mask: FourMask, other: Self) -> Self {
         let either = |lane: usize| if mask.0[lane] { self.0[lane] } else { other.0[lane] };
         Self(std::array::from_fn(either))
+    }
+
+    #[inline(always)]
+    fn to_binary16(self) -> Self {
+        Self(self.0.map(sixteen::round))
     }
 
     #[inline(always)]
