@@ -15,7 +15,9 @@ use crate::interface::record::Beat;
 use crate::order::{Ordered, Schedule};
 use crate::record::end::{End, Ends, Survey};
 use crate::scene::validate::{Limits, Quick, preflight, validate};
-use crate::scene::{Body, Collision, Contact, InputError, Pose, Shape, StepParameters, Velocity};
+use crate::scene::{
+    Body, Collision, Collisions, Contact, InputError, Pose, Shape, StepParameters, Velocity,
+};
 
 const SHAPES: [Shape; 4] = [
     Shape::STATIC,
@@ -162,6 +164,24 @@ fn views(buffers: &mut [Vec<Beat>]) -> Vec<&mut [Beat]> {
     buffers.iter_mut().map(Vec::as_mut_slice).collect()
 }
 
+/// Whether packing refuses none of these, whose beats are the same when nobody looks.
+fn looked_at<C: Collisions + ?Sized>(
+    target: Target<'_>,
+    ends: &[End],
+    entries: &Entries<'_, C>,
+) -> bool {
+    let packed = |target: Target<'_>| {
+        let mut channels = buffers(target.variant, Segment::Collisions, entries.count);
+        let views = &mut views(&mut channels);
+        let (sum, good) =
+            pack_collisions(target, Ends(ends), entries, views, &mut Packers::alone());
+        ((channels, sum), good)
+    };
+    let (beats, good) = packed(target);
+    assert!(packed(Target { quick: None, ..target }) == (beats, true), "the same beats");
+    good
+}
+
 /// What packing and validation say, unless the step is refused whatever it holds.
 fn said(
     limits: &Limits,
@@ -197,30 +217,12 @@ fn said(
     let good = match schedule {
         None => {
             let count = collisions.len();
-            let entries = Entries { collisions, count, added: None, words: None };
-            let mut channels = buffers(variant, Segment::Collisions, count);
-            pack_collisions(
-                target,
-                Ends(&ends),
-                &entries,
-                &mut views(&mut channels),
-                &mut Packers::alone(),
-            )
-            .1
+            looked_at(target, &ends, &Entries { collisions, count, added: None, words: None })
         }
         Some(schedule) => {
-            let (ordered, count) = (Ordered { collisions, schedule }, schedule.len());
-            let entries =
-                Entries { collisions: &ordered, count, added: Some(schedule.empty()), words: None };
-            let mut channels = buffers(variant, Segment::Collisions, count);
-            pack_collisions(
-                target,
-                Ends(&ends),
-                &entries,
-                &mut views(&mut channels),
-                &mut Packers::alone(),
-            )
-            .1
+            let collisions = &Ordered { collisions, schedule };
+            let (count, added) = (schedule.len(), Some(schedule.empty()));
+            looked_at(target, &ends, &Entries { collisions, count, added, words: None })
         }
     };
     Some((bodies_good & good, validate(bodies, collisions, shapes, &parameters, limits)))
@@ -291,6 +293,39 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
             let mut wrong = bodies.clone();
             wrong[at % BODIES].velocity.angular[2] = f32::NAN;
             assert!(!said(&wrong, &collisions));
+        }
+    }
+}
+
+/// A lever arm that one body turns about, and the other may: of the last contact point alone.
+#[test]
+fn an_arm_that_is_too_long_is_noticed_about_whichever_body() {
+    let at = |x, shape| Body {
+        pose: Pose { position: [x, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity: Velocity::default(),
+        shape,
+    };
+    let contact = |x| Contact { point: [x, 2.0, 3.0], distance: -0.01 };
+    for profile in [&HALF, &MIXED, &WINDOWED16] {
+        let mut variant = profile.default_variant();
+        variant.numbers.rows = Precision::Binary16;
+        let limits = limits(variant, true);
+        for (near, far) in [(2, 2), (1, 2), (2, 1), (0, 2), (2, 0)] {
+            let bodies = vec![at(1.0, near), at(17.0, far)];
+            for (body_a, count) in (0..8).map(|case| (case % 2, 1 + case / 2)) {
+                // Of those in the middle there may be any number.
+                let mut contacts = [contact(9.0); 4];
+                let (used, unused) = contacts.split_at_mut(count as usize);
+                used[used.len() - 1] = contact(1.0);
+                unused.fill(contact(f32::NAN));
+                let normal = [0.0, 1.0, 0.0];
+                let body_b = 1 - body_a;
+                let collision = Collision { body_a, body_b, normal, count, contacts };
+                let (good, valid) =
+                    said(&limits, &bodies, &vec![collision; 3], None).expect("nothing else wrong");
+                assert_eq!(good, valid.is_ok(), "{} {near} {far}: {valid:?}", profile.name);
+                assert_eq!(good, far != 2, "{} {near} {far}", profile.name);
+            }
         }
     }
 }

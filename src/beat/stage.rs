@@ -54,6 +54,7 @@ impl<const ROWS: usize> Stage<ROWS> {
             Some(Sixteen::Binary16) => self.narrow(vectors, records, Sixteen::Binary16),
             Some(Sixteen::Thesis16) => self.narrow(vectors, records, Sixteen::Thesis16),
         };
+        debug_assert!(records.next().is_none(), "no more than a block");
         dealer.write(&self.beats.as_flattened()[..beats]);
     }
 

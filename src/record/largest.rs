@@ -62,3 +62,27 @@ impl<const ROWS: usize> Largest<ROWS> {
             .map(|(row, largest)| row.and(Lanes::all(MAGNITUDE)).above(Lanes::from(*largest)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A relative record has infinity in the others.
+    #[test]
+    fn contact_points_that_are_not_used_are_not_held_against_a_limit() {
+        let limits = Largest::<6>::new(2.0, [MAGNITUDE; 6]);
+        let row = |number: f32| Lanes::new([0, number.to_bits(), 0, u32::MAX]);
+        for wrong in 0..6 {
+            let mut record = [row(-2.0); 6];
+            record[wrong] = row(f32::INFINITY);
+            for count in 0..=4 {
+                // Normal and offset are always there.
+                let counts = wrong < 2 + count as usize;
+                let beyond = limits.beyond_used(&record, count).words();
+                assert_eq!(beyond, [0, if counts { u32::MAX } else { 0 }, 0, 0], "{wrong} {count}");
+            }
+            assert_eq!(limits.beyond(&record).words(), [0, u32::MAX, 0, 0]);
+        }
+        assert_eq!(limits.beyond(&[row(2.0); 6]).words(), [0; LANES]);
+    }
+}

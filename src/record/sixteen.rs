@@ -29,7 +29,7 @@ impl Sixteen {
     }
 
     /// A record of f32 as one of this format. Where `integers` says so the word beside the vec3 is an
-    /// unsigned integer, which validation has found to fit.
+    /// unsigned integer, whose lower half is taken: what is more than that validation refuses.
     #[inline(always)]
     pub(crate) fn narrow<V: Vectors, const ROWS: usize>(
         self,
@@ -56,7 +56,7 @@ impl Sixteen {
                     let words = row.words();
                     *to = words.map(thesis16::narrow);
                     if *integer {
-                        #[expect(clippy::cast_possible_truncation, reason = "validated to fit")]
+                        #[expect(clippy::cast_possible_truncation, reason = "its lower half")]
                         let word = words[WORD_LANE] as u16;
                         to[WORD_LANE] = word;
                     }

@@ -1,4 +1,4 @@
-//! This file looks at the input of a step while it is packed: a block at a time, in the cache.
+//! This file looks at the input of a step while it is packed: a block at a time.
 //!
 //! Without a branch per number it is found out whether everything of a record is surely right. One
 //! of which that cannot be said is checked as [`validate`](super::validate) does; what that refuses
