@@ -5,9 +5,9 @@
 //! taken from the values on their way.
 //!
 //! A range goes by blocks of records that lie in the cache: what the caller has is read into one, looked
-//! at, made rows of ([`record`]) and, where the stream has sixteen bits, narrowed; then the block is
-//! dealt out to the channels ([`Dealer`]). What is wrong with the input is not said here, only that
-//! something is.
+//! at and made rows of ([`record`](crate::record)), in the format of the stream; then the block is dealt
+//! out to the channels ([`Dealer`](super::deal::Dealer)). What is wrong with the input is not said here,
+//! only that something is.
 
 use std::mem;
 use std::ops::Range;
