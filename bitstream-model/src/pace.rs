@@ -247,7 +247,8 @@ impl Pace {
 mod tests {
     use super::*;
 
-    /// The beats of an issue and the logarithm of their cycles, the engines, the interval and the clock of a design.
+    /// The beats of an issue and the logarithm of their cycles, the engines, the interval and the clock
+    /// of a design.
     type Design = ([usize; STREAMS_MAX], [u32; STREAMS_MAX], usize, u64, u64);
     const FLOAT: Design = ([2, 2, 2, 1], [0; STREAMS_MAX], 8, 2, 275_000);
     const HALF: Design = ([3, 3, 1, 0], [0, 0, 1, 0], 6, 3, 250_000);

@@ -328,12 +328,13 @@ impl<F: Computed> Work for ChunkWork<'_, F> {
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
             if block.serial() {
-                // SAFETY: so are the rows of its bodies, and the spare one.
+                // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
+                // has the chunk those of its bodies are its own: see `Sync`.
                 let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.quads) };
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
             }
-            // SAFETY: the same.
+            // SAFETY: the same holds for the rows of its bodies, and for the spare one.
             unsafe { kernel::solve(lanes, &self.pass, block, self.field.quads) };
             if self.pass.stage.contact && self.pass.stage.turning {
                 *self.sum = self.sum.saturating_add(counted::<F>(block));
@@ -349,7 +350,8 @@ impl<F: Computed> ChunkWork<'_, F> {
             let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
-            // SAFETY: so are the rows of its bodies.
+            // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
+            // has the chunk those of its bodies are its own: see `Sync`.
             let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.quads) };
             *self.sum = self.sum.saturating_add(sum);
         }

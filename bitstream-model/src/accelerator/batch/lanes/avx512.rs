@@ -129,7 +129,8 @@ impl Numbers for Sixteen {
 
     #[inline(always)]
     fn to_binary16(self) -> Self {
-        // SAFETY: numbers are made where the processor has AVX-512F.
+        // SAFETY: numbers are made by an `Avx512` alone, which there is only where the processor has
+        // AVX-512F.
         Self(unsafe { binary16(self.0) })
     }
 

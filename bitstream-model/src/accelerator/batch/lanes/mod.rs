@@ -4,7 +4,10 @@
 //! A value of a [`Lanes`] type proves that the processor has its instructions, and numbers are made
 //! by one only.
 
-#![allow(unsafe_code, reason = "rows of velocities are reached by pointers from several threads")]
+#![allow(
+    unsafe_code,
+    reason = "instructions of a processor, and rows that several threads reach by pointers"
+)]
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

@@ -168,7 +168,8 @@ impl<L: Lanes> Lanes for Rounded<L> {
         at: usize,
         half: usize,
     ) -> [Self::Numbers; 4] {
-        // SAFETY: the caller promises it.
+        // SAFETY: the caller promises that these quads can be read and nobody writes them meanwhile,
+        // which is all that the lanes within ask for.
         unsafe { self.0.gather(quads, index, at, half) }.map(Sixteens)
     }
 
@@ -181,7 +182,8 @@ impl<L: Lanes> Lanes for Rounded<L> {
         at: usize,
         half: usize,
     ) {
-        // SAFETY: the caller promises it.
+        // SAFETY: the caller promises that these quads can be written and nobody else accesses them
+        // meanwhile, which is all that the lanes within ask for.
         unsafe { self.0.scatter(numbers.map(|number| number.0), quads, index, at, half) }
     }
 
