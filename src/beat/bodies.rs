@@ -15,7 +15,7 @@ use std::ops::Range;
 use bitstream_model::interface::record::Beat;
 
 use super::body_records::{Poses, Velocities};
-use super::deal::BLOCK;
+use super::deal::BODIES;
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stripe::Segment;
 use super::target::Target;
@@ -181,12 +181,12 @@ fn pack_part<B: Bodies + ?Sized>(target: Target<'_>, bodies: &B, mut part: Part<
     let Part { range, .. } = &part;
     let (first, until) = (range.start, range.end);
     let mut packer = BodyPacker::new(target, &mut part);
-    let mut copies = [NOBODY; BLOCK];
-    for first in (first..until).step_by(BLOCK) {
-        let block = &mut copies[..(until - first).min(BLOCK)];
+    let mut copies = [NOBODY; BODIES];
+    for first in (first..until).step_by(BODIES) {
+        let block = &mut copies[..(until - first).min(BODIES)];
         let lying = |range: Range<usize>| bodies.structures().and_then(|all| all.get(range));
         let behind = first + block.len();
-        let ahead = lying(behind..until.min(behind + BLOCK)).unwrap_or_default();
+        let ahead = lying(behind..until.min(behind + BODIES)).unwrap_or_default();
         let block = lying(first..behind).unwrap_or_else(|| {
             for (at, to) in block.iter_mut().enumerate() {
                 *to = bodies.body(first + at);
@@ -226,7 +226,7 @@ impl<'a, 'b> BodyPacker<'a, 'b> {
         }
     }
 
-    /// Does it with the next bodies, at most [`BLOCK`]. Those `ahead` are asked for next, and are on their
+    /// Does it with the next bodies, at most [`BODIES`]. Those `ahead` are asked for next, and are on their
     /// way meanwhile.
     fn write(&mut self, bodies: &[Body], ahead: &[Body]) {
         in_wide_vectors(Writing { packer: self, bodies, ahead });
@@ -256,6 +256,7 @@ impl Work for Writing<'_, '_, '_> {
         let Self { packer, bodies, ahead } = self;
         soon_read(ahead);
         let BodyPacker { target, next, ends, velocities, poses, good, still } = packer;
+        let Target { shapes, quick, .. } = *target;
         let range = *next..*next + bodies.len();
         *next = range.end;
         if let Some(rest) = ends {
@@ -264,18 +265,18 @@ impl Work for Writing<'_, '_, '_> {
             *rest = behind;
             let mut any_still = false;
             for (end, body) in ends.iter_mut().zip(bodies) {
-                *end = End::of(body, target.shapes);
+                *end = End::of(body, shapes);
                 any_still |= end.is_static();
             }
-            *good &= target.quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends));
+            *good &= quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends));
             if any_still {
                 *still = around(still, &range);
             }
-        } else if let Some(quick) = target.quick {
+        } else if let Some(quick) = quick {
             // Read anew they may be others.
-            let mut ends = [End::MISSING; BLOCK];
+            let mut ends = [End::MISSING; BODIES];
             for (end, body) in ends.iter_mut().zip(bodies) {
-                *end = End::of(body, target.shapes);
+                *end = End::of(body, shapes);
             }
             *good &= quick.bodies(range.start, bodies, &ends);
         }

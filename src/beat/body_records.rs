@@ -1,11 +1,9 @@
 //! This file writes velocity and pose records, a block at a time.
 
-use std::slice;
-
 use bitstream_model::interface::profile::Inertia;
 use bitstream_model::interface::record::{Beat, pose, velocity};
 
-use super::deal::Dealer;
+use super::deal::{BODIES, Dealer};
 use super::stage::{Records, Stage};
 use super::stripe::Segment;
 use super::target::Target;
@@ -23,8 +21,8 @@ pub(super) struct Velocities<'a, 'b> {
 /// With and without inertia.
 #[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
 enum VelocityStage {
-    Isotropic(Stage<{ velocity::ROWS }>),
-    World(Stage<{ velocity::WORLD_ROWS }>),
+    Isotropic(Stage<{ velocity::ROWS }, BODIES>),
+    World(Stage<{ velocity::WORLD_ROWS }, BODIES>),
 }
 
 impl<'a, 'b> Velocities<'a, 'b> {
@@ -38,15 +36,15 @@ impl<'a, 'b> Velocities<'a, 'b> {
         Self { shapes: target.shapes, dealer: Dealer::new(&layout, channels), stage }
     }
 
-    /// Writes those of the next bodies, at most [`BLOCK`](super::deal::BLOCK); only the last may be fewer.
+    /// Writes those of the next bodies, at most [`BODIES`]; only the last may be fewer.
     #[inline(always)]
     pub(super) fn write<V: Vectors>(&mut self, vectors: V, bodies: &[Body]) {
         match &mut self.stage {
             VelocityStage::Isotropic(stage) => {
-                stage.send(vectors, &mut Isotropic(bodies.iter()), &mut self.dealer);
+                stage.send(vectors, &mut Isotropic(bodies), &mut self.dealer);
             }
             VelocityStage::World(stage) => {
-                let mut records = World { bodies: bodies.iter(), shapes: self.shapes };
+                let mut records = World { bodies, shapes: self.shapes };
                 stage.send(vectors, &mut records, &mut self.dealer);
             }
         }
@@ -61,7 +59,7 @@ impl<'a, 'b> Velocities<'a, 'b> {
 /// Writes pose records.
 pub(super) struct Poses<'a, 'b> {
     dealer: Dealer<'a, 'b>,
-    stage: Stage<{ pose::ROWS }>,
+    stage: Stage<{ pose::ROWS }, BODIES>,
 }
 
 impl<'a, 'b> Poses<'a, 'b> {
@@ -71,10 +69,10 @@ impl<'a, 'b> Poses<'a, 'b> {
         Self { dealer: Dealer::new(&layout, channels), stage: Stage::new(&layout) }
     }
 
-    /// Writes those of the next bodies, at most [`BLOCK`](super::deal::BLOCK); only the last may be fewer.
+    /// Writes those of the next bodies, at most [`BODIES`]; only the last may be fewer.
     #[inline(always)]
     pub(super) fn write<V: Vectors>(&mut self, vectors: V, bodies: &[Body]) {
-        self.stage.send(vectors, &mut OfPoses(bodies.iter()), &mut self.dealer);
+        self.stage.send(vectors, &mut OfPoses(bodies), &mut self.dealer);
     }
 
     /// Ends the segment; the sum of the words written, modulo 2^32.
@@ -84,20 +82,25 @@ impl<'a, 'b> Poses<'a, 'b> {
 }
 
 /// The velocity records of bodies.
-struct Isotropic<'a>(slice::Iter<'a, Body>);
+struct Isotropic<'a>(&'a [Body]);
 
 impl Records<{ velocity::ROWS }> for Isotropic<'_> {
     const INTEGERS: [bool; velocity::ROWS] = record::velocity::INTEGERS;
 
     #[inline(always)]
-    fn next(&mut self) -> Option<[Lanes; velocity::ROWS]> {
-        self.0.next().map(record::velocity::encode)
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    fn get(&mut self, at: usize) -> Option<[Lanes; velocity::ROWS]> {
+        self.0.get(at).map(record::velocity::encode)
     }
 }
 
 /// The same, with their inertia.
 struct World<'a> {
-    bodies: slice::Iter<'a, Body>,
+    bodies: &'a [Body],
     shapes: &'a [Shape],
 }
 
@@ -105,20 +108,30 @@ impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
     const INTEGERS: [bool; velocity::WORLD_ROWS] = record::velocity::WORLD_INTEGERS;
 
     #[inline(always)]
-    fn next(&mut self) -> Option<[Lanes; velocity::WORLD_ROWS]> {
-        self.bodies.next().map(|body| world_velocity(body, self.shapes))
+    fn len(&self) -> usize {
+        self.bodies.len()
+    }
+
+    #[inline(always)]
+    fn get(&mut self, at: usize) -> Option<[Lanes; velocity::WORLD_ROWS]> {
+        self.bodies.get(at).map(|body| world_velocity(body, self.shapes))
     }
 }
 
 /// The pose records of bodies.
-struct OfPoses<'a>(slice::Iter<'a, Body>);
+struct OfPoses<'a>(&'a [Body]);
 
 impl Records<{ pose::ROWS }> for OfPoses<'_> {
     const INTEGERS: [bool; pose::ROWS] = record::pose::INTEGERS;
 
     #[inline(always)]
-    fn next(&mut self) -> Option<[Lanes; pose::ROWS]> {
-        self.0.next().map(record::pose::encode)
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    fn get(&mut self, at: usize) -> Option<[Lanes; pose::ROWS]> {
+        self.0.get(at).map(record::pose::encode)
     }
 }
 

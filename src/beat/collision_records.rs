@@ -1,8 +1,5 @@
 //! This file makes the records of a block of collisions, and has them looked at on their way.
 
-use std::iter::Zip;
-use std::slice;
-
 use bitstream_model::interface::record::{collision, relative};
 
 use super::stage::Records;
@@ -88,8 +85,9 @@ fn both(ends: Ends<'_>, collision: &Collision) -> [End; 2] {
 /// The records of a block of collisions. Those ahead are fetched meanwhile.
 pub(super) struct Encoding<'p, K> {
     kind: K,
-    next: usize,
-    collisions: Zip<slice::Iter<'p, &'p Collision>, slice::Iter<'p, &'p Collision>>,
+    first: usize,
+    collisions: &'p [&'p Collision],
+    ahead: &'p [&'p Collision],
     ends: Ends<'p>,
 }
 
@@ -97,25 +95,22 @@ impl<'p, K> Encoding<'p, K> {
     /// Those of a block. Of those `ahead` as many are fetched; if they are fewer, none.
     #[inline(always)]
     pub(super) fn new(kind: K, block: &Block<'p>, ahead: &'p [&'p Collision]) -> Self {
-        let collisions = block.collisions;
+        let Block { first, collisions, ends, .. } = *block;
         // Those of a last block that is not whole come by themselves.
         let ahead = ahead.get(..collisions.len()).unwrap_or(collisions);
-        let collisions = collisions.iter().zip(ahead);
-        Self { kind, next: block.first, collisions, ends: block.ends }
+        Self { kind, first, collisions, ahead, ends }
     }
 
-    /// The next record, with the collision and the ends that it is made of.
+    /// A record, with the collision and the ends that it is made of.
     #[inline(always)]
-    fn take<const ROWS: usize>(&mut self) -> Option<([Lanes; ROWS], &'p Collision, [End; 2])>
+    fn take<const ROWS: usize>(&self, at: usize) -> Option<([Lanes; ROWS], &'p Collision, [End; 2])>
     where
         K: Kind<ROWS>,
     {
-        let (collision, ahead) = self.collisions.next()?;
+        let (collision, ahead) = (self.collisions.get(at)?, self.ahead.get(at)?);
         prefetch::<Collision>(ahead);
         let ends = both(self.ends, collision);
-        let record = self.kind.encode(self.next, collision, ends);
-        self.next += 1;
-        Some((record, collision, ends))
+        Some((self.kind.encode(self.first + at, collision, ends), collision, ends))
     }
 }
 
@@ -123,8 +118,13 @@ impl<K: Kind<ROWS>, const ROWS: usize> Records<ROWS> for Encoding<'_, K> {
     const INTEGERS: [bool; ROWS] = K::INTEGERS;
 
     #[inline(always)]
-    fn next(&mut self) -> Option<[Lanes; ROWS]> {
-        self.take().map(|(record, ..)| record)
+    fn len(&self) -> usize {
+        self.collisions.len()
+    }
+
+    #[inline(always)]
+    fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]> {
+        self.take(at).map(|(record, ..)| record)
     }
 }
 
@@ -167,8 +167,13 @@ impl<K: Kind<ROWS>, const ROWS: usize> Records<ROWS> for LookedAt<'_, K> {
     const INTEGERS: [bool; ROWS] = K::INTEGERS;
 
     #[inline(always)]
-    fn next(&mut self) -> Option<[Lanes; ROWS]> {
-        let (record, collision, ends) = self.records.take()?;
+    fn len(&self) -> usize {
+        self.records.collisions.len()
+    }
+
+    #[inline(always)]
+    fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]> {
+        let (record, collision, ends) = self.records.take(at)?;
         self.look.head(collision, ends, self.scheduled);
         self.look.numbers(K::beyond(self.quick, &record, collision.count));
         if self.look.asks_how_far() {

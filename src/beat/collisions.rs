@@ -131,13 +131,12 @@ fn find<'a, C: Collisions + ?Sized>(
     first: usize,
     to: &mut [&'a Collision],
 ) -> bool {
-    let mut all_lie = true;
-    for (to, index) in to.iter_mut().zip(first..) {
-        *to = collisions.structure(index).unwrap_or_else(|| {
-            all_lie = false;
-            collisions.soon(index);
-            &ELSEWHERE
-        });
+    to.fill(&ELSEWHERE);
+    let all_lie = collisions.structures(first, to);
+    if !all_lie {
+        let places = (first..).zip(to.iter());
+        let elsewhere = places.filter(|(_, at)| ptr::eq::<Collision>(**at, &raw const ELSEWHERE));
+        elsewhere.for_each(|(index, _)| collisions.soon(index));
     }
     all_lie
 }
@@ -171,8 +170,8 @@ pub(super) struct CollisionPacker<'a, 'b> {
 /// Of either kind of record.
 #[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
 enum EntryStage {
-    Absolute(Stage<{ collision::ROWS }>),
-    Relative(Stage<{ relative::ROWS }>),
+    Absolute(Stage<{ collision::ROWS }, BLOCK>),
+    Relative(Stage<{ relative::ROWS }, BLOCK>),
 }
 
 impl<'a, 'b> CollisionPacker<'a, 'b> {
@@ -231,7 +230,7 @@ struct Writing<'p, 'a, 'b, K, const ROWS: usize> {
     quick: Option<&'p Quick<'p>>,
     block: Block<'p>,
     ahead: &'p [&'p Collision],
-    stage: &'p mut Stage<ROWS>,
+    stage: &'p mut Stage<ROWS, BLOCK>,
     dealer: &'p mut Dealer<'a, 'b>,
 }
 

@@ -4,9 +4,11 @@
 //! the other, each a run of whole beats upwards, as memory that combines writes wants them. Nothing
 //! is read back: the sum that the accelerator is checked with is taken on the way.
 
+use std::mem;
+
 use bitstream_model::interface::record::Beat;
 
-use super::stripe::{Deal, Layout, Place};
+use super::stripe::{Deal, GROUP, Layout, Place};
 use super::unpack::total;
 use crate::platform::{Lanes, soon_written};
 
@@ -14,8 +16,12 @@ use crate::platform::{Lanes, soon_written};
 /// begins with a group; and so few that a block, read and written, lies in the innermost cache.
 pub(crate) const BLOCK: usize = 30;
 
+/// Records of a block of bodies, which lie one behind the other, as [`BLOCK`].
+pub(super) const BODIES: usize = 120;
+
 /// Writes the beats of one segment.
 pub(super) struct Dealer<'a, 'b> {
+    /// What is not written yet.
     channels: &'a mut [&'b mut [Beat]],
     deal: Deal,
     padded: bool,
@@ -49,8 +55,10 @@ impl<'a, 'b> Dealer<'a, 'b> {
             _ => beats,
         };
         for beat in rest {
-            let Place { channel, slot } = self.deal.next();
-            self.channels[channel][slot] = *beat;
+            let Place { channel, .. } = self.deal.next();
+            let (to, behind) = mem::take(&mut self.channels[channel]).split_at_mut(1);
+            to[0] = *beat;
+            self.channels[channel] = behind;
             self.sum = self.sum.plus(Lanes::from(*beat));
         }
     }
@@ -59,22 +67,19 @@ impl<'a, 'b> Dealer<'a, 'b> {
     #[inline(always)]
     fn groups<'c, const G: usize>(&mut self, beats: &'c [Beat]) -> &'c [Beat] {
         let (groups, rest) = beats.as_chunks::<G>();
-        for (channel, to) in self.channels.iter_mut().enumerate() {
-            let (places, share) = self.deal.places::<G>(channel);
-            let place = self.deal.take(channel, groups.len() * share);
-            // Those of the next block.
-            let behind = &to[place.end.min(to.len())..];
-            soon_written(&behind[..place.len().min(behind.len())]);
-            let to = &mut to[place];
-            let sum = &mut self.sum;
-            match share {
+        for (channel, share) in self.channels.iter_mut().zip(&self.deal.shares) {
+            let (to, behind) = mem::take(channel).split_at_mut(groups.len() * share.count);
+            soon_written(&behind[..to.len().min(behind.len())]);
+            *channel = behind;
+            let (places, sum) = (&share.places, &mut self.sum);
+            match share.count {
                 0 => {}
                 1 => run::<G, 1>(groups, places, to, sum),
                 2 => run::<G, 2>(groups, places, to, sum),
                 3 => run::<G, 3>(groups, places, to, sum),
-                _ => {
+                count => {
                     let beats =
-                        groups.iter().flat_map(|group| places[..share].iter().map(|at| group[*at]));
+                        groups.iter().flat_map(|group| places[..count].iter().map(|at| group[*at]));
                     for (to, beat) in to.iter_mut().zip(beats) {
                         *to = beat;
                         *sum = sum.plus(Lanes::from(beat));
@@ -99,12 +104,12 @@ impl<'a, 'b> Dealer<'a, 'b> {
 #[inline(always)]
 fn run<const G: usize, const S: usize>(
     groups: &[[Beat; G]],
-    places: [usize; G],
+    places: &[usize; GROUP],
     to: &mut [Beat],
     sum: &mut Lanes,
 ) {
     // Said once here, so that it is not asked of every beat.
-    let places: [usize; S] = std::array::from_fn(|at| places[at % G].min(G - 1));
+    let places: [usize; S] = std::array::from_fn(|at| places[at % GROUP].min(G - 1));
     let mut total = *sum;
     for (to, group) in to.as_chunks_mut::<S>().0.iter_mut().zip(groups) {
         let beats = places.map(|place| Lanes::from(group[place]));

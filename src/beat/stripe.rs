@@ -131,19 +131,19 @@ pub(super) struct Deal {
     at: usize,
     slots: [usize; CHANNELS],
     /// What goes to each channel.
-    shares: [Share; CHANNELS],
+    pub(super) shares: [Share; CHANNELS],
 }
 
 /// The beats of a group that go to one channel.
 #[derive(Debug, Clone, Copy, Default)]
-struct Share {
+pub(super) struct Share {
     /// Which they are; the first `count` of these.
-    places: [usize; GROUP],
-    count: usize,
+    pub(super) places: [usize; GROUP],
+    pub(super) count: usize,
 }
 
 /// Beats of a group at most, for [`Deal::places`].
-const GROUP: usize = 8;
+pub(super) const GROUP: usize = 8;
 
 /// Channels at most.
 const CHANNELS: usize = bitstream_model::interface::address_map::DMA_COUNT_MAX;

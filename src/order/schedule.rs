@@ -108,6 +108,23 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
     }
 
     #[inline]
+    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
+        let entries = self.schedule.entries.get(first..).unwrap_or_default();
+        let mut all = true;
+        for (to, entry) in to.iter_mut().zip(entries) {
+            let found = match *entry {
+                EMPTY => Some(&PADDING),
+                index => self.collisions.structure(index as usize),
+            };
+            match found {
+                Some(collision) => *to = collision,
+                None => all = false,
+            }
+        }
+        all
+    }
+
+    #[inline]
     fn soon(&self, index: usize) {
         self.schedule.get(index).into_iter().for_each(|index| self.collisions.soon(index));
     }

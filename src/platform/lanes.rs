@@ -92,6 +92,13 @@ impl Lanes {
         return unsafe { std::mem::transmute::<Vector, [u32; LANES]>(self.0) };
     }
 
+    /// The first three words beside another last one.
+    #[inline(always)]
+    pub(crate) fn beside(self, last: u32) -> Self {
+        let [first, second, third, _] = self.words();
+        Self::new([first, second, third, last])
+    }
+
     /// Word by word, modulo 2^32.
     #[inline(always)]
     pub(crate) fn plus(self, other: Self) -> Self {
@@ -181,6 +188,10 @@ mod tests {
     proptest! {
         #[test]
         fn every_word_is_computed_by_itself(one in any::<[u32; 4]>(), other in any::<[u32; 4]>()) {
+            prop_assert_eq!(
+                Lanes::new(one).beside(other[3]).words(),
+                [one[0], one[1], one[2], other[3]]
+            );
             let [a, b] = [one, other].map(Lanes::new);
             prop_assert_eq!(a.plus(b).words(), each(one, other, u32::wrapping_add));
             prop_assert_eq!(a.and(b).words(), each(one, other, |a, b| a & b));

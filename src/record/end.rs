@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::beside;
+use super::{POSITION, row_of};
 use crate::interface::record::Beat;
 use crate::platform::{Lanes, fetch};
 use crate::scene::{Body, Shape};
@@ -40,15 +40,21 @@ impl End {
             Some(shape) => body.shape | if shape.is_static() { STATIC } else { 0 },
             None => NO_SHAPE,
         };
-        Self { position: body.pose.position, tag }
+        bytemuck::cast(Beat::from(row_of::<POSITION, _>(body).beside(tag)))
     }
 
     /// Its position beside a word.
     #[inline(always)]
     pub(crate) fn with_word(self, word: u32) -> Lanes {
         let whole: Beat = bytemuck::cast(self);
-        let vec3 = Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]);
-        Lanes::from(whole).and(vec3).or(beside(word))
+        Lanes::from(whole).beside(word)
+    }
+
+    /// Its position beside zero.
+    #[inline(always)]
+    pub(crate) fn alone(self) -> Lanes {
+        let whole: Beat = bytemuck::cast(self);
+        Lanes::from(whole).and(Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]))
     }
 
     /// Whether it never moves.

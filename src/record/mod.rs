@@ -16,15 +16,37 @@ pub(crate) mod sixteen;
 mod thesis16;
 pub(crate) mod velocity;
 
+use std::mem::offset_of;
+use std::slice;
+
+use bytemuck::Pod;
+
 use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
 use crate::platform::Lanes;
-use crate::scene::Contact;
+use crate::scene::{Body, Collision, Contact};
 
 /// A vec3 and the word beside it.
 #[inline(always)]
 fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Lanes {
     Lanes::new([x.to_bits(), y.to_bits(), z.to_bits(), word])
 }
+
+/// Four words of a structure, from its word `AT` on: a vec4, or a vec3 and whatever follows it.
+#[inline(always)]
+fn row_of<const AT: usize, T: Pod>(structure: &T) -> Lanes {
+    const { assert!(4 * (AT + LANES) <= size_of::<T>(), "they are its words") };
+    let words: &[u32] = bytemuck::cast_slice(slice::from_ref(structure));
+    words[AT..].first_chunk().map_or(Lanes::all(0), |row| Lanes::new(*row))
+}
+
+/// The word with which the normal of a collision begins.
+const NORMAL: usize = offset_of!(Collision, normal) / 4;
+
+/// The words with which the vectors of a body begin.
+const POSITION: usize = offset_of!(Body, pose.position) / 4;
+const ORIENTATION: usize = offset_of!(Body, pose.orientation) / 4;
+const LINEAR: usize = offset_of!(Body, velocity.linear) / 4;
+const ANGULAR: usize = offset_of!(Body, velocity.angular) / 4;
 
 /// Four numbers, one a lane.
 #[inline(always)]
@@ -67,12 +89,6 @@ pub(crate) fn of_count(
     count: u32,
 ) -> [Lanes; CONTACT_POINTS] {
     table[(count as usize).min(CONTACT_POINTS)].map(Lanes::from)
-}
-
-/// Zeros, and the word beside them.
-#[inline(always)]
-fn beside(word: u32) -> Lanes {
-    Lanes::new([0, 0, 0, word])
 }
 
 /// The vec3 of a beat, whatever the word beside it.

@@ -1,6 +1,6 @@
 //! This file makes the pose record of a body.
 
-use super::{vec3_and_word, vec4};
+use super::{ORIENTATION, POSITION, row_of};
 use crate::interface::record::pose;
 use crate::platform::Lanes;
 use crate::scene::Body;
@@ -16,8 +16,8 @@ pub(crate) const INTEGERS: [bool; pose::ROWS] = [false; pose::ROWS];
 #[inline(always)]
 pub(crate) fn encode(body: &Body) -> [Lanes; pose::ROWS] {
     let mut rows = [Lanes::all(0); pose::ROWS];
-    rows[pose::POSITION] = vec3_and_word(body.pose.position, 0);
-    rows[pose::ORIENTATION] = vec4(body.pose.orientation);
+    rows[pose::POSITION] = row_of::<POSITION, _>(body).beside(0);
+    rows[pose::ORIENTATION] = row_of::<ORIENTATION, _>(body);
     rows
 }
 

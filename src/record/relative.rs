@@ -1,7 +1,7 @@
 //! This file makes the record of a collision relative to body A.
 
 use super::end::End;
-use super::{USED, beside, by_count, contact_row, of_count, vec3_and_word};
+use super::{NORMAL, USED, by_count, contact_row, of_count, row_of};
 use crate::interface::record::{Beat, CONTACT_POINTS, LANES, relative};
 use crate::platform::Lanes;
 use crate::scene::Collision;
@@ -29,9 +29,9 @@ static FAR: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
 #[inline(always)]
 pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Lanes; relative::ROWS] {
     let mut rows = [Lanes::all(0); relative::ROWS];
-    let [a, b] = [a, b].map(|end| end.with_word(0));
-    rows[relative::NORMAL] = vec3_and_word(from.normal, from.body_a);
-    rows[relative::OFFSET] = b.minus_f32(a).or(beside(from.body_b));
+    let [a, b] = [a, b].map(End::alone);
+    rows[relative::NORMAL] = row_of::<NORMAL, _>(from).beside(from.body_a);
+    rows[relative::OFFSET] = b.minus_f32(a).beside(from.body_b);
     let (used, unused) = (of_count(&USED, from.count), of_count(&FAR, from.count));
     let contacts = from.contacts.iter().zip(&mut rows[relative::CONTACTS..]);
     for ((contact, row), (used, unused)) in contacts.zip(used.into_iter().zip(unused)) {

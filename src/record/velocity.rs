@@ -1,7 +1,7 @@
 //! This file makes the velocity record of a body.
 
 use super::inertia::Inverse;
-use super::vec3_and_word;
+use super::{ANGULAR, LINEAR, row_of, vec3_and_word};
 use crate::interface::record::velocity;
 use crate::platform::Lanes;
 use crate::scene::Body;
@@ -28,8 +28,8 @@ pub(crate) const WORLD_INTEGERS: [bool; velocity::WORLD_ROWS] = {
 #[inline(always)]
 pub(crate) fn encode(body: &Body) -> [Lanes; velocity::ROWS] {
     let mut rows = [Lanes::all(0); velocity::ROWS];
-    rows[velocity::LINEAR] = vec3_and_word(body.velocity.linear, body.shape);
-    rows[velocity::ANGULAR] = vec3_and_word(body.velocity.angular, 0);
+    rows[velocity::LINEAR] = row_of::<LINEAR, _>(body).beside(body.shape);
+    rows[velocity::ANGULAR] = row_of::<ANGULAR, _>(body).beside(0);
     rows
 }
 

@@ -4,8 +4,11 @@
 //! it (array of structures), [`BodyArrays`] implements it over separate arrays, and an engine with
 //! a layout of its own implements its two methods: nothing is copied in between.
 
+use bytemuck::{Pod, Zeroable};
+
 /// Position and orientation of a body, world frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Pose {
     /// Centre of mass, m.
     pub position: [f32; 3],
@@ -14,7 +17,8 @@ pub struct Pose {
 }
 
 /// Linear and angular velocity of a body, world frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
 pub struct Velocity {
     /// Velocity of the centre of mass, m/s.
     pub linear: [f32; 3],
@@ -23,7 +27,8 @@ pub struct Velocity {
 }
 
 /// A rigid body.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Body {
     /// Where it is.
     pub pose: Pose,

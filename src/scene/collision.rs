@@ -3,10 +3,13 @@
 /// Contact points of a collision, at most.
 pub use bitstream_model::interface::record::CONTACT_POINTS;
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::platform::prefetch;
 
 /// One point at which two bodies touch.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
 pub struct Contact {
     /// The point on body B's surface, world frame, m.
     pub point: [f32; 3],
@@ -15,7 +18,8 @@ pub struct Contact {
 }
 
 /// Two bodies in contact at one to four points.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Collision {
     /// Index of body A.
     pub body_a: u32,
@@ -55,6 +59,20 @@ pub trait Collisions: Sync {
         None
     }
 
+    /// Where the collisions from `first` on lie, as many as fit in `to` and none of them beyond
+    /// [`len`](Self::len), as [`structure`](Self::structure) says of each; one that does not lie
+    /// anywhere leaves its place as it is. Whether all do.
+    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
+        let mut all = true;
+        for (to, index) in to.iter_mut().zip(first..) {
+            match self.structure(index) {
+                Some(collision) => *to = collision,
+                None => all = false,
+            }
+        }
+        all
+    }
+
     /// Says that collision `index`, which is below [`len`](Self::len) and does not lie there as a
     /// [`structure`](Self::structure), is asked for soon. A layout that can have it fetched gains by
     /// that, above all where collisions are read in an order of their own; nothing else comes of it.
@@ -88,6 +106,13 @@ impl Collisions for [Collision] {
     fn structure(&self, index: usize) -> Option<&Collision> {
         self.get(index)
     }
+
+    #[inline]
+    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
+        let from = self.get(first..).unwrap_or_default();
+        to.iter_mut().zip(from).for_each(|(to, from)| *to = from);
+        to.len() <= from.len()
+    }
 }
 
 impl Collisions for Vec<Collision> {
@@ -103,6 +128,11 @@ impl Collisions for Vec<Collision> {
     #[inline]
     fn structure(&self, index: usize) -> Option<&Collision> {
         self.get(index)
+    }
+
+    #[inline]
+    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
+        self.as_slice().structures(first, to)
     }
 }
 
