@@ -3,10 +3,10 @@
 use bitstream_model::interface::profile::Inertia;
 use bitstream_model::interface::record::{Beat, pose, velocity};
 
-use super::deal::{BODIES, Dealer};
-use super::stage::{Records, Stage};
+use super::deal::Dealer;
 use super::stripe::Segment;
 use super::target::Target;
+use super::unit::Records;
 use crate::platform::{Lanes, Vectors};
 use crate::record;
 use crate::scene::{Body, Shape};
@@ -15,37 +15,27 @@ use crate::scene::{Body, Shape};
 pub(super) struct Velocities<'a, 'b> {
     shapes: &'a [Shape],
     dealer: Dealer<'a, 'b>,
-    stage: VelocityStage,
-}
-
-/// With and without inertia.
-#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
-enum VelocityStage {
-    Isotropic(Stage<{ velocity::ROWS }, BODIES>),
-    World(Stage<{ velocity::WORLD_ROWS }, BODIES>),
+    inertia: Inertia,
 }
 
 impl<'a, 'b> Velocities<'a, 'b> {
     /// From the first record of a group on.
     pub(super) fn new(target: Target<'a>, channels: &'a mut [&'b mut [Beat]]) -> Self {
         let layout = Segment::Velocities.layout(target.variant);
-        let stage = match target.variant.inertia {
-            Inertia::Isotropic => VelocityStage::Isotropic(Stage::new(&layout)),
-            Inertia::World => VelocityStage::World(Stage::new(&layout)),
-        };
-        Self { shapes: target.shapes, dealer: Dealer::new(&layout, channels), stage }
+        let inertia = target.variant.inertia;
+        Self { shapes: target.shapes, dealer: Dealer::new(&layout, channels), inertia }
     }
 
-    /// Writes those of the next bodies, at most [`BODIES`]; only the last may be fewer.
+    /// Writes those of the next bodies, at most [`BODIES`](super::deal::BODIES); only the last may be fewer.
     #[inline(always)]
     pub(super) fn write<V: Vectors>(&mut self, vectors: V, bodies: &[Body]) {
-        match &mut self.stage {
-            VelocityStage::Isotropic(stage) => {
-                stage.send(vectors, &mut Isotropic(bodies), &mut self.dealer);
+        match self.inertia {
+            Inertia::Isotropic => {
+                self.dealer.write(vectors, &mut Isotropic(bodies));
             }
-            VelocityStage::World(stage) => {
+            Inertia::World => {
                 let mut records = World { bodies, shapes: self.shapes };
-                stage.send(vectors, &mut records, &mut self.dealer);
+                self.dealer.write(vectors, &mut records);
             }
         }
     }
@@ -59,20 +49,19 @@ impl<'a, 'b> Velocities<'a, 'b> {
 /// Writes pose records.
 pub(super) struct Poses<'a, 'b> {
     dealer: Dealer<'a, 'b>,
-    stage: Stage<{ pose::ROWS }, BODIES>,
 }
 
 impl<'a, 'b> Poses<'a, 'b> {
     /// From the first record of a group on.
     pub(super) fn new(target: Target<'_>, channels: &'a mut [&'b mut [Beat]]) -> Self {
         let layout = Segment::Poses.layout(target.variant);
-        Self { dealer: Dealer::new(&layout, channels), stage: Stage::new(&layout) }
+        Self { dealer: Dealer::new(&layout, channels) }
     }
 
-    /// Writes those of the next bodies, at most [`BODIES`]; only the last may be fewer.
+    /// Writes those of the next bodies, at most [`BODIES`](super::deal::BODIES); only the last may be fewer.
     #[inline(always)]
     pub(super) fn write<V: Vectors>(&mut self, vectors: V, bodies: &[Body]) {
-        self.stage.send(vectors, &mut OfPoses(bodies), &mut self.dealer);
+        self.dealer.write(vectors, &mut OfPoses(bodies));
     }
 
     /// Ends the segment; the sum of the words written, modulo 2^32.

@@ -2,7 +2,7 @@
 
 use bitstream_model::interface::record::{collision, relative};
 
-use super::stage::Records;
+use super::unit::Records;
 use crate::platform::{Lanes, prefetch};
 use crate::record;
 use crate::record::end::{End, Ends};
@@ -47,22 +47,17 @@ impl Kind<{ collision::ROWS }> for Absolute {
     }
 }
 
-/// Records relative to body A, and what stands in place of the bodies' indices.
+/// Records relative to body A.
 #[derive(Clone, Copy)]
-pub(super) struct Relative<'a> {
-    pub(super) words: Option<&'a [[u32; 2]]>,
-}
+pub(super) struct Relative;
 
-impl Kind<{ relative::ROWS }> for Relative<'_> {
+impl Kind<{ relative::ROWS }> for Relative {
     const INTEGERS: [bool; relative::ROWS] = record::relative::INTEGERS;
 
     #[inline(always)]
-    fn encode(self, index: usize, from: &Collision, ends: [End; 2]) -> [Lanes; relative::ROWS] {
+    fn encode(self, _: usize, from: &Collision, ends: [End; 2]) -> [Lanes; relative::ROWS] {
         let ends = record::relative::anchors(ends, ends.map(|end| !end.is_static()));
-        let Some(words) = self.words else { return record::relative::encode(from, ends) };
-        let mut collision = *from;
-        [collision.body_a, collision.body_b] = words[index];
-        record::relative::encode(&collision, ends)
+        record::relative::encode(from, ends)
     }
 
     #[inline(always)]
@@ -73,6 +68,30 @@ impl Kind<{ relative::ROWS }> for Relative<'_> {
     #[inline(always)]
     fn reach([_, offset, points @ ..]: &[Lanes; relative::ROWS], count: u32) -> Reach {
         Reach::new([Lanes::all(0), *offset], *points, count)
+    }
+}
+
+/// The same, with these words in place of the indices of each one's bodies.
+#[derive(Clone, Copy)]
+pub(super) struct Worded<'a>(pub(super) &'a [[u32; 2]]);
+
+impl Kind<{ relative::ROWS }> for Worded<'_> {
+    const INTEGERS: [bool; relative::ROWS] = Relative::INTEGERS;
+
+    #[inline(always)]
+    fn encode(self, index: usize, from: &Collision, ends: [End; 2]) -> [Lanes; relative::ROWS] {
+        let [body_a, body_b] = self.0[index];
+        Relative.encode(index, &Collision { body_a, body_b, ..*from }, ends)
+    }
+
+    #[inline(always)]
+    fn beyond(quick: &Quick<'_>, record: &[Lanes; relative::ROWS], count: u32) -> Lanes {
+        Relative::beyond(quick, record, count)
+    }
+
+    #[inline(always)]
+    fn reach(record: &[Lanes; relative::ROWS], count: u32) -> Reach {
+        Relative::reach(record, count)
     }
 }
 

@@ -3,19 +3,19 @@
 //! As [`bodies`](super::bodies) writes theirs: by ranges for several threads, and in these block by block,
 //! once, upwards, never read back.
 
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::{mem, ptr};
 
 use bitstream_model::interface::profile::Geometry;
-use bitstream_model::interface::record::{Beat, collision, relative};
+use bitstream_model::interface::record::Beat;
 
-use super::collision_records::{Absolute, Encoding, Kind, LookedAt, Relative};
+use super::collision_records::{Absolute, Encoding, Kind, LookedAt, Relative, Worded};
 use super::deal::{BLOCK, Dealer};
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
-use super::stage::Stage;
 use super::stripe::Segment;
 use super::target::Target;
-use crate::platform::{Vectors, Work, in_wide_vectors};
+use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::end::Ends;
 use crate::scene::validate::{Block, Quick};
 use crate::scene::{CONTACT_POINTS, Collision, Collisions, Contact};
@@ -162,16 +162,9 @@ pub(super) struct CollisionPacker<'a, 'b> {
     ends: Ends<'a>,
     marks: Marks<'a>,
     dealer: Dealer<'a, 'b>,
-    stage: EntryStage,
+    geometry: Geometry,
     /// The index of the next.
     next: usize,
-}
-
-/// Of either kind of record.
-#[expect(clippy::large_enum_variant, reason = "both are blocks, and lie on the stack")]
-enum EntryStage {
-    Absolute(Stage<{ collision::ROWS }, BLOCK>),
-    Relative(Stage<{ relative::ROWS }, BLOCK>),
 }
 
 impl<'a, 'b> CollisionPacker<'a, 'b> {
@@ -187,28 +180,38 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         channels: &'a mut [&'b mut [Beat]],
     ) -> Self {
         let layout = Segment::Collisions.layout(target.variant);
-        let stage = match target.variant.profile.geometry {
-            Geometry::Absolute => EntryStage::Absolute(Stage::new(&layout)),
-            Geometry::Relative => EntryStage::Relative(Stage::new(&layout)),
-        };
+        let geometry = target.variant.profile.geometry;
         let dealer = Dealer::new(&layout, channels);
-        Self { quick: target.quick, ends, marks, dealer, stage, next: first }
+        Self { quick: target.quick, ends, marks, dealer, geometry, next: first }
     }
 
     /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Those `ahead` are
     /// asked for next, and are on their way meanwhile.
     pub(super) fn write(&mut self, collisions: &[&Collision], ahead: &[&Collision]) -> Seen {
-        let Self { quick, ends, marks: Marks { scheduled, words }, dealer, stage, next } = self;
+        let Self { quick, ends, marks: Marks { scheduled, words }, dealer, geometry, next } = self;
         let (quick, first) = (*quick, *next);
         *next += collisions.len();
         let block = Block { first, collisions, ends: *ends, scheduled: *scheduled };
-        match stage {
-            EntryStage::Absolute(stage) => {
-                in_wide_vectors(Writing { kind: Absolute, quick, block, ahead, stage, dealer })
-            }
-            EntryStage::Relative(stage) => {
-                let kind = Relative { words: *words };
-                in_wide_vectors(Writing { kind, quick, block, ahead, stage, dealer })
+        match (*geometry, *words) {
+            (Geometry::Absolute, _) => in_wide_vectors(Writing {
+                kind: Absolute,
+                rows: PhantomData,
+                quick,
+                block,
+                ahead,
+                dealer,
+            }),
+            (Geometry::Relative, None) => in_wide_vectors(Writing {
+                kind: Relative,
+                rows: PhantomData,
+                quick,
+                block,
+                ahead,
+                dealer,
+            }),
+            (Geometry::Relative, Some(words)) => {
+                let kind = Worded(words);
+                in_wide_vectors(Writing { kind, rows: PhantomData, quick, block, ahead, dealer })
             }
         }
     }
@@ -227,10 +230,10 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
 /// A block of collisions, and where it goes.
 struct Writing<'p, 'a, 'b, K, const ROWS: usize> {
     kind: K,
+    rows: PhantomData<[Lanes; ROWS]>,
     quick: Option<&'p Quick<'p>>,
     block: Block<'p>,
     ahead: &'p [&'p Collision],
-    stage: &'p mut Stage<ROWS, BLOCK>,
     dealer: &'p mut Dealer<'a, 'b>,
 }
 
@@ -240,17 +243,17 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
     /// Encodes, looks at and deals out.
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> Seen {
-        let Self { kind, quick, block, ahead, stage, dealer } = self;
+        let Self { kind, quick, block, ahead, dealer, .. } = self;
         for collision in block.collisions {
             block.ends.soon([collision.body_a, collision.body_b]);
         }
         let mut records = Encoding::new(kind, &block, ahead);
         let Some(quick) = quick else {
-            stage.send(vectors, &mut records, dealer);
+            dealer.write(vectors, &mut records);
             return Seen::NOTHING;
         };
         let mut records = LookedAt::new(records, quick, block.scheduled);
-        stage.send(vectors, &mut records, dealer);
+        dealer.write(vectors, &mut records);
         Seen { paddings: records.paddings(), good: records.good(&block) }
     }
 }

@@ -1,16 +1,20 @@
-//! This file deals the beats of a segment out to its channels.
+//! This file deals the records of a segment out to its channels.
 //!
-//! A block of records is laid out in the cache first; then its beats go to the channels one after
-//! the other, each a run of whole beats upwards, as memory that combines writes wants them. Nothing
-//! is read back: the sum that the accelerator is checked with is taken on the way.
+//! They go by units ([`unit`]), from registers, and beat by beat what is left at a segment's end, or has
+//! a stripe that no profile has: in whole beats, on each channel upwards, as memory that combines
+//! writes wants them. Nothing is read back: the sum that the accelerator is checked with is taken on
+//! the way.
 
 use std::mem;
 
 use bitstream_model::interface::record::Beat;
+use bytemuck::Zeroable as _;
 
-use super::stripe::{Deal, GROUP, Layout, Place};
+use super::stripe::{Deal, Layout, Place};
+use super::unit::{self, Format, Pattern, Records};
 use super::unpack::total;
-use crate::platform::{Lanes, soon_written};
+use crate::platform::{Lanes, Vectors};
+use crate::record::sixteen::Sixteen;
 
 /// Records of a block. Divisible by the records of a group of every stripe, so that each block
 /// begins with a group; and so few that a block, read and written, lies in the innermost cache.
@@ -19,102 +23,203 @@ pub(crate) const BLOCK: usize = 30;
 /// Records of a block of bodies, which lie one behind the other, as [`BLOCK`].
 pub(super) const BODIES: usize = 120;
 
-/// Writes the beats of one segment.
+/// Writes the records of one segment.
 pub(super) struct Dealer<'a, 'b> {
     /// What is not written yet.
     channels: &'a mut [&'b mut [Beat]],
+    format: Option<Sixteen>,
+    /// The stripe, if it is known, and its first channel.
+    pattern: Option<(Pattern, usize)>,
     deal: Deal,
     padded: bool,
     sum: Lanes,
 }
 
 impl<'a, 'b> Dealer<'a, 'b> {
-    /// From the first beat on.
+    /// From the first record on.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
     pub(super) fn new(layout: &Layout, channels: &'a mut [&'b mut [Beat]]) -> Self {
         Self {
             channels,
+            format: Sixteen::of(layout.format),
+            pattern: Pattern::of(layout.stripe.streams),
             deal: Deal::new(layout.stripe),
             padded: layout.stripe.padded,
             sum: Lanes::all(0),
         }
     }
 
-    /// Writes the next beats.
+    /// Writes the next records; only the last block may be one that is not whole.
     #[inline(always)]
-    pub(super) fn write(&mut self, beats: &[Beat]) {
-        let rest = match self.deal.group().len() {
-            _ if !self.deal.at_end_of_group() => beats,
-            1 => self.groups::<1>(beats),
-            2 => self.groups::<2>(beats),
-            3 => self.groups::<3>(beats),
-            4 => self.groups::<4>(beats),
-            5 => self.groups::<5>(beats),
-            7 => self.groups::<7>(beats),
-            _ => beats,
-        };
-        for beat in rest {
-            let Place { channel, .. } = self.deal.next();
-            let (to, behind) = mem::take(&mut self.channels[channel]).split_at_mut(1);
-            to[0] = *beat;
-            self.channels[channel] = behind;
-            self.sum = self.sum.plus(Lanes::from(*beat));
+    pub(super) fn write<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
+        &mut self,
+        vectors: V,
+        records: &mut R,
+    ) {
+        // One loop each, in which nothing is asked of the format.
+        match self.format {
+            None => self.write_as(vectors, unit::Whole, records),
+            Some(Sixteen::Binary16) => self.write_as(vectors, unit::Binary16, records),
+            Some(Sixteen::Thesis16) => self.write_as(vectors, unit::Thesis16, records),
         }
     }
 
-    /// Writes whole groups of `G` beats; what is left of the beats.
     #[inline(always)]
-    fn groups<'c, const G: usize>(&mut self, beats: &'c [Beat]) -> &'c [Beat] {
-        let (groups, rest) = beats.as_chunks::<G>();
-        for (channel, share) in self.channels.iter_mut().zip(&self.deal.shares) {
-            let (to, behind) = mem::take(channel).split_at_mut(groups.len() * share.count);
-            soon_written(&behind[..to.len().min(behind.len())]);
-            *channel = behind;
-            let (places, sum) = (&share.places, &mut self.sum);
-            match share.count {
-                0 => {}
-                1 => run::<G, 1>(groups, places, to, sum),
-                2 => run::<G, 2>(groups, places, to, sum),
-                3 => run::<G, 3>(groups, places, to, sum),
-                count => {
-                    let beats =
-                        groups.iter().flat_map(|group| places[..count].iter().map(|at| group[*at]));
-                    for (to, beat) in to.iter_mut().zip(beats) {
-                        *to = beat;
-                        *sum = sum.plus(Lanes::from(beat));
-                    }
+    fn write_as<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
+        &mut self,
+        vectors: V,
+        format: F,
+        records: &mut R,
+    ) {
+        let mut sum = self.sum;
+        let done = match self.pattern {
+            Some((pattern, first)) if self.deal.at_end_of_group() => {
+                let rest = self.channels.get_mut(first..).unwrap_or_default();
+                unit::write(pattern, (vectors, format), records, rest, &mut sum)
+            }
+            _ => 0,
+        };
+        // What is left of them fills no unit. Rows that fill no beat yet wait for the next record's.
+        let mut waiting = [F::Row::zeroed(); 2];
+        let mut count = 0;
+        for at in done..records.len() {
+            let Some(record) = records.get(at) else { break };
+            for row in format.rows::<V, R, ROWS>(vectors, record, &mut sum) {
+                waiting[count] = row;
+                count += 1;
+                if count == F::PER_BEAT {
+                    self.put(F::beat(&mem::replace(&mut waiting, [F::Row::zeroed(); 2])));
+                    count = 0;
                 }
             }
         }
-        rest
+        if count > 0 {
+            self.put(F::beat(&waiting));
+        }
+        self.sum = sum;
+    }
+
+    /// Writes the next beat.
+    fn put(&mut self, beat: Beat) {
+        let Place { channel, .. } = self.deal.next();
+        let (to, behind) = mem::take(&mut self.channels[channel]).split_at_mut(1);
+        to[0] = beat;
+        self.channels[channel] = behind;
     }
 
     /// Fills the last group if the stripe says so; the sum of all words, modulo 2^32.
     #[inline(always)]
     pub(super) fn finish(mut self) -> u32 {
         while self.padded && !self.deal.at_end_of_group() {
-            self.write(&[Beat::default()]);
+            self.put(Beat::default());
         }
         total(self.sum)
     }
 }
 
-/// Writes the `S` beats of each group that go to one channel, and adds them up.
-#[inline(always)]
-fn run<const G: usize, const S: usize>(
-    groups: &[[Beat; G]],
-    places: &[usize; GROUP],
-    to: &mut [Beat],
-    sum: &mut Lanes,
-) {
-    // Said once here, so that it is not asked of every beat.
-    let places: [usize; S] = std::array::from_fn(|at| places[at % GROUP].min(G - 1));
-    let mut total = *sum;
-    for (to, group) in to.as_chunks_mut::<S>().0.iter_mut().zip(groups) {
-        let beats = places.map(|place| Lanes::from(group[place]));
-        total = beats.iter().fold(total, |total, beat| total.plus(*beat));
-        *to = beats.map(Beat::from);
+#[cfg(test)]
+mod tests {
+    use bitstream_model::interface::number::StreamFormat;
+    use bitstream_model::interface::record::LANES;
+    use bitstream_model::interface::stripe::Stripe;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::platform::{Work, in_wide_vectors};
+
+    const ROWS: usize = 3;
+
+    /// Records of three rows, whose first word is an integer.
+    struct Made<'a>(&'a [[[u32; LANES]; ROWS]]);
+
+    impl Records<ROWS> for Made<'_> {
+        const INTEGERS: [bool; ROWS] = [true, false, false];
+
+        #[inline(always)]
+        fn len(&self) -> usize {
+            self.0.len()
+        }
+
+        #[inline(always)]
+        fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]> {
+            self.0.get(at).map(|record| record.map(Lanes::new))
+        }
     }
-    *sum = total;
+
+    struct Dealing<'p, 'a, 'b>(&'p mut Dealer<'a, 'b>, Made<'p>);
+
+    impl Work for Dealing<'_, '_, '_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<V: Vectors>(mut self, vectors: V) {
+            self.0.write(vectors, &mut self.1);
+        }
+    }
+
+    proptest! {
+        /// Of stripes that no profile has, and of some that one has.
+        #[test]
+        fn every_beat_goes_where_the_definition_says(
+            records in prop::collection::vec(prop::array::uniform3(any::<[u32; LANES]>()), 0..100),
+            streams in prop::sample::select(vec![
+                &[1, 0][..], &[0, 1, 1], &[3, 2, 1, 0, 0, 1], &[0, 0, 0, 1, 1, 1, 2], &[2], &[0, 1],
+            ]),
+            padded in any::<bool>(),
+            format in prop::sample::select(vec![
+                StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16,
+            ]),
+        ) {
+            let layout = Layout { rows: ROWS, format, stripe: Stripe { streams, padded } };
+            let mut segments: Vec<Vec<Beat>> = (0..4)
+                .map(|channel| vec![Beat::default(); layout.beats_on_channel(records.len(), channel)])
+                .collect();
+            let mut channels: Vec<&mut [Beat]> = segments.iter_mut().map(Vec::as_mut_slice).collect();
+            let mut dealer = Dealer::new(&layout, &mut channels);
+            for block in records.chunks(BLOCK) {
+                in_wide_vectors(Dealing(&mut dealer, Made(block)));
+            }
+            let sum = dealer.finish();
+
+            // Row by row, with the conversion of one row alone.
+            let rows: Vec<[u32; LANES]> = records.iter().flatten().copied().collect();
+            let mut beats = vec![Beat::default(); layout.beats(records.len())];
+            for (at, row) in rows.iter().enumerate() {
+                match Sixteen::of(format) {
+                    None => beats[at] = Beat(*row),
+                    Some(sixteen) => {
+                        let integer = at.is_multiple_of(ROWS);
+                        let row = narrowed(sixteen, *row, integer).map(u32::from);
+                        let to = &mut beats[at / 2].0[at % 2 * 2..][..2];
+                        to.copy_from_slice(&[row[0] | row[1] << 16, row[2] | row[3] << 16]);
+                    }
+                }
+            }
+            let mut expected: Vec<Vec<Beat>> =
+                segments.iter().map(|segment| vec![Beat::default(); segment.len()]).collect();
+            for (at, beat) in beats.iter().enumerate() {
+                let Place { channel, slot } = layout.place(at);
+                expected[channel][slot] = *beat;
+            }
+            prop_assert_eq!(&segments, &expected);
+            let words = expected.iter().flatten().flat_map(|beat| beat.0);
+            prop_assert_eq!(sum, words.fold(0, u32::wrapping_add));
+        }
+    }
+
+    fn narrowed(format: Sixteen, row: [u32; LANES], integer: bool) -> [u16; LANES] {
+        struct One(Sixteen, [u32; LANES], bool);
+        impl Work for One {
+            type Output = [u16; LANES];
+
+            #[inline(always)]
+            fn run<V: Vectors>(self, vectors: V) -> [u16; LANES] {
+                let Self(format, row, integer) = self;
+                let [narrow] = format.narrow(vectors, [Lanes::new(row)], &[integer]);
+                narrow
+            }
+        }
+        in_wide_vectors(One(format, row, integer))
+    }
 }

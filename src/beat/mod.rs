@@ -12,8 +12,8 @@ mod pack_tests;
 #[cfg(test)]
 mod range_tests;
 pub(crate) mod ranges;
-mod stage;
 pub(crate) mod stripe;
 pub(crate) mod target;
+mod unit;
 pub(crate) mod unpack;
 pub(crate) mod writer;

@@ -131,19 +131,19 @@ pub(super) struct Deal {
     at: usize,
     slots: [usize; CHANNELS],
     /// What goes to each channel.
-    pub(super) shares: [Share; CHANNELS],
+    shares: [Share; CHANNELS],
 }
 
 /// The beats of a group that go to one channel.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Share {
+struct Share {
     /// Which they are; the first `count` of these.
-    pub(super) places: [usize; GROUP],
-    pub(super) count: usize,
+    places: [usize; GROUP],
+    count: usize,
 }
 
 /// Beats of a group at most, for [`Deal::places`].
-pub(super) const GROUP: usize = 8;
+const GROUP: usize = 8;
 
 /// Channels at most.
 const CHANNELS: usize = bitstream_model::interface::address_map::DMA_COUNT_MAX;

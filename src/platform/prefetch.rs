@@ -25,6 +25,15 @@ pub(crate) fn soon_written<T>(values: &[T]) {
     lines(values).for_each(fetch_to_write);
 }
 
+/// Says that what lies a little behind these will be written soon, if they are.
+#[inline(always)]
+pub(crate) fn soon_written_behind<T>(values: &[T]) {
+    lines(values).for_each(|line| fetch_to_write(line.wrapping_add(BEHIND)));
+}
+
+/// Bytes.
+const BEHIND: usize = 1024;
+
 /// An address in every line of these, but perhaps the last.
 #[inline(always)]
 fn lines<T>(values: &[T]) -> impl Iterator<Item = *const u8> {
