@@ -80,12 +80,13 @@ impl<'a, 'b> Dealer<'a, 'b> {
             }
             _ => 0,
         };
+        self.sum = sum;
         // What is left of them fills no unit. Rows that fill no beat yet wait for the next record's.
         let mut waiting = [F::Row::zeroed(); 2];
         let mut count = 0;
         for at in done..records.len() {
             let Some(record) = records.get(at) else { break };
-            for row in format.rows::<V, R, ROWS>(vectors, record, &mut sum) {
+            for row in format.rows::<V, R, ROWS>(vectors, record) {
                 waiting[count] = row;
                 count += 1;
                 if count == F::PER_BEAT {
@@ -97,7 +98,6 @@ impl<'a, 'b> Dealer<'a, 'b> {
         if count > 0 {
             self.put(F::beat(&waiting));
         }
-        self.sum = sum;
     }
 
     /// Writes the next beat.
@@ -106,6 +106,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
         let (to, behind) = mem::take(&mut self.channels[channel]).split_at_mut(1);
         to[0] = beat;
         self.channels[channel] = behind;
+        self.sum = self.sum.plus(beat.into());
     }
 
     /// Fills the last group if the stripe says so; the sum of all words, modulo 2^32.

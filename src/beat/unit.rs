@@ -39,12 +39,11 @@ pub(super) trait Format: Copy {
     /// `#[inline(always)]` belongs to every implementation.
     fn beat(rows: &[Self::Row]) -> Beat;
 
-    /// The rows of a record, whose words are added to the sum. Likewise.
+    /// The rows of a record. Likewise.
     fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
         self,
         vectors: V,
         record: [Lanes; ROWS],
-        sum: &mut Lanes,
     ) -> [Self::Row; ROWS];
 }
 
@@ -67,9 +66,7 @@ impl Format for Whole {
         self,
         _: V,
         record: [Lanes; ROWS],
-        sum: &mut Lanes,
     ) -> [Beat; ROWS] {
-        *sum = record.iter().fold(*sum, |sum, row| sum.plus(*row));
         let mut rows = [Beat::default(); ROWS];
         for (to, row) in rows.iter_mut().zip(&record) {
             *to = (*row).into();
@@ -104,18 +101,8 @@ macro_rules! sixteen {
                 self,
                 vectors: V,
                 record: [Lanes; ROWS],
-                sum: &mut Lanes,
             ) -> [Row; ROWS] {
-                let rows = Sixteen::$format.narrow(vectors, record, &R::INTEGERS);
-                let (first, pairs) = rows.as_rchunks::<2>();
-                for row in first {
-                    let [low, high]: [u32; 2] = bytemuck::cast(*row);
-                    *sum = sum.plus(Lanes::new([low, high, 0, 0]));
-                }
-                for pair in pairs {
-                    *sum = sum.plus(Lanes::new(bytemuck::cast(*pair)));
-                }
-                rows
+                Sixteen::$format.narrow(vectors, record, &R::INTEGERS)
             }
         }
     };
@@ -174,8 +161,8 @@ places! {
     Four: FLOAT.stripes.poses.streams;
 }
 
-/// Writes as many records as fill whole units; how many these are. `rest` is what is not written yet
-/// of the channels, from the first of the stripe on.
+/// Writes as many records as fill whole units, and adds the words written to `sum`; how many records
+/// these are. `rest` is what is not written yet of the channels, from the first of the stripe on.
 #[inline(always)]
 pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
     pattern: Pattern,
@@ -267,12 +254,14 @@ fn unit<
     let mut rows = [[F::Row::zeroed(); ROWS]; RECORDS];
     for (at, to) in rows.iter_mut().enumerate() {
         let Some(record) = records.get(unit * RECORDS + at) else { return };
-        *to = format.rows::<V, R, ROWS>(vectors, record, sum);
+        *to = format.rows::<V, R, ROWS>(vectors, record);
     }
     let rows = rows.as_flattened();
     for at in 0..BEATS {
         let Place { channel, slot } = P::PLACES[at];
-        to[channel][slot] = F::beat(&rows[at * F::PER_BEAT..]);
+        let beat = F::beat(&rows[at * F::PER_BEAT..]);
+        to[channel][slot] = beat;
+        *sum = sum.plus(beat.into());
     }
 }
 
