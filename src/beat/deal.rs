@@ -17,10 +17,11 @@ use crate::platform::{Lanes, Vectors};
 use crate::record::sixteen::Sixteen;
 
 /// Records of a block. Divisible by the records of a group of every stripe, so that each block
-/// begins with a group; and so few that a block, read and written, lies in the innermost cache.
+/// begins with a group; and so few that a block and the next, which is fetched meanwhile, lie in the
+/// innermost cache.
 pub(crate) const BLOCK: usize = 30;
 
-/// Records of a block of bodies, which lie one behind the other, as [`BLOCK`].
+/// Bodies of a block, as [`BLOCK`]: more, as they are small and lie one behind the other.
 pub(super) const BODIES: usize = 120;
 
 /// Writes the records of one segment.
