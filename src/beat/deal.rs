@@ -1,6 +1,6 @@
 //! This file deals the records of a segment out to its channels.
 //!
-//! They go by units ([`unit`]), from registers, and beat by beat what is left at a segment's end, or has
+//! They go by units ([`unit`](mod@unit)), from registers, and beat by beat what is left at a segment's end, or has
 //! a stripe that no profile has: in whole beats, on each channel upwards, as memory that combines
 //! writes wants them. Nothing is read back: the sum that the accelerator is checked with is taken on
 //! the way.

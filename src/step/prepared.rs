@@ -66,7 +66,7 @@ impl InFlight<'_> {
     ///
     /// # Errors
     /// [`Error::Input`]: the input was refused. [`Error::Step`] with
-    /// [`Fault::NoMemory`](crate::Fault::NoMemory): there is no room for a second set of buffers.
+    /// [`Fault::NoMemory`]: there is no room for a second set of buffers.
     /// Either way what was prepared before is gone, and is refused when it is started.
     pub fn prepare<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
