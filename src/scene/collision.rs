@@ -18,6 +18,8 @@ pub struct Contact {
 }
 
 /// Two bodies in contact at one to four points.
+///
+/// Its words lie in this order, without a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Collision {
