@@ -152,6 +152,42 @@ impl Bodies for Unsteady<Body> {
     }
 }
 
+/// Collisions of which one is said to lie somewhere, and it is not said where.
+struct Nowhere(Vec<Collision>);
+
+impl Collisions for Nowhere {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        self.0[index]
+    }
+
+    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
+        for ((to, from), index) in to.iter_mut().zip(&self.0[first..]).zip(first..) {
+            if index != 42 {
+                *to = from;
+            }
+        }
+        true
+    }
+}
+
+#[test]
+fn what_lies_nowhere_is_never_sent() {
+    let (bodies, collisions) = scene();
+    let mut parameters = StepParameters::default();
+    parameters.order = Some(Order::AsGiven);
+    for profile in [&FLOAT, &HALF, &MIXED] {
+        let mut state = bodies.clone();
+        let found = open(profile).step(&mut state, &Nowhere(collisions.clone()), &parameters);
+        let found = found.expect_err("one lies nowhere");
+        assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
+        assert_eq!(state, bodies);
+    }
+}
+
 /// What is wrong only while it is packed must not be sent, though nothing is wrong with it later.
 #[test]
 fn what_is_wrong_at_one_look_alone_is_never_sent() {

@@ -4,10 +4,10 @@
 //! of them upwards, in whole beats, and never read: the sum that the accelerator is checked with is
 //! taken from the values on their way.
 //!
-//! A range goes by blocks of records that lie in the cache: what the caller has is looked at and made
-//! rows of ([`record`](crate::record)), which are dealt out to the channels in the format of the stream
-//! ([`Dealer`](super::deal::Dealer)). What is wrong with the input is not said here, only that something
-//! is.
+//! A range goes by blocks of bodies that lie in the cache, for each is read more than once: what the
+//! caller has is looked at and made rows of ([`record`](crate::record)), which are dealt out to the
+//! channels in the format of the stream ([`Dealer`](super::deal::Dealer)). What is wrong with the input is
+//! not said here, only that something is.
 
 use std::mem;
 use std::ops::Range;

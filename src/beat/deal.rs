@@ -23,6 +23,7 @@ pub(crate) const BLOCK: usize = 30;
 
 /// Bodies of a block, as [`BLOCK`]: more, as they are small and lie one behind the other.
 pub(super) const BODIES: usize = 120;
+const _: () = assert!(BODIES.is_multiple_of(BLOCK), "so that each begins with a group");
 
 /// Writes the records of one segment.
 pub(super) struct Dealer<'a, 'b> {
@@ -174,8 +175,9 @@ mod tests {
             ]),
         ) {
             let layout = Layout { rows: ROWS, format, stripe: Stripe { streams, padded } };
+            // Full of ones, so that a beat left out is seen.
             let mut segments: Vec<Vec<Beat>> = (0..4)
-                .map(|channel| vec![Beat::default(); layout.beats_on_channel(records.len(), channel)])
+                .map(|channel| vec![Beat([u32::MAX; LANES]); layout.beats_on_channel(records.len(), channel)])
                 .collect();
             let mut channels: Vec<&mut [Beat]> = segments.iter_mut().map(Vec::as_mut_slice).collect();
             let mut dealer = Dealer::new(&layout, &mut channels);

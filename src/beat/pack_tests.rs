@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::bodies::{Chosen, pack_poses, pack_velocities, survey};
 use super::collisions::{Entries, pack_collisions};
+use super::deal::{BLOCK, BODIES};
 use super::ranges::Packers;
 use super::stripe::Segment;
 use super::target::Target;
@@ -18,6 +19,23 @@ use crate::scene::{
     Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
     Velocity,
 };
+
+/// Collisions of which only some lie somewhere as they are.
+struct SomeLie<'a>(&'a [(Collision, bool)]);
+
+impl Collisions for SomeLie<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        self.0[index].0
+    }
+
+    fn structure(&self, index: usize) -> Option<&Collision> {
+        self.0.get(index).filter(|(_, lies)| *lies).map(|(collision, _)| collision)
+    }
+}
 
 /// How the words of a stream are written.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -443,11 +461,29 @@ proptest! {
         reader.end();
     }
 
+    /// Of several blocks: where one lies, none may have lain two blocks before, and the other way round.
+    #[test]
+    fn collisions_arrive_whether_they_lie_somewhere_or_not(
+        spec in any_spec(),
+        bodies in prop::collection::vec(any_body(), 12),
+        few in prop::collection::vec(any_collision(), 1..10),
+        picks in prop::collection::vec((any::<prop::sample::Index>(), any::<bool>()), 0..4 * BLOCK),
+    ) {
+        let list: Vec<(Collision, bool)> =
+            picks.into_iter().map(|(pick, lies)| (*pick.get(&few), lies)).collect();
+        let copied: Vec<Collision> = list.iter().map(|(collision, _)| *collision).collect();
+        prop_assert_eq!(
+            collisions(&spec, &bodies, &SomeLie(&list)),
+            collisions(&spec, &bodies, &copied)
+        );
+    }
+
+    /// Of several blocks: they do not lie one behind the other, and each is asked for.
     #[test]
     fn chosen_bodies_arrive_in_their_own_order(
         spec in any_spec(),
         bodies in prop::collection::vec(any_body(), 1..20),
-        picks in prop::collection::vec(any::<prop::sample::Index>(), 0..30),
+        picks in prop::collection::vec(any::<prop::sample::Index>(), 0..3 * BODIES),
     ) {
         let order: Vec<u32> =
             picks.iter().map(|pick| u32::try_from(pick.index(bodies.len())).expect("few")).collect();

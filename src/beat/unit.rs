@@ -288,6 +288,7 @@ mod tests {
     use bitstream_model::interface::profile::{Inertia, PROFILES, Variant};
     use bitstream_model::interface::record::LANES;
 
+    use super::super::deal::BLOCK;
     use super::super::stripe::{Layout, Segment};
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
@@ -322,7 +323,7 @@ mod tests {
         assert_eq!([&[][..], &[1, 0], &[0, 1, 1], &[0, 0]].map(Pattern::of), [None; 4]);
     }
 
-    /// Thirty records of zeros.
+    /// A block of records of zeros.
     struct Zeros;
 
     impl<const ROWS: usize> Records<ROWS> for Zeros {
@@ -330,7 +331,7 @@ mod tests {
 
         #[inline(always)]
         fn len(&self) -> usize {
-            30
+            BLOCK
         }
 
         #[inline(always)]
@@ -349,8 +350,8 @@ mod tests {
         fn run<V: Vectors>(self, vectors: V) -> usize {
             let Self(layout) = self;
             let (pattern, _) = Pattern::of(layout.stripe.streams).expect("a known one");
-            let mut beats = vec![Beat::default(); 4 * 30 * ROWS];
-            let mut rest: Vec<&mut [Beat]> = beats.chunks_mut(30 * ROWS).collect();
+            let mut beats = vec![Beat::default(); 4 * BLOCK * ROWS];
+            let mut rest: Vec<&mut [Beat]> = beats.chunks_mut(BLOCK * ROWS).collect();
             let sum = &mut Lanes::all(0);
             match Sixteen::of(layout.format) {
                 None => {
@@ -381,7 +382,7 @@ mod tests {
                         7 => in_wide_vectors(Written::<7>(layout)),
                         rows => panic!("{rows} rows are those of no record"),
                     };
-                    assert_eq!(written, 30, "{} {segment:?} {inertia:?}", profile.name);
+                    assert_eq!(written, BLOCK, "{} {segment:?} {inertia:?}", profile.name);
                 }
             }
         }

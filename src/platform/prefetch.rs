@@ -25,13 +25,14 @@ pub(crate) fn soon_written<T>(values: &[T]) {
     lines(values).for_each(fetch_to_write);
 }
 
-/// Says that what lies a little behind these will be written soon, if they are.
+/// Says that what lies a little behind these will be written soon: [`soon_written`] for who goes through a
+/// buffer a few beats at a time. Where there is nothing behind them nothing comes of it.
 #[inline(always)]
 pub(crate) fn soon_written_behind<T>(values: &[T]) {
     lines(values).for_each(|line| fetch_to_write(line.wrapping_add(BEHIND)));
 }
 
-/// Bytes.
+/// How far behind, in bytes: so far that it is there in time, so near that it is not gone again.
 const BEHIND: usize = 1024;
 
 /// An address in every line of these, but perhaps the last.

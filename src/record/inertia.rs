@@ -39,6 +39,7 @@ pub(crate) fn about_world_axes(shape: &Shape, orientation: [f32; 4]) -> Inverse 
 }
 
 /// The rotation matrix of a quaternion, by rows.
+#[inline(always)]
 fn rotation([x, y, z, w]: [f32; 4]) -> [[f32; 3]; 3] {
     let d = ((x * x + y * y) + z * z) + w * w;
     let s = 2.0 / d;

@@ -27,6 +27,8 @@ pub struct Velocity {
 }
 
 /// A rigid body.
+///
+/// Its words lie in this order, without a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Body {

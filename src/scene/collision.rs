@@ -18,6 +18,8 @@ pub struct Contact {
 }
 
 /// Two bodies in contact at one to four points.
+///
+/// Its words lie in this order, without a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Collision {
@@ -61,7 +63,8 @@ pub trait Collisions: Sync {
 
     /// Where the collisions from `first` on lie, as many as fit in `to` and none of them beyond
     /// [`len`](Self::len), as [`structure`](Self::structure) says of each; one that does not lie
-    /// anywhere leaves its place as it is. Whether all do.
+    /// anywhere leaves its place as it is. Whether all do; a step refuses one whose place is left all the
+    /// same, as [`InputError::Unsteady`](super::InputError::Unsteady).
     fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
         let mut all = true;
         for (to, index) in to.iter_mut().zip(first..) {

@@ -119,6 +119,7 @@ impl Shape {
 
     /// Whether its inertia is the same about every axis.
     #[must_use]
+    #[inline(always)]
     pub fn is_isotropic(&self) -> bool {
         let [x, y, z] = self.inverse_inertia;
         x - y == 0.0 && x - z == 0.0
@@ -126,6 +127,7 @@ impl Shape {
 
     /// Whether bodies of this shape never move.
     #[must_use]
+    #[inline(always)]
     pub fn is_static(&self) -> bool {
         self.inverse_mass == 0.0
     }
