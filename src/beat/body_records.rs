@@ -4,9 +4,9 @@ use bitstream_model::interface::profile::Inertia;
 use bitstream_model::interface::record::{Beat, pose, velocity};
 
 use super::deal::Dealer;
+use super::format::Records;
 use super::stripe::Segment;
 use super::target::Target;
-use super::unit::Records;
 use crate::platform::{Lanes, Vectors};
 use crate::record;
 use crate::scene::{Body, Shape};

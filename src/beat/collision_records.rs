@@ -2,7 +2,7 @@
 
 use bitstream_model::interface::record::{collision, relative};
 
-use super::unit::Records;
+use super::format::Records;
 use crate::platform::{Lanes, prefetch};
 use crate::record;
 use crate::record::end::{End, Ends};

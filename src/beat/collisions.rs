@@ -18,7 +18,7 @@ use super::target::Target;
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::end::Ends;
 use crate::scene::validate::{Block, Quick};
-use crate::scene::{CONTACT_POINTS, Collision, Collisions, Contact};
+use crate::scene::{Collision, Collisions};
 
 /// The collisions of a step, as they are sent.
 #[derive(Debug)]
@@ -96,7 +96,7 @@ fn pack_range<C: Collisions + ?Sized>(
     let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
     let mut seen = Seen::NOTHING;
     let (mut here, mut next) = (&mut [&ELSEWHERE; BLOCK], &mut [&ELSEWHERE; BLOCK]);
-    let mut copies = [NOTHING; BLOCK];
+    let mut copies = [Collision::NOTHING; BLOCK];
     let until = range.end;
     let mut all_lie = find(collisions, range.start, &mut here[..range.len().min(BLOCK)]);
     for first in range.step_by(BLOCK) {
@@ -143,7 +143,7 @@ fn find<'a, C: Collisions + ?Sized>(
 
 /// Stands for a collision that does not lie anywhere as it is. Should a constant of the same value
 /// have its address, that one is asked for once more, and is what it is.
-static ELSEWHERE: Collision = NOTHING;
+static ELSEWHERE: Collision = Collision::NOTHING;
 
 /// What is said of collisions beside what they hold.
 #[derive(Debug, Clone, Copy)]
@@ -257,12 +257,3 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
         Seen { paddings: records.paddings(), good: records.good(&block) }
     }
 }
-
-/// What a block of collisions holds before it is read.
-pub(crate) const NOTHING: Collision = Collision {
-    body_a: 0,
-    body_b: 0,
-    normal: [0.0; 3],
-    count: 0,
-    contacts: [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS],
-};

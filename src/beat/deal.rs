@@ -10,8 +10,10 @@ use std::mem;
 use bitstream_model::interface::record::Beat;
 use bytemuck::Zeroable as _;
 
+use super::format::{Binary16, Format, Records, Thesis16, Whole};
+use super::pattern::Pattern;
 use super::stripe::{Deal, Layout, Place};
-use super::unit::{self, Format, Pattern, Records};
+use super::unit;
 use super::unpack::total;
 use crate::platform::{Lanes, Vectors};
 use crate::record::sixteen::Sixteen;
@@ -61,9 +63,9 @@ impl<'a, 'b> Dealer<'a, 'b> {
     ) {
         // One loop each, in which nothing is asked of the format.
         match self.format {
-            None => self.write_as(vectors, unit::Whole, records),
-            Some(Sixteen::Binary16) => self.write_as(vectors, unit::Binary16, records),
-            Some(Sixteen::Thesis16) => self.write_as(vectors, unit::Thesis16, records),
+            None => self.write_as::<V, Whole, R, ROWS>(vectors, records),
+            Some(Sixteen::Binary16) => self.write_as::<V, Binary16, R, ROWS>(vectors, records),
+            Some(Sixteen::Thesis16) => self.write_as::<V, Thesis16, R, ROWS>(vectors, records),
         }
     }
 
@@ -71,14 +73,13 @@ impl<'a, 'b> Dealer<'a, 'b> {
     fn write_as<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
         &mut self,
         vectors: V,
-        format: F,
         records: &mut R,
     ) {
         let mut sum = self.sum;
         let done = match self.pattern {
             Some((pattern, first)) if self.deal.at_end_of_group() => {
                 let rest = self.channels.get_mut(first..).unwrap_or_default();
-                unit::write(pattern, (vectors, format), records, rest, &mut sum)
+                unit::write::<V, F, R, ROWS>(pattern, vectors, records, rest, &mut sum)
             }
             _ => 0,
         };
@@ -88,7 +89,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
         let mut count = 0;
         for at in done..records.len() {
             let Some(record) = records.get(at) else { break };
-            for row in format.rows::<V, R, ROWS>(vectors, record) {
+            for row in F::rows::<V, R, ROWS>(vectors, record) {
                 waiting[count] = row;
                 count += 1;
                 if count == F::PER_BEAT {

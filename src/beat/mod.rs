@@ -5,10 +5,12 @@ mod body_records;
 mod collision_records;
 pub(crate) mod collisions;
 mod deal;
+mod format;
 #[cfg(test)]
 mod look_tests;
 #[cfg(test)]
 mod pack_tests;
+mod pattern;
 #[cfg(test)]
 mod range_tests;
 pub(crate) mod ranges;

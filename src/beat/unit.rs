@@ -6,167 +6,20 @@
 
 use std::mem;
 
-use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
 use bitstream_model::interface::record::Beat;
-use bytemuck::{Pod, Zeroable as _};
+use bytemuck::Zeroable as _;
 
+use super::format::{Format, Records};
+use super::pattern::{self, Pattern, Places};
 use super::stripe::Place;
 use crate::platform::{Lanes, Vectors, soon_written_behind};
-use crate::record::sixteen::{Row, Sixteen};
-
-/// Records on their way, in f32.
-///
-/// `get` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
-pub(super) trait Records<const ROWS: usize> {
-    /// Rows whose word is an unsigned integer.
-    const INTEGERS: [bool; ROWS];
-
-    /// How many there are.
-    fn len(&self) -> usize;
-
-    /// One of them, if there is one. Each is asked for once, in their order.
-    fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]>;
-}
-
-/// What rows become in a stream.
-pub(super) trait Format: Copy {
-    /// Rows of a beat.
-    const PER_BEAT: usize;
-
-    type Row: Pod;
-
-    /// The beat of the first of these rows, of which there are as many as it takes. An
-    /// `#[inline(always)]` belongs to every implementation.
-    fn beat(rows: &[Self::Row]) -> Beat;
-
-    /// The rows of a record. Likewise.
-    fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
-        self,
-        vectors: V,
-        record: [Lanes; ROWS],
-    ) -> [Self::Row; ROWS];
-}
-
-/// Words of f32.
-#[derive(Clone, Copy)]
-pub(super) struct Whole;
-
-impl Format for Whole {
-    const PER_BEAT: usize = 1;
-
-    type Row = Beat;
-
-    #[inline(always)]
-    fn beat(rows: &[Beat]) -> Beat {
-        rows[0]
-    }
-
-    #[inline(always)]
-    fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
-        self,
-        _: V,
-        record: [Lanes; ROWS],
-    ) -> [Beat; ROWS] {
-        let mut rows = [Beat::default(); ROWS];
-        for (to, row) in rows.iter_mut().zip(&record) {
-            *to = (*row).into();
-        }
-        rows
-    }
-}
-
-/// Words of binary16.
-#[derive(Clone, Copy)]
-pub(super) struct Binary16;
-
-/// Words of the thesis' sixteen bits.
-#[derive(Clone, Copy)]
-pub(super) struct Thesis16;
-
-/// A format of two rows a beat.
-macro_rules! sixteen {
-    ($format:ident) => {
-        impl Format for $format {
-            const PER_BEAT: usize = 2;
-
-            type Row = Row;
-
-            #[inline(always)]
-            fn beat(rows: &[Row]) -> Beat {
-                bytemuck::cast([rows[0], rows[1]])
-            }
-
-            #[inline(always)]
-            fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
-                self,
-                vectors: V,
-                record: [Lanes; ROWS],
-            ) -> [Row; ROWS] {
-                Sixteen::$format.narrow(vectors, record, &R::INTEGERS)
-            }
-        }
-    };
-}
-sixteen!(Binary16);
-sixteen!(Thesis16);
-
-/// A stripe of one of the profiles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Pattern {
-    FloatCollisions,
-    HalfCollisions,
-    HalfBodies,
-    /// A beat for each of so many channels, in their order.
-    One,
-    Two,
-    Three,
-    Four,
-}
-
-/// Where the beats of a unit go, by channels from the first of the stripe on.
-trait Places<const BEATS: usize> {
-    const PLACES: [Place; BEATS];
-}
-
-macro_rules! places {
-    ($($pattern:ident: $streams:expr;)*) => {
-        impl Pattern {
-            /// That of a group, if it is one of these, and its first channel.
-            pub(super) fn of(group: &[u8]) -> Option<(Self, usize)> {
-                let first = *group.iter().min()?;
-                let is = |streams: &[u8]| {
-                    streams.len() == group.len()
-                        && streams.iter().zip(group).all(|(to, stream)| *to + first == *stream)
-                };
-                let found = None
-                    $(.or_else(|| is($streams).then_some(Self::$pattern)))*;
-                found.map(|pattern| (pattern, usize::from(first)))
-            }
-        }
-        $(
-            struct $pattern;
-            impl<const BEATS: usize> Places<BEATS> for $pattern {
-                const PLACES: [Place; BEATS] = dealt($streams);
-            }
-        )*
-    };
-}
-places! {
-    FloatCollisions: FLOAT.stripes.collisions.streams;
-    HalfCollisions: HALF.stripes.collisions.streams;
-    HalfBodies: HALF.stripes.poses.streams;
-    One: NAIVE.stripes.collisions.streams;
-    Two: WINDOWED.stripes.collisions.streams;
-    Three: MIXED.stripes.collisions.streams;
-    Four: FLOAT.stripes.poses.streams;
-}
 
 /// Writes as many records as fill whole units, and adds the words written to `sum`; how many records
 /// these are. `rest` is what is not written yet of the channels, from the first of the stripe on.
 #[inline(always)]
 pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
     pattern: Pattern,
-    (vectors, format): (V, F),
+    vectors: V,
     records: &mut R,
     rest: &mut [&mut [Beat]],
     sum: &mut Lanes,
@@ -179,8 +32,8 @@ pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
                 let mut rest = rest.iter_mut();
                 $(let Some($channel) = part::<$share>(rest.next(), count) else { return 0 };)*
                 for at in 0..count {
-                    unit::<$places, V, F, R, ROWS, $records, $beats, _>(
-                        (vectors, format), records, at, [$(&mut $channel[at]),*], sum,
+                    unit::<pattern::$places, V, F, R, ROWS, $records, $beats, _>(
+                        vectors, records, at, [$(&mut $channel[at]),*], sum,
                     );
                 }
                 return count * $records;
@@ -242,7 +95,7 @@ fn unit<
     const BEATS: usize,
     const CHANNELS: usize,
 >(
-    (vectors, format): (V, F),
+    vectors: V,
     records: &mut R,
     unit: usize,
     to: [&mut [Beat]; CHANNELS],
@@ -254,7 +107,7 @@ fn unit<
     let mut rows = [[F::Row::zeroed(); ROWS]; RECORDS];
     for (at, to) in rows.iter_mut().enumerate() {
         let Some(record) = records.get(unit * RECORDS + at) else { return };
-        *to = format.rows::<V, R, ROWS>(vectors, record);
+        *to = F::rows::<V, R, ROWS>(vectors, record);
     }
     let rows = rows.as_flattened();
     for at in 0..BEATS {
@@ -265,44 +118,28 @@ fn unit<
     }
 }
 
-/// Where beats go that are dealt out in groups.
-const fn dealt<const BEATS: usize>(streams: &[u8]) -> [Place; BEATS] {
-    let mut places = [Place { channel: 0, slot: 0 }; BEATS];
-    let mut at = 0;
-    while at < BEATS {
-        places[at].channel = streams[at % streams.len()] as usize;
-        let mut before = 0;
-        while before < at {
-            if places[before].channel == places[at].channel {
-                places[at].slot += 1;
-            }
-            before += 1;
-        }
-        at += 1;
-    }
-    places
-}
-
 #[cfg(test)]
 mod tests {
     use bitstream_model::interface::profile::{Inertia, PROFILES, Variant};
     use bitstream_model::interface::record::LANES;
 
     use super::super::deal::BLOCK;
+    use super::super::format::{Binary16, Thesis16, Whole};
     use super::super::stripe::{Layout, Segment};
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
+    use crate::record::sixteen::Sixteen;
 
     /// The places that a pattern has for so many beats.
     fn places<const BEATS: usize>(pattern: Pattern) -> [Place; BEATS] {
         match pattern {
-            Pattern::FloatCollisions => FloatCollisions::PLACES,
-            Pattern::HalfCollisions => HalfCollisions::PLACES,
-            Pattern::HalfBodies => HalfBodies::PLACES,
-            Pattern::One => One::PLACES,
-            Pattern::Two => Two::PLACES,
-            Pattern::Three => Three::PLACES,
-            Pattern::Four => Four::PLACES,
+            Pattern::FloatCollisions => pattern::FloatCollisions::PLACES,
+            Pattern::HalfCollisions => pattern::HalfCollisions::PLACES,
+            Pattern::HalfBodies => pattern::HalfBodies::PLACES,
+            Pattern::One => pattern::One::PLACES,
+            Pattern::Two => pattern::Two::PLACES,
+            Pattern::Three => pattern::Three::PLACES,
+            Pattern::Four => pattern::Four::PLACES,
         }
     }
 
@@ -354,14 +191,12 @@ mod tests {
             let mut rest: Vec<&mut [Beat]> = beats.chunks_mut(BLOCK * ROWS).collect();
             let sum = &mut Lanes::all(0);
             match Sixteen::of(layout.format) {
-                None => {
-                    write::<_, _, _, ROWS>(pattern, (vectors, Whole), &mut Zeros, &mut rest, sum)
-                }
+                None => write::<_, Whole, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum),
                 Some(Sixteen::Binary16) => {
-                    write::<_, _, _, ROWS>(pattern, (vectors, Binary16), &mut Zeros, &mut rest, sum)
+                    write::<_, Binary16, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum)
                 }
                 Some(Sixteen::Thesis16) => {
-                    write::<_, _, _, ROWS>(pattern, (vectors, Thesis16), &mut Zeros, &mut rest, sum)
+                    write::<_, Thesis16, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum)
                 }
             }
         }

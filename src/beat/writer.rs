@@ -5,7 +5,7 @@ use std::fmt;
 
 use bitstream_model::interface::record::Beat;
 
-use super::collisions::{CollisionPacker, Marks, NOTHING};
+use super::collisions::{CollisionPacker, Marks};
 use super::deal::BLOCK;
 use super::target::Target;
 use crate::record::end::Ends;
@@ -53,7 +53,7 @@ impl<'a> Writer<'a> {
             quick: target.quick,
             ends,
             packer: CollisionPacker::new(target, ends, marks, 0, channels),
-            block: [NOTHING; BLOCK],
+            block: [Collision::NOTHING; BLOCK],
             held: 0,
             room,
             refused: None,

@@ -1,6 +1,6 @@
 //! This file holds an order: which collision stands in which entry, and which entries are empty.
 
-use crate::scene::{CONTACT_POINTS, Collision, Collisions, Contact};
+use crate::scene::{Collision, Collisions};
 
 /// What an empty entry holds. No collision has this index: there are fewer.
 pub(super) const EMPTY: u32 = u32::MAX;
@@ -80,15 +80,6 @@ pub struct Ordered<'a, C: ?Sized> {
     pub schedule: &'a Schedule,
 }
 
-/// An entry without a collision.
-const PADDING: Collision = Collision {
-    body_a: 0,
-    body_b: 0,
-    normal: [0.0; 3],
-    count: 0,
-    contacts: [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS],
-};
-
 impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
     fn len(&self) -> usize {
         self.schedule.len()
@@ -96,14 +87,16 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
 
     #[inline]
     fn collision(&self, index: usize) -> Collision {
-        self.schedule.get(index).map_or(PADDING, |index| self.collisions.collision(index))
+        self.schedule
+            .get(index)
+            .map_or(Collision::NOTHING, |index| self.collisions.collision(index))
     }
 
     #[inline]
     fn structure(&self, index: usize) -> Option<&Collision> {
         match self.schedule.get(index) {
             Some(index) => self.collisions.structure(index),
-            None => Some(&PADDING),
+            None => Some(&Collision::NOTHING),
         }
     }
 
@@ -113,7 +106,7 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
         let mut all = true;
         for (to, entry) in to.iter_mut().zip(entries) {
             let found = match *entry {
-                EMPTY => Some(&PADDING),
+                EMPTY => Some(&Collision::NOTHING),
                 index => self.collisions.structure(index as usize),
             };
             match found {

@@ -35,6 +35,17 @@ pub struct Collision {
     pub contacts: [Contact; CONTACT_POINTS],
 }
 
+impl Collision {
+    /// One that says nothing: an entry without contact points, which has no effect.
+    pub(crate) const NOTHING: Self = Self {
+        body_a: 0,
+        body_b: 0,
+        normal: [0.0; 3],
+        count: 0,
+        contacts: [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS],
+    };
+}
+
 /// The collisions of a step, in whatever layout the caller keeps them.
 ///
 /// `[Collision]` and `Vec<Collision>` implement it, [`CollisionArrays`] implements it over separate

@@ -159,6 +159,6 @@ impl Collisions for Announced {
     }
 
     fn collision(&self, _: usize) -> Collision {
-        crate::beat::collisions::NOTHING
+        Collision::NOTHING
     }
 }

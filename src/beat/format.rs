@@ -1,0 +1,97 @@
+//! This file makes beats of records, in each format that a stream may have.
+
+use bitstream_model::interface::record::Beat;
+use bytemuck::Pod;
+
+use crate::platform::{Lanes, Vectors};
+use crate::record::sixteen::{Row, Sixteen};
+
+/// Records on their way, in f32.
+///
+/// `get` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
+pub(super) trait Records<const ROWS: usize> {
+    /// Rows whose word is an unsigned integer.
+    const INTEGERS: [bool; ROWS];
+
+    /// How many there are.
+    fn len(&self) -> usize;
+
+    /// One of them, if there is one. Each is asked for once, in their order.
+    fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]>;
+}
+
+/// What rows become in a stream.
+pub(super) trait Format {
+    /// Rows of a beat.
+    const PER_BEAT: usize;
+
+    type Row: Pod;
+
+    /// The beat of the first of these rows, of which there are as many as it takes. An
+    /// `#[inline(always)]` belongs to every implementation.
+    fn beat(rows: &[Self::Row]) -> Beat;
+
+    /// The rows of a record. Likewise.
+    fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
+        vectors: V,
+        record: [Lanes; ROWS],
+    ) -> [Self::Row; ROWS];
+}
+
+/// Words of f32.
+pub(super) struct Whole;
+
+impl Format for Whole {
+    const PER_BEAT: usize = 1;
+
+    type Row = Beat;
+
+    #[inline(always)]
+    fn beat(rows: &[Beat]) -> Beat {
+        rows[0]
+    }
+
+    #[inline(always)]
+    fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
+        _: V,
+        record: [Lanes; ROWS],
+    ) -> [Beat; ROWS] {
+        let mut rows = [Beat::default(); ROWS];
+        for (to, row) in rows.iter_mut().zip(&record) {
+            *to = (*row).into();
+        }
+        rows
+    }
+}
+
+/// Words of binary16.
+pub(super) struct Binary16;
+
+/// Words of the thesis' sixteen bits.
+pub(super) struct Thesis16;
+
+/// A format of two rows a beat.
+macro_rules! sixteen {
+    ($format:ident) => {
+        impl Format for $format {
+            const PER_BEAT: usize = 2;
+
+            type Row = Row;
+
+            #[inline(always)]
+            fn beat(rows: &[Row]) -> Beat {
+                bytemuck::cast([rows[0], rows[1]])
+            }
+
+            #[inline(always)]
+            fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
+                vectors: V,
+                record: [Lanes; ROWS],
+            ) -> [Row; ROWS] {
+                Sixteen::$format.narrow(vectors, record, &R::INTEGERS)
+            }
+        }
+    };
+}
+sixteen!(Binary16);
+sixteen!(Thesis16);
