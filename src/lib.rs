@@ -164,7 +164,7 @@ pub use platform::{
 };
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Carriers, Collision, CollisionArrays, Collisions,
-    Contact, InputError, Pose, Shape, StepParameters, Velocity,
+    Contact, InputError, Pose, Shape, StepParameters, Structures, Velocity,
 };
 pub use step::{
     Accelerator, AcceleratorError, Awaited, BoardChoice, BoardDescription, BoardKind, Cancellation,

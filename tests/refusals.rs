@@ -10,7 +10,7 @@ use zynq_pgs::interface::profile::{FLOAT, Flow, HALF, MIXED, Profile, WINDOWED, 
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, Contact, Error, InputError,
-    OpenOptions, Pose, Shape, StepParameters, Velocity,
+    OpenOptions, Pose, Shape, StepParameters, Structures, Velocity,
 };
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
@@ -152,39 +152,47 @@ impl Bodies for Unsteady<Body> {
     }
 }
 
-/// Collisions of which one is said to lie somewhere, and it is not said where.
-struct Nowhere(Vec<Collision>);
+/// Collisions that are said to lie elsewhere than they do.
+struct Nowhere {
+    all: Vec<Collision>,
+    order: Vec<u32>,
+}
 
 impl Collisions for Nowhere {
     fn len(&self) -> usize {
-        self.0.len()
+        self.all.len()
     }
 
     fn collision(&self, index: usize) -> Collision {
-        self.0[index]
+        self.all[index]
     }
 
-    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
-        for ((to, from), index) in to.iter_mut().zip(&self.0[first..]).zip(first..) {
-            if index != 42 {
-                *to = from;
-            }
-        }
-        true
+    fn structures(&self) -> Option<Structures<'_>> {
+        Some(Structures::Ordered { all: &self.all, order: &self.order })
     }
 }
 
 #[test]
 fn what_lies_nowhere_is_never_sent() {
-    let (bodies, collisions) = scene();
+    let (bodies, all) = scene();
     let mut parameters = StepParameters::default();
     parameters.order = Some(Order::AsGiven);
     for profile in [&FLOAT, &HALF, &MIXED] {
+        let mut expected = bodies.clone();
+        open(profile).step(&mut expected, &all, &parameters).expect("a step");
+        let mut order: Vec<u32> = (0..).zip(&all).map(|(at, _)| at).collect();
+        order[42] = u32::MAX;
+        let mut nowhere = Nowhere { all: all.clone(), order };
         let mut state = bodies.clone();
-        let found = open(profile).step(&mut state, &Nowhere(collisions.clone()), &parameters);
+        let found = open(profile).step(&mut state, &nowhere, &parameters);
         let found = found.expect_err("one lies nowhere");
         assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
         assert_eq!(state, bodies);
+
+        // If they are not as many, they are asked for one by one.
+        nowhere.order.pop();
+        open(profile).step(&mut state, &nowhere, &parameters).expect("a step");
+        assert_eq!(state, expected);
     }
 }
 

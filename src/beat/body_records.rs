@@ -82,8 +82,8 @@ impl Records<{ velocity::ROWS }> for Isotropic<'_> {
     }
 
     #[inline(always)]
-    fn get(&mut self, at: usize) -> Option<[Lanes; velocity::ROWS]> {
-        self.0.get(at).map(record::velocity::encode)
+    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; velocity::ROWS]; N]> {
+        some(self.0, nth, record::velocity::encode)
     }
 }
 
@@ -102,8 +102,8 @@ impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
     }
 
     #[inline(always)]
-    fn get(&mut self, at: usize) -> Option<[Lanes; velocity::WORLD_ROWS]> {
-        self.bodies.get(at).map(|body| world_velocity(body, self.shapes))
+    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; velocity::WORLD_ROWS]; N]> {
+        some(self.bodies, nth, |body| world_velocity(body, self.shapes))
     }
 }
 
@@ -119,9 +119,24 @@ impl Records<{ pose::ROWS }> for OfPoses<'_> {
     }
 
     #[inline(always)]
-    fn get(&mut self, at: usize) -> Option<[Lanes; pose::ROWS]> {
-        self.0.get(at).map(record::pose::encode)
+    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; pose::ROWS]; N]> {
+        some(self.0, nth, record::pose::encode)
     }
+}
+
+/// The records of the `nth` so many bodies.
+#[inline(always)]
+fn some<const ROWS: usize, const N: usize>(
+    bodies: &[Body],
+    nth: usize,
+    record: impl Fn(&Body) -> [Lanes; ROWS],
+) -> Option<[[Lanes; ROWS]; N]> {
+    let bodies = bodies.as_chunks::<N>().0.get(nth)?;
+    let mut records = [[Lanes::all(0); ROWS]; N];
+    for (to, body) in records.iter_mut().zip(bodies) {
+        *to = record(body);
+    }
+    Some(records)
 }
 
 /// The velocity record of a body with its inertia.

@@ -3,11 +3,11 @@
 use bitstream_model::interface::record::{collision, relative};
 
 use super::format::Records;
-use crate::platform::{Lanes, prefetch};
+use crate::platform::Lanes;
 use crate::record;
 use crate::record::end::{End, Ends};
-use crate::scene::Collision;
 use crate::scene::validate::{Block, Look, Quick, Reach};
+use crate::scene::{Collision, Lying};
 
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
@@ -101,39 +101,68 @@ fn both(ends: Ends<'_>, collision: &Collision) -> [End; 2] {
     [collision.body_a, collision.body_b].map(|body| ends.get(body))
 }
 
-/// The records of a block of collisions. Those ahead are fetched meanwhile.
-pub(super) struct Encoding<'p, K> {
+/// The records of a block of collisions. What is behind it is fetched meanwhile.
+pub(super) struct Encoding<'p, K, L> {
     kind: K,
     first: usize,
-    collisions: &'p [&'p Collision],
-    ahead: &'p [&'p Collision],
+    collisions: L,
+    /// Those that are asked for meanwhile.
+    soon: L,
+    /// Those whose bodies are.
+    bodies_soon: L,
     ends: Ends<'p>,
 }
 
-impl<'p, K> Encoding<'p, K> {
-    /// Those of a block. Of those `ahead` as many are fetched; if they are fewer, none.
+/// How far behind a collision is asked for: so far that it is there in time, so near that it is not gone
+/// again.
+const SOON: usize = 30;
+
+/// The same of its bodies, which it has to say by then.
+const BODIES_SOON: usize = SOON / 2;
+
+impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
+    /// Those of a block, the first of which is number `at` of `all`.
     #[inline(always)]
-    pub(super) fn new(kind: K, block: &Block<'p>, ahead: &'p [&'p Collision]) -> Self {
+    pub(super) fn new(kind: K, block: &Block<'p, L>, all: L, at: usize) -> Self {
         let Block { first, collisions, ends, .. } = *block;
-        // Those of a last block that is not whole come by themselves.
-        let ahead = ahead.get(..collisions.len()).unwrap_or(collisions);
-        Self { kind, first, collisions, ahead, ends }
+        let behind = |distance| all.part(at + distance..at + distance + collisions.len());
+        let (soon, bodies_soon) = (behind(SOON), behind(BODIES_SOON));
+        Self { kind, first, collisions, soon, bodies_soon, ends }
     }
 
-    /// A record, with the collision and the ends that it is made of.
+    /// The `nth` so many records, if there are as many; each is shown to `look`, with the collision and the
+    /// ends that it is made of.
     #[inline(always)]
-    fn take<const ROWS: usize>(&self, at: usize) -> Option<([Lanes; ROWS], &'p Collision, [End; 2])>
+    fn shown<const ROWS: usize, const N: usize>(
+        &self,
+        nth: usize,
+        mut look: impl FnMut(&[Lanes; ROWS], &Collision, [End; 2]),
+    ) -> Option<[[Lanes; ROWS]; N]>
     where
         K: Kind<ROWS>,
     {
-        let (collision, ahead) = (self.collisions.get(at)?, self.ahead.get(at)?);
-        prefetch::<Collision>(ahead);
-        let ends = both(self.ends, collision);
-        Some((self.kind.encode(self.first + at, collision, ends), collision, ends))
+        let collisions = self.collisions.some::<N>(nth)?;
+        self.soon.soon::<N>(nth);
+        // Bodies of neighbours are neighbours.
+        if L::APART
+            && let Some(collisions) = self.bodies_soon.some::<N>(nth)
+        {
+            for collision in collisions {
+                self.ends.soon([collision.body_a, collision.body_b]);
+            }
+        }
+        let first = self.first + nth * N;
+        let mut records = [[Lanes::all(0); ROWS]; N];
+        for ((to, collision), index) in records.iter_mut().zip(collisions).zip(first..) {
+            let ends = both(self.ends, collision);
+            *to = self.kind.encode(index, collision, ends);
+            look(to, collision, ends);
+        }
+        Some(records)
     }
 }
 
-impl<K: Kind<ROWS>, const ROWS: usize> Records<ROWS> for Encoding<'_, K> {
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Encoding<'p, K, L> {
     const INTEGERS: [bool; ROWS] = K::INTEGERS;
 
     #[inline(always)]
@@ -142,22 +171,22 @@ impl<K: Kind<ROWS>, const ROWS: usize> Records<ROWS> for Encoding<'_, K> {
     }
 
     #[inline(always)]
-    fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]> {
-        self.take(at).map(|(record, ..)| record)
+    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]> {
+        self.shown(nth, |_, _, _| {})
     }
 }
 
 /// The same, looked at on their way.
-pub(super) struct LookedAt<'p, K> {
-    records: Encoding<'p, K>,
+pub(super) struct LookedAt<'p, K, L> {
+    records: Encoding<'p, K, L>,
     quick: &'p Quick<'p>,
     look: Look<'p>,
     scheduled: bool,
 }
 
-impl<'p, K: Copy> LookedAt<'p, K> {
+impl<'p, K: Copy, L: Lying<'p>> LookedAt<'p, K, L> {
     #[inline(always)]
-    pub(super) fn new(records: Encoding<'p, K>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
+    pub(super) fn new(records: Encoding<'p, K, L>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
         Self { records, quick, look: Look::new(quick), scheduled }
     }
 
@@ -169,12 +198,12 @@ impl<'p, K: Copy> LookedAt<'p, K> {
 
     /// Whether validation refuses none of the block, all of whose records were taken.
     #[inline(always)]
-    pub(super) fn good<const ROWS: usize>(self, block: &Block<'_>) -> bool
+    pub(super) fn good<const ROWS: usize>(self, block: &Block<'p, L>) -> bool
     where
         K: Kind<ROWS>,
     {
         let Self { records: Encoding { kind, .. }, look, .. } = self;
-        let reaches = (block.first..).zip(block.collisions).map(|(index, collision)| {
+        let reaches = (block.first..).zip(block.collisions.iter()).map(|(index, collision)| {
             let record = kind.encode(index, collision, both(block.ends, collision));
             K::reach(&record, collision.count)
         });
@@ -182,7 +211,7 @@ impl<'p, K: Copy> LookedAt<'p, K> {
     }
 }
 
-impl<K: Kind<ROWS>, const ROWS: usize> Records<ROWS> for LookedAt<'_, K> {
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for LookedAt<'p, K, L> {
     const INTEGERS: [bool; ROWS] = K::INTEGERS;
 
     #[inline(always)]
@@ -191,13 +220,14 @@ impl<K: Kind<ROWS>, const ROWS: usize> Records<ROWS> for LookedAt<'_, K> {
     }
 
     #[inline(always)]
-    fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]> {
-        let (record, collision, ends) = self.records.take(at)?;
-        self.look.head(collision, ends, self.scheduled);
-        self.look.numbers(K::beyond(self.quick, &record, collision.count));
-        if self.look.asks_how_far() {
-            self.look.reach(&K::reach(&record, collision.count), ends);
-        }
-        Some(record)
+    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]> {
+        let Self { records, quick, look, scheduled } = self;
+        records.shown(nth, |record, collision, ends| {
+            look.head(collision, ends, *scheduled);
+            look.numbers(K::beyond(quick, record, collision.count));
+            if look.asks_how_far() {
+                look.reach(&K::reach(record, collision.count), ends);
+            }
+        })
     }
 }

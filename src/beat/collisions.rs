@@ -5,7 +5,6 @@
 
 use std::marker::PhantomData;
 use std::ops::Range;
-use std::{mem, ptr};
 
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::Beat;
@@ -18,7 +17,7 @@ use super::target::Target;
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::end::Ends;
 use crate::scene::validate::{Block, Quick};
-use crate::scene::{Collision, Collisions};
+use crate::scene::{Collision, Collisions, InArray, InOrder, Lying, Structures};
 
 /// The collisions of a step, as they are sent.
 #[derive(Debug)]
@@ -83,67 +82,39 @@ impl Seen {
 
 /// Writes the records of a range of collisions, otherwise as [`pack_collisions`].
 ///
-/// Here is only what depends on the caller's container: where each collision of a block lies. They
-/// may lie anywhere, and those of the next block are on their way while a block is written.
+/// Here is only what depends on the caller's container: where they lie. Those that lie nowhere as they are
+/// asked for one by one.
 fn pack_range<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
     entries: &Entries<'_, C>,
     (range, mut channels): (Range<usize>, Piece<'_>),
 ) -> (u32, Seen) {
-    let Entries { collisions, added, words, .. } = *entries;
+    let Entries { collisions, count, added, words } = *entries;
     let marks = Marks { scheduled: added.is_some(), words };
     let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
-    let mut seen = Seen::NOTHING;
-    let (mut here, mut next) = (&mut [&ELSEWHERE; BLOCK], &mut [&ELSEWHERE; BLOCK]);
-    let mut copies = [Collision::NOTHING; BLOCK];
-    let until = range.end;
-    let mut all_lie = find(collisions, range.start, &mut here[..range.len().min(BLOCK)]);
-    for first in range.step_by(BLOCK) {
-        let here_lie = all_lie;
-        let behind = until.min(first + BLOCK);
-        let ahead = &mut next[..(until - behind).min(BLOCK)];
-        all_lie = find(collisions, behind, ahead);
-        let block = &here[..behind - first];
-        seen = seen.and(if here_lie {
-            packer.write(block, ahead)
-        } else {
-            let mut block = *here;
-            let elsewhere = (first..behind).zip(block.iter_mut().zip(&mut copies));
-            for (index, (to, copy)) in
-                elsewhere.filter(|(_, (to, _))| ptr::eq::<Collision>(**to, &raw const ELSEWHERE))
-            {
-                *copy = collisions.collision(index);
-                *to = copy;
-            }
-            packer.write(&block[..behind - first], ahead)
-        });
-        mem::swap(&mut here, &mut next);
-    }
+    let seen = match collisions.structures().filter(|all| all.len() == count) {
+        Some(Structures::Array(all)) => packer.write(InArray(all).part(range)),
+        Some(Structures::Ordered { all, order }) => {
+            packer.write_ordered(InOrder { all, order }.part(range))
+        }
+        None => {
+            let mut copies = [Collision::NOTHING; BLOCK];
+            let blocks =
+                range.clone().step_by(BLOCK).map(|first| first..range.end.min(first + BLOCK));
+            blocks.fold(Seen::NOTHING, |seen, block| {
+                let copies = &mut copies[..block.len()];
+                // All of a block are on their way while the first are copied.
+                block.clone().for_each(|index| collisions.soon(index));
+                for (to, index) in copies.iter_mut().zip(block) {
+                    *to = collisions.collision(index);
+                }
+                seen.and(packer.write(InArray(copies)))
+            })
+        }
+    };
     (packer.finish(), seen)
 }
-
-/// Where the next collisions lie, the first of which has the index `first`; whether all do. One that
-/// does not lie there as it is ([`ELSEWHERE`]) will be asked for soon.
-#[inline]
-fn find<'a, C: Collisions + ?Sized>(
-    collisions: &'a C,
-    first: usize,
-    to: &mut [&'a Collision],
-) -> bool {
-    to.fill(&ELSEWHERE);
-    let all_lie = collisions.structures(first, to);
-    if !all_lie {
-        let places = (first..).zip(to.iter());
-        let elsewhere = places.filter(|(_, at)| ptr::eq::<Collision>(**at, &raw const ELSEWHERE));
-        elsewhere.for_each(|(index, _)| collisions.soon(index));
-    }
-    all_lie
-}
-
-/// Stands for a collision that does not lie anywhere as it is. Should a constant of the same value
-/// have its address, that one is asked for once more, and is what it is.
-static ELSEWHERE: Collision = Collision::NOTHING;
 
 /// What is said of collisions beside what they hold.
 #[derive(Debug, Clone, Copy)]
@@ -154,7 +125,7 @@ pub(super) struct Marks<'a> {
     pub(super) words: Option<&'a [[u32; 2]]>,
 }
 
-/// Writes collisions, a block at a time.
+/// Writes collisions that lie somewhere.
 ///
 /// It knows nothing of the caller's container, so that it is compiled once, with the driver.
 pub(super) struct CollisionPacker<'a, 'b> {
@@ -185,33 +156,32 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         Self { quick: target.quick, ends, marks, dealer, geometry, next: first }
     }
 
-    /// Writes the next collisions, at most [`BLOCK`]; only the last may be fewer. Those `ahead` are
-    /// asked for next, and are on their way meanwhile.
-    pub(super) fn write(&mut self, collisions: &[&Collision], ahead: &[&Collision]) -> Seen {
+    /// Writes the next collisions. Their number is divisible by [`BLOCK`], unless they are the last.
+    pub(super) fn write(&mut self, collisions: InArray<'_>) -> Seen {
+        self.write_lying(collisions)
+    }
+
+    /// The same.
+    fn write_ordered(&mut self, collisions: InOrder<'_>) -> Seen {
+        self.write_lying(collisions)
+    }
+
+    #[inline(always)]
+    fn write_lying<'p, L: Lying<'p>>(&'p mut self, collisions: L) -> Seen {
         let Self { quick, ends, marks: Marks { scheduled, words }, dealer, geometry, next } = self;
         let (quick, first) = (*quick, *next);
         *next += collisions.len();
-        let block = Block { first, collisions, ends: *ends, scheduled: *scheduled };
+        let all = Block { first, collisions, ends: *ends, scheduled: *scheduled };
         match (*geometry, *words) {
-            (Geometry::Absolute, _) => in_wide_vectors(Writing {
-                kind: Absolute,
-                rows: PhantomData,
-                quick,
-                block,
-                ahead,
-                dealer,
-            }),
-            (Geometry::Relative, None) => in_wide_vectors(Writing {
-                kind: Relative,
-                rows: PhantomData,
-                quick,
-                block,
-                ahead,
-                dealer,
-            }),
+            (Geometry::Absolute, _) => {
+                in_wide_vectors(Writing { kind: Absolute, rows: PhantomData, quick, all, dealer })
+            }
+            (Geometry::Relative, None) => {
+                in_wide_vectors(Writing { kind: Relative, rows: PhantomData, quick, all, dealer })
+            }
             (Geometry::Relative, Some(words)) => {
                 let kind = Worded(words);
-                in_wide_vectors(Writing { kind, rows: PhantomData, quick, block, ahead, dealer })
+                in_wide_vectors(Writing { kind, rows: PhantomData, quick, all, dealer })
             }
         }
     }
@@ -227,33 +197,35 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
     }
 }
 
-/// A block of collisions, and where it goes.
-struct Writing<'p, 'a, 'b, K, const ROWS: usize> {
+/// Collisions, and where they go.
+struct Writing<'p, 'a, 'b, K, L, const ROWS: usize> {
     kind: K,
     rows: PhantomData<[Lanes; ROWS]>,
     quick: Option<&'p Quick<'p>>,
-    block: Block<'p>,
-    ahead: &'p [&'p Collision],
+    all: Block<'p, L>,
     dealer: &'p mut Dealer<'a, 'b>,
 }
 
-impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, '_, K, ROWS> {
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_, '_, K, L, ROWS> {
     type Output = Seen;
 
-    /// Encodes, looks at and deals out.
+    /// Encodes, looks at and deals out, block by block. Those behind are on their way meanwhile.
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> Seen {
-        let Self { kind, quick, block, ahead, dealer, .. } = self;
-        for collision in block.collisions {
-            block.ends.soon([collision.body_a, collision.body_b]);
-        }
-        let mut records = Encoding::new(kind, &block, ahead);
-        let Some(quick) = quick else {
+        let Self { kind, quick, all, dealer, .. } = self;
+        let mut seen = Seen::NOTHING;
+        for at in (0..all.collisions.len()).step_by(BLOCK) {
+            let collisions = all.collisions.part(at..at + BLOCK);
+            let block = Block { first: all.first + at, collisions, ..all };
+            let mut records = Encoding::new(kind, &block, all.collisions, at);
+            let Some(quick) = quick else {
+                dealer.write(vectors, &mut records);
+                continue;
+            };
+            let mut records = LookedAt::new(records, quick, block.scheduled);
             dealer.write(vectors, &mut records);
-            return Seen::NOTHING;
-        };
-        let mut records = LookedAt::new(records, quick, block.scheduled);
-        dealer.write(vectors, &mut records);
-        Seen { paddings: records.paddings(), good: records.good(&block) }
+            seen = seen.and(Seen { paddings: records.paddings(), good: records.good(&block) });
+        }
+        seen
     }
 }

@@ -88,7 +88,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
         let mut waiting = [F::Row::zeroed(); 2];
         let mut count = 0;
         for at in done..records.len() {
-            let Some(record) = records.get(at) else { break };
+            let Some([record]) = records.some(at) else { break };
             for row in F::rows::<V, R, ROWS>(vectors, record) {
                 waiting[count] = row;
                 count += 1;
@@ -146,8 +146,9 @@ mod tests {
         }
 
         #[inline(always)]
-        fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]> {
-            self.0.get(at).map(|record| record.map(Lanes::new))
+        fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]> {
+            let records = self.0.as_chunks::<N>().0.get(nth)?;
+            Some(records.map(|record| record.map(Lanes::new)))
         }
     }
 

@@ -8,7 +8,7 @@ use crate::record::sixteen::{Row, Sixteen};
 
 /// Records on their way, in f32.
 ///
-/// `get` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
+/// `some` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
 pub(super) trait Records<const ROWS: usize> {
     /// Rows whose word is an unsigned integer.
     const INTEGERS: [bool; ROWS];
@@ -16,8 +16,8 @@ pub(super) trait Records<const ROWS: usize> {
     /// How many there are.
     fn len(&self) -> usize;
 
-    /// One of them, if there is one. Each is asked for once, in their order.
-    fn get(&mut self, at: usize) -> Option<[Lanes; ROWS]>;
+    /// The `nth` so many of them, if there are as many. Each is asked for once, in their order.
+    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]>;
 }
 
 /// What rows become in a stream.

@@ -17,23 +17,39 @@ use crate::interface::record::Beat;
 use crate::record::end::{Ends, Survey};
 use crate::scene::{
     Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
-    Velocity,
+    Structures, Velocity,
 };
 
-/// Collisions of which only some lie somewhere as they are.
-struct SomeLie<'a>(&'a [(Collision, bool)]);
+/// Collisions that lie in an order of their own; beyond the list are some without contact points.
+struct Placed<'a> {
+    list: &'a [Collision],
+    order: &'a [u32],
+}
 
-impl Collisions for SomeLie<'_> {
+impl Collisions for Placed<'_> {
+    fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    fn collision(&self, _: usize) -> Collision {
+        unreachable!("they are read where they lie")
+    }
+
+    fn structures(&self) -> Option<Structures<'_>> {
+        Some(Structures::Ordered { all: self.list, order: self.order })
+    }
+}
+
+/// Collisions that do not lie anywhere.
+struct Given<'a>(&'a [Collision]);
+
+impl Collisions for Given<'_> {
     fn len(&self) -> usize {
         self.0.len()
     }
 
     fn collision(&self, index: usize) -> Collision {
-        self.0[index].0
-    }
-
-    fn structure(&self, index: usize) -> Option<&Collision> {
-        self.0.get(index).filter(|(_, lies)| *lies).map(|(collision, _)| collision)
+        self.0[index]
     }
 }
 
@@ -461,21 +477,24 @@ proptest! {
         reader.end();
     }
 
-    /// Of several blocks: where one lies, none may have lain two blocks before, and the other way round.
+    /// Of several blocks.
     #[test]
-    fn collisions_arrive_whether_they_lie_somewhere_or_not(
+    fn collisions_arrive_wherever_they_lie(
         spec in any_spec(),
         bodies in prop::collection::vec(any_body(), 12),
-        few in prop::collection::vec(any_collision(), 1..10),
-        picks in prop::collection::vec((any::<prop::sample::Index>(), any::<bool>()), 0..4 * BLOCK),
+        list in prop::collection::vec(any_collision(), 1..10),
+        order in prop::collection::vec(
+            prop_oneof![9 => 0_u32..10, 1 => Just(u32::MAX)],
+            0..4 * BLOCK,
+        ),
     ) {
-        let list: Vec<(Collision, bool)> =
-            picks.into_iter().map(|(pick, lies)| (*pick.get(&few), lies)).collect();
-        let copied: Vec<Collision> = list.iter().map(|(collision, _)| *collision).collect();
-        prop_assert_eq!(
-            collisions(&spec, &bodies, &SomeLie(&list)),
-            collisions(&spec, &bodies, &copied)
-        );
+        let place = |place: &u32| list.get(*place as usize).copied();
+        let copied: Vec<Collision> =
+            order.iter().map(|at| place(at).unwrap_or(Collision::NOTHING)).collect();
+        let expected = collisions(&spec, &bodies, &copied);
+        let placed = Placed { list: &list, order: &order };
+        prop_assert_eq!(&collisions(&spec, &bodies, &placed), &expected);
+        prop_assert_eq!(&collisions(&spec, &bodies, &Given(&copied)), &expected);
     }
 
     /// Of several blocks: they do not lie one behind the other, and each is asked for.

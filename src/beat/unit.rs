@@ -104,9 +104,9 @@ fn unit<
     for channel in &to {
         soon_written_behind(channel);
     }
+    let Some(records) = records.some::<RECORDS>(unit) else { return };
     let mut rows = [[F::Row::zeroed(); ROWS]; RECORDS];
-    for (at, to) in rows.iter_mut().enumerate() {
-        let Some(record) = records.get(unit * RECORDS + at) else { return };
+    for (to, record) in rows.iter_mut().zip(records) {
         *to = F::rows::<V, R, ROWS>(vectors, record);
     }
     let rows = rows.as_flattened();
@@ -172,8 +172,8 @@ mod tests {
         }
 
         #[inline(always)]
-        fn get(&mut self, _: usize) -> Option<[Lanes; ROWS]> {
-            Some([Lanes::new([0; LANES]); ROWS])
+        fn some<const N: usize>(&mut self, _: usize) -> Option<[[Lanes; ROWS]; N]> {
+            Some([[Lanes::new([0; LANES]); ROWS]; N])
         }
     }
 

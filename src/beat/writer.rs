@@ -10,7 +10,7 @@ use super::deal::BLOCK;
 use super::target::Target;
 use crate::record::end::Ends;
 use crate::scene::validate::{Block, Quick};
-use crate::scene::{Collision, InputError};
+use crate::scene::{Collision, InArray, InputError};
 
 /// Takes the collisions of a step straight into the memory that the board reads.
 ///
@@ -111,9 +111,8 @@ impl<'a> Writer<'a> {
         if count == 0 {
             return;
         }
-        let (first, collisions) = (self.packer.next(), self.block.each_ref());
-        let collisions = &collisions[..count];
-        if !self.packer.write(collisions, &[]).good {
+        let (first, collisions) = (self.packer.next(), InArray(&self.block[..count]));
+        if !self.packer.write(collisions).good {
             let ends = self.ends;
             let block = Block { first, collisions, ends, scheduled: false };
             self.refused = self.quick.and_then(|quick| quick.refusal(&block).err());

@@ -1,6 +1,6 @@
 //! This file holds an order: which collision stands in which entry, and which entries are empty.
 
-use crate::scene::{Collision, Collisions};
+use crate::scene::{Collision, Collisions, Structures};
 
 /// What an empty entry holds. No collision has this index: there are fewer.
 pub(super) const EMPTY: u32 = u32::MAX;
@@ -92,29 +92,14 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
             .map_or(Collision::NOTHING, |index| self.collisions.collision(index))
     }
 
-    #[inline]
-    fn structure(&self, index: usize) -> Option<&Collision> {
-        match self.schedule.get(index) {
-            Some(index) => self.collisions.structure(index),
-            None => Some(&Collision::NOTHING),
-        }
-    }
-
-    #[inline]
-    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
-        let entries = self.schedule.entries.get(first..).unwrap_or_default();
-        let mut all = true;
-        for (to, entry) in to.iter_mut().zip(entries) {
-            let found = match *entry {
-                EMPTY => Some(&Collision::NOTHING),
-                index => self.collisions.structure(index as usize),
-            };
-            match found {
-                Some(collision) => *to = collision,
-                None => all = false,
+    fn structures(&self) -> Option<Structures<'_>> {
+        match self.collisions.structures()? {
+            // An empty entry is beyond them all.
+            Structures::Array(all) => {
+                Some(Structures::Ordered { all, order: &self.schedule.entries })
             }
+            Structures::Ordered { .. } => None,
         }
-        all
     }
 
     #[inline]

@@ -3,7 +3,9 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::{Body, Collision, Collisions, Contact, Pose, Shape, Velocity};
+use crate::scene::{
+    Body, Collision, CollisionArrays, Collisions, Contact, Pose, Shape, Structures, Velocity,
+};
 
 /// A scene without geometry: pairs, which bodies move, where they are.
 #[derive(Debug, Clone)]
@@ -271,58 +273,38 @@ fn ordered_collisions_are_the_callers_with_padding_between() {
     assert_eq!(ordered.collision(3), collisions[1]);
 }
 
-/// Where collisions lie is said of many at once as of each: of what is left out a stranger stands.
-fn lie_as_each_does<C: Collisions + ?Sized>(collisions: &C, name: &str) {
-    let stranger = Collision {
-        body_a: 77,
-        body_b: 78,
-        normal: [0.0; 3],
-        count: 0,
-        contacts: [Contact::default(); 4],
-    };
-    for first in 0..=collisions.len() {
-        for count in 0..=collisions.len() - first {
-            let mut found = vec![&stranger; count];
-            let all = collisions.structures(first, &mut found);
-            let each: Vec<_> = (first..first + count).map(|at| collisions.structure(at)).collect();
-            assert_eq!(all, each.iter().all(Option::is_some), "{name}: {count} from {first}");
-            for (found, each) in found.into_iter().zip(each) {
-                assert_eq!(found, each.unwrap_or(&stranger), "{name}: {count} from {first}");
+#[test]
+fn collisions_in_order_lie_where_those_as_given_do() {
+    /// Those that lie somewhere, one by one.
+    fn lying<C: Collisions + ?Sized>(collisions: &C) -> Option<Vec<Collision>> {
+        match collisions.structures()? {
+            Structures::Array(all) => Some(all.to_vec()),
+            Structures::Ordered { all, order } => {
+                let at = |place: &u32| all.get(*place as usize).copied();
+                Some(order.iter().map(|place| at(place).unwrap_or(Collision::NOTHING)).collect())
             }
         }
     }
-}
 
-#[test]
-fn many_collisions_lie_where_each_of_them_does() {
-    /// Every other lies somewhere.
-    struct EveryOther(Vec<Collision>);
-    impl Collisions for EveryOther {
-        fn len(&self) -> usize {
-            self.0.len()
-        }
-        fn collision(&self, index: usize) -> Collision {
-            self.0[index]
-        }
-        fn structure(&self, index: usize) -> Option<&Collision> {
-            self.0.get(index).filter(|_| index.is_multiple_of(2))
-        }
-    }
-
-    let collision = |body_b| Collision {
-        body_a: 0,
-        body_b,
-        normal: [0.0, 1.0, 0.0],
-        count: 1,
-        contacts: [Contact::default(); 4],
-    };
+    let collision = |body_b| Collision { body_b, count: 1, ..Collision::NOTHING };
     let all: Vec<Collision> = (1..6).map(collision).collect();
-    let some = EveryOther(all.clone());
+    assert_eq!(lying(&all).as_ref(), Some(&all));
+    assert_eq!(lying(all.as_slice()).as_ref(), Some(&all));
     let schedule: Schedule =
         [Some(4), None, Some(2), Some(1), None, Some(0), Some(3)].into_iter().collect();
-    lie_as_each_does(&all, "a vector");
-    lie_as_each_does(all.as_slice(), "a slice");
-    lie_as_each_does(&some, "every other");
-    lie_as_each_does(&Ordered { collisions: &all, schedule: &schedule }, "in order");
-    lie_as_each_does(&Ordered { collisions: &some, schedule: &schedule }, "every other in order");
+    let ordered = Ordered { collisions: &all, schedule: &schedule };
+    let each: Vec<_> = (0..ordered.len()).map(|at| ordered.collision(at)).collect();
+    assert_eq!(lying(&ordered), Some(each));
+    assert_eq!(ordered.structures().map(|all| all.len()), Some(7));
+
+    // What lies nowhere, or in an order of its own, does not in this one.
+    let bodies: Vec<_> = all.iter().map(|collision| [collision.body_a, collision.body_b]).collect();
+    let arrays = CollisionArrays {
+        bodies: &bodies,
+        normals: &[[0.0; 3]; 5],
+        counts: &[1; 5],
+        contacts: &[[[0.0; 4]; 4]; 5],
+    };
+    assert!(lying(&Ordered { collisions: &arrays, schedule: &schedule }).is_none());
+    assert!(lying(&Ordered { collisions: &ordered, schedule: &schedule }).is_none());
 }

@@ -4,12 +4,34 @@
 /// Says that a value will be read soon.
 #[inline(always)]
 pub(crate) fn prefetch<T>(value: &T) {
-    let first: *const i8 = std::ptr::from_ref(value).cast();
-    // The lines of its first byte, of every 64th after it, and of its last.
+    lines_of(std::ptr::from_ref(value));
+}
+
+/// Says that one of these will be read soon. Nothing comes of one that is not there.
+#[inline(always)]
+pub(crate) fn soon_alone<T>(values: &[T], at: usize) {
+    lines_of(values.as_ptr().wrapping_add(at));
+}
+
+/// As [`soon_alone`], where it is said of its neighbours, too: their lines are not asked for twice.
+#[inline(always)]
+pub(crate) fn soon_with_neighbours<T>(values: &[T], at: usize) {
+    first_lines_of(values.as_ptr().wrapping_add(at));
+}
+
+/// Says that what lies at an address is read soon. Any address will do.
+#[inline(always)]
+fn lines_of<T>(value: *const T) {
+    first_lines_of(value);
+    fetch(value.cast::<u8>().wrapping_add(size_of::<T>().saturating_sub(1)));
+}
+
+/// The same but for the line of its last byte, if it is that of no 64th from the first on.
+#[inline(always)]
+fn first_lines_of<T>(value: *const T) {
     for line in 0..size_of::<T>().div_ceil(LINE) {
-        fetch(first.wrapping_add(line * LINE));
+        fetch(value.cast::<u8>().wrapping_add(line * LINE));
     }
-    fetch(first.wrapping_add(size_of::<T>().saturating_sub(1)));
 }
 
 /// Says that all of these will be read soon.

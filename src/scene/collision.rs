@@ -5,6 +5,7 @@ pub use bitstream_model::interface::record::CONTACT_POINTS;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::Structures;
 use crate::platform::prefetch;
 
 /// One point at which two bodies touch.
@@ -62,33 +63,16 @@ pub trait Collisions: Sync {
     /// Collision `index`, which is below [`len`](Self::len).
     fn collision(&self, index: usize) -> Collision;
 
-    /// Collision `index`, which is below [`len`](Self::len), where it lies, if it lies there as this
-    /// structure: it is read without a copy.
+    /// Where all of them lie, if they lie there as structures: they are read without a copy.
     ///
-    /// It is what [`collision`](Self::collision) gives. A view that changes anything leaves this as it
-    /// is.
-    fn structure(&self, index: usize) -> Option<&Collision> {
-        let _ = index;
+    /// There are [`len`](Self::len) of them, each what [`collision`](Self::collision) gives. A view that
+    /// changes anything leaves this as it is.
+    fn structures(&self) -> Option<Structures<'_>> {
         None
     }
 
-    /// Where the collisions from `first` on lie, as many as fit in `to` and none of them beyond
-    /// [`len`](Self::len), as [`structure`](Self::structure) says of each; one that does not lie
-    /// anywhere leaves its place as it is. Whether all do; a step refuses one whose place is left all the
-    /// same, as [`InputError::Unsteady`](super::InputError::Unsteady).
-    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
-        let mut all = true;
-        for (to, index) in to.iter_mut().zip(first..) {
-            match self.structure(index) {
-                Some(collision) => *to = collision,
-                None => all = false,
-            }
-        }
-        all
-    }
-
-    /// Says that collision `index`, which is below [`len`](Self::len) and does not lie there as a
-    /// [`structure`](Self::structure), is asked for soon. A layout that can have it fetched gains by
+    /// Says that collision `index`, which is below [`len`](Self::len), is asked for soon; of those that lie
+    /// there as [`structures`](Self::structures) it is not said. A layout that can have it fetched gains by
     /// that, above all where collisions are read in an order of their own; nothing else comes of it.
     fn soon(&self, index: usize) {
         let _ = index;
@@ -116,16 +100,8 @@ impl Collisions for [Collision] {
         self[index]
     }
 
-    #[inline]
-    fn structure(&self, index: usize) -> Option<&Collision> {
-        self.get(index)
-    }
-
-    #[inline]
-    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
-        let from = self.get(first..).unwrap_or_default();
-        to.iter_mut().zip(from).for_each(|(to, from)| *to = from);
-        to.len() <= from.len()
+    fn structures(&self) -> Option<Structures<'_>> {
+        Some(Structures::Array(self))
     }
 }
 
@@ -139,14 +115,8 @@ impl Collisions for Vec<Collision> {
         self[index]
     }
 
-    #[inline]
-    fn structure(&self, index: usize) -> Option<&Collision> {
-        self.get(index)
-    }
-
-    #[inline]
-    fn structures<'a>(&'a self, first: usize, to: &mut [&'a Collision]) -> bool {
-        self.as_slice().structures(first, to)
+    fn structures(&self) -> Option<Structures<'_>> {
+        Some(Structures::Array(self))
     }
 }
 

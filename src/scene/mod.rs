@@ -6,6 +6,7 @@ mod collision;
 mod input_error;
 mod parameters;
 mod shape;
+mod structures;
 pub(crate) mod validate;
 
 pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
@@ -14,5 +15,7 @@ pub use collision::{CONTACT_POINTS, Collision, CollisionArrays, Collisions, Cont
 pub use input_error::InputError;
 pub use parameters::StepParameters;
 pub use shape::Shape;
+pub use structures::Structures;
 
 pub(crate) use carriers::Demand;
+pub(crate) use structures::{InArray, InOrder, Lying};

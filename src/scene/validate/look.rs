@@ -6,7 +6,7 @@ use super::quick::{Block, Quick, head, is_padding};
 use super::reach::{Furthest, Reach};
 use crate::platform::Lanes;
 use crate::record::end::End;
-use crate::scene::Collision;
+use crate::scene::{Collision, Lying};
 
 /// What has been seen of the collisions of a block.
 pub(crate) struct Look<'a> {
@@ -71,7 +71,11 @@ impl<'a> Look<'a> {
     /// Whether validation refuses nothing of the block, whose collisions all these were and reach as far
     /// as `reaches` say.
     #[inline(always)]
-    pub(crate) fn good(self, block: &Block<'_>, reaches: impl Iterator<Item = Reach>) -> bool {
+    pub(crate) fn good<'b, L: Lying<'b>>(
+        self,
+        block: &Block<'b, L>,
+        reaches: impl Iterator<Item = Reach>,
+    ) -> bool {
         let mut good = self.heads & (self.beyond.words() == [0; LANES]);
         if let Some(bounds) = self.quick.bounds_of_rows() {
             // Where one shape of the table forbids it, nothing is found of all at once.

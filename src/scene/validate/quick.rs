@@ -15,7 +15,7 @@ use crate::platform::Lanes;
 use crate::record;
 use crate::record::end::{End, Ends};
 use crate::record::largest::{Largest, MAGNITUDE};
-use crate::scene::{Body, Collision, InputError};
+use crate::scene::{Body, Collision, InputError, Lying};
 
 /// How far from 1 the square of a normal's length surely may be: the length itself is half as far.
 const NORMAL: f32 = InputError::NORMAL_TOLERANCE;
@@ -98,7 +98,11 @@ impl<'a> Quick<'a> {
 
     /// Whether a bitstream that computes rows in sixteen bits surely computes those of each collision of
     /// a block, which reach as far as `reaches` say.
-    pub(super) fn rows_fit(&self, block: &Block<'_>, reaches: impl Iterator<Item = Reach>) -> bool {
+    pub(super) fn rows_fit<'b, L: Lying<'b>>(
+        &self,
+        block: &Block<'b, L>,
+        reaches: impl Iterator<Item = Reach>,
+    ) -> bool {
         block.collisions.iter().zip(reaches).all(|(collision, reach)| {
             let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
             let shapes = ends.map(|end| end.shape(self.scene.shapes));
@@ -109,7 +113,7 @@ impl<'a> Quick<'a> {
 
     /// Looks at a block as validation does.
     #[cold]
-    pub(super) fn exactly(&self, block: &Block<'_>) -> bool {
+    pub(super) fn exactly<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> bool {
         self.refusal(block).is_ok()
     }
 
@@ -117,12 +121,12 @@ impl<'a> Quick<'a> {
     ///
     /// # Errors
     /// That of the first collision that it refuses.
-    pub(crate) fn refusal(&self, block: &Block<'_>) -> Result<(), InputError> {
+    pub(crate) fn refusal<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> Result<(), InputError> {
         let end = |body: usize| {
             let end = u32::try_from(body).map_or(End::MISSING, |body| block.ends.get(body));
             (end.position, end.shape(self.scene.shapes))
         };
-        (block.first..).zip(block.collisions).try_for_each(|(index, collision)| {
+        (block.first..).zip(block.collisions.iter()).try_for_each(|(index, collision)| {
             if block.scheduled & is_padding(collision) {
                 return Ok(());
             }
@@ -133,10 +137,10 @@ impl<'a> Quick<'a> {
 
 /// Collisions that are looked at together.
 #[derive(Debug)]
-pub(crate) struct Block<'a> {
+pub(crate) struct Block<'a, L> {
     /// Index of the first.
     pub(crate) first: usize,
-    pub(crate) collisions: &'a [&'a Collision],
+    pub(crate) collisions: L,
     /// Of all bodies.
     pub(crate) ends: Ends<'a>,
     /// Whether they are in an order that was made for them. What looks like padding may be of the
