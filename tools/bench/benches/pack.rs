@@ -10,13 +10,15 @@
 //!
 //! The step is one of the thesis' cubes, standing on the ground, or the one in a folder of arrays
 //! (`--input`; or else `full_step186` of the folder that the environment variable `PGS_VECTORS`
-//! names). One thread does everything, if `--threads` does not say otherwise. Each thing is measured alone: it and a `memcpy` from warm
-//! memory to warm memory run in turn, several runs a stretch of which the first do not count, so that its
-//! own buffers are as warm as the caches can hold them. Given are the bytes written, medians, GB/s of
-//! these bytes, and the throughput as a part of that of `memcpy`.
+//! names). One thread does everything, if `--threads` does not say otherwise. Each thing is measured
+//! alone: it and a `memcpy` from warm memory to warm memory run in turn, several runs a stretch of which
+//! the first do not count, so that its own buffers are as warm as the caches can hold them. Given are the
+//! bytes written, medians, GB/s of these bytes, and the throughput as a part of that of `memcpy`.
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
 //! - `as given`, `in order`: collisions alone, in array order and in the order without hazards
+//! - `gathered`: the caller's collisions in that order, copied as they are: what the order itself costs,
+//!   whoever reads them
 //! - `step, ...`: bodies, then collisions
 //! - `checked, ...`: the same with the validation of everything on the way, as a step does it
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
@@ -46,9 +48,9 @@ use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use clap::{Parser, ValueEnum};
 use scene::Grid;
 use serde_json::{Map, Value, json};
-use zynq_pgs::Collision;
 use zynq_pgs::bench::{StepPacker, Unpacker};
 use zynq_pgs::order::{Ordered, Schedule};
+use zynq_pgs::{Collision, Collisions as _};
 
 /// Holds packing and unpacking against `memcpy` of the same bytes.
 #[derive(Debug, Parser)]
@@ -121,6 +123,7 @@ enum Thing {
     Bodies,
     AsGiven,
     InOrder,
+    Gathered,
     StepAsGiven,
     StepInOrder,
     CheckedAsGiven,
@@ -131,7 +134,7 @@ enum Thing {
 
 impl Thing {
     const fn is_packing(self) -> bool {
-        !matches!(self, Self::Unpack | Self::Commit)
+        !matches!(self, Self::Gathered | Self::Unpack | Self::Commit)
     }
 
     const fn name(self) -> &'static str {
@@ -139,6 +142,7 @@ impl Thing {
             Self::Bodies => "bodies",
             Self::AsGiven => "as given",
             Self::InOrder => "in order",
+            Self::Gathered => "gathered",
             Self::StepAsGiven => "step, as given",
             Self::StepInOrder => "step, in order",
             Self::CheckedAsGiven => "checked, as given",
@@ -280,6 +284,8 @@ fn measure(
     }
     let mut unpacker = Unpacker::new(variant, bodies, shapes);
     let mut moved = bodies.clone();
+    let mut gathered = collisions.clone();
+    gathered.resize(schedule.len(), ordered.collision(0));
     // What a collision needs of its bodies, what is committed, and what one cannot say something of:
     // it is refused, and would be measured as it is refused.
     unpacker.unpack(bodies).ok_or("the results are refused")?;
@@ -300,6 +306,7 @@ fn measure(
         Thing::Bodies => of_bodies,
         Thing::AsGiven => of_collisions,
         Thing::InOrder => of_entries,
+        Thing::Gathered => schedule.len() * size_of::<Collision>(),
         Thing::StepAsGiven | Thing::CheckedAsGiven => of_bodies + of_collisions,
         Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
         Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
@@ -317,6 +324,12 @@ fn measure(
         Thing::Commit => contestants.push(Box::new(|| {
             unpacker.commit(&mut moved);
             black_box(&moved);
+        })),
+        Thing::Gathered => contestants.push(Box::new(|| {
+            for (at, to) in gathered.iter_mut().enumerate() {
+                *to = ordered.collision(at);
+            }
+            black_box(&gathered);
         })),
         _ => contestants
             .extend(packers.iter_mut().map(|packer| packing(thing, packer, step, &ordered))),
@@ -353,7 +366,7 @@ fn packing<'a>(
             Thing::CheckedInOrder => {
                 let _ = black_box(packer.pack(bodies, black_box(ordered), shapes, added));
             }
-            Thing::Bodies | Thing::Unpack | Thing::Commit => {}
+            Thing::Bodies | Thing::Gathered | Thing::Unpack | Thing::Commit => {}
         }
     })
 }
