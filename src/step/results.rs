@@ -13,10 +13,10 @@ use super::solver::Accelerator;
 use crate::accelerator::Counters;
 use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
-use crate::beat::unpack::{BLOCK, Reader, Record, finite};
+use crate::beat::unpack::{BLOCK, Reader};
 use crate::order::LiveReport;
-use crate::platform::{Vectors, Work, in_wide_vectors};
-use crate::record::result;
+use crate::record::finite::finite;
+use crate::record::result::{self, Record};
 use crate::scene::Bodies;
 
 impl Accelerator {
@@ -121,8 +121,14 @@ impl Results<'_> {
 
     /// What of it does not depend on the caller's container: it is compiled once, with the driver.
     fn read_in_turn(self, statics: &[u32], into: &mut [Record]) -> (u32, Option<usize>) {
-        let reader = Reader::new(self.layout, self.channels);
-        in_wide_vectors(InTurn { reader, statics, into })
+        let mut reader = Reader::new(self.layout, self.channels);
+        let mut broken = None;
+        if !reader.read(into) {
+            let moves = |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
+            let wrong = (0..).zip(&*into).filter(|(_, record)| !finite(record));
+            broken = wrong.map(|(index, _)| index).find(moves);
+        }
+        (reader.finish(), broken)
     }
 
     /// Reads results in the order of these bodies, and leaves all others as they are; otherwise as
@@ -143,7 +149,7 @@ impl Results<'_> {
             let all_finite = reader.read(records);
             for (record, body) in records.iter().zip(order) {
                 let index = *body as usize;
-                if !all_finite && !finite(&[*record]) {
+                if !all_finite && !finite(record) {
                     broken = Some(broken.map_or(index, |lowest| lowest.min(index)));
                 }
                 // Should a caller's bodies have become fewer, there is nothing to be told of the
@@ -151,33 +157,6 @@ impl Results<'_> {
                 if let Some(to) = spare.get_mut(index) {
                     *to = *record;
                 }
-            }
-        }
-        (reader.finish(), broken)
-    }
-}
-
-/// Results in the order of the bodies.
-struct InTurn<'a> {
-    reader: Reader<'a>,
-    statics: &'a [u32],
-    into: &'a mut [Record],
-}
-
-impl Work for InTurn<'_> {
-    type Output = (u32, Option<usize>);
-
-    /// The sum of the words that were read, and the first body that moves and is not finite.
-    #[inline(always)]
-    fn run<V: Vectors>(self, _: V) -> (u32, Option<usize>) {
-        let Self { mut reader, statics, into } = self;
-        let mut broken = None;
-        for (first, records) in (0..).step_by(BLOCK).zip(into.chunks_mut(BLOCK)) {
-            if !reader.read(records) && broken.is_none() {
-                let moves =
-                    |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
-                let wrong = (first..).zip(&*records).filter(|(_, it)| !finite(&[**it]));
-                broken = wrong.map(|(index, _)| index).find(moves);
             }
         }
         (reader.finish(), broken)
