@@ -176,3 +176,62 @@ pub(crate) fn commit<B: Bodies + ?Sized>(results: &[Record], bodies: &mut B) {
         bodies.commit(index, pose, velocity);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interface::profile::FLOAT;
+    use crate::interface::record::result::{ORIENTATION, POSITION};
+    use crate::scene::{Body, Pose, Velocity};
+
+    const COUNT: usize = 40;
+
+    /// What is read of the results of so many bodies, one row a channel, of which these are not
+    /// finite.
+    fn read_all<T>(broken: &[usize], read: impl FnOnce(Results<'_>, &Vec<Body>) -> T) -> T {
+        let layout = &Segment::Results.layout(&FLOAT.default_variant());
+        let mut channels = vec![vec![Beat::default(); COUNT]; FLOAT.s2mm_widths.len()];
+        for record in broken {
+            channels[ORIENTATION][*record] = Beat([f32::NAN.to_bits(), 0, 0, 0]);
+        }
+        let channels: Vec<&[Beat]> = channels.iter().map(Vec::as_slice).collect();
+        let pose = Pose { position: [5.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+        let bodies = vec![Body { pose, velocity: Velocity::default(), shape: 0 }; COUNT];
+        read(Results { layout, channels: &channels }, &bodies)
+    }
+
+    #[test]
+    fn the_first_body_that_moves_and_is_not_finite_is_told() {
+        let statics = [3, 7];
+        for (broken, told) in
+            [(&[][..], None), (&[7, 3], None), (&[39, 7, 31], Some(31)), (&[4, 3, 38], Some(4))]
+        {
+            let mut spare = Vec::new();
+            let (_, found) = read_all(broken, |results, bodies| {
+                results.in_turn(COUNT, bodies, &statics, &mut spare)
+            });
+            assert_eq!(found, told, "{broken:?}");
+            for (index, record) in spare.iter().enumerate() {
+                let stays = record[POSITION].0[0] == 5.0_f32.to_bits();
+                assert_eq!(stays, statics.contains(&u32::try_from(index).expect("few")), "{index}");
+            }
+        }
+    }
+
+    #[test]
+    fn results_in_another_order_go_to_their_bodies_and_the_lowest_is_told() {
+        // From the last body down, but the first five.
+        let order: Vec<u32> = (5..40).rev().collect();
+        for (broken, told) in [(&[][..], None), (&[2], Some(37)), (&[33, 4, 2], Some(6))] {
+            let mut spare = Vec::new();
+            let (_, found) =
+                read_all(broken, |results, bodies| results.scatter(&order, bodies, &mut spare));
+            assert_eq!(found, told, "{broken:?}");
+            for (index, record) in spare.iter().enumerate() {
+                assert_eq!(record[POSITION].0[0] != 0, index < 5, "{index}");
+                let result = order.iter().position(|body| *body as usize == index);
+                assert_eq!(!finite(record), result.is_some_and(|at| broken.contains(&at)));
+            }
+        }
+    }
+}
