@@ -103,7 +103,8 @@ impl<'a, 'b> Dealer<'a, 'b> {
         }
     }
 
-    /// Writes the next beat.
+    /// Writes the next beat. Where it becomes a part of the loops of units these are in want of registers.
+    #[inline(never)]
     fn put(&mut self, beat: Beat) {
         let channel = self.deal.next();
         let (to, behind) = mem::take(&mut self.channels[channel]).split_at_mut(1);
