@@ -12,7 +12,7 @@ use bytemuck::Zeroable as _;
 
 use super::format::{Binary16, Format, Records, Thesis16, Whole};
 use super::pattern::Pattern;
-use super::stripe::{Deal, Layout, Place};
+use super::stripe::{Deal, Layout};
 use super::unit;
 use super::unpack::total;
 use crate::platform::{Lanes, Vectors};
@@ -103,9 +103,10 @@ impl<'a, 'b> Dealer<'a, 'b> {
         }
     }
 
-    /// Writes the next beat.
+    /// Writes the next beat. Where it becomes a part of the loops of units these are in want of registers.
+    #[inline(never)]
     fn put(&mut self, beat: Beat) {
-        let Place { channel, .. } = self.deal.next();
+        let channel = self.deal.next();
         let (to, behind) = mem::take(&mut self.channels[channel]).split_at_mut(1);
         to[0] = beat;
         self.channels[channel] = behind;
@@ -129,6 +130,7 @@ mod tests {
     use bitstream_model::interface::stripe::Stripe;
     use proptest::prelude::*;
 
+    use super::super::stripe::Place;
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
 

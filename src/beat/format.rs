@@ -1,4 +1,4 @@
-//! This file makes beats of records, in each format that a stream may have.
+//! This file makes beats of records and records of beats, in each format that a stream may have.
 
 use bitstream_model::interface::record::Beat;
 use bytemuck::Pod;
@@ -36,6 +36,9 @@ pub(super) trait Format {
         vectors: V,
         record: [Lanes; ROWS],
     ) -> [Self::Row; ROWS];
+
+    /// The rows that these beats hold, in f32. Likewise.
+    fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS];
 }
 
 /// Words of f32.
@@ -59,6 +62,15 @@ impl Format for Whole {
         let mut rows = [Beat::default(); ROWS];
         for (to, row) in rows.iter_mut().zip(&record) {
             *to = (*row).into();
+        }
+        rows
+    }
+
+    #[inline(always)]
+    fn wide<V: Vectors, const ROWS: usize>(_: V, beats: &[Beat]) -> [Lanes; ROWS] {
+        let mut rows = [Lanes::all(0); ROWS];
+        for (to, beat) in rows.iter_mut().zip(beats) {
+            *to = (*beat).into();
         }
         rows
     }
@@ -89,6 +101,15 @@ macro_rules! sixteen {
                 record: [Lanes; ROWS],
             ) -> [Row; ROWS] {
                 Sixteen::$format.narrow(vectors, record, &R::INTEGERS)
+            }
+
+            #[inline(always)]
+            fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS] {
+                let mut rows = [Lanes::all(0); ROWS];
+                for (to, beat) in rows.as_chunks_mut::<2>().0.iter_mut().zip(beats) {
+                    *to = Sixteen::$format.widen(vectors, bytemuck::cast(*beat));
+                }
+                rows
             }
         }
     };

@@ -2,6 +2,7 @@
 
 pub(crate) mod bodies;
 mod body_records;
+mod collect;
 mod collision_records;
 pub(crate) mod collisions;
 mod deal;

@@ -1,4 +1,4 @@
-//! This file knows the stripes of the profiles when it is compiled.
+//! This file knows the stripes of the profiles and their units when it is compiled.
 
 use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
 
@@ -54,6 +54,42 @@ places! {
     Three: MIXED.stripes.collisions.streams;
     Four: FLOAT.stripes.poses.streams;
 }
+
+/// Units of a pattern: so many records, which are so many beats, and on each channel so many of them.
+/// Each is told to the macro `each`, which returns if it is the one.
+macro_rules! units {
+    ($pattern:expr, $each:ident) => {
+        match $pattern {
+            Pattern::FloatCollisions => $each!(FloatCollisions: 1 are 7: a 2, b 2, c 2, d 1),
+            Pattern::HalfCollisions => $each!(HalfCollisions: 2 are 7: a 3, b 3, c 1),
+            Pattern::HalfBodies => {
+                $each!(HalfBodies: 5 are 5: a 2, b 2, c 1);
+                $each!(HalfBodies: 5 are 10: a 4, b 4, c 2);
+            }
+            Pattern::One => {
+                $each!(One: 1 are 7: a 7);
+                $each!(One: 1 are 1: a 1);
+                $each!(One: 1 are 2: a 2);
+                $each!(One: 1 are 4: a 4);
+            }
+            Pattern::Two => {
+                $each!(Two: 2 are 14: a 7, b 7);
+                $each!(Two: 1 are 6: a 3, b 3);
+                $each!(Two: 2 are 6: a 3, b 3);
+            }
+            Pattern::Three => {
+                $each!(Three: 1 are 3: a 1, b 1, c 1);
+                $each!(Three: 3 are 6: a 2, b 2, c 2);
+                $each!(Three: 3 are 12: a 4, b 4, c 4);
+            }
+            Pattern::Four => {
+                $each!(Four: 2 are 4: a 1, b 1, c 1, d 1);
+                $each!(Four: 1 are 4: a 1, b 1, c 1, d 1);
+            }
+        }
+    };
+}
+pub(super) use units;
 
 /// Where beats go that are dealt out in groups.
 const fn dealt<const BEATS: usize>(streams: &[u8]) -> [Place; BEATS] {

@@ -23,8 +23,6 @@
 //!
 //! Source: interface specification, streams.
 
-use std::ops::Range;
-
 use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::{LANES, pose, result};
@@ -129,74 +127,23 @@ fn share(group: &[u8], channel: usize) -> usize {
 pub(super) struct Deal {
     group: &'static [u8],
     at: usize,
-    slots: [usize; CHANNELS],
-    /// What goes to each channel.
-    shares: [Share; CHANNELS],
 }
-
-/// The beats of a group that go to one channel.
-#[derive(Debug, Clone, Copy, Default)]
-struct Share {
-    /// Which they are; the first `count` of these.
-    places: [usize; GROUP],
-    count: usize,
-}
-
-/// Beats of a group at most, for [`Deal::places`].
-const GROUP: usize = 8;
-
-/// Channels at most.
-const CHANNELS: usize = bitstream_model::interface::address_map::DMA_COUNT_MAX;
 
 impl Deal {
     /// From the first beat on.
-    pub(super) fn new(stripe: Stripe) -> Self {
-        let mut shares = [Share::default(); CHANNELS];
-        for (place, stream) in stripe.streams.iter().enumerate().take(GROUP) {
-            let share = &mut shares[usize::from(*stream)];
-            share.places[share.count] = place;
-            share.count += 1;
-        }
-        Self { group: stripe.streams, at: 0, slots: [0; CHANNELS], shares }
+    pub(super) const fn new(stripe: Stripe) -> Self {
+        Self { group: stripe.streams, at: 0 }
     }
 
-    /// Where the next beat goes.
+    /// The channel of the next beat.
     #[inline(always)]
-    pub(super) fn next(&mut self) -> Place {
+    pub(super) fn next(&mut self) -> usize {
         let channel = usize::from(self.group[self.at]);
         self.at += 1;
         if self.at == self.group.len() {
             self.at = 0;
         }
-        let slot = self.slots[channel];
-        self.slots[channel] += 1;
-        Place { channel, slot }
-    }
-
-    /// The channel of each beat of a group.
-    pub(super) const fn group(&self) -> &'static [u8] {
-        self.group
-    }
-
-    /// Whether a group is one beat for each of its channels, in their order.
-    pub(super) fn one_a_channel(&self) -> bool {
-        (0..).zip(self.group).all(|(channel, stream)| channel == *stream)
-    }
-
-    /// Which beats of a group of `G` go to a channel, and how many they are.
-    #[inline(always)]
-    pub(super) fn places<const G: usize>(&self, channel: usize) -> ([usize; G], usize) {
-        const { assert!(G <= GROUP, "they are kept") };
-        let Share { places, count } = self.shares[channel];
-        (std::array::from_fn(|at| places[at]), count)
-    }
-
-    /// Takes the next slots of one channel. The caller does so for all channels, and whole groups.
-    #[inline(always)]
-    pub(super) fn take(&mut self, channel: usize, slots: usize) -> Range<usize> {
-        let first = self.slots[channel];
-        self.slots[channel] += slots;
-        first..self.slots[channel]
+        channel
     }
 
     /// Whether the group is whole.
@@ -213,6 +160,7 @@ const _: () = assert!(LANES * 4 == bitstream_model::interface::record::BEAT_BYTE
 mod tests {
     use super::Segment::{Collisions, Poses, Results, Velocities};
     use super::*;
+    use bitstream_model::interface::address_map::DMA_COUNT_MAX;
     use bitstream_model::interface::profile::{
         FLOAT, Flow, Geometry, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile,
     };
@@ -307,7 +255,8 @@ mod tests {
                 let Stripe { streams, .. } = segment.layout(&variant).stripe;
                 let channels = profile.mm2s_widths.len();
                 assert!(
-                    (1..=CHANNELS).contains(&channels) && profile.s2mm_widths.len() == channels
+                    (1..=DMA_COUNT_MAX).contains(&channels)
+                        && profile.s2mm_widths.len() == channels
                 );
                 assert!(streams.iter().all(|stream| usize::from(*stream) < channels));
             }
@@ -341,7 +290,7 @@ mod tests {
             let mut places: Vec<_> = (0..beats).map(|beat| layout.place(beat)).collect();
             let mut deal = Deal::new(layout.stripe);
             for (beat, place) in places.iter().enumerate() {
-                prop_assert_eq!(deal.next(), *place);
+                prop_assert_eq!(deal.next(), place.channel);
                 prop_assert_eq!(layout.beat_at(*place), beat);
             }
             prop_assert_eq!(deal.at_end_of_group(), beats.is_multiple_of(layout.stripe.streams.len()));

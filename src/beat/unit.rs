@@ -24,8 +24,7 @@ pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
     rest: &mut [&mut [Beat]],
     sum: &mut Lanes,
 ) -> usize {
-    // Units of so many records, which are so many beats: on each channel so many of them.
-    macro_rules! units {
+    macro_rules! unit {
         ($places:ident: $records:literal are $beats:literal: $($channel:ident $share:literal),*) => {
             if $records * ROWS == $beats * F::PER_BEAT {
                 let count = records.len() / $records;
@@ -40,34 +39,7 @@ pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
             }
         };
     }
-    match pattern {
-        Pattern::FloatCollisions => units!(FloatCollisions: 1 are 7: a 2, b 2, c 2, d 1),
-        Pattern::HalfCollisions => units!(HalfCollisions: 2 are 7: a 3, b 3, c 1),
-        Pattern::HalfBodies => {
-            units!(HalfBodies: 5 are 5: a 2, b 2, c 1);
-            units!(HalfBodies: 5 are 10: a 4, b 4, c 2);
-        }
-        Pattern::One => {
-            units!(One: 1 are 7: a 7);
-            units!(One: 1 are 1: a 1);
-            units!(One: 1 are 2: a 2);
-            units!(One: 1 are 4: a 4);
-        }
-        Pattern::Two => {
-            units!(Two: 2 are 14: a 7, b 7);
-            units!(Two: 1 are 6: a 3, b 3);
-            units!(Two: 2 are 6: a 3, b 3);
-        }
-        Pattern::Three => {
-            units!(Three: 1 are 3: a 1, b 1, c 1);
-            units!(Three: 3 are 6: a 2, b 2, c 2);
-            units!(Three: 3 are 12: a 4, b 4, c 4);
-        }
-        Pattern::Four => {
-            units!(Four: 2 are 4: a 1, b 1, c 1, d 1);
-            units!(Four: 1 are 4: a 1, b 1, c 1, d 1);
-        }
-    }
+    pattern::units!(pattern, unit);
     0
 }
 

@@ -1,202 +1,123 @@
 //! This file reads the results out of the channels' beats.
 //!
-//! The memory may be slow to read, so each beat is read once: a block of records is collected from
-//! the channels, one after the other, and the sum of what was read is taken on the way.
+//! The memory may be slow to read, so each beat is read once, and what is to be known of it is found out
+//! on the way. They come by units ([`collect`]), and beat by beat what is left at a segment's end, or has
+//! a stripe that no profile has.
 
-use bitstream_model::interface::record::{Beat, LANES, WORD_LANE, result};
+use bitstream_model::interface::address_map::DMA_COUNT_MAX;
+use bitstream_model::interface::record::{Beat, result};
 
+use super::collect::{self, Tally};
 pub(crate) use super::deal::BLOCK;
-use super::stripe::{Deal, Layout, Place};
-use crate::platform::Lanes;
-use crate::record::largest::{Largest, MAGNITUDE};
-use crate::record::sixteen::{self, Sixteen};
+use super::format::{Binary16, Format, Thesis16, Whole};
+use super::pattern::Pattern;
+use super::stripe::{Deal, Layout};
+use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
+use crate::record::finite::Finite;
+use crate::record::result::Record;
+use crate::record::sixteen::Sixteen;
 
-/// A record of results, in f32.
-pub(crate) type Record = [Beat; result::ROWS];
-
-/// Reads results, a block at a time, from the result segments, one a channel.
+/// Reads results from the result segments, one a channel.
 ///
 /// A number that the accelerator could not hold is not finite.
 pub(crate) struct Reader<'a> {
-    collector: Collector<'a>,
+    /// What is not read yet.
+    channels: [&'a [Beat]; DMA_COUNT_MAX],
     format: Option<Sixteen>,
-    narrow: [[Beat; result::ROWS]; BLOCK / 2],
+    /// The stripe, if it is known, and its first channel.
+    pattern: Option<(Pattern, usize)>,
+    deal: Deal,
+    sum: Lanes,
 }
 
 impl<'a> Reader<'a> {
     /// From the first record on.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
-    pub(crate) fn new(layout: &Layout, channels: &'a [&'a [Beat]]) -> Self {
+    pub(crate) fn new(layout: &Layout, channels: &[&'a [Beat]]) -> Self {
+        let mut all: [&[Beat]; DMA_COUNT_MAX] = Default::default();
+        all[..channels.len()].copy_from_slice(channels);
         Self {
-            collector: Collector::new(layout, channels),
+            channels: all,
             format: Sixteen::of(layout.format),
-            narrow: [[Beat::default(); result::ROWS]; BLOCK / 2],
+            pattern: Pattern::of(layout.stripe.streams),
+            deal: Deal::new(layout.stripe),
+            sum: Lanes::all(0),
         }
     }
 
-    /// Reads the next records, at most [`BLOCK`]; only the last may be fewer. Whether all their numbers
-    /// are finite.
-    #[inline(always)]
+    /// Reads the next records. Whether all their numbers are finite.
     pub(crate) fn read(&mut self, records: &mut [Record]) -> bool {
-        let Some(format) = self.format else {
-            self.collector.read(records.as_flattened_mut());
-            return finite(records);
-        };
-        // Two beats a record: an even number of rows.
-        let beats = &mut self.narrow.as_flattened_mut()[..records.len() * (result::ROWS / 2)];
-        self.collector.read(beats);
-        format.widen(bytemuck::cast_slice(beats), records.as_flattened_mut());
-        const EXPONENTS: [Beat; result::ROWS / 2] = sixteen::exponents(&NUMBERS);
-        sixteen::finite(&EXPONENTS, beats)
+        in_wide_vectors(Reading { reader: self, records })
     }
 
-    /// The sum of all 32-bit words of the segments, modulo 2^32: what the accelerator counts of what
-    /// it sent.
+    #[inline(always)]
+    fn read_as<V: Vectors, F: Format>(&mut self, vectors: V, records: &mut [Record]) -> bool {
+        let mut tally = Tally { sum: self.sum, finite: Finite::new() };
+        let done = match self.pattern {
+            Some((pattern, first)) if self.deal.at_end_of_group() => {
+                let rest = self.channels.get_mut(first..).unwrap_or_default();
+                collect::read::<V, F>(pattern, vectors, rest, records, &mut tally)
+            }
+            _ => 0,
+        };
+        // What is left of them fills no unit.
+        for record in records.iter_mut().skip(done) {
+            let mut beats = [Beat::default(); result::ROWS];
+            let beats = &mut beats[..result::ROWS / F::PER_BEAT];
+            for beat in &mut *beats {
+                *beat = self.take();
+            }
+            *record = tally.record::<V, F>(vectors, beats);
+        }
+        self.sum = tally.sum;
+        tally.finite.all()
+    }
+
+    /// The next beat.
+    fn take(&mut self) -> Beat {
+        let channel = &mut self.channels[self.deal.next()];
+        let (beat, behind) = channel.split_at(1);
+        *channel = behind;
+        beat[0]
+    }
+
+    /// The sum of all 32-bit words of the segments, modulo 2^32, of those that fill the last group too:
+    /// what the accelerator counts of what it sent.
     pub(crate) fn finish(self) -> u32 {
-        self.collector.finish()
+        total(self.channels.iter().copied().flatten().fold(self.sum, plus))
     }
 }
 
-/// Lanes of a record that are numbers: what lies beside a vec3 is nobody's.
-const NUMBERS: [[bool; LANES]; result::ROWS] = {
-    let mut numbers = [[true; LANES]; result::ROWS];
-    numbers[result::POSITION][WORD_LANE] = false;
-    numbers[result::LINEAR][WORD_LANE] = false;
-    numbers[result::ANGULAR][WORD_LANE] = false;
-    numbers
-};
-
-/// Whether all numbers of these records are finite.
-#[inline(always)]
-pub(crate) fn finite(records: &[Record]) -> bool {
-    const LARGEST: Largest<{ result::ROWS }> = {
-        let mut beside = [f32::MAX.to_bits(); result::ROWS];
-        let mut row = 0;
-        while row < result::ROWS {
-            if !NUMBERS[row][WORD_LANE] {
-                beside[row] = MAGNITUDE;
-            }
-            row += 1;
-        }
-        Largest::new(f32::MAX, beside)
-    };
-    LARGEST.bound(records)
+/// Reading of records, which is compiled for the vectors of this processor.
+struct Reading<'r, 'a> {
+    reader: &'r mut Reader<'a>,
+    records: &'r mut [Record],
 }
 
-/// Reads beats in their order.
-struct Collector<'a> {
-    channels: &'a [&'a [Beat]],
-    deal: Deal,
-    sum: Lanes,
-}
+impl Work for Reading<'_, '_> {
+    type Output = bool;
 
-impl<'a> Collector<'a> {
-    /// From the first beat on.
-    fn new(layout: &Layout, channels: &'a [&'a [Beat]]) -> Self {
-        Self { channels, deal: Deal::new(layout.stripe), sum: Lanes::all(0) }
-    }
-
-    /// Reads the next beats.
     #[inline(always)]
-    fn read(&mut self, beats: &mut [Beat]) {
-        let rest = match self.deal.group().len() {
-            _ if !self.deal.at_end_of_group() => beats,
-            1 => self.groups::<1>(beats),
-            2 => self.groups::<2>(beats),
-            3 => self.groups::<3>(beats),
-            4 => self.groups::<4>(beats),
-            5 => self.groups::<5>(beats),
-            _ => beats,
-        };
-        for beat in rest {
-            let Place { channel, slot } = self.deal.next();
-            *beat = self.channels[channel][slot];
-            self.sum = self.sum.plus(Lanes::from(*beat));
+    fn run<V: Vectors>(self, vectors: V) -> bool {
+        let Self { reader, records } = self;
+        // One loop each, in which nothing is asked of the format.
+        match reader.format {
+            None => reader.read_as::<V, Whole>(vectors, records),
+            Some(Sixteen::Binary16) => reader.read_as::<V, Binary16>(vectors, records),
+            Some(Sixteen::Thesis16) => reader.read_as::<V, Thesis16>(vectors, records),
         }
     }
-
-    /// Reads whole groups of `G` beats; what is left to read.
-    #[inline(always)]
-    fn groups<'c, const G: usize>(&mut self, beats: &'c mut [Beat]) -> &'c mut [Beat] {
-        let (groups, rest) = beats.as_chunks_mut::<G>();
-        if self.deal.one_a_channel() && self.channels.len() == G {
-            let from = std::array::from_fn(|channel| {
-                &self.channels[channel][self.deal.take(channel, groups.len())]
-            });
-            one_each(from, groups, &mut self.sum);
-            return rest;
-        }
-        for (channel, from) in self.channels.iter().enumerate() {
-            let (places, share) = self.deal.places::<G>(channel);
-            let from = &from[self.deal.take(channel, groups.len() * share)];
-            let sum = &mut self.sum;
-            match share {
-                0 => {}
-                1 => run::<G, 1>(from, places, groups, sum),
-                2 => run::<G, 2>(from, places, groups, sum),
-                _ => {
-                    for (from, group) in from.chunks_exact(share).zip(groups.iter_mut()) {
-                        for (from, place) in from.iter().zip(places) {
-                            group[place] = *from;
-                            *sum = sum.plus(Lanes::from(*from));
-                        }
-                    }
-                }
-            }
-        }
-        rest
-    }
-
-    /// The sum of all words, of those that fill the last group too.
-    fn finish(mut self) -> u32 {
-        for (channel, beats) in self.channels.iter().enumerate() {
-            let used = self.deal.take(channel, 0).start;
-            self.sum =
-                beats[used..].iter().fold(self.sum, |sum, beat| sum.plus(Lanes::from(*beat)));
-        }
-        total(self.sum)
-    }
-}
-
-/// Reads groups of which each channel has one beat, in the order of the channels.
-#[inline(always)]
-fn one_each<const G: usize>(from: [&[Beat]; G], groups: &mut [[Beat; G]], sum: &mut Lanes) {
-    // Said once here, so that it is not asked of every beat.
-    let from = from.map(|beats| &beats[..groups.len()]);
-    let mut total = *sum;
-    for (at, group) in groups.iter_mut().enumerate() {
-        for (beat, from) in group.iter_mut().zip(from) {
-            *beat = from[at];
-            total = total.plus(Lanes::from(from[at]));
-        }
-    }
-    *sum = total;
-}
-
-/// Reads the `S` beats of each group that one channel has, and adds them up.
-#[inline(always)]
-fn run<const G: usize, const S: usize>(
-    from: &[Beat],
-    places: [usize; G],
-    groups: &mut [[Beat; G]],
-    sum: &mut Lanes,
-) {
-    // Said once here, so that it is not asked of every beat.
-    let places: [usize; S] = std::array::from_fn(|at| places[at % G].min(G - 1));
-    let mut total = *sum;
-    for (group, from) in groups.iter_mut().zip(from.as_chunks::<S>().0) {
-        for (beat, place) in from.iter().zip(places) {
-            group[place] = *beat;
-            total = total.plus(Lanes::from(*beat));
-        }
-    }
-    *sum = total;
 }
 
 /// Sum of all 32-bit words, modulo 2^32.
 pub(crate) fn sum_of_words(beats: &[Beat]) -> u32 {
-    total(beats.iter().fold(Lanes::all(0), |sum, beat| sum.plus(Lanes::from(*beat))))
+    total(beats.iter().fold(Lanes::all(0), plus))
+}
+
+/// Word by word, modulo 2^32.
+fn plus(sum: Lanes, beat: &Beat) -> Lanes {
+    sum.plus((*beat).into())
 }
 
 /// The lanes' sums in one.
@@ -206,10 +127,14 @@ pub(super) fn total(sum: Lanes) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::stripe::Segment;
+    use bitstream_model::interface::record::LANES;
+    use bitstream_model::interface::stripe::Stripe;
+
+    use super::super::stripe::{Place, Segment};
     use super::*;
     use crate::interface::number::{Numbers, StreamFormat};
     use crate::interface::profile::{HALF, PROFILES, Variant};
+    use crate::record::finite::finite;
     use crate::record::result::decode;
     use crate::scene::{Pose, Velocity};
     use proptest::prelude::*;
@@ -218,10 +143,7 @@ mod tests {
     fn read(layout: &Layout, channels: &[&[Beat]], count: usize) -> (Vec<(Pose, Velocity)>, u32) {
         let mut reader = Reader::new(layout, channels);
         let mut records = vec![Record::default(); count];
-        records.chunks_mut(BLOCK).for_each(|block| {
-            let good = reader.read(block);
-            assert_eq!(good, finite(block));
-        });
+        assert_eq!(reader.read(&mut records), records.iter().all(finite));
         (records.iter().map(decode).collect(), reader.finish())
     }
 
@@ -246,17 +168,32 @@ mod tests {
         assert_eq!(read(&layout, &[&[], &[], &[]], 0).1, 0);
     }
 
+    /// In a unit of each profile and behind the last.
     #[test]
     fn what_is_not_finite_is_found_wherever_it_is_and_nothing_else_is() {
-        let largest = f32::MAX.to_bits();
-        let records = [[Beat([largest; 4]); 4]; 3];
-        assert!(finite(&records) && finite(&[]));
-        for value in [f32::INFINITY, f32::NEG_INFINITY, f32::NAN] {
-            for at in 0..16 {
-                let mut records = records;
-                records[1][at / 4].0[at % 4] = value.to_bits();
-                let beside = [3, 11, 15].contains(&at);
-                assert_eq!(finite(&records), beside, "{value} {at}");
+        const COUNT: usize = 7;
+        for profile in PROFILES.iter().filter(|profile| profile.numbers.poses == StreamFormat::F32)
+        {
+            let layout = Segment::Results.layout(&profile.default_variant());
+            let good = |at: usize, value: f32| {
+                let mut segments = vec![Vec::new(); profile.s2mm_widths.len()];
+                for beat in 0..layout.beats(COUNT) {
+                    let numbers = [f32::MAX, f32::MIN, -0.0, f32::from_bits(1)];
+                    let mut beats = [Beat(numbers.map(f32::to_bits))];
+                    if beat == at / LANES {
+                        beats[0].0[at % LANES] = value.to_bits();
+                    }
+                    segments[layout.place(beat).channel].extend(beats);
+                }
+                let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
+                Reader::new(&layout, &views).read(&mut [Record::default(); COUNT])
+            };
+            for at in 0..COUNT * result::ROWS * LANES {
+                let beside = [3, 11, 15].contains(&(at % 16));
+                for value in [f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -f32::NAN] {
+                    assert_eq!(good(at, value), beside, "{} {value} {at}", profile.name);
+                }
+                assert!(good(at, f32::MIN));
             }
         }
     }
@@ -294,6 +231,21 @@ mod tests {
         let Velocity { linear, angular } = velocity;
         let rows = [&pose.position[..], &pose.orientation, &linear, &angular];
         rows.concat().into_iter().map(f32::to_bits).collect()
+    }
+
+    /// The number of a word, as the bits of an f32.
+    fn number(format: Sixteen, word: u16) -> u32 {
+        let (sign, f, m) = (u32::from(word >> 15) << 31, word >> 10 & 31, word & 1023);
+        let (exponent, fraction) = (i32::from(f) - 15, f32::from(m) / 1024.0);
+        let thesis = format == Sixteen::Thesis16;
+        let magnitude = match (f, m) {
+            // A NaN keeps its bits and is quiet.
+            (31, 1..) if !thesis => return sign | 0x7FC0_0000 | u32::from(m) << 13,
+            (31, _) => f32::INFINITY,
+            (0, _) if !thesis => fraction * 2.0_f32.powi(-14),
+            _ => (1.0 + fraction) * 2.0_f32.powi(exponent),
+        };
+        sign | magnitude.to_bits()
     }
 
     /// Those of the sixteen words of a record that are numbers.
@@ -343,22 +295,61 @@ mod tests {
             let (states, sum) = read(&layout, &views, words.len());
             prop_assert_eq!(sum, sum_of(&segments));
             for (expected, (pose, velocity)) in words.iter().zip(states) {
-                for (found, word) in numbers(pose, velocity).into_iter().zip(of_words(expected)) {
-                    let found = f32::from_bits(found);
-                    let (f, m) = (i32::from(word >> 10 & 31), f64::from(word & 1023) / 1024.0);
-                    if f == 31 {
-                        prop_assert!(!found.is_finite());
-                        continue;
-                    }
-                    let magnitude = if thesis || f > 0 {
-                        (1.0 + m) * 2.0_f64.powi(f - 15)
-                    } else {
-                        m * 2.0_f64.powi(-14)
-                    };
-                    let value = if word >> 15 == 0 { magnitude } else { -magnitude };
-                    prop_assert_eq!(f64::from(found).to_bits(), value.to_bits());
-                }
+                let format = Sixteen::of(poses).expect("one of sixteen bits");
+                let expected: Vec<u32> =
+                    of_words(expected).into_iter().map(|word| number(format, word)).collect();
+                prop_assert_eq!(numbers(pose, velocity), expected);
             }
+        }
+
+        /// Of the stripes of the profiles and of others, in every format, however many are read at a time.
+        #[test]
+        fn every_split_reads_what_the_definition_says(
+            words in prop::collection::vec(any::<[u32; 16]>(), 0..40),
+            blocks in prop::collection::vec(0_usize..12, 0..12),
+            streams in prop::sample::select(
+                PROFILES.iter().map(|profile| profile.stripes.results.streams)
+                    .chain([&[1, 0][..], &[0, 1, 1], &[3, 2, 1, 0, 0, 1], &[2], &[1, 2, 3]])
+                    .collect::<Vec<_>>(),
+            ),
+            padded in any::<bool>(),
+            format in prop::sample::select(StreamFormat::ALL.to_vec()),
+        ) {
+            let layout = Layout { rows: result::ROWS, format, stripe: Stripe { streams, padded } };
+            let count = words.len();
+            let mut segments: Vec<Vec<Beat>> = (0..DMA_COUNT_MAX)
+                .map(|channel| vec![Beat::default(); layout.beats_on_channel(count, channel)])
+                .collect();
+            let mut beats = words.iter().flat_map(|record| record.as_chunks().0).map(|it| Beat(*it));
+            for at in 0..layout.beats(count) {
+                let Place { channel, slot } = layout.place(at);
+                // Padding is of any words.
+                segments[channel][slot] = beats.next().unwrap_or(Beat([3; LANES]));
+            }
+            let expected: Vec<Record> = (0..count)
+                .map(|record| std::array::from_fn(|row| {
+                    let row = record * result::ROWS + row;
+                    let Place { channel, slot } = layout.place(row / layout.rows_per_beat());
+                    let beat = segments[channel][slot];
+                    let Some(sixteen) = Sixteen::of(format) else { return beat };
+                    let halves: [u16; 8] = bytemuck::cast(beat);
+                    let halves = halves.as_chunks::<LANES>().0[row % 2];
+                    Beat(halves.map(|word| number(sixteen, word)))
+                }))
+                .collect();
+
+            let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
+            let mut reader = Reader::new(&layout, &views);
+            let mut found = vec![Record::default(); count];
+            let mut rest = found.as_mut_slice();
+            for block in blocks.into_iter().chain([count]) {
+                let (block, behind) = rest.split_at_mut(block.min(rest.len()));
+                let good = reader.read(block);
+                prop_assert_eq!(good, block.iter().all(finite));
+                rest = behind;
+            }
+            prop_assert_eq!(found, expected);
+            prop_assert_eq!(reader.finish(), sum_of(&segments));
         }
 
         #[test]

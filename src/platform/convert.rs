@@ -1,13 +1,12 @@
 //! This file converts rows of numbers between f32 and binary16 by the processor's instructions.
 //!
-//! `half` knows them, too, but one call converts eight numbers at most, and on aarch64 it wants more
-//! than every processor has: on a Cortex-A53, whose instructions these are, it would compute with
-//! integers. It does what is left over, and everything where there are no such instructions.
+//! `half` knows them, too, but on aarch64 it wants more than every processor has: on a Cortex-A53, whose
+//! instructions these are, it would compute with integers. It does so where there are none.
 #![allow(unsafe_code, reason = "not every processor has the instructions, and vectors are cast")]
 
 use bitstream_model::interface::record::{LANES, WORD_LANE};
+#[cfg(any(test, not(target_arch = "aarch64")))]
 use half::f16;
-use half::slice::{HalfBitsSliceExt as _, HalfFloatSliceExt as _};
 
 use super::lanes::Lanes;
 
@@ -33,34 +32,20 @@ fn row(from: Wide, integer: bool) -> Narrow {
     to
 }
 
-/// Numbers from binary16.
-///
-/// Shape: as many rows of either.
-#[inline]
-pub(crate) fn from_binary16(from: &[Narrow], to: &mut [[f32; LANES]]) {
-    #[cfg(target_arch = "x86_64")]
-    let (from, to) = match x86::there() {
-        // SAFETY: the processor has the instructions that the function is compiled for, and the system
-        // keeps their registers.
-        true => unsafe { x86::from_binary16(from, to) },
-        false => (from, to),
-    };
+/// The numbers of two rows of binary16, in f32.
+#[inline(always)]
+pub(super) fn to_f32(rows: [Narrow; 2]) -> [Lanes; 2] {
     #[cfg(target_arch = "aarch64")]
-    let (from, to) = aarch64::from_binary16(from, to);
-    if !from.is_empty() {
-        let from: &[f16] = from.as_flattened().reinterpret_cast();
-        from.convert_to_f32_slice(to.as_flattened_mut());
-    }
+    let wide = rows.map(aarch64::to_f32);
+    #[cfg(not(target_arch = "aarch64"))]
+    let wide = rows.map(|row| row.map(|bits| f16::from_bits(bits).to_f32_const().to_bits()));
+    wide.map(Lanes::new)
 }
 
 /// A row of words of 32 bits.
 type Wide = [u32; LANES];
 /// A row of words of sixteen bits.
 type Narrow = [u16; LANES];
-
-/// What is left to do.
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-type Rest<'a, From, To> = (&'a [[From; LANES]], &'a mut [[To; LANES]]);
 
 #[cfg(target_arch = "x86_64")]
 pub(super) mod x86 {
@@ -70,14 +55,7 @@ pub(super) mod x86 {
         _mm256_set_m128i,
     };
 
-    use super::{LANES, Lanes, Narrow, Rest, WORD_LANE};
-
-    /// Whether the processor has the instructions. They take the registers of AVX, which a system may
-    /// not keep, and whether it does is asked of AVX alone.
-    #[inline]
-    pub(super) fn there() -> bool {
-        std::arch::is_x86_feature_detected!("avx") && std::arch::is_x86_feature_detected!("f16c")
-    }
+    use super::{LANES, Lanes, Narrow, WORD_LANE};
 
     /// As [`to_binary16`](super::to_binary16).
     #[target_feature(enable = "avx2,f16c")]
@@ -102,18 +80,12 @@ pub(super) mod x86 {
         })
     }
 
-    #[target_feature(enable = "f16c")]
-    pub(super) fn from_binary16<'a>(
-        from: &'a [[u16; LANES]],
-        to: &'a mut [[f32; LANES]],
-    ) -> Rest<'a, u16, f32> {
-        let (pairs, rest) = from.as_chunks::<2>();
-        let (to_pairs, to_rest) = to.as_chunks_mut::<2>();
-        for (from, to) in pairs.iter().zip(to_pairs) {
-            let narrow: __m128i = bytemuck::cast(*from);
-            *to = bytemuck::cast(_mm256_cvtph_ps(narrow));
-        }
-        (rest, to_rest)
+    /// As [`to_f32`](super::to_f32).
+    #[target_feature(enable = "avx2,f16c")]
+    #[inline]
+    pub(in super::super) fn to_f32(rows: [Narrow; 2]) -> [Lanes; 2] {
+        let wide: [__m128i; 2] = bytemuck::cast(_mm256_cvtph_ps(bytemuck::cast(rows)));
+        wide.map(Lanes)
     }
 }
 
@@ -121,7 +93,7 @@ pub(super) mod x86 {
 mod aarch64 {
     use core::arch::aarch64::{float16x4_t, float32x4_t, vcvt_f16_f32, vcvt_f32_f16};
 
-    use super::{LANES, Narrow, Rest, Wide};
+    use super::{Narrow, Wide};
 
     #[inline(always)]
     pub(super) fn to_binary16(from: &Wide) -> Narrow {
@@ -133,19 +105,14 @@ mod aarch64 {
         unsafe { std::mem::transmute::<float16x4_t, Narrow>(narrow) }
     }
 
-    pub(super) fn from_binary16<'a>(
-        from: &'a [[u16; LANES]],
-        to: &'a mut [[f32; LANES]],
-    ) -> Rest<'a, u16, f32> {
-        for (from, to) in from.iter().zip(&mut *to) {
-            // SAFETY: the vector is four words of sixteen bits, of any bits.
-            let narrow = unsafe { std::mem::transmute::<[u16; LANES], float16x4_t>(*from) };
-            // SAFETY: every aarch64 that Linux runs on has the instruction.
-            let wide = unsafe { vcvt_f32_f16(narrow) };
-            // SAFETY: the vector is four f32.
-            *to = unsafe { std::mem::transmute::<float32x4_t, [f32; LANES]>(wide) };
-        }
-        (&[], &mut [])
+    #[inline(always)]
+    pub(super) fn to_f32(from: Narrow) -> Wide {
+        // SAFETY: the vector is four words of sixteen bits, of any bits.
+        let narrow = unsafe { std::mem::transmute::<Narrow, float16x4_t>(from) };
+        // SAFETY: every aarch64 that Linux runs on has the instruction.
+        let wide = unsafe { vcvt_f32_f16(narrow) };
+        // SAFETY: the vector is four f32.
+        unsafe { std::mem::transmute::<float32x4_t, Wide>(wide) }
     }
 }
 
@@ -206,19 +173,31 @@ mod tests {
         }
     }
 
+    /// Rows of binary16 through the vectors of a loop.
+    struct Widening<'a>(&'a [[Narrow; 2]]);
+
+    impl Work for Widening<'_> {
+        type Output = Vec<[Wide; 2]>;
+
+        #[inline(always)]
+        fn run<V: Vectors>(self, vectors: V) -> Vec<[Wide; 2]> {
+            let Self(pairs) = self;
+            pairs.iter().map(|rows| vectors.to_f32(*rows).map(Lanes::words)).collect()
+        }
+    }
+
     #[test]
     fn every_word_is_widened_as_by_integers() {
         let words: Vec<u16> = (0..=u16::MAX).collect();
-        let rows = words.as_chunks::<LANES>().0;
-        for together in 1..=5 {
-            for rows in rows.chunks(together) {
-                let mut found = vec![[0.0; LANES]; rows.len()];
-                from_binary16(rows, &mut found);
-                for (found, word) in found.as_flattened().iter().zip(rows.as_flattened()) {
-                    let expected = f16::from_bits(*word).to_f32_const();
-                    assert_eq!(found.to_bits(), expected.to_bits(), "{word:#06x}");
-                }
-            }
+        let pairs = words.as_chunks::<LANES>().0.as_chunks::<2>().0;
+        let anywhere = pairs.iter().map(|rows| to_f32(*rows).map(Lanes::words));
+        let here = in_wide_vectors(Widening(pairs));
+        assert_eq!(here.len(), pairs.len());
+        for ((here, anywhere), narrow) in here.into_iter().zip(anywhere).zip(pairs) {
+            let number = |bits| f16::from_bits(bits).to_f32_const().to_bits();
+            let expected = narrow.map(|row| row.map(number));
+            assert_eq!(here, expected, "{narrow:#06x?}");
+            assert_eq!(anywhere, expected, "{narrow:#06x?}");
         }
     }
 }

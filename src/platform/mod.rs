@@ -68,7 +68,6 @@ use std::time::Duration;
 
 pub use access_log::{AccessKind, RegisterAccess};
 pub(crate) use buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
-pub(crate) use convert::from_binary16;
 pub use dev_mem::DevMemWindows;
 #[cfg(feature = "emulation")]
 pub(crate) use emulated::EmulatedPlatform;

@@ -23,6 +23,9 @@ pub(crate) trait Vectors: Copy {
     /// Rounds the numbers of two rows to binary16, to nearest even. Where `integers` says so the last word
     /// of a row is an unsigned integer, whose lower half is taken.
     fn to_binary16(self, rows: [Lanes; 2], integers: [bool; 2]) -> [[u16; LANES]; 2];
+
+    /// The numbers of two rows of binary16, in f32.
+    fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2];
 }
 
 /// Those that every processor has.
@@ -33,6 +36,11 @@ impl Vectors for Baseline {
     #[inline(always)]
     fn to_binary16(self, rows: [Lanes; 2], integers: [bool; 2]) -> [[u16; LANES]; 2] {
         convert::to_binary16(rows, integers)
+    }
+
+    #[inline(always)]
+    fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2] {
+        convert::to_f32(rows)
     }
 }
 
@@ -62,6 +70,12 @@ mod x86 {
             // SAFETY: there is one of these only where the processor has the instructions that the
             // function is compiled for.
             unsafe { convert::x86::to_binary16(rows, integers) }
+        }
+
+        #[inline(always)]
+        fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2] {
+            // SAFETY: as above.
+            unsafe { convert::x86::to_f32(rows) }
         }
     }
 

@@ -24,15 +24,6 @@ impl<const ROWS: usize> Largest<ROWS> {
         Self(rows)
     }
 
-    /// Whether all of these records are within. Without a branch per number.
-    #[inline(always)]
-    pub(crate) fn bound(&self, records: &[[Beat; ROWS]]) -> bool {
-        let within = |beyond: Lanes, record: &[Beat; ROWS]| {
-            beyond.or(self.beyond(&std::array::from_fn(|row| Lanes::from(record[row]))))
-        };
-        records.iter().fold(Lanes::all(0), within).words() == [0; LANES]
-    }
-
     /// Bits where a word of any row of a record is beyond its limit, lane by lane; none if none is.
     #[inline(always)]
     pub(crate) fn beyond(&self, record: &[Lanes; ROWS]) -> Lanes {

@@ -7,6 +7,7 @@
 
 pub(crate) mod collision;
 pub(crate) mod end;
+pub(crate) mod finite;
 pub(crate) mod inertia;
 pub(crate) mod largest;
 pub(crate) mod pose;

@@ -4,13 +4,16 @@ use super::{to_vec3, to_vec4, vec3_and_word, vec4};
 use crate::interface::record::{Beat, result};
 use crate::scene::{Pose, Velocity};
 
+/// A record of results, in f32.
+pub(crate) type Record = [Beat; result::ROWS];
+
 /// The new state of a body from its result record; the words beside the vec3 are not looked at.
 ///
 /// Shape: 4 rows. Units: metres, unit quaternion, m/s, rad/s, world frame.
 ///
 /// Source: interface specification, record table.
 #[inline]
-pub(crate) fn decode(beats: &[Beat; result::ROWS]) -> (Pose, Velocity) {
+pub(crate) fn decode(beats: &Record) -> (Pose, Velocity) {
     let pose = Pose {
         position: to_vec3(beats[result::POSITION]),
         orientation: to_vec4(beats[result::ORIENTATION]),
@@ -24,8 +27,8 @@ pub(crate) fn decode(beats: &[Beat; result::ROWS]) -> (Pose, Velocity) {
 
 /// The record of which [`decode`] makes this state again.
 #[inline]
-pub(crate) fn of(pose: Pose, velocity: Velocity) -> [Beat; result::ROWS] {
-    let mut beats = [Beat::default(); result::ROWS];
+pub(crate) fn of(pose: Pose, velocity: Velocity) -> Record {
+    let mut beats = Record::default();
     beats[result::POSITION] = vec3_and_word(pose.position, 0).into();
     beats[result::ORIENTATION] = vec4(pose.orientation).into();
     beats[result::LINEAR] = vec3_and_word(velocity.linear, 0).into();

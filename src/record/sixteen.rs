@@ -1,10 +1,10 @@
 //! This file narrows rows to words of sixteen bits and widens them again.
 
 use bitstream_model::interface::number::StreamFormat;
-use bitstream_model::interface::record::{Beat, LANES, WORD_LANE};
+use bitstream_model::interface::record::{LANES, WORD_LANE};
 
 use super::thesis16;
-use crate::platform::{Lanes, Vectors, from_binary16};
+use crate::platform::{Lanes, Vectors};
 
 /// A row in sixteen bits: half a beat.
 pub(crate) type Row = [u16; LANES];
@@ -66,62 +66,20 @@ impl Sixteen {
         narrow
     }
 
-    /// Rows of f32 numbers from rows of this format. Many at once: how the machine converts is found
-    /// out once a call.
+    /// Two rows of this format in f32.
     #[inline(always)]
-    pub(crate) fn widen(self, rows: &[Row], wide: &mut [Beat]) {
+    pub(crate) fn widen<V: Vectors>(self, vectors: V, rows: [Row; 2]) -> [Lanes; 2] {
         match self {
-            Self::Binary16 => from_binary16(rows, bytemuck::cast_slice_mut(wide)),
-            Self::Thesis16 => {
-                for (to, from) in wide.iter_mut().zip(rows) {
-                    *to = Beat(from.map(thesis16::widen));
-                }
-            }
+            Self::Binary16 => vectors.to_f32(rows),
+            Self::Thesis16 => rows.map(|row| Lanes::new(row.map(thesis16::widen))),
         }
     }
-}
-
-/// The bits of the exponents of a row.
-const EXPONENT: u16 = 0x7C00;
-
-/// The bits of a record's exponents. `numbers` says which of its lanes are numbers.
-///
-/// Shape: `BEATS` beats hold `ROWS` rows.
-pub(crate) const fn exponents<const ROWS: usize, const BEATS: usize>(
-    numbers: &[[bool; LANES]; ROWS],
-) -> [Beat; BEATS] {
-    assert!(BEATS * 2 == ROWS, "two rows a beat");
-    let mut beats = [Beat([0; LANES]); BEATS];
-    let mut at = 0;
-    while at < ROWS * LANES {
-        if numbers[at / LANES][at % LANES] {
-            beats[at / 8].0[at % 8 / 2] |= (EXPONENT as u32) << (at % 2 * 16);
-        }
-        at += 1;
-    }
-    beats
-}
-
-/// Whether all numbers of these records are finite: in neither format are those whose exponent is
-/// all ones. Without a branch per number. `exponents` are the bits to look at ([`exponents`]).
-///
-/// Shape: whole records.
-#[inline(always)]
-pub(crate) fn finite<const BEATS: usize>(exponents: &[Beat; BEATS], beats: &[Beat]) -> bool {
-    // One more than the largest exponent is a carry into the sign, which is not looked at.
-    let one = Lanes::all(0x0400_0400);
-    let mut carries = Lanes::all(0);
-    for record in beats.as_chunks::<BEATS>().0 {
-        for (beat, exponents) in record.iter().zip(exponents) {
-            let exponents = Lanes::from(*beat).and(Lanes::from(*exponents));
-            carries = carries.or(exponents.plus(one));
-        }
-    }
-    carries.and(Lanes::all(0x8000_8000)).words() == [0; LANES]
 }
 
 #[cfg(test)]
 mod tests {
+    use bitstream_model::interface::record::Beat;
+
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
 
@@ -149,9 +107,22 @@ mod tests {
     }
 
     fn widened(format: Sixteen, row: Row) -> Beat {
-        let mut wide = [Beat::default()];
-        format.widen(&[row], &mut wide);
-        wide[0]
+        in_wide_vectors(Widening { format, row })
+    }
+
+    struct Widening {
+        format: Sixteen,
+        row: Row,
+    }
+
+    impl Work for Widening {
+        type Output = Beat;
+
+        #[inline(always)]
+        fn run<V: Vectors>(self, vectors: V) -> Beat {
+            let [wide, _] = self.format.widen(vectors, [self.row, Row::default()]);
+            wide.into()
+        }
     }
 
     fn narrowed(format: Sixteen, value: f32) -> u16 {

@@ -13,10 +13,10 @@ use super::solver::Accelerator;
 use crate::accelerator::Counters;
 use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
-use crate::beat::unpack::{BLOCK, Reader, Record, finite};
+use crate::beat::unpack::{BLOCK, Reader};
 use crate::order::LiveReport;
-use crate::platform::{Vectors, Work, in_wide_vectors};
-use crate::record::result;
+use crate::record::finite::finite;
+use crate::record::result::{self, Record};
 use crate::scene::Bodies;
 
 impl Accelerator {
@@ -121,8 +121,14 @@ impl Results<'_> {
 
     /// What of it does not depend on the caller's container: it is compiled once, with the driver.
     fn read_in_turn(self, statics: &[u32], into: &mut [Record]) -> (u32, Option<usize>) {
-        let reader = Reader::new(self.layout, self.channels);
-        in_wide_vectors(InTurn { reader, statics, into })
+        let mut reader = Reader::new(self.layout, self.channels);
+        let mut broken = None;
+        if !reader.read(into) {
+            let moves = |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
+            let wrong = (0..).zip(&*into).filter(|(_, record)| !finite(record));
+            broken = wrong.map(|(index, _)| index).find(moves);
+        }
+        (reader.finish(), broken)
     }
 
     /// Reads results in the order of these bodies, and leaves all others as they are; otherwise as
@@ -143,7 +149,7 @@ impl Results<'_> {
             let all_finite = reader.read(records);
             for (record, body) in records.iter().zip(order) {
                 let index = *body as usize;
-                if !all_finite && !finite(&[*record]) {
+                if !all_finite && !finite(record) {
                     broken = Some(broken.map_or(index, |lowest| lowest.min(index)));
                 }
                 // Should a caller's bodies have become fewer, there is nothing to be told of the
@@ -151,33 +157,6 @@ impl Results<'_> {
                 if let Some(to) = spare.get_mut(index) {
                     *to = *record;
                 }
-            }
-        }
-        (reader.finish(), broken)
-    }
-}
-
-/// Results in the order of the bodies.
-struct InTurn<'a> {
-    reader: Reader<'a>,
-    statics: &'a [u32],
-    into: &'a mut [Record],
-}
-
-impl Work for InTurn<'_> {
-    type Output = (u32, Option<usize>);
-
-    /// The sum of the words that were read, and the first body that moves and is not finite.
-    #[inline(always)]
-    fn run<V: Vectors>(self, _: V) -> (u32, Option<usize>) {
-        let Self { mut reader, statics, into } = self;
-        let mut broken = None;
-        for (first, records) in (0..).step_by(BLOCK).zip(into.chunks_mut(BLOCK)) {
-            if !reader.read(records) && broken.is_none() {
-                let moves =
-                    |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
-                let wrong = (first..).zip(&*records).filter(|(_, it)| !finite(&[**it]));
-                broken = wrong.map(|(index, _)| index).find(moves);
             }
         }
         (reader.finish(), broken)
@@ -195,5 +174,64 @@ pub(crate) fn commit<B: Bodies + ?Sized>(results: &[Record], bodies: &mut B) {
     for (index, record) in results.iter().enumerate() {
         let (pose, velocity) = result::decode(record);
         bodies.commit(index, pose, velocity);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interface::profile::FLOAT;
+    use crate::interface::record::result::{ORIENTATION, POSITION};
+    use crate::scene::{Body, Pose, Velocity};
+
+    const COUNT: usize = 40;
+
+    /// What is read of the results of so many bodies, one row a channel, of which these are not
+    /// finite.
+    fn read_all<T>(broken: &[usize], read: impl FnOnce(Results<'_>, &Vec<Body>) -> T) -> T {
+        let layout = &Segment::Results.layout(&FLOAT.default_variant());
+        let mut channels = vec![vec![Beat::default(); COUNT]; FLOAT.s2mm_widths.len()];
+        for record in broken {
+            channels[ORIENTATION][*record] = Beat([f32::NAN.to_bits(), 0, 0, 0]);
+        }
+        let channels: Vec<&[Beat]> = channels.iter().map(Vec::as_slice).collect();
+        let pose = Pose { position: [5.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+        let bodies = vec![Body { pose, velocity: Velocity::default(), shape: 0 }; COUNT];
+        read(Results { layout, channels: &channels }, &bodies)
+    }
+
+    #[test]
+    fn the_first_body_that_moves_and_is_not_finite_is_told() {
+        let statics = [3, 7];
+        for (broken, told) in
+            [(&[][..], None), (&[7, 3], None), (&[39, 7, 31], Some(31)), (&[4, 3, 38], Some(4))]
+        {
+            let mut spare = Vec::new();
+            let (_, found) = read_all(broken, |results, bodies| {
+                results.in_turn(COUNT, bodies, &statics, &mut spare)
+            });
+            assert_eq!(found, told, "{broken:?}");
+            for (index, record) in spare.iter().enumerate() {
+                let stays = record[POSITION].0[0] == 5.0_f32.to_bits();
+                assert_eq!(stays, statics.contains(&u32::try_from(index).expect("few")), "{index}");
+            }
+        }
+    }
+
+    #[test]
+    fn results_in_another_order_go_to_their_bodies_and_the_lowest_is_told() {
+        // From the last body down, but the first five.
+        let order: Vec<u32> = (5..40).rev().collect();
+        for (broken, told) in [(&[][..], None), (&[2], Some(37)), (&[33, 4, 2], Some(6))] {
+            let mut spare = Vec::new();
+            let (_, found) =
+                read_all(broken, |results, bodies| results.scatter(&order, bodies, &mut spare));
+            assert_eq!(found, told, "{broken:?}");
+            for (index, record) in spare.iter().enumerate() {
+                assert_eq!(record[POSITION].0[0] != 0, index < 5, "{index}");
+                let result = order.iter().position(|body| *body as usize == index);
+                assert_eq!(!finite(record), result.is_some_and(|at| broken.contains(&at)));
+            }
+        }
     }
 }

@@ -16,9 +16,9 @@ use super::report::StepReport;
 use super::retry::with_retries;
 use crate::accelerator::Capabilities;
 use crate::beat::ranges::Packers;
-use crate::beat::unpack::Record;
 use crate::error::{Error, OpenError};
 use crate::platform::{Deadline, System};
+use crate::record::result::Record;
 use crate::scene::validate::{Limits, validate_shapes};
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 
