@@ -130,14 +130,10 @@ impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
         Self { kind, first, collisions, soon, bodies_soon, ends }
     }
 
-    /// The `nth` so many records, if there are as many; each is shown to `look`, with the collision and the
-    /// ends that it is made of.
+    /// The `nth` so many records, if there are as many, with the collisions and the ends that they are
+    /// made of.
     #[inline(always)]
-    fn shown<const ROWS: usize, const N: usize>(
-        &self,
-        nth: usize,
-        mut look: impl FnMut(&[Lanes; ROWS], &Collision, [End; 2]),
-    ) -> Option<[[Lanes; ROWS]; N]>
+    fn made<const ROWS: usize, const N: usize>(&self, nth: usize) -> Option<Made<'p, ROWS, N>>
     where
         K: Kind<ROWS>,
     {
@@ -151,15 +147,22 @@ impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
                 self.ends.soon([collision.body_a, collision.body_b]);
             }
         }
+        let mut made =
+            Made { records: [[Lanes::all(0); ROWS]; N], collisions, ends: [[End::MISSING; 2]; N] };
         let first = self.first + nth * N;
-        let mut records = [[Lanes::all(0); ROWS]; N];
-        for ((to, collision), index) in records.iter_mut().zip(collisions).zip(first..) {
-            let ends = both(self.ends, collision);
-            *to = self.kind.encode(index, collision, ends);
-            look(to, collision, ends);
+        for (at, collision) in collisions.into_iter().enumerate() {
+            made.ends[at] = both(self.ends, collision);
+            made.records[at] = self.kind.encode(first + at, collision, made.ends[at]);
         }
-        Some(records)
+        Some(made)
     }
+}
+
+/// Records, and what they are made of.
+struct Made<'p, const ROWS: usize, const N: usize> {
+    records: [[Lanes; ROWS]; N],
+    collisions: [&'p Collision; N],
+    ends: [[End; 2]; N],
 }
 
 impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Encoding<'p, K, L> {
@@ -172,7 +175,8 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Encod
 
     #[inline(always)]
     fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]> {
-        self.shown(nth, |_, _, _| {})
+        let Made { records, .. } = self.made(nth)?;
+        Some(records)
     }
 }
 
@@ -221,13 +225,14 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Looke
 
     #[inline(always)]
     fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]> {
-        let Self { records, quick, look, scheduled } = self;
-        records.shown(nth, |record, collision, ends| {
-            look.head(collision, ends, *scheduled);
-            look.numbers(K::beyond(quick, record, collision.count));
-            if look.asks_how_far() {
-                look.reach(&K::reach(record, collision.count), ends);
+        let Made { records, collisions, ends } = self.records.made(nth)?;
+        for ((record, collision), ends) in records.iter().zip(collisions).zip(ends) {
+            self.look.head(collision, ends, self.scheduled);
+            self.look.numbers(K::beyond(self.quick, record, collision.count));
+            if self.look.asks_how_far() {
+                self.look.reach(&K::reach(record, collision.count), ends);
             }
-        })
+        }
+        Some(records)
     }
 }
