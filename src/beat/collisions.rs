@@ -82,8 +82,8 @@ impl Seen {
 
 /// Writes the records of a range of collisions, otherwise as [`pack_collisions`].
 ///
-/// Here is only what depends on the caller's container: where they lie. Those that lie nowhere as they are
-/// asked for one by one.
+/// Here is only what depends on the caller's container: where they lie. Those that lie nowhere as
+/// structures, or are not as many there, are asked for one by one.
 fn pack_range<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,

@@ -66,7 +66,8 @@ pub trait Collisions: Sync {
     /// Where all of them lie, if they lie there as structures: they are read without a copy.
     ///
     /// There are [`len`](Self::len) of them, each what [`collision`](Self::collision) gives. A view that
-    /// changes anything leaves this as it is.
+    /// changes anything leaves this as it is. What is wrong there, and right as `collision` gives it, a step
+    /// refuses as [`InputError::Unsteady`](super::InputError::Unsteady).
     fn structures(&self) -> Option<Structures<'_>> {
         None
     }

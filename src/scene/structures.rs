@@ -17,7 +17,7 @@ pub enum Structures<'a> {
         /// One behind the other.
         all: &'a [Collision],
         /// Where each of them lies in `all`. Beyond its end is one without contact points, which has no
-        /// effect.
+        /// effect, and which a step refuses if it is a caller's.
         order: &'a [u32],
     },
 }
