@@ -108,6 +108,7 @@ fn pack_range<C: Collisions + ?Sized>(
                 block.clone().for_each(|index| collisions.soon(index));
                 for (to, index) in copies.iter_mut().zip(block) {
                     *to = collisions.collision(index);
+                    ends.soon([to.body_a, to.body_b]);
                 }
                 seen.and(packer.write(InArray(copies)))
             })

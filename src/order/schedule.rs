@@ -95,10 +95,10 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
     fn structures(&self) -> Option<Structures<'_>> {
         match self.collisions.structures()? {
             // An empty entry is beyond them all.
-            Structures::Array(all) => {
+            Structures::Array(all) if all.len() == self.collisions.len() => {
                 Some(Structures::Ordered { all, order: &self.schedule.entries })
             }
-            Structures::Ordered { .. } => None,
+            Structures::Array(_) | Structures::Ordered { .. } => None,
         }
     }
 
