@@ -107,11 +107,11 @@ mod aarch64 {
 
     #[inline(always)]
     pub(super) fn to_f32(from: Narrow) -> Wide {
-        // SAFETY: the vector is four words of sixteen bits, of any bits.
+        // SAFETY: both are four words of sixteen bits, eight bytes, and the vector may hold any bits.
         let narrow = unsafe { std::mem::transmute::<Narrow, float16x4_t>(from) };
         // SAFETY: every aarch64 that Linux runs on has the instruction.
         let wide = unsafe { vcvt_f32_f16(narrow) };
-        // SAFETY: the vector is four f32.
+        // SAFETY: both are four words of 32 bits, sixteen bytes, and those of `Wide` may hold any bits.
         unsafe { std::mem::transmute::<float32x4_t, Wide>(wide) }
     }
 }

@@ -74,7 +74,8 @@ mod x86 {
 
         #[inline(always)]
         fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2] {
-            // SAFETY: as above.
+            // SAFETY: there is one of these only where the processor has the instructions that the
+            // function is compiled for.
             unsafe { convert::x86::to_f32(rows) }
         }
     }
