@@ -20,7 +20,7 @@ use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stripe::Segment;
 use super::target::Target;
 use crate::platform::{Vectors, Work, in_wide_vectors, soon_read, soon_written};
-use crate::record::end::{End, Survey};
+use crate::record::end::{End, Survey, Tags};
 use crate::scene::{Bodies, Body, Pose, Velocity};
 
 /// Looks at all bodies and remembers what their collisions' records are made from, and which never
@@ -201,6 +201,7 @@ fn pack_part<B: Bodies + ?Sized>(target: Target<'_>, bodies: &B, mut part: Part<
 /// Surveys bodies and writes their records, whatever of it is wanted, a block at a time.
 struct BodyPacker<'a, 'b> {
     target: Target<'a>,
+    tags: Tags<'a>,
     /// The index of the next.
     next: usize,
     /// The ends that are not written yet.
@@ -217,6 +218,7 @@ impl<'a, 'b> BodyPacker<'a, 'b> {
         let Outcome { good, still, .. } = Outcome::default();
         Self {
             target,
+            tags: Tags::new(target.shapes),
             next: range.start,
             ends: ends.as_deref_mut(),
             velocities: velocities.as_mut().map(|channels| Velocities::new(target, channels)),
@@ -255,19 +257,15 @@ impl Work for Writing<'_, '_, '_> {
     fn run<V: Vectors>(self, vectors: V) {
         let Self { packer, bodies, ahead } = self;
         soon_read(ahead);
-        let BodyPacker { target, next, ends, velocities, poses, good, still } = packer;
-        let Target { shapes, quick, .. } = *target;
+        let BodyPacker { target, tags, next, ends, velocities, poses, good, still } = packer;
+        let quick = target.quick;
         let range = *next..*next + bodies.len();
         *next = range.end;
         if let Some(rest) = ends {
             let (ends, behind) = mem::take(rest).split_at_mut(bodies.len());
             soon_written(&behind[..ahead.len().min(behind.len())]);
             *rest = behind;
-            let mut any_still = false;
-            for (end, body) in ends.iter_mut().zip(bodies) {
-                *end = End::of(body, shapes);
-                any_still |= end.is_static();
-            }
+            let any_still = tags.ends(bodies, ends);
             *good &= quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends));
             if any_still {
                 *still = around(still, &range);
@@ -275,9 +273,7 @@ impl Work for Writing<'_, '_, '_> {
         } else if let Some(quick) = quick {
             // Read anew they may be others.
             let mut ends = [End::MISSING; BODIES];
-            for (end, body) in ends.iter_mut().zip(bodies) {
-                *end = End::of(body, shapes);
-            }
+            tags.ends(bodies, &mut ends);
             *good &= quick.bodies(range.start, bodies, &ends);
         }
         if let Some(velocities) = velocities {

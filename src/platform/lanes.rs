@@ -111,6 +111,19 @@ impl Lanes {
         each!(_mm_and_si128, vandq_u32, u32::bitand, self, other)
     }
 
+    /// The bits that this has and the other does not.
+    #[inline(always)]
+    pub(crate) fn without(self, other: Self) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: every x86-64 has the instruction.
+        return Self(unsafe { arch::_mm_andnot_si128(other.0, self.0) });
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: every aarch64 that Linux runs on has the instruction.
+        return Self(unsafe { arch::vbicq_u32(self.0, other.0) });
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        return Self::new(std::array::from_fn(|k| self.0[k] & !other.0[k]));
+    }
+
     /// All bits of each word that is greater than the other's, as signed integers.
     #[inline(always)]
     pub(crate) fn above(self, other: Self) -> Self {
@@ -196,6 +209,7 @@ mod tests {
             prop_assert_eq!(a.plus(b).words(), each(one, other, u32::wrapping_add));
             prop_assert_eq!(a.and(b).words(), each(one, other, |a, b| a & b));
             prop_assert_eq!(a.or(b).words(), each(one, other, |a, b| a | b));
+            prop_assert_eq!(a.without(b).words(), each(one, other, |a, b| a & !b));
             let above = |a: u32, b: u32| if a.cast_signed() > b.cast_signed() { u32::MAX } else { 0 };
             prop_assert_eq!(a.above(b).words(), each(one, other, above));
         }

@@ -1,7 +1,7 @@
 //! This file makes the record of a collision in world coordinates.
 
 use super::end::End;
-use super::{USED, contact_row, of_count, vec3_and_word};
+use super::{contact_row, used, vec3_and_word};
 use crate::interface::record::{CONTACT_POINTS, collision};
 use crate::platform::Lanes;
 use crate::scene::Collision;
@@ -30,7 +30,7 @@ pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Lanes; collision::R
     rows[collision::BODY_A] = a.with_word(from.body_a);
     rows[collision::BODY_B] = b.with_word(from.body_b);
     let contacts = from.contacts.iter().zip(&mut rows[collision::CONTACTS..]);
-    for ((contact, row), used) in contacts.zip(of_count(&USED, from.count)) {
+    for ((contact, row), used) in contacts.zip(used(from.count)) {
         *row = contact_row(contact).and(used);
     }
     rows

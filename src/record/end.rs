@@ -32,14 +32,10 @@ impl End {
         Self { position, ..Self::MISSING }
     }
 
-    /// That of a body. Without a shape it is static.
+    /// That of a body.
     #[inline(always)]
-    pub(crate) fn of(body: &Body, shapes: &[Shape]) -> Self {
-        let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
-        let tag = match shape {
-            Some(shape) => body.shape | if shape.is_static() { STATIC } else { 0 },
-            None => NO_SHAPE,
-        };
+    fn of(body: &Body, tags: &Tags<'_>) -> Self {
+        let tag = tags.of(body.shape);
         bytemuck::cast(Beat::from(row_of::<POSITION, _>(body).beside(tag)))
     }
 
@@ -74,6 +70,52 @@ impl End {
     pub(crate) fn shape(self, shapes: &[Shape]) -> &Shape {
         let shape = usize::try_from(self.tag & !STATIC).ok().and_then(|shape| shapes.get(shape));
         shape.unwrap_or(&Shape::STATIC)
+    }
+}
+
+/// Shapes whose tags are looked up. Few scenes have more.
+const LOOKED_UP: usize = 64;
+
+/// What is said of bodies of each shape.
+#[derive(Debug)]
+pub(crate) struct Tags<'a> {
+    first: [u32; LOOKED_UP],
+    shapes: &'a [Shape],
+}
+
+impl<'a> Tags<'a> {
+    pub(crate) fn new(shapes: &'a [Shape]) -> Self {
+        let mut first = [NO_SHAPE; LOOKED_UP];
+        for (shape, tag) in (0..).zip(&mut first) {
+            *tag = tag_of(shape, shapes);
+        }
+        Self { first, shapes }
+    }
+
+    #[inline(always)]
+    fn of(&self, shape: u32) -> u32 {
+        let known = usize::try_from(shape).ok().and_then(|shape| self.first.get(shape));
+        known.copied().unwrap_or_else(|| tag_of(shape, self.shapes))
+    }
+
+    /// Makes the ends of bodies; whether any of these never moves, as one without a shape does not.
+    #[inline(always)]
+    pub(crate) fn ends(&self, bodies: &[Body], ends: &mut [End]) -> bool {
+        let mut any = 0;
+        for (end, body) in ends.iter_mut().zip(bodies) {
+            *end = End::of(body, self);
+            any |= end.tag;
+        }
+        any & STATIC != 0
+    }
+}
+
+/// The tag of bodies of a shape.
+#[inline(never)]
+fn tag_of(shape: u32, shapes: &[Shape]) -> u32 {
+    match usize::try_from(shape).ok().and_then(|shape| shapes.get(shape)) {
+        Some(of) => shape | if of.is_static() { STATIC } else { 0 },
+        None => NO_SHAPE,
     }
 }
 

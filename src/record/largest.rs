@@ -1,6 +1,6 @@
 //! This file finds out at once whether all numbers of many records are within their limits.
 
-use super::{USED, of_count};
+use super::used;
 use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
 use crate::platform::Lanes;
 
@@ -35,7 +35,7 @@ impl<const ROWS: usize> Largest<ROWS> {
     /// Shape: contact points are the last rows.
     #[inline(always)]
     pub(crate) fn beyond_used(&self, record: &[Lanes; ROWS], count: u32) -> Lanes {
-        let used = of_count(&USED, count);
+        let used = used(count);
         let used = |row: usize| match row.checked_sub(ROWS - CONTACT_POINTS) {
             Some(ordinal) => used[ordinal],
             None => Lanes::all(u32::MAX),

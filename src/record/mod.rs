@@ -61,35 +61,17 @@ fn contact_row(contact: &Contact) -> Lanes {
     vec3_and_word(contact.point, contact.distance.to_bits())
 }
 
-/// What stands for the contact points of a collision: where one is used, else where it is not.
+/// The bits of the contact points of a collision that are used: all of each, or none. Of a count beyond
+/// `i32`, which validation refuses, none are.
 ///
-/// A table by the number of points that are used, not a branch: counts follow no pattern that could
-/// be predicted.
-const fn by_count(used: Beat, unused: Beat) -> [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] {
-    let mut rows = [[unused; CONTACT_POINTS]; CONTACT_POINTS + 1];
-    let mut count = 0;
-    while count <= CONTACT_POINTS {
-        let mut ordinal = 0;
-        while ordinal < count {
-            rows[count][ordinal] = used;
-            ordinal += 1;
-        }
-        count += 1;
-    }
-    rows
-}
-
-/// The bits of the contact points that are used.
-pub(crate) static USED: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
-    by_count(Beat([u32::MAX; LANES]), Beat([0; LANES]));
-
-/// The row of such a table.
+/// No branch: counts follow no pattern that could be predicted.
 #[inline(always)]
-pub(crate) fn of_count(
-    table: &[[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1],
-    count: u32,
-) -> [Lanes; CONTACT_POINTS] {
-    table[(count as usize).min(CONTACT_POINTS)].map(Lanes::from)
+pub(crate) fn used(count: u32) -> [Lanes; CONTACT_POINTS] {
+    let mut used = [Lanes::all(count); CONTACT_POINTS];
+    for (ordinal, used) in (0..).zip(&mut used) {
+        *used = used.above(Lanes::all(ordinal));
+    }
+    used
 }
 
 /// The vec3 of a beat, whatever the word beside it.

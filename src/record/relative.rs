@@ -1,8 +1,8 @@
 //! This file makes the record of a collision relative to body A.
 
 use super::end::End;
-use super::{NORMAL, USED, by_count, contact_row, of_count, row_of};
-use crate::interface::record::{Beat, CONTACT_POINTS, LANES, relative};
+use super::{NORMAL, contact_row, row_of, used};
+use crate::interface::record::{CONTACT_POINTS, LANES, relative};
 use crate::platform::Lanes;
 use crate::scene::Collision;
 
@@ -14,9 +14,8 @@ pub(crate) const INTEGERS: [bool; relative::ROWS] = {
     integers
 };
 
-/// The distance that marks a contact point which is not there, where one is not.
-static FAR: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] =
-    by_count(Beat([0; LANES]), Beat([0, 0, 0, f32::INFINITY.to_bits()]));
+/// The row of a contact point which is not there.
+const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
 
 /// The collision record: normal, offset from body A to body B, contact points from body A.
 ///
@@ -32,12 +31,11 @@ pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Lanes; relative::RO
     let [a, b] = [a, b].map(End::alone);
     rows[relative::NORMAL] = row_of::<NORMAL, _>(from).beside(from.body_a);
     rows[relative::OFFSET] = b.minus_f32(a).beside(from.body_b);
-    let (used, unused) = (of_count(&USED, from.count), of_count(&FAR, from.count));
     let contacts = from.contacts.iter().zip(&mut rows[relative::CONTACTS..]);
-    for ((contact, row), (used, unused)) in contacts.zip(used.into_iter().zip(unused)) {
+    for ((contact, row), used) in contacts.zip(used(from.count)) {
         // Beside the position is a zero, which takes nothing from the distance.
         let seen = contact_row(contact).minus_f32(a);
-        *row = seen.and(used).or(unused);
+        *row = seen.and(used).or(Lanes::new(FAR).without(used));
     }
     rows
 }
@@ -66,6 +64,7 @@ const _: () = assert!(relative::CONTACTS + CONTACT_POINTS == relative::ROWS);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interface::record::Beat;
     use crate::scene::Contact;
 
     #[test]

@@ -6,7 +6,7 @@ use bitstream_model::interface::record::{CONTACT_POINTS, LANES};
 use super::rows::{LARGEST, LONGEST_ARM, LOSS, largest};
 use crate::platform::Lanes;
 use crate::record::largest::MAGNITUDE;
-use crate::record::{USED, of_count};
+use crate::record::used;
 use crate::scene::Shape;
 
 /// How far the contact points of a collision are that are in use, whatever rounding does to them: the
@@ -30,7 +30,7 @@ impl Reach {
         let magnitude = |lanes: Lanes| lanes.and(Lanes::all(MAGNITUDE));
         let mut arms = [Lanes::all(0); 2];
         let mut furthest = Lanes::all(0);
-        for (point, used) in points.into_iter().zip(of_count(&USED, count)) {
+        for (point, used) in points.into_iter().zip(used(count)) {
             furthest = furthest.larger_f32(magnitude(point).and(used));
             for (arm, position) in arms.iter_mut().zip(positions) {
                 *arm = arm.larger_f32(magnitude(point.minus_f32(position)).and(used));
