@@ -82,7 +82,7 @@ fn side_by_side(scene: &mut Scene, steps: usize, inertia: Inertia) -> Vec<StepRe
         let mut bodies = scene.bodies().to_vec();
         snap(&mut bodies, &mut collisions, FINE);
         let mut expected = bodies.clone();
-        let in_order = by_hand(&expected, &collisions, scene.shapes(), DEPTH);
+        let in_order = by_hand(Order::HazardFree, &expected, &collisions, scene.shapes(), DEPTH);
         float.step(&mut expected, &in_order, &ordered(Order::AsGiven)).expect("a step");
         let report = windowed
             .step(&mut bodies, &collisions, &StepParameters::default())
@@ -176,7 +176,7 @@ fn static_and_untouched_bodies_have_their_place_too() {
             let mut expected = start.clone();
             // The depth of either is more than there are collisions.
             parameters.order = Some(Order::AsGiven);
-            let in_order = by_hand(&expected, &all[..count], &SHAPES, DEPTH);
+            let in_order = by_hand(Order::HazardFree, &expected, &all[..count], &SHAPES, DEPTH);
             float.step(&mut expected, &in_order, &parameters).expect("a step");
             if profile.name == "windowed" {
                 assert_eq!(differing(&bodies, &expected), 0, "{count} {contact} {friction}");
@@ -377,7 +377,7 @@ fn sixteen_bits_give_the_velocities_of_half_waiting_in_the_same_order() {
     for step in 0..5 {
         let mut parameters = ordered(Order::AsGiven);
         parameters.integrate = false;
-        let in_order = by_hand(&bodies, &collisions, scene.shapes(), DEPTH16);
+        let in_order = by_hand(Order::HazardFree, &bodies, &collisions, scene.shapes(), DEPTH16);
         let mut expected = bodies.clone();
         let waited = half.step(&mut expected, &in_order, &parameters).expect("a step");
         assert_eq!(waited.order, Order::AsGiven);
@@ -433,7 +433,7 @@ fn the_full_step_gives_the_bits_of_one_collision_after_the_other() {
     let (mut bodies, mut collisions) = (start.bodies.clone(), start.collisions.clone());
     snap(&mut bodies, &mut collisions, FINE);
     let mut expected = bodies.clone();
-    let in_order = by_hand(&bodies, &collisions, &start.shapes, DEPTH);
+    let in_order = by_hand(Order::HazardFree, &bodies, &collisions, &start.shapes, DEPTH);
     let (_, mut float) = open(BoardConfig { window_slots: Some(1), ..of(&FLOAT) });
     float.set_shapes(&start.shapes).expect("they fit");
     float.step(&mut expected, &in_order, &ordered(Order::AsGiven)).expect("a step");

@@ -111,6 +111,8 @@ pub(super) struct Encoding<'p, K, L> {
     /// Those whose bodies are.
     bodies_soon: L,
     ends: Ends<'p>,
+    /// Whether they lie about where they would in an array.
+    nearby: bool,
 }
 
 /// How far behind a collision is asked for: so far that it is there in time, so near that it is not gone
@@ -120,6 +122,10 @@ const SOON: usize = 30;
 /// The same of its bodies, which it has to say by then.
 const BODIES_SOON: usize = SOON / 2;
 
+/// How far behind what lies about there is asked for, where the order is near to that in memory: from
+/// there it comes line by line, which takes longer than [`SOON`] if it is not in a cache.
+const FAR: usize = 768;
+
 impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
     /// Those of a block, the first of which is number `at` of `all`.
     #[inline(always)]
@@ -127,7 +133,8 @@ impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
         let Block { first, collisions, ends, .. } = *block;
         let behind = |distance| all.part(at + distance..at + distance + collisions.len());
         let (soon, bodies_soon) = (behind(SOON), behind(BODIES_SOON));
-        Self { kind, first, collisions, soon, bodies_soon, ends }
+        let nearby = collisions.is_nearby(first);
+        Self { kind, first, collisions, soon, bodies_soon, ends, nearby }
     }
 
     /// The `nth` so many records, if there are as many, with the collisions and the ends that they are
@@ -147,9 +154,14 @@ impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
                 self.ends.soon([collision.body_a, collision.body_b]);
             }
         }
+        let first = self.first + nth * N;
+        if self.nearby {
+            for at in 0..N {
+                self.collisions.soon_at(first + FAR + at);
+            }
+        }
         let mut made =
             Made { records: [[Lanes::all(0); ROWS]; N], collisions, ends: [[End::MISSING; 2]; N] };
-        let first = self.first + nth * N;
         for (at, collision) in collisions.into_iter().enumerate() {
             made.ends[at] = both(self.ends, collision);
             made.records[at] = self.kind.encode(first + at, collision, made.ends[at]);

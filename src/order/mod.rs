@@ -8,7 +8,8 @@
 //! later. A collision that shares a moving body with one of the `depth - 1` issue slots before it
 //! reads a stale velocity, and the impulse of the earlier one is lost. [`Order::HazardFree`] spaces
 //! the uses of every body so that this never happens, keeps few bodies alive at once (alive: from a
-//! body's first use to its last), and leaves slots empty only where nothing fits. Hardware that
+//! body's first use to its last), and leaves slots empty only where nothing fits;
+//! [`Order::HazardFreeNearby`] instead keeps the collisions near to where they were given. Hardware that
 //! ignores hazards, hardware that waits on them and a sequential solver then give the same bits.
 //!
 //! An order is a function of its input alone: the same on every machine, and the same whatever was

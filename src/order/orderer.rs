@@ -19,10 +19,23 @@ pub enum Order {
     /// No hazards at all and few bodies alive: swept along the longest axis of the scene, with uses
     /// of a body a whole depth apart and empty entries where nothing fits.
     HazardFree,
+    /// No hazards at all, and hardly a collision far from where it was given: what a step reads of the
+    /// caller's memory is in the caches, so that it is packed sooner. As many bodies are alive as in the
+    /// order given. Where that would leave more than one entry in [`Orderer::HARDLY`] empty, because there
+    /// are few collisions or too many of a body's in a row, it is [`Order::HazardFree`].
+    HazardFreeNearby,
+}
+
+impl Order {
+    /// Whether no hazard is in it, whatever the window.
+    #[must_use]
+    pub const fn is_hazard_free(self) -> bool {
+        matches!(self, Self::HazardFree | Self::HazardFreeNearby)
+    }
 }
 
 /// Makes orders, keeping its memory from one to the next: no allocation once it has seen a scene of
-/// that size, for [`Order::AsGiven`] and [`Order::HazardFree`].
+/// that size, for [`Order::AsGiven`] and the orders without hazards.
 #[derive(Debug)]
 pub struct Orderer {
     sweep: Sweep,
@@ -41,6 +54,8 @@ impl Default for Orderer {
 impl Orderer {
     /// Entries of a schedule, at most, if not said otherwise.
     pub const ENTRIES_MAX: usize = 1 << 26;
+    /// Of so many entries of [`Order::HazardFreeNearby`] at most one is empty.
+    pub const HARDLY: usize = 64;
 
     /// Without memory of its own yet.
     #[must_use]
@@ -61,7 +76,7 @@ impl Orderer {
 
     /// Orders the collisions of a step.
     ///
-    /// Only [`Order::HazardFree`] looks at the window. The order is a function of the arguments
+    /// Only the orders without hazards look at the window. The order is a function of the arguments
     /// alone.
     ///
     /// # Errors
@@ -87,13 +102,27 @@ impl Orderer {
             }
             Order::HazardFree => {
                 self.sweep.run(input);
-                let moving = self.sweep.moving();
-                let sweep = &mut self.sweep.collisions;
-                self.tail.bring_forward(sweep, window.entries(), moving);
-                self.groups.place(sweep, moving, window, self.limit, schedule)?;
+                self.place(window, self.limit)?;
+            }
+            Order::HazardFreeNearby => {
+                self.sweep.as_given(input);
+                // One empty entry in `HARDLY` is one beside each `HARDLY - 1` collisions.
+                let few = input.pairs.len() / (Self::HARDLY - 1);
+                if self.place(window, self.limit.min(input.pairs.len() + few)).is_err() {
+                    self.sweep.run(input);
+                    self.place(window, self.limit)?;
+                }
             }
         }
         Ok(&self.schedule)
+    }
+
+    /// Places what was swept so that there are no hazards, in at most so many entries.
+    fn place(&mut self, window: IssueWindow, limit: usize) -> Result<(), OrderError> {
+        let moving = self.sweep.moving();
+        let sweep = &mut self.sweep.collisions;
+        self.tail.bring_forward(sweep, window.entries(), moving);
+        self.groups.place(sweep, moving, window, limit, &mut self.schedule)
     }
 
     /// The order made last; empty before the first.

@@ -9,6 +9,8 @@
 //! Both sorts are by counting: bodies in two passes over the leading bits of their coordinate,
 //! collisions in one pass over buckets of neighbouring sums. What falls together keeps the order
 //! in which it was given.
+//!
+//! Or the order given is that of the sweep, and a body's index its rank.
 
 use super::OrderInput;
 
@@ -61,6 +63,18 @@ impl Sweep {
     pub(super) fn run(&mut self, input: &OrderInput<'_>) {
         self.rank(input);
         self.sort(input.pairs);
+    }
+
+    /// Takes the collisions of an input that was checked as they are given.
+    pub(super) fn as_given(&mut self, input: &OrderInput<'_>) {
+        let OrderInput { pairs, moving, .. } = *input;
+        #[allow(clippy::cast_possible_truncation, reason = "an index of each is a u32: checked")]
+        let still = moving.len() as u32;
+        let rank = |body: u32| if moving[body as usize] { body } else { still };
+        let swept = |(index, pair): (u32, &[u32; 2])| Swept { ranks: pair.map(rank), index };
+        self.moving = still;
+        self.collisions.clear();
+        self.collisions.extend((0..).zip(pairs).map(swept));
     }
 
     /// Ranks the moving bodies along the axis.

@@ -27,13 +27,13 @@ pub struct StepParameters {
     /// Whether to integrate after the solver. Without it the poses come back unchanged, with the
     /// velocities that the solver left (undamped, without gravity).
     pub integrate: bool,
-    /// Order in which the collisions are sent. `None` is [`Order::HazardFree`] on a pipeline that
-    /// does not wait for velocities and on a design that keeps only live bodies, and
+    /// Order in which the collisions are sent. `None` is [`Order::HazardFreeNearby`] on a pipeline that
+    /// does not wait for velocities, [`Order::HazardFree`] on a design that keeps only live bodies, and
     /// [`Order::AsGiven`] on one that waits.
     ///
     /// A pipeline that waits gives what solving the collisions one after the other in this order
     /// gives; orders with hazards cost it cycles. One that does not wait reads stale velocities at
-    /// every hazard and loses impulses: with any other order than the hazard-free one piles gain
+    /// every hazard and loses impulses: with any other order than the hazard-free ones piles gain
     /// energy. One that keeps only live bodies also refuses an order in which a body lives too long,
     /// or too many live at once, as they do where collisions are sorted by body.
     pub order: Option<Order>,

@@ -55,6 +55,13 @@ pub(crate) trait Lying<'a>: Copy {
     /// Says that these are asked for soon, and those before and behind them, too.
     fn soon<const N: usize>(self, nth: usize);
 
+    /// Whether these, which are entry `first` and those behind it, lie apart, but about where they would
+    /// lie one behind the other.
+    fn is_nearby(self, first: usize) -> bool;
+
+    /// Says that what lies at a place is asked for soon, and its neighbours, too.
+    fn soon_at(self, place: usize);
+
     /// Those of a range, as many as there are.
     fn part(self, range: Range<usize>) -> Self;
 
@@ -69,6 +76,10 @@ pub(crate) trait Lying<'a>: Copy {
         })
     }
 }
+
+/// Entries from which on one is no longer where it would lie in an array: so many collisions are in
+/// none of the inner caches.
+const NEARBY: usize = 4096;
 
 /// Those of a range, as many as there are.
 #[inline(always)]
@@ -97,8 +108,18 @@ impl<'a> Lying<'a> for InArray<'a> {
     #[inline(always)]
     fn soon<const N: usize>(self, nth: usize) {
         for at in 0..N {
-            soon_with_neighbours(self.0, nth * N + at);
+            self.soon_at(nth * N + at);
         }
+    }
+
+    #[inline(always)]
+    fn is_nearby(self, _: usize) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn soon_at(self, place: usize) {
+        soon_with_neighbours(self.0, place);
     }
 
     #[inline(always)]
@@ -139,6 +160,16 @@ impl<'a> Lying<'a> for InOrder<'a> {
         if let Some(places) = self.order.as_chunks::<N>().0.get(nth) {
             places.iter().for_each(|place| soon_alone(self.all, *place as usize));
         }
+    }
+
+    #[inline(always)]
+    fn is_nearby(self, first: usize) -> bool {
+        self.order.first().is_some_and(|place| first.abs_diff(*place as usize) < NEARBY)
+    }
+
+    #[inline(always)]
+    fn soon_at(self, place: usize) {
+        soon_with_neighbours(self.all, place);
     }
 
     #[inline(always)]

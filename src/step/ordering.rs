@@ -111,8 +111,11 @@ impl Ordering {
 
 /// The order of a step that asks for none.
 pub(super) fn automatic(capabilities: &Capabilities) -> Order {
-    let waits = capabilities.interlocked && capabilities.window.is_none();
-    if waits { Order::AsGiven } else { Order::HazardFree }
+    match capabilities.window {
+        Some(_) => Order::HazardFree,
+        None if capabilities.interlocked => Order::AsGiven,
+        None => Order::HazardFreeNearby,
+    }
 }
 
 /// An order without hazards does not fit. The moving body with the most collisions tells which

@@ -29,8 +29,9 @@ pub(crate) fn bits(bodies: &[Body]) -> Vec<u32> {
     bodies.iter().flat_map(numbers).map(f32::to_bits).collect()
 }
 
-/// The collisions as the hazard-free order for that depth, issue slots, takes them one by one.
+/// The collisions as an order for that depth, issue slots, takes them one by one.
 pub(crate) fn by_hand(
+    order: Order,
     bodies: &[Body],
     collisions: &[Collision],
     shapes: &[Shape],
@@ -40,6 +41,6 @@ pub(crate) fn by_hand(
     let mut buffers = InputBuffers::new();
     let input = buffers.gather(bodies, collisions, shapes);
     let mut orderer = Orderer::new();
-    let schedule = orderer.order(&input, Order::HazardFree, window).expect("it can be ordered");
+    let schedule = orderer.order(&input, order, window).expect("it can be ordered");
     schedule.iter().flatten().map(|index| collisions[index as usize]).collect()
 }

@@ -4,7 +4,7 @@
 //! cargo bench --bench pack
 //! cargo bench --bench pack -- --input FOLDER --cpu-time
 //! cargo bench --bench pack -- --grid 10x10x10 --runs 31 --json
-//! cargo bench --bench pack -- --profile half --thing in-order
+//! cargo bench --bench pack -- --profile half --thing in-order --order hazard-free
 //! cargo bench --bench pack -- --threads 2
 //! ```
 //!
@@ -16,7 +16,8 @@
 //! bytes written, medians, GB/s of these bytes, and the throughput as a part of that of `memcpy`.
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
-//! - `as given`, `in order`: collisions alone, in array order and in the order without hazards
+//! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the one that
+//!   is the default on a bitstream that does not wait, or `--order`
 //! - `gathered`: the caller's collisions in that order, copied as they are: what the order itself costs,
 //!   whoever reads them
 //! - `step, ...`: bodies, then collisions
@@ -49,7 +50,7 @@ use clap::{Parser, ValueEnum};
 use scene::Grid;
 use serde_json::{Map, Value, json};
 use zynq_pgs::bench::{StepPacker, Unpacker};
-use zynq_pgs::order::{Ordered, Schedule};
+use zynq_pgs::order::{Order, Ordered, Schedule};
 use zynq_pgs::{Collision, Collisions as _};
 
 /// Holds packing and unpacking against `memcpy` of the same bytes.
@@ -71,6 +72,9 @@ struct Options {
     /// Of this profile alone: float, half or mixed
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
+    /// The order of what is packed in order
+    #[arg(long, value_enum, default_value_t = Sent::HazardFreeNearby)]
+    order: Sent,
     /// This thing alone
     #[arg(long, value_enum)]
     thing: Option<Thing>,
@@ -114,6 +118,22 @@ impl Options {
 
     fn clock(&self) -> Clock {
         if self.cpu_time { Clock::Thread } else { Clock::Wall }
+    }
+}
+
+/// An order without hazards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Sent {
+    HazardFree,
+    HazardFreeNearby,
+}
+
+impl Sent {
+    const fn order(self) -> Order {
+        match self {
+            Self::HazardFree => Order::HazardFree,
+            Self::HazardFreeNearby => Order::HazardFreeNearby,
+        }
     }
 }
 
@@ -213,7 +233,7 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let chosen = options.profiles()?;
     let step = options.step()?;
-    let schedule = step.schedule(BoardConfig::default())?;
+    let schedule = step.schedule(BoardConfig::default(), options.order.order())?;
     let clock = if options.cpu_time { "the thread's time" } else { "time that passes" };
     if !options.common.json {
         println!(

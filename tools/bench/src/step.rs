@@ -77,16 +77,16 @@ impl Step {
         })
     }
 
-    /// The order without hazards for a board of that build.
+    /// An order for a board of that build.
     ///
     /// # Errors
     /// If there is no such order.
-    pub fn schedule(&self, config: BoardConfig) -> Result<Schedule, Box<dyn Error>> {
+    pub fn schedule(&self, config: BoardConfig, order: Order) -> Result<Schedule, Box<dyn Error>> {
         let accelerator = open(config, &self.shapes)?;
         let window = IssueWindow::of(accelerator.capabilities(), &self.parameters)?;
         let mut buffers = InputBuffers::new();
         let input = buffers.gather(&self.bodies, &self.collisions, &self.shapes);
-        Ok(Orderer::new().order(&input, Order::HazardFree, window)?.clone())
+        Ok(Orderer::new().order(&input, order, window)?.clone())
     }
 
     /// The collisions in the order without hazards, as a board of that build is sent them.
@@ -94,7 +94,7 @@ impl Step {
     /// # Errors
     /// If there is no such order.
     pub fn in_order(&self, config: BoardConfig) -> Result<Vec<Collision>, Box<dyn Error>> {
-        let schedule = self.schedule(config)?;
+        let schedule = self.schedule(config, Order::HazardFree)?;
         let entries = (0..schedule.len()).filter_map(|entry| schedule.get(entry));
         Ok(entries.map(|index| self.collisions[index]).collect())
     }

@@ -23,13 +23,15 @@ pub(crate) struct OrderingArgs {
 /// An order of the collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OrderName {
-    /// hazard-free where the pipeline does not wait on hazards or keeps only live bodies, as-given
-    /// where it waits
+    /// hazard-free-nearby where the pipeline does not wait on hazards, hazard-free where only live
+    /// bodies are kept, as-given where it waits
     Auto,
     /// As detected, which is how Bullet sorts them: hazards abound
     AsGiven,
     /// No hazards, few bodies alive, few empty entries
     HazardFree,
+    /// No hazards, near to the order as given, few empty entries (hazard-free where they would be many)
+    HazardFreeNearby,
     /// The thesis' Algorithm 3, ties by the lowest index: few bodies alive, nearly all hazardous
     BodyByBody,
     /// The same, ties by the body that became active first
@@ -47,6 +49,7 @@ impl OrderName {
             Self::Auto => None,
             Self::AsGiven => Some(Order::AsGiven),
             Self::HazardFree => Some(Order::HazardFree),
+            Self::HazardFreeNearby => Some(Order::HazardFreeNearby),
             Self::BodyByBody => Some(Order::BodyByBody(Ties::LowestIndex)),
             Self::BodyByBodyOldest => Some(Order::BodyByBody(Ties::Oldest)),
             Self::BodyByBodyNewest => Some(Order::BodyByBody(Ties::Newest)),

@@ -108,14 +108,15 @@ fn unchecked_hazards_show_in_energy_and_velocities() {
 #[test]
 fn without_hazards_it_does_not_matter_who_waits() {
     let scene = ["--grid", "5x5x5", "--steps", "80", "--every", "80", "--verify"];
-    let sides = ["float,hazard-free", "float,unchecked"];
+    let sides = ["float,hazard-free-nearby", "float,unchecked"];
     let document = compare(&[&sides, &scene[..]].concat());
     let last = &document["rows"].as_array().expect("rows").last().expect("a row");
     assert_no_difference(&last["difference"], "");
     for (side, text) in ["a", "b"].into_iter().zip(sides) {
         assert_eq!(document[side]["build"], text);
         let step = &last[side]["step"];
-        assert_eq!((&step["order"]["name"], &step["hazards"]), (&"hazard-free".into(), &0.into()));
+        let order = (&step["order"]["name"], &step["hazards"]);
+        assert_eq!(order, (&"hazard-free-nearby".into(), &0.into()));
         assert_eq!(step["order"]["verified"]["hazards"], 0);
         assert!(step["order"]["verified"]["most_alive"].as_u64() > Some(0));
     }

@@ -150,6 +150,7 @@ pub(super) fn parameters(input: &mut Input<'_>, passes: u32, spoilt: Spoilt) -> 
         parameters.order = Some(input.pick(&[
             Order::AsGiven,
             Order::HazardFree,
+            Order::HazardFreeNearby,
             Order::Colours,
             Order::BodyByBody(Ties::LowestIndex),
         ]));

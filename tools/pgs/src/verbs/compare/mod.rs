@@ -37,8 +37,8 @@ A and B are builds of the emulated board: a profile, and what is not as usual, a
 are binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocked, unchecked, keep,
 flush, isotropic, world; the rest is window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
 length-width=BITS and address-width=BITS. The order in which a board is sent the collisions is one of
-auto, as-given, hazard-free, body-by-body, body-by-body-oldest, body-by-body-newest, colours. Each
-board finds its own collisions.
+auto, as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest,
+colours. Each board finds its own collisions.
 
 Only moving bodies are compared; A is the original. Relative deviations are |B - A| / |A| of each
 component (thesis eq. 4.1); where A's component is 0 they leave it out. A velocity is within 1 % if it

@@ -54,8 +54,8 @@ pub(super) fn measure(
             match &kind {
                 Kind::Fixed(fixed) => schedule.clone_from(fixed),
                 Kind::Made(order) => {
-                    // Only the hazard-free order depends on the depth.
-                    if place == 0 || *order == Order::HazardFree {
+                    // Only the orders without hazards depend on the depth.
+                    if place == 0 || order.is_hazard_free() {
                         let cost = || orderer.order(&input, *order, window).map(|_| ());
                         host_ns = Some(cost::per_collision(&input, runs, cost)?);
                         schedule.clone_from(orderer.schedule());
@@ -100,6 +100,7 @@ fn kinds(source: &Source) -> Result<Vec<(String, Kind)>, OrderError> {
         ("thesis, newest".to_owned(), thesis(Ties::Newest)),
         (format!("{colours} colours"), Kind::Made(Order::Colours)),
         ("hazard-free".to_owned(), Kind::Made(Order::HazardFree)),
+        ("hazard-free nearby".to_owned(), Kind::Made(Order::HazardFreeNearby)),
     ]);
     Ok(kinds)
 }
