@@ -2,13 +2,14 @@
 
 use bitstream_model::interface::profile::Inertia;
 use bitstream_model::interface::record::{Beat, pose, velocity};
+use bytemuck::Zeroable as _;
 
 use super::deal::Dealer;
-use super::format::Records;
+use super::format::{Format, Records};
 use super::stripe::Segment;
 use super::target::Target;
 use crate::platform::{Lanes, Vectors};
-use crate::record;
+use crate::record::{self, Words};
 use crate::scene::{Body, Shape};
 
 /// Writes velocity records.
@@ -74,16 +75,18 @@ impl<'a, 'b> Poses<'a, 'b> {
 struct Isotropic<'a>(&'a [Body]);
 
 impl Records<{ velocity::ROWS }> for Isotropic<'_> {
-    const INTEGERS: [bool; velocity::ROWS] = record::velocity::INTEGERS;
-
     #[inline(always)]
     fn len(&self) -> usize {
         self.0.len()
     }
 
     #[inline(always)]
-    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; velocity::ROWS]; N]> {
-        some(self.0, nth, record::velocity::encode)
+    fn some<F: Format, V: Vectors, const N: usize>(
+        &mut self,
+        vectors: V,
+        nth: usize,
+    ) -> Option<[[F::Row; velocity::ROWS]; N]> {
+        rows_of::<F, V, _, N>(vectors, self.0, nth, (&record::velocity::WORDS, record::velocity::encode))
     }
 }
 
@@ -94,16 +97,19 @@ struct World<'a> {
 }
 
 impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
-    const INTEGERS: [bool; velocity::WORLD_ROWS] = record::velocity::WORLD_INTEGERS;
-
     #[inline(always)]
     fn len(&self) -> usize {
         self.bodies.len()
     }
 
     #[inline(always)]
-    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; velocity::WORLD_ROWS]; N]> {
-        some(self.bodies, nth, |body| world_velocity(body, self.shapes))
+    fn some<F: Format, V: Vectors, const N: usize>(
+        &mut self,
+        vectors: V,
+        nth: usize,
+    ) -> Option<[[F::Row; velocity::WORLD_ROWS]; N]> {
+        let record = |body: &Body| world_velocity(body, self.shapes);
+        rows_of::<F, V, _, N>(vectors, self.bodies, nth, (&record::velocity::WORLD_WORDS, record))
     }
 }
 
@@ -111,32 +117,35 @@ impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
 struct OfPoses<'a>(&'a [Body]);
 
 impl Records<{ pose::ROWS }> for OfPoses<'_> {
-    const INTEGERS: [bool; pose::ROWS] = record::pose::INTEGERS;
-
     #[inline(always)]
     fn len(&self) -> usize {
         self.0.len()
     }
 
     #[inline(always)]
-    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; pose::ROWS]; N]> {
-        some(self.0, nth, record::pose::encode)
+    fn some<F: Format, V: Vectors, const N: usize>(
+        &mut self,
+        vectors: V,
+        nth: usize,
+    ) -> Option<[[F::Row; pose::ROWS]; N]> {
+        rows_of::<F, V, _, N>(vectors, self.0, nth, (&record::pose::WORDS, record::pose::encode))
     }
 }
 
-/// The records of the `nth` so many bodies.
+/// The rows of the `nth` so many bodies, of each such a record with such last words.
 #[inline(always)]
-fn some<const ROWS: usize, const N: usize>(
+fn rows_of<F: Format, V: Vectors, const ROWS: usize, const N: usize>(
+    vectors: V,
     bodies: &[Body],
     nth: usize,
-    record: impl Fn(&Body) -> [Lanes; ROWS],
-) -> Option<[[Lanes; ROWS]; N]> {
+    (words, record): (&Words<ROWS>, impl Fn(&Body) -> [Lanes; ROWS]),
+) -> Option<[[F::Row; ROWS]; N]> {
     let bodies = bodies.as_chunks::<N>().0.get(nth)?;
-    let mut records = [[Lanes::all(0); ROWS]; N];
-    for (to, body) in records.iter_mut().zip(bodies) {
-        *to = record(body);
+    let mut rows = [[F::Row::zeroed(); ROWS]; N];
+    for (to, body) in rows.iter_mut().zip(bodies) {
+        *to = F::rows(vectors, record(body).into(), words);
     }
-    Some(records)
+    Some(rows)
 }
 
 /// The velocity record of a body with its inertia.

@@ -1,21 +1,21 @@
 //! This file makes the records of a block of collisions, and has them looked at on their way.
 
 use bitstream_model::interface::record::{collision, relative};
+use bytemuck::Zeroable as _;
 
-use super::format::Records;
-use crate::platform::Lanes;
-use crate::record;
+use super::format::{Format, Records};
+use crate::platform::{Lanes, Vectors};
+use crate::record::{self, Record, Words};
 use crate::record::end::{End, Ends};
 use crate::scene::validate::{Block, Look, Quick, Reach};
-use crate::scene::{Collision, Lying};
+use crate::scene::{Collision, Lying, Next};
 
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
-    /// Rows whose word is an unsigned integer.
-    const INTEGERS: [bool; ROWS];
+    const WORDS: Words<ROWS>;
 
     /// The record of collision `index`.
-    fn encode(self, index: usize, from: &Collision, ends: [End; 2]) -> [Lanes; ROWS];
+    fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<ROWS>;
 
     /// Bits where a number is beyond what the stream holds.
     fn beyond(quick: &Quick<'_>, record: &[Lanes; ROWS], count: u32) -> Lanes;
@@ -29,10 +29,10 @@ pub(super) trait Kind<const ROWS: usize>: Copy {
 pub(super) struct Absolute;
 
 impl Kind<{ collision::ROWS }> for Absolute {
-    const INTEGERS: [bool; collision::ROWS] = record::collision::INTEGERS;
+    const WORDS: Words<{ collision::ROWS }> = record::collision::WORDS;
 
     #[inline(always)]
-    fn encode(self, _: usize, from: &Collision, ends: [End; 2]) -> [Lanes; collision::ROWS] {
+    fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ collision::ROWS }> {
         record::collision::encode(from, ends)
     }
 
@@ -52,12 +52,11 @@ impl Kind<{ collision::ROWS }> for Absolute {
 pub(super) struct Relative;
 
 impl Kind<{ relative::ROWS }> for Relative {
-    const INTEGERS: [bool; relative::ROWS] = record::relative::INTEGERS;
+    const WORDS: Words<{ relative::ROWS }> = record::relative::WORDS;
 
     #[inline(always)]
-    fn encode(self, _: usize, from: &Collision, ends: [End; 2]) -> [Lanes; relative::ROWS] {
-        let ends = record::relative::anchors(ends, ends.map(|end| !end.is_static()));
-        record::relative::encode(from, ends)
+    fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
+        of_words(from, ends, record::bodies(from))
     }
 
     #[inline(always)]
@@ -71,17 +70,24 @@ impl Kind<{ relative::ROWS }> for Relative {
     }
 }
 
+/// The relative record whose indices are the first two of these words.
+#[inline(always)]
+fn of_words(from: &Collision, [a, b]: [&End; 2], words: Lanes) -> Record<{ relative::ROWS }> {
+    let ends = record::relative::anchors([a, b], [!a.is_static(), !b.is_static()]);
+    record::relative::encode(from, ends, words)
+}
+
 /// The same, with these words in place of the indices of each one's bodies.
 #[derive(Clone, Copy)]
 pub(super) struct Worded<'a>(pub(super) &'a [[u32; 2]]);
 
 impl Kind<{ relative::ROWS }> for Worded<'_> {
-    const INTEGERS: [bool; relative::ROWS] = Relative::INTEGERS;
+    const WORDS: Words<{ relative::ROWS }> = Relative::WORDS;
 
     #[inline(always)]
-    fn encode(self, index: usize, from: &Collision, ends: [End; 2]) -> [Lanes; relative::ROWS] {
-        let [body_a, body_b] = self.0[index];
-        Relative.encode(index, &Collision { body_a, body_b, ..*from }, ends)
+    fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
+        let [word_a, word_b] = self.0[index];
+        of_words(from, ends, Lanes::new([word_a, word_b, 0, 0]))
     }
 
     #[inline(always)]
@@ -97,7 +103,7 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
 
 /// The ends of a collision's bodies.
 #[inline(always)]
-fn both(ends: Ends<'_>, collision: &Collision) -> [End; 2] {
+fn both<'a>(ends: Ends<'a>, collision: &Collision) -> [&'a End; 2] {
     [collision.body_a, collision.body_b].map(|body| ends.get(body))
 }
 
@@ -106,51 +112,37 @@ pub(super) struct Encoding<'p, K, L> {
     kind: K,
     first: usize,
     collisions: L,
-    /// Those that are asked for meanwhile.
-    soon: L,
-    /// Those whose bodies are.
-    bodies_soon: L,
     ends: Ends<'p>,
     /// Whether they lie about where they would in an array.
     nearby: bool,
 }
 
-/// How far behind a collision is asked for: so far that it is there in time, so near that it is not gone
-/// again.
-const SOON: usize = 30;
-
-/// The same of its bodies, which it has to say by then.
-const BODIES_SOON: usize = SOON / 2;
-
 /// How far behind what lies about there is asked for, where the order is near to that in memory: from
-/// there it comes line by line, which takes longer than [`SOON`] if it is not in a cache.
+/// there it comes line by line, which takes longer if it is not in a cache.
 const FAR: usize = 768;
 
 impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
-    /// Those of a block, the first of which is number `at` of `all`.
+    /// Those of a block.
     #[inline(always)]
-    pub(super) fn new(kind: K, block: &Block<'p, L>, all: L, at: usize) -> Self {
+    pub(super) fn new(kind: K, block: &Block<'p, L>) -> Self {
         let Block { first, collisions, ends, .. } = *block;
-        let behind = |distance| all.part(at + distance..at + distance + collisions.len());
-        let (soon, bodies_soon) = (behind(SOON), behind(BODIES_SOON));
-        let nearby = collisions.is_nearby(first);
-        Self { kind, first, collisions, soon, bodies_soon, ends, nearby }
+        Self { kind, first, collisions, ends, nearby: collisions.is_nearby(first) }
     }
 
-    /// The `nth` so many records, if there are as many, with the collisions and the ends that they are
-    /// made of.
+    /// The rows of the `nth` so many records, if there are as many, each of which `witness` sees.
     #[inline(always)]
-    fn made<const ROWS: usize, const N: usize>(&self, nth: usize) -> Option<Made<'p, ROWS, N>>
+    fn rows<F: Format, V: Vectors, W: Witness<K, ROWS>, const ROWS: usize, const N: usize>(
+        &self,
+        vectors: V,
+        nth: usize,
+        witness: &mut W,
+    ) -> Option<[[F::Row; ROWS]; N]>
     where
         K: Kind<ROWS>,
     {
-        let collisions = self.collisions.some::<N>(nth)?;
-        self.soon.soon::<N>(nth);
-        // Bodies of neighbours are neighbours.
-        if L::APART
-            && let Some(collisions) = self.bodies_soon.some::<N>(nth)
-        {
-            for collision in collisions {
+        let Next { these, soon } = self.collisions.next::<N>(nth)?;
+        if let Some(soon) = soon {
+            for collision in soon {
                 self.ends.soon([collision.body_a, collision.body_b]);
             }
         }
@@ -160,56 +152,86 @@ impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
                 self.collisions.soon_at(first + FAR + at);
             }
         }
-        let mut made =
-            Made { records: [[Lanes::all(0); ROWS]; N], collisions, ends: [[End::MISSING; 2]; N] };
-        for (at, collision) in collisions.into_iter().enumerate() {
-            made.ends[at] = both(self.ends, collision);
-            made.records[at] = self.kind.encode(first + at, collision, made.ends[at]);
+        let mut rows = [[F::Row::zeroed(); ROWS]; N];
+        macro_rules! each {
+            ($($at:literal)*) => {
+                const { assert!(N <= [$($at),*].len(), "all of them are written out") };
+                $(if let (Some(to), Some(collision)) = (rows.get_mut($at), these.get($at)) {
+                    let ends = both(self.ends, collision);
+                    let record = self.kind.encode(first + $at, collision, ends);
+                    witness.see(&record, collision, ends);
+                    *to = F::rows(vectors, record, &K::WORDS);
+                })*
+            };
         }
-        Some(made)
+        // A loop of so much is not unrolled, and its rows would go through memory.
+        each!(0 1 2 3 4);
+        Some(rows)
     }
 }
 
-/// Records, and what they are made of.
-struct Made<'p, const ROWS: usize, const N: usize> {
-    records: [[Lanes; ROWS]; N],
-    collisions: [&'p Collision; N],
-    ends: [[End; 2]; N],
+/// Who sees records on their way. An `#[inline(always)]` belongs to every implementation.
+trait Witness<K: Kind<ROWS>, const ROWS: usize> {
+    /// Sees the record of a collision, whose ends these are.
+    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2]);
+}
+
+/// Nobody.
+impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for () {
+    #[inline(always)]
+    fn see(&mut self, _: &Record<ROWS>, _: &Collision, _: [&End; 2]) {}
 }
 
 impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Encoding<'p, K, L> {
-    const INTEGERS: [bool; ROWS] = K::INTEGERS;
-
     #[inline(always)]
     fn len(&self) -> usize {
         self.collisions.len()
     }
 
     #[inline(always)]
-    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]> {
-        let Made { records, .. } = self.made(nth)?;
-        Some(records)
+    fn some<F: Format, V: Vectors, const N: usize>(
+        &mut self,
+        vectors: V,
+        nth: usize,
+    ) -> Option<[[F::Row; ROWS]; N]> {
+        self.rows::<F, V, (), ROWS, N>(vectors, nth, &mut ())
     }
 }
 
-/// The same, looked at on their way.
-pub(super) struct LookedAt<'p, K, L> {
-    records: Encoding<'p, K, L>,
+/// Whoever looks at them as validation does.
+struct Looking<'p> {
     quick: &'p Quick<'p>,
     look: Look<'p>,
     scheduled: bool,
 }
 
+impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for Looking<'_> {
+    #[inline(always)]
+    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2]) {
+        self.look.head(collision, ends, self.scheduled);
+        self.look.numbers(K::beyond(self.quick, &record.rows, collision.count));
+        if self.look.asks_how_far() {
+            self.look.reach(&K::reach(&record.rows, collision.count), ends);
+        }
+    }
+}
+
+/// The same records, looked at on their way.
+pub(super) struct LookedAt<'p, K, L> {
+    records: Encoding<'p, K, L>,
+    looking: Looking<'p>,
+}
+
 impl<'p, K: Copy, L: Lying<'p>> LookedAt<'p, K, L> {
     #[inline(always)]
     pub(super) fn new(records: Encoding<'p, K, L>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
-        Self { records, quick, look: Look::new(quick), scheduled }
+        Self { records, looking: Looking { quick, look: Look::new(quick), scheduled } }
     }
 
     /// How many of those taken look like padding.
     #[inline(always)]
     pub(super) fn paddings(&self) -> usize {
-        self.look.paddings()
+        self.looking.look.paddings()
     }
 
     /// Whether validation refuses none of the block, all of whose records were taken.
@@ -218,33 +240,27 @@ impl<'p, K: Copy, L: Lying<'p>> LookedAt<'p, K, L> {
     where
         K: Kind<ROWS>,
     {
-        let Self { records: Encoding { kind, .. }, look, .. } = self;
+        let Self { records: Encoding { kind, .. }, looking: Looking { look, .. } } = self;
         let reaches = (block.first..).zip(block.collisions.iter()).map(|(index, collision)| {
             let record = kind.encode(index, collision, both(block.ends, collision));
-            K::reach(&record, collision.count)
+            K::reach(&record.rows, collision.count)
         });
         look.good(block, reaches)
     }
 }
 
 impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for LookedAt<'p, K, L> {
-    const INTEGERS: [bool; ROWS] = K::INTEGERS;
-
     #[inline(always)]
     fn len(&self) -> usize {
         self.records.collisions.len()
     }
 
     #[inline(always)]
-    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]> {
-        let Made { records, collisions, ends } = self.records.made(nth)?;
-        for ((record, collision), ends) in records.iter().zip(collisions).zip(ends) {
-            self.look.head(collision, ends, self.scheduled);
-            self.look.numbers(K::beyond(self.quick, record, collision.count));
-            if self.look.asks_how_far() {
-                self.look.reach(&K::reach(record, collision.count), ends);
-            }
-        }
-        Some(records)
+    fn some<F: Format, V: Vectors, const N: usize>(
+        &mut self,
+        vectors: V,
+        nth: usize,
+    ) -> Option<[[F::Row; ROWS]; N]> {
+        self.records.rows::<F, V, _, ROWS, N>(vectors, nth, &mut self.looking)
     }
 }

@@ -96,7 +96,7 @@ fn pack_range<C: Collisions + ?Sized>(
     let seen = match collisions.structures().filter(|all| all.len() == count) {
         Some(Structures::Array(all)) => packer.write(InArray(all).part(range)),
         Some(Structures::Ordered { all, order }) => {
-            packer.write_ordered(InOrder { all, order }.part(range))
+            packer.write_ordered(InOrder::new(all, order).part(range))
         }
         None => {
             let mut copies = [Collision::NOTHING; BLOCK];
@@ -218,7 +218,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_
         for at in (0..all.collisions.len()).step_by(BLOCK) {
             let collisions = all.collisions.part(at..at + BLOCK);
             let block = Block { first: all.first + at, collisions, ..all };
-            let mut records = Encoding::new(kind, &block, all.collisions, at);
+            let mut records = Encoding::new(kind, &block);
             let Some(quick) = quick else {
                 dealer.write(vectors, &mut records);
                 continue;

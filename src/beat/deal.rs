@@ -88,8 +88,8 @@ impl<'a, 'b> Dealer<'a, 'b> {
         let mut waiting = [F::Row::zeroed(); 2];
         let mut count = 0;
         for at in done..records.len() {
-            let Some([record]) = records.some(at) else { break };
-            for row in F::rows::<V, R, ROWS>(vectors, record) {
+            let Some([rows]) = records.some::<F, V, 1>(vectors, at) else { break };
+            for row in rows {
                 waiting[count] = row;
                 count += 1;
                 if count == F::PER_BEAT {
@@ -133,6 +133,7 @@ mod tests {
     use super::super::stripe::Place;
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
+    use crate::record::Words;
 
     const ROWS: usize = 3;
 
@@ -140,17 +141,20 @@ mod tests {
     struct Made<'a>(&'a [[[u32; LANES]; ROWS]]);
 
     impl Records<ROWS> for Made<'_> {
-        const INTEGERS: [bool; ROWS] = [true, false, false];
-
         #[inline(always)]
         fn len(&self) -> usize {
             self.0.len()
         }
 
         #[inline(always)]
-        fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]> {
+        fn some<F: Format, V: Vectors, const N: usize>(
+            &mut self,
+            vectors: V,
+            nth: usize,
+        ) -> Option<[[F::Row; ROWS]; N]> {
             let records = self.0.as_chunks::<N>().0.get(nth)?;
-            Some(records.map(|record| record.map(Lanes::new)))
+            let words = Words { integers: [true, false, false], bodies: None };
+            Some(records.map(|record| F::rows(vectors, record.map(Lanes::new).into(), &words)))
         }
     }
 
@@ -224,7 +228,7 @@ mod tests {
             #[inline(always)]
             fn run<V: Vectors>(self, vectors: V) -> [u16; LANES] {
                 let Self(format, row, integer) = self;
-                let [narrow] = format.narrow(vectors, [Lanes::new(row)], &[integer]);
+                let [narrow] = format.narrow(vectors, [Lanes::new(row)].into(), &Words { integers: [integer], bodies: None });
                 narrow
             }
         }

@@ -5,19 +5,23 @@ use bytemuck::Pod;
 
 use crate::platform::{Lanes, Vectors};
 use crate::record::sixteen::{Row, Sixteen};
+use crate::record::{Record, Words};
 
-/// Records on their way, in f32.
+/// Records on their way.
 ///
 /// `some` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
 pub(super) trait Records<const ROWS: usize> {
-    /// Rows whose word is an unsigned integer.
-    const INTEGERS: [bool; ROWS];
-
     /// How many there are.
     fn len(&self) -> usize;
 
-    /// The `nth` so many of them, if there are as many. Each is asked for once, in their order.
-    fn some<const N: usize>(&mut self, nth: usize) -> Option<[[Lanes; ROWS]; N]>;
+    /// The rows of the `nth` so many of them, if there are as many. Each is asked for once, in their order.
+    ///
+    /// One is done with before the next is begun: more than one in f32 are in want of registers.
+    fn some<F: Format, V: Vectors, const N: usize>(
+        &mut self,
+        vectors: V,
+        nth: usize,
+    ) -> Option<[[F::Row; ROWS]; N]>;
 }
 
 /// What rows become in a stream.
@@ -32,9 +36,10 @@ pub(super) trait Format {
     fn beat(rows: &[Self::Row]) -> Beat;
 
     /// The rows of a record. Likewise.
-    fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
+    fn rows<V: Vectors, const ROWS: usize>(
         vectors: V,
-        record: [Lanes; ROWS],
+        record: Record<ROWS>,
+        words: &Words<ROWS>,
     ) -> [Self::Row; ROWS];
 
     /// The rows that these beats hold, in f32. Likewise.
@@ -55,13 +60,14 @@ impl Format for Whole {
     }
 
     #[inline(always)]
-    fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
+    fn rows<V: Vectors, const ROWS: usize>(
         _: V,
-        record: [Lanes; ROWS],
+        record: Record<ROWS>,
+        words: &Words<ROWS>,
     ) -> [Beat; ROWS] {
         let mut rows = [Beat::default(); ROWS];
-        for (to, row) in rows.iter_mut().zip(&record) {
-            *to = (*row).into();
+        for (to, row) in rows.iter_mut().zip(record.whole(words)) {
+            *to = row.into();
         }
         rows
     }
@@ -96,11 +102,12 @@ macro_rules! sixteen {
             }
 
             #[inline(always)]
-            fn rows<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
+            fn rows<V: Vectors, const ROWS: usize>(
                 vectors: V,
-                record: [Lanes; ROWS],
+                record: Record<ROWS>,
+                words: &Words<ROWS>,
             ) -> [Row; ROWS] {
-                Sixteen::$format.narrow(vectors, record, &R::INTEGERS)
+                Sixteen::$format.narrow(vectors, record, words)
             }
 
             #[inline(always)]

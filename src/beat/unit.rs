@@ -7,7 +7,6 @@
 use std::mem;
 
 use bitstream_model::interface::record::Beat;
-use bytemuck::Zeroable as _;
 
 use super::format::{Format, Records};
 use super::pattern::{self, Pattern, Places};
@@ -76,11 +75,7 @@ fn unit<
     for channel in &to {
         soon_written_behind(channel);
     }
-    let Some(records) = records.some::<RECORDS>(unit) else { return };
-    let mut rows = [[F::Row::zeroed(); ROWS]; RECORDS];
-    for (to, record) in rows.iter_mut().zip(records) {
-        *to = F::rows::<V, R, ROWS>(vectors, record);
-    }
+    let Some(rows) = records.some::<F, V, RECORDS>(vectors, unit) else { return };
     let rows = rows.as_flattened();
     for at in 0..BEATS {
         let Place { channel, slot } = P::PLACES[at];
@@ -93,7 +88,7 @@ fn unit<
 #[cfg(test)]
 mod tests {
     use bitstream_model::interface::profile::{Inertia, PROFILES, Variant};
-    use bitstream_model::interface::record::LANES;
+    use bytemuck::Zeroable as _;
 
     use super::super::deal::BLOCK;
     use super::super::format::{Binary16, Thesis16, Whole};
@@ -136,16 +131,18 @@ mod tests {
     struct Zeros;
 
     impl<const ROWS: usize> Records<ROWS> for Zeros {
-        const INTEGERS: [bool; ROWS] = [false; ROWS];
-
         #[inline(always)]
         fn len(&self) -> usize {
             BLOCK
         }
 
         #[inline(always)]
-        fn some<const N: usize>(&mut self, _: usize) -> Option<[[Lanes; ROWS]; N]> {
-            Some([[Lanes::new([0; LANES]); ROWS]; N])
+        fn some<F: Format, V: Vectors, const N: usize>(
+            &mut self,
+            _: V,
+            _: usize,
+        ) -> Option<[[F::Row; ROWS]; N]> {
+            Some([[F::Row::zeroed(); ROWS]; N])
         }
     }
 

@@ -11,22 +11,26 @@ use half::f16;
 use super::lanes::Lanes;
 
 /// Rounds the numbers of two rows to binary16, to nearest even. Where `integers` says so the last word
-/// of a row is an unsigned integer, whose lower half is taken.
+/// of a row is an unsigned integer, the first of `words` or the second, whose lower half is taken.
 #[inline(always)]
-pub(super) fn to_binary16(rows: [Lanes; 2], integers: [bool; 2]) -> [Narrow; 2] {
+pub(super) fn to_binary16(rows: [Lanes; 2], words: Lanes, integers: [bool; 2]) -> [Narrow; 2] {
     let [first, second] = rows.map(Lanes::words);
-    [row(first, integers[0]), row(second, integers[1])]
+    let [of_first, of_second, ..] = words.words();
+    [
+        row(first, integers[0].then_some(of_first)),
+        row(second, integers[1].then_some(of_second)),
+    ]
 }
 
 /// One row.
 #[inline(always)]
-fn row(from: Wide, integer: bool) -> Narrow {
+fn row(from: Wide, integer: Option<u32>) -> Narrow {
     #[cfg(target_arch = "aarch64")]
     let mut to = aarch64::to_binary16(&from);
     #[cfg(not(target_arch = "aarch64"))]
     let mut to = from.map(|bits| f16::from_f32_const(f32::from_bits(bits)).to_bits());
-    if integer {
-        let [low, high, ..] = from[WORD_LANE].to_le_bytes();
+    if let Some(integer) = integer {
+        let [low, high, ..] = integer.to_le_bytes();
         to[WORD_LANE] = u16::from_le_bytes([low, high]);
     }
     to
@@ -49,9 +53,10 @@ type Narrow = [u16; LANES];
 
 #[cfg(target_arch = "x86_64")]
 pub(super) mod x86 {
+    use core::arch::asm;
     use core::arch::x86_64::{
         __m128i, _MM_FROUND_TO_NEAREST_INT, _mm_blend_epi16, _mm_setr_epi8, _mm_shuffle_epi8,
-        _mm_unpackhi_epi32, _mm256_castsi256_ps, _mm256_cvtph_ps, _mm256_cvtps_ph,
+        _mm256_castsi256_ps, _mm256_cvtph_ps, _mm256_cvtps_ph,
         _mm256_set_m128i,
     };
 
@@ -62,22 +67,35 @@ pub(super) mod x86 {
     #[inline]
     pub(in super::super) fn to_binary16(
         [first, second]: [Lanes; 2],
+        words: Lanes,
         integers: [bool; 2],
     ) -> [Narrow; 2] {
         const { assert!(WORD_LANE == 3 && LANES == 4, "so the bytes are counted") };
         let both = _mm256_castsi256_ps(_mm256_set_m128i(second.0, first.0));
         let numbers = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(both);
-        // The lower halves of the last words, where the integers belong: what became of these as
-        // numbers is nothing.
-        let last = _mm_unpackhi_epi32(first.0, second.0);
-        let places = _mm_setr_epi8(-1, -1, -1, -1, -1, -1, 8, 9, -1, -1, -1, -1, -1, -1, 12, 13);
-        let last = _mm_shuffle_epi8(last, places);
+        // The lower halves of the integers, where they belong: what the last words of the rows became
+        // as numbers is nothing.
+        let places = _mm_setr_epi8(-1, -1, -1, -1, -1, -1, 0, 1, -1, -1, -1, -1, -1, -1, 4, 5);
+        let last = _mm_shuffle_epi8(words.0, places);
+        let numbers = computed_once(numbers);
         bytemuck::cast(match integers {
             [false, false] => numbers,
             [true, false] => _mm_blend_epi16::<0b0000_1000>(numbers, last),
             [false, true] => _mm_blend_epi16::<0b1000_0000>(numbers, last),
             [true, true] => _mm_blend_epi16::<0b1000_1000>(numbers, last),
         })
+    }
+
+    /// The same. Where a vector that is narrowed is also stored the compiler narrows it twice, on its
+    /// way to memory and for what else it is for.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn computed_once(mut vector: __m128i) -> __m128i {
+        // SAFETY: nothing happens.
+        unsafe {
+            asm!("/* {0} */", inout(xmm_reg) vector, options(pure, nomem, nostack, preserves_flags));
+        }
+        vector
     }
 
     /// As [`to_f32`](super::to_f32).
@@ -135,6 +153,11 @@ mod tests {
         all.iter().flat_map(|number| [*number, -*number]).collect()
     }
 
+    /// Integers for two rows, others than their last words.
+    fn words_beside([first, second]: [Wide; 2]) -> Lanes {
+        Lanes::new([first[0].rotate_left(7), second[1].rotate_left(11), !first[2], !second[2]])
+    }
+
     /// Pairs of rows through the vectors of a loop.
     struct Rounding<'a>(&'a [[Wide; 2]], [bool; 2]);
 
@@ -144,7 +167,10 @@ mod tests {
         #[inline(always)]
         fn run<V: Vectors>(self, vectors: V) -> Vec<[Narrow; 2]> {
             let Self(pairs, integers) = self;
-            pairs.iter().map(|rows| vectors.to_binary16(rows.map(Lanes::new), integers)).collect()
+            let narrow = |rows: &[Wide; 2]| {
+                vectors.to_binary16(rows.map(Lanes::new), words_beside(*rows), integers)
+            };
+            pairs.iter().map(narrow).collect()
         }
     }
 
@@ -155,16 +181,19 @@ mod tests {
         wide.resize(wide.len().next_multiple_of(2 * LANES), 0);
         let pairs = wide.as_chunks::<LANES>().0.as_chunks::<2>().0;
         for integers in [[false, false], [true, false], [false, true], [true, true]] {
-            let anywhere = pairs.iter().map(|rows| to_binary16(rows.map(Lanes::new), integers));
+            let anywhere = pairs
+                .iter()
+                .map(|rows| to_binary16(rows.map(Lanes::new), words_beside(*rows), integers));
             let here = in_wide_vectors(Rounding(pairs, integers));
             assert_eq!(here.len(), pairs.len());
             for ((here, anywhere), rows) in here.into_iter().zip(anywhere).zip(pairs) {
+                let words = words_beside(*rows).words();
                 for (place, (wide, integer)) in rows.iter().zip(integers).enumerate() {
                     let number = |bits| f16::from_f32_const(f32::from_bits(bits)).to_bits();
                     let mut expected = wide.map(number);
                     if integer {
                         expected[WORD_LANE] =
-                            u16::try_from(wide[WORD_LANE] & 0xFFFF).expect("sixteen bits");
+                            u16::try_from(words[place] & 0xFFFF).expect("sixteen bits");
                     }
                     assert_eq!(here[place], expected, "{wide:x?}, {integer}");
                     assert_eq!(anywhere[place], expected, "{wide:x?}, {integer}");

@@ -1,19 +1,21 @@
 //! This file makes the record of a collision in world coordinates.
 
 use super::end::End;
-use super::{contact_row, used, vec3_and_word};
+use super::{Record, Words, bodies, contact_row, used, vec3_and_word};
 use crate::interface::record::{CONTACT_POINTS, collision};
 use crate::platform::Lanes;
 use crate::scene::Collision;
 
 /// Rows whose word is an unsigned integer: count and indices.
-pub(crate) const INTEGERS: [bool; collision::ROWS] = {
+pub(crate) const WORDS: Words<{ collision::ROWS }> = {
     let mut integers = [false; collision::ROWS];
     integers[collision::NORMAL] = true;
     integers[collision::BODY_A] = true;
     integers[collision::BODY_B] = true;
-    integers
+    Words { integers, bodies: Some(collision::BODY_A) }
 };
+
+const _: () = assert!(collision::BODY_B == collision::BODY_A + 1);
 
 /// The collision record: normal and count, positions and indices of both bodies, contact points.
 ///
@@ -24,16 +26,16 @@ pub(crate) const INTEGERS: [bool; collision::ROWS] = {
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Lanes; collision::ROWS] {
+pub(crate) fn encode(from: &Collision, [a, b]: [&End; 2]) -> Record<{ collision::ROWS }> {
     let mut rows = [Lanes::all(0); collision::ROWS];
     rows[collision::NORMAL] = vec3_and_word(from.normal, from.count);
-    rows[collision::BODY_A] = a.with_word(from.body_a);
-    rows[collision::BODY_B] = b.with_word(from.body_b);
+    rows[collision::BODY_A] = a.with_tag();
+    rows[collision::BODY_B] = b.with_tag();
     let contacts = from.contacts.iter().zip(&mut rows[collision::CONTACTS..]);
     for ((contact, row), used) in contacts.zip(used(from.count)) {
         *row = contact_row(contact).and(used);
     }
-    rows
+    Record { rows, bodies: bodies(from) }
 }
 
 const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::ROWS);
@@ -89,7 +91,7 @@ mod tests {
             0x00, 0x00, 0x00, 0x00, // unused
         ];
         let ends = [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]].map(End::at);
-        let beats = encode(&collision, ends).map(Beat::from);
+        let beats = encode(&collision, ends.each_ref()).whole(&WORDS).map(Beat::from);
         assert_eq!(bytemuck::bytes_of(&beats), bytes);
     }
 
@@ -104,7 +106,7 @@ mod tests {
                 count,
                 contacts: [contact; 4],
             };
-            let beats = encode(&collision, [End::MISSING; 2]).map(Beat::from);
+            let beats = encode(&collision, [&End::MISSING; 2]).rows.map(Beat::from);
             for (ordinal, beat) in (0..).zip(&beats[3..]) {
                 assert_eq!(*beat == Beat([0; 4]), ordinal >= count, "count {count}: {ordinal}");
             }

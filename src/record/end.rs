@@ -1,5 +1,6 @@
 //! This file says what the record of a collision takes from either of its bodies.
 
+use std::hint::cold_path;
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
@@ -39,35 +40,34 @@ impl End {
         bytemuck::cast(Beat::from(row_of::<POSITION, _>(body).beside(tag)))
     }
 
-    /// Its position beside a word.
+    /// Its position beside a word that says nothing.
     #[inline(always)]
-    pub(crate) fn with_word(self, word: u32) -> Lanes {
-        let whole: Beat = bytemuck::cast(self);
-        Lanes::from(whole).beside(word)
+    pub(crate) fn with_tag(&self) -> Lanes {
+        Lanes::from(bytemuck::cast::<_, Beat>(*self))
     }
 
     /// Its position beside zero.
     #[inline(always)]
-    pub(crate) fn alone(self) -> Lanes {
-        let whole: Beat = bytemuck::cast(self);
+    pub(crate) fn alone(&self) -> Lanes {
+        let whole: Beat = bytemuck::cast(*self);
         Lanes::from(whole).and(Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]))
     }
 
     /// Whether it never moves.
     #[inline(always)]
-    pub(crate) const fn is_static(self) -> bool {
+    pub(crate) const fn is_static(&self) -> bool {
         self.tag & STATIC != 0
     }
 
     /// Whether it has a shape.
     #[inline(always)]
-    pub(crate) const fn has_shape(self) -> bool {
+    pub(crate) const fn has_shape(&self) -> bool {
         self.tag != NO_SHAPE
     }
 
     /// Its shape; a static one, if it has none.
     #[inline]
-    pub(crate) fn shape(self, shapes: &[Shape]) -> &Shape {
+    pub(crate) fn shape<'s>(&self, shapes: &'s [Shape]) -> &'s Shape {
         let shape = usize::try_from(self.tag & !STATIC).ok().and_then(|shape| shapes.get(shape));
         shape.unwrap_or(&Shape::STATIC)
     }
@@ -150,7 +150,7 @@ impl Survey<'_> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ends<'a>(pub(crate) &'a [End]);
 
-impl Ends<'_> {
+impl<'a> Ends<'a> {
     /// Says that those of these bodies are asked for soon.
     #[inline(always)]
     pub(crate) fn soon(self, bodies: [u32; 2]) {
@@ -161,8 +161,14 @@ impl Ends<'_> {
 
     /// That of one body.
     #[inline(always)]
-    pub(crate) fn get(self, body: u32) -> End {
-        let end = usize::try_from(body).ok().and_then(|body| self.0.get(body));
-        *end.unwrap_or(&End::MISSING)
+    pub(crate) fn get(self, body: u32) -> &'a End {
+        match usize::try_from(body).ok().and_then(|body| self.0.get(body)) {
+            Some(end) => end,
+            None => {
+                // A jump that is foreseen costs less than to choose.
+                cold_path();
+                &End::MISSING
+            }
+        }
     }
 }

@@ -26,6 +26,45 @@ use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
 use crate::platform::Lanes;
 use crate::scene::{Body, Collision, Contact};
 
+/// A record on its way, in f32.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Record<const ROWS: usize> {
+    /// Where the index of a body belongs, the last word is any.
+    pub(crate) rows: [Lanes; ROWS],
+    /// The indices of bodies A and B, and any two words behind them.
+    pub(crate) bodies: Lanes,
+}
+
+/// What the last words of a record's rows are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Words<const ROWS: usize> {
+    /// Rows whose last word is an unsigned integer.
+    pub(crate) integers: [bool; ROWS],
+    /// The row of which it is the index of body A, and in the next that of body B, if it is of any.
+    pub(crate) bodies: Option<usize>,
+}
+
+impl<const ROWS: usize> From<[Lanes; ROWS]> for Record<ROWS> {
+    /// A record of no collision.
+    #[inline(always)]
+    fn from(rows: [Lanes; ROWS]) -> Self {
+        Self { rows, bodies: Lanes::all(0) }
+    }
+}
+
+impl<const ROWS: usize> Record<ROWS> {
+    /// Its rows, each with its last word.
+    #[inline(always)]
+    pub(crate) fn whole(self, words: &Words<ROWS>) -> [Lanes; ROWS] {
+        let Self { mut rows, bodies } = self;
+        let [body_a, body_b, ..] = bodies.words();
+        if let Some([a, b, ..]) = words.bodies.and_then(|at| rows.get_mut(at..)) {
+            (*a, *b) = (a.beside(body_a), b.beside(body_b));
+        }
+        rows
+    }
+}
+
 /// A vec3 and the word beside it.
 #[inline(always)]
 fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Lanes {
@@ -39,6 +78,16 @@ fn row_of<const AT: usize, T: Pod>(structure: &T) -> Lanes {
     let words: &[u32] = bytemuck::cast_slice(slice::from_ref(structure));
     words[AT..].first_chunk().map_or(Lanes::all(0), |row| Lanes::new(*row))
 }
+
+/// The indices of the bodies of a collision, and whatever follows them.
+#[inline(always)]
+pub(crate) fn bodies(collision: &Collision) -> Lanes {
+    row_of::<BODIES, _>(collision)
+}
+
+/// The word with which the indices of a collision's bodies begin, B's behind A's.
+const BODIES: usize = offset_of!(Collision, body_a) / 4;
+const _: () = assert!(offset_of!(Collision, body_b) == 4 * (BODIES + 1));
 
 /// The word with which the normal of a collision begins.
 const NORMAL: usize = offset_of!(Collision, normal) / 4;

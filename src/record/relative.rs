@@ -1,21 +1,23 @@
 //! This file makes the record of a collision relative to body A.
 
 use super::end::End;
-use super::{NORMAL, contact_row, row_of, used};
+use super::{NORMAL, Record, Words, contact_row, row_of, used};
 use crate::interface::record::{CONTACT_POINTS, LANES, relative};
 use crate::platform::Lanes;
 use crate::scene::Collision;
 
 /// Rows whose word is an unsigned integer: the indices.
-pub(crate) const INTEGERS: [bool; relative::ROWS] = {
+pub(crate) const WORDS: Words<{ relative::ROWS }> = {
     let mut integers = [false; relative::ROWS];
     integers[relative::NORMAL] = true;
     integers[relative::OFFSET] = true;
-    integers
+    Words { integers, bodies: Some(relative::NORMAL) }
 };
 
 /// The row of a contact point which is not there.
 const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
+
+const _: () = assert!(relative::OFFSET == relative::NORMAL + 1);
 
 /// The collision record: normal, offset from body A to body B, contact points from body A.
 ///
@@ -26,18 +28,22 @@ const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Lanes; relative::ROWS] {
+pub(crate) fn encode(
+    from: &Collision,
+    [a, b]: [&End; 2],
+    bodies: Lanes,
+) -> Record<{ relative::ROWS }> {
     let mut rows = [Lanes::all(0); relative::ROWS];
     let [a, b] = [a, b].map(End::alone);
-    rows[relative::NORMAL] = row_of::<NORMAL, _>(from).beside(from.body_a);
-    rows[relative::OFFSET] = b.minus_f32(a).beside(from.body_b);
+    rows[relative::NORMAL] = row_of::<NORMAL, _>(from);
+    rows[relative::OFFSET] = b.minus_f32(a);
     let contacts = from.contacts.iter().zip(&mut rows[relative::CONTACTS..]);
     for ((contact, row), used) in contacts.zip(used(from.count)) {
         // Beside the position is a zero, which takes nothing from the distance.
         let seen = contact_row(contact).minus_f32(a);
         *row = seen.and(used).or(Lanes::new(FAR).without(used));
     }
-    rows
+    Record { rows, bodies }
 }
 
 /// The positions of bodies A and B that a record is made from.
@@ -45,12 +51,9 @@ pub(crate) fn encode(from: &Collision, [a, b]: [End; 2]) -> [Lanes; relative::RO
 /// A static body has no lever arm that anything comes of, and its centre may be far away, which
 /// sixteen bits pay for with every contact point on it: the other body's position stands in for its.
 #[inline(always)]
-pub(crate) fn anchors<T: Copy>([a, b]: [T; 2], moves: [bool; 2]) -> [T; 2] {
-    match moves {
-        [false, _] => [b, b],
-        [true, false] => [a, a],
-        [true, true] => [a, b],
-    }
+pub(crate) fn anchors<T: Copy>([a, b]: [T; 2], [a_moves, b_moves]: [bool; 2]) -> [T; 2] {
+    let from = if a_moves { a } else { b };
+    [from, if b_moves { b } else { from }]
 }
 
 /// `to` as seen from `from`.
@@ -63,6 +66,7 @@ const _: () = assert!(relative::CONTACTS + CONTACT_POINTS == relative::ROWS);
 
 #[cfg(test)]
 mod tests {
+    use super::super::bodies;
     use super::*;
     use crate::interface::record::Beat;
     use crate::scene::Contact;
@@ -89,7 +93,7 @@ mod tests {
                 Contact { point: [7.0, 8.0, 9.0], distance: -1.0 },
             ],
         };
-        let rows = encode(&collision, [[1.0, 1.0, 5.0], [3.0, 0.0, 5.0]].map(End::at));
+        let rows = encode(&collision, [[1.0, 1.0, 5.0], [3.0, 0.0, 5.0]].map(End::at).each_ref(), bodies(&collision));
         let expected = [
             [0x0000_0000, 0xBF80_0000, 0x0000_0000, 0x0102_0304], // n, bodyA
             [0x4000_0000, 0xBF80_0000, 0x0000_0000, 0x0506_0708], // (2, -1, 0), bodyB
@@ -98,6 +102,6 @@ mod tests {
             [0x0000_0000, 0x0000_0000, 0x0000_0000, 0x7F80_0000], // not there
             [0x0000_0000, 0x0000_0000, 0x0000_0000, 0x7F80_0000], // not there
         ];
-        assert_eq!(rows.map(Beat::from), expected.map(Beat));
+        assert_eq!(rows.whole(&WORDS).map(Beat::from), expected.map(Beat));
     }
 }

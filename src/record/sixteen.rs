@@ -3,7 +3,7 @@
 use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::record::{LANES, WORD_LANE};
 
-use super::thesis16;
+use super::{Record, Words, thesis16};
 use crate::platform::{Lanes, Vectors};
 
 /// A row in sixteen bits: half a beat.
@@ -28,31 +28,40 @@ impl Sixteen {
         }
     }
 
-    /// A record of f32 as one of this format. Where `integers` says so the word beside the vec3 is an
-    /// unsigned integer, whose lower half is taken: what is more than that validation refuses.
+    /// A record of f32 as one of this format. Of a word that is an unsigned integer the lower half is
+    /// taken: what is more than that validation refuses.
     #[inline(always)]
     pub(crate) fn narrow<V: Vectors, const ROWS: usize>(
         self,
         vectors: V,
-        record: [Lanes; ROWS],
-        integers: &[bool; ROWS],
+        record: Record<ROWS>,
+        words: &Words<ROWS>,
     ) -> [Row; ROWS] {
+        let integers = &words.integers;
         let mut narrow = [Row::default(); ROWS];
         match self {
             Self::Binary16 => {
-                // Contact points, the last rows, come in pairs.
-                let (first, pairs) = record.as_rchunks::<2>();
+                // Contact points, the last rows, come in pairs. So do bodies, whose indices go
+                // beside what their rows became.
+                let apart = words.bodies.filter(|at| (ROWS - at).is_multiple_of(2));
+                let rows = if apart.is_some() { record.rows } else { record.whole(words) };
+                let (first, pairs) = rows.as_rchunks::<2>();
                 let (alone, integers) = integers.as_rchunks::<2>();
                 let (to_first, to_pairs) = narrow.as_rchunks_mut::<2>();
                 for ((to, row), integer) in to_first.iter_mut().zip(first).zip(alone) {
-                    [*to, _] = vectors.to_binary16([*row, Lanes::all(0)], [*integer, false]);
+                    let rows = [*row, Lanes::all(0)];
+                    [*to, _] = vectors.to_binary16(rows, last(rows), [*integer, false]);
                 }
-                for ((to, rows), integers) in to_pairs.iter_mut().zip(pairs).zip(integers) {
-                    *to = vectors.to_binary16(*rows, *integers);
+                for (at, ((to, rows), integers)) in
+                    to_pairs.iter_mut().zip(pairs).zip(integers).enumerate()
+                {
+                    let of_bodies = apart == Some(ROWS % 2 + 2 * at);
+                    let words = if of_bodies { record.bodies } else { last(*rows) };
+                    *to = vectors.to_binary16(*rows, words, *integers);
                 }
             }
             Self::Thesis16 => {
-                for ((to, row), integer) in narrow.iter_mut().zip(record).zip(integers) {
+                for ((to, row), integer) in narrow.iter_mut().zip(record.whole(words)).zip(integers) {
                     let words = row.words();
                     *to = words.map(thesis16::narrow);
                     if *integer {
@@ -74,6 +83,12 @@ impl Sixteen {
             Self::Thesis16 => rows.map(|row| Lanes::new(row.map(thesis16::widen))),
         }
     }
+}
+
+/// The last words of two rows, and two zeros.
+#[inline(always)]
+fn last([first, second]: [Lanes; 2]) -> Lanes {
+    Lanes::new([first.words()[WORD_LANE], second.words()[WORD_LANE], 0, 0])
 }
 
 #[cfg(test)]
@@ -102,7 +117,8 @@ mod tests {
 
         #[inline(always)]
         fn run<V: Vectors>(self, vectors: V) -> [Row; ROWS] {
-            self.format.narrow(vectors, self.record, &self.integers)
+            let words = Words { integers: self.integers, bodies: None };
+            self.format.narrow(vectors, self.record.into(), &words)
         }
     }
 

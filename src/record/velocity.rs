@@ -1,23 +1,23 @@
 //! This file makes the velocity record of a body.
 
 use super::inertia::Inverse;
-use super::{ANGULAR, LINEAR, row_of, vec3_and_word};
+use super::{ANGULAR, LINEAR, Words, row_of, vec3_and_word};
 use crate::interface::record::velocity;
 use crate::platform::Lanes;
 use crate::scene::Body;
 
 /// Rows whose word is an unsigned integer: the shape.
-pub(crate) const INTEGERS: [bool; velocity::ROWS] = {
+pub(crate) const WORDS: Words<{ velocity::ROWS }> = {
     let mut integers = [false; velocity::ROWS];
     integers[velocity::LINEAR] = true;
-    integers
+    Words { integers, bodies: None }
 };
 
 /// Rows whose word is an unsigned integer in a record with world inertia.
-pub(crate) const WORLD_INTEGERS: [bool; velocity::WORLD_ROWS] = {
+pub(crate) const WORLD_WORDS: Words<{ velocity::WORLD_ROWS }> = {
     let mut integers = [false; velocity::WORLD_ROWS];
     integers[velocity::LINEAR] = true;
-    integers
+    Words { integers, bodies: None }
 };
 
 /// The velocity record: linear velocity beside the shape index, angular velocity beside 0.

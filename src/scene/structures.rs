@@ -1,6 +1,7 @@
 //! This file says where the collisions lie that a caller keeps as structures: they are read there, without a
 //! copy.
 
+use std::hint::cold_path;
 use std::iter;
 use std::ops::Range;
 
@@ -43,17 +44,15 @@ impl Structures<'_> {
 ///
 /// All of it is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
 pub(crate) trait Lying<'a>: Copy {
-    /// Whether neighbours lie apart, and so do their bodies, which are asked for before they are needed.
-    const APART: bool;
-
     /// How many there are.
     fn len(self) -> usize;
 
     /// The `nth` so many of them, if there are as many.
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]>;
 
-    /// Says that these are asked for soon, and those before and behind them, too.
-    fn soon<const N: usize>(self, nth: usize);
+    /// The same, while those that are asked for soon are: with as many whose bodies are, where neighbours
+    /// lie apart and there are any.
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>>;
 
     /// Whether these, which are entry `first` and those behind it, lie apart, but about where they would
     /// lie one behind the other.
@@ -77,6 +76,21 @@ pub(crate) trait Lying<'a>: Copy {
     }
 }
 
+/// Collisions that it is the turn of.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Next<'a, const N: usize> {
+    pub(crate) these: [&'a Collision; N],
+    /// Those whose bodies are asked for soon, if any are.
+    pub(crate) soon: Option<[&'a Collision; N]>,
+}
+
+/// How far behind a collision is asked for: so far that it is there in time, so near that it is not gone
+/// again.
+const SOON: usize = 30;
+
+/// The same of its bodies, which it has to say by then.
+const BODIES_SOON: usize = SOON / 2;
+
 /// Entries from which on one is no longer where it would lie in an array: so many collisions are in
 /// none of the inner caches.
 const NEARBY: usize = 4096;
@@ -93,8 +107,6 @@ fn part<T>(all: &[T], range: Range<usize>) -> &[T] {
 pub(crate) struct InArray<'a>(pub(crate) &'a [Collision]);
 
 impl<'a> Lying<'a> for InArray<'a> {
-    const APART: bool = false;
-
     #[inline(always)]
     fn len(self) -> usize {
         self.0.len()
@@ -106,10 +118,12 @@ impl<'a> Lying<'a> for InArray<'a> {
     }
 
     #[inline(always)]
-    fn soon<const N: usize>(self, nth: usize) {
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
+        let these = self.some(nth)?;
         for at in 0..N {
-            self.soon_at(nth * N + at);
+            self.soon_at(nth * N + SOON + at);
         }
+        Some(Next { these, soon: None })
     }
 
     #[inline(always)]
@@ -131,35 +145,64 @@ impl<'a> Lying<'a> for InArray<'a> {
 /// [`Structures::Ordered`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InOrder<'a> {
-    pub(crate) all: &'a [Collision],
-    pub(crate) order: &'a [u32],
+    all: &'a [Collision],
+    /// Of these, and of what is behind them.
+    order: &'a [u32],
+    count: usize,
+}
+
+impl<'a> InOrder<'a> {
+    pub(crate) fn new(all: &'a [Collision], order: &'a [u32]) -> Self {
+        Self { all, order, count: order.len() }
+    }
+
+    #[inline(always)]
+    fn at(self, place: u32) -> &'a Collision {
+        match self.all.get(place as usize) {
+            Some(collision) => collision,
+            None => {
+                // A jump that is foreseen costs less than to choose.
+                cold_path();
+                &Collision::NOTHING
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn those<const N: usize>(self, places: &[u32; N]) -> [&'a Collision; N] {
+        let mut those = [&Collision::NOTHING; N];
+        for (to, place) in those.iter_mut().zip(places) {
+            *to = self.at(*place);
+        }
+        those
+    }
 }
 
 impl<'a> Lying<'a> for InOrder<'a> {
-    const APART: bool = true;
-
     #[inline(always)]
     fn len(self) -> usize {
-        self.order.len()
+        self.count
     }
 
     #[inline(always)]
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
         let places = self.order.as_chunks::<N>().0.get(nth)?;
-        let mut some = [&Collision::NOTHING; N];
-        for (to, place) in some.iter_mut().zip(places) {
-            if let Some(collision) = self.all.get(*place as usize) {
-                *to = collision;
-            }
-        }
-        Some(some)
+        Some(self.those(places))
     }
 
     #[inline(always)]
-    fn soon<const N: usize>(self, nth: usize) {
-        if let Some(places) = self.order.as_chunks::<N>().0.get(nth) {
-            places.iter().for_each(|place| soon_alone(self.all, *place as usize));
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
+        let first = nth * N;
+        // One look at how long it is, for all of them.
+        let rest = self.order.get(first..)?;
+        let Some(places) = rest.get(..SOON + N) else {
+            return Some(Next { these: self.those(rest.first_chunk()?), soon: None });
+        };
+        for place in &places[SOON..] {
+            soon_alone(self.all, *place as usize);
         }
+        let soon = places[BODIES_SOON..].first_chunk().map(|places| self.those(places));
+        Some(Next { these: self.those(places.first_chunk()?), soon })
     }
 
     #[inline(always)]
@@ -174,6 +217,7 @@ impl<'a> Lying<'a> for InOrder<'a> {
 
     #[inline(always)]
     fn part(self, range: Range<usize>) -> Self {
-        Self { order: part(self.order, range), ..self }
+        let count = range.end.min(self.count).saturating_sub(range.start);
+        Self { order: self.order.get(range.start..).unwrap_or_default(), count, ..self }
     }
 }

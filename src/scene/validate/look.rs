@@ -37,7 +37,7 @@ impl<'a> Look<'a> {
 
     /// Looks at normal, count and bodies of the next. Where collisions are `scheduled`, it may be padding.
     #[inline(always)]
-    pub(crate) fn head(&mut self, collision: &Collision, ends: [End; 2], scheduled: bool) {
+    pub(crate) fn head(&mut self, collision: &Collision, ends: [&End; 2], scheduled: bool) {
         let padding = scheduled & is_padding(collision);
         self.heads &= head(collision, ends) | padding;
         self.paddings += usize::from(padding);
@@ -58,7 +58,7 @@ impl<'a> Look<'a> {
 
     /// Looks at how far it reaches.
     #[inline(always)]
-    pub(crate) fn reach(&mut self, reach: &Reach, ends: [End; 2]) {
+    pub(crate) fn reach(&mut self, reach: &Reach, ends: [&End; 2]) {
         self.furthest.take(reach, ends.map(|end| !end.is_static()));
     }
 

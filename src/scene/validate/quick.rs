@@ -123,7 +123,7 @@ impl<'a> Quick<'a> {
     /// That of the first collision that it refuses.
     pub(crate) fn refusal<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> Result<(), InputError> {
         let end = |body: usize| {
-            let end = u32::try_from(body).map_or(End::MISSING, |body| block.ends.get(body));
+            let end = u32::try_from(body).map_or(&End::MISSING, |body| block.ends.get(body));
             (end.position, end.shape(self.scene.shapes))
         };
         (block.first..).zip(block.collisions.iter()).try_for_each(|(index, collision)| {
@@ -150,7 +150,7 @@ pub(crate) struct Block<'a, L> {
 
 /// Whether normal, count and bodies of a collision are surely right.
 #[inline(always)]
-pub(super) fn head(collision: &Collision, [a, b]: [End; 2]) -> bool {
+pub(super) fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
     let [x, y, z] = collision.normal;
     let square = x * x + y * y + z * z;
     ((square - 1.0).abs() <= NORMAL)
