@@ -86,7 +86,12 @@ impl Records<{ velocity::ROWS }> for Isotropic<'_> {
         vectors: V,
         nth: usize,
     ) -> Option<[[F::Row; velocity::ROWS]; N]> {
-        rows_of::<F, V, _, N>(vectors, self.0, nth, (&record::velocity::WORDS, record::velocity::encode))
+        rows_of::<F, V, _, N>(
+            vectors,
+            self.0,
+            nth,
+            (&record::velocity::WORDS, record::velocity::encode),
+        )
     }
 }
 

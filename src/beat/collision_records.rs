@@ -5,8 +5,8 @@ use bytemuck::Zeroable as _;
 
 use super::format::{Format, Records};
 use crate::platform::{Lanes, Vectors};
-use crate::record::{self, Record, Words};
 use crate::record::end::{End, Ends};
+use crate::record::{self, Record, Words};
 use crate::scene::validate::{Block, Look, Quick, Reach};
 use crate::scene::{Collision, Lying, Next};
 
@@ -117,9 +117,9 @@ pub(super) struct Encoding<'p, K, L> {
     nearby: bool,
 }
 
-/// How far behind what lies about there is asked for, where the order is near to that in memory: from
+/// How far behind what lies about there is fetched, where the order is near to that in memory: from
 /// there it comes line by line, which takes longer if it is not in a cache.
-const FAR: usize = 768;
+const NEARBY_SOON: usize = 768;
 
 impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
     /// Those of a block.
@@ -149,10 +149,11 @@ impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
         let first = self.first + nth * N;
         if self.nearby {
             for at in 0..N {
-                self.collisions.soon_at(first + FAR + at);
+                self.collisions.soon_at(first + NEARBY_SOON + at);
             }
         }
         let mut rows = [[F::Row::zeroed(); ROWS]; N];
+        // A loop of so much is not unrolled, and its rows would go through memory.
         macro_rules! each {
             ($($at:literal)*) => {
                 const { assert!(N <= [$($at),*].len(), "all of them are written out") };
@@ -164,13 +165,12 @@ impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
                 })*
             };
         }
-        // A loop of so much is not unrolled, and its rows would go through memory.
         each!(0 1 2 3 4);
         Some(rows)
     }
 }
 
-/// Who sees records on their way. An `#[inline(always)]` belongs to every implementation.
+/// Who sees the records on their way. An `#[inline(always)]` belongs to every implementation.
 trait Witness<K: Kind<ROWS>, const ROWS: usize> {
     /// Sees the record of a collision, whose ends these are.
     fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2]);

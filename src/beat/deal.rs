@@ -228,7 +228,11 @@ mod tests {
             #[inline(always)]
             fn run<V: Vectors>(self, vectors: V) -> [u16; LANES] {
                 let Self(format, row, integer) = self;
-                let [narrow] = format.narrow(vectors, [Lanes::new(row)].into(), &Words { integers: [integer], bodies: None });
+                let [narrow] = format.narrow(
+                    vectors,
+                    [Lanes::new(row)].into(),
+                    &Words { integers: [integer], bodies: None },
+                );
                 narrow
             }
         }

@@ -16,10 +16,7 @@ use super::lanes::Lanes;
 pub(super) fn to_binary16(rows: [Lanes; 2], words: Lanes, integers: [bool; 2]) -> [Narrow; 2] {
     let [first, second] = rows.map(Lanes::words);
     let [of_first, of_second, ..] = words.words();
-    [
-        row(first, integers[0].then_some(of_first)),
-        row(second, integers[1].then_some(of_second)),
-    ]
+    [row(first, integers[0].then_some(of_first)), row(second, integers[1].then_some(of_second))]
 }
 
 /// One row.
@@ -56,8 +53,7 @@ pub(super) mod x86 {
     use core::arch::asm;
     use core::arch::x86_64::{
         __m128i, _MM_FROUND_TO_NEAREST_INT, _mm_blend_epi16, _mm_setr_epi8, _mm_shuffle_epi8,
-        _mm256_castsi256_ps, _mm256_cvtph_ps, _mm256_cvtps_ph,
-        _mm256_set_m128i,
+        _mm256_castsi256_ps, _mm256_cvtph_ps, _mm256_cvtps_ph, _mm256_set_m128i,
     };
 
     use super::{LANES, Lanes, Narrow, WORD_LANE};

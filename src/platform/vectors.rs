@@ -22,12 +22,7 @@ pub(crate) trait Work {
 pub(crate) trait Vectors: Copy {
     /// Rounds the numbers of two rows to binary16, to nearest even. Where `integers` says so the last word
     /// of a row is an unsigned integer, the first of `words` or the second, whose lower half is taken.
-    fn to_binary16(
-        self,
-        rows: [Lanes; 2],
-        words: Lanes,
-        integers: [bool; 2],
-    ) -> [[u16; LANES]; 2];
+    fn to_binary16(self, rows: [Lanes; 2], words: Lanes, integers: [bool; 2]) -> [[u16; LANES]; 2];
 
     /// The numbers of two rows of binary16, in f32.
     fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2];
@@ -71,7 +66,12 @@ mod x86 {
 
     impl Vectors for Wide {
         #[inline(always)]
-        fn to_binary16(self, rows: [Lanes; 2], words: Lanes, integers: [bool; 2]) -> [[u16; LANES]; 2] {
+        fn to_binary16(
+            self,
+            rows: [Lanes; 2],
+            words: Lanes,
+            integers: [bool; 2],
+        ) -> [[u16; LANES]; 2] {
             // SAFETY: there is one of these only where the processor has the instructions that the
             // function is compiled for.
             unsafe { convert::x86::to_binary16(rows, words, integers) }

@@ -6,7 +6,8 @@ use crate::platform::Lanes;
 use crate::scene::Body;
 
 /// No row ends in an integer.
-pub(crate) const WORDS: Words<{ pose::ROWS }> = Words { integers: [false; pose::ROWS], bodies: None };
+pub(crate) const WORDS: Words<{ pose::ROWS }> =
+    Words { integers: [false; pose::ROWS], bodies: None };
 
 /// The pose record: position beside 0, orientation.
 ///

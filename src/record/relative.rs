@@ -93,7 +93,11 @@ mod tests {
                 Contact { point: [7.0, 8.0, 9.0], distance: -1.0 },
             ],
         };
-        let rows = encode(&collision, [[1.0, 1.0, 5.0], [3.0, 0.0, 5.0]].map(End::at).each_ref(), bodies(&collision));
+        let rows = encode(
+            &collision,
+            [[1.0, 1.0, 5.0], [3.0, 0.0, 5.0]].map(End::at).each_ref(),
+            bodies(&collision),
+        );
         let expected = [
             [0x0000_0000, 0xBF80_0000, 0x0000_0000, 0x0102_0304], // n, bodyA
             [0x4000_0000, 0xBF80_0000, 0x0000_0000, 0x0506_0708], // (2, -1, 0), bodyB

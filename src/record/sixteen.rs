@@ -61,7 +61,8 @@ impl Sixteen {
                 }
             }
             Self::Thesis16 => {
-                for ((to, row), integer) in narrow.iter_mut().zip(record.whole(words)).zip(integers) {
+                for ((to, row), integer) in narrow.iter_mut().zip(record.whole(words)).zip(integers)
+                {
                     let words = row.words();
                     *to = words.map(thesis16::narrow);
                     if *integer {
@@ -163,6 +164,39 @@ mod tests {
             assert_eq!(narrowed_rows(format, [row; 2], two), two.map(expected));
             let seven = [true, true, false, false, true, false, true];
             assert_eq!(narrowed_rows(format, [row; 7], seven), seven.map(expected));
+        }
+    }
+
+    /// Whether a pair of rows becomes beats together or not.
+    #[test]
+    fn indices_beside_a_record_come_where_they_would_stand_in_it() {
+        struct Apart(Sixteen, Record<5>, usize);
+        impl Work for Apart {
+            type Output = [[Row; 5]; 2];
+
+            #[inline(always)]
+            fn run<V: Vectors>(self, vectors: V) -> [[Row; 5]; 2] {
+                let Self(format, record, at) = self;
+                let mut integers = [false; 5];
+                integers[at..at + 2].fill(true);
+                let words = Words { integers, bodies: Some(at) };
+                let whole = record.whole(&words).into();
+                let in_it = Words { bodies: None, ..words };
+                [format.narrow(vectors, record, &words), format.narrow(vectors, whole, &in_it)]
+            }
+        }
+        let row =
+            |from: u32| Lanes::new([0, 1, 2, 3].map(|at| 0x3F80_1234 + 0x4_0000 * (from + at)));
+        let record = Record {
+            rows: [0, 10, 20, 30, 40].map(row),
+            bodies: Lanes::new([0x0001_ABCD, 0x1234_5678, 7, 8]),
+        };
+        for format in [Sixteen::Binary16, Sixteen::Thesis16] {
+            for at in 0..4 {
+                let [apart, whole] = in_wide_vectors(Apart(format, record, at));
+                assert_eq!(apart, whole, "{format:?} {at}");
+                assert_eq!([apart[at][3], apart[at + 1][3]], [0xABCD, 0x5678], "{format:?} {at}");
+            }
         }
     }
 

@@ -50,8 +50,7 @@ pub(crate) trait Lying<'a>: Copy {
     /// The `nth` so many of them, if there are as many.
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]>;
 
-    /// The same, while those that are asked for soon are: with as many whose bodies are, where neighbours
-    /// lie apart and there are any.
+    /// The `nth` so many of them, of which there are as many, while those are fetched whose turn it is soon.
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>>;
 
     /// Whether these, which are entry `first` and those behind it, lie apart, but about where they would
@@ -76,11 +75,12 @@ pub(crate) trait Lying<'a>: Copy {
     }
 }
 
-/// Collisions that it is the turn of.
+/// Collisions whose turn it is.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Next<'a, const N: usize> {
     pub(crate) these: [&'a Collision; N],
-    /// Those whose bodies are asked for soon, if any are.
+    /// Those whose bodies are to be fetched. Where neighbours lie one behind the other so do their bodies,
+    /// and there are none; nor shortly before the end.
     pub(crate) soon: Option<[&'a Collision; N]>,
 }
 
@@ -146,16 +146,19 @@ impl<'a> Lying<'a> for InArray<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InOrder<'a> {
     all: &'a [Collision],
-    /// Of these, and of what is behind them.
+    /// Places of these, and of what is behind them.
     order: &'a [u32],
+    /// How many these are.
     count: usize,
 }
 
 impl<'a> InOrder<'a> {
+    /// Those at all places of an order.
     pub(crate) fn new(all: &'a [Collision], order: &'a [u32]) -> Self {
         Self { all, order, count: order.len() }
     }
 
+    /// That at a place; one without contact points beyond the end.
     #[inline(always)]
     fn at(self, place: u32) -> &'a Collision {
         match self.all.get(place as usize) {
@@ -168,6 +171,7 @@ impl<'a> InOrder<'a> {
         }
     }
 
+    /// Those at these places.
     #[inline(always)]
     fn those<const N: usize>(self, places: &[u32; N]) -> [&'a Collision; N] {
         let mut those = [&Collision::NOTHING; N];
@@ -186,15 +190,14 @@ impl<'a> Lying<'a> for InOrder<'a> {
 
     #[inline(always)]
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
-        let places = self.order.as_chunks::<N>().0.get(nth)?;
+        let places = self.order.get(..self.count)?.as_chunks::<N>().0.get(nth)?;
         Some(self.those(places))
     }
 
     #[inline(always)]
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
-        let first = nth * N;
-        // One look at how long it is, for all of them.
-        let rest = self.order.get(first..)?;
+        let rest = self.order.get(nth * N..)?;
+        // It is looked at once how many there are, for all of them.
         let Some(places) = rest.get(..SOON + N) else {
             return Some(Next { these: self.those(rest.first_chunk()?), soon: None });
         };
@@ -219,5 +222,61 @@ impl<'a> Lying<'a> for InOrder<'a> {
     fn part(self, range: Range<usize>) -> Self {
         let count = range.end.min(self.count).saturating_sub(range.start);
         Self { order: self.order.get(range.start..).unwrap_or_default(), count, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// So many collisions, which name their place.
+    fn collisions(count: u32) -> Vec<Collision> {
+        (0..count).map(|body_a| Collision { body_a, ..Collision::NOTHING }).collect()
+    }
+
+    fn names<'a>(some: impl IntoIterator<Item = &'a Collision>) -> Vec<u32> {
+        some.into_iter().map(|collision| collision.body_a).collect()
+    }
+
+    /// A part ends where it says, also if there is more behind it.
+    fn parts_are_as_long_as_they_say<'a>(all: impl Lying<'a>, expected: &[u32]) {
+        for range in [0..0, 0..7, 30..60, 60..100, 95..130, 100..101, 200..230] {
+            let part = all.part(range.clone());
+            let there = super::part(expected, range);
+            assert_eq!((part.len(), names(part.iter())), (there.len(), there.to_vec()));
+            assert!(part.some::<2>(there.len() / 2).is_none());
+            for (nth, pair) in there.as_chunks::<2>().0.iter().enumerate() {
+                let next = part.next::<2>(nth).expect("as many");
+                assert_eq!(names(next.these), pair);
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_is_as_long_as_it_says() {
+        let all = collisions(100);
+        let in_turn: Vec<u32> = (0..100).collect();
+        parts_are_as_long_as_they_say(InArray(&all), &in_turn);
+        // Backwards, with one that is not there.
+        let mut order: Vec<u32> = in_turn.into_iter().rev().collect();
+        order[40] = u32::MAX;
+        let mut expected = order.clone();
+        expected[40] = Collision::NOTHING.body_a;
+        parts_are_as_long_as_they_say(InOrder::new(&all, &order), &expected);
+    }
+
+    #[test]
+    fn those_whose_bodies_are_fetched_are_a_little_behind() {
+        let all = collisions(100);
+        let order: Vec<u32> = (0..100).rev().collect();
+        let part = InOrder::new(&all, &order).part(30..60);
+        let soon = |nth| part.next::<2>(nth).expect("as many").soon.map(names);
+        // Entries 30 + 15 and the next; beyond the part, too.
+        assert_eq!(soon(0), Some(vec![54, 53]));
+        assert_eq!(soon(14), Some(vec![26, 25]));
+        // Of the last none are.
+        let last = InOrder::new(&all, &order).part(90..100);
+        assert!(last.next::<2>(0).expect("as many").soon.is_none());
+        assert!(InArray(&all).next::<2>(0).expect("as many").soon.is_none());
     }
 }
