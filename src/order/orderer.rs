@@ -20,9 +20,10 @@ pub enum Order {
     /// of a body a whole depth apart and empty entries where nothing fits.
     HazardFree,
     /// No hazards at all, and hardly a collision far from where it was given: what a step reads of the
-    /// caller's memory is in the caches, so that it is packed sooner. As many bodies are alive as in the
-    /// order given. Where that would leave more than one entry in [`Orderer::HARDLY`] empty, because there
-    /// are few collisions or too many of a body's in a row, it is [`Order::HazardFree`].
+    /// caller's memory is in the caches, so that it is packed sooner. About as many bodies are alive as in
+    /// the order given. Where that would leave more empty than one entry in 64 and four windows, because
+    /// too many of a body's collisions are given in a row, it is [`Order::HazardFree`] instead, and
+    /// [`Orderer::made`] says so.
     HazardFreeNearby,
 }
 
@@ -34,8 +35,8 @@ impl Order {
     }
 }
 
-/// Makes orders, keeping its memory from one to the next: no allocation once it has seen a scene of
-/// that size, for [`Order::AsGiven`] and the orders without hazards.
+/// Makes orders, keeping its memory from one to the next: no allocation once it has [made](Self::made) the
+/// same of a scene of that size, for [`Order::AsGiven`] and the orders without hazards.
 #[derive(Debug)]
 pub struct Orderer {
     sweep: Sweep,
@@ -43,6 +44,7 @@ pub struct Orderer {
     groups: Groups,
     schedule: Schedule,
     limit: usize,
+    made: Order,
 }
 
 impl Default for Orderer {
@@ -54,8 +56,6 @@ impl Default for Orderer {
 impl Orderer {
     /// Entries of a schedule, at most, if not said otherwise.
     pub const ENTRIES_MAX: usize = 1 << 26;
-    /// Of so many entries of [`Order::HazardFreeNearby`] at most one is empty.
-    pub const HARDLY: usize = 64;
 
     /// Without memory of its own yet.
     #[must_use]
@@ -66,6 +66,7 @@ impl Orderer {
             groups: Groups::default(),
             schedule: Schedule::default(),
             limit: Self::ENTRIES_MAX,
+            made: Order::AsGiven,
         }
     }
 
@@ -90,6 +91,7 @@ impl Orderer {
         window: IssueWindow,
     ) -> Result<&Schedule, OrderError> {
         input.check()?;
+        self.made = order;
         let schedule = &mut self.schedule;
         match order {
             Order::AsGiven => {
@@ -106,9 +108,9 @@ impl Orderer {
             }
             Order::HazardFreeNearby => {
                 self.sweep.as_given(input);
-                // One empty entry in `HARDLY` is one beside each `HARDLY - 1` collisions.
-                let few = input.pairs.len() / (Self::HARDLY - 1);
-                if self.place(window, self.limit.min(input.pairs.len() + few)).is_err() {
+                let short = self.limit.min(hardly_longer(input.pairs.len(), window));
+                if self.place(window, short).is_err() {
+                    self.made = Order::HazardFree;
                     self.sweep.run(input);
                     self.place(window, self.limit)?;
                 }
@@ -125,11 +127,26 @@ impl Orderer {
         self.groups.place(sweep, moving, window, limit, &mut self.schedule)
     }
 
+    /// What the order made last is: what was asked for, or [`Order::HazardFree`] in its place.
+    #[must_use]
+    pub fn made(&self) -> Order {
+        self.made
+    }
+
     /// The order made last; empty before the first.
     #[must_use]
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }
+}
+
+/// Entries of [`Order::HazardFreeNearby`] at most, of so many collisions.
+///
+/// One entry in 64 may be empty, and four windows beside them: whatever the order, the last uses of a body
+/// lie a window apart. The thesis' piles leave two to four empty at their end, of whatever size they are.
+pub(super) fn hardly_longer(collisions: usize, window: IssueWindow) -> usize {
+    // One empty entry in 64 is one beside each 63 collisions.
+    collisions + collisions / 63 + 4 * window.entries()
 }
 
 /// Number of colours of [`Order::Colours`].

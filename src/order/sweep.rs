@@ -54,7 +54,7 @@ pub(super) struct Sweep {
 }
 
 impl Sweep {
-    /// Number of moving bodies, which is the rank of every static one.
+    /// The rank of every static body, which is above that of every moving one.
     pub(super) fn moving(&self) -> u32 {
         self.moving
     }

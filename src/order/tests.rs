@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 
+use super::orderer::hardly_longer;
 use super::*;
 use crate::scene::{
     Body, Collision, CollisionArrays, Collisions, Contact, Pose, Shape, Structures, Velocity,
@@ -80,14 +81,20 @@ proptest! {
         }
     }
 
-    /// It is one that is hardly longer than the collisions, or the other hazard-free one.
+    /// It is one that is hardly longer than the collisions, or the other hazard-free one, and says which.
     #[test]
     fn a_nearby_order_is_short_or_the_other_one(
         given in any_given(200, 600),
         window in any_window(),
     ) {
-        let nearby = ordered(&given, Order::HazardFreeNearby, window);
-        if nearby.empty() * Orderer::HARDLY > nearby.len() {
+        let mut orderer = Orderer::new();
+        let nearby = orderer.order(&given.input(), Order::HazardFreeNearby, window).expect("an order");
+        let (nearby, made) = (nearby.clone(), orderer.made());
+        let most = hardly_longer(given.pairs.len(), window);
+        if made == Order::HazardFreeNearby {
+            prop_assert!(nearby.len() <= most, "{}", nearby.len());
+        } else {
+            prop_assert_eq!(made, Order::HazardFree);
             prop_assert_eq!(nearby, ordered(&given, Order::HazardFree, window));
         }
     }
@@ -186,14 +193,57 @@ fn a_nearby_order_moves_hardly_a_collision_far() {
     };
     for (depth, per_issue) in [(16, 1), (64, 1), (106, 2)] {
         let window = IssueWindow::new(depth, per_issue).expect("a window");
-        let nearby = ordered(&given, Order::HazardFreeNearby, window);
-        assert!(nearby.empty() * Orderer::HARDLY <= nearby.len(), "{depth}");
+        let mut orderer = Orderer::new();
+        let nearby = orderer.order(&given.input(), Order::HazardFreeNearby, window);
+        let nearby = nearby.expect("an order").clone();
+        assert_eq!(orderer.made(), Order::HazardFreeNearby, "{depth}");
         // The open groups, what waits, and what is brought forward at the end.
         let reach = 64 * (depth.div_ceil(8) * per_issue) as usize + 256 + 16 * window.entries();
         assert!(moved(&nearby) <= reach, "{depth}: {}", moved(&nearby));
         let swept = ordered(&given, Order::HazardFree, window);
         assert!(moved(&swept) > given.pairs.len() / 2, "{depth}: {}", moved(&swept));
     }
+}
+
+/// A chain of which every collision meets the one before it: a nearby order is one collision a window,
+/// unless there are so few that this is no more than the end of any order.
+#[test]
+fn a_nearby_order_gives_way_where_it_would_be_longer() {
+    let window = IssueWindow::new(24, 1).expect("a window");
+    let made = |count: u32| {
+        let pairs: Vec<[u32; 2]> = (1..=count).map(|body| [0, body]).collect();
+        let bodies = pairs.len() + 1;
+        let given = Given { pairs, moving: vec![true; bodies], positions: vec![[0.0; 3]; bodies] };
+        let mut orderer = Orderer::new();
+        let schedule = orderer.order(&given.input(), Order::HazardFreeNearby, window);
+        let entries = schedule.expect("an order").len();
+        assert_eq!(orderer.schedule(), &ordered(&given, orderer.made(), window));
+        (orderer.made(), entries)
+    };
+    // A group is three slots, so that the nth use is n times 24 to 27 slots behind the first.
+    assert_eq!(made(4).0, Order::HazardFreeNearby);
+    assert!(made(4).1 <= 4 + 4 * 24, "{}", made(4).1);
+    assert_eq!(made(6).0, Order::HazardFree);
+    assert!(made(6).1 > 6 + 4 * 24, "{}", made(6).1);
+}
+
+/// The limit is that of the order that was made, and the error says it.
+#[test]
+fn a_nearby_order_has_the_same_limit() {
+    let given = sheet(30);
+    let window = IssueWindow::new(64, 1).expect("a window");
+    let mut orderer = Orderer::new();
+    let entries = |orderer: &mut Orderer, order| {
+        orderer.order(&given.input(), order, window).map(Schedule::len)
+    };
+    let nearby = entries(&mut orderer, Order::HazardFreeNearby).expect("an order");
+    assert_eq!(orderer.made(), Order::HazardFreeNearby);
+    orderer.set_limit(nearby);
+    assert_eq!(entries(&mut orderer, Order::HazardFreeNearby), Ok(nearby));
+    let limit = given.pairs.len();
+    orderer.set_limit(limit);
+    let refused = OrderError::TooLong { depth: 64, limit, collisions: limit };
+    assert_eq!(entries(&mut orderer, Order::HazardFreeNearby), Err(refused));
 }
 
 #[test]

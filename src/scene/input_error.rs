@@ -348,8 +348,8 @@ pub enum InputError {
     /// A body lives longer than the bitstream lets it.
     #[error(
         "in this order body {body} is used first in entry {first} and last in entry {last}, and the \
-         bitstream's delay lines take spans of less than {lag}: ask for another order (the hazard-free \
-         one keeps spans short unless a body has dozens of collisions), or load another bitstream \
+         bitstream's delay lines take spans of less than {lag}: ask for another order (hazard-free \
+         keeps spans short unless a body has dozens of collisions), or load another bitstream \
          ({carriers})"
     )]
     SpanTooLong {

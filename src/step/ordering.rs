@@ -26,6 +26,7 @@ pub(super) struct Ordering {
 /// How the collisions of a step were ordered.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Arranged {
+    /// What was made.
     pub(super) order: Order,
     /// Whether there is a schedule; without one they are as given.
     pub(super) scheduled: bool,
@@ -95,7 +96,7 @@ impl Ordering {
             }
             None => None,
         };
-        Ok(Arranged { order, scheduled: true, verified, live })
+        Ok(Arranged { order: self.orderer.made(), scheduled: true, verified, live })
     }
 
     /// The schedule made last.

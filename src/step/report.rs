@@ -59,7 +59,8 @@ pub struct StepReport {
     pub bodies: u64,
     /// Number of collisions.
     pub collisions: u64,
-    /// The order in which they were sent.
+    /// The order in which they were sent: [`Order::HazardFree`] where [`Order::HazardFreeNearby`] gave way
+    /// to it.
     pub order: Order,
     /// Entries left empty between them, sent as collisions without contact points.
     pub empty: u64,

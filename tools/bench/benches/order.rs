@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo bench --bench order
 //! cargo bench --bench order -- --grid 10x10x10 --steps 4 --json
+//! cargo bench --bench order -- --order hazard-free
 //! ```
 //!
 //! The thesis' cubes, standing on the ground, are stepped on the emulated board. The first step
@@ -18,11 +19,11 @@ use std::hint::black_box;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use bench::options::{Common, Pile};
+use bench::options::{Common, Pile, Sent};
 use bench::{Run, medians, milliseconds, ratio};
 use bitstream_model::interface::profile::FLOAT;
 use bitstream_model::{BoardConfig, EmulatedBoard};
-use clap::Parser;
+use clap::{Parser, ValueEnum as _};
 use scene::{Scene, SceneOptions};
 use serde_json::json;
 use zynq_pgs::bench::CollisionPacker;
@@ -35,6 +36,9 @@ use zynq_pgs::{Accelerator, BoardChoice, OpenOptions, StepParameters};
 struct Options {
     #[command(flatten)]
     pile: Pile,
+    /// The order that is made
+    #[arg(long, value_enum, default_value_t = Sent::HazardFreeNearby)]
+    order: Sent,
     #[command(flatten)]
     common: Common,
 }
@@ -86,8 +90,9 @@ impl Row {
     }
 }
 
-/// What a step keeps for the next.
+/// What is made, and what a step keeps for the next.
 struct Kept {
+    order: Order,
     buffers: InputBuffers,
     orderer: Orderer,
     checker: Checker,
@@ -95,8 +100,9 @@ struct Kept {
 }
 
 impl Kept {
-    fn new() -> Self {
+    fn new(order: Order) -> Self {
         Self {
+            order,
             buffers: InputBuffers::new(),
             orderer: Orderer::new(),
             checker: Checker::new(),
@@ -125,9 +131,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
     accelerator.set_shapes(scene.shapes())?;
     let window = IssueWindow::of(accelerator.capabilities(), &StepParameters::default())?;
+    let order = options.order.to_possible_value().ok_or("an order has a name")?;
+    let order = order.get_name();
     if !json {
         println!(
-            "{} cubes dropped from {} m, depth {} issue slots, medians of {} runs in turn\n",
+            "{} cubes dropped from {} m, {order}, depth {} issue slots, medians of {} runs in turn\n",
             grid,
             drop,
             window.depth(),
@@ -136,7 +144,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         println!(" step collisions  empty     order    verify      pack      pack   order");
         println!("                               ms        ms  in order  as given by pack");
     }
-    let mut kept = Kept::new();
+    let mut kept = Kept::new(options.order.order());
     let mut rows = Vec::new();
     for step in 1..=steps {
         scene.detect();
@@ -151,10 +159,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if json {
         let rows: Vec<_> = rows.iter().map(Row::to_json).collect();
         let document = json!({
-            "schema": 1,
+            "schema": 2,
             "bench": "order",
             "grid": grid.to_string(),
             "drop_m": drop,
+            "order": order,
             "depth": window.depth(),
             "runs": runs,
             "steps": rows,
@@ -173,11 +182,12 @@ fn measure(
     window: IssueWindow,
 ) -> Result<Row, Box<dyn Error>> {
     let (bodies, collisions, shapes) = (scene.bodies(), scene.collisions(), scene.shapes());
-    let Kept { buffers, orderer, checker, packer } = kept;
+    let Kept { order: wanted, buffers, orderer, checker, packer } = kept;
+    let wanted = *wanted;
     let first = step == 1;
     let begin = Instant::now();
     buffers.gather(bodies, collisions, shapes);
-    let schedule = orderer.order(&buffers.input(), Order::HazardFree, window)?.clone();
+    let schedule = orderer.order(&buffers.input(), wanted, window)?.clone();
     let once = begin.elapsed();
     let input = buffers.input();
     checker.verify(&schedule, &input, window)?;
@@ -189,7 +199,7 @@ fn measure(
     let mut contestants: [Run<'_>; 4] = [
         Box::new(|| {
             let input = again.gather(bodies, collisions, shapes);
-            let _ = black_box(orderer.order(&input, Order::HazardFree, window));
+            let _ = black_box(orderer.order(&input, wanted, window));
         }),
         Box::new(|| {
             let _ = black_box(checker.verify(&schedule, &input, window));

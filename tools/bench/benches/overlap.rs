@@ -25,14 +25,13 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-use bench::options::{Common, Pile};
+use bench::options::{Common, Pile, Sent};
 use bench::step::Step;
 use bench::{median, milliseconds};
 use bitstream_model::{BoardConfig, CpuPort, EmulatedBoard};
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use scene::Grid;
 use serde_json::json;
-use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, HostTimes, InFlight,
     OpenOptions, Pose, StepParameters, StepReport, Velocity,
@@ -59,21 +58,6 @@ struct Options {
     unpack_ms: Option<Duration>,
     #[command(flatten)]
     common: Common,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Sent {
-    AsGiven,
-    HazardFree,
-}
-
-impl Sent {
-    fn order(self) -> Order {
-        match self {
-            Self::AsGiven => Order::AsGiven,
-            Self::HazardFree => Order::HazardFree,
-        }
-    }
 }
 
 fn time(text: &str) -> Result<Duration, String> {

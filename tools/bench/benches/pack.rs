@@ -17,7 +17,7 @@
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
 //! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the one that
-//!   is the default on a bitstream that does not wait, or `--order`
+//!   is the default on a bitstream that does not wait, or `--order`, in the window of `float`
 //! - `gathered`: the caller's collisions in that order, copied as they are: what the order itself costs,
 //!   whoever reads them
 //! - `step, ...`: bodies, then collisions
@@ -40,7 +40,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use bench::options::{Common, Pile};
+use bench::options::{Common, Pile, Sent};
 use bench::step::Step;
 use bench::{Clock, Run, milliseconds, ratio, warm_medians};
 use bitstream_model::BoardConfig;
@@ -50,7 +50,7 @@ use clap::{Parser, ValueEnum};
 use scene::Grid;
 use serde_json::{Map, Value, json};
 use zynq_pgs::bench::{StepPacker, Unpacker};
-use zynq_pgs::order::{Order, Ordered, Schedule};
+use zynq_pgs::order::{Ordered, Schedule};
 use zynq_pgs::{Collision, Collisions as _};
 
 /// Holds packing and unpacking against `memcpy` of the same bytes.
@@ -118,22 +118,6 @@ impl Options {
 
     fn clock(&self) -> Clock {
         if self.cpu_time { Clock::Thread } else { Clock::Wall }
-    }
-}
-
-/// An order without hazards.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Sent {
-    HazardFree,
-    HazardFreeNearby,
-}
-
-impl Sent {
-    const fn order(self) -> Order {
-        match self {
-            Self::HazardFree => Order::HazardFree,
-            Self::HazardFreeNearby => Order::HazardFreeNearby,
-        }
     }
 }
 
@@ -234,11 +218,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let chosen = options.profiles()?;
     let step = options.step()?;
     let schedule = step.schedule(BoardConfig::default(), options.order.order())?;
+    let order = options.order.to_possible_value().ok_or("an order has a name")?;
+    let order = order.get_name();
     let clock = if options.cpu_time { "the thread's time" } else { "time that passes" };
     if !options.common.json {
         println!(
-            "{}: {} bodies, {} collisions, {} empty entries in order; medians of {} stretches in \
-             turn, {clock}; {} packing\n",
+            "{}: {} bodies, {} collisions; in order is {order}, {} empty entries; medians of {} \
+             stretches in turn, {clock}; {} packing\n",
             step.name,
             step.bodies.len(),
             step.collisions.len(),
@@ -271,11 +257,12 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     if options.common.json {
         let document = json!({
-            "schema": 3,
+            "schema": 4,
             "bench": "pack",
             "step": step.name,
             "bodies": step.bodies.len(),
             "collisions": step.collisions.len(),
+            "order": order,
             "empty": schedule.empty(),
             "runs": options.common.runs(),
             "clock": clock,

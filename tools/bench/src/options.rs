@@ -1,7 +1,8 @@
 //! This file holds the options that the benchmarks share.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use scene::Grid;
+use zynq_pgs::order::Order;
 
 /// How it is measured and shown.
 #[derive(Debug, Clone, Copy, Args)]
@@ -44,5 +45,28 @@ impl Pile {
     #[must_use]
     pub fn standing(grid: Grid, steps: u32) -> Self {
         Self { grid, drop: 0.0, steps }
+    }
+}
+
+/// The order in which collisions are packed or sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Sent {
+    /// As the step has them
+    AsGiven,
+    /// Without hazards, swept through the scene
+    HazardFree,
+    /// Without hazards, about where the step has them
+    HazardFreeNearby,
+}
+
+impl Sent {
+    /// As the driver calls it.
+    #[must_use]
+    pub const fn order(self) -> Order {
+        match self {
+            Self::AsGiven => Order::AsGiven,
+            Self::HazardFree => Order::HazardFree,
+            Self::HazardFreeNearby => Order::HazardFreeNearby,
+        }
     }
 }

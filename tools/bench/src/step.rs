@@ -89,7 +89,7 @@ impl Step {
         Ok(Orderer::new().order(&input, order, window)?.clone())
     }
 
-    /// The collisions in the order without hazards, as a board of that build is sent them.
+    /// The collisions in the order `hazard-free`, as a board of that build is sent them.
     ///
     /// # Errors
     /// If there is no such order.
@@ -100,7 +100,7 @@ impl Step {
     }
 }
 
-/// An emulated board that takes the same step again and again, in the order without hazards.
+/// An emulated board that takes the same step again and again, in the order `hazard-free`.
 #[derive(Debug)]
 pub struct Emulated<'a> {
     step: &'a Step,

@@ -30,7 +30,7 @@ fn number(row: &Value, key: &str) -> f64 {
 }
 
 /// Those without hazards.
-const OURS: [&str; 2] = ["hazard-free", "hazard-free nearby"];
+const OURS: [&str; 2] = ["hazard-free", "hazard-free-nearby"];
 
 #[test]
 fn every_order_is_shown_at_every_depth_and_ours_has_no_hazard() {

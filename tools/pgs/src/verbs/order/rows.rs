@@ -100,7 +100,7 @@ fn kinds(source: &Source) -> Result<Vec<(String, Kind)>, OrderError> {
         ("thesis, newest".to_owned(), thesis(Ties::Newest)),
         (format!("{colours} colours"), Kind::Made(Order::Colours)),
         ("hazard-free".to_owned(), Kind::Made(Order::HazardFree)),
-        ("hazard-free nearby".to_owned(), Kind::Made(Order::HazardFreeNearby)),
+        ("hazard-free-nearby".to_owned(), Kind::Made(Order::HazardFreeNearby)),
     ]);
     Ok(kinds)
 }
