@@ -282,7 +282,7 @@ fn the_full_step_gives_the_same_bits_and_keeps_its_energy() {
             let differing = expected.iter().zip(&found).filter(|(one, other)| one != other).count();
             println!("{hazards:?}: {differing} of {} values differ from sequential", found.len());
             assert_eq!(differing, 0);
-            assert_eq!((report.hazards, report.cycles.stalls), (0, 0));
+            assert_eq!((report.hazards, report.cycles.stalls, report.order), (0, 0, order));
             // As reported for 158 slots: between the limits of 128 and 192.
             assert!(report.empty * 1000 <= report.collisions * 7, "{} empty", report.empty);
         }

@@ -73,7 +73,7 @@ impl End {
     }
 }
 
-/// Shapes whose tags are looked up. Few scenes have more.
+/// Shapes whose tags are looked up: all that a profile has room for. A bitstream may have more.
 const LOOKED_UP: usize = 64;
 
 /// What is said of bodies of each shape.
@@ -168,6 +168,36 @@ impl<'a> Ends<'a> {
                 // A jump that is foreseen costs less than to choose.
                 cold_path();
                 &End::MISSING
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bitstream may have more shapes than are looked up.
+    #[test]
+    fn every_body_has_the_tag_of_its_shape() {
+        for count in [0, 1, LOOKED_UP - 1, LOOKED_UP, LOOKED_UP + 1, 3 * LOOKED_UP] {
+            let shapes: Vec<Shape> = (0..count)
+                .map(|shape| match shape % 3 {
+                    0 => Shape::STATIC,
+                    _ => Shape::isotropic(1.0, shape as f32),
+                })
+                .collect();
+            let tags = Tags::new(&shapes);
+            for shape in (0..200).chain([STATIC, STATIC | 1, u32::MAX]) {
+                let body = Body { shape, ..Body::zeroed() };
+                let mut ends = [End::MISSING];
+                let any_still = tags.ends(&[body], &mut ends);
+                let end = ends[0];
+                let expected = shapes.get(shape as usize);
+                assert_eq!(end.has_shape(), expected.is_some(), "{shape} of {count}");
+                let still = expected.is_none_or(Shape::is_static);
+                assert_eq!((end.is_static(), any_still), (still, still), "{shape} of {count}");
+                assert_eq!(end.shape(&shapes), expected.unwrap_or(&Shape::STATIC));
             }
         }
     }
