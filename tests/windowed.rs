@@ -242,7 +242,7 @@ fn a_body_that_lives_too_long_is_refused_with_the_profiles_that_could() {
     assert_eq!(
         text,
         "in this order body 0 is used first in entry 0 and last in entry 3000, and the bitstream's \
-         delay lines take spans of less than 2816: ask for another order (the hazard-free one keeps \
+         delay lines take spans of less than 2816: ask for another order (hazard-free keeps \
          spans short unless a body has dozens of collisions), or load another bitstream (profiles that could: naive, float, half, mixed)"
     );
     // Exactly as long as they are, and one more.

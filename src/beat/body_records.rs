@@ -137,7 +137,7 @@ impl Records<{ pose::ROWS }> for OfPoses<'_> {
     }
 }
 
-/// The rows of the `nth` so many bodies, of each such a record with such last words.
+/// The rows of the `nth` so many bodies: of what `record` makes of each, whose last words are `words`.
 #[inline(always)]
 fn rows_of<F: Format, V: Vectors, const ROWS: usize, const N: usize>(
     vectors: V,

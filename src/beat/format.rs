@@ -14,7 +14,8 @@ pub(super) trait Records<const ROWS: usize> {
     /// How many there are.
     fn len(&self) -> usize;
 
-    /// The rows of the `nth` so many of them, if there are as many. Each is asked for once, in their order.
+    /// The rows of the `nth` so many of them, of which there are as many ([`Self::len`]). Each is asked for
+    /// once, in their order.
     ///
     /// One is done with before the next is begun: more than one in f32 are in want of registers.
     fn some<F: Format, V: Vectors, const N: usize>(

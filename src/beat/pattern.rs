@@ -79,7 +79,6 @@ macro_rules! units {
             }
             Pattern::Three => {
                 $each!(Three: 2 are 6: a 2, b 2, c 2);
-                $each!(Three: 1 are 3: a 1, b 1, c 1);
                 $each!(Three: 3 are 6: a 2, b 2, c 2);
                 $each!(Three: 3 are 12: a 4, b 4, c 4);
             }

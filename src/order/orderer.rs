@@ -21,9 +21,9 @@ pub enum Order {
     HazardFree,
     /// No hazards at all, and hardly a collision far from where it was given: what a step reads of the
     /// caller's memory is in the caches, so that it is packed sooner. About as many bodies are alive as in
-    /// the order given. Where that would leave more empty than one entry in 64 and four windows, because
-    /// too many of a body's collisions are given in a row, it is [`Order::HazardFree`] instead, and
-    /// [`Orderer::made`] says so.
+    /// the order given. Where it would be longer than the collisions and the body with the most of them
+    /// ask for, by more than one entry in 64 and four windows, or longer than the
+    /// [limit](Orderer::set_limit), it is [`Order::HazardFree`] instead, and [`Orderer::made`] says so.
     HazardFreeNearby,
 }
 
@@ -43,6 +43,8 @@ pub struct Orderer {
     tail: Tail,
     groups: Groups,
     schedule: Schedule,
+    /// Collisions of each body.
+    uses: Vec<u32>,
     limit: usize,
     made: Order,
 }
@@ -65,6 +67,7 @@ impl Orderer {
             tail: Tail::default(),
             groups: Groups::default(),
             schedule: Schedule::default(),
+            uses: Vec::new(),
             limit: Self::ENTRIES_MAX,
             made: Order::AsGiven,
         }
@@ -91,8 +94,8 @@ impl Orderer {
         window: IssueWindow,
     ) -> Result<&Schedule, OrderError> {
         input.check()?;
-        self.made = order;
         let schedule = &mut self.schedule;
+        let mut made = order;
         match order {
             Order::AsGiven => {
                 schedule.clear();
@@ -108,15 +111,27 @@ impl Orderer {
             }
             Order::HazardFreeNearby => {
                 self.sweep.as_given(input);
-                let short = self.limit.min(hardly_longer(input.pairs.len(), window));
-                if self.place(window, short).is_err() {
-                    self.made = Order::HazardFree;
+                let most = hardly_longer(input.pairs.len(), self.most_uses(input), window);
+                if self.place(window, self.limit.min(most)).is_err() {
+                    made = Order::HazardFree;
                     self.sweep.run(input);
                     self.place(window, self.limit)?;
                 }
             }
         }
+        self.made = made;
         Ok(&self.schedule)
+    }
+
+    /// Collisions of the moving body that has the most.
+    fn most_uses(&mut self, input: &OrderInput<'_>) -> usize {
+        self.uses.clear();
+        self.uses.resize(input.moving.len(), 0);
+        for body in input.pairs.as_flattened() {
+            self.uses[*body as usize] += 1;
+        }
+        let moving = self.uses.iter().zip(input.moving).filter(|(_, moving)| **moving);
+        moving.map(|(uses, _)| *uses as usize).max().unwrap_or(0)
     }
 
     /// Places what was swept so that there are no hazards, in at most so many entries.
@@ -127,7 +142,8 @@ impl Orderer {
         self.groups.place(sweep, moving, window, limit, &mut self.schedule)
     }
 
-    /// What the order made last is: what was asked for, or [`Order::HazardFree`] in its place.
+    /// What the order made last is: what was asked for, or [`Order::HazardFree`] in its place. After an error
+    /// it says nothing.
     #[must_use]
     pub fn made(&self) -> Order {
         self.made
@@ -140,13 +156,14 @@ impl Orderer {
     }
 }
 
-/// Entries of [`Order::HazardFreeNearby`] at most, of so many collisions.
+/// Entries of [`Order::HazardFreeNearby`] at most, of so many collisions, of which a moving body has so many.
 ///
-/// One entry in 64 may be empty, and four windows beside them: whatever the order, the last uses of a body
-/// lie a window apart. The thesis' piles leave two to four empty at their end, of whatever size they are.
-pub(super) fn hardly_longer(collisions: usize, window: IssueWindow) -> usize {
-    // One empty entry in 64 is one beside each 63 collisions.
-    collisions + collisions / 63 + 4 * window.entries()
+/// Whatever the order, the uses of a body lie a window apart, and one more entry in 64 and four windows may
+/// be empty: no more than the thesis' piles leave at their end.
+pub(super) fn hardly_longer(collisions: usize, uses: usize, window: IssueWindow) -> usize {
+    let entries = collisions.max(uses.saturating_sub(1) * window.entries());
+    // One empty entry in 64 is one beside each 63 others.
+    entries + entries / 63 + 4 * window.entries()
 }
 
 /// Number of colours of [`Order::Colours`].

@@ -90,7 +90,10 @@ proptest! {
         let mut orderer = Orderer::new();
         let nearby = orderer.order(&given.input(), Order::HazardFreeNearby, window).expect("an order");
         let (nearby, made) = (nearby.clone(), orderer.made());
-        let most = hardly_longer(given.pairs.len(), window);
+        let uses = |body: u32| given.pairs.iter().filter(|pair| pair.contains(&body)).count();
+        let moving = (0..).zip(&given.moving).filter(|(_, moving)| **moving);
+        let most_uses = moving.map(|(body, _)| uses(body)).max().unwrap_or(0);
+        let most = hardly_longer(given.pairs.len(), most_uses, window);
         if made == Order::HazardFreeNearby {
             prop_assert!(nearby.len() <= most, "{}", nearby.len());
         } else {
@@ -205,26 +208,40 @@ fn a_nearby_order_moves_hardly_a_collision_far() {
     }
 }
 
-/// A chain of which every collision meets the one before it: a nearby order is one collision a window,
-/// unless there are so few that this is no more than the end of any order.
 #[test]
-fn a_nearby_order_gives_way_where_it_would_be_longer() {
-    let window = IssueWindow::new(24, 1).expect("a window");
-    let made = |count: u32| {
-        let pairs: Vec<[u32; 2]> = (1..=count).map(|body| [0, body]).collect();
-        let bodies = pairs.len() + 1;
-        let given = Given { pairs, moving: vec![true; bodies], positions: vec![[0.0; 3]; bodies] };
-        let mut orderer = Orderer::new();
-        let schedule = orderer.order(&given.input(), Order::HazardFreeNearby, window);
-        let entries = schedule.expect("an order").len();
-        assert_eq!(orderer.schedule(), &ordered(&given, orderer.made(), window));
-        (orderer.made(), entries)
-    };
-    // A group is three slots, so that the nth use is n times 24 to 27 slots behind the first.
-    assert_eq!(made(4).0, Order::HazardFreeNearby);
-    assert!(made(4).1 <= 4 + 4 * 24, "{}", made(4).1);
-    assert_eq!(made(6).0, Order::HazardFree);
-    assert!(made(6).1 > 6 + 4 * 24, "{}", made(6).1);
+fn a_nearby_order_is_about_as_long_as_any_has_to_be() {
+    let window = IssueWindow::new(24, 2).expect("a window");
+    for (collisions, uses, most) in [
+        (0, 0, 192),
+        (62, 1, 62 + 192),
+        (63, 1, 64 + 192),
+        (127_746, 12, 127_746 + 2_027 + 192),
+        // Nine windows between ten uses.
+        (10, 10, 432 + 6 + 192),
+    ] {
+        assert_eq!(hardly_longer(collisions, uses, window), most, "{collisions}, {uses}");
+    }
+}
+
+/// Where the other one is shorter, and the nearby one too long for the board.
+#[test]
+fn a_nearby_order_gives_way_to_one_that_fits() {
+    let window = IssueWindow::new(64, 1).expect("a window");
+    let (given, swept) = (5..40)
+        .find_map(|side| {
+            let given = sheet(side);
+            let [nearby, swept] = [Order::HazardFreeNearby, Order::HazardFree]
+                .map(|order| ordered(&given, order, window));
+            (nearby.len() > swept.len()).then_some((given, swept))
+        })
+        .expect("one of them");
+    let mut orderer = Orderer::new();
+    orderer.set_limit(swept.len());
+    orderer.order(&given.input(), Order::HazardFreeNearby, window).expect("it fits");
+    assert_eq!((orderer.schedule(), orderer.made()), (&swept, Order::HazardFree));
+    orderer.set_limit(Orderer::ENTRIES_MAX);
+    orderer.order(&given.input(), Order::HazardFreeNearby, window).expect("it fits");
+    assert_eq!(orderer.made(), Order::HazardFreeNearby);
 }
 
 /// The limit is that of the order that was made, and the error says it.

@@ -2,7 +2,10 @@
 //!
 //! `half` knows them, too, but on aarch64 it wants more than every processor has: on a Cortex-A53, whose
 //! instructions these are, it would compute with integers. It does so where there are none.
-#![allow(unsafe_code, reason = "not every processor has the instructions, and vectors are cast")]
+#![allow(
+    unsafe_code,
+    reason = "not every processor has the instructions, vectors are cast, and one is made opaque"
+)]
 
 use bitstream_model::interface::record::{LANES, WORD_LANE};
 #[cfg(any(test, not(target_arch = "aarch64")))]
@@ -82,12 +85,12 @@ pub(super) mod x86 {
         })
     }
 
-    /// The same. Where a vector that is narrowed is also stored the compiler narrows it twice, on its
-    /// way to memory and for what else it is for.
+    /// This vector. Otherwise the compiler narrows what is stored and used, too, once for either, and to
+    /// memory it takes twice as long.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn computed_once(mut vector: __m128i) -> __m128i {
-        // SAFETY: nothing happens.
+        // SAFETY: the text is a comment, so that no instruction is run, and the register holds what it held.
         unsafe {
             asm!("/* {0} */", inout(xmm_reg) vector, options(pure, nomem, nostack, preserves_flags));
         }

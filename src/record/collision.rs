@@ -6,13 +6,11 @@ use crate::interface::record::{CONTACT_POINTS, collision};
 use crate::platform::Lanes;
 use crate::scene::Collision;
 
-/// Rows whose word is an unsigned integer: count and indices.
+/// The integers are count and indices.
 pub(crate) const WORDS: Words<{ collision::ROWS }> = {
     let mut integers = [false; collision::ROWS];
     integers[collision::NORMAL] = true;
-    integers[collision::BODY_A] = true;
-    integers[collision::BODY_B] = true;
-    Words { integers, bodies: Some(collision::BODY_A) }
+    Words::of_collision(integers, collision::BODY_A)
 };
 
 const _: () = assert!(collision::BODY_B == collision::BODY_A + 1);

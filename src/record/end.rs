@@ -40,7 +40,7 @@ impl End {
         bytemuck::cast(Beat::from(row_of::<POSITION, _>(body).beside(tag)))
     }
 
-    /// Its position beside a word that says nothing.
+    /// Its position beside its tag, which is no part of a record.
     #[inline(always)]
     pub(crate) fn with_tag(&self) -> Lanes {
         Lanes::from(bytemuck::cast::<_, Beat>(*self))

@@ -29,7 +29,7 @@ use crate::scene::{Body, Collision, Contact};
 /// A record on its way, in f32.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Record<const ROWS: usize> {
-    /// Where the index of a body belongs, the last word is any.
+    /// The last word of a row in which a body's index belongs means nothing.
     pub(crate) rows: [Lanes; ROWS],
     /// The indices of bodies A and B, and any two words behind them.
     pub(crate) bodies: Lanes,
@@ -40,8 +40,20 @@ pub(crate) struct Record<const ROWS: usize> {
 pub(crate) struct Words<const ROWS: usize> {
     /// Rows whose last word is an unsigned integer.
     pub(crate) integers: [bool; ROWS],
-    /// The row of which it is the index of body A, and in the next that of body B, if it is of any.
+    /// The row whose last word is the index of body A; in the next it is that of body B. `None` in a record
+    /// of no collision.
     pub(crate) bodies: Option<usize>,
+}
+
+impl<const ROWS: usize> Words<ROWS> {
+    /// Those of a collision, which ends in the indices of its bodies in row `at` and the next, and in the
+    /// rows `integers` in other integers.
+    pub(crate) const fn of_collision(mut integers: [bool; ROWS], at: usize) -> Self {
+        assert!(at + 1 < ROWS, "there is a row for each of them");
+        integers[at] = true;
+        integers[at + 1] = true;
+        Self { integers, bodies: Some(at) }
+    }
 }
 
 impl<const ROWS: usize> From<[Lanes; ROWS]> for Record<ROWS> {

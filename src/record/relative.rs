@@ -6,13 +6,9 @@ use crate::interface::record::{CONTACT_POINTS, LANES, relative};
 use crate::platform::Lanes;
 use crate::scene::Collision;
 
-/// Rows whose word is an unsigned integer: the indices.
-pub(crate) const WORDS: Words<{ relative::ROWS }> = {
-    let mut integers = [false; relative::ROWS];
-    integers[relative::NORMAL] = true;
-    integers[relative::OFFSET] = true;
-    Words { integers, bodies: Some(relative::NORMAL) }
-};
+/// The integers are the indices.
+pub(crate) const WORDS: Words<{ relative::ROWS }> =
+    Words::of_collision([false; relative::ROWS], relative::NORMAL);
 
 /// The row of a contact point which is not there.
 const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];

@@ -177,9 +177,7 @@ mod tests {
             #[inline(always)]
             fn run<V: Vectors>(self, vectors: V) -> [[Row; 5]; 2] {
                 let Self(format, record, at) = self;
-                let mut integers = [false; 5];
-                integers[at..at + 2].fill(true);
-                let words = Words { integers, bodies: Some(at) };
+                let words = Words::of_collision([false; 5], at);
                 let whole = record.whole(&words).into();
                 let in_it = Words { bodies: None, ..words };
                 [format.narrow(vectors, record, &words), format.narrow(vectors, whole, &in_it)]

@@ -60,7 +60,7 @@ pub struct StepReport {
     /// Number of collisions.
     pub collisions: u64,
     /// The order in which they were sent: [`Order::HazardFree`] where [`Order::HazardFreeNearby`] gave way
-    /// to it.
+    /// to it ([`Orderer::made`](crate::order::Orderer::made)).
     pub order: Order,
     /// Entries left empty between them, sent as collisions without contact points.
     pub empty: u64,

@@ -23,7 +23,7 @@ use bench::options::{Common, Pile, Sent};
 use bench::{Run, medians, milliseconds, ratio};
 use bitstream_model::interface::profile::FLOAT;
 use bitstream_model::{BoardConfig, EmulatedBoard};
-use clap::{Parser, ValueEnum as _};
+use clap::Parser;
 use scene::{Scene, SceneOptions};
 use serde_json::json;
 use zynq_pgs::bench::CollisionPacker;
@@ -36,7 +36,7 @@ use zynq_pgs::{Accelerator, BoardChoice, OpenOptions, StepParameters};
 struct Options {
     #[command(flatten)]
     pile: Pile,
-    /// The order that is made
+    /// The order that is made, one without hazards
     #[arg(long, value_enum, default_value_t = Sent::HazardFreeNearby)]
     order: Sent,
     #[command(flatten)]
@@ -131,8 +131,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
     accelerator.set_shapes(scene.shapes())?;
     let window = IssueWindow::of(accelerator.capabilities(), &StepParameters::default())?;
-    let order = options.order.to_possible_value().ok_or("an order has a name")?;
-    let order = order.get_name();
+    let order = options.order.name();
     if !json {
         println!(
             "{} cubes dropped from {} m, {order}, depth {} issue slots, medians of {} runs in turn\n",
@@ -144,7 +143,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         println!(" step collisions  empty     order    verify      pack      pack   order");
         println!("                               ms        ms  in order  as given by pack");
     }
-    let mut kept = Kept::new(options.order.order());
+    let mut kept = Kept::new(options.order.without_hazards()?);
     let mut rows = Vec::new();
     for step in 1..=steps {
         scene.detect();

@@ -261,7 +261,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             "schema": 1,
             "bench": "overlap",
             "scene": name,
-            "order": if options.order == Sent::AsGiven { "as-given" } else { "hazard-free" },
+            "order": options.order.name(),
             "bodies": job.bodies.len(),
             "collisions": job.collisions.len(),
             "steps": steps,

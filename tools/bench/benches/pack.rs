@@ -72,7 +72,7 @@ struct Options {
     /// Of this profile alone: float, half or mixed
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
-    /// The order of what is packed in order
+    /// The order of what is packed in order, one without hazards
     #[arg(long, value_enum, default_value_t = Sent::HazardFreeNearby)]
     order: Sent,
     /// This thing alone
@@ -217,9 +217,8 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let chosen = options.profiles()?;
     let step = options.step()?;
-    let schedule = step.schedule(BoardConfig::default(), options.order.order())?;
-    let order = options.order.to_possible_value().ok_or("an order has a name")?;
-    let order = order.get_name();
+    let schedule = step.schedule(BoardConfig::default(), options.order.without_hazards()?)?;
+    let order = options.order.name();
     let clock = if options.cpu_time { "the thread's time" } else { "time that passes" };
     if !options.common.json {
         println!(

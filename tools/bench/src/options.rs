@@ -60,6 +60,27 @@ pub enum Sent {
 }
 
 impl Sent {
+    /// As it is written on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::AsGiven => "as-given",
+            Self::HazardFree => "hazard-free",
+            Self::HazardFreeNearby => "hazard-free-nearby",
+        }
+    }
+
+    /// One without hazards, as the driver calls it.
+    ///
+    /// # Errors
+    /// If it is none, which to ask for.
+    pub fn without_hazards(self) -> Result<Order, String> {
+        match self {
+            Self::AsGiven => Err("--order is hazard-free or hazard-free-nearby here".to_owned()),
+            Self::HazardFree | Self::HazardFreeNearby => Ok(self.order()),
+        }
+    }
+
     /// As the driver calls it.
     #[must_use]
     pub const fn order(self) -> Order {
