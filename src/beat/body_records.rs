@@ -86,12 +86,8 @@ impl Records<{ velocity::ROWS }> for Isotropic<'_> {
         vectors: V,
         nth: usize,
     ) -> Option<[[F::Row; velocity::ROWS]; N]> {
-        rows_of::<F, V, _, N>(
-            vectors,
-            self.0,
-            nth,
-            (&record::velocity::WORDS, record::velocity::encode),
-        )
+        let (words, record) = (&record::velocity::WORDS, record::velocity::encode);
+        rows_of::<F, V, _, N>(vectors, self.0, nth, words, record)
     }
 }
 
@@ -114,7 +110,7 @@ impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
         nth: usize,
     ) -> Option<[[F::Row; velocity::WORLD_ROWS]; N]> {
         let record = |body: &Body| world_velocity(body, self.shapes);
-        rows_of::<F, V, _, N>(vectors, self.bodies, nth, (&record::velocity::WORLD_WORDS, record))
+        rows_of::<F, V, _, N>(vectors, self.bodies, nth, &record::velocity::WORLD_WORDS, record)
     }
 }
 
@@ -133,7 +129,7 @@ impl Records<{ pose::ROWS }> for OfPoses<'_> {
         vectors: V,
         nth: usize,
     ) -> Option<[[F::Row; pose::ROWS]; N]> {
-        rows_of::<F, V, _, N>(vectors, self.0, nth, (&record::pose::WORDS, record::pose::encode))
+        rows_of::<F, V, _, N>(vectors, self.0, nth, &record::pose::WORDS, record::pose::encode)
     }
 }
 
@@ -143,7 +139,8 @@ fn rows_of<F: Format, V: Vectors, const ROWS: usize, const N: usize>(
     vectors: V,
     bodies: &[Body],
     nth: usize,
-    (words, record): (&Words<ROWS>, impl Fn(&Body) -> [Lanes; ROWS]),
+    words: &Words<ROWS>,
+    record: impl Fn(&Body) -> [Lanes; ROWS],
 ) -> Option<[[F::Row; ROWS]; N]> {
     let bodies = bodies.as_chunks::<N>().0.get(nth)?;
     let mut rows = [[F::Row::zeroed(); ROWS]; N];

@@ -12,6 +12,7 @@ use crate::scene::{Collision, Lying, Next};
 
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
+    /// What the last words of its rows are.
     const WORDS: Words<ROWS>;
 
     /// The record of collision `index`.

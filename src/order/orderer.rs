@@ -21,9 +21,9 @@ pub enum Order {
     HazardFree,
     /// No hazards at all, and hardly a collision far from where it was given: what a step reads of the
     /// caller's memory is in the caches, so that it is packed sooner. About as many bodies are alive as in
-    /// the order given. Where it would be longer than the collisions and the body with the most of them
-    /// ask for, by more than one entry in 64 and four windows, or longer than the
-    /// [limit](Orderer::set_limit), it is [`Order::HazardFree`] instead, and [`Orderer::made`] says so.
+    /// the order given. Any order has an entry for each collision, and a window between two uses of a body:
+    /// where this one would be longer than that by more than one entry in 64 and four windows, or longer
+    /// than the [limit](Orderer::set_limit), it is [`Order::HazardFree`] instead, and [`Orderer::made`] says so.
     HazardFreeNearby,
 }
 
@@ -158,8 +158,9 @@ impl Orderer {
 
 /// Entries of [`Order::HazardFreeNearby`] at most, of so many collisions, of which a moving body has so many.
 ///
-/// Whatever the order, the uses of a body lie a window apart, and one more entry in 64 and four windows may
-/// be empty: no more than the thesis' piles leave at their end.
+/// Whatever the order, the uses of a body lie a window apart. Beside that one entry in 64 and four windows
+/// may be empty: a choice, by which most piles of the thesis' cubes are left where they are (`pgs order
+/// --grid` shows the empty entries of either order).
 pub(super) fn hardly_longer(collisions: usize, uses: usize, window: IssueWindow) -> usize {
     let entries = collisions.max(uses.saturating_sub(1) * window.entries());
     // One empty entry in 64 is one beside each 63 others.

@@ -90,7 +90,8 @@ pub(super) mod x86 {
     #[target_feature(enable = "avx2")]
     #[inline]
     fn computed_once(mut vector: __m128i) -> __m128i {
-        // SAFETY: the text is a comment, so that no instruction is run, and the register holds what it held.
+        // SAFETY: the template is a comment: no instruction is run. So the register holds what it held,
+        // and there is no memory, stack or flag that the options could be wrong about.
         unsafe {
             asm!("/* {0} */", inout(xmm_reg) vector, options(pure, nomem, nostack, preserves_flags));
         }

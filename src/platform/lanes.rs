@@ -115,10 +115,11 @@ impl Lanes {
     #[inline(always)]
     pub(crate) fn without(self, other: Self) -> Self {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: every x86-64 has the instruction.
+        // SAFETY: SSE2, whose instruction it is, belongs to every x86-64; it works on registers alone.
         return Self(unsafe { arch::_mm_andnot_si128(other.0, self.0) });
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: every aarch64 that Linux runs on has the instruction.
+        // SAFETY: NEON, whose instruction it is, belongs to every aarch64 that Linux runs on; it works on
+        // registers alone.
         return Self(unsafe { arch::vbicq_u32(self.0, other.0) });
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return Self::new(std::array::from_fn(|k| self.0[k] & !other.0[k]));

@@ -72,8 +72,8 @@ mod x86 {
             words: Lanes,
             integers: [bool; 2],
         ) -> [[u16; LANES]; 2] {
-            // SAFETY: there is one of these only where the processor has the instructions that the
-            // function is compiled for.
+            // SAFETY: the function wants AVX2 and F16C. A `Wide` is made in `run` alone, which is called
+            // only where both were found.
             unsafe { convert::x86::to_binary16(rows, words, integers) }
         }
 

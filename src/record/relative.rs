@@ -18,7 +18,8 @@ const _: () = assert!(relative::OFFSET == relative::NORMAL + 1);
 /// The collision record: normal, offset from body A to body B, contact points from body A.
 ///
 /// Differences are rounded to f32 before anything else happens to them. Contact points from `count`
-/// on are zeros at infinite distance, whatever the caller left there.
+/// on are zeros at infinite distance, whatever the caller left there. The indices of the bodies are the
+/// first two words of `bodies`: where only live bodies are kept, others than the caller's.
 ///
 /// Shape: 6 rows. Units: metres, world axes; distance negative = penetrating.
 ///

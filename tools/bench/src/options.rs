@@ -62,12 +62,8 @@ pub enum Sent {
 impl Sent {
     /// As it is written on the command line.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::AsGiven => "as-given",
-            Self::HazardFree => "hazard-free",
-            Self::HazardFreeNearby => "hazard-free-nearby",
-        }
+    pub fn name(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 
     /// One without hazards, as the driver calls it.
