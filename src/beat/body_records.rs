@@ -2,14 +2,13 @@
 
 use bitstream_model::interface::profile::Inertia;
 use bitstream_model::interface::record::{Beat, pose, velocity};
-use bytemuck::Zeroable as _;
 
 use super::deal::Dealer;
-use super::format::{Format, Records};
+use super::format::Records;
 use super::stripe::Segment;
 use super::target::Target;
-use crate::platform::{Lanes, Vectors};
-use crate::record::{self, Words};
+use crate::platform::Vectors;
+use crate::record::{self, Record, Rows};
 use crate::scene::{Body, Shape};
 
 /// Writes velocity records.
@@ -81,13 +80,8 @@ impl Records<{ velocity::ROWS }> for Isotropic<'_> {
     }
 
     #[inline(always)]
-    fn some<F: Format, V: Vectors, const N: usize>(
-        &mut self,
-        vectors: V,
-        nth: usize,
-    ) -> Option<[[F::Row; velocity::ROWS]; N]> {
-        let (words, record) = (&record::velocity::WORDS, record::velocity::encode);
-        rows_of::<F, V, _, N>(vectors, self.0, nth, words, record)
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+        give::<_, N>(self.0, nth, record::velocity::encode, to)
     }
 }
 
@@ -104,13 +98,9 @@ impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
     }
 
     #[inline(always)]
-    fn some<F: Format, V: Vectors, const N: usize>(
-        &mut self,
-        vectors: V,
-        nth: usize,
-    ) -> Option<[[F::Row; velocity::WORLD_ROWS]; N]> {
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
         let record = |body: &Body| world_velocity(body, self.shapes);
-        rows_of::<F, V, _, N>(vectors, self.bodies, nth, &record::velocity::WORLD_WORDS, record)
+        give::<_, N>(self.bodies, nth, record, to)
     }
 }
 
@@ -124,35 +114,28 @@ impl Records<{ pose::ROWS }> for OfPoses<'_> {
     }
 
     #[inline(always)]
-    fn some<F: Format, V: Vectors, const N: usize>(
-        &mut self,
-        vectors: V,
-        nth: usize,
-    ) -> Option<[[F::Row; pose::ROWS]; N]> {
-        rows_of::<F, V, _, N>(vectors, self.0, nth, &record::pose::WORDS, record::pose::encode)
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+        give::<_, N>(self.0, nth, |body| record::pose::encode(body).into(), to)
     }
 }
 
-/// The rows of the `nth` so many bodies: of what `record` makes of each, whose last words are `words`.
+/// Gives the rows of the `nth` so many bodies to `to`: of what `record` makes of each.
 #[inline(always)]
-fn rows_of<F: Format, V: Vectors, const ROWS: usize, const N: usize>(
-    vectors: V,
+fn give<const ROWS: usize, const N: usize>(
     bodies: &[Body],
     nth: usize,
-    words: &Words<ROWS>,
-    record: impl Fn(&Body) -> [Lanes; ROWS],
-) -> Option<[[F::Row; ROWS]; N]> {
-    let bodies = bodies.as_chunks::<N>().0.get(nth)?;
-    let mut rows = [[F::Row::zeroed(); ROWS]; N];
-    for (to, body) in rows.iter_mut().zip(bodies) {
-        *to = F::rows(vectors, record(body).into(), words);
+    record: impl Fn(&Body) -> Record<ROWS>,
+    to: &mut impl Rows,
+) -> Option<()> {
+    for body in bodies.as_chunks::<N>().0.get(nth)? {
+        record(body).give(to);
     }
-    Some(rows)
+    Some(())
 }
 
 /// The velocity record of a body with its inertia.
 #[inline(always)]
-fn world_velocity(body: &Body, shapes: &[Shape]) -> [Lanes; velocity::WORLD_ROWS] {
+fn world_velocity(body: &Body, shapes: &[Shape]) -> Record<{ velocity::WORLD_ROWS }> {
     let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
     let shape = shape.unwrap_or(&Shape::STATIC);
     let inertia = record::inertia::about_world_axes(shape, body.pose.orientation);

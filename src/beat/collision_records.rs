@@ -1,20 +1,16 @@
 //! This file makes the records of a block of collisions, and has them looked at on their way.
 
 use bitstream_model::interface::record::{collision, relative};
-use bytemuck::Zeroable as _;
 
-use super::format::{Format, Records};
-use crate::platform::{Lanes, Vectors};
+use super::format::Records;
+use crate::platform::Lanes;
 use crate::record::end::{End, Ends};
-use crate::record::{self, Record, Words};
+use crate::record::{self, Integer, Record, Rows};
 use crate::scene::validate::{Block, Look, Quick, Reach};
 use crate::scene::{Collision, Lying, Next};
 
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
-    /// What the last words of its rows are.
-    const WORDS: Words<ROWS>;
-
     /// The record of collision `index`.
     fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<ROWS>;
 
@@ -30,8 +26,6 @@ pub(super) trait Kind<const ROWS: usize>: Copy {
 pub(super) struct Absolute;
 
 impl Kind<{ collision::ROWS }> for Absolute {
-    const WORDS: Words<{ collision::ROWS }> = record::collision::WORDS;
-
     #[inline(always)]
     fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ collision::ROWS }> {
         record::collision::encode(from, ends)
@@ -53,11 +47,9 @@ impl Kind<{ collision::ROWS }> for Absolute {
 pub(super) struct Relative;
 
 impl Kind<{ relative::ROWS }> for Relative {
-    const WORDS: Words<{ relative::ROWS }> = record::relative::WORDS;
-
     #[inline(always)]
     fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
-        of_words(from, ends, record::bodies(from))
+        of_bodies(from, ends, record::bodies(from))
     }
 
     #[inline(always)]
@@ -71,11 +63,24 @@ impl Kind<{ relative::ROWS }> for Relative {
     }
 }
 
-/// The relative record whose indices are the first two of these words.
+/// The relative record whose indices are these.
 #[inline(always)]
-fn of_words(from: &Collision, [a, b]: [&End; 2], words: Lanes) -> Record<{ relative::ROWS }> {
-    let ends = record::relative::anchors([a, b], [!a.is_static(), !b.is_static()]);
-    record::relative::encode(from, ends, words)
+fn of_bodies(
+    from: &Collision,
+    [a, b]: [&End; 2],
+    bodies: [Integer; 2],
+) -> Record<{ relative::ROWS }> {
+    // Whether it does is mostly foreseen, as few collisions are with what never moves or nearly all are: a
+    // jump costs less then than to choose.
+    let ends = if a.is_static() | b.is_static() { anchors(a, b) } else { [a, b] };
+    record::relative::encode(from, ends, bodies)
+}
+
+/// The ends that a record is made from where one never moves.
+#[cold]
+#[inline(never)]
+fn anchors<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
+    record::relative::anchors([a, b], [!a.is_static(), !b.is_static()])
 }
 
 /// The same, with these words in place of the indices of each one's bodies.
@@ -83,12 +88,11 @@ fn of_words(from: &Collision, [a, b]: [&End; 2], words: Lanes) -> Record<{ relat
 pub(super) struct Worded<'a>(pub(super) &'a [[u32; 2]]);
 
 impl Kind<{ relative::ROWS }> for Worded<'_> {
-    const WORDS: Words<{ relative::ROWS }> = Relative::WORDS;
-
     #[inline(always)]
     fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
         let [word_a, word_b] = self.0[index];
-        of_words(from, ends, Lanes::new([word_a, word_b, 0, 0]))
+        let words = Lanes::new([word_a, word_b, 0, 0]);
+        of_bodies(from, ends, [Integer::new::<0>(words), Integer::new::<1>(words)])
     }
 
     #[inline(always)]
@@ -105,7 +109,7 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
 /// The ends of a collision's bodies.
 #[inline(always)]
 fn both<'a>(ends: Ends<'a>, collision: &Collision) -> [&'a End; 2] {
-    [collision.body_a, collision.body_b].map(|body| ends.get(body))
+    [ends.get(collision.body_a), ends.get(collision.body_b)]
 }
 
 /// The records of a block of collisions. What is behind it is fetched meanwhile.
@@ -114,71 +118,66 @@ pub(super) struct Encoding<'p, K, L> {
     first: usize,
     collisions: L,
     ends: Ends<'p>,
-    /// Whether they lie about where they would in an array.
-    nearby: bool,
 }
-
-/// How far behind what lies about there is fetched, where the order is near to that in memory: from
-/// there it comes line by line, which takes longer if it is not in a cache.
-const NEARBY_SOON: usize = 768;
 
 impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
     /// Those of a block.
     #[inline(always)]
     pub(super) fn new(kind: K, block: &Block<'p, L>) -> Self {
         let Block { first, collisions, ends, .. } = *block;
-        Self { kind, first, collisions, ends, nearby: collisions.is_nearby(first) }
+        Self { kind, first, collisions, ends }
     }
 
-    /// The rows of the `nth` so many records, if there are as many, each of which `witness` sees.
+    /// Gives the rows of the `nth` so many records to `to`; `witness` sees each.
     #[inline(always)]
-    fn rows<F: Format, V: Vectors, W: Witness<K, ROWS>, const ROWS: usize, const N: usize>(
+    fn give<W: Witness<K, ROWS>, const ROWS: usize, const N: usize>(
         &self,
-        vectors: V,
         nth: usize,
+        to: &mut impl Rows,
         witness: &mut W,
-    ) -> Option<[[F::Row; ROWS]; N]>
+    ) -> Option<()>
     where
         K: Kind<ROWS>,
     {
-        let Next { these, soon } = self.collisions.next::<N>(nth)?;
+        let Next { these, soon } = self.collisions.next::<N>(nth, W::SLOW)?;
         if let Some(soon) = soon {
             for collision in soon {
                 self.ends.soon([collision.body_a, collision.body_b]);
             }
         }
         let first = self.first + nth * N;
-        if self.nearby {
-            for at in 0..N {
-                self.collisions.soon_at(first + NEARBY_SOON + at);
-            }
-        }
-        let mut rows = [[F::Row::zeroed(); ROWS]; N];
         // A loop of so much is not unrolled, and its rows would go through memory.
         macro_rules! each {
             ($($at:literal)*) => {
                 const { assert!(N <= [$($at),*].len(), "all of them are written out") };
-                $(if let (Some(to), Some(collision)) = (rows.get_mut($at), these.get($at)) {
+                // What there is not is not compiled.
+                $(if const { $at < N } {
+                    let collision = these[$at];
                     let ends = both(self.ends, collision);
                     let record = self.kind.encode(first + $at, collision, ends);
                     witness.see(&record, collision, ends);
-                    *to = F::rows(vectors, record, &K::WORDS);
+                    record.give(to);
                 })*
             };
         }
         each!(0 1 2 3 4);
-        Some(rows)
+        Some(())
     }
 }
 
 /// Who sees the records on their way. An `#[inline(always)]` belongs to every implementation.
 trait Witness<K: Kind<ROWS>, const ROWS: usize> {
+    /// Whether that takes longer than to make the record.
+    const SLOW: bool;
+
     /// Sees the record of a collision, whose ends these are.
     fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2]);
 }
 
 /// Nobody.
 impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for () {
+    const SLOW: bool = false;
+
     #[inline(always)]
     fn see(&mut self, _: &Record<ROWS>, _: &Collision, _: [&End; 2]) {}
 }
@@ -190,12 +189,8 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Encod
     }
 
     #[inline(always)]
-    fn some<F: Format, V: Vectors, const N: usize>(
-        &mut self,
-        vectors: V,
-        nth: usize,
-    ) -> Option<[[F::Row; ROWS]; N]> {
-        self.rows::<F, V, (), ROWS, N>(vectors, nth, &mut ())
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+        self.give::<(), ROWS, N>(nth, to, &mut ())
     }
 }
 
@@ -207,6 +202,8 @@ struct Looking<'p> {
 }
 
 impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for Looking<'_> {
+    const SLOW: bool = true;
+
     #[inline(always)]
     fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2]) {
         self.look.head(collision, ends, self.scheduled);
@@ -257,11 +254,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Looke
     }
 
     #[inline(always)]
-    fn some<F: Format, V: Vectors, const N: usize>(
-        &mut self,
-        vectors: V,
-        nth: usize,
-    ) -> Option<[[F::Row; ROWS]; N]> {
-        self.records.rows::<F, V, _, ROWS, N>(vectors, nth, &mut self.looking)
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+        self.records.give::<_, ROWS, N>(nth, to, &mut self.looking)
     }
 }

@@ -10,14 +10,14 @@ use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::Beat;
 
 use super::collision_records::{Absolute, Encoding, Kind, LookedAt, Relative, Worded};
-use super::deal::{BLOCK, Dealer};
+use super::deal::{BLOCK, Dealer, MANY};
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stripe::Segment;
 use super::target::Target;
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::end::Ends;
 use crate::scene::validate::{Block, Quick};
-use crate::scene::{Collision, Collisions, InArray, InOrder, Lying, Structures};
+use crate::scene::{Collision, Collisions, InArray, InNearbyOrder, InOrder, Lying, Structures};
 
 /// The collisions of a step, as they are sent.
 #[derive(Debug)]
@@ -96,7 +96,11 @@ fn pack_range<C: Collisions + ?Sized>(
     let seen = match collisions.structures().filter(|all| all.len() == count) {
         Some(Structures::Array(all)) => packer.write(InArray(all).part(range)),
         Some(Structures::Ordered { all, order }) => {
-            packer.write_ordered(InOrder::new(all, order).part(range))
+            let order = InOrder::new(all, order).part(range.clone());
+            match order.nearby(range.start) {
+                Some(order) => packer.write_nearby(order),
+                None => packer.write_ordered(order),
+            }
         }
         None => {
             let mut copies = [Collision::NOTHING; BLOCK];
@@ -167,6 +171,11 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         self.write_lying(collisions)
     }
 
+    /// The same.
+    fn write_nearby(&mut self, collisions: InNearbyOrder<'_>) -> Seen {
+        self.write_lying(collisions)
+    }
+
     #[inline(always)]
     fn write_lying<'p, L: Lying<'p>>(&'p mut self, collisions: L) -> Seen {
         let Self { quick, ends, marks: Marks { scheduled, words }, dealer, geometry, next } = self;
@@ -215,8 +224,11 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_
     fn run<V: Vectors>(self, vectors: V) -> Seen {
         let Self { kind, quick, all, dealer, .. } = self;
         let mut seen = Seen::NOTHING;
-        for at in (0..all.collisions.len()).step_by(BLOCK) {
-            let collisions = all.collisions.part(at..at + BLOCK);
+        // Validation goes by blocks. Without it, as packing alone is measured, there is nothing to be done
+        // for each that is worth it.
+        let size = if quick.is_some() { BLOCK } else { MANY };
+        for at in (0..all.collisions.len()).step_by(size) {
+            let collisions = all.collisions.part(at..at + size);
             let block = Block { first: all.first + at, collisions, ..all };
             let mut records = Encoding::new(kind, &block);
             let Some(quick) = quick else {

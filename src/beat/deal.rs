@@ -8,20 +8,23 @@
 use std::mem;
 
 use bitstream_model::interface::record::Beat;
-use bytemuck::Zeroable as _;
 
-use super::format::{Binary16, Format, Records, Thesis16, Whole};
+use super::format::{Beats, Binary16, Format, Records, Thesis16, Whole};
 use super::pattern::Pattern;
 use super::stripe::{Deal, Layout};
 use super::unit;
 use super::unpack::total;
 use crate::platform::{Lanes, Vectors};
 use crate::record::sixteen::Sixteen;
+use crate::record::{Row, Rows};
 
 /// Records of a block. Divisible by the records of a group of every stripe, so that each block
-/// begins with a group; and so few that a block and the next, which is fetched meanwhile, lie in the
-/// innermost cache.
+/// begins with a group; and so few that those of a block and those fetched meanwhile lie in the innermost
+/// cache.
 pub(crate) const BLOCK: usize = 30;
+
+/// Records of many blocks: so many that beginning one costs next to nothing a record.
+pub(super) const MANY: usize = 32 * BLOCK;
 
 /// Bodies of a block, as [`BLOCK`]: more, as they are small and lie one behind the other.
 pub(super) const BODIES: usize = 120;
@@ -84,22 +87,16 @@ impl<'a, 'b> Dealer<'a, 'b> {
             _ => 0,
         };
         self.sum = sum;
-        // What is left of them fills no unit. Rows that fill no beat yet wait for the next record's.
-        let mut waiting = [F::Row::zeroed(); 2];
-        let mut count = 0;
+        // What is left of them fills no unit.
+        let mut rest = Rest { dealer: self, beats: Beats::<V, F>::new(vectors) };
         for at in done..records.len() {
-            let Some([rows]) = records.some::<F, V, 1>(vectors, at) else { break };
-            for row in rows {
-                waiting[count] = row;
-                count += 1;
-                if count == F::PER_BEAT {
-                    self.put(F::beat(&mem::replace(&mut waiting, [F::Row::zeroed(); 2])));
-                    count = 0;
-                }
+            if records.some::<1>(at, &mut rest).is_none() {
+                break;
             }
         }
-        if count > 0 {
-            self.put(F::beat(&waiting));
+        let Rest { dealer, beats } = rest;
+        if let Some(beat) = beats.last() {
+            dealer.put(beat);
         }
     }
 
@@ -123,6 +120,21 @@ impl<'a, 'b> Dealer<'a, 'b> {
     }
 }
 
+/// Where rows go whose beats are written one by one.
+struct Rest<'d, 'a, 'b, V, F> {
+    dealer: &'d mut Dealer<'a, 'b>,
+    beats: Beats<V, F>,
+}
+
+impl<V: Vectors, F: Format> Rows for Rest<'_, '_, '_, V, F> {
+    #[inline(always)]
+    fn row(&mut self, row: Row) {
+        if let Some(beat) = self.beats.with(row) {
+            self.dealer.put(beat);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use bitstream_model::interface::number::StreamFormat;
@@ -133,7 +145,7 @@ mod tests {
     use super::super::stripe::Place;
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
-    use crate::record::Words;
+    use crate::record::{Integer, Record};
 
     const ROWS: usize = 3;
 
@@ -147,14 +159,13 @@ mod tests {
         }
 
         #[inline(always)]
-        fn some<F: Format, V: Vectors, const N: usize>(
-            &mut self,
-            vectors: V,
-            nth: usize,
-        ) -> Option<[[F::Row; ROWS]; N]> {
-            let records = self.0.as_chunks::<N>().0.get(nth)?;
-            let words = Words { integers: [true, false, false], bodies: None };
-            Some(records.map(|record| F::rows(vectors, record.map(Lanes::new).into(), &words)))
+        fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+            for record in self.0.as_chunks::<N>().0.get(nth)? {
+                let mut record = Record::from(record.map(Lanes::new));
+                record.integers[0] = Some(Integer::new::<{ LANES - 1 }>(record.rows[0]));
+                record.give(to);
+            }
+            Some(())
         }
     }
 
@@ -228,11 +239,9 @@ mod tests {
             #[inline(always)]
             fn run<V: Vectors>(self, vectors: V) -> [u16; LANES] {
                 let Self(format, row, integer) = self;
-                let [narrow] = format.narrow(
-                    vectors,
-                    [Lanes::new(row)].into(),
-                    &Words { integers: [integer], bodies: None },
-                );
+                let numbers = Lanes::new(row);
+                let integer = integer.then(|| Integer::new::<{ LANES - 1 }>(numbers));
+                let [narrow, _] = format.narrow(vectors, [Row { numbers, integer }, Row::zero()]);
                 narrow
             }
         }

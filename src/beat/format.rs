@@ -1,11 +1,12 @@
 //! This file makes beats of records and records of beats, in each format that a stream may have.
 
+use std::marker::PhantomData;
+
 use bitstream_model::interface::record::Beat;
-use bytemuck::Pod;
 
 use crate::platform::{Lanes, Vectors};
-use crate::record::sixteen::{Row, Sixteen};
-use crate::record::{Record, Words};
+use crate::record::sixteen::Sixteen;
+use crate::record::{Row, Rows};
 
 /// Records on their way.
 ///
@@ -14,15 +15,12 @@ pub(super) trait Records<const ROWS: usize> {
     /// How many there are.
     fn len(&self) -> usize;
 
-    /// The rows of the `nth` so many of them, of which there are as many ([`Self::len`]). Each is asked for
-    /// once, in their order.
+    /// Gives the rows of the `nth` so many of them, `ROWS` each, to `to`, one after the other; none if there
+    /// are fewer. Each is asked for once, in their order.
     ///
-    /// One is done with before the next is begun: more than one in f32 are in want of registers.
-    fn some<F: Format, V: Vectors, const N: usize>(
-        &mut self,
-        vectors: V,
-        nth: usize,
-    ) -> Option<[[F::Row; ROWS]; N]>;
+    /// What a row becomes is made before the next record is begun: more than one in f32 are in want of
+    /// registers.
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()>;
 }
 
 /// What rows become in a stream.
@@ -30,21 +28,50 @@ pub(super) trait Format {
     /// Rows of a beat.
     const PER_BEAT: usize;
 
-    type Row: Pod;
-
-    /// The beat of the first of these rows, of which there are as many as it takes. An
-    /// `#[inline(always)]` belongs to every implementation.
-    fn beat(rows: &[Self::Row]) -> Beat;
-
-    /// The rows of a record. Likewise.
-    fn rows<V: Vectors, const ROWS: usize>(
-        vectors: V,
-        record: Record<ROWS>,
-        words: &Words<ROWS>,
-    ) -> [Self::Row; ROWS];
+    /// The beat of so many rows, the first of these. An `#[inline(always)]` belongs to every implementation.
+    fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat;
 
     /// The rows that these beats hold, in f32. Likewise.
     fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS];
+}
+
+/// Rows of which beats are made.
+///
+/// All of it is a part of the loop that gives them: no row goes through memory.
+pub(super) struct Beats<V, F> {
+    vectors: V,
+    format: PhantomData<F>,
+    /// That which fills no beat alone.
+    waiting: Row,
+    half: bool,
+}
+
+impl<V: Vectors, F: Format> Beats<V, F> {
+    #[inline(always)]
+    pub(super) fn new(vectors: V) -> Self {
+        Self { vectors, format: PhantomData, waiting: Row::zero(), half: false }
+    }
+
+    /// The beat that is full with one more.
+    #[inline(always)]
+    pub(super) fn with(&mut self, row: Row) -> Option<Beat> {
+        const { assert!(F::PER_BEAT <= 2, "one waits at most") };
+        if const { F::PER_BEAT == 1 } {
+            return Some(F::beat(self.vectors, [row, Row::zero()]));
+        }
+        self.half = !self.half;
+        if self.half {
+            self.waiting = row;
+            return None;
+        }
+        Some(F::beat(self.vectors, [self.waiting, row]))
+    }
+
+    /// The last one, if it is not full; zeros are beside its row.
+    #[inline(always)]
+    pub(super) fn last(self) -> Option<Beat> {
+        self.half.then(|| F::beat(self.vectors, [self.waiting, Row::zero()]))
+    }
 }
 
 /// Words of f32.
@@ -53,24 +80,9 @@ pub(super) struct Whole;
 impl Format for Whole {
     const PER_BEAT: usize = 1;
 
-    type Row = Beat;
-
     #[inline(always)]
-    fn beat(rows: &[Beat]) -> Beat {
-        rows[0]
-    }
-
-    #[inline(always)]
-    fn rows<V: Vectors, const ROWS: usize>(
-        _: V,
-        record: Record<ROWS>,
-        words: &Words<ROWS>,
-    ) -> [Beat; ROWS] {
-        let mut rows = [Beat::default(); ROWS];
-        for (to, row) in rows.iter_mut().zip(record.whole(words)) {
-            *to = row.into();
-        }
-        rows
+    fn beat<V: Vectors>(_: V, [row, _]: [Row; 2]) -> Beat {
+        row.whole().into()
     }
 
     #[inline(always)]
@@ -95,20 +107,9 @@ macro_rules! sixteen {
         impl Format for $format {
             const PER_BEAT: usize = 2;
 
-            type Row = Row;
-
             #[inline(always)]
-            fn beat(rows: &[Row]) -> Beat {
-                bytemuck::cast([rows[0], rows[1]])
-            }
-
-            #[inline(always)]
-            fn rows<V: Vectors, const ROWS: usize>(
-                vectors: V,
-                record: Record<ROWS>,
-                words: &Words<ROWS>,
-            ) -> [Row; ROWS] {
-                Sixteen::$format.narrow(vectors, record, words)
+            fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat {
+                bytemuck::cast(Sixteen::$format.narrow(vectors, rows))
             }
 
             #[inline(always)]

@@ -16,7 +16,9 @@ use crate::interface::profile::{Geometry, Inertia, PROFILES, Variant};
 use crate::interface::record::Beat;
 use crate::record::end::{End, Ends, Survey};
 use crate::scene::validate::{Limits, Quick, preflight};
-use crate::scene::{Body, Collision, Contact, Pose, Shape, StepParameters, Velocity};
+use crate::scene::{
+    Body, Collision, Collisions, Contact, Pose, Shape, StepParameters, Structures, Velocity,
+};
 
 const SHAPES: [Shape; 3] = [Shape::STATIC, Shape::isotropic(1.0, 1.5), Shape::isotropic(2.0, 0.3)];
 const SEGMENTS: [Segment; 3] = [Segment::Velocities, Segment::Poses, Segment::Collisions];
@@ -87,6 +89,34 @@ struct Input {
     /// Some of the bodies, in an order of their own.
     order: Vec<u32>,
     words: Option<Vec<[u32; 2]>>,
+    /// As many places of collisions, some of which are not there.
+    places: Vec<u32>,
+}
+
+/// Collisions in an order.
+struct Placed<'a> {
+    list: &'a [Collision],
+    order: &'a [u32],
+}
+
+impl Placed<'_> {
+    fn copy(&self, index: usize) -> Collision {
+        self.list.get(self.order[index] as usize).copied().unwrap_or(Collision::NOTHING)
+    }
+}
+
+impl Collisions for Placed<'_> {
+    fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        self.copy(index)
+    }
+
+    fn structures(&self) -> Option<Structures<'_>> {
+        Some(Structures::Ordered { all: self.list, order: self.order })
+    }
 }
 
 /// All that comes of packing it.
@@ -102,7 +132,7 @@ struct Packed {
 impl Input {
     /// Packs all of it.
     fn pack(&self, packers: &mut Packers) -> Packed {
-        let Self { limits, bodies, collisions, order, words } = self;
+        let Self { limits, bodies, collisions, order, places, .. } = self;
         let parameters = StepParameters::default();
         let quick = preflight(bodies, collisions, &SHAPES, &parameters, limits).map(Quick::new);
         let quick = quick.expect("nothing else is wrong");
@@ -130,12 +160,18 @@ impl Input {
         let views_of = &mut views(&mut some_poses);
         let (of_other, other_good) = pack_poses(target, &chosen, order.len(), views_of, packers);
 
-        let count = collisions.len();
-        let entries = Entries { collisions, count, added: None, words: words.as_deref() };
-        let mut records = self.buffers(Segment::Collisions, count);
-        let views_of = &mut views(&mut records);
-        let (of_records, good) =
-            pack_collisions(target, Ends(&ends[0]), &entries, views_of, packers);
+        let ends_of = Ends(&ends[0]);
+        let (records, (of_records, good)) = self.records(target, ends_of, collisions, packers);
+        // In an order, whether they are looked at or not, they are those copied in it.
+        let unchecked = Target { quick: None, ..target };
+        let placed = Placed { list: collisions, order: places };
+        let copied: Vec<Collision> = (0..places.len()).map(|at| placed.copy(at)).collect();
+        let (expected, (sum, _)) = self.records(target, ends_of, &copied, packers);
+        for target in [target, unchecked] {
+            let (found, (found_sum, _)) = self.records(target, ends_of, &placed, packers);
+            assert!(found == expected && found_sum == sum, "{}", target.quick.is_some());
+        }
+        assert!(self.records(unchecked, ends_of, collisions, packers).0 == records);
         Packed {
             channels: [velocities, poses, some_velocities, some_poses, records].concat(),
             sums: [of_velocities, of_poses, of_some, of_other, of_records],
@@ -143,6 +179,21 @@ impl Input {
             ends,
             statics,
         }
+    }
+
+    /// The records of collisions; their sum, and whether they are good.
+    fn records<C: Collisions + ?Sized>(
+        &self,
+        target: Target<'_>,
+        ends: Ends<'_>,
+        collisions: &C,
+        packers: &mut Packers,
+    ) -> (Vec<Vec<Beat>>, (u32, bool)) {
+        let count = collisions.len();
+        let entries = Entries { collisions, count, added: None, words: self.words.as_deref() };
+        let mut records = self.buffers(Segment::Collisions, count);
+        let seen = pack_collisions(target, ends, &entries, &mut views(&mut records), packers);
+        (records, seen)
     }
 
     /// Full of ones, so that a beat left out is seen.
@@ -184,6 +235,8 @@ prop_compose! {
         bodies in any_count(),
         collisions in any_count(),
         chosen in any_count(),
+        // How far from where it would be a collision lies at most.
+        stray in prop::sample::select(vec![1, 900, u16::MAX]),
         still_of in prop::sample::select(vec![0, 1, 2, 50, 3000]),
         // What validation refuses.
         wrong in prop::array::uniform2(prop::option::weighted(0.3, any::<prop::sample::Index>())),
@@ -198,6 +251,13 @@ prop_compose! {
         let order = (0..chosen).map(|_| numbers.below(few).into()).collect();
         let words = (variant.profile.geometry == Geometry::Relative)
             .then(|| collisions.iter().map(|_| [(); 2].map(|()| numbers.below(9000).into())).collect());
+        let places = (0_u32..)
+            .zip(&collisions)
+            .map(|(at, _)| match numbers.below(50) {
+                0 => u32::MAX,
+                _ => (at + u32::from(numbers.below(stray))).saturating_sub(u32::from(stray / 2)),
+            })
+            .collect();
         let [body, collision] = wrong;
         if let Some(body) = body {
             body.get_mut(&mut bodies).pose.orientation = [0.0; 4];
@@ -205,7 +265,7 @@ prop_compose! {
         if let Some(collision) = collision.filter(|_| !collisions.is_empty()) {
             collision.get_mut(&mut collisions).normal = [0.5; 3];
         }
-        Input { limits: limits(variant), bodies, collisions, order, words }
+        Input { limits: limits(variant), bodies, collisions, order, words, places }
     }
 }
 
@@ -242,7 +302,8 @@ fn one_wrong_record_is_noticed_in_whichever_range() {
     for profile in PROFILES {
         let limits = limits(profile.default_variant());
         let (bodies, collisions) = (bodies.clone(), Vec::clone(&collisions));
-        let mut input = Input { limits, bodies, collisions, order: vec![], words: None };
+        let (order, places) = (vec![], vec![]);
+        let mut input = Input { limits, bodies, collisions, order, words: None, places };
         assert_eq!(input.pack(&mut packers).good, [true; 4], "{}", profile.name);
         for at in [0, RANGE - 1, RANGE, 2 * RANGE, 2 * RANGE + 4] {
             let right = (input.bodies[at], input.collisions[at]);

@@ -8,10 +8,11 @@ use std::mem;
 
 use bitstream_model::interface::record::Beat;
 
-use super::format::{Format, Records};
+use super::format::{Beats, Format, Records};
 use super::pattern::{self, Pattern, Places};
 use super::stripe::Place;
 use crate::platform::{Lanes, Vectors, soon_written_behind};
+use crate::record::{Row, Rows};
 
 /// Writes as many records as fill whole units, and adds the words written to `sum`; how many records
 /// these are. `rest` is what is not written yet of the channels, from the first of the stripe on.
@@ -25,7 +26,7 @@ pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
 ) -> usize {
     macro_rules! unit {
         ($places:ident: $records:literal are $beats:literal: $($channel:ident $share:literal),*) => {
-            if $records * ROWS == $beats * F::PER_BEAT {
+            if const { $records * ROWS == $beats * F::PER_BEAT } {
                 let count = records.len() / $records;
                 let mut rest = rest.iter_mut();
                 $(let Some($channel) = part::<$share>(rest.next(), count) else { return 0 };)*
@@ -75,20 +76,43 @@ fn unit<
     for channel in &to {
         soon_written_behind(channel);
     }
-    let Some(rows) = records.some::<F, V, RECORDS>(vectors, unit) else { return };
-    let rows = rows.as_flattened();
-    for at in 0..BEATS {
-        let Place { channel, slot } = P::PLACES[at];
-        let beat = F::beat(&rows[at * F::PER_BEAT..]);
+    let mut made = [Beat::default(); BEATS];
+    let beats = Beats::<V, F>::new(vectors);
+    let mut into = Made { beats, to: &mut made, at: 0 };
+    if records.some::<RECORDS>(unit, &mut into).is_none() {
+        return;
+    }
+    debug_assert_eq!(into.at, BEATS, "a unit is whole beats");
+    for (beat, Place { channel, slot }) in made.into_iter().zip(P::PLACES) {
         to[channel][slot] = beat;
         *sum = sum.plus(beat.into());
+    }
+}
+
+/// The beats of a unit, to be kept in registers: while none is written, what records are made from is read
+/// where it is needed.
+struct Made<'a, V, F> {
+    beats: Beats<V, F>,
+    to: &'a mut [Beat],
+    /// How many there are.
+    at: usize,
+}
+
+impl<V: Vectors, F: Format> Rows for Made<'_, V, F> {
+    #[inline(always)]
+    fn row(&mut self, row: Row) {
+        if let Some(beat) = self.beats.with(row)
+            && let Some(to) = self.to.get_mut(self.at)
+        {
+            *to = beat;
+            self.at += 1;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use bitstream_model::interface::profile::{Inertia, PROFILES, Variant};
-    use bytemuck::Zeroable as _;
 
     use super::super::deal::BLOCK;
     use super::super::format::{Binary16, Thesis16, Whole};
@@ -137,12 +161,9 @@ mod tests {
         }
 
         #[inline(always)]
-        fn some<F: Format, V: Vectors, const N: usize>(
-            &mut self,
-            _: V,
-            _: usize,
-        ) -> Option<[[F::Row; ROWS]; N]> {
-            Some([[F::Row::zeroed(); ROWS]; N])
+        fn some<const N: usize>(&mut self, _: usize, to: &mut impl Rows) -> Option<()> {
+            (0..N * ROWS).for_each(|_| to.row(Row::zero()));
+            Some(())
         }
     }
 

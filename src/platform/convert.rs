@@ -13,13 +13,17 @@ use half::f16;
 
 use super::lanes::Lanes;
 
-/// Rounds the numbers of two rows to binary16, to nearest even. Where `integers` says so the last word
-/// of a row is an unsigned integer, the first of `words` or the second, whose lower half is taken.
+/// An unsigned integer that a row ends in: four words, and which of them it is.
+pub(super) type Last = (Lanes, usize);
+
+/// Rounds the numbers of two rows to binary16, to nearest even. The lower half of an integer, where there
+/// is one, is what such a row ends in.
 #[inline(always)]
-pub(super) fn to_binary16(rows: [Lanes; 2], words: Lanes, integers: [bool; 2]) -> [Narrow; 2] {
+pub(super) fn to_binary16(rows: [Lanes; 2], integers: [Option<Last>; 2]) -> [Narrow; 2] {
     let [first, second] = rows.map(Lanes::words);
-    let [of_first, of_second, ..] = words.words();
-    [row(first, integers[0].then_some(of_first)), row(second, integers[1].then_some(of_second))]
+    let [of_first, of_second] =
+        integers.map(|integer| integer.map(|(words, at)| words.words()[at]));
+    [row(first, of_first), row(second, of_second)]
 }
 
 /// One row.
@@ -55,34 +59,80 @@ type Narrow = [u16; LANES];
 pub(super) mod x86 {
     use core::arch::asm;
     use core::arch::x86_64::{
-        __m128i, _MM_FROUND_TO_NEAREST_INT, _mm_blend_epi16, _mm_setr_epi8, _mm_shuffle_epi8,
+        __m128i, _MM_FROUND_TO_NEAREST_INT, _mm_blend_epi16, _mm_or_si128, _mm_shuffle_epi8,
         _mm256_castsi256_ps, _mm256_cvtph_ps, _mm256_cvtps_ph, _mm256_set_m128i,
     };
 
-    use super::{LANES, Lanes, Narrow, WORD_LANE};
+    use super::{LANES, Lanes, Last, Narrow, WORD_LANE};
 
     /// As [`to_binary16`](super::to_binary16).
+    ///
+    /// What is written for all four cases is too much to become a part of a loop by itself, so it is made
+    /// one; what is left there of each is an instruction or two.
+    ///
+    /// # Safety
+    /// The processor has AVX2 and F16C.
+    #[inline(always)]
+    pub(in super::super) unsafe fn to_binary16(
+        rows: [Lanes; 2],
+        integers: [Option<Last>; 2],
+    ) -> [Narrow; 2] {
+        const { assert!(WORD_LANE == 3 && LANES == 4, "so the blends are written") };
+        const FIRST: usize = WORD_LANE;
+        const SECOND: usize = LANES + WORD_LANE;
+        let [first, second] = integers;
+        let first = first.map(half::<FIRST>);
+        let second = second.map(half::<SECOND>);
+        // SAFETY: the function wants AVX2 and F16C, which the caller knows to be there.
+        let numbers = unsafe { numbers(rows) };
+        // What the last words of such rows became as numbers is nothing.
+        bytemuck::cast(match (first, second) {
+            (None, None) => numbers,
+            // SAFETY: the function wants AVX2, which the caller knows to be there.
+            (Some(first), None) => unsafe { beside::<{ 1 << FIRST }>(numbers, first) },
+            // SAFETY: as above.
+            (None, Some(second)) => unsafe { beside::<{ 1 << SECOND }>(numbers, second) },
+            // SAFETY: as above.
+            (Some(first), Some(second)) => unsafe {
+                beside_both::<{ 1 << FIRST | 1 << SECOND }>(numbers, first, second)
+            },
+        })
+    }
+
+    /// The rows as numbers of binary16.
     #[target_feature(enable = "avx2,f16c")]
     #[inline]
-    pub(in super::super) fn to_binary16(
-        [first, second]: [Lanes; 2],
-        words: Lanes,
-        integers: [bool; 2],
-    ) -> [Narrow; 2] {
-        const { assert!(WORD_LANE == 3 && LANES == 4, "so the bytes are counted") };
+    fn numbers([first, second]: [Lanes; 2]) -> __m128i {
         let both = _mm256_castsi256_ps(_mm256_set_m128i(second.0, first.0));
-        let numbers = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(both);
-        // The lower halves of the integers, where they belong: what the last words of the rows became
-        // as numbers is nothing.
-        let places = _mm_setr_epi8(-1, -1, -1, -1, -1, -1, 0, 1, -1, -1, -1, -1, -1, -1, 4, 5);
-        let last = _mm_shuffle_epi8(words.0, places);
-        let numbers = computed_once(numbers);
-        bytemuck::cast(match integers {
-            [false, false] => numbers,
-            [true, false] => _mm_blend_epi16::<0b0000_1000>(numbers, last),
-            [false, true] => _mm_blend_epi16::<0b1000_0000>(numbers, last),
-            [true, true] => _mm_blend_epi16::<0b1000_1000>(numbers, last),
-        })
+        computed_once(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(both))
+    }
+
+    /// Where the bytes come from of the lower half of an integer as half `TO` of eight, beside zeros.
+    #[inline(always)]
+    fn half<const TO: usize>((words, at): Last) -> (__m128i, [u8; 16]) {
+        let mut from = [u8::MAX; 16];
+        [from[2 * TO], from[2 * TO + 1]] = [[0, 1], [4, 5], [8, 9], [12, 13]][at];
+        (words.0, from)
+    }
+
+    /// Halves of an integer where `OTHERS` has a bit, of `numbers` elsewhere.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn beside<const OTHERS: i32>(numbers: __m128i, (words, from): (__m128i, [u8; 16])) -> __m128i {
+        _mm_blend_epi16::<OTHERS>(numbers, _mm_shuffle_epi8(words, bytemuck::cast(from)))
+    }
+
+    /// The same of two integers.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn beside_both<const OTHERS: i32>(
+        numbers: __m128i,
+        (first, from_first): (__m128i, [u8; 16]),
+        (second, from_second): (__m128i, [u8; 16]),
+    ) -> __m128i {
+        let first = _mm_shuffle_epi8(first, bytemuck::cast(from_first));
+        let second = _mm_shuffle_epi8(second, bytemuck::cast(from_second));
+        _mm_blend_epi16::<OTHERS>(numbers, _mm_or_si128(first, second))
     }
 
     /// This vector. Otherwise the compiler narrows what is stored and used, too, once for either, and to
@@ -153,23 +203,23 @@ mod tests {
         all.iter().flat_map(|number| [*number, -*number]).collect()
     }
 
-    /// Integers for two rows, others than their last words.
-    fn words_beside([first, second]: [Wide; 2]) -> Lanes {
-        Lanes::new([first[0].rotate_left(7), second[1].rotate_left(11), !first[2], !second[2]])
+    /// What two rows end in: the lower halves of these words, or none.
+    type Ends = [Option<([u32; LANES], usize)>; 2];
+
+    fn lanes(ends: Ends) -> [Option<Last>; 2] {
+        ends.map(|end| end.map(|(words, at)| (Lanes::new(words), at)))
     }
 
     /// Pairs of rows through the vectors of a loop.
-    struct Rounding<'a>(&'a [[Wide; 2]], [bool; 2]);
+    struct Rounding<'a>(&'a [[Wide; 2]], Ends);
 
     impl Work for Rounding<'_> {
         type Output = Vec<[Narrow; 2]>;
 
         #[inline(always)]
         fn run<V: Vectors>(self, vectors: V) -> Vec<[Narrow; 2]> {
-            let Self(pairs, integers) = self;
-            let narrow = |rows: &[Wide; 2]| {
-                vectors.to_binary16(rows.map(Lanes::new), words_beside(*rows), integers)
-            };
+            let Self(pairs, ends) = self;
+            let narrow = |rows: &[Wide; 2]| vectors.to_binary16(rows.map(Lanes::new), lanes(ends));
             pairs.iter().map(narrow).collect()
         }
     }
@@ -180,23 +230,27 @@ mod tests {
         let mut wide: Vec<u32> = wide().into_iter().map(f32::to_bits).collect();
         wide.resize(wide.len().next_multiple_of(2 * LANES), 0);
         let pairs = wide.as_chunks::<LANES>().0.as_chunks::<2>().0;
-        for integers in [[false, false], [true, false], [false, true], [true, true]] {
-            let anywhere = pairs
-                .iter()
-                .map(|rows| to_binary16(rows.map(Lanes::new), words_beside(*rows), integers));
-            let here = in_wide_vectors(Rounding(pairs, integers));
+        let words = [0x1234_5678, 0x9ABC_DEF0, 0x0FED_CBA9, 0x8765_4321];
+        let any = |words| (0..LANES).map(move |at| Some((words, at))).chain([None]);
+        let ends = any(words).flat_map(|first| {
+            // Of the same words, and of others.
+            let others = words.map(u32::reverse_bits);
+            any(words).chain(any(others)).map(move |second| [first, second])
+        });
+        for ends in ends {
+            let anywhere = pairs.iter().map(|rows| to_binary16(rows.map(Lanes::new), lanes(ends)));
+            let here = in_wide_vectors(Rounding(pairs, ends));
             assert_eq!(here.len(), pairs.len());
             for ((here, anywhere), rows) in here.into_iter().zip(anywhere).zip(pairs) {
-                let words = words_beside(*rows).words();
-                for (place, (wide, integer)) in rows.iter().zip(integers).enumerate() {
+                for (place, (wide, end)) in rows.iter().zip(ends).enumerate() {
                     let number = |bits| f16::from_f32_const(f32::from_bits(bits)).to_bits();
                     let mut expected = wide.map(number);
-                    if integer {
+                    if let Some((words, at)) = end {
                         expected[WORD_LANE] =
-                            u16::try_from(words[place] & 0xFFFF).expect("sixteen bits");
+                            u16::try_from(words[at] & 0xFFFF).expect("sixteen bits");
                     }
-                    assert_eq!(here[place], expected, "{wide:x?}, {integer}");
-                    assert_eq!(anywhere[place], expected, "{wide:x?}, {integer}");
+                    assert_eq!(here[place], expected, "{wide:x?}, {end:x?}");
+                    assert_eq!(anywhere[place], expected, "{wide:x?}, {end:x?}");
                 }
             }
         }

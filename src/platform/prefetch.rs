@@ -13,10 +13,10 @@ pub(crate) fn soon_alone<T>(values: &[T], at: usize) {
     lines_of(values.as_ptr().wrapping_add(at));
 }
 
-/// As [`soon_alone`], where it is said of its neighbours, too: their lines are not asked for twice.
+/// As [`soon_alone`], of so many, where it is said of those behind them, too: few lines are asked for twice.
 #[inline(always)]
-pub(crate) fn soon_with_neighbours<T>(values: &[T], at: usize) {
-    first_lines_of(values.as_ptr().wrapping_add(at));
+pub(crate) fn soon_with_those_behind<const N: usize, T>(values: &[T], at: usize) {
+    first_lines_of(values.as_ptr().wrapping_add(at).cast::<[T; N]>());
 }
 
 /// Says that what lies at an address is read soon. Any address will do.

@@ -3,7 +3,7 @@
 
 use bitstream_model::interface::record::LANES;
 
-use super::convert;
+use super::convert::{self, Last};
 use super::lanes::Lanes;
 
 /// Loops that are compiled anew for wider vectors.
@@ -20,9 +20,9 @@ pub(crate) trait Work {
 /// What the vectors that a loop is compiled for can do. Whoever has one knows that the processor has
 /// them.
 pub(crate) trait Vectors: Copy {
-    /// Rounds the numbers of two rows to binary16, to nearest even. Where `integers` says so the last word
-    /// of a row is an unsigned integer, the first of `words` or the second, whose lower half is taken.
-    fn to_binary16(self, rows: [Lanes; 2], words: Lanes, integers: [bool; 2]) -> [[u16; LANES]; 2];
+    /// Rounds the numbers of two rows to binary16, to nearest even. Where a row ends in an unsigned integer
+    /// its lower half is taken: of four words, that at a place.
+    fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Last>; 2]) -> [[u16; LANES]; 2];
 
     /// The numbers of two rows of binary16, in f32.
     fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2];
@@ -34,8 +34,8 @@ pub(super) struct Baseline;
 
 impl Vectors for Baseline {
     #[inline(always)]
-    fn to_binary16(self, rows: [Lanes; 2], words: Lanes, integers: [bool; 2]) -> [[u16; LANES]; 2] {
-        convert::to_binary16(rows, words, integers)
+    fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Last>; 2]) -> [[u16; LANES]; 2] {
+        convert::to_binary16(rows, integers)
     }
 
     #[inline(always)]
@@ -58,7 +58,7 @@ pub(crate) fn in_wide_vectors<W: Work>(work: W) -> W::Output {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{LANES, Lanes, Vectors, Work, convert};
+    use super::{LANES, Lanes, Last, Vectors, Work, convert};
 
     /// Those of AVX2, and the conversions of F16C. There is one in [`run`] alone.
     #[derive(Debug, Clone, Copy)]
@@ -66,15 +66,10 @@ mod x86 {
 
     impl Vectors for Wide {
         #[inline(always)]
-        fn to_binary16(
-            self,
-            rows: [Lanes; 2],
-            words: Lanes,
-            integers: [bool; 2],
-        ) -> [[u16; LANES]; 2] {
+        fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Last>; 2]) -> [[u16; LANES]; 2] {
             // SAFETY: the function wants AVX2 and F16C. A `Wide` is made in `run` alone, which is called
             // only where both were found.
-            unsafe { convert::x86::to_binary16(rows, words, integers) }
+            unsafe { convert::x86::to_binary16(rows, integers) }
         }
 
         #[inline(always)]

@@ -1,19 +1,12 @@
 //! This file makes the record of a collision in world coordinates.
 
+use std::mem::offset_of;
+
 use super::end::End;
-use super::{Record, Words, bodies, contact_row, used, vec3_and_word};
-use crate::interface::record::{CONTACT_POINTS, collision};
+use super::{Integer, NORMAL, Record, bodies, contact_row, row_of, used};
+use crate::interface::record::{CONTACT_POINTS, WORD_LANE, collision};
 use crate::platform::Lanes;
 use crate::scene::Collision;
-
-/// The integers are count and indices.
-pub(crate) const WORDS: Words<{ collision::ROWS }> = {
-    let mut integers = [false; collision::ROWS];
-    integers[collision::NORMAL] = true;
-    Words::of_collision(integers, collision::BODY_A)
-};
-
-const _: () = assert!(collision::BODY_B == collision::BODY_A + 1);
 
 /// The collision record: normal and count, positions and indices of both bodies, contact points.
 ///
@@ -26,17 +19,22 @@ const _: () = assert!(collision::BODY_B == collision::BODY_A + 1);
 #[inline(always)]
 pub(crate) fn encode(from: &Collision, [a, b]: [&End; 2]) -> Record<{ collision::ROWS }> {
     let mut rows = [Lanes::all(0); collision::ROWS];
-    rows[collision::NORMAL] = vec3_and_word(from.normal, from.count);
+    rows[collision::NORMAL] = row_of::<NORMAL, _>(from);
     rows[collision::BODY_A] = a.with_tag();
     rows[collision::BODY_B] = b.with_tag();
     let contacts = from.contacts.iter().zip(&mut rows[collision::CONTACTS..]);
     for ((contact, row), used) in contacts.zip(used(from.count)) {
         *row = contact_row(contact).and(used);
     }
-    Record { rows, bodies: bodies(from) }
+    let mut integers = [None; collision::ROWS];
+    integers[collision::NORMAL] = Some(Integer::new::<WORD_LANE>(rows[collision::NORMAL]));
+    [integers[collision::BODY_A], integers[collision::BODY_B]] = bodies(from).map(Some);
+    Record { rows, integers }
 }
 
 const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::ROWS);
+// Beside the normal of a collision is its count.
+const _: () = assert!(offset_of!(Collision, count) == 4 * (NORMAL + WORD_LANE));
 
 #[cfg(test)]
 mod tests {
@@ -89,7 +87,7 @@ mod tests {
             0x00, 0x00, 0x00, 0x00, // unused
         ];
         let ends = [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]].map(End::at);
-        let beats = encode(&collision, ends.each_ref()).whole(&WORDS).map(Beat::from);
+        let beats = encode(&collision, ends.each_ref()).whole().map(Beat::from);
         assert_eq!(bytemuck::bytes_of(&beats), bytes);
     }
 

@@ -29,52 +29,105 @@ use crate::scene::{Body, Collision, Contact};
 /// A record on its way, in f32.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Record<const ROWS: usize> {
-    /// The last word of a row in which a body's index belongs means nothing.
+    /// The last word of a row in which an integer belongs means nothing.
     pub(crate) rows: [Lanes; ROWS],
-    /// The indices of bodies A and B, and any two words behind them.
-    pub(crate) bodies: Lanes,
+    /// The unsigned integers in which rows end. They stay where they were found until they stand in their
+    /// beat: into a row of numbers and out of a narrowed one they would go twice.
+    pub(crate) integers: [Option<Integer>; ROWS],
 }
 
-/// What the last words of a record's rows are.
+/// One of four words.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Words<const ROWS: usize> {
-    /// Rows whose last word is an unsigned integer.
-    pub(crate) integers: [bool; ROWS],
-    /// The row whose last word is the index of body A; in the next it is that of body B. `None` in a record
-    /// of no collision.
-    pub(crate) bodies: Option<usize>,
+pub(crate) struct Integer {
+    words: Lanes,
+    at: usize,
 }
 
-impl<const ROWS: usize> Words<ROWS> {
-    /// Those of a collision, which ends in the indices of its bodies in row `at` and the next, and in the
-    /// rows `integers` in other integers.
-    pub(crate) const fn of_collision(mut integers: [bool; ROWS], at: usize) -> Self {
-        assert!(at + 1 < ROWS, "there is a row for each of them");
-        integers[at] = true;
-        integers[at + 1] = true;
-        Self { integers, bodies: Some(at) }
+impl Integer {
+    /// Word `AT` of these.
+    #[inline(always)]
+    pub(crate) const fn new<const AT: usize>(words: Lanes) -> Self {
+        const { assert!(AT < LANES, "it is one of four") };
+        Self { words, at: AT }
+    }
+
+    /// Four words, and which of them it is.
+    #[inline(always)]
+    pub(crate) const fn parts(self) -> (Lanes, usize) {
+        (self.words, self.at)
+    }
+}
+
+impl From<Integer> for u32 {
+    #[inline(always)]
+    fn from(Integer { words, at }: Integer) -> Self {
+        words.words()[at]
+    }
+}
+
+/// A row of a record.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    /// The last is a number only where there is no integer.
+    pub(crate) numbers: Lanes,
+    pub(crate) integer: Option<Integer>,
+}
+
+impl Row {
+    /// Four times zero.
+    #[inline(always)]
+    pub(crate) fn zero() -> Self {
+        Self { numbers: Lanes::all(0), integer: None }
+    }
+
+    /// All four words.
+    #[inline(always)]
+    pub(crate) fn whole(self) -> Lanes {
+        match self.integer {
+            None => self.numbers,
+            Some(integer) => self.numbers.beside(integer.into()),
+        }
     }
 }
 
 impl<const ROWS: usize> From<[Lanes; ROWS]> for Record<ROWS> {
-    /// A record of no collision.
+    /// A record of numbers alone.
     #[inline(always)]
     fn from(rows: [Lanes; ROWS]) -> Self {
-        Self { rows, bodies: Lanes::all(0) }
+        Self { rows, integers: [None; ROWS] }
     }
 }
 
 impl<const ROWS: usize> Record<ROWS> {
-    /// Its rows, each with its last word.
+    /// Gives all rows to `to`, one after the other.
     #[inline(always)]
-    pub(crate) fn whole(self, words: &Words<ROWS>) -> [Lanes; ROWS] {
-        let Self { mut rows, bodies } = self;
-        let [body_a, body_b, ..] = bodies.words();
-        if let Some([a, b, ..]) = words.bodies.and_then(|at| rows.get_mut(at..)) {
-            (*a, *b) = (a.beside(body_a), b.beside(body_b));
+    pub(crate) fn give(&self, to: &mut impl Rows) {
+        // Not all of a loop would be unrolled, and then its rows would go through memory.
+        macro_rules! each {
+            ($($at:literal)*) => {
+                const { assert!(ROWS <= [$($at),*].len(), "all of them are written out") };
+                // What there is not is not compiled.
+                $(if const { $at < ROWS } {
+                    to.row(Row { numbers: self.rows[$at], integer: self.integers[$at] });
+                })*
+            };
         }
-        rows
+        each!(0 1 2 3 4 5 6);
     }
+
+    /// Its rows, all of each.
+    #[cfg(test)]
+    pub(crate) fn whole(self) -> [Lanes; ROWS] {
+        std::array::from_fn(|at| Row { numbers: self.rows[at], integer: self.integers[at] }.whole())
+    }
+}
+
+/// Where the rows of records go.
+///
+/// It is a part of the loop that gives: an `#[inline(always)]` belongs to every implementation.
+pub(crate) trait Rows {
+    /// Takes the next.
+    fn row(&mut self, row: Row);
 }
 
 /// A vec3 and the word beside it.
@@ -91,10 +144,11 @@ fn row_of<const AT: usize, T: Pod>(structure: &T) -> Lanes {
     words[AT..].first_chunk().map_or(Lanes::all(0), |row| Lanes::new(*row))
 }
 
-/// The indices of the bodies of a collision, and whatever follows them.
+/// The indices of the bodies of a collision.
 #[inline(always)]
-pub(crate) fn bodies(collision: &Collision) -> Lanes {
-    row_of::<BODIES, _>(collision)
+pub(crate) fn bodies(collision: &Collision) -> [Integer; 2] {
+    let words = row_of::<BODIES, _>(collision);
+    [Integer::new::<0>(words), Integer::new::<1>(words)]
 }
 
 /// The word with which the indices of a collision's bodies begin, B's behind A's.
@@ -103,6 +157,9 @@ const _: () = assert!(offset_of!(Collision, body_b) == 4 * (BODIES + 1));
 
 /// The word with which the normal of a collision begins.
 const NORMAL: usize = offset_of!(Collision, normal) / 4;
+
+/// Where a row with the angular velocity of a body has its shape.
+const SHAPE: usize = offset_of!(Body, shape) / 4 - ANGULAR;
 
 /// The words with which the vectors of a body begin.
 const POSITION: usize = offset_of!(Body, pose.position) / 4;

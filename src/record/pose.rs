@@ -1,13 +1,9 @@
 //! This file makes the pose record of a body.
 
-use super::{ORIENTATION, POSITION, Words, row_of};
+use super::{ORIENTATION, POSITION, row_of};
 use crate::interface::record::pose;
 use crate::platform::Lanes;
 use crate::scene::Body;
-
-/// No row ends in an integer.
-pub(crate) const WORDS: Words<{ pose::ROWS }> =
-    Words { integers: [false; pose::ROWS], bodies: None };
 
 /// The pose record: position beside 0, orientation.
 ///

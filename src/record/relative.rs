@@ -1,25 +1,19 @@
 //! This file makes the record of a collision relative to body A.
 
 use super::end::End;
-use super::{NORMAL, Record, Words, contact_row, row_of, used};
+use super::{Integer, NORMAL, Record, contact_row, row_of, used};
 use crate::interface::record::{CONTACT_POINTS, LANES, relative};
 use crate::platform::Lanes;
 use crate::scene::Collision;
 
-/// The integers are the indices.
-pub(crate) const WORDS: Words<{ relative::ROWS }> =
-    Words::of_collision([false; relative::ROWS], relative::NORMAL);
-
 /// The row of a contact point which is not there.
 const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
-
-const _: () = assert!(relative::OFFSET == relative::NORMAL + 1);
 
 /// The collision record: normal, offset from body A to body B, contact points from body A.
 ///
 /// Differences are rounded to f32 before anything else happens to them. Contact points from `count`
-/// on are zeros at infinite distance, whatever the caller left there. The indices of the bodies are the
-/// first two words of `bodies`: where only live bodies are kept, others than the caller's.
+/// on are zeros at infinite distance, whatever the caller left there. The indices of the bodies are
+/// `bodies`: where only live bodies are kept, others than the caller's.
 ///
 /// Shape: 6 rows. Units: metres, world axes; distance negative = penetrating.
 ///
@@ -28,7 +22,7 @@ const _: () = assert!(relative::OFFSET == relative::NORMAL + 1);
 pub(crate) fn encode(
     from: &Collision,
     [a, b]: [&End; 2],
-    bodies: Lanes,
+    bodies: [Integer; 2],
 ) -> Record<{ relative::ROWS }> {
     let mut rows = [Lanes::all(0); relative::ROWS];
     let [a, b] = [a, b].map(End::alone);
@@ -40,7 +34,9 @@ pub(crate) fn encode(
         let seen = contact_row(contact).minus_f32(a);
         *row = seen.and(used).or(Lanes::new(FAR).without(used));
     }
-    Record { rows, bodies }
+    let mut integers = [None; relative::ROWS];
+    [integers[relative::NORMAL], integers[relative::OFFSET]] = bodies.map(Some);
+    Record { rows, integers }
 }
 
 /// The positions of bodies A and B that a record is made from.
@@ -103,6 +99,6 @@ mod tests {
             [0x0000_0000, 0x0000_0000, 0x0000_0000, 0x7F80_0000], // not there
             [0x0000_0000, 0x0000_0000, 0x0000_0000, 0x7F80_0000], // not there
         ];
-        assert_eq!(rows.whole(&WORDS).map(Beat::from), expected.map(Beat));
+        assert_eq!(rows.whole().map(Beat::from), expected.map(Beat));
     }
 }

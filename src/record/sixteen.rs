@@ -3,7 +3,7 @@
 use bitstream_model::interface::number::StreamFormat;
 use bitstream_model::interface::record::{LANES, WORD_LANE};
 
-use super::{Record, Words, thesis16};
+use super::{self as record, Integer, thesis16};
 use crate::platform::{Lanes, Vectors};
 
 /// A row in sixteen bits: half a beat.
@@ -18,6 +18,19 @@ pub(crate) enum Sixteen {
     Thesis16,
 }
 
+/// As [`Sixteen::narrow`], of [`Sixteen::Thesis16`]. Word by word it is too much to stand in every loop.
+#[inline(never)]
+fn cut(numbers: [Lanes; 2], integers: [Option<(Lanes, usize)>; 2]) -> [Row; 2] {
+    let mut narrow = numbers.map(|row| row.words().map(thesis16::narrow));
+    for (to, integer) in narrow.iter_mut().zip(integers) {
+        if let Some((words, at)) = integer {
+            let [low, high, ..] = words.words()[at].to_le_bytes();
+            to[WORD_LANE] = u16::from_le_bytes([low, high]);
+        }
+    }
+    narrow
+}
+
 impl Sixteen {
     /// The format of a stream, if its words have sixteen bits.
     pub(crate) const fn of(format: StreamFormat) -> Option<Self> {
@@ -28,52 +41,16 @@ impl Sixteen {
         }
     }
 
-    /// A record of f32 as one of this format. Of a word that is an unsigned integer the lower half is
-    /// taken: what is more than that validation refuses.
+    /// Two rows of f32 as a beat of this format. Of an unsigned integer the lower half is taken: what is
+    /// more than that validation refuses.
     #[inline(always)]
-    pub(crate) fn narrow<V: Vectors, const ROWS: usize>(
-        self,
-        vectors: V,
-        record: Record<ROWS>,
-        words: &Words<ROWS>,
-    ) -> [Row; ROWS] {
-        let integers = &words.integers;
-        let mut narrow = [Row::default(); ROWS];
+    pub(crate) fn narrow<V: Vectors>(self, vectors: V, rows: [record::Row; 2]) -> [Row; 2] {
+        let numbers = rows.map(|row| row.numbers);
+        let integers = rows.map(|row| row.integer.map(Integer::parts));
         match self {
-            Self::Binary16 => {
-                // Contact points, the last rows, come in pairs. So do bodies, whose indices go
-                // beside what their rows became.
-                let apart = words.bodies.filter(|at| (ROWS - at).is_multiple_of(2));
-                let rows = if apart.is_some() { record.rows } else { record.whole(words) };
-                let (first, pairs) = rows.as_rchunks::<2>();
-                let (alone, integers) = integers.as_rchunks::<2>();
-                let (to_first, to_pairs) = narrow.as_rchunks_mut::<2>();
-                for ((to, row), integer) in to_first.iter_mut().zip(first).zip(alone) {
-                    let rows = [*row, Lanes::all(0)];
-                    [*to, _] = vectors.to_binary16(rows, last(rows), [*integer, false]);
-                }
-                for (at, ((to, rows), integers)) in
-                    to_pairs.iter_mut().zip(pairs).zip(integers).enumerate()
-                {
-                    let of_bodies = apart == Some(ROWS % 2 + 2 * at);
-                    let words = if of_bodies { record.bodies } else { last(*rows) };
-                    *to = vectors.to_binary16(*rows, words, *integers);
-                }
-            }
-            Self::Thesis16 => {
-                for ((to, row), integer) in narrow.iter_mut().zip(record.whole(words)).zip(integers)
-                {
-                    let words = row.words();
-                    *to = words.map(thesis16::narrow);
-                    if *integer {
-                        #[expect(clippy::cast_possible_truncation, reason = "its lower half")]
-                        let word = words[WORD_LANE] as u16;
-                        to[WORD_LANE] = word;
-                    }
-                }
-            }
+            Self::Binary16 => vectors.to_binary16(numbers, integers),
+            Self::Thesis16 => cut(numbers, integers),
         }
-        narrow
     }
 
     /// Two rows of this format in f32.
@@ -86,12 +63,6 @@ impl Sixteen {
     }
 }
 
-/// The last words of two rows, and two zeros.
-#[inline(always)]
-fn last([first, second]: [Lanes; 2]) -> Lanes {
-    Lanes::new([first.words()[WORD_LANE], second.words()[WORD_LANE], 0, 0])
-}
-
 #[cfg(test)]
 mod tests {
     use bitstream_model::interface::record::Beat;
@@ -99,27 +70,40 @@ mod tests {
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
 
-    fn narrowed_rows<const ROWS: usize>(
+    fn narrowed_pair(
         format: Sixteen,
-        rows: [Beat; ROWS],
-        integers: [bool; ROWS],
-    ) -> [Row; ROWS] {
-        in_wide_vectors(Narrowing { format, record: rows.map(Lanes::from), integers })
+        rows: [[u32; LANES]; 2],
+        ends: [Option<usize>; 2],
+    ) -> [Row; 2] {
+        in_wide_vectors(Narrowing { format, rows, ends })
     }
 
-    struct Narrowing<const ROWS: usize> {
+    /// Two rows, which end in integers of words beside them.
+    struct Narrowing {
         format: Sixteen,
-        record: [Lanes; ROWS],
-        integers: [bool; ROWS],
+        rows: [[u32; LANES]; 2],
+        /// Which of [`INTEGERS`].
+        ends: [Option<usize>; 2],
     }
 
-    impl<const ROWS: usize> Work for Narrowing<ROWS> {
-        type Output = [Row; ROWS];
+    const INTEGERS: [u32; LANES] = [0x0001_ABCD, 0x1234_5678, 7, 0xFFFF_8000];
+
+    impl Work for Narrowing {
+        type Output = [Row; 2];
 
         #[inline(always)]
-        fn run<V: Vectors>(self, vectors: V) -> [Row; ROWS] {
-            let words = Words { integers: self.integers, bodies: None };
-            self.format.narrow(vectors, self.record.into(), &words)
+        fn run<V: Vectors>(self, vectors: V) -> [Row; 2] {
+            let words = Lanes::new(INTEGERS);
+            let integer = |at: usize| {
+                let each =
+                    [Integer::new::<0>, Integer::new::<1>, Integer::new::<2>, Integer::new::<3>];
+                each[at](words)
+            };
+            let row = |at: usize| record::Row {
+                numbers: Lanes::new(self.rows[at]),
+                integer: self.ends[at].map(integer),
+            };
+            self.format.narrow(vectors, [row(0), row(1)])
         }
     }
 
@@ -143,7 +127,7 @@ mod tests {
     }
 
     fn narrowed(format: Sixteen, value: f32) -> u16 {
-        narrowed_rows(format, [Beat([value.to_bits(); 4])], [false])[0][1]
+        narrowed_pair(format, [[value.to_bits(); LANES]; 2], [None; 2])[0][1]
     }
 
     #[test]
@@ -157,43 +141,21 @@ mod tests {
     #[test]
     fn integers_are_integers_in_either_format() {
         for format in [Sixteen::Binary16, Sixteen::Thesis16] {
-            let row = Beat([0x3F80_0000, 0xC000_0000, 0x4248_0000, 0xABCD]);
-            // 1, -2, 50 are exact in both.
-            let expected = |integer| [0x3C00, 0xC000, 0x5240, if integer { 0xABCD } else { 0 }];
-            let two = [true, false];
-            assert_eq!(narrowed_rows(format, [row; 2], two), two.map(expected));
-            let seven = [true, true, false, false, true, false, true];
-            assert_eq!(narrowed_rows(format, [row; 7], seven), seven.map(expected));
-        }
-    }
-
-    /// Whether a pair of rows becomes beats together or not.
-    #[test]
-    fn indices_beside_a_record_come_where_they_would_stand_in_it() {
-        struct Apart(Sixteen, Record<5>, usize);
-        impl Work for Apart {
-            type Output = [[Row; 5]; 2];
-
-            #[inline(always)]
-            fn run<V: Vectors>(self, vectors: V) -> [[Row; 5]; 2] {
-                let Self(format, record, at) = self;
-                let words = Words::of_collision([false; 5], at);
-                let whole = record.whole(&words).into();
-                let in_it = Words { bodies: None, ..words };
-                [format.narrow(vectors, record, &words), format.narrow(vectors, whole, &in_it)]
-            }
-        }
-        let row =
-            |from: u32| Lanes::new([0, 1, 2, 3].map(|at| 0x3F80_1234 + 0x4_0000 * (from + at)));
-        let record = Record {
-            rows: [0, 10, 20, 30, 40].map(row),
-            bodies: Lanes::new([0x0001_ABCD, 0x1234_5678, 7, 8]),
-        };
-        for format in [Sixteen::Binary16, Sixteen::Thesis16] {
-            for at in 0..4 {
-                let [apart, whole] = in_wide_vectors(Apart(format, record, at));
-                assert_eq!(apart, whole, "{format:?} {at}");
-                assert_eq!([apart[at][3], apart[at + 1][3]], [0xABCD, 0x5678], "{format:?} {at}");
+            // 1, -2, 50 and 3, -4, 100 are exact in both.
+            let rows = [[1.0, -2.0, 50.0, 1.0_f32], [3.0, -4.0, 100.0, -1.0]];
+            let words = [[0x3C00, 0xC000, 0x5240, 0x3C00], [0x4200, 0xC400, 0x5640, 0xBC00]];
+            let ends = || [None, Some(0), Some(1), Some(2), Some(3)];
+            for (first, second) in
+                ends().into_iter().flat_map(|one| ends().map(|other| (one, other)))
+            {
+                let mut expected = words;
+                for (row, end) in expected.iter_mut().zip([first, second]) {
+                    if let Some(end) = end {
+                        row[WORD_LANE] = [0xABCD, 0x5678, 7, 0x8000][end];
+                    }
+                }
+                let rows = rows.map(|row| row.map(f32::to_bits));
+                assert_eq!(narrowed_pair(format, rows, [first, second]), expected, "{format:?}");
             }
         }
     }

@@ -1,24 +1,10 @@
 //! This file makes the velocity record of a body.
 
 use super::inertia::Inverse;
-use super::{ANGULAR, LINEAR, Words, row_of, vec3_and_word};
+use super::{ANGULAR, Integer, LINEAR, Record, SHAPE, row_of, vec3_and_word};
 use crate::interface::record::velocity;
 use crate::platform::Lanes;
 use crate::scene::Body;
-
-/// Rows whose word is an unsigned integer: the shape.
-pub(crate) const WORDS: Words<{ velocity::ROWS }> = {
-    let mut integers = [false; velocity::ROWS];
-    integers[velocity::LINEAR] = true;
-    Words { integers, bodies: None }
-};
-
-/// Rows whose word is an unsigned integer in a record with world inertia.
-pub(crate) const WORLD_WORDS: Words<{ velocity::WORLD_ROWS }> = {
-    let mut integers = [false; velocity::WORLD_ROWS];
-    integers[velocity::LINEAR] = true;
-    Words { integers, bodies: None }
-};
 
 /// The velocity record: linear velocity beside the shape index, angular velocity beside 0.
 ///
@@ -26,11 +12,13 @@ pub(crate) const WORLD_WORDS: Words<{ velocity::WORLD_ROWS }> = {
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(body: &Body) -> [Lanes; velocity::ROWS] {
-    let mut rows = [Lanes::all(0); velocity::ROWS];
-    rows[velocity::LINEAR] = row_of::<LINEAR, _>(body).beside(body.shape);
-    rows[velocity::ANGULAR] = row_of::<ANGULAR, _>(body).beside(0);
-    rows
+pub(crate) fn encode(body: &Body) -> Record<{ velocity::ROWS }> {
+    let mut record = Record::from([Lanes::all(0); velocity::ROWS]);
+    let angular_and_shape = row_of::<ANGULAR, _>(body);
+    record.rows[velocity::LINEAR] = row_of::<LINEAR, _>(body);
+    record.integers[velocity::LINEAR] = Some(Integer::new::<SHAPE>(angular_and_shape));
+    record.rows[velocity::ANGULAR] = angular_and_shape.beside(0);
+    record
 }
 
 /// The velocity record with world inertia: the two rows above, and the inverse inertia of the body.
@@ -39,14 +27,15 @@ pub(crate) fn encode(body: &Body) -> [Lanes; velocity::ROWS] {
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode_world(body: &Body, inertia: &Inverse) -> [Lanes; velocity::WORLD_ROWS] {
-    let [linear, angular] = encode(body);
-    let mut rows = [Lanes::all(0); velocity::WORLD_ROWS];
-    rows[velocity::LINEAR] = linear;
-    rows[velocity::ANGULAR] = angular;
-    rows[velocity::DIAGONAL] = vec3_and_word(inertia.diagonal, 0);
-    rows[velocity::OFF_DIAGONAL] = vec3_and_word(inertia.off_diagonal, 0);
-    rows
+pub(crate) fn encode_world(body: &Body, inertia: &Inverse) -> Record<{ velocity::WORLD_ROWS }> {
+    let Record { rows: [linear, angular], integers } = encode(body);
+    let mut record = Record::from([Lanes::all(0); velocity::WORLD_ROWS]);
+    record.rows[velocity::LINEAR] = linear;
+    record.rows[velocity::ANGULAR] = angular;
+    [record.integers[velocity::LINEAR], record.integers[velocity::ANGULAR]] = integers;
+    record.rows[velocity::DIAGONAL] = vec3_and_word(inertia.diagonal, 0);
+    record.rows[velocity::OFF_DIAGONAL] = vec3_and_word(inertia.off_diagonal, 0);
+    record
 }
 
 const _: () = assert!(velocity::LINEAR == 0 && velocity::ANGULAR == 1);
@@ -74,7 +63,7 @@ mod tests {
             0x00, 0x00, 0x00, 0x80, // w.z -0.0
             0x00, 0x00, 0x00, 0x00,
         ];
-        assert_eq!(bytemuck::bytes_of(&encode(&body).map(Beat::from)), bytes);
+        assert_eq!(bytemuck::bytes_of(&encode(&body).whole().map(Beat::from)), bytes);
     }
     #[test]
     fn world_inertia_follows_the_velocities() {
@@ -84,8 +73,8 @@ mod tests {
             shape: 5,
         };
         let inertia = Inverse { diagonal: [1.0, 2.0, 3.0], off_diagonal: [-0.5, 0.25, 4.0] };
-        let rows = encode_world(&body, &inertia).map(Beat::from);
-        assert_eq!(rows[..2], encode(&body).map(Beat::from));
+        let rows = encode_world(&body, &inertia).whole().map(Beat::from);
+        assert_eq!(rows[..2], encode(&body).whole().map(Beat::from));
         assert_eq!(rows[2], Beat([0x3F80_0000, 0x4000_0000, 0x4040_0000, 0]));
         assert_eq!(rows[3], Beat([0xBF00_0000, 0x3E80_0000, 0x4080_0000, 0]));
     }

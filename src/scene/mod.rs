@@ -18,4 +18,4 @@ pub use shape::Shape;
 pub use structures::Structures;
 
 pub(crate) use carriers::Demand;
-pub(crate) use structures::{InArray, InOrder, Lying, Next};
+pub(crate) use structures::{InArray, InNearbyOrder, InOrder, Lying, Next};

@@ -6,7 +6,7 @@ use std::iter;
 use std::ops::Range;
 
 use super::Collision;
-use crate::platform::{soon_alone, soon_with_neighbours};
+use crate::platform::{soon_alone, soon_with_those_behind};
 
 /// Where collisions lie ([`Collisions::structures`](super::Collisions::structures)).
 #[derive(Debug, Clone, Copy)]
@@ -51,14 +51,8 @@ pub(crate) trait Lying<'a>: Copy {
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]>;
 
     /// The `nth` so many of them, of which there are as many, while those are fetched whose turn it is soon.
-    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>>;
-
-    /// Whether these, which are entry `first` and those behind it, lie apart, but about where they would
-    /// lie one behind the other.
-    fn is_nearby(self, first: usize) -> bool;
-
-    /// Says that what lies at a place is asked for soon, and its neighbours, too.
-    fn soon_at(self, place: usize);
+    /// `slowly` says that much is done with each.
+    fn next<const N: usize>(self, nth: usize, slowly: bool) -> Option<Next<'a, N>>;
 
     /// Those of a range, as many as there are.
     fn part(self, range: Range<usize>) -> Self;
@@ -79,8 +73,8 @@ pub(crate) trait Lying<'a>: Copy {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Next<'a, const N: usize> {
     pub(crate) these: [&'a Collision; N],
-    /// Those whose bodies are to be fetched. `None` shortly before the end, and where collisions lie one
-    /// behind the other: so do their bodies then.
+    /// Those whose bodies are to be fetched. `None` shortly before the end, and where it costs more than it
+    /// brings: where collisions lie one behind the other, or about so, their bodies do, too.
     pub(crate) soon: Option<[&'a Collision; N]>,
 }
 
@@ -88,12 +82,22 @@ pub(crate) struct Next<'a, const N: usize> {
 /// again.
 const SOON: usize = 30;
 
+/// The same in an array, which comes without being looked up, and so sooner.
+const SOON_IN_ARRAY: usize = 70;
+
 /// The same of its bodies, which it has to say by then.
 const BODIES_SOON: usize = SOON / 2;
+
+/// How far behind what lies about there is fetched, where the order is near to that in memory: it comes line
+/// by line, and is asked for when it is in a cache.
+const NEARBY_SOON: usize = 768;
 
 /// Entries from which on one is no longer where it would lie in an array: so many collisions are in
 /// none of the inner caches.
 const NEARBY: usize = 4096;
+
+/// Every so many entries one is looked at to find out.
+const SAMPLED: usize = 64;
 
 /// Those of a range, as many as there are.
 #[inline(always)]
@@ -118,23 +122,11 @@ impl<'a> Lying<'a> for InArray<'a> {
     }
 
     #[inline(always)]
-    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
+    fn next<const N: usize>(self, nth: usize, _: bool) -> Option<Next<'a, N>> {
         let these = self.some(nth)?;
         // Beyond the end, too: that is memory of somebody else's, which stays as it is.
-        for at in 0..N {
-            self.soon_at(nth * N + SOON + at);
-        }
+        soon_with_those_behind::<N, _>(self.0, nth * N + SOON_IN_ARRAY);
         Some(Next { these, soon: None })
-    }
-
-    #[inline(always)]
-    fn is_nearby(self, _: usize) -> bool {
-        false
-    }
-
-    #[inline(always)]
-    fn soon_at(self, place: usize) {
-        soon_with_neighbours(self.0, place);
     }
 
     #[inline(always)]
@@ -196,7 +188,7 @@ impl<'a> Lying<'a> for InOrder<'a> {
     }
 
     #[inline(always)]
-    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
+    fn next<const N: usize>(self, nth: usize, _: bool) -> Option<Next<'a, N>> {
         let rest = self.order.get(nth * N..)?;
         // It is looked at once how many there are, for all of them.
         let Some(places) = rest.get(..SOON + N) else {
@@ -210,19 +202,63 @@ impl<'a> Lying<'a> for InOrder<'a> {
     }
 
     #[inline(always)]
-    fn is_nearby(self, first: usize) -> bool {
-        self.order.first().is_some_and(|place| first.abs_diff(*place as usize) < NEARBY)
+    fn part(self, range: Range<usize>) -> Self {
+        let count = range.end.min(self.count).saturating_sub(range.start);
+        Self { order: self.order.get(range.start..).unwrap_or_default(), count, ..self }
+    }
+}
+
+/// [`Structures::Ordered`], where each lies about where it would in an array.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InNearbyOrder<'a> {
+    order: InOrder<'a>,
+    /// The index of the first of these.
+    first: usize,
+}
+
+impl<'a> InOrder<'a> {
+    /// The same, if nearly all of these lie about where they would in an array; entry `first` is the first
+    /// of them. Those that are not there lie nowhere.
+    pub(crate) fn nearby(self, first: usize) -> Option<InNearbyOrder<'a>> {
+        let order = self.order.get(..self.count)?;
+        let sampled = (first..).step_by(SAMPLED).zip(order.iter().step_by(SAMPLED));
+        let (mut near, mut far) = (0, 0);
+        for (entry, place) in sampled {
+            let place = *place as usize;
+            match entry.abs_diff(place) < NEARBY {
+                true => near += 1,
+                false => far += usize::from(place < self.all.len()),
+            }
+        }
+        (near > 15 * far).then_some(InNearbyOrder { order: self, first })
+    }
+}
+
+impl<'a> Lying<'a> for InNearbyOrder<'a> {
+    #[inline(always)]
+    fn len(self) -> usize {
+        self.order.len()
     }
 
     #[inline(always)]
-    fn soon_at(self, place: usize) {
-        soon_with_neighbours(self.all, place);
+    fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
+        self.order.some(nth)
+    }
+
+    #[inline(always)]
+    fn next<const N: usize>(self, nth: usize, slowly: bool) -> Option<Next<'a, N>> {
+        soon_with_those_behind::<N, _>(self.order.all, self.first + nth * N + NEARBY_SOON);
+        if slowly {
+            // While one is worked on the processor does not come to the next by itself.
+            return self.order.next(nth, slowly);
+        }
+        Some(Next { these: self.some(nth)?, soon: None })
     }
 
     #[inline(always)]
     fn part(self, range: Range<usize>) -> Self {
-        let count = range.end.min(self.count).saturating_sub(range.start);
-        Self { order: self.order.get(range.start..).unwrap_or_default(), count, ..self }
+        let first = self.first + range.start;
+        Self { order: self.order.part(range), first }
     }
 }
 
@@ -249,7 +285,7 @@ mod tests {
             assert_eq!((part.len(), names(part.iter())), (there.len(), there.to_vec()));
             assert!(part.some::<2>(there.len() / 2).is_none());
             for (nth, pair) in there.as_chunks::<2>().0.iter().enumerate() {
-                let next = part.next::<2>(nth).expect("as many");
+                let next = part.next::<2>(nth, true).expect("as many");
                 assert_eq!(names(next.these), pair);
             }
         }
@@ -266,6 +302,36 @@ mod tests {
         let mut expected = order.clone();
         expected[40] = Collision::NOTHING.body_a;
         parts_are_as_long_as_they_say(InOrder::new(&all, &order), &expected);
+        let near = InOrder::new(&all, &order).nearby(0).expect("a hundred lie near each other");
+        parts_are_as_long_as_they_say(near, &expected);
+        // What is fetched goes by the entry.
+        let part = near.part(10..90).part(15..200);
+        assert_eq!(part.first, 25);
+        assert!(part.next::<2>(3, false).expect("as many").soon.is_none());
+        assert!(part.next::<2>(3, true).expect("as many").soon.is_some());
+    }
+
+    #[test]
+    fn an_order_is_nearby_where_nearly_all_of_it_lies_about_where_it_would() {
+        let all = collisions(100_000);
+        let in_turn: Vec<u32> = (0..100_000).collect();
+        let nearby = |order: &[u32], range: Range<usize>| {
+            let first = range.start;
+            InOrder::new(&all, order).part(range).nearby(first).is_some()
+        };
+        assert!(nearby(&in_turn, 0..100_000) && nearby(&in_turn, 90_000..100_000));
+        // Swapped in pairs, and with some that are not there.
+        let mut swapped: Vec<u32> = in_turn.iter().map(|place| place ^ 1).collect();
+        swapped.iter_mut().step_by(3).for_each(|place| *place = u32::MAX);
+        assert!(nearby(&swapped, 0..100_000));
+        let backwards: Vec<u32> = in_turn.iter().rev().copied().collect();
+        assert!(!nearby(&backwards, 0..100_000) && !nearby(&backwards, 0..10_000));
+        assert!(nearby(&backwards, 49_000..51_000));
+        // A tenth lies elsewhere.
+        let mut scattered = in_turn.clone();
+        scattered.iter_mut().step_by(10).for_each(|place| *place = 99_999 - *place);
+        assert!(!nearby(&scattered, 0..40_000));
+        assert!(!nearby(&[], 0..0));
     }
 
     #[test]
@@ -273,13 +339,13 @@ mod tests {
         let all = collisions(100);
         let order: Vec<u32> = (0..100).rev().collect();
         let part = InOrder::new(&all, &order).part(30..60);
-        let soon = |nth| part.next::<2>(nth).expect("as many").soon.map(names);
+        let soon = |nth| part.next::<2>(nth, true).expect("as many").soon.map(names);
         // Entries 30 + 15 and the next; beyond the part, too.
         assert_eq!(soon(0), Some(vec![54, 53]));
         assert_eq!(soon(14), Some(vec![26, 25]));
         // Of the last none are.
         let last = InOrder::new(&all, &order).part(90..100);
-        assert!(last.next::<2>(0).expect("as many").soon.is_none());
-        assert!(InArray(&all).next::<2>(0).expect("as many").soon.is_none());
+        assert!(last.next::<2>(0, true).expect("as many").soon.is_none());
+        assert!(InArray(&all).next::<2>(0, true).expect("as many").soon.is_none());
     }
 }
