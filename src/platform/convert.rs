@@ -83,16 +83,16 @@ pub(super) mod x86 {
         let [first, second] = integers;
         let first = first.map(half::<FIRST>);
         let second = second.map(half::<SECOND>);
-        // SAFETY: the function wants AVX2 and F16C, which the caller knows to be there.
+        // SAFETY: `numbers` wants AVX2 and F16C, which the caller promises; it computes in registers.
         let numbers = unsafe { numbers(rows) };
         // What the last words of such rows became as numbers is nothing.
         bytemuck::cast(match (first, second) {
             (None, None) => numbers,
-            // SAFETY: the function wants AVX2, which the caller knows to be there.
+            // SAFETY: `beside` wants AVX2, which the caller promises; it computes in registers.
             (Some(first), None) => unsafe { beside::<{ 1 << FIRST }>(numbers, first) },
-            // SAFETY: as above.
+            // SAFETY: `beside` wants AVX2, which the caller promises; it computes in registers.
             (None, Some(second)) => unsafe { beside::<{ 1 << SECOND }>(numbers, second) },
-            // SAFETY: as above.
+            // SAFETY: `beside_both` wants AVX2, which the caller promises; it computes in registers.
             (Some(first), Some(second)) => unsafe {
                 beside_both::<{ 1 << FIRST | 1 << SECOND }>(numbers, first, second)
             },
@@ -107,9 +107,12 @@ pub(super) mod x86 {
         computed_once(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(both))
     }
 
-    /// Where the bytes come from of the lower half of an integer as half `TO` of eight, beside zeros.
+    /// Bytes, and which of them each byte of what they are shuffled to is; it is zero where that is above 127.
+    type Shuffle = (__m128i, [u8; 16]);
+
+    /// The lower half of an integer as half `TO` of eight, beside zeros.
     #[inline(always)]
-    fn half<const TO: usize>((words, at): Last) -> (__m128i, [u8; 16]) {
+    fn half<const TO: usize>((words, at): Last) -> Shuffle {
         let mut from = [u8::MAX; 16];
         [from[2 * TO], from[2 * TO + 1]] = [[0, 1], [4, 5], [8, 9], [12, 13]][at];
         (words.0, from)
@@ -118,7 +121,7 @@ pub(super) mod x86 {
     /// Halves of an integer where `OTHERS` has a bit, of `numbers` elsewhere.
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn beside<const OTHERS: i32>(numbers: __m128i, (words, from): (__m128i, [u8; 16])) -> __m128i {
+    fn beside<const OTHERS: i32>(numbers: __m128i, (words, from): Shuffle) -> __m128i {
         _mm_blend_epi16::<OTHERS>(numbers, _mm_shuffle_epi8(words, bytemuck::cast(from)))
     }
 
@@ -127,8 +130,8 @@ pub(super) mod x86 {
     #[inline]
     fn beside_both<const OTHERS: i32>(
         numbers: __m128i,
-        (first, from_first): (__m128i, [u8; 16]),
-        (second, from_second): (__m128i, [u8; 16]),
+        (first, from_first): Shuffle,
+        (second, from_second): Shuffle,
     ) -> __m128i {
         let first = _mm_shuffle_epi8(first, bytemuck::cast(from_first));
         let second = _mm_shuffle_epi8(second, bytemuck::cast(from_second));

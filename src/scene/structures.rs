@@ -88,8 +88,8 @@ const SOON_IN_ARRAY: usize = 70;
 /// The same of its bodies, which it has to say by then.
 const BODIES_SOON: usize = SOON / 2;
 
-/// How far behind what lies about there is fetched, where the order is near to that in memory: it comes line
-/// by line, and is asked for when it is in a cache.
+/// How far behind what lies about there is fetched, where the order is near to that in memory: line by line,
+/// so that what is looked up then is in a cache.
 const NEARBY_SOON: usize = 768;
 
 /// Entries from which on one is no longer where it would lie in an array: so many collisions are in

@@ -155,7 +155,7 @@ pub(crate) struct Block<'a, L> {
 #[inline(always)]
 pub(super) fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
     // Each by itself: the compiler would square the row that they are sent in, with the count beside them,
-    // and packing with its checks takes up to twice as long then (`cargo bench --bench pack`, `checked`).
+    // which slows packing with its checks (`checked` in `cargo bench --bench pack`). It is for speed alone.
     let [x, y, z] = collision.normal.map(black_box);
     let square = x * x + y * y + z * z;
     ((square - 1.0).abs() <= NORMAL)

@@ -56,9 +56,8 @@ impl Clock {
     }
 }
 
-/// Runs of a stretch that are not measured: they bring into the caches what the others left outside. Caches
-/// are slow to forget: what lies in the last one is not all there before ten runs, and until then a run
-/// takes up to twice as long, and another time from one stretch to the next.
+/// Runs of a stretch that are not measured: they bring into the caches what the others left outside. The
+/// last cache is slow to forget these, so that some runs pass until one takes no longer than the next.
 const WARMING: usize = 10;
 /// Runs of a stretch that are measured.
 const MEASURED: usize = 3;
