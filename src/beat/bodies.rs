@@ -19,7 +19,7 @@ use super::deal::BODIES;
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stripe::Segment;
 use super::target::Target;
-use crate::platform::{Vectors, Work, in_wide_vectors, soon_read, soon_written};
+use crate::platform::{Vectors, Work, in_wide_vectors};
 use crate::record::end::{End, Survey, Tags};
 use crate::scene::{Bodies, Body, Pose, Velocity};
 
@@ -184,16 +184,13 @@ fn pack_part<B: Bodies + ?Sized>(target: Target<'_>, bodies: &B, mut part: Part<
     let mut copies = [NOBODY; BODIES];
     for first in (first..until).step_by(BODIES) {
         let block = &mut copies[..(until - first).min(BODIES)];
-        let lying = |range: Range<usize>| bodies.structures().and_then(|all| all.get(range));
-        let behind = first + block.len();
-        let ahead = lying(behind..until.min(behind + BODIES)).unwrap_or_default();
-        let block = lying(first..behind).unwrap_or_else(|| {
+        let lying = bodies.structures().and_then(|all| all.get(first..first + block.len()));
+        packer.write(lying.unwrap_or_else(|| {
             for (at, to) in block.iter_mut().enumerate() {
                 *to = bodies.body(first + at);
             }
             block
-        });
-        packer.write(block, ahead);
+        }));
     }
     packer.finish()
 }
@@ -228,10 +225,9 @@ impl<'a, 'b> BodyPacker<'a, 'b> {
         }
     }
 
-    /// Does it with the next bodies, at most [`BODIES`]. Those `ahead` are asked for next, and are on their
-    /// way meanwhile.
-    fn write(&mut self, bodies: &[Body], ahead: &[Body]) {
-        in_wide_vectors(Writing { packer: self, bodies, ahead });
+    /// Does it with the next bodies, at most [`BODIES`].
+    fn write(&mut self, bodies: &[Body]) {
+        in_wide_vectors(Writing { packer: self, bodies });
     }
 
     /// Ends the segments.
@@ -247,7 +243,6 @@ impl<'a, 'b> BodyPacker<'a, 'b> {
 struct Writing<'p, 'a, 'b> {
     packer: &'p mut BodyPacker<'a, 'b>,
     bodies: &'p [Body],
-    ahead: &'p [Body],
 }
 
 impl Work for Writing<'_, '_, '_> {
@@ -255,15 +250,13 @@ impl Work for Writing<'_, '_, '_> {
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) {
-        let Self { packer, bodies, ahead } = self;
-        soon_read(ahead);
+        let Self { packer, bodies } = self;
         let BodyPacker { target, tags, next, ends, velocities, poses, good, still } = packer;
         let quick = target.quick;
         let range = *next..*next + bodies.len();
         *next = range.end;
         if let Some(rest) = ends {
             let (ends, behind) = mem::take(rest).split_at_mut(bodies.len());
-            soon_written(&behind[..ahead.len().min(behind.len())]);
             *rest = behind;
             let any_still = tags.ends(bodies, ends);
             *good &= quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends));

@@ -11,7 +11,7 @@ use bitstream_model::interface::record::Beat;
 use super::format::{Beats, Format, Records};
 use super::pattern::{self, Pattern, Places};
 use super::stripe::Place;
-use crate::platform::{Lanes, Vectors, soon_written_behind};
+use crate::platform::{Lanes, Vectors};
 use crate::record::{Row, Rows};
 
 /// Writes as many records as fill whole units, and adds the words written to `sum`; how many records
@@ -73,9 +73,6 @@ fn unit<
     to: [&mut [Beat]; CHANNELS],
     sum: &mut Lanes,
 ) {
-    for channel in &to {
-        soon_written_behind(channel);
-    }
     let mut made = [Beat::default(); BEATS];
     let beats = Beats::<V, F>::new(vectors);
     let mut into = Made { beats, to: &mut made, at: 0 };

@@ -78,10 +78,7 @@ pub use hardware::MemoryChoice;
 pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
 pub(crate) use lanes::Lanes;
 pub(crate) use memory::{DmaMemory, SharedMemory};
-pub(crate) use prefetch::{
-    fetch, prefetch, soon_alone, soon_read, soon_with_those_behind, soon_written,
-    soon_written_behind,
-};
+pub(crate) use prefetch::{fetch, prefetch, soon_alone, soon_with_those_behind};
 #[cfg(feature = "emulation")]
 pub(crate) use remote::{RemotePlatform, memory_beside};
 pub use reserved::ReservedMemory;

@@ -1,4 +1,4 @@
-//! This file tells the processor what will be read or written soon.
+//! This file tells the processor what will be read soon.
 #![allow(unsafe_code, reason = "hints to the caches exist as intrinsics on raw pointers only")]
 
 /// Says that a value will be read soon.
@@ -32,56 +32,6 @@ fn first_lines_of<T>(value: *const T) {
     for line in 0..size_of::<T>().div_ceil(LINE) {
         fetch(value.cast::<u8>().wrapping_add(line * LINE));
     }
-}
-
-/// Says that all of these will be read soon.
-#[inline(always)]
-pub(crate) fn soon_read<T>(values: &[T]) {
-    lines(values).for_each(fetch);
-}
-
-/// Says that all of these will be written soon: of memory that is cached, a line that is written in part
-/// comes into the cache first.
-#[inline(always)]
-pub(crate) fn soon_written<T>(values: &[T]) {
-    lines(values).for_each(fetch_to_write);
-}
-
-/// Says that what lies a little behind these will be written soon: [`soon_written`] for who goes through a
-/// buffer a few beats at a time. Where there is nothing behind them nothing comes of it.
-#[inline(always)]
-pub(crate) fn soon_written_behind<T>(values: &[T]) {
-    lines(values).for_each(|line| fetch_to_write(line.wrapping_add(BEHIND)));
-}
-
-/// How far behind, in bytes: so far that it is there in time, so near that it is not gone again.
-const BEHIND: usize = 1024;
-
-/// An address in every line of these, but perhaps the last.
-#[inline(always)]
-fn lines<T>(values: &[T]) -> impl Iterator<Item = *const u8> {
-    let first: *const u8 = values.as_ptr().cast();
-    (0..size_of_val(values)).step_by(LINE).map(move |at| first.wrapping_add(at))
-}
-
-/// Says that what lies at an address is written soon. Any address will do.
-#[inline(always)]
-fn fetch_to_write<T>(at: *const T) {
-    let at: *const i8 = at.cast();
-    #[cfg(target_arch = "x86_64")]
-    // SAFETY: a prefetch neither reads nor faults, whatever the address.
-    // Not every processor can ask for a line to itself: unless the program is built for one that can,
-    // it is read, which is the same as long as nobody else has it.
-    unsafe {
-        core::arch::x86_64::_mm_prefetch::<{ core::arch::x86_64::_MM_HINT_ET0 }>(at);
-    }
-    #[cfg(target_arch = "aarch64")]
-    // SAFETY: a prefetch neither faults nor changes registers, whatever the address.
-    unsafe {
-        core::arch::asm!("prfm pstl1keep, [{}]", in(reg) at, options(nostack, preserves_flags, nomem));
-    }
-    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-    let _ = at;
 }
 
 /// Bytes of a line of a cache.
