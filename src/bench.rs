@@ -9,7 +9,7 @@ use crate::beat::collisions::{Entries, pack_collisions};
 use crate::beat::ranges::Packers;
 use crate::beat::stripe::Segment;
 use crate::beat::target::Target;
-use crate::record::end::{End, Ends, Survey};
+use crate::record::end::{Survey, Table};
 use crate::record::result::Record;
 use crate::scene::validate::{Limits, Quick, preflight};
 use crate::scene::{Bodies, Collisions, InputError, Shape, StepParameters};
@@ -20,7 +20,7 @@ use crate::step::{Results, commit};
 pub struct CollisionPacker {
     variant: Variant,
     channels: [Vec<Beat>; DMA_COUNT_MAX],
-    ends: Vec<End>,
+    ends: Table,
     statics: Vec<u32>,
 }
 
@@ -28,7 +28,7 @@ impl CollisionPacker {
     /// For one bitstream; without memory of its own yet.
     #[must_use]
     pub fn new(variant: Variant) -> Self {
-        Self { variant, channels: Default::default(), ends: Vec::new(), statics: Vec::new() }
+        Self { variant, channels: Default::default(), ends: Table::default(), statics: Vec::new() }
     }
 
     /// Packs the records of all collisions over the bitstream's channels; returns the sum of their
@@ -52,7 +52,7 @@ impl CollisionPacker {
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
         survey(target, bodies, bodies.len(), into, &mut Packers::alone());
         let entries = Entries { collisions, count, added: None, words: None };
-        pack_collisions(target, Ends(&self.ends), &entries, channels, &mut Packers::alone()).0
+        pack_collisions(target, self.ends.ends(), &entries, channels, &mut Packers::alone()).0
     }
 }
 
@@ -63,7 +63,7 @@ pub struct StepPacker {
     velocities: [Vec<Beat>; DMA_COUNT_MAX],
     collisions: [Vec<Beat>; DMA_COUNT_MAX],
     poses: [Vec<Beat>; DMA_COUNT_MAX],
-    ends: Vec<End>,
+    ends: Table,
     statics: Vec<u32>,
     packers: Packers,
 }
@@ -87,7 +87,7 @@ impl StepPacker {
             velocities: Default::default(),
             collisions: Default::default(),
             poses: Default::default(),
-            ends: Vec::new(),
+            ends: Table::default(),
             statics: Vec::new(),
             packers: Packers::new(threads),
         }
@@ -173,7 +173,7 @@ impl StepPacker {
         let entries = Entries { collisions, count, added, words: None };
         pack_collisions(
             target,
-            Ends(&self.ends),
+            self.ends.ends(),
             &entries,
             &mut channels[active],
             &mut self.packers,
@@ -202,7 +202,7 @@ impl Unpacker {
             let one = Beat([0x3F80_0000; 4]);
             channel.resize(layout.beats_on_channel(bodies.len(), place), one);
         }
-        let (mut ends, mut statics) = (Vec::new(), Vec::new());
+        let (mut ends, mut statics) = (Table::default(), Vec::new());
         let target = Target { variant: &variant, shapes, quick: None };
         let into = Survey { ends: &mut ends, statics: &mut statics };
         survey(target, bodies, bodies.len(), into, &mut Packers::alone());

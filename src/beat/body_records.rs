@@ -71,6 +71,7 @@ impl<'a, 'b> Poses<'a, 'b> {
 }
 
 /// The velocity records of bodies.
+#[derive(Clone, Copy)]
 struct Isotropic<'a>(&'a [Body]);
 
 impl Records<{ velocity::ROWS }> for Isotropic<'_> {
@@ -86,6 +87,7 @@ impl Records<{ velocity::ROWS }> for Isotropic<'_> {
 }
 
 /// The same, with their inertia.
+#[derive(Clone, Copy)]
 struct World<'a> {
     bodies: &'a [Body],
     shapes: &'a [Shape],
@@ -105,6 +107,7 @@ impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
 }
 
 /// The pose records of bodies.
+#[derive(Clone, Copy)]
 struct OfPoses<'a>(&'a [Body]);
 
 impl Records<{ pose::ROWS }> for OfPoses<'_> {

@@ -2,15 +2,18 @@
 
 use bitstream_model::interface::record::{collision, relative};
 
-use super::format::Records;
+use super::format::{Format, Records};
 use crate::platform::Lanes;
-use crate::record::end::{End, Ends};
+use crate::record::end::{End, Ends, Lookup};
 use crate::record::{self, Integer, Record, Rows};
 use crate::scene::validate::{Block, Look, Quick, Reach};
 use crate::scene::{Collision, Lying, Next};
 
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
+    /// Where the bodies of a collision are looked up whose record is sent in a format.
+    type Ends<'a, F: Format>: Lookup<'a>;
+
     /// The record of collision `index`.
     fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<ROWS>;
 
@@ -26,6 +29,8 @@ pub(super) trait Kind<const ROWS: usize>: Copy {
 pub(super) struct Absolute;
 
 impl Kind<{ collision::ROWS }> for Absolute {
+    type Ends<'a, F: Format> = F::Ends<'a>;
+
     #[inline(always)]
     fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ collision::ROWS }> {
         record::collision::encode(from, ends)
@@ -47,9 +52,11 @@ impl Kind<{ collision::ROWS }> for Absolute {
 pub(super) struct Relative;
 
 impl Kind<{ relative::ROWS }> for Relative {
+    type Ends<'a, F: Format> = F::Ends<'a>;
+
     #[inline(always)]
     fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
-        of_bodies(from, ends, record::bodies(from))
+        of_bodies(from, ends, || record::bodies(from))
     }
 
     #[inline(always)]
@@ -68,12 +75,12 @@ impl Kind<{ relative::ROWS }> for Relative {
 fn of_bodies(
     from: &Collision,
     [a, b]: [&End; 2],
-    bodies: [Integer; 2],
+    bodies: impl FnOnce() -> [Integer; 2],
 ) -> Record<{ relative::ROWS }> {
     // Whether it does is mostly foreseen, as few collisions are with what never moves or nearly all are: a
     // jump costs less then than to choose.
     let ends = if a.is_static() | b.is_static() { anchors(a, b) } else { [a, b] };
-    record::relative::encode(from, ends, bodies)
+    record::relative::encode(from, ends, bodies())
 }
 
 /// The ends that a record is made from where one never moves.
@@ -88,11 +95,14 @@ fn anchors<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
 pub(super) struct Worded<'a>(pub(super) &'a [[u32; 2]]);
 
 impl Kind<{ relative::ROWS }> for Worded<'_> {
+    /// What is sent is not by what they are looked up.
+    type Ends<'a, F: Format> = Ends<'a>;
+
     #[inline(always)]
     fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
         let [word_a, word_b] = self.0[index];
         let words = Lanes::new([word_a, word_b, 0, 0]);
-        of_bodies(from, ends, [Integer::new::<0>(words), Integer::new::<1>(words)])
+        of_bodies(from, ends, || [Integer::new::<0>(words), Integer::new::<1>(words)])
     }
 
     #[inline(always)]
@@ -108,23 +118,24 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
 
 /// The ends of a collision's bodies.
 #[inline(always)]
-fn both<'a>(ends: Ends<'a>, collision: &Collision) -> [&'a End; 2] {
+fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
     [ends.get(collision.body_a), ends.get(collision.body_b)]
 }
 
 /// The records of a block of collisions. What is behind it is fetched meanwhile.
-pub(super) struct Encoding<'p, K, L> {
+#[derive(Clone, Copy)]
+pub(super) struct Encoding<K, L, E> {
     kind: K,
     first: usize,
     collisions: L,
-    ends: Ends<'p>,
+    ends: E,
 }
 
-impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
-    /// Those of a block.
+impl<'p, K, L: Lying<'p>, E: Lookup<'p>> Encoding<K, L, E> {
+    /// Those of a block, whose bodies are looked up here.
     #[inline(always)]
-    pub(super) fn new(kind: K, block: &Block<'p, L>) -> Self {
-        let Block { first, collisions, ends, .. } = *block;
+    pub(super) fn new(kind: K, block: &Block<'p, L>, ends: E) -> Self {
+        let Block { first, collisions, .. } = *block;
         Self { kind, first, collisions, ends }
     }
 
@@ -155,7 +166,8 @@ impl<'p, K, L: Lying<'p>> Encoding<'p, K, L> {
                     let collision = these[$at];
                     let ends = both(self.ends, collision);
                     let record = self.kind.encode(first + $at, collision, ends);
-                    witness.see(&record, collision, ends);
+                    let known = self.ends.has([collision.body_a, collision.body_b]);
+                    witness.see(&record, collision, ends, known);
                     record.give(to);
                 })*
             };
@@ -170,8 +182,8 @@ trait Witness<K: Kind<ROWS>, const ROWS: usize> {
     /// Whether that takes longer than to make the record.
     const SLOW: bool;
 
-    /// Sees the record of a collision, whose ends these are.
-    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2]);
+    /// Sees the record of a collision, whose ends these are, if it is `known`.
+    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], known: bool);
 }
 
 /// Nobody.
@@ -179,10 +191,12 @@ impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for () {
     const SLOW: bool = false;
 
     #[inline(always)]
-    fn see(&mut self, _: &Record<ROWS>, _: &Collision, _: [&End; 2]) {}
+    fn see(&mut self, _: &Record<ROWS>, _: &Collision, _: [&End; 2], _: bool) {}
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Encoding<'p, K, L> {
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, const ROWS: usize> Records<ROWS>
+    for Encoding<K, L, E>
+{
     #[inline(always)]
     fn len(&self) -> usize {
         self.collisions.len()
@@ -195,6 +209,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for Encod
 }
 
 /// Whoever looks at them as validation does.
+#[derive(Clone, Copy)]
 struct Looking<'p> {
     quick: &'p Quick<'p>,
     look: Look<'p>,
@@ -205,8 +220,8 @@ impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for Looking<'_> {
     const SLOW: bool = true;
 
     #[inline(always)]
-    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2]) {
-        self.look.head(collision, ends, self.scheduled);
+    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], known: bool) {
+        self.look.head(collision, ends, known, self.scheduled);
         self.look.numbers(K::beyond(self.quick, &record.rows, collision.count));
         if self.look.asks_how_far() {
             self.look.reach(&K::reach(&record.rows, collision.count), ends);
@@ -215,14 +230,15 @@ impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for Looking<'_> {
 }
 
 /// The same records, looked at on their way.
-pub(super) struct LookedAt<'p, K, L> {
-    records: Encoding<'p, K, L>,
+#[derive(Clone, Copy)]
+pub(super) struct LookedAt<'p, K, L, E> {
+    records: Encoding<K, L, E>,
     looking: Looking<'p>,
 }
 
-impl<'p, K: Copy, L: Lying<'p>> LookedAt<'p, K, L> {
+impl<'p, K: Copy, L: Lying<'p>, E: Lookup<'p>> LookedAt<'p, K, L, E> {
     #[inline(always)]
-    pub(super) fn new(records: Encoding<'p, K, L>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
+    pub(super) fn new(records: Encoding<K, L, E>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
         Self { records, looking: Looking { quick, look: Look::new(quick), scheduled } }
     }
 
@@ -247,7 +263,9 @@ impl<'p, K: Copy, L: Lying<'p>> LookedAt<'p, K, L> {
     }
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Records<ROWS> for LookedAt<'p, K, L> {
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, const ROWS: usize> Records<ROWS>
+    for LookedAt<'p, K, L, E>
+{
     #[inline(always)]
     fn len(&self) -> usize {
         self.records.collisions.len()

@@ -11,11 +11,12 @@ use bitstream_model::interface::record::Beat;
 
 use super::collision_records::{Absolute, Encoding, Kind, LookedAt, Relative, Worded};
 use super::deal::{BLOCK, Dealer, MANY};
+use super::format::{Format, in_format};
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stripe::Segment;
 use super::target::Target;
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
-use crate::record::end::Ends;
+use crate::record::end::{Ends, Lookup as _};
 use crate::scene::validate::{Block, Quick};
 use crate::scene::{Collision, Collisions, InArray, InNearbyOrder, InOrder, Lying, Structures};
 
@@ -35,7 +36,8 @@ pub(crate) struct Entries<'a, C: ?Sized> {
 /// Writes the records of collisions; the sum of the words written, modulo 2^32, and whether
 /// validation refuses none.
 ///
-/// A body that does not exist has its position written as zeros, and one without a shape is static.
+/// A body that does not exist has its position written as zeros, and one without a shape is static. Where
+/// indices are sent in sixteen bits, the lower halves of them count.
 /// Should a caller's [`Collisions`] answer differently from one look to the next, validation looks at
 /// what is written; of what looks like padding it refuses more than the order added.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
@@ -74,6 +76,9 @@ pub(super) struct Seen {
 impl Seen {
     /// Of none.
     const NOTHING: Self = Self { good: true, paddings: 0 };
+
+    /// Of what cannot be written.
+    const REFUSED: Self = Self { good: false, paddings: 0 };
 
     fn and(self, other: Self) -> Self {
         Self { good: self.good & other.good, paddings: self.paddings + other.paddings }
@@ -219,10 +224,18 @@ struct Writing<'p, 'a, 'b, K, L, const ROWS: usize> {
 impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_, '_, K, L, ROWS> {
     type Output = Seen;
 
-    /// Encodes, looks at and deals out, block by block. Those behind are on their way meanwhile.
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> Seen {
+        in_format!(self.dealer.format(), F => self.run_as::<V, F>(vectors))
+    }
+}
+
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, L, ROWS> {
+    /// Encodes, looks at and deals out, block by block. Those behind are on their way meanwhile.
+    #[inline(always)]
+    fn run_as<V: Vectors, F: Format>(self, vectors: V) -> Seen {
         let Self { kind, quick, all, dealer, .. } = self;
+        let Some(ends) = K::Ends::<'p, F>::of(all.ends) else { return Seen::REFUSED };
         let mut seen = Seen::NOTHING;
         // Validation goes by blocks. Without it, as packing alone is measured, there is nothing to be done
         // for each that is worth it.
@@ -230,13 +243,13 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_
         for at in (0..all.collisions.len()).step_by(size) {
             let collisions = all.collisions.part(at..at + size);
             let block = Block { first: all.first + at, collisions, ..all };
-            let mut records = Encoding::new(kind, &block);
+            let mut records = Encoding::new(kind, &block, ends);
             let Some(quick) = quick else {
-                dealer.write(vectors, &mut records);
+                dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
                 continue;
             };
             let mut records = LookedAt::new(records, quick, block.scheduled);
-            dealer.write(vectors, &mut records);
+            dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
             seen = seen.and(Seen { paddings: records.paddings(), good: records.good(&block) });
         }
         seen

@@ -9,7 +9,7 @@ use std::mem;
 
 use bitstream_model::interface::record::Beat;
 
-use super::format::{Beats, Binary16, Format, Records, Thesis16, Whole};
+use super::format::{Beats, Format, Records, in_format};
 use super::pattern::Pattern;
 use super::stripe::{Deal, Layout};
 use super::unit;
@@ -64,16 +64,18 @@ impl<'a, 'b> Dealer<'a, 'b> {
         vectors: V,
         records: &mut R,
     ) {
-        // One loop each, in which nothing is asked of the format.
-        match self.format {
-            None => self.write_as::<V, Whole, R, ROWS>(vectors, records),
-            Some(Sixteen::Binary16) => self.write_as::<V, Binary16, R, ROWS>(vectors, records),
-            Some(Sixteen::Thesis16) => self.write_as::<V, Thesis16, R, ROWS>(vectors, records),
-        }
+        in_format!(self.format, F => self.write_as::<V, F, R, ROWS>(vectors, records));
     }
 
+    /// The format in which they are written, if its words have sixteen bits.
     #[inline(always)]
-    fn write_as<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
+    pub(super) const fn format(&self) -> Option<Sixteen> {
+        self.format
+    }
+
+    /// As [`Self::write`], in this format, which is [`Self::format`].
+    #[inline(always)]
+    pub(super) fn write_as<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
         &mut self,
         vectors: V,
         records: &mut R,
@@ -150,6 +152,7 @@ mod tests {
     const ROWS: usize = 3;
 
     /// Records of three rows, whose first word is an integer.
+    #[derive(Clone, Copy)]
     struct Made<'a>(&'a [[[u32; LANES]; ROWS]]);
 
     impl Records<ROWS> for Made<'_> {

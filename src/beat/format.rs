@@ -5,13 +5,15 @@ use std::marker::PhantomData;
 use bitstream_model::interface::record::Beat;
 
 use crate::platform::{Lanes, Vectors};
+use crate::record::end::{Ends, Lookup, LowEnds};
 use crate::record::sixteen::Sixteen;
 use crate::record::{Row, Rows};
 
 /// Records on their way.
 ///
-/// `some` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
-pub(super) trait Records<const ROWS: usize> {
+/// `some` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation. A loop has
+/// a copy of its own, which no pointer leads to: it lies in registers.
+pub(super) trait Records<const ROWS: usize>: Copy {
     /// How many there are.
     fn len(&self) -> usize;
 
@@ -27,6 +29,9 @@ pub(super) trait Records<const ROWS: usize> {
 pub(super) trait Format {
     /// Rows of a beat.
     const PER_BEAT: usize;
+
+    /// Where bodies are looked up whose indices are sent in it.
+    type Ends<'a>: Lookup<'a>;
 
     /// The beat of so many rows, the first of these. An `#[inline(always)]` belongs to every implementation.
     fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat;
@@ -74,11 +79,35 @@ impl<V: Vectors, F: Format> Beats<V, F> {
     }
 }
 
+/// Does `$work` in the format that the words of a stream have, which it knows as `$name`.
+macro_rules! in_format {
+    ($format:expr, $name:ident => $work:expr) => {
+        // One loop each, in which nothing is asked of the format.
+        match $format {
+            None => {
+                type $name = $crate::beat::format::Whole;
+                $work
+            }
+            Some($crate::record::sixteen::Sixteen::Binary16) => {
+                type $name = $crate::beat::format::Binary16;
+                $work
+            }
+            Some($crate::record::sixteen::Sixteen::Thesis16) => {
+                type $name = $crate::beat::format::Thesis16;
+                $work
+            }
+        }
+    };
+}
+pub(super) use in_format;
+
 /// Words of f32.
 pub(super) struct Whole;
 
 impl Format for Whole {
     const PER_BEAT: usize = 1;
+
+    type Ends<'a> = Ends<'a>;
 
     #[inline(always)]
     fn beat<V: Vectors>(_: V, [row, _]: [Row; 2]) -> Beat {
@@ -106,6 +135,8 @@ macro_rules! sixteen {
     ($format:ident) => {
         impl Format for $format {
             const PER_BEAT: usize = 2;
+
+            type Ends<'a> = LowEnds<'a>;
 
             #[inline(always)]
             fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat {

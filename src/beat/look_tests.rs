@@ -13,7 +13,7 @@ use crate::interface::profile::{
 };
 use crate::interface::record::Beat;
 use crate::order::{Ordered, Schedule};
-use crate::record::end::{End, Ends, Survey};
+use crate::record::end::{Ends, Survey, Table};
 use crate::scene::validate::{Limits, Quick, preflight, validate};
 use crate::scene::{
     Body, Collision, Collisions, Contact, InputError, Pose, Shape, StepParameters, Velocity,
@@ -130,6 +130,11 @@ prop_compose! {
             300 => (0_u32..40, 1_u32..40).prop_map(|(a, by)| [a, (a + by) % 40]),
             1 => [0_u32..42, 0_u32..42],
             1 => [any::<u32>(), any::<u32>()],
+            // Whose lower halves are those of bodies that there are.
+            1 => (0_u32..40, 1_u32..40, 1_u32..4).prop_map(|(a, by, beyond)| {
+                let [a, b] = [a, (a + by) % 40];
+                [a | (beyond & 1) << 16, b | (beyond & 2) << 30]
+            }),
         ],
         normal in prop_oneof![
             300 => Just([0.0_f32, -1.0, 0.0]),
@@ -167,14 +172,13 @@ fn views(buffers: &mut [Vec<Beat>]) -> Vec<&mut [Beat]> {
 /// Whether packing refuses none of these, whose beats are the same when nobody looks.
 fn looked_at<C: Collisions + ?Sized>(
     target: Target<'_>,
-    ends: &[End],
+    ends: Ends<'_>,
     entries: &Entries<'_, C>,
 ) -> bool {
     let packed = |target: Target<'_>| {
         let mut channels = buffers(target.variant, Segment::Collisions, entries.count);
         let views = &mut views(&mut channels);
-        let (sum, good) =
-            pack_collisions(target, Ends(ends), entries, views, &mut Packers::alone());
+        let (sum, good) = pack_collisions(target, ends, entries, views, &mut Packers::alone());
         ((channels, sum), good)
     };
     let (beats, good) = packed(target);
@@ -194,7 +198,7 @@ fn said(
     let quick = Quick::new(scene);
     let variant = &limits.variant;
     let target = Target { variant, shapes, quick: Some(&quick) };
-    let (mut ends, mut statics) = (Vec::new(), Vec::new());
+    let (mut ends, mut statics) = (Table::default(), Vec::new());
     let count = bodies.len();
     let mut velocities = buffers(variant, Segment::Velocities, count);
     let mut poses = buffers(variant, Segment::Poses, count);
@@ -210,19 +214,21 @@ fn said(
         |body: &Body| shapes.get(body.shape as usize).is_some_and(|shape| !shape.is_static());
     let still = (0..).zip(bodies).filter(|(_, body)| !moves(body)).map(|(at, _)| at);
     assert_eq!(statics, still.collect::<Vec<u32>>());
-    let (mut other_ends, mut other_statics) = (vec![End::MISSING], vec![7]);
+    let (mut other_ends, mut other_statics) = (Table::default(), vec![7]);
     let into = Survey { ends: &mut other_ends, statics: &mut other_statics };
     assert_eq!(survey(target, bodies, count, into, &mut Packers::alone()), bodies_good);
-    assert_eq!((other_ends.len(), other_statics), (ends.len(), statics));
+    // As bytes: a position may be no number.
+    let bytes = |ends: &Table| bytemuck::cast_slice::<_, u8>(ends.of_bodies()).to_vec();
+    assert_eq!((bytes(&other_ends), other_statics), (bytes(&ends), statics));
     let good = match schedule {
         None => {
             let count = collisions.len();
-            looked_at(target, &ends, &Entries { collisions, count, added: None, words: None })
+            looked_at(target, ends.ends(), &Entries { collisions, count, added: None, words: None })
         }
         Some(schedule) => {
             let collisions = &Ordered { collisions, schedule };
             let (count, added) = (schedule.len(), Some(schedule.empty()));
-            looked_at(target, &ends, &Entries { collisions, count, added, words: None })
+            looked_at(target, ends.ends(), &Entries { collisions, count, added, words: None })
         }
     };
     Some((bodies_good & good, validate(bodies, collisions, shapes, &parameters, limits)))

@@ -14,7 +14,7 @@ use crate::interface::profile::{
     FLOAT, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,
 };
 use crate::interface::record::Beat;
-use crate::record::end::{Ends, Survey};
+use crate::record::end::{Survey, Table};
 use crate::scene::{
     Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
     Structures, Velocity,
@@ -290,12 +290,12 @@ fn entries(
     words: Option<&[[u32; 2]]>,
 ) -> Vec<Vec<Beat>> {
     let count = collisions.len();
-    let (mut ends, mut statics) = (Vec::new(), Vec::new());
+    let (mut ends, mut statics) = (Table::default(), Vec::new());
     let into = Survey { ends: &mut ends, statics: &mut statics };
     survey(target(spec), bodies, bodies.len(), into, &mut Packers::alone());
     let entries = Entries { collisions, count, added: None, words };
     packed(spec, Segment::Collisions, count, |views| {
-        pack_collisions(target(spec), Ends(&ends), &entries, views, &mut Packers::alone()).0
+        pack_collisions(target(spec), ends.ends(), &entries, views, &mut Packers::alone()).0
     })
 }
 

@@ -14,7 +14,7 @@ use super::stripe::Segment;
 use super::target::Target;
 use crate::interface::profile::{Geometry, Inertia, PROFILES, Variant};
 use crate::interface::record::Beat;
-use crate::record::end::{End, Ends, Survey};
+use crate::record::end::{End, Ends, Survey, Table};
 use crate::scene::validate::{Limits, Quick, preflight};
 use crate::scene::{
     Body, Collision, Collisions, Contact, Pose, Shape, StepParameters, Structures, Velocity,
@@ -125,7 +125,7 @@ struct Packed {
     channels: Vec<Vec<Beat>>,
     sums: [u32; 5],
     good: [bool; 4],
-    ends: [Vec<End>; 2],
+    ends: [Table; 2],
     statics: [Vec<u32>; 2],
 }
 
@@ -138,7 +138,8 @@ impl Input {
         let quick = quick.expect("nothing else is wrong");
         let target = Target { variant: &limits.variant, shapes: &SHAPES, quick: Some(&quick) };
         // What an earlier step has left is longer or shorter.
-        let mut ends = [vec![End::at([7.0; 3]); 3000], vec![]];
+        let mut ends = [Table::default(), Table::default()];
+        Survey { ends: &mut ends[0], statics: &mut Vec::new() }.ends(3000).fill(End::at([7.0; 3]));
         let mut statics = [vec![7; 3000], vec![]];
         let [first, second] = ends.each_mut();
         let [first_statics, second_statics] = statics.each_mut();
@@ -160,7 +161,7 @@ impl Input {
         let views_of = &mut views(&mut some_poses);
         let (of_other, other_good) = pack_poses(target, &chosen, order.len(), views_of, packers);
 
-        let ends_of = Ends(&ends[0]);
+        let ends_of = ends[0].ends();
         let (records, (of_records, good)) = self.records(target, ends_of, collisions, packers);
         // In an order, whether they are looked at or not, they are those copied in it.
         let unchecked = Target { quick: None, ..target };

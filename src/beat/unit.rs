@@ -112,7 +112,7 @@ mod tests {
     use bitstream_model::interface::profile::{Inertia, PROFILES, Variant};
 
     use super::super::deal::BLOCK;
-    use super::super::format::{Binary16, Thesis16, Whole};
+    use super::super::format::in_format;
     use super::super::stripe::{Layout, Segment};
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
@@ -149,6 +149,7 @@ mod tests {
     }
 
     /// A block of records of zeros.
+    #[derive(Clone, Copy)]
     struct Zeros;
 
     impl<const ROWS: usize> Records<ROWS> for Zeros {
@@ -177,15 +178,9 @@ mod tests {
             let mut beats = vec![Beat::default(); 4 * BLOCK * ROWS];
             let mut rest: Vec<&mut [Beat]> = beats.chunks_mut(BLOCK * ROWS).collect();
             let sum = &mut Lanes::all(0);
-            match Sixteen::of(layout.format) {
-                None => write::<_, Whole, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum),
-                Some(Sixteen::Binary16) => {
-                    write::<_, Binary16, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum)
-                }
-                Some(Sixteen::Thesis16) => {
-                    write::<_, Thesis16, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum)
-                }
-            }
+            in_format!(Sixteen::of(layout.format), F => {
+                write::<_, F, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum)
+            })
         }
     }
 

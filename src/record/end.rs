@@ -35,8 +35,7 @@ impl End {
 
     /// That of a body.
     #[inline(always)]
-    fn of(body: &Body, tags: &Tags<'_>) -> Self {
-        let tag = tags.of(body.shape);
+    fn of(body: &Body, tag: u32) -> Self {
         bytemuck::cast(Beat::from(row_of::<POSITION, _>(body).beside(tag)))
     }
 
@@ -92,30 +91,77 @@ impl<'a> Tags<'a> {
         Self { first, shapes }
     }
 
-    #[inline(always)]
-    fn of(&self, shape: u32) -> u32 {
-        let known = usize::try_from(shape).ok().and_then(|shape| self.first.get(shape));
-        known.copied().unwrap_or_else(|| tag_of(shape, self.shapes))
-    }
-
     /// Makes the ends of bodies; whether any of these never moves, as one without a shape does not.
     #[inline(always)]
     pub(crate) fn ends(&self, bodies: &[Body], ends: &mut [End]) -> bool {
-        let mut any = 0;
+        let (mut tags, mut shapes) = (0, 0);
         for (end, body) in ends.iter_mut().zip(bodies) {
-            *end = End::of(body, self);
-            any |= end.tag;
+            // Without a jump; a shape that is not looked up is seen behind the loop.
+            let tag = self.first[body.shape as usize % LOOKED_UP];
+            *end = End::of(body, tag);
+            tags |= tag;
+            shapes |= body.shape;
         }
-        any & STATIC != 0
+        if shapes as usize >= LOOKED_UP {
+            tags = self.each(bodies, ends);
+        }
+        tags & STATIC != 0
+    }
+
+    /// The same of any shapes; the bits of all tags.
+    #[cold]
+    #[inline(never)]
+    fn each(&self, bodies: &[Body], ends: &mut [End]) -> u32 {
+        let mut tags = 0;
+        for (end, body) in ends.iter_mut().zip(bodies) {
+            let tag = tag_of(body.shape, self.shapes);
+            *end = End::of(body, tag);
+            tags |= tag;
+        }
+        tags
     }
 }
 
 /// The tag of bodies of a shape.
-#[inline(never)]
 fn tag_of(shape: u32, shapes: &[Shape]) -> u32 {
     match usize::try_from(shape).ok().and_then(|shape| shapes.get(shape)) {
         Some(of) => shape | if of.is_static() { STATIC } else { 0 },
         None => NO_SHAPE,
+    }
+}
+
+/// Bodies that an index of sixteen bits may name.
+const LOW: usize = 1 << u16::BITS;
+
+/// The ends of all bodies of a step. Kept, so that a step allocates nothing.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Table {
+    /// At least [`LOW`] of them, from the first step on; [`End::MISSING`] where there is no body.
+    ends: Vec<End>,
+    /// How many bodies there are.
+    count: usize,
+}
+
+impl Table {
+    /// Those of so many bodies, all of which are written now.
+    fn anew(&mut self, count: usize) -> &mut [End] {
+        if let Some(gone) = self.ends.get_mut(count..self.count) {
+            gone.fill(End::MISSING);
+        }
+        self.ends.resize(count.max(LOW), End::MISSING);
+        self.count = count;
+        &mut self.ends[..count]
+    }
+
+    /// To look up.
+    pub(crate) fn ends(&self) -> Ends<'_> {
+        Ends(&self.ends)
+    }
+
+    /// That of each body.
+    #[cfg(test)]
+    pub(crate) fn of_bodies(&self) -> &[End] {
+        &self.ends[..self.count]
     }
 }
 
@@ -124,7 +170,7 @@ fn tag_of(shape: u32, shapes: &[Shape]) -> u32 {
 #[derive(Debug)]
 pub(crate) struct Survey<'a> {
     /// What the records of collisions take of each.
-    pub(crate) ends: &'a mut Vec<End>,
+    pub(crate) ends: &'a mut Table,
     /// Indices of those that never move, upwards.
     pub(crate) statics: &'a mut Vec<u32>,
 }
@@ -133,35 +179,53 @@ impl Survey<'_> {
     /// The ends of so many bodies, all of which are written before [`Self::settle`].
     pub(crate) fn ends(&mut self, count: usize) -> &mut [End] {
         self.statics.clear();
-        self.ends.resize(count, End::MISSING);
-        self.ends
+        self.ends.anew(count)
     }
 
     /// Finds those that never move, which are all among these.
     pub(crate) fn settle(&mut self, among: Range<usize>) {
-        let ends = self.ends.get(among.clone()).unwrap_or_default();
+        let ends = self.ends.ends.get(among.clone()).unwrap_or_default();
         // No bitstream has more bodies than u32 counts.
         let still = among.zip(ends).filter(|(_, end)| end.is_static());
         self.statics.extend(still.filter_map(|(at, _)| u32::try_from(at).ok()));
     }
 }
 
-/// The ends of all bodies of a step, to look up.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Ends<'a>(pub(crate) &'a [End]);
+/// Ends to look up by the indices of a collision's bodies.
+///
+/// All of it is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
+pub(crate) trait Lookup<'a>: Copy {
+    /// Among the ends of all bodies. There is none only before the first [`Survey`].
+    fn of(all: Ends<'a>) -> Option<Self>;
 
-impl<'a> Ends<'a> {
-    /// Says that those of these bodies are asked for soon.
-    #[inline(always)]
-    pub(crate) fn soon(self, bodies: [u32; 2]) {
-        for body in bodies {
-            fetch(self.0.as_ptr().wrapping_add(body as usize));
-        }
-    }
+    /// Whether it has each body that these may name.
+    fn has(self, bodies: [u32; 2]) -> bool;
 
     /// That of one body.
+    fn get(self, body: u32) -> &'a End;
+
+    /// Says that those of these bodies are asked for soon.
+    fn soon(self, bodies: [u32; 2]);
+}
+
+/// The ends of all bodies of a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ends<'a>(&'a [End]);
+
+impl<'a> Lookup<'a> for Ends<'a> {
     #[inline(always)]
-    pub(crate) fn get(self, body: u32) -> &'a End {
+    fn of(all: Self) -> Option<Self> {
+        Some(all)
+    }
+
+    /// Those that there are not are found to be missing.
+    #[inline(always)]
+    fn has(self, _: [u32; 2]) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn get(self, body: u32) -> &'a End {
         match usize::try_from(body).ok().and_then(|body| self.0.get(body)) {
             Some(end) => end,
             None => {
@@ -171,11 +235,74 @@ impl<'a> Ends<'a> {
             }
         }
     }
+
+    #[inline(always)]
+    fn soon(self, bodies: [u32; 2]) {
+        for body in bodies {
+            fetch(self.0.as_ptr().wrapping_add(body as usize));
+        }
+    }
+}
+
+/// The ends of the bodies that indices of sixteen bits may name. Of an index the lower half is taken, as in
+/// the records of such indices, so that there is one for each without a look at how many there are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LowEnds<'a>(&'a [End; LOW]);
+
+impl<'a> Lookup<'a> for LowEnds<'a> {
+    #[inline(always)]
+    fn of(Ends(all): Ends<'a>) -> Option<Self> {
+        all.first_chunk().map(Self)
+    }
+
+    #[inline(always)]
+    fn has(self, [a, b]: [u32; 2]) -> bool {
+        ((a | b) as usize) < LOW
+    }
+
+    #[inline(always)]
+    fn get(self, body: u32) -> &'a End {
+        &self.0[body as usize % LOW]
+    }
+
+    #[inline(always)]
+    fn soon(self, bodies: [u32; 2]) {
+        Ends(self.0).soon(bodies);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A step whose bodies are at these places.
+    fn surveyed(table: &mut Table, places: impl ExactSizeIterator<Item = f32>) {
+        let mut statics = Vec::new();
+        let mut survey = Survey { ends: table, statics: &mut statics };
+        let ends = survey.ends(places.len());
+        ends.iter_mut().zip(places).for_each(|(end, x)| *end = End::at([x; 3]));
+    }
+
+    #[test]
+    fn bodies_are_found_and_those_of_an_earlier_step_are_not() {
+        let mut table = Table::default();
+        for count in [3, LOW - 1, LOW, LOW + 1, 2 * LOW, 5, 0, 7] {
+            surveyed(&mut table, (0..count).map(|at| at as f32));
+            assert_eq!(table.of_bodies().len(), count);
+            let ends = table.ends();
+            let low = LowEnds::of(ends).expect("it was surveyed");
+            for at in [0, 1, count.wrapping_sub(1), count, count + 1, LOW - 1, LOW, 3 * LOW] {
+                let Ok(body) = u32::try_from(at) else { continue };
+                let end =
+                    |at: usize| if at < count { End::at([at as f32; 3]) } else { End::MISSING };
+                assert_eq!(*ends.get(body), end(at), "{at} of {count}");
+                assert_eq!(*low.get(body), end(at % LOW), "{at} of {count}");
+                assert!(ends.has([body, 0]) && ends.has([0, body]));
+                assert_eq!([low.has([body, 0]), low.has([0, body])], [at < LOW; 2]);
+            }
+        }
+        assert!(LowEnds::of(Table::default().ends()).is_none());
+    }
 
     /// A bitstream may have more shapes than are looked up.
     #[test]

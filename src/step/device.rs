@@ -21,7 +21,7 @@ use crate::error::OpenError;
 use crate::platform::{
     Access, AccessCounts, Platform, PlatformError, RegisterMap, Window, release_to_device,
 };
-use crate::record::end::End;
+use crate::record::end::Table;
 use crate::scene::StepParameters;
 
 /// Status registers of all channels: S2MM first, then MM2S.
@@ -73,7 +73,7 @@ pub(crate) struct Device {
     /// Who writes the records.
     pub(super) packers: Packers,
     /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
-    pub(super) ends: Vec<End>,
+    pub(super) ends: Table,
     /// Those of the step in each bank that never move, by their indices, upwards.
     pub(super) statics: PerBank<Vec<u32>>,
 }
@@ -143,7 +143,7 @@ impl Device {
             cancellation: None,
             largest: largest_piece(capabilities.length_width),
             packers: Packers::new(None),
-            ends: Vec::new(),
+            ends: Table::default(),
             statics: PerBank::default(),
         }
     }

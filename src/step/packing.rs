@@ -12,7 +12,7 @@ use crate::beat::collisions::{Entries, pack_collisions};
 use crate::beat::target::Target;
 use crate::beat::writer::Writer;
 use crate::order::Lives;
-use crate::record::end::{Ends, Survey};
+use crate::record::end::Survey;
 use crate::scene::validate::Quick;
 use crate::scene::{Bodies, Collisions, InputError, Shape};
 
@@ -69,7 +69,7 @@ impl Device {
         let words = lives.map(Lives::words);
         let of_entries = Entries { collisions, count: plan.collisions, added, words };
         let (collisions, good) =
-            pack_collisions(target, Ends(&self.ends), &of_entries, &mut entries[active], packers);
+            pack_collisions(target, self.ends.ends(), &of_entries, &mut entries[active], packers);
         (Sent { velocities, collisions, poses }, bodies_good & good)
     }
 
@@ -94,7 +94,7 @@ impl Device {
             refuse()?;
             return Err(InputError::Unsteady);
         }
-        let (ends, entries) = (Ends(&self.ends), &mut entries[active]);
+        let (ends, entries) = (self.ends.ends(), &mut entries[active]);
         let mut writer = Writer::new(target, ends, plan.collisions, entries);
         narrow_phase(&mut writer);
         let (collisions, count) = writer.finish()?;

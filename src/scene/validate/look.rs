@@ -9,6 +9,7 @@ use crate::record::end::End;
 use crate::scene::{Collision, Lying};
 
 /// What has been seen of the collisions of a block.
+#[derive(Clone, Copy)]
 pub(crate) struct Look<'a> {
     quick: &'a Quick<'a>,
     /// Whether [`head`] is right for all of them but padding.
@@ -35,11 +36,18 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// Looks at normal, count and bodies of the next. Where collisions are `scheduled`, it may be padding.
+    /// Looks at normal, count and bodies of the next, whose ends these are if it is `known`. Where
+    /// collisions are `scheduled`, it may be padding.
     #[inline(always)]
-    pub(crate) fn head(&mut self, collision: &Collision, ends: [&End; 2], scheduled: bool) {
+    pub(crate) fn head(
+        &mut self,
+        collision: &Collision,
+        ends: [&End; 2],
+        known: bool,
+        scheduled: bool,
+    ) {
         let padding = scheduled & is_padding(collision);
-        self.heads &= head(collision, ends) | padding;
+        self.heads &= head(collision, ends) & known | padding;
         self.paddings += usize::from(padding);
     }
 

@@ -15,7 +15,7 @@ use super::reach::{Extremes, Reach, surely_fit};
 use super::{Scene, check_whole};
 use crate::platform::Lanes;
 use crate::record;
-use crate::record::end::{End, Ends};
+use crate::record::end::{End, Ends, Lookup};
 use crate::record::largest::{Largest, MAGNITUDE};
 use crate::scene::{Body, Collision, InputError, Lying};
 

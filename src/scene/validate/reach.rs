@@ -77,6 +77,7 @@ pub(super) fn surely_fit(reach: &Reach, shapes: [&Shape; 2], flush: bool) -> boo
 }
 
 /// The furthest that any of some collisions reaches.
+#[derive(Clone, Copy)]
 pub(super) struct Furthest {
     arms: Lanes,
     /// Those about bodies that move.
