@@ -27,15 +27,24 @@ pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
     macro_rules! unit {
         ($places:ident: $records:literal are $beats:literal: $($channel:ident $share:literal),*) => {
             if const { $records * ROWS == $beats * F::PER_BEAT } {
-                let count = records.len() / $records;
-                let mut rest = rest.iter_mut();
-                $(let Some($channel) = part::<$share>(rest.next(), count) else { return 0 };)*
-                for at in 0..count {
-                    unit::<pattern::$places, V, F, R, ROWS, $records, $beats, _>(
-                        vectors, records, at, [$(&mut $channel[at]),*], sum,
-                    );
-                }
-                return count * $records;
+                // As a part of all the others this loop would have hardly a register.
+                let begin = (*records, *sum);
+                let written;
+                (*records, *sum, written) = vectors.apart(move || {
+                    let (mut records, mut sum) = begin;
+                    let count = records.len() / $records;
+                    let mut rest = rest.iter_mut();
+                    $(let Some($channel) = part::<$share>(rest.next(), count) else {
+                        return (records, sum, 0);
+                    };)*
+                    for at in 0..count {
+                        unit::<pattern::$places, V, F, R, ROWS, $records, $beats, _>(
+                            vectors, &mut records, at, [$(&mut $channel[at]),*], &mut sum,
+                        );
+                    }
+                    (records, sum, count * $records)
+                });
+                return written;
             }
         };
     }

@@ -26,6 +26,10 @@ pub(crate) trait Vectors: Copy {
 
     /// The numbers of two rows of binary16, in f32.
     fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2];
+
+    /// Does it as a function of its own, which is compiled for these vectors, too: a loop that is no part of
+    /// others shares no registers with them.
+    fn apart<T>(self, work: impl FnOnce() -> T) -> T;
 }
 
 /// Those that every processor has.
@@ -41,6 +45,11 @@ impl Vectors for Baseline {
     #[inline(always)]
     fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2] {
         convert::to_f32(rows)
+    }
+
+    #[inline(never)]
+    fn apart<T>(self, work: impl FnOnce() -> T) -> T {
+        work()
     }
 }
 
@@ -78,6 +87,19 @@ mod x86 {
             // function is compiled for.
             unsafe { convert::x86::to_f32(rows) }
         }
+
+        #[inline(always)]
+        fn apart<T>(self, work: impl FnOnce() -> T) -> T {
+            // SAFETY: `apart` wants AVX2 and F16C. A `Wide` is made in `run` alone, which is called only
+            // where both were found.
+            unsafe { apart(work) }
+        }
+    }
+
+    #[target_feature(enable = "avx2,f16c")]
+    #[inline(never)]
+    fn apart<T>(work: impl FnOnce() -> T) -> T {
+        work()
     }
 
     #[target_feature(enable = "avx2,f16c")]
