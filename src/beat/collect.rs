@@ -105,7 +105,7 @@ mod tests {
     use bitstream_model::interface::profile::PROFILES;
 
     use super::super::deal::BLOCK;
-    use super::super::format::{Binary16, Thesis16, Whole};
+    use super::super::format::in_format;
     use super::super::stripe::{Layout, Segment};
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
@@ -125,15 +125,9 @@ mod tests {
             let rest = &mut [&beats[..]; 4];
             let records = &mut [Record::default(); BLOCK];
             let tally = &mut Tally { sum: Lanes::all(0), finite: Finite::new() };
-            match Sixteen::of(layout.format) {
-                None => read::<V, Whole>(pattern, vectors, rest, records, tally),
-                Some(Sixteen::Binary16) => {
-                    read::<V, Binary16>(pattern, vectors, rest, records, tally)
-                }
-                Some(Sixteen::Thesis16) => {
-                    read::<V, Thesis16>(pattern, vectors, rest, records, tally)
-                }
-            }
+            in_format!(Sixteen::of(layout.format), F => {
+                read::<V, F>(pattern, vectors, rest, records, tally)
+            })
         }
     }
 

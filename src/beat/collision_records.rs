@@ -4,7 +4,7 @@ use bitstream_model::interface::record::{collision, relative};
 
 use super::format::{Format, Records};
 use crate::platform::Lanes;
-use crate::record::end::{End, Ends, Lookup};
+use crate::record::end::{self, End, Ends};
 use crate::record::{self, Integer, Record, Rows};
 use crate::scene::validate::{Block, Look, Quick, Reach};
 use crate::scene::{Collision, Lying, Next};
@@ -12,7 +12,7 @@ use crate::scene::{Collision, Lying, Next};
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
     /// Where the bodies of a collision are looked up whose record is sent in a format.
-    type Ends<'a, F: Format>: Lookup<'a>;
+    type Lookup<'a, F: Format>: end::Lookup<'a>;
 
     /// The record of collision `index`.
     fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<ROWS>;
@@ -29,7 +29,7 @@ pub(super) trait Kind<const ROWS: usize>: Copy {
 pub(super) struct Absolute;
 
 impl Kind<{ collision::ROWS }> for Absolute {
-    type Ends<'a, F: Format> = F::Ends<'a>;
+    type Lookup<'a, F: Format> = F::Lookup<'a>;
 
     #[inline(always)]
     fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ collision::ROWS }> {
@@ -52,7 +52,7 @@ impl Kind<{ collision::ROWS }> for Absolute {
 pub(super) struct Relative;
 
 impl Kind<{ relative::ROWS }> for Relative {
-    type Ends<'a, F: Format> = F::Ends<'a>;
+    type Lookup<'a, F: Format> = F::Lookup<'a>;
 
     #[inline(always)]
     fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
@@ -70,7 +70,8 @@ impl Kind<{ relative::ROWS }> for Relative {
     }
 }
 
-/// The relative record whose indices are these.
+/// The relative record whose indices are these, which are asked for where they are needed: made before they
+/// would hold registers meanwhile.
 #[inline(always)]
 fn of_bodies(
     from: &Collision,
@@ -95,8 +96,8 @@ fn anchors<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
 pub(super) struct Worded<'a>(pub(super) &'a [[u32; 2]]);
 
 impl Kind<{ relative::ROWS }> for Worded<'_> {
-    /// What is sent is not by what they are looked up.
-    type Ends<'a, F: Format> = Ends<'a>;
+    /// The words are short and the indices are not: there may be more bodies than sixteen bits name.
+    type Lookup<'a, F: Format> = Ends<'a>;
 
     #[inline(always)]
     fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
@@ -118,7 +119,7 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
 
 /// The ends of a collision's bodies.
 #[inline(always)]
-fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
+fn both<'a>(ends: impl end::Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
     [ends.get(collision.body_a), ends.get(collision.body_b)]
 }
 
@@ -131,7 +132,7 @@ pub(super) struct Encoding<K, L, E> {
     ends: E,
 }
 
-impl<'p, K, L: Lying<'p>, E: Lookup<'p>> Encoding<K, L, E> {
+impl<'p, K, L: Lying<'p>, E: end::Lookup<'p>> Encoding<K, L, E> {
     /// Those of a block, whose bodies are looked up here.
     #[inline(always)]
     pub(super) fn new(kind: K, block: &Block<'p, L>, ends: E) -> Self {
@@ -166,8 +167,8 @@ impl<'p, K, L: Lying<'p>, E: Lookup<'p>> Encoding<K, L, E> {
                     let collision = these[$at];
                     let ends = both(self.ends, collision);
                     let record = self.kind.encode(first + $at, collision, ends);
-                    let known = self.ends.has([collision.body_a, collision.body_b]);
-                    witness.see(&record, collision, ends, known);
+                    let found = self.ends.finds([collision.body_a, collision.body_b]);
+                    witness.see(&record, collision, ends, found);
                     record.give(to);
                 })*
             };
@@ -182,8 +183,9 @@ trait Witness<K: Kind<ROWS>, const ROWS: usize> {
     /// Whether that takes longer than to make the record.
     const SLOW: bool;
 
-    /// Sees the record of a collision, whose ends these are, if it is `known`.
-    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], known: bool);
+    /// Sees the record of a collision. These are the ends it was made of; those of the collision's bodies, if
+    /// they were `found`.
+    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], found: bool);
 }
 
 /// Nobody.
@@ -194,7 +196,7 @@ impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for () {
     fn see(&mut self, _: &Record<ROWS>, _: &Collision, _: [&End; 2], _: bool) {}
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, const ROWS: usize> Records<ROWS>
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: end::Lookup<'p>, const ROWS: usize> Records<ROWS>
     for Encoding<K, L, E>
 {
     #[inline(always)]
@@ -220,8 +222,8 @@ impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for Looking<'_> {
     const SLOW: bool = true;
 
     #[inline(always)]
-    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], known: bool) {
-        self.look.head(collision, ends, known, self.scheduled);
+    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], found: bool) {
+        self.look.head(collision, ends, found, self.scheduled);
         self.look.numbers(K::beyond(self.quick, &record.rows, collision.count));
         if self.look.asks_how_far() {
             self.look.reach(&K::reach(&record.rows, collision.count), ends);
@@ -236,7 +238,7 @@ pub(super) struct LookedAt<'p, K, L, E> {
     looking: Looking<'p>,
 }
 
-impl<'p, K: Copy, L: Lying<'p>, E: Lookup<'p>> LookedAt<'p, K, L, E> {
+impl<'p, K: Copy, L: Lying<'p>, E: end::Lookup<'p>> LookedAt<'p, K, L, E> {
     #[inline(always)]
     pub(super) fn new(records: Encoding<K, L, E>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
         Self { records, looking: Looking { quick, look: Look::new(quick), scheduled } }
@@ -255,6 +257,7 @@ impl<'p, K: Copy, L: Lying<'p>, E: Lookup<'p>> LookedAt<'p, K, L, E> {
         K: Kind<ROWS>,
     {
         let Self { records: Encoding { kind, .. }, looking: Looking { look, .. } } = self;
+        // By all their bits: of what was not found the others may have been another body's.
         let reaches = (block.first..).zip(block.collisions.iter()).map(|(index, collision)| {
             let record = kind.encode(index, collision, both(block.ends, collision));
             K::reach(&record.rows, collision.count)
@@ -263,7 +266,7 @@ impl<'p, K: Copy, L: Lying<'p>, E: Lookup<'p>> LookedAt<'p, K, L, E> {
     }
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, const ROWS: usize> Records<ROWS>
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: end::Lookup<'p>, const ROWS: usize> Records<ROWS>
     for LookedAt<'p, K, L, E>
 {
     #[inline(always)]

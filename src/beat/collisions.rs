@@ -16,7 +16,7 @@ use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stripe::Segment;
 use super::target::Target;
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
-use crate::record::end::{Ends, Lookup as _};
+use crate::record::end::{Ends, Lookup};
 use crate::scene::validate::{Block, Quick};
 use crate::scene::{Collision, Collisions, InArray, InNearbyOrder, InOrder, Lying, Structures};
 
@@ -37,7 +37,8 @@ pub(crate) struct Entries<'a, C: ?Sized> {
 /// validation refuses none.
 ///
 /// A body that does not exist has its position written as zeros, and one without a shape is static. Where
-/// indices are sent in sixteen bits, the lower halves of them count.
+/// indices are sent in sixteen bits, the lower halves of them count; of more bodies than these name nothing
+/// is written, and it is refused.
 /// Should a caller's [`Collisions`] answer differently from one look to the next, validation looks at
 /// what is written; of what looks like padding it refuses more than the order added.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
@@ -77,7 +78,7 @@ impl Seen {
     /// Of none.
     const NOTHING: Self = Self { good: true, paddings: 0 };
 
-    /// Of what cannot be written.
+    /// Of what is not written: there are more bodies than the stream's indices name, or none was looked at.
     const REFUSED: Self = Self { good: false, paddings: 0 };
 
     fn and(self, other: Self) -> Self {
@@ -235,7 +236,9 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
     #[inline(always)]
     fn run_as<V: Vectors, F: Format>(self, vectors: V) -> Seen {
         let Self { kind, quick, all, dealer, .. } = self;
-        let Some(ends) = K::Ends::<'p, F>::of(all.ends) else { return Seen::REFUSED };
+        let Some(ends) = <K::Lookup<'p, F> as Lookup>::of(all.ends) else {
+            return Seen::REFUSED;
+        };
         let mut seen = Seen::NOTHING;
         // Validation goes by blocks. Without it, as packing alone is measured, there is nothing to be done
         // for each that is worth it.

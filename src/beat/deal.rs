@@ -80,6 +80,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
         vectors: V,
         records: &mut R,
     ) {
+        debug_assert_eq!(F::SIXTEEN, self.format, "the words are those of the stream");
         let mut sum = self.sum;
         let done = match self.pattern {
             Some((pattern, first)) if self.deal.at_end_of_group() => {

@@ -5,14 +5,15 @@ use std::marker::PhantomData;
 use bitstream_model::interface::record::Beat;
 
 use crate::platform::{Lanes, Vectors};
-use crate::record::end::{Ends, Lookup, LowEnds};
+use crate::record::end::{self, Ends, LowEnds};
 use crate::record::sixteen::Sixteen;
 use crate::record::{Row, Rows};
 
 /// Records on their way.
 ///
 /// `some` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation. A loop has
-/// a copy of its own, which no pointer leads to: it lies in registers.
+/// a copy of its own, which no pointer leads to: it lies in registers. Whoever takes such a copy puts it back:
+/// what was seen of the records on their way is in it.
 pub(super) trait Records<const ROWS: usize>: Copy {
     /// How many there are.
     fn len(&self) -> usize;
@@ -30,8 +31,11 @@ pub(super) trait Format {
     /// Rows of a beat.
     const PER_BEAT: usize;
 
+    /// What its words are, if they have sixteen bits.
+    const SIXTEEN: Option<Sixteen>;
+
     /// Where bodies are looked up whose indices are sent in it.
-    type Ends<'a>: Lookup<'a>;
+    type Lookup<'a>: end::Lookup<'a>;
 
     /// The beat of so many rows, the first of these. An `#[inline(always)]` belongs to every implementation.
     fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat;
@@ -107,7 +111,9 @@ pub(super) struct Whole;
 impl Format for Whole {
     const PER_BEAT: usize = 1;
 
-    type Ends<'a> = Ends<'a>;
+    const SIXTEEN: Option<Sixteen> = None;
+
+    type Lookup<'a> = Ends<'a>;
 
     #[inline(always)]
     fn beat<V: Vectors>(_: V, [row, _]: [Row; 2]) -> Beat {
@@ -136,7 +142,9 @@ macro_rules! sixteen {
         impl Format for $format {
             const PER_BEAT: usize = 2;
 
-            type Ends<'a> = LowEnds<'a>;
+            const SIXTEEN: Option<Sixteen> = Some(Sixteen::$format);
+
+            type Lookup<'a> = LowEnds<'a>;
 
             #[inline(always)]
             fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat {

@@ -1,6 +1,7 @@
 //! What the packer writes, read back by a decoder that was written from the specification's tables
 //! and shares nothing with it: no stripe, no record, no conversion.
 
+use bytemuck::Zeroable as _;
 use proptest::prelude::*;
 
 use super::bodies::{Chosen, pack_poses, pack_velocities, survey};
@@ -567,6 +568,66 @@ fn a_body_that_does_not_exist_is_sent_with_a_position_of_zeros() {
     let buffers = collisions(&FLOAT_SPEC, bodies.as_slice(), [collision].as_slice());
     assert_eq!(buffers[1][0], Beat([0, 0, 0, 3]));
     assert_eq!(buffers[2][0], Beat([0, 0, 0, u32::MAX]));
+}
+
+/// Where sixteen bits do not name all bodies, a profile sends all bits of an index or another word for it.
+#[test]
+fn bodies_beyond_sixteen_bits_are_looked_up_by_all_their_bits() {
+    let count = (1 << 16) + 2;
+    let at = |index: u32| if index < 1 << 16 { 0.0 } else { (index % 7 + 1) as f32 };
+    let bodies: Vec<Body> = (0..count)
+        .map(|index| Body {
+            pose: Pose { position: [at(index), 0.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+            velocity: Velocity::default(),
+            shape: 1,
+        })
+        .collect();
+    let [body_a, body_b] = [count - 1, count - 2];
+    let normal = [0.0, 1.0, 0.0];
+    let contact = Contact { point: [5.0, 0.0, 0.0], distance: 0.25 };
+    let list = [Collision { body_a, body_b, normal, count: 1, contacts: [contact; 4] }];
+    assert_ne!(at(body_a).to_bits(), at(body_b).to_bits(), "they are told apart");
+    for spec in [NAIVE_SPEC, FLOAT_SPEC, WINDOWED_SPEC, WINDOWED16_SPEC] {
+        let words = spec.relative.then_some(&[[8, 9]][..]);
+        let buffers = entries(&spec, &bodies, list.as_slice(), words);
+        let rows = if spec.relative { 6 } else { 7 };
+        let mut reader = Reader::new(&spec, spec.collision_group, spec.collisions, &buffers, rows);
+        let reach = if spec.relative {
+            reader.vector(normal, 8);
+            reader.vector([at(body_b) - at(body_a), 0.0, 0.0], 9);
+            5.0 - at(body_a)
+        } else {
+            reader.vector(normal, 1);
+            reader.vector([at(body_a), 0.0, 0.0], body_a);
+            reader.vector([at(body_b), 0.0, 0.0], body_b);
+            5.0
+        };
+        reader.numbers([reach, 0.0, 0.0, 0.25]);
+    }
+}
+
+/// No profile has room for them; should one come here nevertheless, nothing of them is sent.
+#[test]
+fn more_bodies_than_a_stream_has_indices_for_are_refused() {
+    let list = [Collision::NOTHING; BLOCK];
+    let entries = Entries { collisions: &list[..], count: BLOCK, added: None, words: None };
+    for (count, fits) in [(1 << 16, true), ((1 << 16) + 1, false)] {
+        let bodies = vec![Body { shape: 1, ..Body::zeroed() }; count];
+        let (mut ends, mut statics) = (Table::default(), Vec::new());
+        let into = Survey { ends: &mut ends, statics: &mut statics };
+        survey(target(&HALF_SPEC), &bodies, count, into, &mut Packers::alone());
+        let layout = Segment::Collisions.layout(&HALF_SPEC.variant);
+        let ones = Beat([u32::MAX; 4]);
+        let mut buffers: [Vec<Beat>; 3] =
+            std::array::from_fn(|channel| vec![ones; layout.beats_on_channel(BLOCK, channel)]);
+        let mut views = buffers.each_mut().map(Vec::as_mut_slice);
+        let packers = &mut Packers::alone();
+        let (_, good) =
+            pack_collisions(target(&HALF_SPEC), ends.ends(), &entries, &mut views, packers);
+        assert_eq!(good, fits, "{count}");
+        let untouched = buffers.iter().flatten().filter(|beat| **beat == ones).count();
+        assert_eq!(untouched, if fits { 0 } else { layout.beats(BLOCK) }, "{count}");
+    }
 }
 
 /// A shape that turns with its body, and one that is not there.

@@ -9,7 +9,7 @@ use bitstream_model::interface::record::{Beat, result};
 
 use super::collect::{self, Tally};
 pub(crate) use super::deal::BLOCK;
-use super::format::{Binary16, Format, Thesis16, Whole};
+use super::format::{Format, in_format};
 use super::pattern::Pattern;
 use super::stripe::{Deal, Layout};
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
@@ -101,12 +101,7 @@ impl Work for Reading<'_, '_> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> bool {
         let Self { reader, records } = self;
-        // One loop each, in which nothing is asked of the format.
-        match reader.format {
-            None => reader.read_as::<V, Whole>(vectors, records),
-            Some(Sixteen::Binary16) => reader.read_as::<V, Binary16>(vectors, records),
-            Some(Sixteen::Thesis16) => reader.read_as::<V, Thesis16>(vectors, records),
-        }
+        in_format!(reader.format, F => reader.read_as::<V, F>(vectors, records))
     }
 }
 

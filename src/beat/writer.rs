@@ -115,7 +115,9 @@ impl<'a> Writer<'a> {
         if !self.packer.write(collisions).good {
             let ends = self.ends;
             let block = Block { first, collisions, ends, scheduled: false };
-            self.refused = self.quick.and_then(|quick| quick.refusal(&block).err());
+            let found = self.quick.and_then(|quick| quick.refusal(&block).err());
+            // What was not written is never sent, whoever is to blame.
+            self.refused = Some(found.unwrap_or(InputError::Unsteady));
         }
     }
 
@@ -133,5 +135,31 @@ impl<'a> Writer<'a> {
                 Ok((self.packer.finish(), written))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::stripe::Segment;
+    use super::*;
+    use crate::interface::profile::HALF;
+    use crate::record::end::Table;
+
+    /// The driver looks at the bodies first; that a step is refused does not rest on it.
+    #[test]
+    fn what_is_not_written_is_refused() {
+        let variant = HALF.default_variant();
+        let layout = Segment::Collisions.layout(&variant);
+        let mut buffers: [Vec<Beat>; 3] = std::array::from_fn(|channel| {
+            vec![Beat::default(); layout.beats_on_channel(BLOCK, channel)]
+        });
+        let mut views = buffers.each_mut().map(Vec::as_mut_slice);
+        let target = Target { variant: &variant, shapes: &[], quick: None };
+        let never_surveyed = Table::default();
+        let mut writer = Writer::new(target, never_surveyed.ends(), BLOCK, &mut views);
+        for _ in 0..BLOCK {
+            writer.push(&Collision::NOTHING);
+        }
+        assert_eq!(writer.finish(), Err(InputError::Unsteady));
     }
 }

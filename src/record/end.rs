@@ -1,11 +1,13 @@
 //! This file says what the record of a collision takes from either of its bodies.
 
+use std::fmt;
 use std::hint::cold_path;
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
 use super::{POSITION, row_of};
+use crate::interface::number::StreamFormat;
 use crate::interface::record::Beat;
 use crate::platform::{Lanes, fetch};
 use crate::scene::{Body, Shape};
@@ -132,14 +134,23 @@ fn tag_of(shape: u32, shapes: &[Shape]) -> u32 {
 
 /// Bodies that an index of sixteen bits may name.
 const LOW: usize = 1 << u16::BITS;
+const _: () = assert!(StreamFormat::Binary16.largest_index() as usize == LOW - 1);
+const _: () = assert!(StreamFormat::Thesis16.largest_index() as usize == LOW - 1);
 
 /// The ends of all bodies of a step. Kept, so that a step allocates nothing.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Default, PartialEq)]
 pub(crate) struct Table {
-    /// At least [`LOW`] of them, from the first step on; [`End::MISSING`] where there is no body.
+    /// At least [`LOW`] of them, a megabyte, from the first step on; [`End::MISSING`] where there is no body.
     ends: Vec<End>,
     /// How many bodies there are.
     count: usize,
+}
+
+/// Without the ends: whatever holds a table is printed in a line.
+impl fmt::Debug for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Table").field("count", &self.count).finish_non_exhaustive()
+    }
 }
 
 impl Table {
@@ -155,7 +166,7 @@ impl Table {
 
     /// To look up.
     pub(crate) fn ends(&self) -> Ends<'_> {
-        Ends(&self.ends)
+        Ends { all: &self.ends, count: self.count }
     }
 
     /// That of each body.
@@ -195,11 +206,11 @@ impl Survey<'_> {
 ///
 /// All of it is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
 pub(crate) trait Lookup<'a>: Copy {
-    /// Among the ends of all bodies. There is none only before the first [`Survey`].
+    /// Among the ends of all bodies; none where some would never be found, and before the first [`Survey`].
     fn of(all: Ends<'a>) -> Option<Self>;
 
-    /// Whether it has each body that these may name.
-    fn has(self, bodies: [u32; 2]) -> bool;
+    /// Whether what is found by these indices is theirs; else it may be that of other bodies.
+    fn finds(self, bodies: [u32; 2]) -> bool;
 
     /// That of one body.
     fn get(self, body: u32) -> &'a End;
@@ -210,7 +221,11 @@ pub(crate) trait Lookup<'a>: Copy {
 
 /// The ends of all bodies of a step.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Ends<'a>(&'a [End]);
+pub(crate) struct Ends<'a> {
+    all: &'a [End],
+    /// How many bodies there are.
+    count: usize,
+}
 
 impl<'a> Lookup<'a> for Ends<'a> {
     #[inline(always)]
@@ -218,15 +233,15 @@ impl<'a> Lookup<'a> for Ends<'a> {
         Some(all)
     }
 
-    /// Those that there are not are found to be missing.
+    /// Where there is no body, [`End::MISSING`] is.
     #[inline(always)]
-    fn has(self, _: [u32; 2]) -> bool {
+    fn finds(self, _: [u32; 2]) -> bool {
         true
     }
 
     #[inline(always)]
     fn get(self, body: u32) -> &'a End {
-        match usize::try_from(body).ok().and_then(|body| self.0.get(body)) {
+        match usize::try_from(body).ok().and_then(|body| self.all.get(body)) {
             Some(end) => end,
             None => {
                 // A jump that is foreseen costs less than to choose.
@@ -239,24 +254,31 @@ impl<'a> Lookup<'a> for Ends<'a> {
     #[inline(always)]
     fn soon(self, bodies: [u32; 2]) {
         for body in bodies {
-            fetch(self.0.as_ptr().wrapping_add(body as usize));
+            soon_in(self.all, body);
         }
     }
 }
 
-/// The ends of the bodies that indices of sixteen bits may name. Of an index the lower half is taken, as in
-/// the records of such indices, so that there is one for each without a look at how many there are.
+/// Says that the end of a body is asked for soon.
+#[inline(always)]
+fn soon_in(ends: &[End], body: u32) {
+    fetch(ends.as_ptr().wrapping_add(body as usize));
+}
+
+/// The ends of all bodies of a step that has no more than indices of sixteen bits may name. Of an index the
+/// lower half is taken, as in the records of such indices, so that there is one for each without a look at
+/// how many there are.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LowEnds<'a>(&'a [End; LOW]);
 
 impl<'a> Lookup<'a> for LowEnds<'a> {
     #[inline(always)]
-    fn of(Ends(all): Ends<'a>) -> Option<Self> {
-        all.first_chunk().map(Self)
+    fn of(Ends { all, count }: Ends<'a>) -> Option<Self> {
+        all.first_chunk().filter(|_| count <= LOW).map(Self)
     }
 
     #[inline(always)]
-    fn has(self, [a, b]: [u32; 2]) -> bool {
+    fn finds(self, [a, b]: [u32; 2]) -> bool {
         ((a | b) as usize) < LOW
     }
 
@@ -267,7 +289,9 @@ impl<'a> Lookup<'a> for LowEnds<'a> {
 
     #[inline(always)]
     fn soon(self, bodies: [u32; 2]) {
-        Ends(self.0).soon(bodies);
+        for body in bodies {
+            soon_in(self.0, body);
+        }
     }
 }
 
@@ -290,15 +314,17 @@ mod tests {
             surveyed(&mut table, (0..count).map(|at| at as f32));
             assert_eq!(table.of_bodies().len(), count);
             let ends = table.ends();
-            let low = LowEnds::of(ends).expect("it was surveyed");
+            let low = LowEnds::of(ends);
+            assert_eq!(low.is_some(), count <= LOW, "{count}");
             for at in [0, 1, count.wrapping_sub(1), count, count + 1, LOW - 1, LOW, 3 * LOW] {
                 let Ok(body) = u32::try_from(at) else { continue };
                 let end =
                     |at: usize| if at < count { End::at([at as f32; 3]) } else { End::MISSING };
                 assert_eq!(*ends.get(body), end(at), "{at} of {count}");
+                assert!(ends.finds([body, 0]) && ends.finds([0, body]));
+                let Some(low) = low else { continue };
                 assert_eq!(*low.get(body), end(at % LOW), "{at} of {count}");
-                assert!(ends.has([body, 0]) && ends.has([0, body]));
-                assert_eq!([low.has([body, 0]), low.has([0, body])], [at < LOW; 2]);
+                assert_eq!([low.finds([body, 0]), low.finds([0, body])], [at < LOW; 2]);
             }
         }
         assert!(LowEnds::of(Table::default().ends()).is_none());

@@ -36,18 +36,18 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// Looks at normal, count and bodies of the next, whose ends these are if it is `known`. Where
-    /// collisions are `scheduled`, it may be padding.
+    /// Looks at normal, count and bodies of the next. These are the ends of its bodies if they were `found`;
+    /// else of any, and it is looked at again. Where collisions are `scheduled`, it may be padding.
     #[inline(always)]
     pub(crate) fn head(
         &mut self,
         collision: &Collision,
         ends: [&End; 2],
-        known: bool,
+        found: bool,
         scheduled: bool,
     ) {
         let padding = scheduled & is_padding(collision);
-        self.heads &= head(collision, ends) & known | padding;
+        self.heads &= head(collision, ends) & found | padding;
         self.paddings += usize::from(padding);
     }
 
