@@ -32,13 +32,13 @@ impl CollisionPacker {
     }
 
     /// Packs the records of all collisions over the bitstream's channels; returns the sum of their
-    /// words, modulo 2^32.
+    /// words, modulo 2^32, or `None` if there are more bodies than a stream of sixteen bits has indices for.
     pub fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
         collisions: &C,
         shapes: &[Shape],
-    ) -> u32 {
+    ) -> Option<u32> {
         let count = collisions.len();
         let layout = Segment::Collisions.layout(&self.variant);
         let streams = self.variant.profile.mm2s_widths.len();
@@ -52,7 +52,9 @@ impl CollisionPacker {
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
         survey(target, bodies, bodies.len(), into, &mut Packers::alone());
         let entries = Entries { collisions, count, added: None, words: None };
-        pack_collisions(target, self.ends.ends(), &entries, channels, &mut Packers::alone()).0
+        let packers = &mut Packers::alone();
+        let (sum, good) = pack_collisions(target, self.ends.ends(), &entries, channels, packers);
+        good.then_some(sum)
     }
 }
 
@@ -100,16 +102,18 @@ impl StepPacker {
     }
 
     /// Writes the records of all collisions of the bodies that were packed last, unchecked; returns
-    /// the sum of their words, modulo 2^32. `added` is how many the order added that was made for
-    /// them, `None` if there is none.
+    /// the sum of their words, modulo 2^32, or `None` as [`CollisionPacker::pack`] does. `added` is how many
+    /// the order added that was made for them, `None` if there is none.
     pub fn pack_collisions<C: Collisions + ?Sized>(
         &mut self,
         collisions: &C,
         shapes: &[Shape],
         added: Option<usize>,
-    ) -> u32 {
+    ) -> Option<u32> {
         let variant = self.limits.variant;
-        self.entries(collisions, added, Target { variant: &variant, shapes, quick: None }).0
+        let target = Target { variant: &variant, shapes, quick: None };
+        let (sum, good) = self.entries(collisions, added, target);
+        good.then_some(sum)
     }
 
     /// Writes and checks everything; returns the sum of all words, modulo 2^32, or `None` if
@@ -267,7 +271,7 @@ mod tests {
         // All other words are zero.
         assert_eq!(
             CollisionPacker::new(FLOAT.default_variant()).pack(&bodies, &vec![collision; 7], &[]),
-            7 * (4 + 1)
+            Some(7 * (4 + 1))
         );
     }
 }

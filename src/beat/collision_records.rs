@@ -4,7 +4,7 @@ use bitstream_model::interface::record::{collision, relative};
 
 use super::format::{Format, Records};
 use crate::platform::Lanes;
-use crate::record::end::{self, End, Ends};
+use crate::record::end::{End, Ends, Lookup};
 use crate::record::{self, Integer, Record, Rows};
 use crate::scene::validate::{Block, Look, Quick, Reach};
 use crate::scene::{Collision, Lying, Next};
@@ -12,7 +12,7 @@ use crate::scene::{Collision, Lying, Next};
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
     /// Where the bodies of a collision are looked up whose record is sent in a format.
-    type Lookup<'a, F: Format>: end::Lookup<'a>;
+    type Among<'a, F: Format>: Lookup<'a>;
 
     /// The record of collision `index`.
     fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<ROWS>;
@@ -29,7 +29,7 @@ pub(super) trait Kind<const ROWS: usize>: Copy {
 pub(super) struct Absolute;
 
 impl Kind<{ collision::ROWS }> for Absolute {
-    type Lookup<'a, F: Format> = F::Lookup<'a>;
+    type Among<'a, F: Format> = F::Among<'a>;
 
     #[inline(always)]
     fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ collision::ROWS }> {
@@ -52,7 +52,7 @@ impl Kind<{ collision::ROWS }> for Absolute {
 pub(super) struct Relative;
 
 impl Kind<{ relative::ROWS }> for Relative {
-    type Lookup<'a, F: Format> = F::Lookup<'a>;
+    type Among<'a, F: Format> = F::Among<'a>;
 
     #[inline(always)]
     fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
@@ -70,8 +70,8 @@ impl Kind<{ relative::ROWS }> for Relative {
     }
 }
 
-/// The relative record whose indices are these, which are asked for where they are needed: made before they
-/// would hold registers meanwhile.
+/// The relative record whose indices are these. They are asked for where they are needed: made earlier, they
+/// would hold registers until then.
 #[inline(always)]
 fn of_bodies(
     from: &Collision,
@@ -97,7 +97,7 @@ pub(super) struct Worded<'a>(pub(super) &'a [[u32; 2]]);
 
 impl Kind<{ relative::ROWS }> for Worded<'_> {
     /// The words are short and the indices are not: there may be more bodies than sixteen bits name.
-    type Lookup<'a, F: Format> = Ends<'a>;
+    type Among<'a, F: Format> = Ends<'a>;
 
     #[inline(always)]
     fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
@@ -119,7 +119,7 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
 
 /// The ends of a collision's bodies.
 #[inline(always)]
-fn both<'a>(ends: impl end::Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
+fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
     [ends.get(collision.body_a), ends.get(collision.body_b)]
 }
 
@@ -132,7 +132,7 @@ pub(super) struct Encoding<K, L, E> {
     ends: E,
 }
 
-impl<'p, K, L: Lying<'p>, E: end::Lookup<'p>> Encoding<K, L, E> {
+impl<'p, K, L: Lying<'p>, E: Lookup<'p>> Encoding<K, L, E> {
     /// Those of a block, whose bodies are looked up here.
     #[inline(always)]
     pub(super) fn new(kind: K, block: &Block<'p, L>, ends: E) -> Self {
@@ -167,8 +167,8 @@ impl<'p, K, L: Lying<'p>, E: end::Lookup<'p>> Encoding<K, L, E> {
                     let collision = these[$at];
                     let ends = both(self.ends, collision);
                     let record = self.kind.encode(first + $at, collision, ends);
-                    let found = self.ends.finds([collision.body_a, collision.body_b]);
-                    witness.see(&record, collision, ends, found);
+                    let theirs = self.ends.by_all_bits([collision.body_a, collision.body_b]);
+                    witness.see(&record, collision, ends, theirs);
                     record.give(to);
                 })*
             };
@@ -183,9 +183,9 @@ trait Witness<K: Kind<ROWS>, const ROWS: usize> {
     /// Whether that takes longer than to make the record.
     const SLOW: bool;
 
-    /// Sees the record of a collision. These are the ends it was made of; those of the collision's bodies, if
-    /// they were `found`.
-    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], found: bool);
+    /// Sees the record of a collision. These are the ends it was made of: whether they are `theirs`, the
+    /// bodies' of the collision, is sure or not.
+    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], theirs: bool);
 }
 
 /// Nobody.
@@ -196,7 +196,7 @@ impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for () {
     fn see(&mut self, _: &Record<ROWS>, _: &Collision, _: [&End; 2], _: bool) {}
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: end::Lookup<'p>, const ROWS: usize> Records<ROWS>
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, const ROWS: usize> Records<ROWS>
     for Encoding<K, L, E>
 {
     #[inline(always)]
@@ -222,8 +222,8 @@ impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for Looking<'_> {
     const SLOW: bool = true;
 
     #[inline(always)]
-    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], found: bool) {
-        self.look.head(collision, ends, found, self.scheduled);
+    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], theirs: bool) {
+        self.look.head(collision, ends, theirs, self.scheduled);
         self.look.numbers(K::beyond(self.quick, &record.rows, collision.count));
         if self.look.asks_how_far() {
             self.look.reach(&K::reach(&record.rows, collision.count), ends);
@@ -238,7 +238,7 @@ pub(super) struct LookedAt<'p, K, L, E> {
     looking: Looking<'p>,
 }
 
-impl<'p, K: Copy, L: Lying<'p>, E: end::Lookup<'p>> LookedAt<'p, K, L, E> {
+impl<'p, K: Copy, L: Lying<'p>, E: Lookup<'p>> LookedAt<'p, K, L, E> {
     #[inline(always)]
     pub(super) fn new(records: Encoding<K, L, E>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
         Self { records, looking: Looking { quick, look: Look::new(quick), scheduled } }
@@ -257,7 +257,7 @@ impl<'p, K: Copy, L: Lying<'p>, E: end::Lookup<'p>> LookedAt<'p, K, L, E> {
         K: Kind<ROWS>,
     {
         let Self { records: Encoding { kind, .. }, looking: Looking { look, .. } } = self;
-        // By all their bits: of what was not found the others may have been another body's.
+        // These are asked for only where every record was made of its own bodies' ends, or is padding.
         let reaches = (block.first..).zip(block.collisions.iter()).map(|(index, collision)| {
             let record = kind.encode(index, collision, both(block.ends, collision));
             K::reach(&record.rows, collision.count)
@@ -266,7 +266,7 @@ impl<'p, K: Copy, L: Lying<'p>, E: end::Lookup<'p>> LookedAt<'p, K, L, E> {
     }
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: end::Lookup<'p>, const ROWS: usize> Records<ROWS>
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, const ROWS: usize> Records<ROWS>
     for LookedAt<'p, K, L, E>
 {
     #[inline(always)]

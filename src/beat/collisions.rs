@@ -38,7 +38,7 @@ pub(crate) struct Entries<'a, C: ?Sized> {
 ///
 /// A body that does not exist has its position written as zeros, and one without a shape is static. Where
 /// indices are sent in sixteen bits, the lower halves of them count; of more bodies than these name nothing
-/// is written, and it is refused.
+/// is written, and any is refused.
 /// Should a caller's [`Collisions`] answer differently from one look to the next, validation looks at
 /// what is written; of what looks like padding it refuses more than the order added.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
@@ -236,7 +236,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
     #[inline(always)]
     fn run_as<V: Vectors, F: Format>(self, vectors: V) -> Seen {
         let Self { kind, quick, all, dealer, .. } = self;
-        let Some(ends) = <K::Lookup<'p, F> as Lookup>::of(all.ends) else {
+        let Some(ends) = <K::Among<'p, F> as Lookup>::of(all.ends) else {
             return Seen::REFUSED;
         };
         let mut seen = Seen::NOTHING;

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use bitstream_model::interface::record::Beat;
 
 use crate::platform::{Lanes, Vectors};
-use crate::record::end::{self, Ends, LowEnds};
+use crate::record::end::{Ends, Lookup, LowEnds};
 use crate::record::sixteen::Sixteen;
 use crate::record::{Row, Rows};
 
@@ -35,7 +35,7 @@ pub(super) trait Format {
     const SIXTEEN: Option<Sixteen>;
 
     /// Where bodies are looked up whose indices are sent in it.
-    type Lookup<'a>: end::Lookup<'a>;
+    type Among<'a>: Lookup<'a>;
 
     /// The beat of so many rows, the first of these. An `#[inline(always)]` belongs to every implementation.
     fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat;
@@ -113,7 +113,7 @@ impl Format for Whole {
 
     const SIXTEEN: Option<Sixteen> = None;
 
-    type Lookup<'a> = Ends<'a>;
+    type Among<'a> = Ends<'a>;
 
     #[inline(always)]
     fn beat<V: Vectors>(_: V, [row, _]: [Row; 2]) -> Beat {
@@ -144,7 +144,7 @@ macro_rules! sixteen {
 
             const SIXTEEN: Option<Sixteen> = Some(Sixteen::$format);
 
-            type Lookup<'a> = LowEnds<'a>;
+            type Among<'a> = LowEnds<'a>;
 
             #[inline(always)]
             fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat {

@@ -303,6 +303,38 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
     }
 }
 
+/// The lower halves of their indices are those of others, which are as right or wrong as these are not.
+#[test]
+fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
+    let low = 1 << 16;
+    let body = |shape| Body {
+        pose: Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity: Velocity::default(),
+        shape,
+    };
+    let collision = |body_a, body_b| Collision {
+        body_a,
+        body_b,
+        normal: [0.0, 1.0, 0.0],
+        count: 1,
+        contacts: [Contact::default(); 4],
+    };
+    for profile in [&NAIVE, &FLOAT, &WINDOWED] {
+        let limits = limits(profile.default_variant(), false);
+        // Two that never move, and all others do.
+        for still in [[0, 1], [low, low + 1]] {
+            let mut bodies = vec![body(1); low + 2];
+            still.iter().for_each(|at| bodies[*at] = body(0));
+            for (pair, right) in [([0, 1], still[0] == low), ([low, low + 1], still[0] == 0)] {
+                let [a, b] = pair.map(|at| u32::try_from(at).expect("few"));
+                let (good, valid) = said(&limits, &bodies, &vec![collision(a, b); 3], None)
+                    .expect("nothing else wrong");
+                assert_eq!((good, valid.is_ok()), (right, right), "{} {pair:?}", profile.name);
+            }
+        }
+    }
+}
+
 /// A lever arm that one body turns about, and the other may: of the last contact point alone.
 #[test]
 fn an_arm_that_is_too_long_is_noticed_about_whichever_body() {

@@ -116,7 +116,7 @@ impl<'a> Writer<'a> {
             let ends = self.ends;
             let block = Block { first, collisions, ends, scheduled: false };
             let found = self.quick.and_then(|quick| quick.refusal(&block).err());
-            // What was not written is never sent, whoever is to blame.
+            // What was not written is never sent.
             self.refused = Some(found.unwrap_or(InputError::Unsteady));
         }
     }
@@ -125,7 +125,8 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// What validation refuses of the first collision that is wrong;
-    /// [`InputError::MoreThanAnnounced`].
+    /// [`InputError::MoreThanAnnounced`]; [`InputError::Unsteady`] of what was not written although nothing is
+    /// wrong with it, which the driver's limits on bodies rule out.
     pub(crate) fn finish(mut self) -> Result<(u32, usize), InputError> {
         self.flush();
         match self.refused {
@@ -140,26 +141,63 @@ impl<'a> Writer<'a> {
 
 #[cfg(test)]
 mod tests {
+    use bytemuck::Zeroable as _;
+
+    use super::super::bodies::survey;
+    use super::super::ranges::Packers;
     use super::super::stripe::Segment;
     use super::*;
     use crate::interface::profile::HALF;
-    use crate::record::end::Table;
+    use crate::record::end::{Survey, Table};
+    use crate::scene::validate::{Limits, preflight};
+    use crate::scene::{Body, Contact, Shape, StepParameters};
 
-    /// The driver looks at the bodies first; that a step is refused does not rest on it.
+    /// The driver's limits on bodies rule it out; that such a step is refused does not rest on them.
     #[test]
     fn what_is_not_written_is_refused() {
+        let shapes = [Shape::isotropic(1.0, 1.0)];
+        let mut body = Body::zeroed();
+        body.pose.orientation = [0.0, 0.0, 0.0, 1.0];
+        let collision = Collision {
+            body_a: 0,
+            body_b: 1,
+            normal: [0.0, 1.0, 0.0],
+            count: 1,
+            contacts: [Contact::default(); 4],
+        };
         let variant = HALF.default_variant();
-        let layout = Segment::Collisions.layout(&variant);
-        let mut buffers: [Vec<Beat>; 3] = std::array::from_fn(|channel| {
-            vec![Beat::default(); layout.beats_on_channel(BLOCK, channel)]
-        });
-        let mut views = buffers.each_mut().map(Vec::as_mut_slice);
-        let target = Target { variant: &variant, shapes: &[], quick: None };
-        let never_surveyed = Table::default();
-        let mut writer = Writer::new(target, never_surveyed.ends(), BLOCK, &mut views);
-        for _ in 0..BLOCK {
-            writer.push(&Collision::NOTHING);
+        for (count, fits) in [(1 << 16, true), ((1 << 16) + 1, false)] {
+            let bodies = vec![body; count];
+            let limits = Limits {
+                variant,
+                flush_subnormals: false,
+                body_capacity: u32::MAX,
+                collision_capacity: u32::MAX,
+                shape_capacity: u32::MAX,
+                memory_bytes: u32::MAX,
+                bytes_per_body: 1,
+                bytes_per_collision: 1,
+            };
+            let list = vec![collision; BLOCK];
+            let parameters = StepParameters::default();
+            let scene = preflight(&bodies, &list, &shapes, &parameters, &limits);
+            let quick = Quick::new(scene.expect("limits that rule nothing out"));
+            for quick in [None, Some(&quick)] {
+                let target = Target { variant: &variant, shapes: &shapes, quick };
+                let (mut ends, mut statics) = (Table::default(), Vec::new());
+                let into = Survey { ends: &mut ends, statics: &mut statics };
+                assert!(survey(target, &bodies, count, into, &mut Packers::alone()));
+                let layout = Segment::Collisions.layout(&variant);
+                let mut buffers: [Vec<Beat>; 3] = std::array::from_fn(|channel| {
+                    vec![Beat::default(); layout.beats_on_channel(BLOCK, channel)]
+                });
+                let mut views = buffers.each_mut().map(Vec::as_mut_slice);
+                let mut writer = Writer::new(target, ends.ends(), BLOCK, &mut views);
+                list.iter().for_each(|collision| writer.push(collision));
+                let finished = writer.finish();
+                let expected = if fits { Ok(BLOCK) } else { Err(InputError::Unsteady) };
+                assert_eq!(finished.map(|(_, written)| written), expected, "{count}");
+            }
         }
-        assert_eq!(writer.finish(), Err(InputError::Unsteady));
     }
 }

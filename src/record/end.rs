@@ -146,7 +146,7 @@ pub(crate) struct Table {
     count: usize,
 }
 
-/// Without the ends: whatever holds a table is printed in a line.
+/// Without the ends, which are many.
 impl fmt::Debug for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Table").field("count", &self.count).finish_non_exhaustive()
@@ -206,11 +206,11 @@ impl Survey<'_> {
 ///
 /// All of it is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
 pub(crate) trait Lookup<'a>: Copy {
-    /// Among the ends of all bodies; none where some would never be found, and before the first [`Survey`].
+    /// Among the ends of all bodies; none if some of these would never be found.
     fn of(all: Ends<'a>) -> Option<Self>;
 
-    /// Whether what is found by these indices is theirs; else it may be that of other bodies.
-    fn finds(self, bodies: [u32; 2]) -> bool;
+    /// Whether these are looked up by all their bits; else what is found may be another body's.
+    fn by_all_bits(self, bodies: [u32; 2]) -> bool;
 
     /// That of one body.
     fn get(self, body: u32) -> &'a End;
@@ -220,7 +220,7 @@ pub(crate) trait Lookup<'a>: Copy {
 }
 
 /// The ends of all bodies of a step.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(crate) struct Ends<'a> {
     all: &'a [End],
     /// How many bodies there are.
@@ -235,7 +235,7 @@ impl<'a> Lookup<'a> for Ends<'a> {
 
     /// Where there is no body, [`End::MISSING`] is.
     #[inline(always)]
-    fn finds(self, _: [u32; 2]) -> bool {
+    fn by_all_bits(self, _: [u32; 2]) -> bool {
         true
     }
 
@@ -268,17 +268,18 @@ fn soon_in(ends: &[End], body: u32) {
 /// The ends of all bodies of a step that has no more than indices of sixteen bits may name. Of an index the
 /// lower half is taken, as in the records of such indices, so that there is one for each without a look at
 /// how many there are.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(crate) struct LowEnds<'a>(&'a [End; LOW]);
 
 impl<'a> Lookup<'a> for LowEnds<'a> {
+    /// There is none before the first [`Survey`], either.
     #[inline(always)]
     fn of(Ends { all, count }: Ends<'a>) -> Option<Self> {
         all.first_chunk().filter(|_| count <= LOW).map(Self)
     }
 
     #[inline(always)]
-    fn finds(self, [a, b]: [u32; 2]) -> bool {
+    fn by_all_bits(self, [a, b]: [u32; 2]) -> bool {
         ((a | b) as usize) < LOW
     }
 
@@ -313,6 +314,7 @@ mod tests {
         for count in [3, LOW - 1, LOW, LOW + 1, 2 * LOW, 5, 0, 7] {
             surveyed(&mut table, (0..count).map(|at| at as f32));
             assert_eq!(table.of_bodies().len(), count);
+            assert!(format!("{table:?}").len() < 50, "it is printed without the ends");
             let ends = table.ends();
             let low = LowEnds::of(ends);
             assert_eq!(low.is_some(), count <= LOW, "{count}");
@@ -321,10 +323,10 @@ mod tests {
                 let end =
                     |at: usize| if at < count { End::at([at as f32; 3]) } else { End::MISSING };
                 assert_eq!(*ends.get(body), end(at), "{at} of {count}");
-                assert!(ends.finds([body, 0]) && ends.finds([0, body]));
+                assert!(ends.by_all_bits([body, 0]) && ends.by_all_bits([0, body]));
                 let Some(low) = low else { continue };
                 assert_eq!(*low.get(body), end(at % LOW), "{at} of {count}");
-                assert_eq!([low.finds([body, 0]), low.finds([0, body])], [at < LOW; 2]);
+                assert_eq!([low.by_all_bits([body, 0]), low.by_all_bits([0, body])], [at < LOW; 2]);
             }
         }
         assert!(LowEnds::of(Table::default().ends()).is_none());

@@ -36,18 +36,18 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// Looks at normal, count and bodies of the next. These are the ends of its bodies if they were `found`;
-    /// else of any, and it is looked at again. Where collisions are `scheduled`, it may be padding.
+    /// Looks at normal, count and bodies of the next. The ends are `theirs`, the bodies', or may be others': then
+    /// it is looked at again, unless it is padding, which it may be where collisions are `scheduled`.
     #[inline(always)]
     pub(crate) fn head(
         &mut self,
         collision: &Collision,
         ends: [&End; 2],
-        found: bool,
+        theirs: bool,
         scheduled: bool,
     ) {
         let padding = scheduled & is_padding(collision);
-        self.heads &= head(collision, ends) & found | padding;
+        self.heads &= head(collision, ends) & theirs | padding;
         self.paddings += usize::from(padding);
     }
 

@@ -139,7 +139,6 @@ impl<'a> Quick<'a> {
 }
 
 /// Collisions that are looked at together.
-#[derive(Debug)]
 pub(crate) struct Block<'a, L> {
     /// Index of the first.
     pub(crate) first: usize,

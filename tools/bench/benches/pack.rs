@@ -297,12 +297,13 @@ fn measure(
     unpacker.unpack(bodies).ok_or("the results are refused")?;
     for packer in &mut packers {
         packer.pack_bodies(bodies, shapes);
+        let added = Some(schedule.empty());
         match thing {
+            Thing::AsGiven | Thing::StepAsGiven => packer.pack_collisions(collisions, shapes, None),
+            Thing::InOrder | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
             Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, None)?,
-            Thing::CheckedInOrder => {
-                packer.pack(bodies, &ordered, shapes, Some(schedule.empty()))?
-            }
-            _ => Some(0),
+            Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, added)?,
+            Thing::Bodies | Thing::Gathered | Thing::Unpack | Thing::Commit => Some(0),
         }
         .ok_or("the step is refused")?;
     }
