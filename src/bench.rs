@@ -102,8 +102,8 @@ impl StepPacker {
     }
 
     /// Writes the records of all collisions of the bodies that were packed last, unchecked; returns
-    /// the sum of their words, modulo 2^32, or `None` as [`CollisionPacker::pack`] does. `added` is how many
-    /// the order added that was made for them, `None` if there is none.
+    /// the sum of their words, modulo 2^32, or `None` as [`CollisionPacker::pack`] does, or if no bodies were
+    /// packed. `added` is how many the order added that was made for them, `None` if there is none.
     pub fn pack_collisions<C: Collisions + ?Sized>(
         &mut self,
         collisions: &C,

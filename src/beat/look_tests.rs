@@ -9,7 +9,7 @@ use super::stripe::Segment;
 use super::target::Target;
 use crate::interface::number::{Numbers, Precision, StreamFormat};
 use crate::interface::profile::{
-    FLOAT, Geometry, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,
+    FLOAT, Flow, Geometry, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,
 };
 use crate::interface::record::Beat;
 use crate::order::{Ordered, Schedule};
@@ -220,15 +220,16 @@ fn said(
     // As bytes: a position may be no number.
     let bytes = |ends: &Table| bytemuck::cast_slice::<_, u8>(ends.of_bodies()).to_vec();
     assert_eq!((bytes(&other_ends), other_statics), (bytes(&ends), statics));
+    let count = schedule.map_or(collisions.len(), Schedule::len);
+    let added = schedule.map(Schedule::empty);
+    // A window has places of its own in place of indices, always.
+    let places = vec![[8, 9]; count];
+    let words = matches!(variant.profile.flow, Flow::Window(_)).then_some(&places[..]);
     let good = match schedule {
-        None => {
-            let count = collisions.len();
-            looked_at(target, ends.ends(), &Entries { collisions, count, added: None, words: None })
-        }
+        None => looked_at(target, ends.ends(), &Entries { collisions, count, added, words }),
         Some(schedule) => {
             let collisions = &Ordered { collisions, schedule };
-            let (count, added) = (schedule.len(), Some(schedule.empty()));
-            looked_at(target, ends.ends(), &Entries { collisions, count, added, words: None })
+            looked_at(target, ends.ends(), &Entries { collisions, count, added, words })
         }
     };
     Some((bodies_good & good, validate(bodies, collisions, shapes, &parameters, limits)))
@@ -319,7 +320,7 @@ fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
         count: 1,
         contacts: [Contact::default(); 4],
     };
-    for profile in [&NAIVE, &FLOAT, &WINDOWED] {
+    for profile in [&NAIVE, &FLOAT, &WINDOWED, &WINDOWED16] {
         let limits = limits(profile.default_variant(), false);
         // Two that never move, and all others do.
         for still in [[0, 1], [low, low + 1]] {

@@ -28,8 +28,8 @@ pub(crate) trait Vectors: Copy {
     fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2];
 
     /// Does it as a function of its own, which is compiled for these vectors, too: a loop that is no part of
-    /// others shares no registers with them. Each closure has one such function, and
-    /// so becomes a part of it; should it not, the bits are the same.
+    /// others shares no registers with them. Each closure is called from one such function alone, and becomes
+    /// a part of it; should it not, the bits are the same.
     fn apart<T>(self, work: impl FnOnce() -> T) -> T;
 }
 

@@ -1,61 +1,78 @@
 #!/usr/bin/env bash
-# Counts by callgrind the instructions of the loops that pack: what noise hides from a benchmark, and no
-# other test sees, as a loop that has lost its registers to another packs the same beats.
+# Counts by callgrind the instructions of the loops that pack whole units (src/beat/unit.rs): what noise
+# hides from a benchmark, and no other test sees, as a loop that has lost its registers to another packs the
+# same beats. What is looked at outside of these loops is not counted.
 #
 #   tools/scripts/instructions.sh                    counts on a pile, and holds the counts against limits
 #   tools/scripts/instructions.sh --input FOLDER     prints them alone, of a step in a folder of arrays
 #
-# Of each: profile, thing (`cargo bench --bench pack -- --help`), instructions an entry, limit.
+# Of each: profile, thing (of those that tools/bench/benches/pack.rs describes), instructions an entry, limit.
 #
-# Exit code: 0 done, 1 something takes more than its limit, 77 skipped: not on this machine.
+# Exit code: 0 done, 1 something takes more than its limit or cannot be counted, 77 skipped: not on this
+# machine.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 case "$*" in
 	'') scene=(--grid 12x12x12) ;;
-	'--input '?*) scene=("$@") ;;
+	'--input '?*) scene=(--input "$(realpath -e "$2")") ;;
 	*) fail "expected nothing or --input FOLDER, found: $*" ;;
 esac
-# The loops are compiled for other vectors elsewhere, and the limits are of these.
+# Elsewhere the loops are compiled for other vectors than those whose instructions the limits count.
+rustc -vV | grep -q '^host: x86_64' || skip "the limits are those of x86-64"
 for feature in avx2 f16c; do
-	grep -q -w $feature /proc/cpuinfo 2>/dev/null || skip "the processor has no $feature, of which the limits are"
+	grep -q -w $feature /proc/cpuinfo 2>/dev/null || skip "the limits are those of $feature, which the processor has not"
 done
 command -v valgrind >/dev/null || need_packages valgrind
 cd "$repository"
-built=$(cargo bench --bench pack --no-run --locked --quiet --message-format=json |
-	sed -n 's/.*"executable":"\([^"]*\/pack-[^"]*\)".*/\1/p')
+built=$(cargo bench --bench pack --no-run --locked --quiet --message-format=json-render-diagnostics |
+	sed -n 's/.*"executable":"\([^"]*\/pack-[^"]*\)".*/\1/p') || fail "the benchmark 'pack' cannot be built"
 [ -n "$built" ] || fail "cargo does not say where the benchmark is that it has built"
 
 # The loops are functions of their own, of this name.
 loops='zynq_pgs::platform::vectors::x86::apart*'
+log=$(mktemp)
+litter+=("$log")
+limit_of_time=${VALGRIND_LIMIT:-600}
 
-# What a run of the benchmark says, in so many stretches.
-run() {
-	attend timeout "${VALGRIND_LIMIT:-600}" valgrind --tool=callgrind --callgrind-out-file=/dev/null \
+# Has callgrind count in a run of the benchmark, in so many stretches; what both say is in the log.
+count() {
+	local code=0
+	attend timeout "$limit_of_time" valgrind --tool=callgrind --callgrind-out-file=/dev/null \
 		--toggle-collect="$loops" "$built" --bench "${scene[@]}" --order hazard-free \
-		--profile "$1" --thing "$2" --runs "$3" 2>&1
+		--profile "$1" --thing "$2" --runs "$3" >"$log" 2>&1 || code=$?
+	[ $code != 124 ] || fail "$1 $2: not done in $limit_of_time s (VALGRIND_LIMIT)"
+	[ $code = 0 ] || fail "$1 $2: $(tail -n 3 "$log")"
 }
-# The number in front of these words, or behind them.
-before() { sed -n "s/.* \([0-9]*\) $1.*/\1/p" <<<"$2"; }
-behind() { sed -n "s/.*$1 \([0-9]*\).*/\1/p" <<<"$2"; }
+# What the log says instead of the number in this text.
+said() {
+	local found
+	found=$(sed -n "s/.*${1/NUMBER/\\([0-9][0-9]*\\)}.*/\\1/p" "$log")
+	[ -n "$found" ] || fail "neither callgrind nor the benchmark says '$1'"
+	echo "$found"
+}
 
-# Of a stretch, so many packings: those of `tools/bench/src/lib.rs` that count and those that do not.
-packings=13
+compared=no
+[ "${scene[0]}" != --grid ] || compared=yes
 good=yes
 # A tenth above what they were when this was written.
 while read -r profile thing limit; do
-	one=$(run "$profile" "$thing" 1) || fail "$profile $thing: $one"
-	two=$(run "$profile" "$thing" 2) || fail "$profile $thing: $two"
-	entries=$(before 'collisions;' "$one")
-	case $thing in *in-order) entries=$((entries + $(before 'empty entries;' "$one"))) ;; esac
-	count=$((($(behind 'Collected :' "$two") - $(behind 'Collected :' "$one")) / packings))
-	[ $count -gt 0 ] || fail "callgrind sees no $loops: is it called something else now?"
+	count "$profile" "$thing" 1
+	once=$(said 'Collected : NUMBER')
+	count "$profile" "$thing" 2
+	twice=$(said 'Collected : NUMBER')
+	packings=$(said 'stretches of NUMBER runs')
+	entries=$(said ' NUMBER collisions;')
+	added=$(said ' NUMBER empty entries;')
+	case $thing in *in-order) entries=$((entries + added)) ;; esac
 	# In tenths, which the shell can divide.
-	tenths=$((count * 10 / entries))
+	tenths=$(((twice - once) * 10 / packings / entries))
 	verdict=
-	if [ "${scene[0]}" = --grid ]; then
+	if [ $compared = yes ]; then
 		verdict=" of $limit"
 		[ $tenths -le $((limit * 10)) ] || { good=no; verdict+=': too many'; }
+		# So few that the limit would hide anything, if they are all of them.
+		[ $tenths -ge $((limit * 7)) ] || { good=no; verdict+=': too few'; }
 	fi
 	echo "$profile $thing: $((tenths / 10)).$((tenths % 10)) instructions an entry$verdict"
 done <<'LIMITS'
@@ -72,4 +89,5 @@ mixed in-order 54
 mixed checked-as-given 170
 mixed checked-in-order 212
 LIMITS
-[ $good = yes ] || fail "packing takes more instructions than it did: the loops are in src/beat/unit.rs"
+[ $good = yes ] || fail "packing does not take the instructions it did: if the commit before it does, with" \
+	"$(rustc --version), look at the loops (and at the name '$loops'); else change the limits"

@@ -42,7 +42,7 @@ use std::time::Duration;
 
 use bench::options::{Common, Pile, Sent};
 use bench::step::Step;
-use bench::{Clock, Run, milliseconds, ratio, warm_medians};
+use bench::{Clock, Run, STRETCH, milliseconds, ratio, warm_medians};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, Profile};
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
@@ -223,7 +223,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if !options.common.json {
         println!(
             "{}: {} bodies, {} collisions; in order is {order}, {} empty entries; medians of {} \
-             stretches in turn, {clock}; {} packing\n",
+             stretches of {STRETCH} runs in turn, {clock}; {} packing\n",
             step.name,
             step.bodies.len(),
             step.collisions.len(),

@@ -61,6 +61,8 @@ impl Clock {
 const WARMING: usize = 10;
 /// Runs of a stretch that are measured.
 const MEASURED: usize = 3;
+/// Runs of a stretch.
+pub const STRETCH: usize = WARMING + MEASURED;
 
 /// Runs all in turn, in so many stretches each; the median time of each.
 ///
@@ -127,7 +129,7 @@ mod tests {
         ];
         assert_eq!(warm_medians(2, Clock::Thread, &mut contestants).len(), 2);
         drop(contestants);
-        let stretch = |it: &str| it.repeat(WARMING + MEASURED);
+        let stretch = |it: &str| it.repeat(STRETCH);
         assert_eq!(order.into_inner(), (stretch("a") + &stretch("b")).repeat(2));
     }
 
