@@ -30,7 +30,7 @@ pub(crate) trait Vectors: Copy {
     /// Does it as a function of its own, which is compiled for these vectors, too: a loop that is no part of
     /// others shares no registers with them. Each closure is called from one such function alone, and becomes
     /// a part of it; should it not, the bits are the same.
-    fn apart<T>(self, work: impl FnOnce() -> T) -> T;
+    fn apart<T, W: FnOnce() -> T>(self, work: W) -> T;
 }
 
 /// Those that every processor has.
@@ -49,7 +49,7 @@ impl Vectors for Baseline {
     }
 
     #[inline(never)]
-    fn apart<T>(self, work: impl FnOnce() -> T) -> T {
+    fn apart<T, W: FnOnce() -> T>(self, work: W) -> T {
         work()
     }
 }
@@ -68,6 +68,8 @@ pub(crate) fn in_wide_vectors<W: Work>(work: W) -> W::Output {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
+    use std::hint::black_box;
+
     use super::{LANES, Lanes, Last, Vectors, Work, convert};
 
     /// Those of AVX2, and the conversions of F16C. There is one in [`run`] alone.
@@ -90,7 +92,9 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn apart<T>(self, work: impl FnOnce() -> T) -> T {
+        fn apart<T, W: FnOnce() -> T>(self, work: W) -> T {
+            // From here, where the vectors are not said, the compiler would inline it nevertheless.
+            let apart: unsafe fn(W) -> T = black_box(apart::<T, W>);
             // SAFETY: `apart` wants AVX2 and F16C. A `Wide` is made in `run` alone, which is called only
             // where both were found.
             unsafe { apart(work) }
@@ -99,7 +103,7 @@ mod x86 {
 
     #[target_feature(enable = "avx2,f16c")]
     #[inline(never)]
-    fn apart<T>(work: impl FnOnce() -> T) -> T {
+    fn apart<T, W: FnOnce() -> T>(work: W) -> T {
         work()
     }
 
