@@ -259,15 +259,15 @@ impl Work for Writing<'_, '_, '_> {
             let (ends, behind) = mem::take(rest).split_at_mut(bodies.len());
             *rest = behind;
             let any_still = tags.ends(bodies, ends);
-            *good &= quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends));
+            *good &= quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends, any_still));
             if any_still {
                 *still = around(still, &range);
             }
         } else if let Some(quick) = quick {
             // Read anew they may be others.
             let mut ends = [End::MISSING; BODIES];
-            tags.ends(bodies, &mut ends);
-            *good &= quick.bodies(range.start, bodies, &ends);
+            let any_still = tags.ends(bodies, &mut ends);
+            *good &= quick.bodies(range.start, bodies, &ends, any_still);
         }
         if let Some(velocities) = velocities {
             velocities.write(vectors, bodies);

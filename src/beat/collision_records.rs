@@ -1,12 +1,13 @@
 //! This file makes the records of a block of collisions, and has them looked at on their way.
 
-use bitstream_model::interface::record::{collision, relative};
+use bitstream_model::interface::record::{CONTACT_POINTS, collision, relative};
 
 use super::format::{Format, Records};
 use crate::platform::Lanes;
 use crate::record::end::{End, Ends, Lookup};
+use crate::record::largest::MAGNITUDE;
 use crate::record::{self, Integer, Record, Rows};
-use crate::scene::validate::{Block, Look, Quick, Reach};
+use crate::scene::validate::{Block, Look, Places, Quick};
 use crate::scene::{Collision, Lying, Next};
 
 /// A kind of collision record of `ROWS` rows.
@@ -14,14 +15,14 @@ pub(super) trait Kind<const ROWS: usize>: Copy {
     /// Where the bodies of a collision are looked up whose record is sent in a format.
     type Among<'a, F: Format>: Lookup<'a>;
 
-    /// The record of collision `index`.
-    fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<ROWS>;
+    /// The ends that a record is made from, given those of the collision's bodies.
+    fn anchors(ends: [&End; 2]) -> [&End; 2];
 
-    /// Bits where a number is beyond what the stream holds.
-    fn beyond(quick: &Quick<'_>, record: &[Lanes; ROWS], count: u32) -> Lanes;
+    /// The record of collision `index`, from its [anchors](Self::anchors).
+    fn encode(self, index: usize, from: &Collision, anchors: [&End; 2]) -> Record<ROWS>;
 
-    /// How far the contact points are.
-    fn reach(record: &[Lanes; ROWS], count: u32) -> Reach;
+    /// The places that it holds.
+    fn places(from: &Collision, anchors: [&End; 2]) -> Places;
 }
 
 /// Records in world coordinates.
@@ -32,18 +33,22 @@ impl Kind<{ collision::ROWS }> for Absolute {
     type Among<'a, F: Format> = F::Among<'a>;
 
     #[inline(always)]
-    fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ collision::ROWS }> {
-        record::collision::encode(from, ends)
+    fn anchors(ends: [&End; 2]) -> [&End; 2] {
+        ends
     }
 
     #[inline(always)]
-    fn beyond(quick: &Quick<'_>, record: &[Lanes; collision::ROWS], _: u32) -> Lanes {
-        quick.beyond_absolute(record)
+    fn encode(self, _: usize, from: &Collision, anchors: [&End; 2]) -> Record<{ collision::ROWS }> {
+        record::collision::encode(from, anchors)
     }
 
     #[inline(always)]
-    fn reach([_, a, b, points @ ..]: &[Lanes; collision::ROWS], count: u32) -> Reach {
-        Reach::new([*a, *b], *points, count)
+    fn places(from: &Collision, anchors: [&End; 2]) -> Places {
+        let [_, a, b, points @ ..] = record::collision::encode(from, anchors).rows;
+        let magnitudes = points.map(|point| point.and(Lanes::all(MAGNITUDE)));
+        let [of_a, of_b] = [a, b].map(|position| position.and(magnitude_of_vec3()));
+        let sum = added(magnitudes).plus_f32(of_a.plus_f32(of_b));
+        Places { positions: [a, b], points, sum }
     }
 }
 
@@ -55,39 +60,39 @@ impl Kind<{ relative::ROWS }> for Relative {
     type Among<'a, F: Format> = F::Among<'a>;
 
     #[inline(always)]
-    fn encode(self, _: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
-        of_bodies(from, ends, || record::bodies(from))
+    fn anchors(ends: [&End; 2]) -> [&End; 2] {
+        anchors(ends)
     }
 
     #[inline(always)]
-    fn beyond(quick: &Quick<'_>, record: &[Lanes; relative::ROWS], count: u32) -> Lanes {
-        quick.beyond_relative(record, count)
+    fn encode(self, _: usize, from: &Collision, anchors: [&End; 2]) -> Record<{ relative::ROWS }> {
+        record::relative::encode(from, anchors, record::bodies(from))
     }
 
     #[inline(always)]
-    fn reach([_, offset, points @ ..]: &[Lanes; relative::ROWS], count: u32) -> Reach {
-        Reach::new([Lanes::all(0), *offset], *points, count)
+    fn places(from: &Collision, anchors: [&End; 2]) -> Places {
+        let (offset, points) = record::relative::seen(from, anchors);
+        let mut magnitudes = points;
+        for (point, used) in magnitudes.iter_mut().zip(record::used_magnitudes(from.count)) {
+            *point = point.and(used);
+        }
+        let sum = added(magnitudes).plus_f32(offset.and(magnitude_of_vec3()));
+        Places { positions: [Lanes::all(0), offset], points, sum }
     }
 }
 
-/// The relative record whose indices are these. They are asked for where they are needed: made earlier, they
-/// would hold registers until then.
+/// The ends that a relative record is made from.
 #[inline(always)]
-fn of_bodies(
-    from: &Collision,
-    [a, b]: [&End; 2],
-    bodies: impl FnOnce() -> [Integer; 2],
-) -> Record<{ relative::ROWS }> {
-    // Whether it does is mostly foreseen, as few collisions are with what never moves or nearly all are: a
-    // jump costs less then than to choose.
-    let ends = if a.is_static() | b.is_static() { anchors(a, b) } else { [a, b] };
-    record::relative::encode(from, ends, bodies())
+fn anchors([a, b]: [&End; 2]) -> [&End; 2] {
+    // Whether one never moves is mostly foreseen, as few collisions are with what never moves or nearly all
+    // are: a jump costs less then than to choose.
+    if a.is_static() | b.is_static() { chosen(a, b) } else { [a, b] }
 }
 
-/// The ends that a record is made from where one never moves.
+/// The same where one never moves.
 #[cold]
 #[inline(never)]
-fn anchors<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
+fn chosen<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
     record::relative::anchors([a, b], [!a.is_static(), !b.is_static()])
 }
 
@@ -100,21 +105,39 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
     type Among<'a, F: Format> = Ends<'a>;
 
     #[inline(always)]
-    fn encode(self, index: usize, from: &Collision, ends: [&End; 2]) -> Record<{ relative::ROWS }> {
+    fn anchors(ends: [&End; 2]) -> [&End; 2] {
+        anchors(ends)
+    }
+
+    #[inline(always)]
+    fn encode(
+        self,
+        index: usize,
+        from: &Collision,
+        anchors: [&End; 2],
+    ) -> Record<{ relative::ROWS }> {
         let [word_a, word_b] = self.0[index];
         let words = Lanes::new([word_a, word_b, 0, 0]);
-        of_bodies(from, ends, || [Integer::new::<0>(words), Integer::new::<1>(words)])
+        let bodies = [Integer::new::<0>(words), Integer::new::<1>(words)];
+        record::relative::encode(from, anchors, bodies)
     }
 
     #[inline(always)]
-    fn beyond(quick: &Quick<'_>, record: &[Lanes; relative::ROWS], count: u32) -> Lanes {
-        Relative::beyond(quick, record, count)
+    fn places(from: &Collision, anchors: [&End; 2]) -> Places {
+        Relative::places(from, anchors)
     }
+}
 
-    #[inline(always)]
-    fn reach(record: &[Lanes; relative::ROWS], count: u32) -> Reach {
-        Relative::reach(record, count)
-    }
+/// The sum of magnitudes.
+#[inline(always)]
+fn added([first, second, third, fourth]: [Lanes; CONTACT_POINTS]) -> Lanes {
+    first.plus_f32(second).plus_f32(third.plus_f32(fourth))
+}
+
+/// The bits of the magnitude of a vec3, and none beside it.
+#[inline(always)]
+fn magnitude_of_vec3() -> Lanes {
+    Lanes::new([MAGNITUDE, MAGNITUDE, MAGNITUDE, 0])
 }
 
 /// The ends of a collision's bodies.
@@ -123,35 +146,90 @@ fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
     [ends.get(collision.body_a), ends.get(collision.body_b)]
 }
 
-/// The records of a block of collisions. What is behind it is fetched meanwhile.
+/// The records of a block of collisions, seen by a witness on their way. What is behind it is fetched
+/// meanwhile.
 #[derive(Clone, Copy)]
-pub(super) struct Encoding<K, L, E> {
+pub(super) struct Encoding<K, L, E, W> {
     kind: K,
     first: usize,
     collisions: L,
     ends: E,
+    witness: W,
 }
 
-impl<'p, K, L: Lying<'p>, E: Lookup<'p>> Encoding<K, L, E> {
+impl<'p, K, L: Lying<'p>, E: Lookup<'p>, W> Encoding<K, L, E, W> {
     /// Those of a block, whose bodies are looked up here.
     #[inline(always)]
-    pub(super) fn new(kind: K, block: &Block<'p, L>, ends: E) -> Self {
+    pub(super) fn new(kind: K, block: &Block<'p, L>, ends: E, witness: W) -> Self {
         let Block { first, collisions, .. } = *block;
-        Self { kind, first, collisions, ends }
+        Self { kind, first, collisions, ends, witness }
     }
+}
 
-    /// Gives the rows of the `nth` so many records to `to`; `witness` sees each.
+/// Who sees the records on their way. An `#[inline(always)]` belongs to every implementation.
+pub(super) trait Witness: Copy {
+    /// Sees the collision of one, the ends of its bodies, and those that the record is made from.
+    fn see<K: Kind<ROWS>, const ROWS: usize>(
+        &mut self,
+        collision: &Collision,
+        ends: [&End; 2],
+        anchors: [&End; 2],
+    );
+}
+
+/// Nobody.
+impl Witness for () {
     #[inline(always)]
-    fn give<W: Witness<K, ROWS>, const ROWS: usize, const N: usize>(
-        &self,
-        nth: usize,
-        to: &mut impl Rows,
-        witness: &mut W,
-    ) -> Option<()>
+    fn see<K: Kind<ROWS>, const ROWS: usize>(&mut self, _: &Collision, _: [&End; 2], _: [&End; 2]) {
+    }
+}
+
+/// Whoever looks at them as validation does.
+impl<const REACHES: bool> Witness for Look<REACHES> {
+    #[inline(always)]
+    fn see<K: Kind<ROWS>, const ROWS: usize>(
+        &mut self,
+        collision: &Collision,
+        ends: [&End; 2],
+        anchors: [&End; 2],
+    ) {
+        self.take(collision, ends, &K::places(collision, anchors));
+    }
+}
+
+impl<'p, K, L: Lying<'p>, E: Lookup<'p>, const REACHES: bool> Encoding<K, L, E, Look<REACHES>> {
+    /// Whether validation refuses none of the block, all of whose records were taken; and how many of it look
+    /// like padding, if the block is scheduled.
+    #[inline(always)]
+    pub(super) fn good<const ROWS: usize>(
+        self,
+        quick: &Quick<'_>,
+        block: &Block<'p, L>,
+    ) -> (bool, usize)
     where
         K: Kind<ROWS>,
     {
-        let Next { these, soon } = self.collisions.next::<N>(nth, W::SLOW)?;
+        let Self { ends, witness, .. } = self;
+        // These are asked for only where every record was made of its own bodies' ends.
+        let places = block
+            .collisions
+            .iter()
+            .map(|collision| K::places(collision, K::anchors(both(ends, collision))));
+        witness.good(quick, block, ends, places)
+    }
+}
+
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, W: Witness, const ROWS: usize> Records<ROWS>
+    for Encoding<K, L, E, W>
+{
+    #[inline(always)]
+    fn len(&self) -> usize {
+        self.collisions.len()
+    }
+
+    #[inline(always)]
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+        let Next { these, soon } = self.collisions.next::<N>(nth)?;
         if let Some(soon) = soon {
             for collision in soon {
                 self.ends.soon([collision.body_a, collision.body_b]);
@@ -166,116 +244,14 @@ impl<'p, K, L: Lying<'p>, E: Lookup<'p>> Encoding<K, L, E> {
                 $(if const { $at < N } {
                     let collision = these[$at];
                     let ends = both(self.ends, collision);
-                    let record = self.kind.encode(first + $at, collision, ends);
-                    let theirs = self.ends.by_all_bits([collision.body_a, collision.body_b]);
-                    witness.see(&record, collision, ends, theirs);
+                    let anchors = K::anchors(ends);
+                    let record = self.kind.encode(first + $at, collision, anchors);
+                    self.witness.see::<K, ROWS>(collision, ends, anchors);
                     record.give(to);
                 })*
             };
         }
         each!(0 1 2 3 4);
         Some(())
-    }
-}
-
-/// Who sees the records on their way. An `#[inline(always)]` belongs to every implementation.
-trait Witness<K: Kind<ROWS>, const ROWS: usize> {
-    /// Whether that takes longer than to make the record.
-    const SLOW: bool;
-
-    /// Sees the record of a collision. These are the ends it was made of: whether they are `theirs`, the
-    /// bodies' of the collision, is sure or not.
-    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], theirs: bool);
-}
-
-/// Nobody.
-impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for () {
-    const SLOW: bool = false;
-
-    #[inline(always)]
-    fn see(&mut self, _: &Record<ROWS>, _: &Collision, _: [&End; 2], _: bool) {}
-}
-
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, const ROWS: usize> Records<ROWS>
-    for Encoding<K, L, E>
-{
-    #[inline(always)]
-    fn len(&self) -> usize {
-        self.collisions.len()
-    }
-
-    #[inline(always)]
-    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
-        self.give::<(), ROWS, N>(nth, to, &mut ())
-    }
-}
-
-/// Whoever looks at them as validation does.
-#[derive(Clone, Copy)]
-struct Looking<'p> {
-    quick: &'p Quick<'p>,
-    look: Look<'p>,
-    scheduled: bool,
-}
-
-impl<K: Kind<ROWS>, const ROWS: usize> Witness<K, ROWS> for Looking<'_> {
-    const SLOW: bool = true;
-
-    #[inline(always)]
-    fn see(&mut self, record: &Record<ROWS>, collision: &Collision, ends: [&End; 2], theirs: bool) {
-        self.look.head(collision, ends, theirs, self.scheduled);
-        self.look.numbers(K::beyond(self.quick, &record.rows, collision.count));
-        if self.look.asks_how_far() {
-            self.look.reach(&K::reach(&record.rows, collision.count), ends);
-        }
-    }
-}
-
-/// The same records, looked at on their way.
-#[derive(Clone, Copy)]
-pub(super) struct LookedAt<'p, K, L, E> {
-    records: Encoding<K, L, E>,
-    looking: Looking<'p>,
-}
-
-impl<'p, K: Copy, L: Lying<'p>, E: Lookup<'p>> LookedAt<'p, K, L, E> {
-    #[inline(always)]
-    pub(super) fn new(records: Encoding<K, L, E>, quick: &'p Quick<'p>, scheduled: bool) -> Self {
-        Self { records, looking: Looking { quick, look: Look::new(quick), scheduled } }
-    }
-
-    /// How many of those taken look like padding.
-    #[inline(always)]
-    pub(super) fn paddings(&self) -> usize {
-        self.looking.look.paddings()
-    }
-
-    /// Whether validation refuses none of the block, all of whose records were taken.
-    #[inline(always)]
-    pub(super) fn good<const ROWS: usize>(self, block: &Block<'p, L>) -> bool
-    where
-        K: Kind<ROWS>,
-    {
-        let Self { records: Encoding { kind, .. }, looking: Looking { look, .. } } = self;
-        // These are asked for only where every record was made of its own bodies' ends, or is padding.
-        let reaches = (block.first..).zip(block.collisions.iter()).map(|(index, collision)| {
-            let record = kind.encode(index, collision, both(block.ends, collision));
-            K::reach(&record.rows, collision.count)
-        });
-        look.good(block, reaches)
-    }
-}
-
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, const ROWS: usize> Records<ROWS>
-    for LookedAt<'p, K, L, E>
-{
-    #[inline(always)]
-    fn len(&self) -> usize {
-        self.records.collisions.len()
-    }
-
-    #[inline(always)]
-    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
-        self.records.give::<_, ROWS, N>(nth, to, &mut self.looking)
     }
 }

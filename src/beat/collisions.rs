@@ -9,15 +9,15 @@ use std::ops::Range;
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::Beat;
 
-use super::collision_records::{Absolute, Encoding, Kind, LookedAt, Relative, Worded};
-use super::deal::{BLOCK, Dealer, MANY};
+use super::collision_records::{Absolute, Encoding, Kind, Relative, Worded};
+use super::deal::{BLOCK, Dealer, LOOKED_AT, MANY};
 use super::format::{Format, in_format};
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stripe::Segment;
 use super::target::Target;
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::end::{Ends, Lookup};
-use crate::scene::validate::{Block, Quick};
+use crate::scene::validate::{Block, Look, Quick};
 use crate::scene::{Collision, Collisions, InArray, InNearbyOrder, InOrder, Lying, Structures};
 
 /// The collisions of a step, as they are sent.
@@ -242,18 +242,29 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
         let mut seen = Seen::NOTHING;
         // Validation goes by blocks. Without it, as packing alone is measured, there is nothing to be done
         // for each that is worth it.
-        let size = if quick.is_some() { BLOCK } else { MANY };
+        let size = if quick.is_some() { LOOKED_AT } else { MANY };
         for at in (0..all.collisions.len()).step_by(size) {
             let collisions = all.collisions.part(at..at + size);
             let block = Block { first: all.first + at, collisions, ..all };
-            let mut records = Encoding::new(kind, &block, ends);
-            let Some(quick) = quick else {
-                dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
-                continue;
+            // One loop each, in which nothing is asked of what is looked for.
+            macro_rules! write {
+                ($witness:expr) => {{
+                    let mut records = Encoding::new(kind, &block, ends, $witness);
+                    dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
+                    records
+                }};
+            }
+            let (good, paddings) = match quick {
+                None => {
+                    write!(());
+                    continue;
+                }
+                Some(quick) if quick.asks_how_far() => {
+                    write!(Look::<true>::new(quick)).good(quick, &block)
+                }
+                Some(quick) => write!(Look::<false>::new(quick)).good(quick, &block),
             };
-            let mut records = LookedAt::new(records, quick, block.scheduled);
-            dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
-            seen = seen.and(Seen { paddings: records.paddings(), good: records.good(&block) });
+            seen = seen.and(Seen { good, paddings });
         }
         seen
     }

@@ -26,6 +26,10 @@ pub(crate) const BLOCK: usize = 30;
 /// Records of many blocks: so many that beginning one costs next to nothing a record.
 pub(super) const MANY: usize = 32 * BLOCK;
 
+/// Collisions that are looked at together: as many as lie in the innermost cache, should it be necessary to look
+/// at them again.
+pub(super) const LOOKED_AT: usize = 4 * BLOCK;
+
 /// Bodies of a block, as [`BLOCK`]: more, as they are small and lie one behind the other.
 pub(super) const BODIES: usize = 120;
 const _: () = assert!(BODIES.is_multiple_of(BLOCK), "so that each begins with a group");

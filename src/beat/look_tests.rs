@@ -9,7 +9,7 @@ use super::stripe::Segment;
 use super::target::Target;
 use crate::interface::number::{Numbers, Precision, StreamFormat};
 use crate::interface::profile::{
-    FLOAT, Flow, Geometry, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16,
+    FLOAT, Flow, Geometry, HALF, Inertia, MIXED, NAIVE, PROFILES, Variant, WINDOWED, WINDOWED16,
 };
 use crate::interface::record::Beat;
 use crate::order::{Ordered, Schedule};
@@ -301,6 +301,62 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
             wrong[at % BODIES].velocity.angular[2] = f32::NAN;
             assert!(!said(&wrong, &collisions));
         }
+    }
+}
+
+/// A block with padding among its collisions is looked at again, by another way.
+#[test]
+fn what_is_wrong_beside_padding_is_noticed() {
+    let pose = Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] };
+    let body = |shape| Body { pose, velocity: Velocity::default(), shape };
+    // The one that padding names is static, and so is the last.
+    let bodies = [vec![body(0)], vec![body(1); BODIES], vec![body(0)]].concat();
+    let still = u32::try_from(BODIES + 1).expect("few");
+    let contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
+    let collision = Collision {
+        body_a: 3,
+        body_b: 4,
+        normal: [0.0, 1.0, 0.0],
+        count: 3,
+        contacts: [contact; 4],
+    };
+    let on_ground = Collision { body_b: still, ..collision };
+    let nan = Contact { distance: f32::NAN, ..contact };
+    let wrongs = [
+        ("static", Collision { body_a: 0, ..on_ground }),
+        ("missing", Collision { body_a: still + 1, ..collision }),
+        ("beyond sixteen bits", Collision { body_b: 1 << 16, ..collision }),
+        ("long", Collision { normal: [0.0, 1.002, 0.0], ..collision }),
+        ("short", Collision { normal: [0.0, 0.998, 0.0], ..collision }),
+        ("no number", Collision { normal: [0.0, f32::NAN, 0.0], ..collision }),
+        ("none", Collision { count: 0, ..collision }),
+        ("many", Collision { count: 5, ..collision }),
+        ("NaN", Collision { contacts: [contact, contact, nan, contact], ..collision }),
+    ];
+    for profile in PROFILES {
+        let limits = limits(profile.default_variant(), true);
+        let said = |wrong: Option<Collision>, empty: &[usize]| {
+            let mut collisions = vec![collision, on_ground].repeat(100);
+            if let Some(wrong) = wrong {
+                collisions[50] = wrong;
+            }
+            let mut entries: Vec<Option<u32>> = (0..200).map(Some).collect();
+            empty.iter().for_each(|at| entries.insert(*at, None));
+            let schedule: Schedule = entries.into_iter().collect();
+            let (good, valid) =
+                said(&limits, &bodies, &collisions, Some(&schedule)).expect("nothing else wrong");
+            assert_eq!(good, valid.is_ok(), "{}: {valid:?}", profile.name);
+            good
+        };
+        for empty in [&[][..], &[40], &[0, 1, 52, 150, 200]] {
+            assert!(said(None, empty), "{} {empty:?}", profile.name);
+            for (what, wrong) in wrongs {
+                assert!(!said(Some(wrong), empty), "{} {empty:?}: {what}", profile.name);
+            }
+        }
+        // What only looks like padding is counted.
+        let alike = Collision { body_b: 3, count: 0, ..collision };
+        assert!(!said(Some(alike), &[40]), "{}", profile.name);
     }
 }
 

@@ -105,6 +105,12 @@ impl Lanes {
         each!(_mm_add_epi32, vaddq_u32, u32::wrapping_add, self, other)
     }
 
+    /// The same less the other's.
+    #[inline(always)]
+    pub(crate) fn minus(self, other: Self) -> Self {
+        each!(_mm_sub_epi32, vsubq_u32, u32::wrapping_sub, self, other)
+    }
+
     /// The bits that both have.
     #[inline(always)]
     pub(crate) fn and(self, other: Self) -> Self {
@@ -144,6 +150,60 @@ impl Lanes {
         }));
     }
 
+    /// The last word four times.
+    #[inline(always)]
+    fn last(self) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: SSE2, whose instruction it is, belongs to every x86-64; it works on registers alone.
+        return Self(unsafe { arch::_mm_shuffle_epi32::<0xFF>(self.0) });
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: NEON, whose instruction it is, belongs to every aarch64 that Linux runs on; it works on
+        // registers alone.
+        return Self(unsafe { arch::vdupq_laneq_u32::<3>(self.0) });
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        return Self::all(self.0[3]);
+    }
+
+    /// All bits of each word if the last one has the top bit, else none.
+    #[inline(always)]
+    pub(crate) fn top_of_last(self) -> Self {
+        Self::all(0).above(self.last())
+    }
+
+    /// The first two words the other way round, and the last two.
+    #[inline(always)]
+    fn neighbours(self) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `last`.
+        return Self(unsafe { arch::_mm_shuffle_epi32::<0b10_11_00_01>(self.0) });
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: as in `last`.
+        return Self(unsafe { arch::vrev64q_u32(self.0) });
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        return Self(std::array::from_fn(|k| self.0[k ^ 1]));
+    }
+
+    /// The last two words before the first two.
+    #[inline(always)]
+    fn halves(self) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `last`.
+        return Self(unsafe { arch::_mm_shuffle_epi32::<0b01_00_11_10>(self.0) });
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: as in `last`.
+        return Self(unsafe { arch::vextq_u32::<2>(self.0, self.0) });
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        return Self(std::array::from_fn(|k| self.0[k ^ 2]));
+    }
+
+    /// The sum of all four f32, in each word: of the first two and of the last two, and of these, rounded to
+    /// nearest even each.
+    #[inline(always)]
+    pub(crate) fn sum_f32(self) -> Self {
+        let pairs = self.plus_f32(self.neighbours());
+        pairs.plus_f32(pairs.halves())
+    }
+
     /// Sums of f32, rounded to nearest even.
     #[inline(always)]
     pub(crate) fn plus_f32(self, other: Self) -> Self {
@@ -166,6 +226,12 @@ impl Lanes {
     #[inline(always)]
     pub(crate) fn larger_f32(self, other: Self) -> Self {
         each_f32!(_mm_max_ps, vmaxq_f32, f32::max, self, other)
+    }
+
+    /// The smaller ones of f32. Likewise.
+    #[inline(always)]
+    pub(crate) fn smaller_f32(self, other: Self) -> Self {
+        each_f32!(_mm_min_ps, vminq_f32, f32::min, self, other)
     }
 
     /// The bits that either has.
@@ -213,6 +279,8 @@ mod tests {
             prop_assert_eq!(a.without(b).words(), each(one, other, |a, b| a & !b));
             let above = |a: u32, b: u32| if a.cast_signed() > b.cast_signed() { u32::MAX } else { 0 };
             prop_assert_eq!(a.above(b).words(), each(one, other, above));
+            prop_assert_eq!(a.minus(b).words(), each(one, other, u32::wrapping_sub));
+            prop_assert_eq!(a.top_of_last().words(), [above(0, one[3]); 4]);
         }
 
         #[test]
@@ -232,6 +300,10 @@ mod tests {
             let unsigned_zero = |word| (f32::from_bits(word) + 0.0).to_bits();
             let larger = a.larger_f32(b).words().map(unsigned_zero);
             prop_assert_eq!(larger, of(f32::max).map(unsigned_zero));
+            let smaller = a.smaller_f32(b).words().map(unsigned_zero);
+            prop_assert_eq!(smaller, of(f32::min).map(unsigned_zero));
+            let sum = (one[0] + one[1]) + (one[2] + one[3]);
+            prop_assert_eq!(a.sum_f32().words(), [sum.to_bits(); 4]);
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::mem::offset_of;
 
 use super::end::End;
-use super::{Integer, NORMAL, Record, bodies, contact_row, row_of, used};
+use super::{Integer, NORMAL, Record, bodies, contact_rows, row_of, used};
 use crate::interface::record::{CONTACT_POINTS, WORD_LANE, collision};
 use crate::platform::Lanes;
 use crate::scene::Collision;
@@ -22,9 +22,9 @@ pub(crate) fn encode(from: &Collision, [a, b]: [&End; 2]) -> Record<{ collision:
     rows[collision::NORMAL] = row_of::<NORMAL, _>(from);
     rows[collision::BODY_A] = a.with_tag();
     rows[collision::BODY_B] = b.with_tag();
-    let contacts = from.contacts.iter().zip(&mut rows[collision::CONTACTS..]);
-    for ((contact, row), used) in contacts.zip(used(from.count)) {
-        *row = contact_row(contact).and(used);
+    let contacts = contact_rows(from).into_iter().zip(&mut rows[collision::CONTACTS..]);
+    for ((point, row), used) in contacts.zip(used(from.count)) {
+        *row = point.and(used);
     }
     let mut integers = [None; collision::ROWS];
     integers[collision::NORMAL] = Some(Integer::new::<WORD_LANE>(rows[collision::NORMAL]));

@@ -6,9 +6,9 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{POSITION, row_of};
+use super::{POSITION, alone, row_of};
 use crate::interface::number::StreamFormat;
-use crate::interface::record::Beat;
+use crate::interface::record::{Beat, WORD_LANE};
 use crate::platform::{Lanes, fetch};
 use crate::scene::{Body, Shape};
 
@@ -18,11 +18,13 @@ use crate::scene::{Body, Shape};
 pub(crate) struct End {
     /// Centre of mass, m.
     pub(crate) position: [f32; 3],
-    /// The shape's index, and in the top bit whether it is static.
+    /// The shape's index, and above it whether it is static, and whether there is a shape.
     tag: u32,
 }
 
 const STATIC: u32 = 1 << 31;
+const SHAPELESS: u32 = 1 << 30;
+/// One without a shape is static.
 const NO_SHAPE: u32 = u32::MAX;
 
 impl End {
@@ -50,8 +52,7 @@ impl End {
     /// Its position beside zero.
     #[inline(always)]
     pub(crate) fn alone(&self) -> Lanes {
-        let whole: Beat = bytemuck::cast(*self);
-        Lanes::from(whole).and(Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]))
+        alone(self.with_tag())
     }
 
     /// Whether it never moves.
@@ -63,7 +64,26 @@ impl End {
     /// Whether it has a shape.
     #[inline(always)]
     pub(crate) const fn has_shape(&self) -> bool {
-        self.tag != NO_SHAPE
+        self.tag & SHAPELESS == 0
+    }
+
+    /// Whether one of some has no shape; in `tags` are the bits of [`Self::with_tag`] that any has.
+    #[inline(always)]
+    pub(crate) fn any_shapeless(tags: Lanes) -> bool {
+        tags.words()[WORD_LANE] & SHAPELESS != 0
+    }
+
+    /// Whether one of some never moves; likewise.
+    #[inline(always)]
+    pub(crate) fn any_static(tags: Lanes) -> bool {
+        tags.words()[WORD_LANE] & STATIC != 0
+    }
+
+    /// All bits if it never moves, else none.
+    #[inline(always)]
+    pub(crate) fn still(&self) -> Lanes {
+        const { assert!(STATIC == 1 << 31, "the top bit") };
+        self.with_tag().top_of_last()
     }
 
     /// Its shape; a static one, if it has none.
@@ -127,8 +147,9 @@ impl<'a> Tags<'a> {
 /// The tag of bodies of a shape.
 fn tag_of(shape: u32, shapes: &[Shape]) -> u32 {
     match usize::try_from(shape).ok().and_then(|shape| shapes.get(shape)) {
-        Some(of) => shape | if of.is_static() { STATIC } else { 0 },
-        None => NO_SHAPE,
+        Some(of) if shape < SHAPELESS => shape | if of.is_static() { STATIC } else { 0 },
+        // No bitstream has room for more.
+        _ => NO_SHAPE,
     }
 }
 
@@ -209,7 +230,8 @@ pub(crate) trait Lookup<'a>: Copy {
     /// Among the ends of all bodies; none if some of these would never be found.
     fn of(all: Ends<'a>) -> Option<Self>;
 
-    /// Whether these are looked up by all their bits; else what is found may be another body's.
+    /// Whether bodies that have no other bits than these are looked up by all their bits; else what is found
+    /// may be another body's.
     fn by_all_bits(self, bodies: [u32; 2]) -> bool;
 
     /// That of one body.
@@ -353,6 +375,10 @@ mod tests {
                 let still = expected.is_none_or(Shape::is_static);
                 assert_eq!((end.is_static(), any_still), (still, still), "{shape} of {count}");
                 assert_eq!(end.shape(&shapes), expected.unwrap_or(&Shape::STATIC));
+                let tag = end.with_tag();
+                assert_eq!(End::any_shapeless(tag), expected.is_none(), "{shape} of {count}");
+                assert_eq!(End::any_static(tag), still, "{shape} of {count}");
+                assert_eq!(end.still().words(), [if still { u32::MAX } else { 0 }; 4]);
             }
         }
     }

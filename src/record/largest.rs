@@ -1,7 +1,6 @@
 //! This file finds out at once whether all numbers of many records are within their limits.
 
-use super::used;
-use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
+use crate::interface::record::{Beat, LANES, WORD_LANE};
 use crate::platform::Lanes;
 
 /// An f32 without its sign; as a limit, any word at all.
@@ -27,30 +26,11 @@ impl<const ROWS: usize> Largest<ROWS> {
     /// Bits where a word of any row of a record is beyond its limit, lane by lane; none if none is.
     #[inline(always)]
     pub(crate) fn beyond(&self, record: &[Lanes; ROWS]) -> Lanes {
-        self.beyond_each(record).fold(Lanes::all(0), Lanes::or)
-    }
-
-    /// The same of a collision of so many contact points: what is in the others does not matter.
-    ///
-    /// Shape: contact points are the last rows.
-    #[inline(always)]
-    pub(crate) fn beyond_used(&self, record: &[Lanes; ROWS], count: u32) -> Lanes {
-        let used = used(count);
-        let used = |row: usize| match row.checked_sub(ROWS - CONTACT_POINTS) {
-            Some(ordinal) => used[ordinal],
-            None => Lanes::all(u32::MAX),
-        };
-        let found = (0..).zip(self.beyond_each(record)).map(|(row, found)| found.and(used(row)));
-        found.fold(Lanes::all(0), Lanes::or)
-    }
-
-    /// All bits of each word that is beyond its limit, row by row.
-    #[inline(always)]
-    fn beyond_each<'a>(&'a self, record: &'a [Lanes; ROWS]) -> impl Iterator<Item = Lanes> + 'a {
-        record
+        let each = record
             .iter()
             .zip(&self.0)
-            .map(|(row, largest)| row.and(Lanes::all(MAGNITUDE)).above(Lanes::from(*largest)))
+            .map(|(row, largest)| row.and(Lanes::all(MAGNITUDE)).above(Lanes::from(*largest)));
+        each.fold(Lanes::all(0), Lanes::or)
     }
 }
 
@@ -58,22 +38,20 @@ impl<const ROWS: usize> Largest<ROWS> {
 mod tests {
     use super::*;
 
-    /// A relative record has infinity in the others.
     #[test]
-    fn contact_points_that_are_not_used_are_not_held_against_a_limit() {
-        let limits = Largest::<6>::new(2.0, [MAGNITUDE; 6]);
-        let row = |number: f32| Lanes::new([0, number.to_bits(), 0, u32::MAX]);
-        for wrong in 0..6 {
-            let mut record = [row(-2.0); 6];
-            record[wrong] = row(f32::INFINITY);
-            for count in 0..=4 {
-                // Normal and offset are always there.
-                let counts = wrong < 2 + count as usize;
-                let beyond = limits.beyond_used(&record, count).words();
-                assert_eq!(beyond, [0, if counts { u32::MAX } else { 0 }, 0, 0], "{wrong} {count}");
-            }
-            assert_eq!(limits.beyond(&record).words(), [0, u32::MAX, 0, 0]);
+    fn every_word_is_held_against_the_limit_of_its_own() {
+        let limits = Largest::<2>::new(2.0, [MAGNITUDE, 0.5_f32.to_bits()]);
+        let row = |number: f32| Lanes::new([0, 0, number.to_bits(), 0.5_f32.to_bits()]);
+        let beside = |word| Lanes::new([0, 0, 0, word]);
+        for (record, found) in [
+            ([row(2.0), row(-2.0)], [0; LANES]),
+            ([row(2.0_f32.next_up()), row(0.0)], [0, 0, u32::MAX, 0]),
+            ([row(0.0), row(f32::NEG_INFINITY)], [0, 0, u32::MAX, 0]),
+            ([row(f32::NAN), row(0.0)], [0, 0, u32::MAX, 0]),
+            ([beside(u32::MAX), row(0.0)], [0; LANES]),
+            ([row(0.0), beside((-0.75_f32).to_bits())], [0, 0, 0, u32::MAX]),
+        ] {
+            assert_eq!(limits.beyond(&record).words(), found);
         }
-        assert_eq!(limits.beyond(&[row(2.0); 6]).words(), [0; LANES]);
     }
 }

@@ -26,6 +26,8 @@ use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
 use crate::platform::Lanes;
 use crate::scene::{Body, Collision, Contact};
 
+use self::largest::MAGNITUDE;
+
 /// A record on its way, in f32.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Record<const ROWS: usize> {
@@ -144,11 +146,29 @@ fn row_of<const AT: usize, T: Pod>(structure: &T) -> Lanes {
     words[AT..].first_chunk().map_or(Lanes::all(0), |row| Lanes::new(*row))
 }
 
+/// A vec3 beside zero.
+#[inline(always)]
+pub(crate) fn alone(row: Lanes) -> Lanes {
+    row.and(Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]))
+}
+
 /// The indices of the bodies of a collision.
 #[inline(always)]
 pub(crate) fn bodies(collision: &Collision) -> [Integer; 2] {
-    let words = row_of::<BODIES, _>(collision);
+    let words = body_words(collision);
     [Integer::new::<0>(words), Integer::new::<1>(words)]
+}
+
+/// The same, as the first two of four words.
+#[inline(always)]
+pub(crate) fn body_words(collision: &Collision) -> Lanes {
+    row_of::<BODIES, _>(collision)
+}
+
+/// The normal of a collision beside its count.
+#[inline(always)]
+pub(crate) fn normal_and_count(collision: &Collision) -> Lanes {
+    row_of::<NORMAL, _>(collision)
 }
 
 /// The word with which the indices of a collision's bodies begin, B's behind A's.
@@ -173,10 +193,11 @@ fn vec4(value: [f32; 4]) -> Lanes {
     Lanes::new(value.map(f32::to_bits))
 }
 
-/// A contact point beside its distance.
+/// All four contact points of a collision beside their distances.
 #[inline(always)]
-fn contact_row(contact: &Contact) -> Lanes {
-    vec3_and_word(contact.point, contact.distance.to_bits())
+pub(crate) fn contact_rows(collision: &Collision) -> [Lanes; CONTACT_POINTS] {
+    let row = |contact: &Contact| vec3_and_word(contact.point, contact.distance.to_bits());
+    collision.contacts.each_ref().map(row)
 }
 
 /// The bits of the contact points of a collision that are used: all of each, or none. Of a count beyond
@@ -192,6 +213,28 @@ pub(crate) fn used(count: u32) -> [Lanes; CONTACT_POINTS] {
     used
 }
 
+/// The bits of the magnitudes of the contact points that are used, as [`used`]. These are looked up: it takes
+/// fewer instructions than to compare, and to take the sign off. Of a count beyond four, which validation
+/// refuses, it is not said which.
+#[inline(always)]
+pub(crate) fn used_magnitudes(count: u32) -> [Lanes; CONTACT_POINTS] {
+    USED_MAGNITUDES[count as usize % USED_MAGNITUDES.len()].map(Lanes::from)
+}
+
+static USED_MAGNITUDES: [[Beat; CONTACT_POINTS]; (CONTACT_POINTS + 1).next_power_of_two()] = {
+    let mut table = [[Beat([0; LANES]); CONTACT_POINTS]; (CONTACT_POINTS + 1).next_power_of_two()];
+    let mut count = 0;
+    while count <= CONTACT_POINTS {
+        let mut ordinal = 0;
+        while ordinal < count {
+            table[count][ordinal] = Beat([MAGNITUDE; LANES]);
+            ordinal += 1;
+        }
+        count += 1;
+    }
+    table
+};
+
 /// The vec3 of a beat, whatever the word beside it.
 #[inline]
 fn to_vec3(Beat([x, y, z, _]): Beat) -> [f32; 3] {
@@ -202,6 +245,21 @@ fn to_vec3(Beat([x, y, z, _]): Beat) -> [f32; 3] {
 #[inline]
 fn to_vec4(beat: Beat) -> [f32; 4] {
     beat.0.map(f32::from_bits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn magnitudes_that_are_used_are_those_of_what_is_used() {
+        for count in 0..=4 {
+            let magnitudes = used_magnitudes(count).map(Lanes::words);
+            assert_eq!(magnitudes, used(count).map(|used| used.and(Lanes::all(MAGNITUDE)).words()));
+        }
+        // Whatever they are, there are some.
+        [5, 7, 8, u32::MAX].map(used_magnitudes);
+    }
 }
 
 // `vec3_and_word` and `to_vec3` spell the lanes out.

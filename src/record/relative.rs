@@ -1,7 +1,7 @@
 //! This file makes the record of a collision relative to body A.
 
 use super::end::End;
-use super::{Integer, NORMAL, Record, contact_row, row_of, used};
+use super::{Integer, NORMAL, Record, contact_rows, row_of, used};
 use crate::interface::record::{CONTACT_POINTS, LANES, relative};
 use crate::platform::Lanes;
 use crate::scene::Collision;
@@ -25,18 +25,24 @@ pub(crate) fn encode(
     bodies: [Integer; 2],
 ) -> Record<{ relative::ROWS }> {
     let mut rows = [Lanes::all(0); relative::ROWS];
-    let [a, b] = [a, b].map(End::alone);
+    let (offset, points) = seen(from, [a, b]);
     rows[relative::NORMAL] = row_of::<NORMAL, _>(from);
-    rows[relative::OFFSET] = b.minus_f32(a);
-    let contacts = from.contacts.iter().zip(&mut rows[relative::CONTACTS..]);
-    for ((contact, row), used) in contacts.zip(used(from.count)) {
-        // Beside the position is a zero, which takes nothing from the distance.
-        let seen = contact_row(contact).minus_f32(a);
-        *row = seen.and(used).or(Lanes::new(FAR).without(used));
+    rows[relative::OFFSET] = offset;
+    let contacts = points.into_iter().zip(&mut rows[relative::CONTACTS..]);
+    for ((point, row), used) in contacts.zip(used(from.count)) {
+        *row = point.and(used).or(Lanes::new(FAR).without(used));
     }
     let mut integers = [None; relative::ROWS];
     [integers[relative::NORMAL], integers[relative::OFFSET]] = bodies.map(Some);
     Record { rows, integers }
+}
+
+/// Body B from body A, and from there all four contact points beside their distances.
+#[inline(always)]
+pub(crate) fn seen(from: &Collision, [a, b]: [&End; 2]) -> (Lanes, [Lanes; CONTACT_POINTS]) {
+    let [a, b] = [a, b].map(End::alone);
+    // Beside the position is a zero, which takes nothing from the distance.
+    (b.minus_f32(a), contact_rows(from).map(|point| point.minus_f32(a)))
 }
 
 /// The positions of bodies A and B that a record is made from.

@@ -51,8 +51,7 @@ pub(crate) trait Lying<'a>: Copy {
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]>;
 
     /// The `nth` so many of them, of which there are as many, while those are fetched whose turn it is soon.
-    /// `slowly` says that much is done with each.
-    fn next<const N: usize>(self, nth: usize, slowly: bool) -> Option<Next<'a, N>>;
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>>;
 
     /// Those of a range, as many as there are.
     fn part(self, range: Range<usize>) -> Self;
@@ -122,7 +121,7 @@ impl<'a> Lying<'a> for InArray<'a> {
     }
 
     #[inline(always)]
-    fn next<const N: usize>(self, nth: usize, _: bool) -> Option<Next<'a, N>> {
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
         let these = self.some(nth)?;
         // Beyond the end, too: that is memory of somebody else's, which stays as it is.
         soon_with_those_behind::<N, _>(self.0, nth * N + SOON_IN_ARRAY);
@@ -188,7 +187,7 @@ impl<'a> Lying<'a> for InOrder<'a> {
     }
 
     #[inline(always)]
-    fn next<const N: usize>(self, nth: usize, _: bool) -> Option<Next<'a, N>> {
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
         let rest = self.order.get(nth * N..)?;
         // It is looked at once how many there are, for all of them.
         let Some(places) = rest.get(..SOON + N) else {
@@ -246,12 +245,8 @@ impl<'a> Lying<'a> for InNearbyOrder<'a> {
     }
 
     #[inline(always)]
-    fn next<const N: usize>(self, nth: usize, slowly: bool) -> Option<Next<'a, N>> {
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
         soon_with_those_behind::<N, _>(self.order.all, self.first + nth * N + NEARBY_SOON);
-        if slowly {
-            // While one is worked on the processor does not come to the next by itself.
-            return self.order.next(nth, slowly);
-        }
         Some(Next { these: self.some(nth)?, soon: None })
     }
 
@@ -285,7 +280,7 @@ mod tests {
             assert_eq!((part.len(), names(part.iter())), (there.len(), there.to_vec()));
             assert!(part.some::<2>(there.len() / 2).is_none());
             for (nth, pair) in there.as_chunks::<2>().0.iter().enumerate() {
-                let next = part.next::<2>(nth, true).expect("as many");
+                let next = part.next::<2>(nth).expect("as many");
                 assert_eq!(names(next.these), pair);
             }
         }
@@ -307,8 +302,7 @@ mod tests {
         // What is fetched goes by the entry.
         let part = near.part(10..90).part(15..200);
         assert_eq!(part.first, 25);
-        assert!(part.next::<2>(3, false).expect("as many").soon.is_none());
-        assert!(part.next::<2>(3, true).expect("as many").soon.is_some());
+        assert!(part.next::<2>(3).expect("as many").soon.is_none());
     }
 
     #[test]
@@ -339,13 +333,13 @@ mod tests {
         let all = collisions(100);
         let order: Vec<u32> = (0..100).rev().collect();
         let part = InOrder::new(&all, &order).part(30..60);
-        let soon = |nth| part.next::<2>(nth, true).expect("as many").soon.map(names);
+        let soon = |nth| part.next::<2>(nth).expect("as many").soon.map(names);
         // Entries 30 + 15 and the next; beyond the part, too.
         assert_eq!(soon(0), Some(vec![54, 53]));
         assert_eq!(soon(14), Some(vec![26, 25]));
         // Of the last none are.
         let last = InOrder::new(&all, &order).part(90..100);
-        assert!(last.next::<2>(0, true).expect("as many").soon.is_none());
-        assert!(InArray(&all).next::<2>(0, true).expect("as many").soon.is_none());
+        assert!(last.next::<2>(0).expect("as many").soon.is_none());
+        assert!(InArray(&all).next::<2>(0).expect("as many").soon.is_none());
     }
 }

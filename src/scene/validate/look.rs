@@ -1,96 +1,119 @@
 //! This file looks at the collisions of a block, one after the other, while their records are made.
 
-use bitstream_model::interface::record::LANES;
-
-use super::quick::{Block, Quick, head, is_padding};
-use super::reach::{Furthest, Reach};
+use super::quick::{Block, MOST_POINTS, NORMAL, Quick};
+use super::reach::{Furthest, Places, Reach};
 use crate::platform::Lanes;
-use crate::record::end::End;
+use crate::record::end::{End, Lookup};
+use crate::record::{alone, body_words, normal_and_count};
 use crate::scene::{Collision, Lying};
 
+/// Bits that a count less one has none of.
+const BEYOND_COUNTS: u32 = !(MOST_POINTS - 1);
+const _: () = assert!(MOST_POINTS.is_power_of_two());
+
+/// Bounds on the square of a normal's length, as bits.
+const SHORTEST: u32 = (1.0 - NORMAL).to_bits();
+const LONGEST: u32 = (1.0 + NORMAL).to_bits();
+
+/// A word in the last lane.
+#[inline(always)]
+fn last(word: u32) -> Lanes {
+    Lanes::new([0, 0, 0, word])
+}
+
 /// What has been seen of the collisions of a block.
+///
+/// Nothing is decided of any before the end: bits gather. `REACHES` says whether it matters how far they reach.
 #[derive(Clone, Copy)]
-pub(crate) struct Look<'a> {
-    quick: &'a Quick<'a>,
-    /// Whether [`head`] is right for all of them but padding.
-    heads: bool,
-    paddings: usize,
-    /// Bits where a number is beyond what the stream holds.
+pub(crate) struct Look<const REACHES: bool> {
+    /// The top bit where both bodies are the same.
+    alike: u32,
+    /// Of the indices of bodies A and B, in the first two words.
+    named: Lanes,
+    /// Of counts less one, in the last word.
+    counts: Lanes,
+    /// Of the tags of all ends.
+    tags: Lanes,
+    /// Of the tags that both ends have; the top bit, too, where the length of a normal is wrong.
+    wrong: Lanes,
+    /// The top bits where a number may be beyond what the stream holds.
     beyond: Lanes,
-    /// Whether it matters how far they reach.
-    reaches: bool,
+    /// What it holds.
+    limit: Lanes,
     furthest: Furthest,
 }
 
-impl<'a> Look<'a> {
+impl<const REACHES: bool> Look<REACHES> {
     /// At none yet.
     #[inline(always)]
-    pub(crate) fn new(quick: &'a Quick<'a>) -> Self {
+    pub(crate) fn new(quick: &Quick<'_>) -> Self {
+        let none = Lanes::all(0);
         Self {
-            quick,
-            heads: true,
-            paddings: 0,
-            beyond: Lanes::all(0),
-            reaches: quick.bounds_of_rows().is_some_and(|bounds| bounds.allow()),
+            alike: 0,
+            named: none,
+            counts: none,
+            tags: none,
+            wrong: none,
+            beyond: none,
+            limit: Lanes::all(quick.limit_of_collisions().to_bits()),
             furthest: Furthest::new(),
         }
     }
 
-    /// Looks at normal, count and bodies of the next. The ends are `theirs`, the bodies', or may be others': then
-    /// it is looked at again, unless it is padding, which it may be where collisions are `scheduled`.
+    /// Looks at the next, whose record is made of these ends.
     #[inline(always)]
-    pub(crate) fn head(
-        &mut self,
-        collision: &Collision,
-        ends: [&End; 2],
-        theirs: bool,
-        scheduled: bool,
-    ) {
-        let padding = scheduled & is_padding(collision);
-        self.heads &= head(collision, ends) & theirs | padding;
-        self.paddings += usize::from(padding);
+    pub(crate) fn take(&mut self, collision: &Collision, ends: [&End; 2], places: &Places) {
+        // Not below zero, unless they are alike or much is wrong with them.
+        self.alike |= (collision.body_a ^ collision.body_b).wrapping_sub(1);
+        self.named = self.named.or(body_words(collision));
+        let normal = normal_and_count(collision);
+        self.counts = self.counts.or(normal.plus(last(u32::MAX)));
+        let [a, b] = ends.map(End::with_tag);
+        self.tags = self.tags.or(a).or(b);
+        // All four are multiplied, none of which is the count: it would be subnormal, which is slow.
+        let normal = alone(normal);
+        let square = normal.times_f32(normal).sum_f32();
+        // As bits, which are in the order of the numbers: below zero where one is larger.
+        let off = square.minus(last(SHORTEST)).or(last(LONGEST).minus(square));
+        self.wrong = self.wrong.or(off).or(a.and(b));
+        // The sign of NaN is not said.
+        self.beyond = self.beyond.or(self.limit.minus(places.sum)).or(places.sum);
+        if const { REACHES } {
+            let [a, b] = ends;
+            let reach = Reach::new(places, collision.count);
+            self.furthest.take(&reach, [a.still(), b.still()]);
+        }
     }
 
-    /// Looks at its record, of which these are the bits of numbers that are beyond what the stream
-    /// holds.
+    /// Whether validation refuses nothing of the block, whose collisions all these were, at these
+    /// `places`, whose bodies were looked up in `ends`; and how many of it look like padding.
     #[inline(always)]
-    pub(crate) fn numbers(&mut self, beyond: Lanes) {
-        self.beyond = self.beyond.or(beyond);
-    }
-
-    /// Whether it is to be said how far each reaches.
-    #[inline(always)]
-    pub(crate) fn asks_how_far(&self) -> bool {
-        self.reaches
-    }
-
-    /// Looks at how far it reaches.
-    #[inline(always)]
-    pub(crate) fn reach(&mut self, reach: &Reach, ends: [&End; 2]) {
-        self.furthest.take(reach, ends.map(|end| !end.is_static()));
-    }
-
-    /// How many look like padding.
-    #[inline(always)]
-    pub(crate) fn paddings(&self) -> usize {
-        self.paddings
-    }
-
-    /// Whether validation refuses nothing of the block, whose collisions all these were and reach as far
-    /// as `reaches` say.
-    #[inline(always)]
-    pub(crate) fn good<'b, L: Lying<'b>>(
+    pub(crate) fn good<'b, L: Lying<'b>, E: Lookup<'b>>(
         self,
+        quick: &Quick<'_>,
         block: &Block<'b, L>,
-        reaches: impl Iterator<Item = Reach>,
-    ) -> bool {
-        let mut good = self.heads & (self.beyond.words() == [0; LANES]);
-        if let Some(bounds) = self.quick.bounds_of_rows() {
+        ends: E,
+        places: impl Iterator<Item = Places>,
+    ) -> (bool, usize) {
+        let [a, b, ..] = self.named.words();
+        let [.., counts] = self.counts.words();
+        let mut good = ends.by_all_bits([a, b])
+            & (self.alike >> 31 == 0)
+            & (counts & BEYOND_COUNTS == 0)
+            & !End::any_shapeless(self.tags)
+            & !End::any_static(self.wrong);
+        let mut paddings = 0;
+        if !good && block.scheduled {
+            // Padding among them is none of that.
+            (good, paddings) = quick.heads(block);
+        }
+        good = good && self.beyond.words().iter().all(|word| word >> 31 == 0);
+        if let Some(bounds) = quick.bounds_of_rows() {
             // Where one shape of the table forbids it, nothing is found of all at once.
             good = good
-                && (self.reaches && self.furthest.all_surely_fit(bounds)
-                    || self.quick.rows_fit(block, reaches));
+                && (REACHES && self.furthest.all_surely_fit(bounds)
+                    || quick.rows_fit(block, places));
         }
-        good || self.quick.exactly(block)
+        (good || quick.exactly(block), paddings)
     }
 }

@@ -4,14 +4,12 @@
 //! of which that cannot be said is checked as [`validate`](super::validate) does; what that refuses
 //! is refused there, by its own words and in its own order.
 
-use std::hint::black_box;
-
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::Geometry;
-use bitstream_model::interface::record::{CONTACT_POINTS, LANES, collision, relative};
+use bitstream_model::interface::record::{CONTACT_POINTS, LANES};
 
 use super::body::check_body;
-use super::reach::{Extremes, Reach, surely_fit};
+use super::reach::{Extremes, Places, Reach, surely_fit};
 use super::{Scene, check_whole};
 use crate::platform::Lanes;
 use crate::record;
@@ -20,11 +18,11 @@ use crate::record::largest::{Largest, MAGNITUDE};
 use crate::scene::{Body, Collision, InputError, Lying};
 
 /// How far from 1 the square of a normal's length surely may be: the length itself is half as far.
-const NORMAL: f32 = InputError::NORMAL_TOLERANCE;
+pub(super) const NORMAL: f32 = InputError::NORMAL_TOLERANCE;
+#[expect(clippy::cast_possible_truncation, reason = "four")]
+pub(super) const MOST_POINTS: u32 = CONTACT_POINTS as u32;
 /// Square of twice the length that an orientation must have.
 const ORIENTATION: f32 = 4.0 * InputError::SHORTEST_ORIENTATION * InputError::SHORTEST_ORIENTATION;
-#[expect(clippy::cast_possible_truncation, reason = "four")]
-const MOST_POINTS: u32 = CONTACT_POINTS as u32;
 
 /// Looks at the bodies and collisions of one step.
 #[derive(Debug)]
@@ -33,8 +31,6 @@ pub(crate) struct Quick<'a> {
     /// What bounds the rows, where they are computed in sixteen bits.
     short_rows: Option<Extremes>,
     bodies: Largest<4>,
-    absolute: Largest<{ collision::ROWS }>,
-    relative: Largest<{ relative::ROWS }>,
 }
 
 impl<'a> Quick<'a> {
@@ -42,9 +38,7 @@ impl<'a> Quick<'a> {
     pub(crate) fn new(scene: Scene<'a>) -> Self {
         let held = scene.held;
         let any = MAGNITUDE;
-        let [velocities, poses, limit] =
-            [held.velocities, held.poses, held.collisions].map(StreamFormat::largest);
-        let number = limit.to_bits();
+        let [velocities, poses] = [held.velocities, held.poses].map(StreamFormat::largest);
         let Largest([linear, angular]) = Largest::new(velocities, [any; 2]);
         let Largest([position, orientation]) = Largest::new(poses, [any, poses.to_bits()]);
         let geometry = scene.variant.profile.geometry;
@@ -53,29 +47,41 @@ impl<'a> Quick<'a> {
         Self {
             short_rows: short_rows.then(|| Extremes::new(scene.shapes, scene.flush_subnormals)),
             bodies: Largest([linear, angular, position, orientation]),
-            absolute: Largest::new(limit, [any, any, any, number, number, number, number]),
-            relative: Largest::new(limit, [any, any, number, number, number, number]),
             scene,
         }
     }
 
     /// Whether validation refuses nothing of these bodies, the first of which has the index `first`;
-    /// `ends` are theirs.
+    /// `ends` are theirs, and `any_still` says whether any of these is static.
     #[inline(always)]
-    pub(crate) fn bodies(&self, first: usize, bodies: &[Body], ends: &[End]) -> bool {
-        let mut good = true;
-        for (body, end) in bodies.iter().zip(ends) {
+    pub(crate) fn bodies(
+        &self,
+        first: usize,
+        bodies: &[Body],
+        ends: &[End],
+        any_still: bool,
+    ) -> bool {
+        let (mut beyond, mut length) = (Lanes::all(0), Lanes::all(0));
+        for body in bodies {
             // What is beside the vectors, whatever it is, is not bounded.
             let [linear, angular] = record::velocity::encode(body).rows;
             let [position, orientation] = record::pose::encode(body);
-            let beyond = self.bodies.beyond(&[linear, angular, position, orientation]);
-            good &= beyond.words() == [0; LANES];
-            let [x, y, z, w] = body.pose.orientation;
-            let square = x * x + y * y + z * z + w * w;
-            good &= (ORIENTATION..=f32::MAX).contains(&square) & end.has_shape();
-            let speeds = [body.velocity.linear, body.velocity.angular];
-            let moves = speeds.as_flattened().iter().fold(0, |bits, v| bits | v.to_bits());
-            good &= !end.is_static() | (moves & MAGNITUDE == 0);
+            beyond = beyond.or(self.bodies.beyond(&[linear, angular, position, orientation]));
+            let square = orientation.times_f32(orientation).sum_f32();
+            // As bits, which are in the order of the numbers: below zero where one is larger.
+            let [least, most] =
+                [ORIENTATION, f32::MAX / 2.0].map(|bound| Lanes::all(bound.to_bits()));
+            length = length.or(square.minus(least)).or(most.minus(square));
+        }
+        let [length, ..] = length.words();
+        let mut good = (beyond.words() == [0; LANES]) & (length >> 31 == 0);
+        if any_still {
+            // One without a shape is among them.
+            good &= bodies.iter().zip(ends).all(|(body, end)| {
+                let speeds = [body.velocity.linear, body.velocity.angular];
+                let moves = speeds.as_flattened().iter().fold(0, |bits, v| bits | v.to_bits());
+                !end.is_static() | (end.has_shape() & (moves & MAGNITUDE == 0))
+            });
         }
         good || (first..).zip(bodies).all(|(at, body)| check_body(at, body, &self.scene).is_ok())
     }
@@ -86,32 +92,47 @@ impl<'a> Quick<'a> {
         self.short_rows.as_ref()
     }
 
-    /// Bits where a number of a record in world coordinates is beyond what the stream holds; none if none
-    /// is.
+    /// Whether it matters how far collisions reach, and may be found of many at once.
     #[inline(always)]
-    pub(crate) fn beyond_absolute(&self, record: &[Lanes; collision::ROWS]) -> Lanes {
-        self.absolute.beyond(record)
+    pub(crate) fn asks_how_far(&self) -> bool {
+        self.short_rows.as_ref().is_some_and(Extremes::allow)
     }
 
-    /// As [`Self::beyond_absolute`], of a record relative to body A, of so many contact points.
+    /// The largest number that the stream of collisions holds.
     #[inline(always)]
-    pub(crate) fn beyond_relative(&self, record: &[Lanes; relative::ROWS], count: u32) -> Lanes {
-        self.relative.beyond_used(record, count)
+    pub(super) const fn limit_of_collisions(&self) -> f32 {
+        self.scene.held.collisions.largest()
     }
 
     /// Whether a bitstream that computes rows in sixteen bits surely computes those of each collision of
-    /// a block, which reach as far as `reaches` say.
+    /// a block, which are at these `places`.
     pub(super) fn rows_fit<'b, L: Lying<'b>>(
         &self,
         block: &Block<'b, L>,
-        reaches: impl Iterator<Item = Reach>,
+        places: impl Iterator<Item = Places>,
     ) -> bool {
-        block.collisions.iter().zip(reaches).all(|(collision, reach)| {
+        block.collisions.iter().zip(places).all(|(collision, places)| {
+            let reach = Reach::new(&places, collision.count);
             let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
             let shapes = ends.map(|end| end.shape(self.scene.shapes));
             surely_fit(&reach, shapes, self.scene.flush_subnormals)
                 | (block.scheduled & is_padding(collision))
         })
+    }
+
+    /// Whether normals, counts and bodies of all of a block but padding are surely right, and how many look
+    /// like padding.
+    // Out of the way of blocks without padding, which most are.
+    #[inline(never)]
+    pub(super) fn heads<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> (bool, usize) {
+        let (mut good, mut paddings) = (true, 0);
+        for collision in block.collisions.iter() {
+            let padding = is_padding(collision);
+            let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
+            good &= padding | head(collision, ends);
+            paddings += usize::from(padding);
+        }
+        (good, paddings)
     }
 
     /// Looks at a block as validation does.
@@ -152,10 +173,8 @@ pub(crate) struct Block<'a, L> {
 
 /// Whether normal, count and bodies of a collision are surely right.
 #[inline(always)]
-pub(super) fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
-    // Each by itself: the compiler would square the row that they are sent in, with the count beside them,
-    // which slows packing with its checks (`checked` in `cargo bench --bench pack`). It is for speed alone.
-    let [x, y, z] = collision.normal.map(black_box);
+fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
+    let [x, y, z] = collision.normal;
     let square = x * x + y * y + z * z;
     ((square - 1.0).abs() <= NORMAL)
         & (collision.count.wrapping_sub(1) < MOST_POINTS)

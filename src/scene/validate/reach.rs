@@ -9,49 +9,64 @@ use crate::record::largest::MAGNITUDE;
 use crate::record::used;
 use crate::scene::Shape;
 
-/// How far the contact points of a collision are that are in use, whatever rounding does to them: the
-/// longest of each component, taken together.
+/// Where the bodies and the contact points of a collision are, as they are streamed.
+#[derive(Clone, Copy)]
+pub(crate) struct Places {
+    /// Of body A and body B, m. What is beside them does not matter.
+    pub(crate) positions: [Lanes; 2],
+    /// Beside their distances, m. Those that are not used do not matter.
+    pub(crate) points: [Lanes; CONTACT_POINTS],
+    /// The magnitudes of both positions and of the contact points in use, added up component by component, and
+    /// of their distances beside them. No number is larger, and of what is not finite no number comes.
+    pub(crate) sum: Lanes,
+}
+
+/// How far the contact points of a collision are that are in use, at most.
 ///
 /// What is longer in any component is no shorter after any of the roundings, so that what is found
 /// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
 /// left out at the end. What NaN makes of it does not matter: the bound on numbers refuses that.
 pub(crate) struct Reach {
-    /// Lever arms about body A and body B, m.
+    /// Lever arms about body A and body B, m, but for what is lost of their two ends.
     arms: [Lanes; 2],
-    /// From the origin, m.
-    furthest: Lanes,
+    /// [That](Places::sum) of the places: neither an arm nor the sum of the points is longer, and no end of an
+    /// arm is farther.
+    sum: Lanes,
 }
 
 impl Reach {
-    /// Of rows that hold the positions of both bodies and contact points as they are streamed, `count` of
-    /// which are in use.
+    /// Of these places, the first `count` points of which are in use.
     #[inline(always)]
-    pub(crate) fn new(positions: [Lanes; 2], points: [Lanes; CONTACT_POINTS], count: u32) -> Self {
-        let magnitude = |lanes: Lanes| lanes.and(Lanes::all(MAGNITUDE));
-        let mut arms = [Lanes::all(0); 2];
-        let mut furthest = Lanes::all(0);
-        for (point, used) in points.into_iter().zip(used(count)) {
-            furthest = furthest.larger_f32(magnitude(point).and(used));
-            for (arm, position) in arms.iter_mut().zip(positions) {
-                *arm = arm.larger_f32(magnitude(point.minus_f32(position)).and(used));
-            }
+    pub(super) fn new(places: &Places, count: u32) -> Self {
+        let [first, rest @ ..] = places.points;
+        let [any, used @ ..] = used(count);
+        let (mut least, mut most) = (first, first);
+        for (point, used) in rest.into_iter().zip(used) {
+            // One that is not used is where the first is.
+            let point = point.and(used).or(first.without(used));
+            least = least.smaller_f32(point);
+            most = most.larger_f32(point);
         }
-        let loss = Lanes::all(LOSS.to_bits());
-        for (arm, position) in arms.iter_mut().zip(positions) {
-            *arm = arm.plus_f32(furthest.plus_f32(magnitude(position)).times_f32(loss));
-        }
-        Self { arms, furthest }
+        // The larger one is not below zero: the most is no less than the least.
+        let arm = |at: Lanes| most.minus_f32(at).larger_f32(at.minus_f32(least)).and(any);
+        let [a, b] = places.positions;
+        Self { arms: [arm(a), arm(b)], sum: places.sum }
     }
 }
 
-/// Whether arms and points are as near as a row needs them, whatever the masses.
+/// What may be lost of both ends of an arm, m.
 #[inline(always)]
-fn near(arms: Lanes, furthest: Lanes) -> bool {
-    let limit =
-        |limit: f32| Lanes::new([limit.to_bits(), limit.to_bits(), limit.to_bits(), MAGNITUDE]);
-    // Four of them, and a little for the roundings of their sum.
-    let beyond = furthest.above(limit(LARGEST / 4.01)).or(arms.above(limit(LONGEST_ARM)));
-    beyond.words() == [0; LANES]
+fn with_loss(arm: Lanes, sum: Lanes) -> Lanes {
+    arm.plus_f32(sum.times_f32(Lanes::all(LOSS.to_bits())))
+}
+
+/// Whether arms and sums of contact points are in range, whatever the masses.
+#[inline(always)]
+fn near(sum: Lanes) -> bool {
+    const { assert!(LONGEST_ARM < LARGEST, "the shorter one bounds both") };
+    // A little less for what is lost, and for the roundings of the sum.
+    let limit = (LONGEST_ARM * 0.99).to_bits();
+    sum.above(Lanes::new([limit, limit, limit, MAGNITUDE])).words() == [0; LANES]
 }
 
 /// The square of the length of a vec3.
@@ -69,20 +84,17 @@ pub(super) fn surely_fit(reach: &Reach, shapes: [&Shape; 2], flush: bool) -> boo
     let mass = a.inverse_mass + b.inverse_mass;
     let mut turning = [0.0; 2];
     for ((turning, shape), arm) in turning.iter_mut().zip(shapes).zip(reach.arms) {
-        *turning = largest_inertia(shape) * square(arm);
+        *turning = largest_inertia(shape) * square(with_loss(arm, reach.sum));
     }
-    near(reach.arms[0].larger_f32(reach.arms[1]), reach.furthest)
-        & (mass >= 1.0 / LARGEST)
-        & (mass + turning[0] + turning[1] <= largest(flush))
+    near(reach.sum) & (mass >= 1.0 / LARGEST) & (mass + turning[0] + turning[1] <= largest(flush))
 }
 
 /// The furthest that any of some collisions reaches.
 #[derive(Clone, Copy)]
 pub(super) struct Furthest {
-    arms: Lanes,
-    /// Those about bodies that move.
+    /// The arms about bodies that move.
     turning: Lanes,
-    points: Lanes,
+    sum: Lanes,
 }
 
 impl Furthest {
@@ -90,28 +102,25 @@ impl Furthest {
     #[inline(always)]
     pub(super) fn new() -> Self {
         let none = Lanes::all(0);
-        Self { arms: none, turning: none, points: none }
+        Self { turning: none, sum: none }
     }
 
-    /// Takes one more, of whose bodies those move.
+    /// Takes one more; all bits of `still` say that one of its bodies does not move.
     #[inline(always)]
-    pub(super) fn take(&mut self, reach: &Reach, moves: [bool; 2]) {
-        for (arm, moves) in reach.arms.into_iter().zip(moves) {
-            self.arms = self.arms.larger_f32(arm);
-            let turning = arm.and(Lanes::all(if moves { u32::MAX } else { 0 }));
-            self.turning = self.turning.larger_f32(turning);
-        }
-        self.points = self.points.larger_f32(reach.furthest);
+    pub(super) fn take(&mut self, reach: &Reach, still: [Lanes; 2]) {
+        let [a, b] = reach.arms;
+        let [still_a, still_b] = still;
+        let turning = a.without(still_a).larger_f32(b.without(still_b));
+        self.turning = self.turning.larger_f32(turning);
+        self.sum = self.sum.larger_f32(reach.sum);
     }
 
     /// Whether a bitstream that computes rows in binary16 surely computes those of all of them, which
     /// are of bodies of any of these shapes, not both static. No if those do not [allow](Extremes::allow) it.
     #[inline(always)]
     pub(super) fn all_surely_fit(&self, shapes: &Extremes) -> bool {
-        let turning = shapes.inertia * square(self.turning);
-        near(self.arms, self.points)
-            & shapes.allow()
-            & (shapes.mass + turning + turning <= shapes.largest)
+        let turning = shapes.inertia * square(with_loss(self.turning, self.sum));
+        near(self.sum) & shapes.allow() & (shapes.mass + turning + turning <= shapes.largest)
     }
 }
 
@@ -206,8 +215,13 @@ mod tests {
             };
             // Whatever stands beside a vec3.
             let positions = self.positions.map(|position| row(position, f32::NAN));
+            let count = self.collision.count;
             let points = self.collision.contacts.map(|contact| row(contact.point, f32::INFINITY));
-            Reach::new(positions, points, self.collision.count)
+            let magnitude = Lanes::new([MAGNITUDE, MAGNITUDE, MAGNITUDE, 0]);
+            let seen = &points[..count as usize];
+            let all = positions.iter().chain(seen).map(|at| at.and(magnitude));
+            let sum = all.fold(Lanes::all(0), Lanes::plus_f32);
+            Reach::new(&Places { positions, points, sum }, count)
         }
 
         fn shapes<'a>(&self, table: &'a [Shape]) -> [&'a Shape; 2] {
@@ -229,8 +243,10 @@ mod tests {
     fn together(all: &[One], geometry: Geometry, table: &[Shape], flush: bool) -> bool {
         let mut furthest = Furthest::new();
         for one in all {
-            let moves = one.shapes(table).map(|shape| !shape.is_static());
-            furthest.take(&one.reach(geometry), moves);
+            let still = one
+                .shapes(table)
+                .map(|shape| Lanes::all(if shape.is_static() { u32::MAX } else { 0 }));
+            furthest.take(&one.reach(geometry), still);
         }
         furthest.all_surely_fit(&Extremes::new(table, flush))
     }
@@ -269,7 +285,7 @@ mod tests {
     #[test]
     fn contact_points_far_out_are_found() {
         let table = [GROUND, POINT_MASS];
-        for (x, fits) in [(15_900.0, true), (16_100.0, false), (-16_100.0, false)] {
+        for (x, fits) in [(7_000.0, true), (16_100.0, false), (-16_100.0, false)] {
             let far = at([[x, 0.0, 0.0]; 2], [x, 0.0, 0.0], [1, 1]);
             let near = at([[0.0; 3]; 2], [1.0, 0.0, 0.0], [0, 1]);
             assert_eq!(far.fits(Geometry::Absolute, &table, false), fits);
