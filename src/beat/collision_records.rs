@@ -7,7 +7,7 @@ use crate::platform::Lanes;
 use crate::record::end::{End, Ends, Lookup};
 use crate::record::largest::MAGNITUDE;
 use crate::record::{self, Integer, Record, Rows};
-use crate::scene::validate::{Block, Look, Places, Quick};
+use crate::scene::validate::{Block, Locations, Look, Quick};
 use crate::scene::{Collision, Lying, Next};
 
 /// A kind of collision record of `ROWS` rows.
@@ -21,8 +21,8 @@ pub(super) trait Kind<const ROWS: usize>: Copy {
     /// The record of collision `index`, from its [anchors](Self::anchors).
     fn encode(self, index: usize, from: &Collision, anchors: [&End; 2]) -> Record<ROWS>;
 
-    /// The places that it holds.
-    fn places(from: &Collision, anchors: [&End; 2]) -> Places;
+    /// The locations that it holds.
+    fn locations(from: &Collision, anchors: [&End; 2]) -> Locations;
 }
 
 /// Records in world coordinates.
@@ -43,12 +43,12 @@ impl Kind<{ collision::ROWS }> for Absolute {
     }
 
     #[inline(always)]
-    fn places(from: &Collision, anchors: [&End; 2]) -> Places {
+    fn locations(from: &Collision, anchors: [&End; 2]) -> Locations {
         let [_, a, b, points @ ..] = record::collision::encode(from, anchors).rows;
         let magnitudes = points.map(|point| point.and(Lanes::all(MAGNITUDE)));
         let [of_a, of_b] = [a, b].map(|position| position.and(magnitude_of_vec3()));
         let sum = added(magnitudes).plus_f32(of_a.plus_f32(of_b));
-        Places { positions: [a, b], points, sum }
+        Locations { positions: [a, b], points, sum }
     }
 }
 
@@ -61,7 +61,7 @@ impl Kind<{ relative::ROWS }> for Relative {
 
     #[inline(always)]
     fn anchors(ends: [&End; 2]) -> [&End; 2] {
-        anchors(ends)
+        anchored(ends)
     }
 
     #[inline(always)]
@@ -70,33 +70,33 @@ impl Kind<{ relative::ROWS }> for Relative {
     }
 
     #[inline(always)]
-    fn places(from: &Collision, anchors: [&End; 2]) -> Places {
+    fn locations(from: &Collision, anchors: [&End; 2]) -> Locations {
         let (offset, points) = record::relative::seen(from, anchors);
         let mut magnitudes = points;
         for (point, used) in magnitudes.iter_mut().zip(record::used_magnitudes(from.count)) {
             *point = point.and(used);
         }
         let sum = added(magnitudes).plus_f32(offset.and(magnitude_of_vec3()));
-        Places { positions: [Lanes::all(0), offset], points, sum }
+        Locations { positions: [Lanes::all(0), offset], points, sum }
     }
 }
 
 /// The ends that a relative record is made from.
 #[inline(always)]
-fn anchors([a, b]: [&End; 2]) -> [&End; 2] {
+fn anchored([a, b]: [&End; 2]) -> [&End; 2] {
     // Whether one never moves is mostly foreseen, as few collisions are with what never moves or nearly all
     // are: a jump costs less then than to choose.
-    if a.is_static() | b.is_static() { chosen(a, b) } else { [a, b] }
+    if a.is_static() | b.is_static() { one_still(a, b) } else { [a, b] }
 }
 
-/// The same where one never moves.
+/// The same of bodies one of which never moves.
 #[cold]
 #[inline(never)]
-fn chosen<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
+fn one_still<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
     record::relative::anchors([a, b], [!a.is_static(), !b.is_static()])
 }
 
-/// The same, with these words in place of the indices of each one's bodies.
+/// Records relative to body A, with these words in place of the indices of each one's bodies.
 #[derive(Clone, Copy)]
 pub(super) struct Worded<'a>(pub(super) &'a [[u32; 2]]);
 
@@ -106,7 +106,7 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
 
     #[inline(always)]
     fn anchors(ends: [&End; 2]) -> [&End; 2] {
-        anchors(ends)
+        anchored(ends)
     }
 
     #[inline(always)]
@@ -123,8 +123,8 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
     }
 
     #[inline(always)]
-    fn places(from: &Collision, anchors: [&End; 2]) -> Places {
-        Relative::places(from, anchors)
+    fn locations(from: &Collision, anchors: [&End; 2]) -> Locations {
+        Relative::locations(from, anchors)
     }
 }
 
@@ -168,7 +168,8 @@ impl<'p, K, L: Lying<'p>, E: Lookup<'p>, W> Encoding<K, L, E, W> {
 
 /// Who sees the records on their way. An `#[inline(always)]` belongs to every implementation.
 pub(super) trait Witness: Copy {
-    /// Sees the collision of one, the ends of its bodies, and those that the record is made from.
+    /// Sees the collision of one, the ends of its bodies as they were looked up, and those that the record is
+    /// made from.
     fn see<K: Kind<ROWS>, const ROWS: usize>(
         &mut self,
         collision: &Collision,
@@ -193,7 +194,7 @@ impl<const REACHES: bool> Witness for Look<REACHES> {
         ends: [&End; 2],
         anchors: [&End; 2],
     ) {
-        self.take(collision, ends, &K::places(collision, anchors));
+        self.take(collision, ends, &K::locations(collision, anchors));
     }
 }
 
@@ -210,12 +211,12 @@ impl<'p, K, L: Lying<'p>, E: Lookup<'p>, const REACHES: bool> Encoding<K, L, E, 
         K: Kind<ROWS>,
     {
         let Self { ends, witness, .. } = self;
-        // These are asked for only where every record was made of its own bodies' ends.
-        let places = block
+        // These are asked for only where every record was made of its own bodies' ends, or is padding.
+        let locations = block
             .collisions
             .iter()
-            .map(|collision| K::places(collision, K::anchors(both(ends, collision))));
-        witness.good(quick, block, ends, places)
+            .map(|collision| K::locations(collision, K::anchors(both(ends, collision))));
+        witness.good(quick, block, ends, locations)
     }
 }
 

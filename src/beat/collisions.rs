@@ -10,7 +10,7 @@ use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::Beat;
 
 use super::collision_records::{Absolute, Encoding, Kind, Relative, Worded};
-use super::deal::{BLOCK, Dealer, LOOKED_AT, MANY};
+use super::deal::{BLOCK, CHECKED, Dealer, MANY};
 use super::format::{Format, in_format};
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
 use super::stripe::Segment;
@@ -242,7 +242,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
         let mut seen = Seen::NOTHING;
         // Validation goes by blocks. Without it, as packing alone is measured, there is nothing to be done
         // for each that is worth it.
-        let size = if quick.is_some() { LOOKED_AT } else { MANY };
+        let size = if quick.is_some() { CHECKED } else { MANY };
         for at in (0..all.collisions.len()).step_by(size) {
             let collisions = all.collisions.part(at..at + size);
             let block = Block { first: all.first + at, collisions, ..all };

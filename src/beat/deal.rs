@@ -26,9 +26,9 @@ pub(crate) const BLOCK: usize = 30;
 /// Records of many blocks: so many that beginning one costs next to nothing a record.
 pub(super) const MANY: usize = 32 * BLOCK;
 
-/// Collisions that are looked at together: as many as lie in the innermost cache, should it be necessary to look
-/// at them again.
-pub(super) const LOOKED_AT: usize = 4 * BLOCK;
+/// Collisions in an array that are looked at together: as many as lie in the innermost cache, should they be
+/// looked at again.
+pub(super) const CHECKED: usize = 4 * BLOCK;
 
 /// Bodies of a block, as [`BLOCK`]: more, as they are small and lie one behind the other.
 pub(super) const BODIES: usize = 120;

@@ -22,6 +22,7 @@ pub(crate) struct End {
     tag: u32,
 }
 
+/// The top bit, as [`End::with_tag`] says.
 const STATIC: u32 = 1 << 31;
 const SHAPELESS: u32 = 1 << 30;
 /// One without a shape is static.
@@ -43,7 +44,7 @@ impl End {
         bytemuck::cast(Beat::from(row_of::<POSITION, _>(body).beside(tag)))
     }
 
-    /// Its position beside its tag, which is no part of a record.
+    /// Its position beside its tag, which is no part of a record: the top bit says that it never moves.
     #[inline(always)]
     pub(crate) fn with_tag(&self) -> Lanes {
         Lanes::from(bytemuck::cast::<_, Beat>(*self))
@@ -73,16 +74,9 @@ impl End {
         tags.words()[WORD_LANE] & SHAPELESS != 0
     }
 
-    /// Whether one of some never moves; likewise.
-    #[inline(always)]
-    pub(crate) fn any_static(tags: Lanes) -> bool {
-        tags.words()[WORD_LANE] & STATIC != 0
-    }
-
     /// All bits if it never moves, else none.
     #[inline(always)]
     pub(crate) fn still(&self) -> Lanes {
-        const { assert!(STATIC == 1 << 31, "the top bit") };
         self.with_tag().top_of_last()
     }
 
@@ -377,7 +371,7 @@ mod tests {
                 assert_eq!(end.shape(&shapes), expected.unwrap_or(&Shape::STATIC));
                 let tag = end.with_tag();
                 assert_eq!(End::any_shapeless(tag), expected.is_none(), "{shape} of {count}");
-                assert_eq!(End::any_static(tag), still, "{shape} of {count}");
+                assert_eq!(tag.words()[3] >> 31 == 1, still, "{shape} of {count}");
                 assert_eq!(end.still().words(), [if still { u32::MAX } else { 0 }; 4]);
             }
         }

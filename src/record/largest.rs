@@ -1,4 +1,4 @@
-//! This file finds out at once whether all numbers of many records are within their limits.
+//! This file finds out at once whether all numbers of a record are within their limits.
 
 use crate::interface::record::{Beat, LANES, WORD_LANE};
 use crate::platform::Lanes;

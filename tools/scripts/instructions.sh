@@ -67,12 +67,13 @@ while read -r profile thing limit; do
 	case $thing in *in-order) entries=$((entries + added)) ;; esac
 	# In tenths, which the shell can divide.
 	tenths=$(((twice - once) * 10 / packings / entries))
+	[ $tenths -gt 0 ] || fail "$profile $thing: nothing is counted (of ${packers[*]})"
 	verdict=
 	if [ $compared = yes ]; then
 		verdict=" of $limit"
 		[ $tenths -le $((limit * 10)) ] || { good=no; verdict+=': too many'; }
 		# So few that the limit would hide anything, if they are all of them.
-		[ $tenths -ge $((limit * 7)) ] || { good=no; verdict+=': too few'; }
+		[ $tenths -ge $((limit * 8)) ] || { good=no; verdict+=': too few'; }
 	fi
 	echo "$profile $thing: $((tenths / 10)).$((tenths % 10)) instructions an entry$verdict"
 done <<'LIMITS'

@@ -1,7 +1,9 @@
 //! This file looks at the collisions of a block, one after the other, while their records are made.
 
-use super::quick::{Block, MOST_POINTS, NORMAL, Quick};
-use super::reach::{Furthest, Places, Reach};
+use bitstream_model::interface::number::StreamFormat;
+
+use super::quick::{Block, MOST_POINTS, OFF_UNIT, Quick};
+use super::reach::{Furthest, Locations, Reach};
 use crate::platform::Lanes;
 use crate::record::end::{End, Lookup};
 use crate::record::{alone, body_words, normal_and_count};
@@ -12,12 +14,16 @@ const BEYOND_COUNTS: u32 = !(MOST_POINTS - 1);
 const _: () = assert!(MOST_POINTS.is_power_of_two());
 
 /// Bounds on the square of a normal's length, as bits.
-const SHORTEST: u32 = (1.0 - NORMAL).to_bits();
-const LONGEST: u32 = (1.0 + NORMAL).to_bits();
+const SHORTEST: u32 = (1.0 - OFF_UNIT).to_bits();
+const LONGEST: u32 = (1.0 + OFF_UNIT).to_bits();
+
+// What is no longer than that is no number beyond what a stream holds, either.
+const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Binary16.largest());
+const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Thesis16.largest());
 
 /// A word in the last lane.
 #[inline(always)]
-fn last(word: u32) -> Lanes {
+fn in_last(word: u32) -> Lanes {
     Lanes::new([0, 0, 0, word])
 }
 
@@ -34,7 +40,7 @@ pub(crate) struct Look<const REACHES: bool> {
     counts: Lanes,
     /// Of the tags of all ends.
     tags: Lanes,
-    /// Of the tags that both ends have; the top bit, too, where the length of a normal is wrong.
+    /// The top bit of the last word where both bodies are static or the length of a normal is wrong.
     wrong: Lanes,
     /// The top bits where a number may be beyond what the stream holds.
     beyond: Lanes,
@@ -60,51 +66,52 @@ impl<const REACHES: bool> Look<REACHES> {
         }
     }
 
-    /// Looks at the next, whose record is made of these ends.
+    /// Looks at the next, whose bodies were looked up and have these ends. Those that its record is made from
+    /// may be others; the `locations` are the record's.
     #[inline(always)]
-    pub(crate) fn take(&mut self, collision: &Collision, ends: [&End; 2], places: &Places) {
+    pub(crate) fn take(&mut self, collision: &Collision, ends: [&End; 2], locations: &Locations) {
         // Not below zero, unless they are alike or much is wrong with them.
         self.alike |= (collision.body_a ^ collision.body_b).wrapping_sub(1);
         self.named = self.named.or(body_words(collision));
         let normal = normal_and_count(collision);
-        self.counts = self.counts.or(normal.plus(last(u32::MAX)));
+        self.counts = self.counts.or(normal.plus(in_last(u32::MAX)));
         let [a, b] = ends.map(End::with_tag);
         self.tags = self.tags.or(a).or(b);
         // All four are multiplied, none of which is the count: it would be subnormal, which is slow.
         let normal = alone(normal);
         let square = normal.times_f32(normal).sum_f32();
         // As bits, which are in the order of the numbers: below zero where one is larger.
-        let off = square.minus(last(SHORTEST)).or(last(LONGEST).minus(square));
+        let off = square.minus(in_last(SHORTEST)).or(in_last(LONGEST).minus(square));
         self.wrong = self.wrong.or(off).or(a.and(b));
         // The sign of NaN is not said.
-        self.beyond = self.beyond.or(self.limit.minus(places.sum)).or(places.sum);
+        self.beyond = self.beyond.or(self.limit.minus(locations.sum)).or(locations.sum);
         if const { REACHES } {
             let [a, b] = ends;
-            let reach = Reach::new(places, collision.count);
+            let reach = Reach::new(locations, collision.count);
             self.furthest.take(&reach, [a.still(), b.still()]);
         }
     }
 
     /// Whether validation refuses nothing of the block, whose collisions all these were, at these
-    /// `places`, whose bodies were looked up in `ends`; and how many of it look like padding.
+    /// `locations`, with their bodies looked up in `ends`; and how many of it look like padding.
     #[inline(always)]
     pub(crate) fn good<'b, L: Lying<'b>, E: Lookup<'b>>(
         self,
         quick: &Quick<'_>,
         block: &Block<'b, L>,
         ends: E,
-        places: impl Iterator<Item = Places>,
+        locations: impl Iterator<Item = Locations>,
     ) -> (bool, usize) {
         let [a, b, ..] = self.named.words();
-        let [.., counts] = self.counts.words();
+        let [[.., counts], [.., wrong]] = [self.counts, self.wrong].map(Lanes::words);
         let mut good = ends.by_all_bits([a, b])
             & (self.alike >> 31 == 0)
             & (counts & BEYOND_COUNTS == 0)
             & !End::any_shapeless(self.tags)
-            & !End::any_static(self.wrong);
+            & (wrong >> 31 == 0);
         let mut paddings = 0;
         if !good && block.scheduled {
-            // Padding among them is none of that.
+            // Padding counts as wrong above.
             (good, paddings) = quick.heads(block);
         }
         good = good && self.beyond.words().iter().all(|word| word >> 31 == 0);
@@ -112,7 +119,7 @@ impl<const REACHES: bool> Look<REACHES> {
             // Where one shape of the table forbids it, nothing is found of all at once.
             good = good
                 && (REACHES && self.furthest.all_surely_fit(bounds)
-                    || quick.rows_fit(block, places));
+                    || quick.rows_fit(block, locations));
         }
         (good || quick.exactly(block), paddings)
     }

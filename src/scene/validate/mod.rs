@@ -16,7 +16,7 @@ mod shape;
 
 pub(crate) use look::Look;
 pub(crate) use quick::{Block, Quick};
-pub(crate) use reach::Places;
+pub(crate) use reach::Locations;
 pub(crate) use shape::{needed, validate_shapes};
 
 use self::body::{check_body, shape_of};

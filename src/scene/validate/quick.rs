@@ -1,15 +1,18 @@
 //! This file looks at the input of a step while it is packed: a block at a time.
 //!
-//! Without a branch per number it is found out whether everything of a record is surely right. One
+//! Without a branch per number it is found out whether everything of a block is surely right. One
 //! of which that cannot be said is checked as [`validate`](super::validate) does; what that refuses
 //! is refused there, by its own words and in its own order.
+
+#[cfg(test)]
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::{CONTACT_POINTS, LANES};
 
 use super::body::check_body;
-use super::reach::{Extremes, Places, Reach, surely_fit};
+use super::reach::{Extremes, Locations, Reach, surely_fit};
 use super::{Scene, check_whole};
 use crate::platform::Lanes;
 use crate::record;
@@ -18,7 +21,7 @@ use crate::record::largest::{Largest, MAGNITUDE};
 use crate::scene::{Body, Collision, InputError, Lying};
 
 /// How far from 1 the square of a normal's length surely may be: the length itself is half as far.
-pub(super) const NORMAL: f32 = InputError::NORMAL_TOLERANCE;
+pub(super) const OFF_UNIT: f32 = InputError::NORMAL_TOLERANCE;
 #[expect(clippy::cast_possible_truncation, reason = "four")]
 pub(super) const MOST_POINTS: u32 = CONTACT_POINTS as u32;
 /// Square of twice the length that an orientation must have.
@@ -31,6 +34,9 @@ pub(crate) struct Quick<'a> {
     /// What bounds the rows, where they are computed in sixteen bits.
     short_rows: Option<Extremes>,
     bodies: Largest<4>,
+    /// Blocks that were not found good at once.
+    #[cfg(test)]
+    pub(crate) doubted: AtomicUsize,
 }
 
 impl<'a> Quick<'a> {
@@ -47,6 +53,8 @@ impl<'a> Quick<'a> {
         Self {
             short_rows: short_rows.then(|| Extremes::new(scene.shapes, scene.flush_subnormals)),
             bodies: Largest([linear, angular, position, orientation]),
+            #[cfg(test)]
+            doubted: AtomicUsize::new(0),
             scene,
         }
     }
@@ -68,7 +76,7 @@ impl<'a> Quick<'a> {
             let [position, orientation] = record::pose::encode(body);
             beyond = beyond.or(self.bodies.beyond(&[linear, angular, position, orientation]));
             let square = orientation.times_f32(orientation).sum_f32();
-            // As bits, which are in the order of the numbers: below zero where one is larger.
+            // As bits, as a normal's.
             let [least, most] =
                 [ORIENTATION, f32::MAX / 2.0].map(|bound| Lanes::all(bound.to_bits()));
             length = length.or(square.minus(least)).or(most.minus(square));
@@ -83,7 +91,20 @@ impl<'a> Quick<'a> {
                 !end.is_static() | (end.has_shape() & (moves & MAGNITUDE == 0))
             });
         }
-        good || (first..).zip(bodies).all(|(at, body)| check_body(at, body, &self.scene).is_ok())
+        good || self.bodies_exactly(first, bodies)
+    }
+
+    /// Looks at bodies as validation does.
+    #[cold]
+    fn bodies_exactly(&self, first: usize, bodies: &[Body]) -> bool {
+        self.doubt();
+        (first..).zip(bodies).all(|(at, body)| check_body(at, body, &self.scene).is_ok())
+    }
+
+    /// Counts a block that was not found good at once.
+    fn doubt(&self) {
+        #[cfg(test)]
+        self.doubted.fetch_add(1, Ordering::Relaxed);
     }
 
     /// What bounds the rows, where they are computed in sixteen bits.
@@ -105,14 +126,14 @@ impl<'a> Quick<'a> {
     }
 
     /// Whether a bitstream that computes rows in sixteen bits surely computes those of each collision of
-    /// a block, which are at these `places`.
+    /// a block, which are at these `locations`.
     pub(super) fn rows_fit<'b, L: Lying<'b>>(
         &self,
         block: &Block<'b, L>,
-        places: impl Iterator<Item = Places>,
+        locations: impl Iterator<Item = Locations>,
     ) -> bool {
-        block.collisions.iter().zip(places).all(|(collision, places)| {
-            let reach = Reach::new(&places, collision.count);
+        block.collisions.iter().zip(locations).all(|(collision, locations)| {
+            let reach = Reach::new(&locations, collision.count);
             let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
             let shapes = ends.map(|end| end.shape(self.scene.shapes));
             surely_fit(&reach, shapes, self.scene.flush_subnormals)
@@ -138,6 +159,7 @@ impl<'a> Quick<'a> {
     /// Looks at a block as validation does.
     #[cold]
     pub(super) fn exactly<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> bool {
+        self.doubt();
         self.refusal(block).is_ok()
     }
 
@@ -176,7 +198,7 @@ pub(crate) struct Block<'a, L> {
 fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
     let [x, y, z] = collision.normal;
     let square = x * x + y * y + z * z;
-    ((square - 1.0).abs() <= NORMAL)
+    ((square - 1.0).abs() <= OFF_UNIT)
         & (collision.count.wrapping_sub(1) < MOST_POINTS)
         & (collision.body_a != collision.body_b)
         & a.has_shape()
@@ -186,6 +208,6 @@ fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
 
 /// Whether an order may have made it.
 #[inline(always)]
-pub(super) fn is_padding(collision: &Collision) -> bool {
+fn is_padding(collision: &Collision) -> bool {
     (collision.count == 0) & (collision.body_a == collision.body_b)
 }

@@ -11,13 +11,15 @@ use crate::scene::Shape;
 
 /// Where the bodies and the contact points of a collision are, as they are streamed.
 #[derive(Clone, Copy)]
-pub(crate) struct Places {
+pub(crate) struct Locations {
     /// Of body A and body B, m. What is beside them does not matter.
     pub(crate) positions: [Lanes; 2],
     /// Beside their distances, m. Those that are not used do not matter.
     pub(crate) points: [Lanes; CONTACT_POINTS],
     /// The magnitudes of both positions and of the contact points in use, added up component by component, and
-    /// of their distances beside them. No number is larger, and of what is not finite no number comes.
+    /// of their distances beside them: at least as large as each of them; infinite or NaN if one is. It takes
+    /// less than to bound each by itself, and finds less: records some kilometres from the origin are looked at
+    /// again.
     pub(crate) sum: Lanes,
 }
 
@@ -26,19 +28,19 @@ pub(crate) struct Places {
 /// What is longer in any component is no shorter after any of the roundings, so that what is found
 /// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
 /// left out at the end. What NaN makes of it does not matter: the bound on numbers refuses that.
-pub(crate) struct Reach {
+pub(super) struct Reach {
     /// Lever arms about body A and body B, m, but for what is lost of their two ends.
     arms: [Lanes; 2],
-    /// [That](Places::sum) of the places: neither an arm nor the sum of the points is longer, and no end of an
+    /// [That](Locations::sum) of the locations: neither an arm nor the sum of the points is longer, and no end of an
     /// arm is farther.
     sum: Lanes,
 }
 
 impl Reach {
-    /// Of these places, the first `count` points of which are in use.
+    /// Of these locations, the first `count` points of which are in use.
     #[inline(always)]
-    pub(super) fn new(places: &Places, count: u32) -> Self {
-        let [first, rest @ ..] = places.points;
+    pub(super) fn new(locations: &Locations, count: u32) -> Self {
+        let [first, rest @ ..] = locations.points;
         let [any, used @ ..] = used(count);
         let (mut least, mut most) = (first, first);
         for (point, used) in rest.into_iter().zip(used) {
@@ -49,8 +51,8 @@ impl Reach {
         }
         // The larger one is not below zero: the most is no less than the least.
         let arm = |at: Lanes| most.minus_f32(at).larger_f32(at.minus_f32(least)).and(any);
-        let [a, b] = places.positions;
-        Self { arms: [arm(a), arm(b)], sum: places.sum }
+        let [a, b] = locations.positions;
+        Self { arms: [arm(a), arm(b)], sum: locations.sum }
     }
 }
 
@@ -60,12 +62,17 @@ fn with_loss(arm: Lanes, sum: Lanes) -> Lanes {
     arm.plus_f32(sum.times_f32(Lanes::all(LOSS.to_bits())))
 }
 
+/// How much of the longest arm the sum of all may be: a little less, for what is lost of its ends, and for the
+/// roundings.
+const SHARE: f32 = 0.99;
+const _: () = assert!(SHARE * (1.0 + LOSS) < 0.999, "what is lost belongs to an arm");
+const _: () =
+    assert!(SHARE * LONGEST_ARM < 0.999 * LARGEST, "so that it bounds the sum of the points, too");
+
 /// Whether arms and sums of contact points are in range, whatever the masses.
 #[inline(always)]
 fn near(sum: Lanes) -> bool {
-    const { assert!(LONGEST_ARM < LARGEST, "the shorter one bounds both") };
-    // A little less for what is lost, and for the roundings of the sum.
-    let limit = (LONGEST_ARM * 0.99).to_bits();
+    let limit = (SHARE * LONGEST_ARM).to_bits();
     sum.above(Lanes::new([limit, limit, limit, MAGNITUDE])).words() == [0; LANES]
 }
 
@@ -221,7 +228,7 @@ mod tests {
             let seen = &points[..count as usize];
             let all = positions.iter().chain(seen).map(|at| at.and(magnitude));
             let sum = all.fold(Lanes::all(0), Lanes::plus_f32);
-            Reach::new(&Places { positions, points, sum }, count)
+            Reach::new(&Locations { positions, points, sum }, count)
         }
 
         fn shapes<'a>(&self, table: &'a [Shape]) -> [&'a Shape; 2] {
