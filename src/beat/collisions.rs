@@ -247,7 +247,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
             let collisions = all.collisions.part(at..at + size);
             let block = Block { first: all.first + at, collisions, ..all };
             // One loop each, in which nothing is asked of what is looked for.
-            macro_rules! write {
+            macro_rules! written {
                 ($witness:expr) => {{
                     let mut records = Encoding::new(kind, &block, ends, $witness);
                     dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
@@ -256,13 +256,13 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
             }
             let (good, paddings) = match quick {
                 None => {
-                    write!(());
+                    written!(());
                     continue;
                 }
                 Some(quick) if quick.asks_how_far() => {
-                    write!(Look::<true>::new(quick)).good(quick, &block)
+                    written!(Look::<true>::new(quick)).good(quick, &block)
                 }
-                Some(quick) => write!(Look::<false>::new(quick)).good(quick, &block),
+                Some(quick) => written!(Look::<false>::new(quick)).good(quick, &block),
             };
             seen = seen.and(Seen { good, paddings });
         }

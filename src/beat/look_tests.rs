@@ -28,6 +28,16 @@ const SHAPES: [Shape; 4] = [
 ];
 pub(super) const BODIES: usize = 40;
 
+/// Of a body.
+const POSE: Pose = Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] };
+
+/// Near it.
+const CONTACT: Contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
+
+/// Of two such bodies, right wherever both may move.
+const COLLISION: Collision =
+    Collision { body_a: 3, body_b: 4, normal: [0.0, 1.0, 0.0], count: 3, contacts: [CONTACT; 4] };
+
 /// All that a bitstream takes: the last is too heavy for one that flushes. As long as it is in the table
 /// no block of rows in sixteen bits is found right at once.
 fn shapes(limits: &Limits) -> &'static [Shape] {
@@ -180,7 +190,7 @@ fn a_pile_is_found_good_at_once() {
                     }
                     variant.numbers = Numbers { rows, collisions: format, ..variant.numbers };
                     for schedule in [None, Some(&schedule)] {
-                        // Of all shapes the last forbids it.
+                        // Without the heaviest of the shapes, beside which nothing is found at once.
                         let limits = limits(variant, true);
                         let ((good, valid), doubted) =
                             said_and_doubted(&limits, &bodies, &collisions, schedule)
@@ -197,22 +207,15 @@ fn a_pile_is_found_good_at_once() {
 /// Or the properties would hold of nothing: both happen, of every kind of geometry and rows.
 #[test]
 fn a_good_scene_is_good_and_one_wrong_number_is_not() {
-    let pose = Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] };
     let bodies: Vec<Body> = (0..BODIES)
         .map(|_| Body {
-            pose,
+            pose: POSE,
             velocity: Velocity { linear: [1.0; 3], angular: [2.0; 3] },
             shape: 1,
         })
         .collect();
-    let contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
-    let collision = Collision {
-        body_a: 3,
-        body_b: 4,
-        normal: [0.0, 1.0, 0.0],
-        count: 3,
-        contacts: [contact, contact, contact, Contact { point: [f32::NAN; 3], distance: f32::NAN }],
-    };
+    let mut collision = COLLISION;
+    collision.contacts[3] = Contact { point: [f32::NAN; 3], distance: f32::NAN };
     let collisions = vec![collision; 2 * CHECKED + 1];
     for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16] {
         let relative = profile.geometry == Geometry::Relative;
@@ -238,37 +241,28 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
 /// A block with padding among its collisions is looked at again, by another way.
 #[test]
 fn what_is_wrong_beside_padding_is_noticed() {
-    let pose = Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] };
-    let body = |shape| Body { pose, velocity: Velocity::default(), shape };
+    let body = |shape| Body { pose: POSE, velocity: Velocity::default(), shape };
     // The one that padding names is static, and so is the last.
     let bodies = [vec![body(0)], vec![body(1); BODIES], vec![body(0)]].concat();
     let still = u32::try_from(BODIES + 1).expect("few");
-    let contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
-    let collision = Collision {
-        body_a: 3,
-        body_b: 4,
-        normal: [0.0, 1.0, 0.0],
-        count: 3,
-        contacts: [contact; 4],
-    };
-    let on_ground = Collision { body_b: still, ..collision };
-    let nan = Contact { distance: f32::NAN, ..contact };
+    let on_ground = Collision { body_b: still, ..COLLISION };
+    let nan = Contact { distance: f32::NAN, ..CONTACT };
     let wrongs = [
         ("static", Collision { body_a: 0, ..on_ground }),
-        ("missing", Collision { body_a: still + 1, ..collision }),
-        ("beyond sixteen bits", Collision { body_b: 1 << 16, ..collision }),
-        ("long", Collision { normal: [0.0, 1.002, 0.0], ..collision }),
-        ("short", Collision { normal: [0.0, 0.998, 0.0], ..collision }),
-        ("no number", Collision { normal: [0.0, f32::NAN, 0.0], ..collision }),
-        ("no number either", Collision { normal: [0.0, -f32::NAN, 0.0], ..collision }),
-        ("none", Collision { count: 0, ..collision }),
-        ("many", Collision { count: 5, ..collision }),
-        ("NaN", Collision { contacts: [contact, contact, nan, contact], ..collision }),
+        ("missing", Collision { body_a: still + 1, ..COLLISION }),
+        ("beyond sixteen bits", Collision { body_b: 1 << 16, ..COLLISION }),
+        ("long", Collision { normal: [0.0, 1.002, 0.0], ..COLLISION }),
+        ("short", Collision { normal: [0.0, 0.998, 0.0], ..COLLISION }),
+        ("no number", Collision { normal: [0.0, f32::NAN, 0.0], ..COLLISION }),
+        ("no number either", Collision { normal: [0.0, -f32::NAN, 0.0], ..COLLISION }),
+        ("none", Collision { count: 0, ..COLLISION }),
+        ("many", Collision { count: 5, ..COLLISION }),
+        ("NaN", Collision { contacts: [CONTACT, CONTACT, nan, CONTACT], ..COLLISION }),
     ];
     for profile in PROFILES {
         let limits = limits(profile.default_variant(), true);
         let said = |wrong: Option<Collision>, at: usize, empty: &[usize]| {
-            let mut collisions = [collision, on_ground].repeat(CHECKED);
+            let mut collisions = [COLLISION, on_ground].repeat(CHECKED);
             if let Some(wrong) = wrong {
                 collisions[at] = wrong;
             }
@@ -294,7 +288,7 @@ fn what_is_wrong_beside_padding_is_noticed() {
             }
         }
         // What only looks like padding is counted.
-        let alike = Collision { body_b: 3, count: 0, ..collision };
+        let alike = Collision { body_b: 3, count: 0, ..COLLISION };
         assert!(!said(Some(alike), 50, &[40]), "{}", profile.name);
     }
 }
@@ -303,11 +297,7 @@ fn what_is_wrong_beside_padding_is_noticed() {
 #[test]
 fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
     let low = 1 << 16;
-    let body = |shape| Body {
-        pose: Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity: Velocity::default(),
-        shape,
-    };
+    let body = |shape| Body { pose: POSE, velocity: Velocity::default(), shape };
     let collision = |body_a, body_b| Collision {
         body_a,
         body_b,

@@ -174,10 +174,11 @@ impl Lanes {
     #[inline(always)]
     fn neighbours(self) -> Self {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: as in `last`.
+        // SAFETY: SSE2, whose instruction it is, belongs to every x86-64; it works on registers alone.
         return Self(unsafe { arch::_mm_shuffle_epi32::<0b10_11_00_01>(self.0) });
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: as in `last`.
+        // SAFETY: NEON, whose instruction it is, belongs to every aarch64 that Linux runs on; it works on
+        // registers alone.
         return Self(unsafe { arch::vrev64q_u32(self.0) });
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return Self(std::array::from_fn(|k| self.0[k ^ 1]));
@@ -187,10 +188,11 @@ impl Lanes {
     #[inline(always)]
     fn halves(self) -> Self {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: as in `last`.
+        // SAFETY: SSE2, whose instruction it is, belongs to every x86-64; it works on registers alone.
         return Self(unsafe { arch::_mm_shuffle_epi32::<0b01_00_11_10>(self.0) });
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: as in `last`.
+        // SAFETY: NEON, whose instruction it is, belongs to every aarch64 that Linux runs on; it works on
+        // registers alone.
         return Self(unsafe { arch::vextq_u32::<2>(self.0, self.0) });
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return Self(std::array::from_fn(|k| self.0[k ^ 2]));
