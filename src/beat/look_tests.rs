@@ -31,6 +31,10 @@ pub(super) const BODIES: usize = 40;
 /// Of a body.
 const POSE: Pose = Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] };
 
+/// One that stays where it is, and may move.
+pub(super) const BODY: Body =
+    Body { pose: POSE, velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] }, shape: 1 };
+
 /// Near it.
 const CONTACT: Contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
 

@@ -8,6 +8,8 @@ pub(crate) mod collisions;
 mod deal;
 mod format;
 #[cfg(test)]
+mod look_body_tests;
+#[cfg(test)]
 mod look_properties;
 #[cfg(test)]
 mod look_tests;

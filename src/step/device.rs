@@ -45,7 +45,6 @@ enum Activity {
 }
 
 /// An open board.
-#[derive(Debug)]
 pub(crate) struct Device {
     pub(super) mm2s: Vec<Lane>,
     pub(super) s2mm: Vec<Lane>,

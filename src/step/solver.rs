@@ -3,6 +3,7 @@
 //! Validate, order, reserve, pack (`load.rs`); hand over, start; then, in [`InFlight`], wait, take
 //! back, check, unpack, commit: nothing of the caller's changes before the last.
 
+use std::fmt;
 use std::sync::Arc;
 
 use super::bank::{Bank, PerBank};
@@ -30,7 +31,6 @@ pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
 /// An open accelerator.
 ///
 /// Dropping it stops the DMA channels and frees their memory.
-#[derive(Debug)]
 pub struct Accelerator {
     board: BoardDescription,
     pub(super) device: Device,
@@ -46,6 +46,19 @@ pub struct Accelerator {
     pub(super) orderings: PerBank<Ordering>,
     /// Results of a step until all are checked. Kept, so that a step allocates nothing.
     pub(super) spare: Vec<Record>,
+}
+
+/// What it is, not what it keeps of its steps: that is as long as they are.
+impl fmt::Debug for Accelerator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Accelerator")
+            .field("board", &self.board)
+            .field("capabilities", &self.device.capabilities)
+            .field("shapes", &self.shapes.len())
+            .field("loads", &self.loads)
+            .field("dead", &self.device.dead)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Accelerator {

@@ -94,6 +94,21 @@ fn a_step_stops_the_cubes_and_leaves_the_ground() {
     assert_eq!(board.violations(), []);
 }
 
+/// A step has megabytes, of which a line of a log has no use.
+#[test]
+fn what_an_accelerator_prints_for_debugging_is_no_longer_after_a_longer_step() {
+    let printed = |cubes| {
+        let (_, mut accelerator) = open(BoardConfig::default());
+        step(&mut accelerator, cubes).0.expect("a good step");
+        format!("{accelerator:?}")
+    };
+    let (short, long) = (printed(5), printed(500));
+    assert!(short.contains("emulated") && short.contains("collisions: 5,"), "{short}");
+    assert!(long.contains("collisions: 500,"), "{long}");
+    // Numbers have more digits there.
+    assert!(long.len() < short.len() + 100, "{} and {} characters", short.len(), long.len());
+}
+
 #[test]
 fn a_steady_step_costs_39_accesses_with_wide_addresses_and_31_with_narrow_ones() {
     for (address_width, accesses) in [(40, 39), (32, 31)] {

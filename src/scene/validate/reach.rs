@@ -315,6 +315,23 @@ mod tests {
         }
     }
 
+    /// A body is as easily turned as about the axis about which it is most easily turned.
+    #[test]
+    fn whichever_component_of_the_inertia_is_largest_counts() {
+        for component in 0..3 {
+            let mut rod = CUBE;
+            rod.inverse_inertia[component] = 30_000.0;
+            for (table, fits) in [([GROUND, CUBE], true), ([GROUND, rod], false)] {
+                let one = at([[0.0; 3], [2.0, 0.0, 0.0]], [1.0, 0.0, 0.0], [0, 1]);
+                for geometry in GEOMETRIES {
+                    assert_eq!(one.fits(geometry, &table, true), fits);
+                    assert_eq!(one.surely_fits(geometry, &table, true), fits);
+                    assert_eq!(together(std::slice::from_ref(&one), geometry, &table, true), fits);
+                }
+            }
+        }
+    }
+
     /// So that both sides of every limit are met.
     fn length() -> impl Strategy<Value = f32> {
         let magnitude = prop_oneof![
