@@ -1,19 +1,18 @@
-//! What is said of bodies while they are packed, against what validation says of them.
+//! What is said of bodies, and of collisions with bodies far away, while they are packed, against what
+//! validation says of them.
 
 use super::look_tests::{BODY, limits, said};
 use crate::interface::number::{Numbers, Precision, StreamFormat};
-use crate::interface::profile::{Geometry, HALF, MIXED, PROFILES, WINDOWED16};
+use crate::interface::profile::{Geometry, HALF, MIXED, PROFILES, Profile, WINDOWED16};
 use crate::scene::validate::Limits;
-use crate::scene::{Body, Collision, Contact};
+use crate::scene::{Body, Collision, Contact, InputError};
 
-/// What packing and validation say of these bodies alone, in a profile.
-macro_rules! said_of {
-    ($profile:expr, $bodies:expr) => {{
-        let limits = limits($profile.default_variant(), true);
-        let (good, valid) = said(&limits, &$bodies, &Vec::new(), None).expect("nothing else wrong");
-        assert_eq!(good, valid.is_ok(), "{}: {valid:?}", $profile.name);
-        good
-    }};
+/// Whether packing and validation find these bodies right, which have no collisions, in a profile.
+fn said_of(profile: &'static Profile, bodies: &Vec<Body>) -> bool {
+    let limits = limits(profile.default_variant(), true);
+    let (good, valid) = said(&limits, bodies, &Vec::new(), None).expect("nothing else wrong");
+    assert_eq!(good, valid.is_ok(), "{}: {valid:?}", profile.name);
+    good
 }
 
 #[test]
@@ -24,10 +23,10 @@ fn a_static_body_that_moves_in_any_direction_is_noticed() {
                 let mut bodies = vec![BODY; 3];
                 let still = &mut bodies[1];
                 still.shape = 0;
-                let directions = [&mut still.velocity.linear, &mut still.velocity.angular];
-                directions[component / 3][component % 3] = speed;
+                let velocities = [&mut still.velocity.linear, &mut still.velocity.angular];
+                velocities[component / 3][component % 3] = speed;
                 let of = (profile.name, component, speed);
-                assert_eq!(said_of!(profile, bodies), right, "{of:?}");
+                assert_eq!(said_of(profile, &bodies), right, "{of:?}");
             }
         }
     }
@@ -42,7 +41,9 @@ fn an_orientation_that_is_too_short_or_too_long_is_noticed() {
             for (length, right) in [
                 (1.0, true),
                 (-1.0, true),
+                (0.9 * InputError::SHORTEST_ORIENTATION, false),
                 (0.0, false),
+                (1e30, false),
                 (f32::NAN, false),
                 (f32::INFINITY, false),
                 (1e5, holds >= 1e5),
@@ -51,14 +52,14 @@ fn an_orientation_that_is_too_short_or_too_long_is_noticed() {
                 bodies[1].pose.orientation = [0.0; 4];
                 bodies[1].pose.orientation[component] = length;
                 let of = (profile.name, component, length);
-                assert_eq!(said_of!(profile, bodies), right, "{of:?}");
+                assert_eq!(said_of(profile, &bodies), right, "{of:?}");
             }
         }
     }
 }
 
 /// What packing and validation find good of two bodies in contact, one of which has this shape and is so far
-/// away: as body A and as body B, along each axis. Beside it is which of these it was.
+/// away: as body A and as body B, along each axis. Each comes with a description of its case.
 fn said_of_far(limits: &Limits, distance: f32, shape: u32) -> Vec<((bool, bool), String)> {
     let contact = Contact { point: BODY.pose.position, distance: -0.01 };
     let pairs = [[0, 1], [1, 0]].into_iter();
@@ -76,14 +77,15 @@ fn said_of_far(limits: &Limits, distance: f32, shape: u32) -> Vec<((bool, bool),
     cases.map(said).collect()
 }
 
-/// No mass turns on its arm, and no contact point is far; but the arm is computed, unless it is left out.
+/// The arm is computed although a static body does not turn; relative records have the position of the other
+/// body in place of its own.
 #[test]
 fn a_static_body_that_is_too_far_is_noticed_whichever_it_is() {
     for profile in [&HALF, &MIXED, &WINDOWED16] {
         let mut variant = profile.default_variant();
         variant.numbers.rows = Precision::Binary16;
-        let left_out = profile.geometry == Geometry::Relative;
-        for (distance, right) in [(30_000.0, true), (-50_000.0, left_out), (50_000.0, left_out)] {
+        let replaced = profile.geometry == Geometry::Relative;
+        for (distance, right) in [(30_000.0, true), (-50_000.0, replaced), (50_000.0, replaced)] {
             for (found, of) in said_of_far(&limits(variant, true), distance, 0) {
                 assert_eq!(found, (right, right), "{of}");
             }
@@ -91,7 +93,7 @@ fn a_static_body_that_is_too_far_is_noticed_whichever_it_is() {
     }
 }
 
-/// Beyond what collisions hold, but not the poses; and rows are as wide as these.
+/// It is beyond what collisions hold and within what poses hold, and rows are f32: no arm is refused first.
 #[test]
 fn a_position_that_collisions_do_not_hold_is_noticed_whichever_body_it_is_of() {
     for profile in [&HALF, &MIXED, &WINDOWED16] {

@@ -31,7 +31,7 @@ pub(super) const BODIES: usize = 40;
 /// Of a body.
 const POSE: Pose = Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] };
 
-/// One that stays where it is, and may move.
+/// One that is at rest, and may move.
 pub(super) const BODY: Body =
     Body { pose: POSE, velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] }, shape: 1 };
 

@@ -48,7 +48,7 @@ pub struct Accelerator {
     pub(super) spare: Vec<Record>,
 }
 
-/// What it is, not what it keeps of its steps: that is as long as they are.
+/// What it is, and a summary of the step in each bank: not the records, results and tables, which grow with it.
 impl fmt::Debug for Accelerator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Accelerator")

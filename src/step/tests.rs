@@ -94,7 +94,7 @@ fn a_step_stops_the_cubes_and_leaves_the_ground() {
     assert_eq!(board.violations(), []);
 }
 
-/// A step has megabytes, of which a line of a log has no use.
+/// A step has megabytes, for which a line of a log has no use.
 #[test]
 fn what_an_accelerator_prints_for_debugging_is_no_longer_after_a_longer_step() {
     let printed = |cubes| {

@@ -315,7 +315,7 @@ mod tests {
         }
     }
 
-    /// A body is as easily turned as about the axis about which it is most easily turned.
+    /// It bounds how easily a body is turned, whichever axis it belongs to.
     #[test]
     fn whichever_component_of_the_inertia_is_largest_counts() {
         for component in 0..3 {
