@@ -78,7 +78,9 @@ pub use hardware::MemoryChoice;
 pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
 pub(crate) use lanes::Lanes;
 pub(crate) use memory::{DmaMemory, SharedMemory};
-pub(crate) use prefetch::{fetch, prefetch, soon_alone, soon_with_those_behind};
+pub(crate) use prefetch::{
+    fetch, later_with_those_behind, prefetch, soon_alone, soon_with_those_behind,
+};
 #[cfg(feature = "emulation")]
 pub(crate) use remote::{RemotePlatform, memory_beside};
 pub use reserved::ReservedMemory;

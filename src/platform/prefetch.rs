@@ -16,21 +16,27 @@ pub(crate) fn soon_alone<T>(values: &[T], at: usize) {
 /// As [`soon_alone`], of so many, where it is said of those behind them, too: few lines are asked for twice.
 #[inline(always)]
 pub(crate) fn soon_with_those_behind<const N: usize, T>(values: &[T], at: usize) {
-    first_lines_of(values.as_ptr().wrapping_add(at).cast::<[T; N]>());
+    first_lines_of::<FIRST, [T; N]>(values.as_ptr().wrapping_add(at).cast());
+}
+
+/// As [`soon_with_those_behind`], of what is read later: it is fetched into the second cache.
+#[inline(always)]
+pub(crate) fn later_with_those_behind<const N: usize, T>(values: &[T], at: usize) {
+    first_lines_of::<SECOND, [T; N]>(values.as_ptr().wrapping_add(at).cast());
 }
 
 /// Says that what lies at an address is read soon. Any address will do.
 #[inline(always)]
 fn lines_of<T>(value: *const T) {
-    first_lines_of(value);
+    first_lines_of::<FIRST, T>(value);
     fetch(value.cast::<u8>().wrapping_add(size_of::<T>().saturating_sub(1)));
 }
 
 /// The same but for the line of its last byte, if it is that of no 64th from the first on.
 #[inline(always)]
-fn first_lines_of<T>(value: *const T) {
+fn first_lines_of<const CACHE: usize, T>(value: *const T) {
     for line in 0..size_of::<T>().div_ceil(LINE) {
-        fetch(value.cast::<u8>().wrapping_add(line * LINE));
+        fetch_into::<CACHE, _>(value.cast::<u8>().wrapping_add(line * LINE));
     }
 }
 
@@ -40,16 +46,36 @@ const LINE: usize = 64;
 /// Says that what lies at an address is read soon. Any address will do.
 #[inline(always)]
 pub(crate) fn fetch<T>(at: *const T) {
+    fetch_into::<FIRST, T>(at);
+}
+
+/// The caches that something is fetched into, the innermost first.
+const FIRST: usize = 1;
+const SECOND: usize = 2;
+
+/// As [`fetch`], into a cache.
+#[inline(always)]
+fn fetch_into<const CACHE: usize, T>(at: *const T) {
+    const { assert!(CACHE == FIRST || CACHE == SECOND, "there is a hint for either") };
     let at: *const i8 = at.cast();
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: a prefetch neither reads nor faults, whatever the address.
-    unsafe {
-        core::arch::x86_64::_mm_prefetch::<{ core::arch::x86_64::_MM_HINT_T0 }>(at);
+    {
+        use core::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
+        if const { CACHE == FIRST } {
+            // SAFETY: a prefetch neither reads nor faults, whatever the address.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(at) };
+        } else {
+            // SAFETY: a prefetch neither reads nor faults, whatever the address.
+            unsafe { _mm_prefetch::<_MM_HINT_T1>(at) };
+        }
     }
     #[cfg(target_arch = "aarch64")]
     // SAFETY: a prefetch neither faults nor changes registers, whatever the address.
     unsafe {
-        core::arch::asm!("prfm pldl1keep, [{}]", in(reg) at, options(nostack, preserves_flags, nomem));
+        core::arch::asm!(
+            "prfm pldl{}keep, [{}]", const CACHE, in(reg) at,
+            options(nostack, preserves_flags, nomem)
+        );
     }
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     let _ = at;

@@ -6,7 +6,7 @@ use std::iter;
 use std::ops::Range;
 
 use super::Collision;
-use crate::platform::{soon_alone, soon_with_those_behind};
+use crate::platform::{later_with_those_behind, soon_alone, soon_with_those_behind};
 
 /// Where collisions lie ([`Collisions::structures`](super::Collisions::structures)).
 #[derive(Debug, Clone, Copy)]
@@ -87,9 +87,12 @@ const SOON_IN_ARRAY: usize = 70;
 /// The same of its bodies, which it has to say by then.
 const BODIES_SOON: usize = SOON / 2;
 
-/// How far behind what lies about there is fetched, where the order is near to that in memory: line by line,
-/// so that what is looked up then is in a cache.
-const NEARBY_SOON: usize = 768;
+/// How far behind what lies about there is fetched, where the order is near to that in memory: line by line
+/// into the second cache, farther than an order goes astray.
+const NEARBY_LATER: usize = 1100;
+
+/// How far behind a collision is asked for there: it comes from the second cache.
+const NEARBY_SOON: usize = 14;
 
 /// Entries from which on one is no longer where it would lie in an array: so many collisions are in
 /// none of the inner caches.
@@ -163,6 +166,23 @@ impl<'a> InOrder<'a> {
         }
     }
 
+    /// The places of the `nth` so many, while that is fetched which lies at the places `soon` entries behind
+    /// them. All places up to there, too, if there are as many.
+    #[inline(always)]
+    fn places<const N: usize>(
+        self,
+        nth: usize,
+        soon: usize,
+    ) -> Option<(&'a [u32; N], Option<&'a [u32]>)> {
+        let rest = self.order.get(nth * N..)?;
+        // It is looked at once how many there are, for all of them.
+        let Some(places) = rest.get(..soon + N) else { return Some((rest.first_chunk()?, None)) };
+        for place in &places[soon..] {
+            soon_alone(self.all, *place as usize);
+        }
+        Some((places.first_chunk()?, Some(places)))
+    }
+
     /// Those at these places.
     #[inline(always)]
     fn those<const N: usize>(self, places: &[u32; N]) -> [&'a Collision; N] {
@@ -188,16 +208,9 @@ impl<'a> Lying<'a> for InOrder<'a> {
 
     #[inline(always)]
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
-        let rest = self.order.get(nth * N..)?;
-        // It is looked at once how many there are, for all of them.
-        let Some(places) = rest.get(..SOON + N) else {
-            return Some(Next { these: self.those(rest.first_chunk()?), soon: None });
-        };
-        for place in &places[SOON..] {
-            soon_alone(self.all, *place as usize);
-        }
-        let soon = places[BODIES_SOON..].first_chunk().map(|places| self.those(places));
-        Some(Next { these: self.those(places.first_chunk()?), soon })
+        let (these, places) = self.places(nth, SOON)?;
+        let soon = places.and_then(|places| places[BODIES_SOON..].first_chunk());
+        Some(Next { these: self.those(these), soon: soon.map(|places| self.those(places)) })
     }
 
     #[inline(always)]
@@ -246,8 +259,10 @@ impl<'a> Lying<'a> for InNearbyOrder<'a> {
 
     #[inline(always)]
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
-        soon_with_those_behind::<N, _>(self.order.all, self.first + nth * N + NEARBY_SOON);
-        Some(Next { these: self.some(nth)?, soon: None })
+        let Self { order, first } = self;
+        later_with_those_behind::<N, _>(order.all, first + nth * N + NEARBY_LATER);
+        let (these, _) = order.places(nth, NEARBY_SOON)?;
+        Some(Next { these: order.those(these), soon: None })
     }
 
     #[inline(always)]
