@@ -4,6 +4,7 @@ use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
+use crate::beat::bare;
 use crate::beat::bodies::{pack_bodies, survey};
 use crate::beat::collisions::{Entries, pack_collisions};
 use crate::beat::ranges::Packers;
@@ -135,6 +136,16 @@ impl StepPacker {
         let (of_bodies, bodies_good) = self.bodies(bodies, target);
         let (of_collisions, good) = self.entries(collisions, added, target);
         Ok((bodies_good & good).then(|| of_bodies.wrapping_add(of_collisions)))
+    }
+
+    /// Reads all collisions and writes as many bytes as their records have, without making any: what fills no
+    /// unit of records is left out. How many these are.
+    pub fn deal_bare<C: Collisions + ?Sized>(&mut self, collisions: &C) -> usize {
+        let variant = self.limits.variant;
+        let target = Target { variant: &variant, shapes: &[], quick: None };
+        let count = collisions.len();
+        let channels = &mut channels(&mut self.collisions, Segment::Collisions, count, target);
+        bare::deal(&variant, collisions, &mut channels[..variant.profile.mm2s_widths.len()])
     }
 
     /// Bytes of the records of so many bodies, and of so many collisions.

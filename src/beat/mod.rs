@@ -1,5 +1,7 @@
 //! This folder lays records out over the channels of a board, and reads results back from them.
 
+#[cfg(feature = "bench")]
+pub(crate) mod bare;
 pub(crate) mod bodies;
 mod body_records;
 mod collect;

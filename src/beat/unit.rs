@@ -54,7 +54,7 @@ pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
 
 /// The next `count` times `S` beats of a channel.
 #[inline(always)]
-fn part<'b, const S: usize>(
+pub(super) fn part<'b, const S: usize>(
     rest: Option<&mut &'b mut [Beat]>,
     count: usize,
 ) -> Option<&'b mut [[Beat; S]]> {

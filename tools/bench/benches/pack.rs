@@ -18,6 +18,8 @@
 //! - `bodies`: velocities and poses, and what collisions need of bodies
 //! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the one that
 //!   is the default on a bitstream that does not wait, or `--order`, in the window of `float`
+//! - `bare, ...`: the same collisions read and as many bytes written to as many channels, in the same loops,
+//!   and nothing computed: what packing can reach at most
 //! - `gathered`: the caller's collisions in that order, copied as they are: what the order itself costs,
 //!   whoever reads them
 //! - `step, ...`: bodies, then collisions
@@ -127,6 +129,8 @@ enum Thing {
     Bodies,
     AsGiven,
     InOrder,
+    BareAsGiven,
+    BareInOrder,
     Gathered,
     StepAsGiven,
     StepInOrder,
@@ -138,7 +142,10 @@ enum Thing {
 
 impl Thing {
     const fn is_packing(self) -> bool {
-        !matches!(self, Self::Gathered | Self::Unpack | Self::Commit)
+        !matches!(
+            self,
+            Self::BareAsGiven | Self::BareInOrder | Self::Gathered | Self::Unpack | Self::Commit
+        )
     }
 
     const fn name(self) -> &'static str {
@@ -146,6 +153,8 @@ impl Thing {
             Self::Bodies => "bodies",
             Self::AsGiven => "as given",
             Self::InOrder => "in order",
+            Self::BareAsGiven => "bare, as given",
+            Self::BareInOrder => "bare, in order",
             Self::Gathered => "gathered",
             Self::StepAsGiven => "step, as given",
             Self::StepInOrder => "step, in order",
@@ -303,16 +312,18 @@ fn measure(
             Thing::InOrder | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
             Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, None)?,
             Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, added)?,
+            Thing::BareAsGiven => Some(0).filter(|_| packer.deal_bare(collisions) > 0),
+            Thing::BareInOrder => Some(0).filter(|_| packer.deal_bare(&ordered) > 0),
             Thing::Bodies | Thing::Gathered | Thing::Unpack | Thing::Commit => Some(0),
         }
-        .ok_or("the step is refused")?;
+        .ok_or("the step is refused, or has no collisions")?;
     }
     let [of_bodies, of_collisions] = packers[0].bytes(bodies.len(), collisions.len());
     let [_, of_entries] = packers[0].bytes(bodies.len(), schedule.len());
     let bytes = match thing {
         Thing::Bodies => of_bodies,
-        Thing::AsGiven => of_collisions,
-        Thing::InOrder => of_entries,
+        Thing::AsGiven | Thing::BareAsGiven => of_collisions,
+        Thing::InOrder | Thing::BareInOrder => of_entries,
         Thing::Gathered => schedule.len() * size_of::<Collision>(),
         Thing::StepAsGiven | Thing::CheckedAsGiven => of_bodies + of_collisions,
         Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
@@ -331,6 +342,12 @@ fn measure(
         Thing::Commit => contestants.push(Box::new(|| {
             unpacker.commit(&mut moved);
             black_box(&moved);
+        })),
+        Thing::BareAsGiven => contestants.push(Box::new(|| {
+            black_box(packers[0].deal_bare(black_box(collisions)));
+        })),
+        Thing::BareInOrder => contestants.push(Box::new(|| {
+            black_box(packers[0].deal_bare(black_box(&ordered)));
         })),
         Thing::Gathered => contestants.push(Box::new(|| {
             for (at, to) in gathered.iter_mut().enumerate() {
@@ -373,7 +390,8 @@ fn packing<'a>(
             Thing::CheckedInOrder => {
                 let _ = black_box(packer.pack(bodies, black_box(ordered), shapes, added));
             }
-            Thing::Bodies | Thing::Gathered | Thing::Unpack | Thing::Commit => {}
+            // That is no packing, or done above.
+            _ => {}
         }
     })
 }
