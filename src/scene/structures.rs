@@ -166,21 +166,21 @@ impl<'a> InOrder<'a> {
         }
     }
 
-    /// The places of the `nth` so many, while that is fetched which lies at the places `soon` entries behind
-    /// them. All places up to there, too, if there are as many.
+    /// The places of the `nth` so many and of those behind them, `soon` entries further, while that is fetched
+    /// which lies at the last of these; none if there are fewer.
     #[inline(always)]
-    fn places<const N: usize>(
-        self,
-        nth: usize,
-        soon: usize,
-    ) -> Option<(&'a [u32; N], Option<&'a [u32]>)> {
-        let rest = self.order.get(nth * N..)?;
-        // It is looked at once how many there are, for all of them.
-        let Some(places) = rest.get(..soon + N) else { return Some((rest.first_chunk()?, None)) };
+    fn places<const N: usize>(self, nth: usize, soon: usize) -> Option<&'a [u32]> {
+        let places = self.order.get(nth * N..)?.get(..soon + N)?;
         for place in &places[soon..] {
             soon_alone(self.all, *place as usize);
         }
-        Some((places.first_chunk()?, Some(places)))
+        Some(places)
+    }
+
+    /// The `nth` so many, behind which there are too few for anything to be fetched.
+    #[inline(always)]
+    fn last<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
+        Some(self.those(self.order.get(nth * N..)?.first_chunk()?))
     }
 
     /// Those at these places.
@@ -208,9 +208,12 @@ impl<'a> Lying<'a> for InOrder<'a> {
 
     #[inline(always)]
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
-        let (these, places) = self.places(nth, SOON)?;
-        let soon = places.and_then(|places| places[BODIES_SOON..].first_chunk());
-        Some(Next { these: self.those(these), soon: soon.map(|places| self.those(places)) })
+        // It is looked at once how many there are, for all of them.
+        let Some(places) = self.places::<N>(nth, SOON) else {
+            return Some(Next { these: self.last(nth)?, soon: None });
+        };
+        let soon = places[BODIES_SOON..].first_chunk().map(|places| self.those(places));
+        Some(Next { these: self.those(places.first_chunk()?), soon })
     }
 
     #[inline(always)]
@@ -261,8 +264,10 @@ impl<'a> Lying<'a> for InNearbyOrder<'a> {
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
         let Self { order, first } = self;
         later_with_those_behind::<N, _>(order.all, first + nth * N + NEARBY_LATER);
-        let (these, _) = order.places(nth, NEARBY_SOON)?;
-        Some(Next { these: order.those(these), soon: None })
+        let Some(places) = order.places::<N>(nth, NEARBY_SOON) else {
+            return Some(Next { these: order.last(nth)?, soon: None });
+        };
+        Some(Next { these: order.those(places.first_chunk()?), soon: None })
     }
 
     #[inline(always)]
