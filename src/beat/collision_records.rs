@@ -10,6 +10,51 @@ use crate::record::{self, Integer, Record, Rows};
 use crate::scene::validate::{Block, Locations, Look, Quick};
 use crate::scene::{Collision, Lying, Next};
 
+/// A collision, and whether it is known to have all contact points: nothing is masked then.
+#[derive(Clone, Copy)]
+pub(super) struct Counted<'a> {
+    collision: &'a Collision,
+    full: bool,
+}
+
+impl<'a> Counted<'a> {
+    /// One that is known to have all.
+    #[inline(always)]
+    const fn full(collision: &'a Collision) -> Self {
+        Self { collision, full: true }
+    }
+
+    /// How many it has.
+    #[inline(always)]
+    const fn count(self) -> u32 {
+        if self.full { FULL } else { self.collision.count }
+    }
+}
+
+impl<'a> From<&'a Collision> for Counted<'a> {
+    #[inline(always)]
+    fn from(collision: &'a Collision) -> Self {
+        Self { collision, full: false }
+    }
+}
+
+/// Every so many collisions one is looked at to find out whether most have all contact points.
+const SAMPLED: usize = 15;
+
+/// Whether most of these have all contact points, a few of which tell.
+#[inline(always)]
+pub(super) fn most_are_full<'p>(collisions: impl Lying<'p>) -> bool {
+    let sampled = (0..collisions.len()).step_by(SAMPLED);
+    let full =
+        |nth: &usize| collisions.some::<1>(*nth).is_some_and(|[collision]| collision.count == FULL);
+    let others = sampled.clone().filter(|nth| !full(nth)).count();
+    others * 8 <= sampled.len()
+}
+
+/// As many contact points as a collision may have.
+#[expect(clippy::cast_possible_truncation, reason = "four")]
+const FULL: u32 = CONTACT_POINTS as u32;
+
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
     /// Where the bodies of a collision are looked up whose record is sent in a format.
@@ -19,10 +64,10 @@ pub(super) trait Kind<const ROWS: usize>: Copy {
     fn anchors(ends: [&End; 2]) -> [&End; 2];
 
     /// The record of collision `index`, from its [anchors](Self::anchors).
-    fn encode(self, index: usize, from: &Collision, anchors: [&End; 2]) -> Record<ROWS>;
+    fn encode(self, index: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<ROWS>;
 
     /// The locations that it holds.
-    fn locations(from: &Collision, anchors: [&End; 2]) -> Locations;
+    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations;
 }
 
 /// Records in world coordinates.
@@ -38,13 +83,14 @@ impl Kind<{ collision::ROWS }> for Absolute {
     }
 
     #[inline(always)]
-    fn encode(self, _: usize, from: &Collision, anchors: [&End; 2]) -> Record<{ collision::ROWS }> {
-        record::collision::encode(from, anchors)
+    fn encode(self, _: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<{ collision::ROWS }> {
+        record::collision::encode(of.collision, of.count(), anchors)
     }
 
     #[inline(always)]
-    fn locations(from: &Collision, anchors: [&End; 2]) -> Locations {
-        let [_, a, b, points @ ..] = record::collision::encode(from, anchors).rows;
+    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
+        let record = record::collision::encode(of.collision, of.count(), anchors);
+        let [_, a, b, points @ ..] = record.rows;
         let magnitudes = points.map(|point| point.and(Lanes::all(MAGNITUDE)));
         let [of_a, of_b] = [a, b].map(|position| position.and(magnitude_of_vec3()));
         let sum = added(magnitudes).plus_f32(of_a.plus_f32(of_b));
@@ -65,15 +111,15 @@ impl Kind<{ relative::ROWS }> for Relative {
     }
 
     #[inline(always)]
-    fn encode(self, _: usize, from: &Collision, anchors: [&End; 2]) -> Record<{ relative::ROWS }> {
-        record::relative::encode(from, anchors, record::bodies(from))
+    fn encode(self, _: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<{ relative::ROWS }> {
+        record::relative::encode(of.collision, of.count(), anchors, record::bodies(of.collision))
     }
 
     #[inline(always)]
-    fn locations(from: &Collision, anchors: [&End; 2]) -> Locations {
-        let (offset, points) = record::relative::seen(from, anchors);
+    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
+        let (offset, points) = record::relative::seen(of.collision, anchors);
         let mut magnitudes = points;
-        for (point, used) in magnitudes.iter_mut().zip(record::used_magnitudes(from.count)) {
+        for (point, used) in magnitudes.iter_mut().zip(record::used_magnitudes(of.count())) {
             *point = point.and(used);
         }
         let sum = added(magnitudes).plus_f32(offset.and(magnitude_of_vec3()));
@@ -113,18 +159,18 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
     fn encode(
         self,
         index: usize,
-        from: &Collision,
+        of: Counted<'_>,
         anchors: [&End; 2],
     ) -> Record<{ relative::ROWS }> {
         let [word_a, word_b] = self.0[index];
         let words = Lanes::new([word_a, word_b, 0, 0]);
         let bodies = [Integer::new::<0>(words), Integer::new::<1>(words)];
-        record::relative::encode(from, anchors, bodies)
+        record::relative::encode(of.collision, of.count(), anchors, bodies)
     }
 
     #[inline(always)]
-    fn locations(from: &Collision, anchors: [&End; 2]) -> Locations {
-        Relative::locations(from, anchors)
+    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
+        Relative::locations(of, anchors)
     }
 }
 
@@ -148,8 +194,11 @@ fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
 
 /// The records of a block of collisions, seen by a witness on their way. What is behind it is fetched
 /// meanwhile.
+///
+/// `MOST_FULL` says whether most have all contact points: where some that are made together have, no mask is made.
+/// That is a jump, which is foreseen then.
 #[derive(Clone, Copy)]
-pub(super) struct Encoding<K, L, E, W> {
+pub(super) struct Encoding<K, L, E, W, const MOST_FULL: bool> {
     kind: K,
     first: usize,
     collisions: L,
@@ -157,7 +206,7 @@ pub(super) struct Encoding<K, L, E, W> {
     witness: W,
 }
 
-impl<'p, K, L: Lying<'p>, E: Lookup<'p>, W> Encoding<K, L, E, W> {
+impl<'p, K, L: Lying<'p>, E: Lookup<'p>, W, const MOST_FULL: bool> Encoding<K, L, E, W, MOST_FULL> {
     /// Those of a block, whose bodies are looked up here.
     #[inline(always)]
     pub(super) fn new(kind: K, block: &Block<'p, L>, ends: E, witness: W) -> Self {
@@ -172,7 +221,7 @@ pub(super) trait Witness: Copy {
     /// made from.
     fn see<K: Kind<ROWS>, const ROWS: usize>(
         &mut self,
-        collision: &Collision,
+        of: Counted<'_>,
         ends: [&End; 2],
         anchors: [&End; 2],
     );
@@ -181,7 +230,12 @@ pub(super) trait Witness: Copy {
 /// Nobody.
 impl Witness for () {
     #[inline(always)]
-    fn see<K: Kind<ROWS>, const ROWS: usize>(&mut self, _: &Collision, _: [&End; 2], _: [&End; 2]) {
+    fn see<K: Kind<ROWS>, const ROWS: usize>(
+        &mut self,
+        _: Counted<'_>,
+        _: [&End; 2],
+        _: [&End; 2],
+    ) {
     }
 }
 
@@ -190,15 +244,17 @@ impl<const REACHES: bool> Witness for Look<REACHES> {
     #[inline(always)]
     fn see<K: Kind<ROWS>, const ROWS: usize>(
         &mut self,
-        collision: &Collision,
+        of: Counted<'_>,
         ends: [&End; 2],
         anchors: [&End; 2],
     ) {
-        self.take(collision, ends, &K::locations(collision, anchors));
+        self.take(of.collision, of.count(), ends, &K::locations(of, anchors));
     }
 }
 
-impl<'p, K, L: Lying<'p>, E: Lookup<'p>, const REACHES: bool> Encoding<K, L, E, Look<REACHES>> {
+impl<'p, K, L: Lying<'p>, E: Lookup<'p>, const REACHES: bool, const MOST_FULL: bool>
+    Encoding<K, L, E, Look<REACHES>, MOST_FULL>
+{
     /// Whether validation refuses none of the block, all of whose records were taken; and how many of it look
     /// like padding, if the block is scheduled.
     #[inline(always)]
@@ -215,13 +271,49 @@ impl<'p, K, L: Lying<'p>, E: Lookup<'p>, const REACHES: bool> Encoding<K, L, E, 
         let locations = block
             .collisions
             .iter()
-            .map(|collision| K::locations(collision, K::anchors(both(ends, collision))));
+            .map(|collision| K::locations(collision.into(), K::anchors(both(ends, collision))));
         witness.good(quick, block, ends, locations)
     }
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, W: Witness, const ROWS: usize> Records<ROWS>
-    for Encoding<K, L, E, W>
+/// Does something with each of so many. A loop of so much is not unrolled, and its rows would go through
+/// memory.
+macro_rules! each {
+    ($count:ident, $at:ident => $work:expr) => {
+        each!($count, $at => $work; 0 1 2 3 4)
+    };
+    ($count:ident, $at:ident => $work:expr; $($nth:literal)*) => {
+        const { assert!($count <= [$($nth),*].len(), "all of them are written out") };
+        // What there is not is not compiled.
+        $(if const { $nth < $count } {
+            let $at = $nth;
+            $work;
+        })*
+    };
+}
+
+impl<'p, K, L, E: Lookup<'p>, W: Witness, const MOST_FULL: bool> Encoding<K, L, E, W, MOST_FULL> {
+    /// The record of one of the block, which the witness sees.
+    #[inline(always)]
+    fn record<const ROWS: usize>(&mut self, at: usize, of: Counted<'_>) -> Record<ROWS>
+    where
+        K: Kind<ROWS>,
+    {
+        let ends = both(self.ends, of.collision);
+        let anchors = K::anchors(ends);
+        let record = self.kind.encode(self.first + at, of, anchors);
+        self.witness.see::<K, ROWS>(of, ends, anchors);
+        record
+    }
+}
+
+impl<'p, K, L, E, W, const ROWS: usize, const MOST_FULL: bool> Records<ROWS>
+    for Encoding<K, L, E, W, MOST_FULL>
+where
+    K: Kind<ROWS>,
+    L: Lying<'p>,
+    E: Lookup<'p>,
+    W: Witness,
 {
     #[inline(always)]
     fn len(&self) -> usize {
@@ -236,23 +328,32 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, E: Lookup<'p>, W: Witness, const ROWS: usi
                 self.ends.soon([collision.body_a, collision.body_b]);
             }
         }
-        let first = self.first + nth * N;
-        // A loop of so much is not unrolled, and its rows would go through memory.
-        macro_rules! each {
-            ($($at:literal)*) => {
-                const { assert!(N <= [$($at),*].len(), "all of them are written out") };
-                // What there is not is not compiled.
-                $(if const { $at < N } {
-                    let collision = these[$at];
-                    let ends = both(self.ends, collision);
-                    let anchors = K::anchors(ends);
-                    let record = self.kind.encode(first + $at, collision, anchors);
-                    self.witness.see::<K, ROWS>(collision, ends, anchors);
-                    record.give(to);
-                })*
-            };
+        if MOST_FULL && these.iter().all(|collision| collision.count == FULL) {
+            each!(N, at => self.record(nth * N + at, Counted::full(these[at])).give(to));
+        } else {
+            each!(N, at => self.record(nth * N + at, these[at].into()).give(to));
         }
-        each!(0 1 2 3 4);
         Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::InArray;
+
+    #[test]
+    fn most_are_full_where_few_of_those_looked_at_are_not() {
+        let full = Collision { count: FULL, ..Collision::NOTHING };
+        let mut collisions = vec![full; 16 * SAMPLED];
+        let most = |collisions: &[Collision]| most_are_full(InArray(collisions));
+        assert!(most(&collisions) && most(&[]) && most(&[full]));
+        assert!(!most(&[Collision::NOTHING]));
+        for (nth, count) in [(0, 3), (15, 5)] {
+            collisions[nth * SAMPLED].count = count;
+            assert!(most(&collisions), "{nth}");
+        }
+        collisions[7 * SAMPLED].count = 0;
+        assert!(!most(&collisions));
     }
 }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use bitstream_model::interface::profile::Geometry;
 use bitstream_model::interface::record::Beat;
 
-use super::collision_records::{Absolute, Encoding, Kind, Relative, Worded};
+use super::collision_records::{Absolute, Encoding, Kind, Relative, Worded, most_are_full};
 use super::deal::{BLOCK, CHECKED, Dealer, MANY};
 use super::format::{Format, in_format};
 use super::ranges::{Packers, Piece, Pieces, ranges, whole};
@@ -147,6 +147,8 @@ pub(super) struct CollisionPacker<'a, 'b> {
     geometry: Geometry,
     /// The index of the next.
     next: usize,
+    /// Whether most collisions are expected to have all contact points, as those written last have.
+    most_full: bool,
 }
 
 impl<'a, 'b> CollisionPacker<'a, 'b> {
@@ -164,7 +166,7 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         let layout = Segment::Collisions.layout(target.variant);
         let geometry = target.variant.profile.geometry;
         let dealer = Dealer::new(&layout, channels);
-        Self { quick: target.quick, ends, marks, dealer, geometry, next: first }
+        Self { quick: target.quick, ends, marks, dealer, geometry, next: first, most_full: true }
     }
 
     /// Writes the next collisions. Their number is divisible by [`BLOCK`], unless they are the last.
@@ -184,21 +186,20 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
 
     #[inline(always)]
     fn write_lying<'p, L: Lying<'p>>(&'p mut self, collisions: L) -> Seen {
-        let Self { quick, ends, marks: Marks { scheduled, words }, dealer, geometry, next } = self;
+        let Self { quick, ends, marks, dealer, geometry, next, most_full } = self;
+        let Marks { scheduled, words } = *marks;
         let (quick, first) = (*quick, *next);
         *next += collisions.len();
-        let all = Block { first, collisions, ends: *ends, scheduled: *scheduled };
-        match (*geometry, *words) {
-            (Geometry::Absolute, _) => {
-                in_wide_vectors(Writing { kind: Absolute, rows: PhantomData, quick, all, dealer })
-            }
-            (Geometry::Relative, None) => {
-                in_wide_vectors(Writing { kind: Relative, rows: PhantomData, quick, all, dealer })
-            }
-            (Geometry::Relative, Some(words)) => {
-                let kind = Worded(words);
-                in_wide_vectors(Writing { kind, rows: PhantomData, quick, all, dealer })
-            }
+        let all = Block { first, collisions, ends: *ends, scheduled };
+        macro_rules! writing {
+            ($kind:expr) => {
+                Writing { kind: $kind, rows: PhantomData, quick, all, dealer, most_full }
+            };
+        }
+        match (*geometry, words) {
+            (Geometry::Absolute, _) => in_wide_vectors(writing!(Absolute)),
+            (Geometry::Relative, None) => in_wide_vectors(writing!(Relative)),
+            (Geometry::Relative, Some(words)) => in_wide_vectors(writing!(Worded(words))),
         }
     }
 
@@ -220,6 +221,7 @@ struct Writing<'p, 'a, 'b, K, L, const ROWS: usize> {
     quick: Option<&'p Quick<'p>>,
     all: Block<'p, L>,
     dealer: &'p mut Dealer<'a, 'b>,
+    most_full: &'p mut bool,
 }
 
 impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_, '_, K, L, ROWS> {
@@ -235,7 +237,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
     /// Encodes, looks at and deals out, block by block. Those behind are on their way meanwhile.
     #[inline(always)]
     fn run_as<V: Vectors, F: Format>(self, vectors: V) -> Seen {
-        let Self { kind, quick, all, dealer, .. } = self;
+        let Self { kind, quick, all, dealer, most_full, .. } = self;
         let Some(ends) = <K::Among<'p, F> as Lookup>::of(all.ends) else {
             return Seen::REFUSED;
         };
@@ -248,22 +250,35 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
             let block = Block { first: all.first + at, collisions, ..all };
             // One loop each, in which nothing is asked of what is looked for.
             macro_rules! written {
-                ($witness:expr) => {{
-                    let mut records = Encoding::new(kind, &block, ends, $witness);
+                ($witness:expr, $most_full:literal) => {{
+                    let mut records =
+                        Encoding::<_, _, _, _, $most_full>::new(kind, &block, ends, $witness);
                     dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
                     records
                 }};
             }
+            macro_rules! looked_at {
+                ($quick:ident, $reaches:literal) => {{
+                    let look = Look::<$reaches>::new($quick);
+                    if const { F::SIXTEEN.is_some() } && *most_full {
+                        written!(look, true).good($quick, &block)
+                    } else {
+                        written!(look, false).good($quick, &block)
+                    }
+                }};
+            }
             let (good, paddings) = match quick {
                 None => {
-                    written!(());
+                    written!((), false);
                     continue;
                 }
-                Some(quick) if quick.asks_how_far() => {
-                    written!(Look::<true>::new(quick)).good(quick, &block)
-                }
-                Some(quick) => written!(Look::<false>::new(quick)).good(quick, &block),
+                Some(quick) if quick.asks_how_far() => looked_at!(quick, true),
+                Some(quick) => looked_at!(quick, false),
             };
+            // In loops of f32, and in those that do not look, the jump costs what the masks do.
+            if const { F::SIXTEEN.is_some() } {
+                *most_full = most_are_full(collisions);
+            }
             seen = seen.and(Seen { good, paddings });
         }
         seen

@@ -169,18 +169,21 @@ fn a_pile_is_found_good_at_once() {
     let moving = (0..299).map(|at| body(at as f32 / 4.0, 1));
     let bodies: Vec<Body> = std::iter::once(ground).chain(moving).collect();
     let far = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
-    let collisions: Vec<Collision> = (1..299_u32)
-        .map(|at| {
+    let pile = |count: fn(u32) -> u32| -> Vec<Collision> {
+        let collision = |at| {
             let x = (at - 1) as f32 / 4.0;
             let contact = Contact { point: [x, 0.25, 89.75], distance: -0.01 };
             let mut contacts = [contact; 4];
-            contacts[1 + at as usize % 4..].fill(far);
+            contacts[count(at) as usize..].fill(far);
             let other = if at % 5 == 0 { 0 } else { at + 1 };
             let [body_a, body_b] = if at % 2 == 0 { [at, other] } else { [other, at] };
             let normal = [0.6, 0.0, if at % 3 == 0 { 0.8 } else { -0.8 }];
-            Collision { body_a, body_b, normal, count: 1 + at % 4, contacts }
-        })
-        .collect();
+            Collision { body_a, body_b, normal, count: count(at), contacts }
+        };
+        (1..299).map(collision).collect()
+    };
+    // Of any number of contact points, and nearly all of all.
+    let piles = [pile(|at| 1 + at % 4), pile(|at| if at % 60 == 0 { 2 } else { 4 })];
     let entries = (0..298).map(|at| (at % 90 != 89).then_some(at));
     let schedule: Schedule = entries.chain((0..298).filter(|at| at % 90 == 89).map(Some)).collect();
     let formats = [StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16];
@@ -193,11 +196,14 @@ fn a_pile_is_found_good_at_once() {
                         continue;
                     }
                     variant.numbers = Numbers { rows, collisions: format, ..variant.numbers };
-                    for schedule in [None, Some(&schedule)] {
+                    let ordered = [None, Some(&schedule)];
+                    for (schedule, collisions) in
+                        ordered.into_iter().flat_map(|it| piles.iter().map(move |pile| (it, pile)))
+                    {
                         // Without the heaviest of the shapes, beside which nothing is found at once.
                         let limits = limits(variant, true);
                         let ((good, valid), doubted) =
-                            said_and_doubted(&limits, &bodies, &collisions, schedule)
+                            said_and_doubted(&limits, &bodies, collisions, schedule)
                                 .expect("nothing else wrong");
                         let of = (profile.name, inertia, format, rows, schedule.is_some());
                         assert_eq!((good, valid, doubted), (true, Ok(()), 0), "{of:?}");
@@ -220,8 +226,17 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
         .collect();
     let mut collision = COLLISION;
     collision.contacts[3] = Contact { point: [f32::NAN; 3], distance: f32::NAN };
-    let collisions = vec![collision; 2 * CHECKED + 1];
-    for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16] {
+    let full = Collision { count: 4, ..COLLISION };
+    // Most have all contact points, or none has.
+    let piles = [vec![collision; 2 * CHECKED + 1], {
+        let mut collisions = vec![full; 2 * CHECKED + 1];
+        collisions.iter_mut().step_by(50).for_each(|some| *some = collision);
+        collisions
+    }];
+    let profiles = [&FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16];
+    for (profile, collisions) in
+        profiles.into_iter().flat_map(|of| piles.iter().map(move |it| (of, it)))
+    {
         let relative = profile.geometry == Geometry::Relative;
         let limits = limits(profile.default_variant(), true);
         let said = |bodies: &Vec<Body>, collisions: &Vec<Collision>| {
@@ -230,14 +245,15 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
             assert_eq!(good, valid.is_ok(), "{relative} {valid:?}");
             good
         };
-        assert!(said(&bodies, &collisions));
+        assert!(said(&bodies, collisions));
         for at in [0, CHECKED - 1, CHECKED, 2 * CHECKED] {
             let mut wrong = collisions.clone();
-            wrong[at].contacts[2].distance = f32::INFINITY;
+            let last = wrong[at].count as usize - 1;
+            wrong[at].contacts[last].distance = f32::INFINITY;
             assert!(!said(&bodies, &wrong));
             let mut wrong = bodies.clone();
             wrong[at % BODIES].velocity.angular[2] = f32::NAN;
-            assert!(!said(&wrong, &collisions));
+            assert!(!said(&wrong, collisions));
         }
     }
 }

@@ -67,14 +67,15 @@ impl Numbers {
         }
     }
 
-    fn collision(&mut self, bodies: u16) -> Collision {
+    /// One of so many has any number of contact points, the others have all.
+    fn collision(&mut self, bodies: u16, others: u16) -> Collision {
         let body_a = self.below(bodies);
         let body_b = (body_a + 1 + self.below(bodies - 1)) % bodies;
         Collision {
             body_a: body_a.into(),
             body_b: body_b.into(),
             normal: [0.0, -1.0, 0.0],
-            count: 1 + u32::from(self.below(4)),
+            count: if self.below(others) == 0 { 1 + u32::from(self.below(4)) } else { 4 },
             contacts: [(); 4].map(|()| Contact { point: self.vec3(), distance: self.number() }),
         }
     }
@@ -239,6 +240,7 @@ prop_compose! {
         // How far from where it would be a collision lies at most.
         stray in prop::sample::select(vec![1, 900, u16::MAX]),
         still_of in prop::sample::select(vec![0, 1, 2, 50, 3000]),
+        others in prop::sample::select(vec![1, 40]),
         // What validation refuses.
         wrong in prop::array::uniform2(prop::option::weighted(0.3, any::<prop::sample::Index>())),
         seed in any::<u64>(),
@@ -248,7 +250,7 @@ prop_compose! {
             (0..bodies + 2).map(|_| numbers.body(still_of)).collect();
         let few = u16::try_from(bodies.len()).expect("few");
         let mut collisions: Vec<Collision> =
-            (0..collisions).map(|_| numbers.collision(few)).collect();
+            (0..collisions).map(|_| numbers.collision(few, others)).collect();
         let order = (0..chosen).map(|_| numbers.below(few).into()).collect();
         let words = (variant.profile.geometry == Geometry::Relative)
             .then(|| collisions.iter().map(|_| [(); 2].map(|()| numbers.below(9000).into())).collect());
@@ -299,7 +301,7 @@ fn one_wrong_record_is_noticed_in_whichever_range() {
     let mut packers = Packers::new(Some(3));
     let mut numbers = Numbers(1);
     let bodies: Vec<Body> = (0..2 * RANGE + 5).map(|_| numbers.body(0)).collect();
-    let collisions = (0..2 * RANGE + 7).map(|_| numbers.collision(4000)).collect();
+    let collisions = (0..2 * RANGE + 7).map(|_| numbers.collision(4000, 2)).collect();
     for profile in PROFILES {
         let limits = limits(profile.default_variant());
         let (bodies, collisions) = (bodies.clone(), Vec::clone(&collisions));

@@ -12,7 +12,7 @@ const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
 /// The collision record: normal, offset from body A to body B, contact points from body A.
 ///
 /// Differences are rounded to f32 before anything else happens to them. Contact points from `count`
-/// on are zeros at infinite distance, whatever the caller left there. The indices of the bodies are
+/// on, which is the collision's, are zeros at infinite distance, whatever the caller left there. The indices of the bodies are
 /// `bodies`: where only live bodies are kept, others than the caller's.
 ///
 /// Shape: 6 rows. Units: metres, world axes; distance negative = penetrating.
@@ -21,6 +21,7 @@ const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
 #[inline(always)]
 pub(crate) fn encode(
     from: &Collision,
+    count: u32,
     [a, b]: [&End; 2],
     bodies: [Integer; 2],
 ) -> Record<{ relative::ROWS }> {
@@ -29,7 +30,7 @@ pub(crate) fn encode(
     rows[relative::NORMAL] = row_of::<NORMAL, _>(from);
     rows[relative::OFFSET] = offset;
     let contacts = points.into_iter().zip(&mut rows[relative::CONTACTS..]);
-    for ((point, row), used) in contacts.zip(used(from.count)) {
+    for ((point, row), used) in contacts.zip(used(count)) {
         *row = point.and(used).or(Lanes::new(FAR).without(used));
     }
     let mut integers = [None; relative::ROWS];
@@ -94,6 +95,7 @@ mod tests {
         };
         let rows = encode(
             &collision,
+            2,
             [[1.0, 1.0, 5.0], [3.0, 0.0, 5.0]].map(End::at).each_ref(),
             bodies(&collision),
         );

@@ -67,9 +67,15 @@ impl<const REACHES: bool> Look<REACHES> {
     }
 
     /// Looks at the next, whose bodies were looked up and have these ends. Those that its record is made from
-    /// may be others; the `locations` are the record's.
+    /// may be others; `count` is the collision's, the `locations` are the record's.
     #[inline(always)]
-    pub(crate) fn take(&mut self, collision: &Collision, ends: [&End; 2], locations: &Locations) {
+    pub(crate) fn take(
+        &mut self,
+        collision: &Collision,
+        count: u32,
+        ends: [&End; 2],
+        locations: &Locations,
+    ) {
         // Not below zero, unless they are alike or much is wrong with them.
         self.alike |= (collision.body_a ^ collision.body_b).wrapping_sub(1);
         self.named = self.named.or(body_words(collision));
@@ -87,7 +93,7 @@ impl<const REACHES: bool> Look<REACHES> {
         self.beyond = self.beyond.or(self.limit.minus(locations.sum)).or(locations.sum);
         if const { REACHES } {
             let [a, b] = ends;
-            let reach = Reach::new(locations, collision.count);
+            let reach = Reach::new(locations, count);
             self.furthest.take(&reach, [a.still(), b.still()]);
         }
     }
