@@ -138,8 +138,8 @@ impl StepPacker {
         Ok((bodies_good & good).then(|| of_bodies.wrapping_add(of_collisions)))
     }
 
-    /// Reads all collisions and writes as many bytes as their records have, without making any: what fills no
-    /// unit of records is left out. How many these are.
+    /// Reads collisions and writes as many bytes as their records have, without making any; how many. Those at
+    /// the end that fill no unit of records are left out, and all that do not lie as structures.
     pub fn deal_bare<C: Collisions + ?Sized>(&mut self, collisions: &C) -> usize {
         let variant = self.limits.variant;
         let target = Target { variant: &variant, shapes: &[], quick: None };

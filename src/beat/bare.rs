@@ -1,19 +1,23 @@
 //! This file deals collisions out without making records of them: feature `bench`.
 //!
-//! Every word of each is read and as many bytes go to the channels as its record has, in the same loops of
-//! units; nothing is looked up and nothing converted. Packing cannot take less.
+//! Every word of each is read, and as many bytes as its record has go to the channels, through the loops of
+//! [units](super::unit); no body is looked up, nothing is masked, converted or looked at. About that is the
+//! least that packing can take.
 
 use bitstream_model::interface::profile::{Geometry, Variant};
 use bitstream_model::interface::record::{Beat, LANES, collision, relative};
 
-use super::pattern::{self, Pattern, Places};
-use super::stripe::{Place, Segment};
-use super::unit::part;
+use super::collision_records::each;
+use super::format::{Join, Records};
+use super::pattern::Pattern;
+use super::stripe::Segment;
+use super::unit;
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
+use crate::record::{Record, Row, Rows};
 use crate::scene::{Collision, Collisions, InArray, InOrder, Lying, Next, Structures};
 
-/// Deals out all collisions but what fills no unit; how many these are. None of a stripe that no profile has,
-/// and where they lie nowhere as structures.
+/// Deals out all collisions but those at the end that fill no unit; how many were dealt out. None are of a
+/// stripe that no profile has, or where they do not lie as structures.
 ///
 /// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel)
 /// says of their records.
@@ -22,20 +26,21 @@ pub(crate) fn deal<C: Collisions + ?Sized>(
     collisions: &C,
     channels: &mut [&mut [Beat]],
 ) -> usize {
-    match collisions.structures() {
-        Some(Structures::Array(all)) => lying(variant, InArray(all), channels),
+    // Others are not as many as there is room for.
+    match collisions.structures().filter(|all| all.len() == collisions.len()) {
+        Some(Structures::Array(all)) => dealt(variant, InArray(all), channels),
         Some(Structures::Ordered { all, order }) => {
             let order = InOrder::new(all, order);
             match order.nearby(0) {
-                Some(order) => lying(variant, order, channels),
-                None => lying(variant, order, channels),
+                Some(order) => dealt(variant, order, channels),
+                None => dealt(variant, order, channels),
             }
         }
         None => 0,
     }
 }
 
-fn lying<'p, L: Lying<'p>>(
+fn dealt<'p, L: Lying<'p>>(
     variant: &Variant,
     collisions: L,
     channels: &mut [&mut [Beat]],
@@ -43,97 +48,103 @@ fn lying<'p, L: Lying<'p>>(
     let layout = Segment::Collisions.layout(variant);
     let Some((pattern, first)) = Pattern::of(layout.stripe.streams) else { return 0 };
     let rest = channels.get_mut(first..).unwrap_or_default();
-    match (variant.profile.geometry, layout.rows_per_beat()) {
-        (Geometry::Absolute, 1) => {
-            in_wide_vectors(Dealing::<_, { collision::ROWS }, 1> { pattern, collisions, rest })
-        }
-        (Geometry::Absolute, _) => {
-            in_wide_vectors(Dealing::<_, { collision::ROWS }, 2> { pattern, collisions, rest })
-        }
-        (Geometry::Relative, 1) => {
-            in_wide_vectors(Dealing::<_, { relative::ROWS }, 1> { pattern, collisions, rest })
-        }
-        (Geometry::Relative, _) => {
-            in_wide_vectors(Dealing::<_, { relative::ROWS }, 2> { pattern, collisions, rest })
-        }
-    }
+    let per_beat = layout.rows_per_beat();
+    in_wide_vectors(Dealing {
+        geometry: variant.profile.geometry,
+        per_beat,
+        pattern,
+        collisions,
+        rest,
+    })
 }
 
-/// Collisions, and where they go: as many bytes as records of `ROWS` rows have, so many a beat.
-struct Dealing<'c, 'b, L, const ROWS: usize, const PER_BEAT: usize> {
+/// Collisions, and where they go.
+struct Dealing<'c, 'b, L> {
+    geometry: Geometry,
+    per_beat: usize,
     pattern: Pattern,
     collisions: L,
     rest: &'c mut [&'b mut [Beat]],
 }
 
-impl<'p, L: Lying<'p>, const ROWS: usize, const PER_BEAT: usize> Work
-    for Dealing<'_, '_, L, ROWS, PER_BEAT>
-{
+impl<'p, L: Lying<'p>> Work for Dealing<'_, '_, L> {
     type Output = usize;
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> usize {
-        let Self { pattern, collisions, rest } = self;
-        macro_rules! unit {
-            ($places:ident: $records:literal are $beats:literal: $($channel:ident $share:literal),*) => {
-                if const { $records * ROWS == $beats * PER_BEAT } {
-                    return vectors.apart(move || {
-                        let count = collisions.len() / $records;
-                        let mut rest = rest.iter_mut();
-                        $(let Some($channel) = part::<$share>(rest.next(), count) else { return 0 };)*
-                        for at in 0..count {
-                            let Some(Next { these, .. }) = collisions.next::<$records>(at) else { break };
-                            let beats: [Lanes; $beats] = folded(these);
-                            let to = [$(&mut $channel[at][..]),*];
-                            let places = <pattern::$places as Places<$beats>>::PLACES;
-                            for (beat, Place { channel, slot }) in beats.into_iter().zip(places) {
-                                to[channel][slot] = beat.into();
-                            }
-                        }
-                        count * $records
-                    });
-                }
+        let Self { geometry, per_beat, pattern, collisions, rest } = self;
+        let (records, sum) = (&mut AsTheyLie(collisions), &mut Lanes::all(0));
+        macro_rules! written {
+            ($join:ty, $rows:expr) => {
+                unit::write::<V, $join, _, { $rows }>(pattern, vectors, records, rest, sum)
             };
         }
-        pattern::units!(pattern, unit);
-        0
+        match (geometry, per_beat) {
+            (Geometry::Absolute, 1) => written!(Alone, collision::ROWS),
+            (Geometry::Absolute, _) => written!(Folded, collision::ROWS),
+            (Geometry::Relative, 1) => written!(Alone, relative::ROWS),
+            (Geometry::Relative, _) => written!(Folded, relative::ROWS),
+        }
     }
 }
 
-/// All words of some collisions in so many beats, one over the other where there are more.
-#[inline(always)]
-fn folded<const RECORDS: usize, const BEATS: usize>(
-    these: [&Collision; RECORDS],
-) -> [Lanes; BEATS] {
-    let mut beats = [Lanes::all(0); BEATS];
-    // Loops of so much are not unrolled, and the words would go through memory.
-    macro_rules! each {
-        ($nth:literal: $($at:literal)*) => {
-            const { assert!([$($at),*].len() == ROWS_LYING, "all of them are written out") };
-            if const { $nth < RECORDS } {
-                let words: &[u32; WORDS] = bytemuck::cast_ref(these[$nth]);
-                $({
-                    // The last one overlaps the one before it.
-                    let from = const { if $at == ROWS_LYING - 1 { WORDS - LANES } else { LANES * $at } };
-                    let row = words[from..].first_chunk().map_or(Lanes::all(0), |row| Lanes::new(*row));
-                    let beat = &mut beats[const { ($nth * ROWS_LYING + $at) % BEATS }];
-                    *beat = beat.or(row);
-                })*
-            }
-        };
+/// A row is a beat.
+struct Alone;
+
+impl Join for Alone {
+    const PER_BEAT: usize = 1;
+
+    #[inline(always)]
+    fn beat<V: Vectors>(_: V, [row, _]: [Row; 2]) -> Beat {
+        row.numbers.into()
     }
-    const { assert!(RECORDS <= 5, "all of them are written out") };
-    each!(0: 0 1 2 3 4 5);
-    each!(1: 0 1 2 3 4 5);
-    each!(2: 0 1 2 3 4 5);
-    each!(3: 0 1 2 3 4 5);
-    each!(4: 0 1 2 3 4 5);
-    beats
 }
 
-/// Words of a collision as it lies, and rows with all of these.
+/// Two rows are a beat, one over the other: all of both is read for it.
+struct Folded;
+
+impl Join for Folded {
+    const PER_BEAT: usize = 2;
+
+    #[inline(always)]
+    fn beat<V: Vectors>(_: V, [first, second]: [Row; 2]) -> Beat {
+        first.numbers.or(second.numbers).into()
+    }
+}
+
+/// The words of collisions as they lie, in so many rows.
+#[derive(Clone, Copy)]
+struct AsTheyLie<L>(L);
+
+impl<'p, L: Lying<'p>, const ROWS: usize> Records<ROWS> for AsTheyLie<L> {
+    #[inline(always)]
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+        let Next { these, .. } = self.0.next::<N>(nth)?;
+        each!(N, at => Record::<ROWS>::from(rows(these[at])).give(to));
+        Some(())
+    }
+}
+
+/// Words of a collision.
 const WORDS: usize = size_of::<Collision>() / 4;
-const ROWS_LYING: usize = WORDS.div_ceil(LANES);
+
+/// All of them, and the last ones once more in the rows that are more than these.
+#[inline(always)]
+fn rows<const ROWS: usize>(collision: &Collision) -> [Lanes; ROWS] {
+    const { assert!(ROWS * LANES >= WORDS, "all are there") };
+    let words: &[u32; WORDS] = bytemuck::cast_ref(collision);
+    let mut rows = [Lanes::all(0); ROWS];
+    for (at, row) in rows.iter_mut().enumerate() {
+        let from = (at * LANES).min(WORDS - LANES);
+        *row = words[from..].first_chunk().map_or(*row, |words| Lanes::new(*words));
+    }
+    rows
+}
 
 #[cfg(test)]
 mod tests {
@@ -141,8 +152,12 @@ mod tests {
     use bitstream_model::interface::profile::PROFILES;
 
     use super::*;
+    use crate::order::{Ordered, Schedule};
 
-    fn dealt(variant: &Variant, collisions: &[Collision]) -> (usize, Vec<Vec<Beat>>) {
+    fn channels<C: Collisions + ?Sized>(
+        variant: &Variant,
+        collisions: &C,
+    ) -> (usize, Vec<Vec<Beat>>) {
         let layout = Segment::Collisions.layout(variant);
         let beats = |channel| layout.beats_on_channel(collisions.len(), channel);
         let mut channels: Vec<_> =
@@ -152,24 +167,71 @@ mod tests {
         (count, channels)
     }
 
+    /// Divisible by the records of a unit of every stripe.
+    const COUNT: usize = 60;
+
     #[test]
     fn every_word_is_read_and_every_beat_written() {
-        const COUNT: usize = 12;
         for profile in PROFILES {
             let variant = profile.default_variant();
             let nothing = vec![Collision::NOTHING; COUNT];
-            let (count, zeros) = dealt(&variant, &nothing);
+            let (count, zeros) = channels(&variant, &nothing);
             assert_eq!(count, COUNT, "{}", profile.name);
             assert!(
                 zeros.iter().flatten().all(|beat| *beat == Beat::default()),
                 "{}",
                 profile.name
             );
-            for word in 0..WORDS {
+            // Whichever of a unit it is.
+            for (nth, word) in
+                (COUNT - 5..COUNT).flat_map(|nth| (0..WORDS).map(move |it| (nth, it)))
+            {
                 let mut collisions = nothing.clone();
-                bytemuck::cast_mut::<_, [u32; WORDS]>(&mut collisions[COUNT - 1])[word] = 1;
-                assert!(dealt(&variant, &collisions).1 != zeros, "{} {word}", profile.name);
+                bytemuck::cast_mut::<_, [u32; WORDS]>(&mut collisions[nth])[word] = 1;
+                let (_, found) = channels(&variant, &collisions);
+                assert!(found != zeros, "{} {nth} {word}", profile.name);
             }
         }
+    }
+
+    /// Near to where they lie and far from there.
+    #[test]
+    fn collisions_in_an_order_are_dealt_out_in_it() {
+        const MANY: u32 = 12_000;
+        let one = |body_a| Collision { body_a, ..Collision::NOTHING };
+        let list: Vec<Collision> = (1..).map(one).take(MANY as usize).collect();
+        let turned: Vec<u32> = (0..MANY).rev().collect();
+        let swapped: Vec<u32> = (0..MANY).map(|at| at ^ 1).collect();
+        for order in [turned, swapped] {
+            let schedule: Schedule = order.iter().copied().map(Some).collect();
+            let there: Vec<Collision> = order.iter().map(|at| list[*at as usize]).collect();
+            for profile in PROFILES {
+                let variant = profile.default_variant();
+                let ordered = Ordered { collisions: &list, schedule: &schedule };
+                let (expected, found) = (channels(&variant, &there), channels(&variant, &ordered));
+                assert!(found == expected, "{}", profile.name);
+            }
+        }
+    }
+
+    /// A caller's container may say two things.
+    #[test]
+    fn what_lies_there_is_as_many_as_are_told() {
+        struct Wrong(Vec<Collision>);
+        impl Collisions for Wrong {
+            fn len(&self) -> usize {
+                self.0.len() - 1
+            }
+
+            fn collision(&self, index: usize) -> Collision {
+                self.0[index]
+            }
+
+            fn structures(&self) -> Option<Structures<'_>> {
+                Some(Structures::Array(&self.0))
+            }
+        }
+        let variant = PROFILES[0].default_variant();
+        assert_eq!(channels(&variant, &Wrong(vec![Collision::NOTHING; COUNT])).0, 0);
     }
 }

@@ -6,42 +6,16 @@ use super::format::{Format, Records};
 use crate::platform::Lanes;
 use crate::record::end::{End, Ends, Lookup};
 use crate::record::largest::MAGNITUDE;
-use crate::record::{self, Integer, Record, Rows};
+use crate::record::{self, Counted, FULL, Integer, Record, Rows};
 use crate::scene::validate::{Block, Locations, Look, Quick};
 use crate::scene::{Collision, Lying, Next};
 
-/// A collision, and whether it is known to have all contact points: nothing is masked then.
-#[derive(Clone, Copy)]
-pub(super) struct Counted<'a> {
-    collision: &'a Collision,
-    full: bool,
-}
-
-impl<'a> Counted<'a> {
-    /// One that is known to have all.
-    #[inline(always)]
-    const fn full(collision: &'a Collision) -> Self {
-        Self { collision, full: true }
-    }
-
-    /// How many it has.
-    #[inline(always)]
-    const fn count(self) -> u32 {
-        if self.full { FULL } else { self.collision.count }
-    }
-}
-
-impl<'a> From<&'a Collision> for Counted<'a> {
-    #[inline(always)]
-    fn from(collision: &'a Collision) -> Self {
-        Self { collision, full: false }
-    }
-}
-
-/// Every so many collisions one is looked at to find out whether most have all contact points.
+/// Every so many collisions one is looked at to find out whether most have all contact points: eight of a block
+/// that is looked at, two of one that a caller's collisions are copied to.
 const SAMPLED: usize = 15;
 
-/// Whether most of these have all contact points, a few of which tell.
+/// Whether most of these have all contact points, a few of which tell: of eight one may be another, as a jump
+/// that is not foreseen costs about as much as eight times the masks.
 #[inline(always)]
 pub(super) fn most_are_full<'p>(collisions: impl Lying<'p>) -> bool {
     let sampled = (0..collisions.len()).step_by(SAMPLED);
@@ -50,10 +24,6 @@ pub(super) fn most_are_full<'p>(collisions: impl Lying<'p>) -> bool {
     let others = sampled.clone().filter(|nth| !full(nth)).count();
     others * 8 <= sampled.len()
 }
-
-/// As many contact points as a collision may have.
-#[expect(clippy::cast_possible_truncation, reason = "four")]
-const FULL: u32 = CONTACT_POINTS as u32;
 
 /// A kind of collision record of `ROWS` rows.
 pub(super) trait Kind<const ROWS: usize>: Copy {
@@ -84,12 +54,12 @@ impl Kind<{ collision::ROWS }> for Absolute {
 
     #[inline(always)]
     fn encode(self, _: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<{ collision::ROWS }> {
-        record::collision::encode(of.collision, of.count(), anchors)
+        record::collision::encode(of, anchors)
     }
 
     #[inline(always)]
     fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
-        let record = record::collision::encode(of.collision, of.count(), anchors);
+        let record = record::collision::encode(of, anchors);
         let [_, a, b, points @ ..] = record.rows;
         let magnitudes = points.map(|point| point.and(Lanes::all(MAGNITUDE)));
         let [of_a, of_b] = [a, b].map(|position| position.and(magnitude_of_vec3()));
@@ -112,7 +82,7 @@ impl Kind<{ relative::ROWS }> for Relative {
 
     #[inline(always)]
     fn encode(self, _: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<{ relative::ROWS }> {
-        record::relative::encode(of.collision, of.count(), anchors, record::bodies(of.collision))
+        record::relative::encode(of, anchors, record::bodies(of.collision))
     }
 
     #[inline(always)]
@@ -165,7 +135,7 @@ impl Kind<{ relative::ROWS }> for Worded<'_> {
         let [word_a, word_b] = self.0[index];
         let words = Lanes::new([word_a, word_b, 0, 0]);
         let bodies = [Integer::new::<0>(words), Integer::new::<1>(words)];
-        record::relative::encode(of.collision, of.count(), anchors, bodies)
+        record::relative::encode(of, anchors, bodies)
     }
 
     #[inline(always)]
@@ -195,8 +165,8 @@ fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
 /// The records of a block of collisions, seen by a witness on their way. What is behind it is fetched
 /// meanwhile.
 ///
-/// `MOST_FULL` says whether most have all contact points: where some that are made together have, no mask is made.
-/// That is a jump, which is foreseen then.
+/// `MOST_FULL` says whether most have all contact points: where all that are made together have, nothing is
+/// masked. That is a jump, which is foreseen then.
 #[derive(Clone, Copy)]
 pub(super) struct Encoding<K, L, E, W, const MOST_FULL: bool> {
     kind: K,
@@ -248,7 +218,7 @@ impl<const REACHES: bool> Witness for Look<REACHES> {
         ends: [&End; 2],
         anchors: [&End; 2],
     ) {
-        self.take(of.collision, of.count(), ends, &K::locations(of, anchors));
+        self.take(of, ends, &K::locations(of, anchors));
     }
 }
 
@@ -291,6 +261,8 @@ macro_rules! each {
         })*
     };
 }
+#[cfg(feature = "bench")]
+pub(super) use each;
 
 impl<'p, K, L, E: Lookup<'p>, W: Witness, const MOST_FULL: bool> Encoding<K, L, E, W, MOST_FULL> {
     /// The record of one of the block, which the witness sees.

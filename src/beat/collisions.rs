@@ -147,7 +147,8 @@ pub(super) struct CollisionPacker<'a, 'b> {
     geometry: Geometry,
     /// The index of the next.
     next: usize,
-    /// Whether most collisions are expected to have all contact points, as those written last have.
+    /// Whether most collisions are expected to have all contact points, as those written last have. Of the first
+    /// ones it is expected.
     most_full: bool,
 }
 
@@ -167,6 +168,13 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         let geometry = target.variant.profile.geometry;
         let dealer = Dealer::new(&layout, channels);
         Self { quick: target.quick, ends, marks, dealer, geometry, next: first, most_full: true }
+    }
+
+    /// The same, but that it is expected of the first ones that few have all contact points.
+    #[cfg(test)]
+    pub(super) const fn expecting_few_full(mut self) -> Self {
+        self.most_full = false;
+        self
     }
 
     /// Writes the next collisions. Their number is divisible by [`BLOCK`], unless they are the last.
@@ -234,6 +242,12 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_
 }
 
 impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, L, ROWS> {
+    /// Whether a loop that looks jumps where all contact points are used: in loops of f32, and in those that do not
+    /// look, that costs what the masks do.
+    const fn jumps<F: Format>() -> bool {
+        F::SIXTEEN.is_some()
+    }
+
     /// Encodes, looks at and deals out, block by block. Those behind are on their way meanwhile.
     #[inline(always)]
     fn run_as<V: Vectors, F: Format>(self, vectors: V) -> Seen {
@@ -260,7 +274,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
             macro_rules! looked_at {
                 ($quick:ident, $reaches:literal) => {{
                     let look = Look::<$reaches>::new($quick);
-                    if const { F::SIXTEEN.is_some() } && *most_full {
+                    if const { Self::jumps::<F>() } && *most_full {
                         written!(look, true).good($quick, &block)
                     } else {
                         written!(look, false).good($quick, &block)
@@ -275,8 +289,8 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, 
                 Some(quick) if quick.asks_how_far() => looked_at!(quick, true),
                 Some(quick) => looked_at!(quick, false),
             };
-            // In loops of f32, and in those that do not look, the jump costs what the masks do.
-            if const { F::SIXTEEN.is_some() } {
+            // For the next block: of that nothing is in a cache yet.
+            if const { Self::jumps::<F>() } {
                 *most_full = most_are_full(collisions);
             }
             seen = seen.and(Seen { good, paddings });

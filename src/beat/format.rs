@@ -26,21 +26,24 @@ pub(super) trait Records<const ROWS: usize>: Copy {
     fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()>;
 }
 
-/// What rows become in a stream.
-pub(super) trait Format {
+/// What beats are made of rows.
+pub(super) trait Join {
     /// Rows of a beat.
     const PER_BEAT: usize;
 
+    /// The beat of so many rows, the first of these. An `#[inline(always)]` belongs to every implementation.
+    fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat;
+}
+
+/// What rows become in a stream.
+pub(super) trait Format: Join {
     /// What its words are, if they have sixteen bits.
     const SIXTEEN: Option<Sixteen>;
 
     /// Where bodies are looked up whose indices are sent in it.
     type Among<'a>: Lookup<'a>;
 
-    /// The beat of so many rows, the first of these. An `#[inline(always)]` belongs to every implementation.
-    fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat;
-
-    /// The rows that these beats hold, in f32. Likewise.
+    /// The rows that these beats hold, in f32. An `#[inline(always)]` belongs to every implementation.
     fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS];
 }
 
@@ -55,7 +58,7 @@ pub(super) struct Beats<V, F> {
     half: bool,
 }
 
-impl<V: Vectors, F: Format> Beats<V, F> {
+impl<V: Vectors, F: Join> Beats<V, F> {
     #[inline(always)]
     pub(super) fn new(vectors: V) -> Self {
         Self { vectors, format: PhantomData, waiting: Row::zero(), half: false }
@@ -108,17 +111,19 @@ pub(super) use in_format;
 /// Words of f32.
 pub(super) struct Whole;
 
-impl Format for Whole {
+impl Join for Whole {
     const PER_BEAT: usize = 1;
-
-    const SIXTEEN: Option<Sixteen> = None;
-
-    type Among<'a> = Ends<'a>;
 
     #[inline(always)]
     fn beat<V: Vectors>(_: V, [row, _]: [Row; 2]) -> Beat {
         row.whole().into()
     }
+}
+
+impl Format for Whole {
+    const SIXTEEN: Option<Sixteen> = None;
+
+    type Among<'a> = Ends<'a>;
 
     #[inline(always)]
     fn wide<V: Vectors, const ROWS: usize>(_: V, beats: &[Beat]) -> [Lanes; ROWS] {
@@ -139,17 +144,19 @@ pub(super) struct Thesis16;
 /// A format of two rows a beat.
 macro_rules! sixteen {
     ($format:ident) => {
-        impl Format for $format {
+        impl Join for $format {
             const PER_BEAT: usize = 2;
-
-            const SIXTEEN: Option<Sixteen> = Some(Sixteen::$format);
-
-            type Among<'a> = LowEnds<'a>;
 
             #[inline(always)]
             fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat {
                 bytemuck::cast(Sixteen::$format.narrow(vectors, rows))
             }
+        }
+
+        impl Format for $format {
+            const SIXTEEN: Option<Sixteen> = Some(Sixteen::$format);
+
+            type Among<'a> = LowEnds<'a>;
 
             #[inline(always)]
             fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS] {

@@ -8,7 +8,7 @@ use std::mem;
 
 use bitstream_model::interface::record::Beat;
 
-use super::format::{Beats, Format, Records};
+use super::format::{Beats, Join, Records};
 use super::pattern::{self, Pattern, Places};
 use super::stripe::Place;
 use crate::platform::{Lanes, Vectors};
@@ -17,7 +17,7 @@ use crate::record::{Row, Rows};
 /// Writes as many records as fill whole units, and adds the words written to `sum`; how many records
 /// these are. `rest` is what is not written yet of the channels, from the first of the stripe on.
 #[inline(always)]
-pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
+pub(super) fn write<V: Vectors, F: Join, R: Records<ROWS>, const ROWS: usize>(
     pattern: Pattern,
     vectors: V,
     records: &mut R,
@@ -54,7 +54,7 @@ pub(super) fn write<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
 
 /// The next `count` times `S` beats of a channel.
 #[inline(always)]
-pub(super) fn part<'b, const S: usize>(
+fn part<'b, const S: usize>(
     rest: Option<&mut &'b mut [Beat]>,
     count: usize,
 ) -> Option<&'b mut [[Beat; S]]> {
@@ -69,7 +69,7 @@ pub(super) fn part<'b, const S: usize>(
 fn unit<
     P: Places<BEATS>,
     V: Vectors,
-    F: Format,
+    F: Join,
     R: Records<ROWS>,
     const ROWS: usize,
     const RECORDS: usize,
@@ -104,7 +104,7 @@ struct Made<'a, V, F> {
     at: usize,
 }
 
-impl<V: Vectors, F: Format> Rows for Made<'_, V, F> {
+impl<V: Vectors, F: Join> Rows for Made<'_, V, F> {
     #[inline(always)]
     fn row(&mut self, row: Row) {
         if let Some(beat) = self.beats.with(row)

@@ -32,7 +32,8 @@ fn lines_of<T>(value: *const T) {
     fetch(value.cast::<u8>().wrapping_add(size_of::<T>().saturating_sub(1)));
 }
 
-/// The same but for the line of its last byte, if it is that of no 64th from the first on.
+/// The same, of the cache that is filled, but for the line of its last byte, if it is that of no 64th from the
+/// first on.
 #[inline(always)]
 fn first_lines_of<const CACHE: usize, T>(value: *const T) {
     for line in 0..size_of::<T>().div_ceil(LINE) {
@@ -61,12 +62,11 @@ fn fetch_into<const CACHE: usize, T>(at: *const T) {
     #[cfg(target_arch = "x86_64")]
     {
         use core::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
-        if const { CACHE == FIRST } {
+        match CACHE {
             // SAFETY: a prefetch neither reads nor faults, whatever the address.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(at) };
-        } else {
-            // SAFETY: a prefetch neither reads nor faults, whatever the address.
-            unsafe { _mm_prefetch::<_MM_HINT_T1>(at) };
+            FIRST => unsafe { _mm_prefetch::<_MM_HINT_T0>(at) },
+            // SAFETY: as the other one, it neither reads nor faults, whatever the address.
+            _ => unsafe { _mm_prefetch::<_MM_HINT_T1>(at) },
         }
     }
     #[cfg(target_arch = "aarch64")]

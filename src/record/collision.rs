@@ -3,31 +3,28 @@
 use std::mem::offset_of;
 
 use super::end::End;
-use super::{Integer, NORMAL, Record, bodies, contact_rows, row_of, used};
+use super::{Counted, Integer, NORMAL, Record, bodies, contact_rows, row_of, used};
 use crate::interface::record::{CONTACT_POINTS, WORD_LANE, collision};
 use crate::platform::Lanes;
 use crate::scene::Collision;
 
 /// The collision record: normal and count, positions and indices of both bodies, contact points.
 ///
-/// Contact points from `count` on, which is the collision's, are zeros, whatever the caller left there: they
-/// may hold anything (NaN too), and what is sent must not depend on it.
+/// Contact points from the count on are zeros, whatever the caller left there: they may hold anything
+/// (NaN too), and what is sent must not depend on it.
 ///
 /// Shape: 7 rows. Units: metres, world frame; distance negative = penetrating.
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(
-    from: &Collision,
-    count: u32,
-    [a, b]: [&End; 2],
-) -> Record<{ collision::ROWS }> {
+pub(crate) fn encode(of: Counted<'_>, [a, b]: [&End; 2]) -> Record<{ collision::ROWS }> {
+    let from = of.collision;
     let mut rows = [Lanes::all(0); collision::ROWS];
     rows[collision::NORMAL] = row_of::<NORMAL, _>(from);
     rows[collision::BODY_A] = a.with_tag();
     rows[collision::BODY_B] = b.with_tag();
     let contacts = contact_rows(from).into_iter().zip(&mut rows[collision::CONTACTS..]);
-    for ((point, row), used) in contacts.zip(used(count)) {
+    for ((point, row), used) in contacts.zip(used(of.count())) {
         *row = point.and(used);
     }
     let mut integers = [None; collision::ROWS];
@@ -91,7 +88,7 @@ mod tests {
             0x00, 0x00, 0x00, 0x00, // unused
         ];
         let ends = [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]].map(End::at);
-        let beats = encode(&collision, 3, ends.each_ref()).whole().map(Beat::from);
+        let beats = encode((&collision).into(), ends.each_ref()).whole().map(Beat::from);
         assert_eq!(bytemuck::bytes_of(&beats), bytes);
     }
 
@@ -106,7 +103,7 @@ mod tests {
                 count,
                 contacts: [contact; 4],
             };
-            let beats = encode(&collision, count, [&End::MISSING; 2]).rows.map(Beat::from);
+            let beats = encode((&collision).into(), [&End::MISSING; 2]).rows.map(Beat::from);
             for (ordinal, beat) in (0..).zip(&beats[3..]) {
                 assert_eq!(*beat == Beat([0; 4]), ordinal >= count, "count {count}: {ordinal}");
             }

@@ -200,10 +200,46 @@ pub(crate) fn contact_rows(collision: &Collision) -> [Lanes; CONTACT_POINTS] {
     collision.contacts.each_ref().map(row)
 }
 
+/// A collision, and whether it is known to have all contact points: nothing is masked of it then.
+#[derive(Clone, Copy)]
+pub(crate) struct Counted<'a> {
+    pub(crate) collision: &'a Collision,
+    full: bool,
+}
+
+impl<'a> Counted<'a> {
+    /// One that is known to have all.
+    #[inline(always)]
+    pub(crate) fn full(collision: &'a Collision) -> Self {
+        debug_assert_eq!(collision.count, FULL, "it has all");
+        Self { collision, full: true }
+    }
+
+    /// How many it has.
+    #[inline(always)]
+    pub(crate) const fn count(self) -> u32 {
+        // Where it is known, all that depends on it is known when it is compiled.
+        if self.full { FULL } else { self.collision.count }
+    }
+}
+
+impl<'a> From<&'a Collision> for Counted<'a> {
+    /// One of any count.
+    #[inline(always)]
+    fn from(collision: &'a Collision) -> Self {
+        Self { collision, full: false }
+    }
+}
+
+/// As many contact points as a collision may have.
+#[expect(clippy::cast_possible_truncation, reason = "four")]
+pub(crate) const FULL: u32 = CONTACT_POINTS as u32;
+
 /// The bits of the contact points of a collision that are used: all of each, or none. Of a count beyond
 /// `i32`, which validation refuses, none are.
 ///
-/// No branch: counts follow no pattern that could be predicted.
+/// Without a branch: where it is not known that a collision has all ([`Counted`]), counts follow no pattern that
+/// could be predicted.
 #[inline(always)]
 pub(crate) fn used(count: u32) -> [Lanes; CONTACT_POINTS] {
     let mut used = [Lanes::all(count); CONTACT_POINTS];

@@ -1,7 +1,7 @@
 //! This file makes the record of a collision relative to body A.
 
 use super::end::End;
-use super::{Integer, NORMAL, Record, contact_rows, row_of, used};
+use super::{Counted, Integer, NORMAL, Record, contact_rows, row_of, used};
 use crate::interface::record::{CONTACT_POINTS, LANES, relative};
 use crate::platform::Lanes;
 use crate::scene::Collision;
@@ -11,8 +11,8 @@ const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
 
 /// The collision record: normal, offset from body A to body B, contact points from body A.
 ///
-/// Differences are rounded to f32 before anything else happens to them. Contact points from `count`
-/// on, which is the collision's, are zeros at infinite distance, whatever the caller left there. The indices of the bodies are
+/// Differences are rounded to f32 before anything else happens to them. Contact points from the count
+/// on are zeros at infinite distance, whatever the caller left there. The indices of the bodies are
 /// `bodies`: where only live bodies are kept, others than the caller's.
 ///
 /// Shape: 6 rows. Units: metres, world axes; distance negative = penetrating.
@@ -20,17 +20,17 @@ const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
 /// Source: interface specification, record table.
 #[inline(always)]
 pub(crate) fn encode(
-    from: &Collision,
-    count: u32,
+    of: Counted<'_>,
     [a, b]: [&End; 2],
     bodies: [Integer; 2],
 ) -> Record<{ relative::ROWS }> {
+    let from = of.collision;
     let mut rows = [Lanes::all(0); relative::ROWS];
     let (offset, points) = seen(from, [a, b]);
     rows[relative::NORMAL] = row_of::<NORMAL, _>(from);
     rows[relative::OFFSET] = offset;
     let contacts = points.into_iter().zip(&mut rows[relative::CONTACTS..]);
-    for ((point, row), used) in contacts.zip(used(count)) {
+    for ((point, row), used) in contacts.zip(used(of.count())) {
         *row = point.and(used).or(Lanes::new(FAR).without(used));
     }
     let mut integers = [None; relative::ROWS];
@@ -94,8 +94,7 @@ mod tests {
             ],
         };
         let rows = encode(
-            &collision,
-            2,
+            (&collision).into(),
             [[1.0, 1.0, 5.0], [3.0, 0.0, 5.0]].map(End::at).each_ref(),
             bodies(&collision),
         );

@@ -88,10 +88,11 @@ const SOON_IN_ARRAY: usize = 70;
 const BODIES_SOON: usize = SOON / 2;
 
 /// How far behind what lies about there is fetched, where the order is near to that in memory: line by line
-/// into the second cache, farther than an order goes astray.
+/// into the second cache. As far as nearly all go astray, and so few that they lie there until it is their
+/// turn; at the end of a part that a thread has, what the next one begins with is on its way, too.
 const NEARBY_LATER: usize = 1100;
 
-/// How far behind a collision is asked for there: it comes from the second cache.
+/// How far behind a collision is asked for there, by its place: most come from the second cache then.
 const NEARBY_SOON: usize = 14;
 
 /// Entries from which on one is no longer where it would lie in an array: so many collisions are in
@@ -166,10 +167,10 @@ impl<'a> InOrder<'a> {
         }
     }
 
-    /// The places of the `nth` so many and of those behind them, `soon` entries further, while that is fetched
-    /// which lies at the last of these; none if there are fewer.
+    /// Has those fetched whose turn it is `soon` entries behind the `nth` so many; the places of these and of all
+    /// up to there. None if there are fewer.
     #[inline(always)]
-    fn places<const N: usize>(self, nth: usize, soon: usize) -> Option<&'a [u32]> {
+    fn fetch_behind<const N: usize>(self, nth: usize, soon: usize) -> Option<&'a [u32]> {
         let places = self.order.get(nth * N..)?.get(..soon + N)?;
         for place in &places[soon..] {
             soon_alone(self.all, *place as usize);
@@ -209,7 +210,7 @@ impl<'a> Lying<'a> for InOrder<'a> {
     #[inline(always)]
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
         // It is looked at once how many there are, for all of them.
-        let Some(places) = self.places::<N>(nth, SOON) else {
+        let Some(places) = self.fetch_behind::<N>(nth, SOON) else {
             return Some(Next { these: self.last(nth)?, soon: None });
         };
         let soon = places[BODIES_SOON..].first_chunk().map(|places| self.those(places));
@@ -264,7 +265,7 @@ impl<'a> Lying<'a> for InNearbyOrder<'a> {
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
         let Self { order, first } = self;
         later_with_those_behind::<N, _>(order.all, first + nth * N + NEARBY_LATER);
-        let Some(places) = order.places::<N>(nth, NEARBY_SOON) else {
+        let Some(places) = order.fetch_behind::<N>(nth, NEARBY_SOON) else {
             return Some(Next { these: order.last(nth)?, soon: None });
         };
         Some(Next { these: order.those(places.first_chunk()?), soon: None })

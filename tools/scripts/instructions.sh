@@ -7,6 +7,8 @@
 #   tools/scripts/instructions.sh --input FOLDER     prints them alone, of a step in a folder of arrays
 #
 # Of each: profile, thing (of those that tools/bench/benches/pack.rs describes), instructions an entry, limit.
+# The pile's collisions have four contact points and its order is near to the one that they lie in; loops of
+# other collisions and of orders that go far are counted of a step in a folder alone.
 #
 # Exit code: 0 done, 1 something takes more than its limit or cannot be counted, 77 skipped: not on this
 # machine.

@@ -2,16 +2,16 @@
 
 use bitstream_model::interface::number::StreamFormat;
 
-use super::quick::{Block, MOST_POINTS, OFF_UNIT, Quick};
+use super::quick::{Block, OFF_UNIT, Quick};
 use super::reach::{Furthest, Locations, Reach};
 use crate::platform::Lanes;
 use crate::record::end::{End, Lookup};
-use crate::record::{alone, body_words, normal_and_count};
-use crate::scene::{Collision, Lying};
+use crate::record::{Counted, FULL, alone, body_words, normal_and_count};
+use crate::scene::Lying;
 
 /// Bits that a count less one has none of.
-const BEYOND_COUNTS: u32 = !(MOST_POINTS - 1);
-const _: () = assert!(MOST_POINTS.is_power_of_two());
+const BEYOND_COUNTS: u32 = !(FULL - 1);
+const _: () = assert!(FULL.is_power_of_two());
 
 /// Bounds on the square of a normal's length, as bits.
 const SHORTEST: u32 = (1.0 - OFF_UNIT).to_bits();
@@ -67,15 +67,10 @@ impl<const REACHES: bool> Look<REACHES> {
     }
 
     /// Looks at the next, whose bodies were looked up and have these ends. Those that its record is made from
-    /// may be others; `count` is the collision's, the `locations` are the record's.
+    /// may be others; the `locations` are the record's.
     #[inline(always)]
-    pub(crate) fn take(
-        &mut self,
-        collision: &Collision,
-        count: u32,
-        ends: [&End; 2],
-        locations: &Locations,
-    ) {
+    pub(crate) fn take(&mut self, of: Counted<'_>, ends: [&End; 2], locations: &Locations) {
+        let collision = of.collision;
         // Not below zero, unless they are alike or much is wrong with them.
         self.alike |= (collision.body_a ^ collision.body_b).wrapping_sub(1);
         self.named = self.named.or(body_words(collision));
@@ -93,7 +88,7 @@ impl<const REACHES: bool> Look<REACHES> {
         self.beyond = self.beyond.or(self.limit.minus(locations.sum)).or(locations.sum);
         if const { REACHES } {
             let [a, b] = ends;
-            let reach = Reach::new(locations, count);
+            let reach = Reach::new(locations, of.count());
             self.furthest.take(&reach, [a.still(), b.still()]);
         }
     }

@@ -9,21 +9,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bitstream_model::interface::number::{Precision, StreamFormat};
 use bitstream_model::interface::profile::Geometry;
-use bitstream_model::interface::record::{CONTACT_POINTS, LANES};
+use bitstream_model::interface::record::LANES;
 
 use super::body::check_body;
 use super::reach::{Extremes, Locations, Reach, surely_fit};
 use super::{Scene, check_whole};
 use crate::platform::Lanes;
-use crate::record;
 use crate::record::end::{End, Ends, Lookup};
 use crate::record::largest::{Largest, MAGNITUDE};
+use crate::record::{self, FULL};
 use crate::scene::{Body, Collision, InputError, Lying};
 
 /// How far from 1 the square of a normal's length surely may be: the length itself is half as far.
 pub(super) const OFF_UNIT: f32 = InputError::NORMAL_TOLERANCE;
-#[expect(clippy::cast_possible_truncation, reason = "four")]
-pub(super) const MOST_POINTS: u32 = CONTACT_POINTS as u32;
 /// Square of twice the length that an orientation must have.
 const ORIENTATION: f32 = 4.0 * InputError::SHORTEST_ORIENTATION * InputError::SHORTEST_ORIENTATION;
 
@@ -199,7 +197,7 @@ fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
     let [x, y, z] = collision.normal;
     let square = x * x + y * y + z * z;
     ((square - 1.0).abs() <= OFF_UNIT)
-        & (collision.count.wrapping_sub(1) < MOST_POINTS)
+        & (collision.count.wrapping_sub(1) < FULL)
         & (collision.body_a != collision.body_b)
         & a.has_shape()
         & b.has_shape()

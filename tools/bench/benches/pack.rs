@@ -19,16 +19,14 @@
 //! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the one that
 //!   is the default on a bitstream that does not wait, or `--order`, in the window of `float`
 //! - `bare, ...`: the same collisions read and as many bytes written to as many channels, in the same loops,
-//!   and nothing computed: what packing can reach at most
-//! - `gathered`: the caller's collisions in that order, copied as they are: what the order itself costs,
-//!   whoever reads them
+//!   and nothing made of them: about the least that packing can take
 //! - `step, ...`: bodies, then collisions
 //! - `checked, ...`: the same with the validation of everything on the way, as a step does it
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
 //! - `commit`: from there to the caller's bodies
 //!
-//! With `--threads` packing is measured beside packing on one thread, too, in the same turns; `memcpy` and
-//! what follows packing stay on one, which is why the latter is left out.
+//! With `--threads` packing is measured beside packing on one thread, too, in the same turns; `memcpy` stays
+//! on one, and so does all else, which is left out.
 //!
 //! `--cpu-time` counts the time that the thread runs instead of the time that passes: where others
 //! want the cores too, these are far apart.
@@ -51,9 +49,9 @@ use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use clap::{Parser, ValueEnum};
 use scene::Grid;
 use serde_json::{Map, Value, json};
+use zynq_pgs::Collision;
 use zynq_pgs::bench::{StepPacker, Unpacker};
 use zynq_pgs::order::{Ordered, Schedule};
-use zynq_pgs::{Collision, Collisions as _};
 
 /// Holds packing and unpacking against `memcpy` of the same bytes.
 #[derive(Debug, Parser)]
@@ -131,7 +129,6 @@ enum Thing {
     InOrder,
     BareAsGiven,
     BareInOrder,
-    Gathered,
     StepAsGiven,
     StepInOrder,
     CheckedAsGiven,
@@ -142,10 +139,7 @@ enum Thing {
 
 impl Thing {
     const fn is_packing(self) -> bool {
-        !matches!(
-            self,
-            Self::BareAsGiven | Self::BareInOrder | Self::Gathered | Self::Unpack | Self::Commit
-        )
+        !matches!(self, Self::BareAsGiven | Self::BareInOrder | Self::Unpack | Self::Commit)
     }
 
     const fn name(self) -> &'static str {
@@ -155,7 +149,6 @@ impl Thing {
             Self::InOrder => "in order",
             Self::BareAsGiven => "bare, as given",
             Self::BareInOrder => "bare, in order",
-            Self::Gathered => "gathered",
             Self::StepAsGiven => "step, as given",
             Self::StepInOrder => "step, in order",
             Self::CheckedAsGiven => "checked, as given",
@@ -265,7 +258,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     if options.common.json {
         let document = json!({
-            "schema": 4,
+            "schema": 5,
             "bench": "pack",
             "step": step.name,
             "bodies": step.bodies.len(),
@@ -299,8 +292,6 @@ fn measure(
     }
     let mut unpacker = Unpacker::new(variant, bodies, shapes);
     let mut moved = bodies.clone();
-    let mut gathered = collisions.clone();
-    gathered.resize(schedule.len(), ordered.collision(0));
     // What a collision needs of its bodies, what is committed, and what one cannot say something of:
     // it is refused, and would be measured as it is refused.
     unpacker.unpack(bodies).ok_or("the results are refused")?;
@@ -312,11 +303,11 @@ fn measure(
             Thing::InOrder | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
             Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, None)?,
             Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, added)?,
-            Thing::BareAsGiven => Some(0).filter(|_| packer.deal_bare(collisions) > 0),
-            Thing::BareInOrder => Some(0).filter(|_| packer.deal_bare(&ordered) > 0),
-            Thing::Bodies | Thing::Gathered | Thing::Unpack | Thing::Commit => Some(0),
+            Thing::BareAsGiven => (packer.deal_bare(collisions) > 0).then_some(0),
+            Thing::BareInOrder => (packer.deal_bare(&ordered) > 0).then_some(0),
+            Thing::Bodies | Thing::Unpack | Thing::Commit => Some(0),
         }
-        .ok_or("the step is refused, or has no collisions")?;
+        .ok_or("the step is refused, or has too few collisions")?;
     }
     let [of_bodies, of_collisions] = packers[0].bytes(bodies.len(), collisions.len());
     let [_, of_entries] = packers[0].bytes(bodies.len(), schedule.len());
@@ -324,7 +315,6 @@ fn measure(
         Thing::Bodies => of_bodies,
         Thing::AsGiven | Thing::BareAsGiven => of_collisions,
         Thing::InOrder | Thing::BareInOrder => of_entries,
-        Thing::Gathered => schedule.len() * size_of::<Collision>(),
         Thing::StepAsGiven | Thing::CheckedAsGiven => of_bodies + of_collisions,
         Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
         Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
@@ -348,12 +338,6 @@ fn measure(
         })),
         Thing::BareInOrder => contestants.push(Box::new(|| {
             black_box(packers[0].deal_bare(black_box(&ordered)));
-        })),
-        Thing::Gathered => contestants.push(Box::new(|| {
-            for (at, to) in gathered.iter_mut().enumerate() {
-                *to = ordered.collision(at);
-            }
-            black_box(&gathered);
         })),
         _ => contestants
             .extend(packers.iter_mut().map(|packer| packing(thing, packer, step, &ordered))),
@@ -390,8 +374,11 @@ fn packing<'a>(
             Thing::CheckedInOrder => {
                 let _ = black_box(packer.pack(bodies, black_box(ordered), shapes, added));
             }
-            // That is no packing, or done above.
-            _ => {}
+            Thing::Bodies
+            | Thing::BareAsGiven
+            | Thing::BareInOrder
+            | Thing::Unpack
+            | Thing::Commit => {}
         }
     })
 }
