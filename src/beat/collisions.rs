@@ -17,6 +17,7 @@ use super::stripe::Segment;
 use super::target::Target;
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::end::{Ends, Lookup};
+use crate::record::sixteen::Sixteen;
 use crate::scene::validate::{Block, Look, Quick};
 use crate::scene::{Collision, Collisions, InArray, InNearbyOrder, InOrder, Lying, Structures};
 
@@ -243,9 +244,9 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_
 
 impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, L, ROWS> {
     /// Whether a loop that looks jumps where all contact points are used: in loops of f32, and in those that do not
-    /// look, that costs what the masks do.
+    /// look, that costs what the masks do; what is cut to the thesis' format takes far longer than either.
     const fn jumps<F: Format>() -> bool {
-        F::SIXTEEN.is_some()
+        matches!(F::SIXTEEN, Some(Sixteen::Binary16))
     }
 
     /// Encodes, looks at and deals out, block by block. Those behind are on their way meanwhile.
