@@ -203,13 +203,19 @@ pub struct Unpacker {
     channels: [Vec<Beat>; DMA_COUNT_MAX],
     statics: Vec<u32>,
     spare: Vec<Record>,
+    packers: Packers,
 }
 
 impl Unpacker {
     /// For one bitstream and these bodies, whose results are all the same finite numbers. Packing
-    /// them remembers which never move; it is done here.
+    /// them remembers which never move; it is done here. Threads as [`StepPacker::new`].
     #[must_use]
-    pub fn new<B: Bodies + ?Sized>(variant: Variant, bodies: &B, shapes: &[Shape]) -> Self {
+    pub fn new<B: Bodies + ?Sized>(
+        variant: Variant,
+        bodies: &B,
+        shapes: &[Shape],
+        threads: Option<usize>,
+    ) -> Self {
         let layout = Segment::Results.layout(&variant);
         let mut channels: [Vec<Beat>; DMA_COUNT_MAX] = Default::default();
         for (place, channel) in channels.iter_mut().enumerate() {
@@ -221,7 +227,7 @@ impl Unpacker {
         let target = Target { variant: &variant, shapes, quick: None };
         let into = Survey { ends: &mut ends, statics: &mut statics };
         survey(target, bodies, bodies.len(), into, &mut Packers::alone());
-        Self { variant, channels, statics, spare: Vec::new() }
+        Self { variant, channels, statics, spare: Vec::new(), packers: Packers::new(threads) }
     }
 
     /// Bytes of so many results, once they are read: f32, whatever the format of the stream.
@@ -237,7 +243,8 @@ impl Unpacker {
         let channels = self.channels.each_ref().map(Vec::as_slice);
         let active = ..self.variant.profile.s2mm_widths.len();
         let results = Results { layout: &layout, channels: &channels[active] };
-        let (sum, broken) = results.in_turn(bodies.len(), bodies, &self.statics, &mut self.spare);
+        let Self { statics, spare, packers, .. } = self;
+        let (sum, broken) = results.in_turn(bodies.len(), bodies, statics, spare, packers);
         broken.is_none().then_some(sum)
     }
 

@@ -1,5 +1,5 @@
-//! However many threads write the records of a step, the step is the same: on every profile, as given
-//! and in order, and where steps are prepared, too.
+//! However many threads write the records of a step and read its results, the step is the same: on every
+//! profile, as given and in order, and where steps are prepared, too.
 #![cfg(feature = "emulation")]
 
 mod common;

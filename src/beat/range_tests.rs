@@ -1,4 +1,4 @@
-//! That records are the same however many threads write them.
+//! That records are the same however many threads write them, and results however many read them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -12,9 +12,11 @@ use super::deal::BLOCK;
 use super::ranges::{Packers, Pieces, RANGE, ranges, whole};
 use super::stripe::Segment;
 use super::target::Target;
+use super::unpack::{Reader, read_all};
 use crate::interface::profile::{Geometry, Inertia, PROFILES, Variant};
 use crate::interface::record::Beat;
 use crate::record::end::{End, Ends, Survey, Table};
+use crate::record::result::Record;
 use crate::scene::validate::{Limits, Quick, preflight};
 use crate::scene::{
     Body, Collision, Collisions, Contact, Pose, Shape, StepParameters, Structures, Velocity,
@@ -354,6 +356,47 @@ fn ranges_are_for_all_threads_and_few_records_for_the_caller() {
     assert_eq!(cut, [(0, RANGE), (RANGE, 2 * RANGE), (2 * RANGE, many)]);
     let [a, b, c] = [0, 1, 2].map(|at| joined[at].2);
     assert!(a != b && b != c && c != a && [a, b, c].contains(&caller));
+}
+
+/// One that is not finite is found in whichever range it is, and padding is counted once.
+#[test]
+fn results_are_read_the_same_by_any_number_of_threads() {
+    let crews = &mut [Some(1), Some(2), Some(3), None].map(Packers::new);
+    for profile in PROFILES {
+        let layout = Segment::Results.layout(&profile.default_variant());
+        for count in [0, 1, RANGE, RANGE + 1, 3 * RANGE + BLOCK + 1] {
+            // Finite as one number and as two.
+            let word = |at: usize| 0x2000_2000 + u32::try_from(at % 0x1000).expect("few");
+            let mut buffers: Vec<Vec<Beat>> = (0..profile.s2mm_widths.len())
+                .map(|channel| {
+                    let beats = 0..layout.beats_on_channel(count, channel);
+                    beats.map(|at| Beat([at, at + 1, channel, 3 * at].map(word))).collect()
+                })
+                .collect();
+            let wrong = [None, Some(0), Some(RANGE), count.checked_sub(1)];
+            for wrong in wrong.into_iter().filter(|at| at.is_none_or(|at| at < count)) {
+                let spoilt =
+                    wrong.map(|record| layout.place(record * layout.rows / layout.rows_per_beat()));
+                if let Some(place) = spoilt {
+                    buffers[place.channel][place.slot].0[0] |= 0x7FFF_7FFF;
+                }
+                let channels: Vec<&[Beat]> = buffers.iter().map(Vec::as_slice).collect();
+                let mut expected = vec![Record::default(); count];
+                let mut reader = Reader::new(&layout, &channels);
+                assert_eq!(reader.read(&mut expected), wrong.is_none());
+                let sum = reader.finish();
+                for crew in &mut *crews {
+                    let mut found = vec![Record::default(); count];
+                    let read = read_all(&layout, &channels, &mut found, crew);
+                    assert_eq!(read, (sum, wrong.is_none()), "{} {count} {wrong:?}", profile.name);
+                    assert!(found == expected, "{} {count} {wrong:?}", profile.name);
+                }
+                if let Some(place) = spoilt {
+                    buffers[place.channel][place.slot].0[0] = word(place.slot);
+                }
+            }
+        }
+    }
 }
 
 /// Every range begins where the definition of the stripe says, on each channel.

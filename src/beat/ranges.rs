@@ -1,4 +1,4 @@
-//! This file cuts the records of a segment into ranges, and has threads write them side by side.
+//! This file cuts the records of a segment into ranges, and has threads write or read them side by side.
 //!
 //! A range is whole blocks, but for the last, so that it begins with a group of every stripe: on each
 //! channel its beats lie by themselves. Only the last range ends within a group, and is padded.
@@ -25,7 +25,7 @@ const UNASKED: usize = 4;
 /// Threads at most.
 const MOST: usize = 64;
 
-/// The threads that write records.
+/// The threads that write records and read results.
 #[derive(Debug)]
 pub(crate) struct Packers {
     /// How many there may be, the caller's among them; as many as are worth it, if nobody said it.
@@ -99,10 +99,13 @@ pub(super) fn ranges(
     (0..count).step_by(size).map(move |first| first..count.min(first + size))
 }
 
-/// Beats on each channel; none on those that there are not.
-pub(super) type Piece<'a> = [&'a mut [Beat]; DMA_COUNT_MAX];
+/// Beats on each channel, to be written; none on those that there are not.
+pub(super) type Piece<'a> = PieceOf<&'a mut [Beat]>;
 
-/// All beats of a segment.
+/// As [`Piece`], of beats that are written or read.
+pub(super) type PieceOf<S> = [S; DMA_COUNT_MAX];
+
+/// All beats of a segment, to be written.
 pub(super) fn whole<'a>(channels: &'a mut [&mut [Beat]]) -> Piece<'a> {
     let mut whole = Piece::default();
     for (to, channel) in whole.iter_mut().zip(channels) {
@@ -111,30 +114,47 @@ pub(super) fn whole<'a>(channels: &'a mut [&mut [Beat]]) -> Piece<'a> {
     whole
 }
 
-/// The channels of a segment, cut into ranges.
-#[derive(Debug)]
-pub(super) struct Pieces<'a> {
-    /// Beats of a range.
-    beats: [usize; DMA_COUNT_MAX],
-    rest: Piece<'a>,
+/// Beats one behind the other on a channel.
+pub(super) trait Run: Default {
+    /// So many of them, or as many as there are, and what is behind.
+    fn cut(self, beats: usize) -> (Self, Self);
 }
 
-impl<'a> Pieces<'a> {
+impl Run for &mut [Beat] {
+    fn cut(self, beats: usize) -> (Self, Self) {
+        self.split_at_mut(beats.min(self.len()))
+    }
+}
+
+impl Run for &[Beat] {
+    fn cut(self, beats: usize) -> (Self, Self) {
+        self.split_at(beats.min(self.len()))
+    }
+}
+
+/// The channels of a segment, cut into ranges.
+#[derive(Debug)]
+pub(super) struct Pieces<S> {
+    /// Beats of a range.
+    beats: [usize; DMA_COUNT_MAX],
+    rest: PieceOf<S>,
+}
+
+impl<S: Run> Pieces<S> {
     /// For ranges of `size` records, whole blocks.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says of all records.
-    pub(super) fn new(layout: &Layout, size: usize, channels: Piece<'a>) -> Self {
+    pub(super) fn new(layout: &Layout, size: usize, channels: PieceOf<S>) -> Self {
         let beats = std::array::from_fn(|channel| layout.beats_on_channel(size, channel));
         Self { beats, rest: channels }
     }
 
     /// The next range's; nothing behind the last.
-    pub(super) fn cut(&mut self) -> Piece<'a> {
-        let mut piece = Piece::default();
+    pub(super) fn cut(&mut self) -> PieceOf<S> {
+        let mut piece = PieceOf::default();
         for ((piece, rest), beats) in piece.iter_mut().zip(&mut self.rest).zip(self.beats) {
             // The last one may be shorter.
-            let all = std::mem::take(rest);
-            (*piece, *rest) = all.split_at_mut(beats.min(all.len()));
+            (*piece, *rest) = std::mem::take(rest).cut(beats);
         }
         piece
     }

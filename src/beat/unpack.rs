@@ -4,25 +4,60 @@
 //! on the way. They come by units ([`collect`]), and beat by beat what is left at a segment's end, or has
 //! a stripe that no profile has.
 
-use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::record::{Beat, result};
 
 use super::collect::{self, Tally};
 pub(crate) use super::deal::BLOCK;
 use super::format::{Format, in_format};
 use super::pattern::Pattern;
+use super::ranges::{Packers, PieceOf, Pieces};
 use super::stripe::{Deal, Layout};
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::finite::Finite;
 use crate::record::result::Record;
 use crate::record::sixteen::Sixteen;
 
+/// Reads the results of all these records from the result segments, one a channel, on several threads where
+/// they are many; the sum as [`Reader::finish`] gives it, and whether all their numbers are finite.
+///
+/// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+pub(crate) fn read_all(
+    layout: &Layout,
+    channels: &[&[Beat]],
+    records: &mut [Record],
+    packers: &mut Packers,
+) -> (u32, bool) {
+    let (mut sum, mut all_finite) = (0_u32, true);
+    let count = records.len();
+    let cut = |size| {
+        let (mut pieces, all) = (Pieces::new(layout, size, all_of(channels)), records);
+        all.chunks_mut(size).map(move |records| (records, pieces.cut()))
+    };
+    let work = |(records, piece): (&mut [Record], PieceOf<&[Beat]>)| {
+        let mut reader = Reader::new(layout, &piece);
+        let finite = reader.read(records);
+        (reader.finish(), finite)
+    };
+    packers.each(count, cut, work, |(of_range, finite)| {
+        sum = sum.wrapping_add(of_range);
+        all_finite &= finite;
+    });
+    (sum, all_finite)
+}
+
+/// All beats of a segment, to be read.
+fn all_of<'a>(channels: &[&'a [Beat]]) -> PieceOf<&'a [Beat]> {
+    let mut all = PieceOf::default();
+    all[..channels.len()].copy_from_slice(channels);
+    all
+}
+
 /// Reads results from the result segments, one a channel.
 ///
 /// A number that the accelerator could not hold is not finite.
 pub(crate) struct Reader<'a> {
     /// What is not read yet.
-    channels: [&'a [Beat]; DMA_COUNT_MAX],
+    channels: PieceOf<&'a [Beat]>,
     format: Option<Sixteen>,
     /// The stripe, if it is known, and its first channel.
     pattern: Option<(Pattern, usize)>,
@@ -35,10 +70,8 @@ impl<'a> Reader<'a> {
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
     pub(crate) fn new(layout: &Layout, channels: &[&'a [Beat]]) -> Self {
-        let mut all: [&[Beat]; DMA_COUNT_MAX] = Default::default();
-        all[..channels.len()].copy_from_slice(channels);
         Self {
-            channels: all,
+            channels: all_of(channels),
             format: Sixteen::of(layout.format),
             pattern: Pattern::of(layout.stripe.streams),
             deal: Deal::new(layout.stripe),
@@ -122,6 +155,7 @@ pub(super) fn total(sum: Lanes) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use bitstream_model::interface::address_map::DMA_COUNT_MAX;
     use bitstream_model::interface::record::LANES;
     use bitstream_model::interface::stripe::Stripe;
 

@@ -69,7 +69,7 @@ pub(crate) struct Device {
     pub(super) cancellation: Option<Cancellation>,
     /// The longest piece that a descriptor carries, bytes.
     pub(super) largest: u32,
-    /// Who writes the records.
+    /// Who writes the records and reads the results.
     pub(super) packers: Packers,
     /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
     pub(super) ends: Table,

@@ -9,6 +9,7 @@ use bitstream_model::interface::record::Beat;
 
 use super::packing::Source;
 use super::plan::{Plan, bytes};
+use super::results::received;
 use super::solver::Accelerator;
 use super::symptom::Symptom;
 use crate::axi_dma::{Direction, largest_piece};
@@ -111,8 +112,7 @@ impl Accelerator {
         let interrupts = self.device.wait(&plan, &deadline)?;
         let counters = self.device.collect(&deadline)?;
         self.device.take_back(bank)?;
-        let mut channels = Default::default();
-        self.results(&plan, bank, &mut channels);
+        let channels = received(&self.device.s2mm, &plan, bank);
         Ok(Echoed {
             results: channels[..plan.channels()].iter().map(|beats| beats.to_vec()).collect(),
             sent: sent.velocities.wrapping_add(sent.collisions).wrapping_add(sent.poses),

@@ -6,32 +6,23 @@ use bitstream_model::interface::address_map::DMA_COUNT_MAX;
 use bitstream_model::interface::record::Beat;
 
 use super::bank::Bank;
+use super::device::Device;
 use super::fault::Fault;
+use super::lane::Lane;
 use super::packing::Sent;
 use super::plan::Plan;
 use super::solver::Accelerator;
 use crate::accelerator::Counters;
 use crate::axi_dma::Direction;
+use crate::beat::ranges::Packers;
 use crate::beat::stripe::{Layout, Segment};
-use crate::beat::unpack::{BLOCK, Reader};
+use crate::beat::unpack::{BLOCK, Reader, read_all};
 use crate::order::LiveReport;
 use crate::record::finite::finite;
 use crate::record::result::{self, Record};
 use crate::scene::Bodies;
 
 impl Accelerator {
-    /// The result beats of each channel, in a bank.
-    pub(super) fn results<'a>(
-        &'a self,
-        plan: &Plan,
-        bank: Bank,
-        channels: &mut [&'a [Beat]; DMA_COUNT_MAX],
-    ) {
-        for (place, lane) in self.device.s2mm.iter().enumerate() {
-            channels[place] = &lane.beats(bank)[..plan.results(place)];
-        }
-    }
-
     /// Compares the accelerator's sum of the words that it received with ours, if it has one.
     pub(super) fn check_received(
         plan: &Plan,
@@ -66,16 +57,13 @@ impl Accelerator {
     ) -> Result<(), Fault> {
         // A panic of the caller's loses it: the next step makes it anew.
         let mut spare = std::mem::take(&mut self.spare);
-        let mut channels = Default::default();
-        self.results(plan, bank, &mut channels);
+        let Device { s2mm, statics, packers, .. } = &mut self.device;
+        let channels = received(s2mm, plan, bank);
         let layout = Segment::Results.layout(&plan.variant);
         let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
         let (found, broken) = match live.map(|_| self.orderings[bank].lives()) {
             Some(lives) => results.scatter(lives.results(), bodies, &mut spare),
-            None => {
-                let statics = &self.device.statics[bank];
-                results.in_turn(plan.bodies, bodies, statics, &mut spare)
-            }
+            None => results.in_turn(plan.bodies, bodies, &statics[bank], &mut spare, packers),
         };
         self.spare = spare;
         match (answered, broken) {
@@ -86,6 +74,19 @@ impl Accelerator {
             _ => Ok(()),
         }
     }
+}
+
+/// The result beats of each channel, in a bank.
+pub(super) fn received<'a>(
+    lanes: &'a [Lane],
+    plan: &Plan,
+    bank: Bank,
+) -> [&'a [Beat]; DMA_COUNT_MAX] {
+    let mut channels = <[&[Beat]; DMA_COUNT_MAX]>::default();
+    for (place, lane) in lanes.iter().enumerate() {
+        channels[place] = &lane.beats(bank)[..plan.results(place)];
+    }
+    channels
 }
 
 /// The result segments of a step.
@@ -107,10 +108,11 @@ impl Results<'_> {
         bodies: &B,
         statics: &[u32],
         spare: &mut Vec<Record>,
+        packers: &mut Packers,
     ) -> (u32, Option<usize>) {
         // What is there from the last step is overwritten.
         spare.resize(count, Record::default());
-        let (sum, broken) = self.read_in_turn(statics, spare);
+        let (sum, broken) = self.read_in_turn(statics, spare, packers);
         for index in statics.iter().map(|index| *index as usize) {
             if let Some(to) = spare.get_mut(index) {
                 *to = own(bodies, index);
@@ -120,15 +122,19 @@ impl Results<'_> {
     }
 
     /// What of it does not depend on the caller's container: it is compiled once, with the driver.
-    fn read_in_turn(self, statics: &[u32], into: &mut [Record]) -> (u32, Option<usize>) {
-        let mut reader = Reader::new(self.layout, self.channels);
-        let mut broken = None;
-        if !reader.read(into) {
-            let moves = |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
-            let wrong = (0..).zip(&*into).filter(|(_, record)| !finite(record));
-            broken = wrong.map(|(index, _)| index).find(moves);
+    fn read_in_turn(
+        self,
+        statics: &[u32],
+        into: &mut [Record],
+        packers: &mut Packers,
+    ) -> (u32, Option<usize>) {
+        let (sum, all_finite) = read_all(self.layout, self.channels, into, packers);
+        if all_finite {
+            return (sum, None);
         }
-        (reader.finish(), broken)
+        let moves = |at: &usize| statics.binary_search_by_key(at, |at| *at as usize).is_err();
+        let wrong = (0..).zip(&*into).filter(|(_, record)| !finite(record));
+        (sum, wrong.map(|(index, _)| index).find(moves))
     }
 
     /// Reads results in the order of these bodies, and leaves all others as they are; otherwise as
@@ -208,7 +214,7 @@ mod tests {
         {
             let mut spare = Vec::new();
             let (_, found) = read_all(broken, |results, bodies| {
-                results.in_turn(COUNT, bodies, &statics, &mut spare)
+                results.in_turn(COUNT, bodies, &statics, &mut spare, &mut Packers::alone())
             });
             assert_eq!(found, told, "{broken:?}");
             for (index, record) in spare.iter().enumerate() {

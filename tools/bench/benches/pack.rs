@@ -25,8 +25,8 @@
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
 //! - `commit`: from there to the caller's bodies
 //!
-//! With `--threads` packing is measured beside packing on one thread, too, in the same turns; `memcpy` stays
-//! on one, and so does all else, which is left out.
+//! With `--threads` packing and unpacking are measured beside the same on one thread, too, in the same turns;
+//! `memcpy` stays on one, and so does all else, which is left out.
 //!
 //! `--cpu-time` counts the time that the thread runs instead of the time that passes: where others
 //! want the cores too, these are far apart.
@@ -63,7 +63,7 @@ struct Options {
     /// The step in this folder of arrays instead of a pile
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
-    /// Threads that pack; more than one are held against one, too
+    /// Threads that pack and unpack; more than one are held against one, too
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     threads: u16,
     /// Time for which the thread runs, not that which passes
@@ -112,7 +112,7 @@ impl Options {
 
     fn things(&self) -> impl Iterator<Item = Thing> {
         let wanted = |thing: &Thing| self.thing.is_none_or(|wanted| wanted == *thing);
-        let several = |thing: &Thing| self.threads == 1 || thing.is_packing();
+        let several = |thing: &Thing| self.threads == 1 || thing.is_shared();
         Thing::value_variants().iter().copied().filter(wanted).filter(several)
     }
 
@@ -138,8 +138,9 @@ enum Thing {
 }
 
 impl Thing {
-    const fn is_packing(self) -> bool {
-        !matches!(self, Self::BareAsGiven | Self::BareInOrder | Self::Unpack | Self::Commit)
+    /// Whether several threads do it.
+    const fn is_shared(self) -> bool {
+        !matches!(self, Self::BareAsGiven | Self::BareInOrder | Self::Commit)
     }
 
     const fn name(self) -> &'static str {
@@ -285,16 +286,20 @@ fn measure(
     let Step { bodies, collisions, shapes, .. } = step;
     let ordered = Ordered { collisions, schedule };
     let variant = profile.default_variant();
-    let packer = |threads: u16| StepPacker::new(variant, Some(threads.into()));
-    let mut packers = vec![packer(options.threads)];
+    let mut threads = vec![Some(usize::from(options.threads))];
     if options.threads > 1 {
-        packers.push(packer(1));
+        threads.push(Some(1));
     }
-    let mut unpacker = Unpacker::new(variant, bodies, shapes);
+    let packer = |threads: &Option<usize>| StepPacker::new(variant, *threads);
+    let unpacker = |threads: &Option<usize>| Unpacker::new(variant, bodies, shapes, *threads);
+    let mut packers: Vec<StepPacker> = threads.iter().map(packer).collect();
+    let mut unpackers: Vec<Unpacker> = threads.iter().map(unpacker).collect();
     let mut moved = bodies.clone();
     // What a collision needs of its bodies, what is committed, and what one cannot say something of:
     // it is refused, and would be measured as it is refused.
-    unpacker.unpack(bodies).ok_or("the results are refused")?;
+    for unpacker in &mut unpackers {
+        unpacker.unpack(bodies).ok_or("the results are refused")?;
+    }
     for packer in &mut packers {
         packer.pack_bodies(bodies, shapes);
         let added = Some(schedule.empty());
@@ -326,11 +331,13 @@ fn measure(
         black_box(&to);
     })];
     match thing {
-        Thing::Unpack => contestants.push(Box::new(|| {
-            black_box(unpacker.unpack(black_box(bodies)));
+        Thing::Unpack => contestants.extend(unpackers.iter_mut().map(|unpacker| -> Run<'_> {
+            Box::new(|| {
+                black_box(unpacker.unpack(black_box(bodies)));
+            })
         })),
         Thing::Commit => contestants.push(Box::new(|| {
-            unpacker.commit(&mut moved);
+            unpackers[0].commit(&mut moved);
             black_box(&moved);
         })),
         Thing::BareAsGiven => contestants.push(Box::new(|| {
