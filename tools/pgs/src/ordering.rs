@@ -91,6 +91,29 @@ pub(crate) fn name(order: Order) -> String {
     found.map_or_else(|| "another".to_owned(), |name| name.text())
 }
 
+/// The orders that the steps of a run were sent in, and how many each: one order gives way to another where
+/// that would leave too many entries empty.
+#[derive(Debug, Default)]
+pub(crate) struct Taken(Vec<(Order, u32)>);
+
+impl Taken {
+    /// A step was sent.
+    pub(crate) fn see(&mut self, order: Order) {
+        match self.0.iter_mut().find(|(taken, _)| *taken == order) {
+            Some((_, steps)) => *steps += 1,
+            None => self.0.push((order, 1)),
+        }
+    }
+
+    /// In words, the one met first before the others; nothing if all steps had one order.
+    pub(crate) fn text(&self) -> Option<String> {
+        let all: u32 = self.0.iter().map(|(_, steps)| steps).sum();
+        let each = self.0.iter().map(|(order, steps)| format!("{} in {steps}", name(*order)));
+        let texts: Vec<String> = each.collect();
+        (texts.len() > 1).then(|| format!("of {all} steps {}", texts.join(", ")))
+    }
+}
+
 /// In which order a step was sent, in words.
 pub(crate) fn text(report: &StepReport) -> String {
     let mut text = name(report.order);

@@ -114,6 +114,29 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
     }
 }
 
+/// The first order gives way where it would leave too many entries empty: each step's report says which it was.
+#[test]
+fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
+    let scene = ["run", "--hazards", "unchecked", "--grid", "9x9x9", "--steps", "66"];
+    let ran = run([&["--json"], &scene[..]].concat());
+    let document: Value = serde_json::from_str(&ran.stdout).expect("a document");
+    let steps = document["steps"].as_array().expect("steps");
+    let mut counted = Vec::<(&str, u32)>::new();
+    for name in steps.iter().map(|step| step["order"]["name"].as_str().expect("a name")) {
+        match counted.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, steps)) => *steps += 1,
+            None => counted.push((name, 1)),
+        }
+    }
+    let [(first, some), (other, rest)] = counted[..] else { panic!("{counted:?}") };
+    let expected = format!("\norders     of 66 steps {first} in {some}, {other} in {rest}\n");
+    let text = run(scene).stdout;
+    assert!(text.contains(&expected), "{text}");
+
+    let one = run([&scene[..], &["--order", "hazard-free"]].concat()).stdout;
+    assert!(one.contains("order      hazard-free\n") && !one.contains("orders"), "{one}");
+}
+
 /// `full_step186`, if it is there; says once if it is not.
 fn full_step() -> Option<PathBuf> {
     let Some(root) = std::env::var_os("PGS_VECTORS").map(PathBuf::from) else {

@@ -166,6 +166,7 @@ pub(crate) fn run(
     args.planned.inject(&mut opened, &parameters)?;
     let variant = opened.accelerator.capabilities().variant;
     let mut footprint = Footprint::default();
+    let mut orders = ordering::Taken::default();
     let mut documents = Vec::new();
     let mut done = 0;
     let mut retries = 0;
@@ -176,6 +177,7 @@ pub(crate) fn run(
         done += 1;
         retries += u64::from(row.report.retries);
         footprint.see(&variant, &row.report);
+        orders.see(row.report.order);
         if done == 1 && !common.json {
             // Only now: a scene that is refused prints nothing but the refusal.
             progress.suspend(|| print_heading(args, &opened, &row.report, out))?;
@@ -218,6 +220,9 @@ pub(crate) fn run(
         if !complete {
             writeln!(out, "interrupted after {done} of {} steps", args.steps)?;
         }
+        if let Some(orders) = orders.text() {
+            writeln!(out, "orders     {orders}")?;
+        }
         if let Some(memory) = footprint.text() {
             writeln!(out, "memory     {memory}")?;
         }
@@ -226,7 +231,7 @@ pub(crate) fn run(
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
 
-/// Which board, which scene, and the names of the columns.
+/// Which board, which scene, the first step's order, and the names of the columns.
 fn print_heading(
     args: &RunArgs,
     opened: &Opened,
