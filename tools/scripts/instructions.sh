@@ -1,14 +1,17 @@
 #!/usr/bin/env bash
-# Counts by callgrind the instructions that pack and look at records once it is known where these lie: what
-# noise hides from a benchmark, and no other test sees, as a loop that has lost its registers to another packs
-# the same beats, and what is looked at twice is as right or wrong.
+# Counts instructions by callgrind: what noise hides from a benchmark, and no other test sees.
+#
+# - Packing and looking at records once it is known where these lie: a loop that has lost its registers to
+#   another packs the same beats, and what is looked at twice is as right or wrong.
+# - A step on the emulated board: collisions that are taken one after the other instead of many at a time give
+#   the same bits.
 #
 #   tools/scripts/instructions.sh                    counts on a pile, and holds the counts against limits
 #   tools/scripts/instructions.sh --input FOLDER     prints them alone, of a step in a folder of arrays
 #
-# Of each: profile, thing (of those that tools/bench/benches/pack.rs describes), instructions an entry, limit.
-# The pile's collisions have four contact points and its order is near to the one that they lie in; loops of
-# other collisions and of orders that go far are counted of a step in a folder alone.
+# Of each: profile, thing (of those that tools/bench/benches/pack.rs describes, or a step), instructions an
+# entry or a collision, limit. The pile's collisions have four contact points and its order is near to the one
+# that they lie in; loops of other collisions and of orders that go far are counted of a step in a folder alone.
 #
 # Exit code: 0 done, 1 something takes more than its limit or cannot be counted, 77 skipped: not on this
 # machine.
@@ -27,24 +30,33 @@ for feature in avx2 f16c; do
 done
 command -v valgrind >/dev/null || need_packages valgrind
 cd "$repository"
-built=$(cargo bench --bench pack --no-run --locked --quiet --message-format=json-render-diagnostics |
-	sed -n 's/.*"executable":"\([^"]*\/pack-[^"]*\)".*/\1/p') || fail "the benchmark 'pack' cannot be built"
-[ -n "$built" ] || fail "cargo does not say where the benchmark is that it has built"
 
-# All of that is in these functions.
+# Builds a benchmark; where it is.
+built() {
+	local binary
+	binary=$(cargo bench --bench "$1" --no-run --locked --quiet --message-format=json-render-diagnostics |
+		sed -n 's/.*"executable":"\([^"]*\/'"$1"'-[^"]*\)".*/\1/p') || fail "the benchmark '$1' cannot be built"
+	[ -n "$binary" ] || fail "cargo does not say where the benchmark '$1' is that it has built"
+	echo "$binary"
+}
+pack=$(built pack)
+speed=$(built speed)
+
+# All of packing is in the first of these functions, all that the board does in the last.
 packers=('zynq_pgs::beat::collisions::CollisionPacker::write*' 'zynq_pgs::beat::bodies::BodyPacker::write')
+board='bitstream_model::board::Board::advance'
 log=$(mktemp)
 litter+=("$log")
 limit_of_time=${VALGRIND_LIMIT:-600}
 
-# Has callgrind count in a run of the benchmark, in so many stretches; what both say is in the log.
+# Has callgrind count what the first names, with options of its own and a program's; what both say is in the log.
 count() {
-	local code=0
-	attend timeout "$limit_of_time" valgrind --tool=callgrind --callgrind-out-file=/dev/null \
-		"${packers[@]/#/--toggle-collect=}" "$built" --bench "${scene[@]}" --order hazard-free \
-		--profile "$1" --thing "$2" --runs "$3" >"$log" 2>&1 || code=$?
-	[ $code != 124 ] || fail "$1 $2: not done in $limit_of_time s (VALGRIND_LIMIT)"
-	[ $code = 0 ] || fail "$1 $2: $(tail -n 3 "$log")"
+	local what=$1 code=0
+	shift
+	attend timeout "$limit_of_time" valgrind --tool=callgrind --callgrind-out-file=/dev/null "$@" >"$log" 2>&1 ||
+		code=$?
+	[ $code != 124 ] || fail "$what: not done in $limit_of_time s (VALGRIND_LIMIT)"
+	[ $code = 0 ] || fail "$what: $(tail -n 3 "$log")"
 }
 # What the log says instead of the number in this text.
 said() {
@@ -57,27 +69,34 @@ said() {
 compared=no
 [ "${scene[0]}" != --grid ] || compared=yes
 good=yes
-# A tenth above what they were when this was written.
+# Prints instructions, given in tenths, which the shell can divide, and holds them against their limit.
+hold() {
+	local what=$1 tenths=$2 each=$3 limit=$4 verdict=
+	[ "$tenths" -gt 0 ] || fail "$what: nothing is counted (of ${packers[*]} or $board)"
+	if [ $compared = yes ]; then
+		verdict=" of $limit"
+		[ "$tenths" -le $((limit * 10)) ] || { good=no; verdict+=': too many'; }
+		# So few that the limit would hide anything, if they are all of them.
+		[ "$tenths" -ge $((limit * 8)) ] || { good=no; verdict+=': too few'; }
+	fi
+	echo "$what: $((tenths / 10)).$((tenths % 10)) instructions $each$verdict"
+}
+
+# Packing. Limits are a tenth above what was counted when this was written, here and below.
 while read -r profile thing limit; do
-	count "$profile" "$thing" 1
-	once=$(said 'Collected : NUMBER')
-	count "$profile" "$thing" 2
-	twice=$(said 'Collected : NUMBER')
+	what="$profile $thing"
+	# In one stretch and in two: the difference is that of the runs of a stretch alone.
+	counted=()
+	for runs in 1 2; do
+		count "$what" "${packers[@]/#/--toggle-collect=}" "$pack" --bench "${scene[@]}" --order hazard-free \
+			--profile "$profile" --thing "$thing" --runs $runs
+		counted+=("$(said 'Collected : NUMBER')")
+	done
 	packings=$(said 'stretches of NUMBER runs')
 	entries=$(said ' NUMBER collisions;')
 	added=$(said ' NUMBER empty entries;')
 	case $thing in *in-order) entries=$((entries + added)) ;; esac
-	# In tenths, which the shell can divide.
-	tenths=$(((twice - once) * 10 / packings / entries))
-	[ $tenths -gt 0 ] || fail "$profile $thing: nothing is counted (of ${packers[*]})"
-	verdict=
-	if [ $compared = yes ]; then
-		verdict=" of $limit"
-		[ $tenths -le $((limit * 10)) ] || { good=no; verdict+=': too many'; }
-		# So few that the limit would hide anything, if they are all of them.
-		[ $tenths -ge $((limit * 8)) ] || { good=no; verdict+=': too few'; }
-	fi
-	echo "$profile $thing: $((tenths / 10)).$((tenths % 10)) instructions an entry$verdict"
+	hold "$what" $(((counted[1] - counted[0]) * 10 / packings / entries)) "an entry" "$limit"
 done <<'LIMITS'
 float as-given 49
 float in-order 75
@@ -92,5 +111,22 @@ mixed in-order 65
 mixed checked-as-given 127
 mixed checked-in-order 160
 LIMITS
-[ $good = yes ] || fail "packing does not take the instructions it did: if the commit before it does, with" \
-	"$(rustc --version), look at the loops (and at the names ${packers[*]}); else change the limits"
+
+# A step on the emulated board, on one thread; the vectors are those that valgrind knows, AVX2. It is taken
+# twice.
+while read -r profile limit; do
+	what="$profile step"
+	count "$what" "--toggle-collect=$board" "$speed" --bench "${scene[@]}" --steps 1 --only emulated --profile "$profile"
+	instructions=$(said 'Collected : NUMBER')
+	# Beside it are the iterations of the step.
+	collisions=$(sed -n 's/^\([0-9][0-9]*\) [0-9]* [0-9]*$/\1/p' "$log")
+	[ -n "$collisions" ] || fail "the benchmark does not say how many collisions there are"
+	hold "$what" $((instructions * 10 / 2 / collisions)) "a collision" "$limit"
+done <<'LIMITS'
+float 3030
+half 4490
+mixed 2320
+LIMITS
+
+[ $good = yes ] || fail "something does not take the instructions it did: if the commit before it does, with" \
+	"$(rustc --version), look at the loops (and at the names ${packers[*]} and $board); else change the limits"

@@ -1,13 +1,14 @@
-//! This file has valgrind count instructions, of the yardstick and of packing: what noise hides.
+//! This file has valgrind count instructions, of the yardstick and of packing, and does alone what a script
+//! counts: what noise hides.
 
 use std::error::Error;
 use std::hint::black_box;
 use std::process::Command;
 
-use bench::step::Step;
+use bench::step::{Emulated, Step};
 use bench::yardstick::Yardstick;
 use bitstream_model::BoardConfig;
-use bitstream_model::interface::profile::FLOAT;
+use bitstream_model::interface::profile::{FLOAT, Profile};
 use clap::ValueEnum;
 use serde_json::{Value, json};
 use zynq_pgs::StepParameters;
@@ -38,10 +39,16 @@ pub(crate) enum Only {
     Yardstick,
     /// Pack its collisions, as they are given
     Pack,
+    /// Take it twice on the emulated board of a profile
+    Emulated,
 }
 
 /// Does it, and says how many collisions and passes there were.
-pub(crate) fn run(only: Only, step: &Step) -> Result<(), Box<dyn Error>> {
+pub(crate) fn run(
+    only: Only,
+    profile: &'static Profile,
+    step: &Step,
+) -> Result<(), Box<dyn Error>> {
     match only {
         Only::Yardstick => {
             let in_order = step.in_order(BoardConfig::default())?;
@@ -51,6 +58,12 @@ pub(crate) fn run(only: Only, step: &Step) -> Result<(), Box<dyn Error>> {
         Only::Pack => {
             let mut packer = CollisionPacker::new(FLOAT.default_variant());
             black_box(packer.pack(&step.bodies, &step.collisions, &step.shapes));
+        }
+        Only::Emulated => {
+            let config = BoardConfig { profile, threads: 1, ..BoardConfig::default() };
+            let mut board = Emulated::new(step, config)?;
+            board.take()?;
+            board.take()?;
         }
     }
     let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
@@ -106,6 +119,7 @@ pub(crate) fn count(
     command.arg(match only {
         Only::Yardstick => "yardstick",
         Only::Pack => "pack",
+        Only::Emulated => "emulated",
     });
     match &options.input {
         Some(folder) => command.arg("--input").arg(folder),

@@ -28,6 +28,7 @@ use std::process::ExitCode;
 use bench::options::{Common, Pile};
 use bench::step::Step;
 use bitstream_model::BoardConfig;
+use bitstream_model::interface::profile::{FLOAT, Profile};
 use clap::{Parser, ValueEnum};
 use serde_json::{Map, Value, json};
 
@@ -52,6 +53,9 @@ struct Options {
     /// Only do this, once: for a tool that counts.
     #[arg(long, value_enum, hide = true)]
     only: Option<callgrind::Only>,
+    /// On the emulated board of this profile
+    #[arg(long, value_parser = profile, default_value = FLOAT.name, hide = true)]
+    profile: &'static Profile,
     #[command(flatten)]
     common: Common,
 }
@@ -90,6 +94,11 @@ impl Options {
     }
 }
 
+/// The profile of that name.
+fn profile(name: &str) -> Result<&'static Profile, String> {
+    Profile::by_name(name).ok_or_else(|| "there is no such profile".to_owned())
+}
+
 /// What JSON says of a section; its text is printed as it comes.
 type Outcome = Result<Value, Box<dyn Error>>;
 
@@ -108,7 +117,7 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if let Some(only) = options.only {
-        return callgrind::run(only, &options.step()?);
+        return callgrind::run(only, options.profile, &options.step()?);
     }
     let mut document = Map::new();
     document.insert("schema".to_owned(), 1.into());
