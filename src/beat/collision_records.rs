@@ -3,10 +3,10 @@
 use bitstream_model::interface::record::{CONTACT_POINTS, collision, relative};
 
 use super::format::{Format, Records};
-use crate::platform::Lanes;
+use crate::platform::{Integer, Lanes};
 use crate::record::end::{End, Ends, Lookup};
 use crate::record::largest::MAGNITUDE;
-use crate::record::{self, Counted, FULL, Integer, Record, Rows};
+use crate::record::{self, Counted, FULL, Record, Rows};
 use crate::scene::validate::{Block, Locations, Look, Quick};
 use crate::scene::{Collision, Lying, Next};
 

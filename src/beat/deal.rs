@@ -151,8 +151,8 @@ mod tests {
 
     use super::super::stripe::Place;
     use super::*;
-    use crate::platform::{Work, in_wide_vectors};
-    use crate::record::{Integer, Record};
+    use crate::platform::{Integer, Work, in_wide_vectors};
+    use crate::record::Record;
 
     const ROWS: usize = 3;
 

@@ -11,31 +11,26 @@ use bitstream_model::interface::record::{LANES, WORD_LANE};
 #[cfg(any(test, not(target_arch = "aarch64")))]
 use half::f16;
 
-use super::lanes::Lanes;
-
-/// An unsigned integer that a row ends in: four words, and which of them it is.
-pub(super) type Last = (Lanes, usize);
+use super::lanes::{Integer, Lanes};
 
 /// Rounds the numbers of two rows to binary16, to nearest even. The lower half of an integer, where there
 /// is one, is what such a row ends in.
 #[inline(always)]
-pub(super) fn to_binary16(rows: [Lanes; 2], integers: [Option<Last>; 2]) -> [Narrow; 2] {
+pub(super) fn to_binary16(rows: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
     let [first, second] = rows.map(Lanes::words);
-    let [of_first, of_second] =
-        integers.map(|integer| integer.map(|(words, at)| words.words()[at]));
+    let [of_first, of_second] = integers;
     [row(first, of_first), row(second, of_second)]
 }
 
 /// One row.
 #[inline(always)]
-fn row(from: Wide, integer: Option<u32>) -> Narrow {
+fn row(from: Wide, integer: Option<Integer>) -> Narrow {
     #[cfg(target_arch = "aarch64")]
     let mut to = aarch64::to_binary16(&from);
     #[cfg(not(target_arch = "aarch64"))]
     let mut to = from.map(|bits| f16::from_f32_const(f32::from_bits(bits)).to_bits());
     if let Some(integer) = integer {
-        let [low, high, ..] = integer.to_le_bytes();
-        to[WORD_LANE] = u16::from_le_bytes([low, high]);
+        to[WORD_LANE] = integer.low();
     }
     to
 }
@@ -52,8 +47,8 @@ pub(super) fn to_f32(rows: [Narrow; 2]) -> [Lanes; 2] {
 
 /// A row of words of 32 bits.
 type Wide = [u32; LANES];
-/// A row of words of sixteen bits.
-type Narrow = [u16; LANES];
+/// A row of words of sixteen bits: half a beat.
+pub(crate) type Narrow = [u16; LANES];
 
 #[cfg(target_arch = "x86_64")]
 pub(super) mod x86 {
@@ -63,7 +58,7 @@ pub(super) mod x86 {
         _mm256_castsi256_ps, _mm256_cvtph_ps, _mm256_cvtps_ph, _mm256_set_m128i,
     };
 
-    use super::{LANES, Lanes, Last, Narrow, WORD_LANE};
+    use super::{Integer, LANES, Lanes, Narrow, WORD_LANE};
 
     /// As [`to_binary16`](super::to_binary16).
     ///
@@ -75,7 +70,7 @@ pub(super) mod x86 {
     #[inline(always)]
     pub(in super::super) unsafe fn to_binary16(
         rows: [Lanes; 2],
-        integers: [Option<Last>; 2],
+        integers: [Option<Integer>; 2],
     ) -> [Narrow; 2] {
         const { assert!(WORD_LANE == 3 && LANES == 4, "so the blends are written") };
         const FIRST: usize = WORD_LANE;
@@ -112,7 +107,7 @@ pub(super) mod x86 {
 
     /// The lower half of an integer as half `TO` of eight, beside zeros.
     #[inline(always)]
-    fn half<const TO: usize>((words, at): Last) -> Shuffle {
+    fn half<const TO: usize>(Integer { words, at }: Integer) -> Shuffle {
         let mut from = [u8::MAX; 16];
         [from[2 * TO], from[2 * TO + 1]] = [[0, 1], [4, 5], [8, 9], [12, 13]][at];
         (words.0, from)
@@ -209,8 +204,8 @@ mod tests {
     /// What two rows end in: the lower halves of these words, or none.
     type Ends = [Option<([u32; LANES], usize)>; 2];
 
-    fn lanes(ends: Ends) -> [Option<Last>; 2] {
-        ends.map(|end| end.map(|(words, at)| (Lanes::new(words), at)))
+    fn lanes(ends: Ends) -> [Option<Integer>; 2] {
+        ends.map(|end| end.map(|(words, at)| Integer { words: Lanes::new(words), at }))
     }
 
     /// Pairs of rows through the vectors of a loop.

@@ -257,6 +257,38 @@ impl From<Lanes> for Beat {
     }
 }
 
+/// An unsigned integer that stands in a row: one of four words, of which it is not taken out before it is
+/// written.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Integer {
+    pub(super) words: Lanes,
+    /// Which of them.
+    pub(super) at: usize,
+}
+
+impl Integer {
+    /// Word `AT` of these.
+    #[inline(always)]
+    pub(crate) const fn new<const AT: usize>(words: Lanes) -> Self {
+        const { assert!(AT < LANES, "it is one of four") };
+        Self { words, at: AT }
+    }
+
+    /// Its lower half.
+    #[inline(always)]
+    pub(crate) fn low(self) -> u16 {
+        let [low, high, ..] = u32::from(self).to_le_bytes();
+        u16::from_le_bytes([low, high])
+    }
+}
+
+impl From<Integer> for u32 {
+    #[inline(always)]
+    fn from(Integer { words, at }: Integer) -> Self {
+        words.words()[at]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

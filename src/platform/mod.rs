@@ -68,6 +68,7 @@ use std::time::Duration;
 
 pub use access_log::{AccessKind, RegisterAccess};
 pub(crate) use buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
+pub(crate) use convert::Narrow;
 pub use dev_mem::DevMemWindows;
 #[cfg(feature = "emulation")]
 pub(crate) use emulated::EmulatedPlatform;
@@ -76,7 +77,7 @@ pub(crate) use fence::{acquire_from_device, release_to_device};
 pub use fpga::require_bitstream;
 pub use hardware::MemoryChoice;
 pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
-pub(crate) use lanes::Lanes;
+pub(crate) use lanes::{Integer, Lanes};
 pub(crate) use memory::{DmaMemory, SharedMemory};
 pub(crate) use prefetch::{
     fetch, later_with_those_behind, prefetch, soon_alone, soon_with_those_behind,

@@ -1,10 +1,8 @@
 //! This file runs loops in wider vectors than every processor has, where this one has them.
 #![allow(unsafe_code, reason = "not every processor has the instructions")]
 
-use bitstream_model::interface::record::LANES;
-
-use super::convert::{self, Last};
-use super::lanes::Lanes;
+use super::convert::{self, Narrow};
+use super::lanes::{Integer, Lanes};
 
 /// Loops that are compiled anew for wider vectors.
 ///
@@ -21,11 +19,11 @@ pub(crate) trait Work {
 /// them.
 pub(crate) trait Vectors: Copy {
     /// Rounds the numbers of two rows to binary16, to nearest even. Where a row ends in an unsigned integer
-    /// its lower half is taken: of four words, that at a place.
-    fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Last>; 2]) -> [[u16; LANES]; 2];
+    /// its lower half is taken.
+    fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2];
 
     /// The numbers of two rows of binary16, in f32.
-    fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2];
+    fn to_f32(self, rows: [Narrow; 2]) -> [Lanes; 2];
 
     /// Does it as a function of its own, which is compiled for these vectors, too: a loop that is no part of
     /// others shares no registers with them. Each closure is called from one such function alone, and becomes
@@ -39,12 +37,12 @@ pub(super) struct Baseline;
 
 impl Vectors for Baseline {
     #[inline(always)]
-    fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Last>; 2]) -> [[u16; LANES]; 2] {
+    fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
         convert::to_binary16(rows, integers)
     }
 
     #[inline(always)]
-    fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2] {
+    fn to_f32(self, rows: [Narrow; 2]) -> [Lanes; 2] {
         convert::to_f32(rows)
     }
 
@@ -70,7 +68,7 @@ pub(crate) fn in_wide_vectors<W: Work>(work: W) -> W::Output {
 mod x86 {
     use std::hint::black_box;
 
-    use super::{LANES, Lanes, Last, Vectors, Work, convert};
+    use super::{Integer, Lanes, Narrow, Vectors, Work, convert};
 
     /// Those of AVX2, and the conversions of F16C. There is one in [`run`] alone.
     #[derive(Debug, Clone, Copy)]
@@ -78,14 +76,14 @@ mod x86 {
 
     impl Vectors for Wide {
         #[inline(always)]
-        fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Last>; 2]) -> [[u16; LANES]; 2] {
+        fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
             // SAFETY: the function wants AVX2 and F16C. A `Wide` is made in `run` alone, which is called
             // only where both were found.
             unsafe { convert::x86::to_binary16(rows, integers) }
         }
 
         #[inline(always)]
-        fn to_f32(self, rows: [[u16; LANES]; 2]) -> [Lanes; 2] {
+        fn to_f32(self, rows: [Narrow; 2]) -> [Lanes; 2] {
             // SAFETY: there is one of these only where the processor has the instructions that the
             // function is compiled for.
             unsafe { convert::x86::to_f32(rows) }

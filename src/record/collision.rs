@@ -3,9 +3,9 @@
 use std::mem::offset_of;
 
 use super::end::End;
-use super::{Counted, Integer, NORMAL, Record, bodies, contact_rows, row_of, used};
+use super::{Counted, NORMAL, Record, bodies, contact_rows, row_of, used};
 use crate::interface::record::{CONTACT_POINTS, WORD_LANE, collision};
-use crate::platform::Lanes;
+use crate::platform::{Integer, Lanes};
 use crate::scene::Collision;
 
 /// The collision record: normal and count, positions and indices of both bodies, contact points.

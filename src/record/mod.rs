@@ -23,7 +23,7 @@ use std::slice;
 use bytemuck::Pod;
 
 use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
-use crate::platform::Lanes;
+use crate::platform::{Integer, Lanes};
 use crate::scene::{Body, Collision, Contact};
 
 use self::largest::MAGNITUDE;
@@ -36,35 +36,6 @@ pub(crate) struct Record<const ROWS: usize> {
     /// The unsigned integers in which rows end. They stay where they were found until they stand in their
     /// beat: into a row of numbers and out of a narrowed one they would go twice.
     pub(crate) integers: [Option<Integer>; ROWS],
-}
-
-/// One of four words.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Integer {
-    words: Lanes,
-    at: usize,
-}
-
-impl Integer {
-    /// Word `AT` of these.
-    #[inline(always)]
-    pub(crate) const fn new<const AT: usize>(words: Lanes) -> Self {
-        const { assert!(AT < LANES, "it is one of four") };
-        Self { words, at: AT }
-    }
-
-    /// Four words, and which of them it is.
-    #[inline(always)]
-    pub(crate) const fn parts(self) -> (Lanes, usize) {
-        (self.words, self.at)
-    }
-}
-
-impl From<Integer> for u32 {
-    #[inline(always)]
-    fn from(Integer { words, at }: Integer) -> Self {
-        words.words()[at]
-    }
 }
 
 /// A row of a record.

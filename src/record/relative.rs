@@ -1,9 +1,9 @@
 //! This file makes the record of a collision relative to body A.
 
 use super::end::End;
-use super::{Counted, Integer, NORMAL, Record, contact_rows, row_of, used};
+use super::{Counted, NORMAL, Record, contact_rows, row_of, used};
 use crate::interface::record::{CONTACT_POINTS, LANES, relative};
-use crate::platform::Lanes;
+use crate::platform::{Integer, Lanes};
 use crate::scene::Collision;
 
 /// The row of a contact point which is not there.

@@ -1,13 +1,10 @@
 //! This file narrows rows to words of sixteen bits and widens them again.
 
 use bitstream_model::interface::number::StreamFormat;
-use bitstream_model::interface::record::{LANES, WORD_LANE};
+use bitstream_model::interface::record::WORD_LANE;
 
-use super::{self as record, Integer, thesis16};
-use crate::platform::{Lanes, Vectors};
-
-/// A row in sixteen bits: half a beat.
-pub(crate) type Row = [u16; LANES];
+use super::{Row, thesis16};
+use crate::platform::{Integer, Lanes, Narrow, Vectors};
 
 /// A format of sixteen bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,12 +17,11 @@ pub(crate) enum Sixteen {
 
 /// As [`Sixteen::narrow`], of [`Sixteen::Thesis16`]. Word by word it is too much to stand in every loop.
 #[inline(never)]
-fn cut(numbers: [Lanes; 2], integers: [Option<(Lanes, usize)>; 2]) -> [Row; 2] {
+fn cut(numbers: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
     let mut narrow = numbers.map(|row| row.words().map(thesis16::narrow));
     for (to, integer) in narrow.iter_mut().zip(integers) {
-        if let Some((words, at)) = integer {
-            let [low, high, ..] = words.words()[at].to_le_bytes();
-            to[WORD_LANE] = u16::from_le_bytes([low, high]);
+        if let Some(integer) = integer {
+            to[WORD_LANE] = integer.low();
         }
     }
     narrow
@@ -44,9 +40,9 @@ impl Sixteen {
     /// Two rows of f32 as a beat of this format. Of an unsigned integer the lower half is taken: what is
     /// more than that validation refuses.
     #[inline(always)]
-    pub(crate) fn narrow<V: Vectors>(self, vectors: V, rows: [record::Row; 2]) -> [Row; 2] {
+    pub(crate) fn narrow<V: Vectors>(self, vectors: V, rows: [Row; 2]) -> [Narrow; 2] {
         let numbers = rows.map(|row| row.numbers);
-        let integers = rows.map(|row| row.integer.map(Integer::parts));
+        let integers = rows.map(|row| row.integer);
         match self {
             Self::Binary16 => vectors.to_binary16(numbers, integers),
             Self::Thesis16 => cut(numbers, integers),
@@ -55,7 +51,7 @@ impl Sixteen {
 
     /// Two rows of this format in f32.
     #[inline(always)]
-    pub(crate) fn widen<V: Vectors>(self, vectors: V, rows: [Row; 2]) -> [Lanes; 2] {
+    pub(crate) fn widen<V: Vectors>(self, vectors: V, rows: [Narrow; 2]) -> [Lanes; 2] {
         match self {
             Self::Binary16 => vectors.to_f32(rows),
             Self::Thesis16 => rows.map(|row| Lanes::new(row.map(thesis16::widen))),
@@ -65,7 +61,7 @@ impl Sixteen {
 
 #[cfg(test)]
 mod tests {
-    use bitstream_model::interface::record::Beat;
+    use bitstream_model::interface::record::{Beat, LANES};
 
     use super::*;
     use crate::platform::{Work, in_wide_vectors};
@@ -74,7 +70,7 @@ mod tests {
         format: Sixteen,
         rows: [[u32; LANES]; 2],
         ends: [Option<usize>; 2],
-    ) -> [Row; 2] {
+    ) -> [Narrow; 2] {
         in_wide_vectors(Narrowing { format, rows, ends })
     }
 
@@ -89,17 +85,17 @@ mod tests {
     const INTEGERS: [u32; LANES] = [0x0001_ABCD, 0x1234_5678, 7, 0xFFFF_8000];
 
     impl Work for Narrowing {
-        type Output = [Row; 2];
+        type Output = [Narrow; 2];
 
         #[inline(always)]
-        fn run<V: Vectors>(self, vectors: V) -> [Row; 2] {
+        fn run<V: Vectors>(self, vectors: V) -> [Narrow; 2] {
             let words = Lanes::new(INTEGERS);
             let integer = |at: usize| {
                 let each =
                     [Integer::new::<0>, Integer::new::<1>, Integer::new::<2>, Integer::new::<3>];
                 each[at](words)
             };
-            let row = |at: usize| record::Row {
+            let row = |at: usize| Row {
                 numbers: Lanes::new(self.rows[at]),
                 integer: self.ends[at].map(integer),
             };
@@ -107,13 +103,13 @@ mod tests {
         }
     }
 
-    fn widened(format: Sixteen, row: Row) -> Beat {
+    fn widened(format: Sixteen, row: Narrow) -> Beat {
         in_wide_vectors(Widening { format, row })
     }
 
     struct Widening {
         format: Sixteen,
-        row: Row,
+        row: Narrow,
     }
 
     impl Work for Widening {
@@ -121,7 +117,7 @@ mod tests {
 
         #[inline(always)]
         fn run<V: Vectors>(self, vectors: V) -> Beat {
-            let [wide, _] = self.format.widen(vectors, [self.row, Row::default()]);
+            let [wide, _] = self.format.widen(vectors, [self.row, Narrow::default()]);
             wide.into()
         }
     }

@@ -1,9 +1,9 @@
 //! This file makes the velocity record of a body.
 
 use super::inertia::Inverse;
-use super::{ANGULAR, Integer, LINEAR, Record, SHAPE, row_of, vec3_and_word};
+use super::{ANGULAR, LINEAR, Record, SHAPE, row_of, vec3_and_word};
 use crate::interface::record::velocity;
-use crate::platform::Lanes;
+use crate::platform::{Integer, Lanes};
 use crate::scene::Body;
 
 /// The velocity record: linear velocity beside the shape index, angular velocity beside 0.
