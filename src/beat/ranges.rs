@@ -14,7 +14,7 @@ use crew::Crew;
 
 use super::deal::BLOCK;
 use super::stripe::Layout;
-use crate::platform::release_to_device;
+use crate::platform::{acquire_from_device, release_to_device};
 
 /// Records of a range: so few that nobody waits long for a thread that took the last one, so many that
 /// taking one costs nothing beside it. As many are not worth waking a thread.
@@ -62,8 +62,10 @@ impl Packers {
         };
         let join = Mutex::new(join);
         crew.each(cut(RANGE), |range| {
+            // The caller's own barriers, after the board has told and before it is told, are of what the caller
+            // loads and stores.
+            acquire_from_device();
             let done = work(range);
-            // The caller's own barrier, before it tells the board, is of the caller's stores.
             release_to_device();
             // After a panic nothing that was joined is used.
             join.lock().unwrap_or_else(PoisonError::into_inner)(done);
@@ -86,7 +88,7 @@ fn start(threads: Option<usize>) -> Crew {
     let found = || thread::available_parallelism().map_or(1, NonZero::get).min(UNASKED);
     let crew = Crew::new("pack", threads.unwrap_or_else(found).clamp(1, MOST) - 1);
     if let Some(error) = crew.refused() {
-        log::warn!("no thread to help with packing: {error}");
+        log::warn!("no thread to help with packing and reading results: {error}");
     }
     crew
 }
@@ -99,11 +101,12 @@ pub(super) fn ranges(
     (0..count).step_by(size).map(move |first| first..count.min(first + size))
 }
 
-/// Beats on each channel, to be written; none on those that there are not.
+/// Beats on each channel; none on those that there are not.
+type PieceOf<S> = [S; DMA_COUNT_MAX];
+/// Those that are written.
 pub(super) type Piece<'a> = PieceOf<&'a mut [Beat]>;
-
-/// As [`Piece`], of beats that are written or read.
-pub(super) type PieceOf<S> = [S; DMA_COUNT_MAX];
+/// Those that are read.
+pub(super) type PieceRead<'a> = PieceOf<&'a [Beat]>;
 
 /// All beats of a segment, to be written.
 pub(super) fn whole<'a>(channels: &'a mut [&mut [Beat]]) -> Piece<'a> {
@@ -114,20 +117,29 @@ pub(super) fn whole<'a>(channels: &'a mut [&mut [Beat]]) -> Piece<'a> {
     whole
 }
 
-/// Beats one behind the other on a channel.
-pub(super) trait Run: Default {
-    /// So many of them, or as many as there are, and what is behind.
-    fn cut(self, beats: usize) -> (Self, Self);
+/// All beats of a segment, to be read.
+pub(super) fn whole_read<'a>(channels: &[&'a [Beat]]) -> PieceRead<'a> {
+    let mut whole = PieceRead::default();
+    for (to, channel) in whole.iter_mut().zip(channels) {
+        *to = channel;
+    }
+    whole
 }
 
-impl Run for &mut [Beat] {
-    fn cut(self, beats: usize) -> (Self, Self) {
+/// Beats one behind the other on a channel.
+pub(super) trait Stretch: Default {
+    /// So many of them, or as many as there are, and what is behind.
+    fn parted(self, beats: usize) -> (Self, Self);
+}
+
+impl Stretch for &mut [Beat] {
+    fn parted(self, beats: usize) -> (Self, Self) {
         self.split_at_mut(beats.min(self.len()))
     }
 }
 
-impl Run for &[Beat] {
-    fn cut(self, beats: usize) -> (Self, Self) {
+impl Stretch for &[Beat] {
+    fn parted(self, beats: usize) -> (Self, Self) {
         self.split_at(beats.min(self.len()))
     }
 }
@@ -140,7 +152,7 @@ pub(super) struct Pieces<S> {
     rest: PieceOf<S>,
 }
 
-impl<S: Run> Pieces<S> {
+impl<S: Stretch> Pieces<S> {
     /// For ranges of `size` records, whole blocks.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says of all records.
@@ -154,7 +166,7 @@ impl<S: Run> Pieces<S> {
         let mut piece = PieceOf::default();
         for ((piece, rest), beats) in piece.iter_mut().zip(&mut self.rest).zip(self.beats) {
             // The last one may be shorter.
-            (*piece, *rest) = std::mem::take(rest).cut(beats);
+            (*piece, *rest) = std::mem::take(rest).parted(beats);
         }
         piece
     }

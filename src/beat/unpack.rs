@@ -10,7 +10,7 @@ use super::collect::{self, Tally};
 pub(crate) use super::deal::BLOCK;
 use super::format::{Format, in_format};
 use super::pattern::Pattern;
-use super::ranges::{Packers, PieceOf, Pieces};
+use super::ranges::{Packers, PieceRead, Pieces, whole_read};
 use super::stripe::{Deal, Layout};
 use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::finite::Finite;
@@ -30,10 +30,10 @@ pub(crate) fn read_all(
     let (mut sum, mut all_finite) = (0_u32, true);
     let count = records.len();
     let cut = |size| {
-        let (mut pieces, all) = (Pieces::new(layout, size, all_of(channels)), records);
+        let (mut pieces, all) = (Pieces::new(layout, size, whole_read(channels)), records);
         all.chunks_mut(size).map(move |records| (records, pieces.cut()))
     };
-    let work = |(records, piece): (&mut [Record], PieceOf<&[Beat]>)| {
+    let work = |(records, piece): (&mut [Record], PieceRead<'_>)| {
         let mut reader = Reader::new(layout, &piece);
         let finite = reader.read(records);
         (reader.finish(), finite)
@@ -45,19 +45,12 @@ pub(crate) fn read_all(
     (sum, all_finite)
 }
 
-/// All beats of a segment, to be read.
-fn all_of<'a>(channels: &[&'a [Beat]]) -> PieceOf<&'a [Beat]> {
-    let mut all = PieceOf::default();
-    all[..channels.len()].copy_from_slice(channels);
-    all
-}
-
 /// Reads results from the result segments, one a channel.
 ///
 /// A number that the accelerator could not hold is not finite.
 pub(crate) struct Reader<'a> {
     /// What is not read yet.
-    channels: PieceOf<&'a [Beat]>,
+    channels: PieceRead<'a>,
     format: Option<Sixteen>,
     /// The stripe, if it is known, and its first channel.
     pattern: Option<(Pattern, usize)>,
@@ -71,7 +64,7 @@ impl<'a> Reader<'a> {
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
     pub(crate) fn new(layout: &Layout, channels: &[&'a [Beat]]) -> Self {
         Self {
-            channels: all_of(channels),
+            channels: whole_read(channels),
             format: Sixteen::of(layout.format),
             pattern: Pattern::of(layout.stripe.streams),
             deal: Deal::new(layout.stripe),

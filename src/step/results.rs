@@ -194,7 +194,7 @@ mod tests {
 
     /// What is read of the results of so many bodies, one row a channel, of which these are not
     /// finite.
-    fn read_all<T>(broken: &[usize], read: impl FnOnce(Results<'_>, &Vec<Body>) -> T) -> T {
+    fn of_broken<T>(broken: &[usize], read: impl FnOnce(Results<'_>, &Vec<Body>) -> T) -> T {
         let layout = &Segment::Results.layout(&FLOAT.default_variant());
         let mut channels = vec![vec![Beat::default(); COUNT]; FLOAT.s2mm_widths.len()];
         for record in broken {
@@ -213,7 +213,7 @@ mod tests {
             [(&[][..], None), (&[7, 3], None), (&[39, 7, 31], Some(31)), (&[4, 3, 38], Some(4))]
         {
             let mut spare = Vec::new();
-            let (_, found) = read_all(broken, |results, bodies| {
+            let (_, found) = of_broken(broken, |results, bodies| {
                 results.in_turn(COUNT, bodies, &statics, &mut spare, &mut Packers::alone())
             });
             assert_eq!(found, told, "{broken:?}");
@@ -231,7 +231,7 @@ mod tests {
         for (broken, told) in [(&[][..], None), (&[2], Some(37)), (&[33, 4, 2], Some(6))] {
             let mut spare = Vec::new();
             let (_, found) =
-                read_all(broken, |results, bodies| results.scatter(&order, bodies, &mut spare));
+                of_broken(broken, |results, bodies| results.scatter(&order, bodies, &mut spare));
             assert_eq!(found, told, "{broken:?}");
             for (index, record) in spare.iter().enumerate() {
                 assert_eq!(record[POSITION].0[0] != 0, index < 5, "{index}");

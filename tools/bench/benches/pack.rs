@@ -226,7 +226,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if !options.common.json {
         println!(
             "{}: {} bodies, {} collisions; in order is {order}, {} empty entries; medians of {} \
-             stretches of {STRETCH} runs in turn, {clock}; {} packing\n",
+             stretches of {STRETCH} runs in turn, {clock}; {}\n",
             step.name,
             step.bodies.len(),
             step.collisions.len(),
@@ -293,7 +293,10 @@ fn measure(
     let packer = |threads: &Option<usize>| StepPacker::new(variant, *threads);
     let unpacker = |threads: &Option<usize>| Unpacker::new(variant, bodies, shapes, *threads);
     let mut packers: Vec<StepPacker> = threads.iter().map(packer).collect();
-    let mut unpackers: Vec<Unpacker> = threads.iter().map(unpacker).collect();
+    let mut unpackers: Vec<Unpacker> = match thing {
+        Thing::Unpack | Thing::Commit => threads.iter().map(unpacker).collect(),
+        _ => Vec::new(),
+    };
     let mut moved = bodies.clone();
     // What a collision needs of its bodies, what is committed, and what one cannot say something of:
     // it is refused, and would be measured as it is refused.

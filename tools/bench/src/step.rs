@@ -30,7 +30,7 @@ pub struct Step {
     pub parameters: StepParameters,
 }
 
-/// Opens an emulated board; as many threads as that may take write the records.
+/// Opens an emulated board; as many threads as that may take write the records and read the results.
 fn open(config: BoardConfig, shapes: &[Shape]) -> Result<Accelerator, Box<dyn Error>> {
     let board = BoardChoice::Emulated(EmulatedBoard::new(config)?.cpu_port());
     let pack_threads = Some(config.threads);

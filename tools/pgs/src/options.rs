@@ -51,8 +51,8 @@ pub(crate) struct BuildArgs {
     #[arg(long, value_name = "BITS", value_parser = address_width)]
     pub(crate) address_width: Option<u32>,
     /// Threads of this machine that an emulated board's arithmetic may take, finding the collisions of a
-    /// scene, and writing the records of a step; no result depends on it [default: as many as there
-    /// are, at most 4]
+    /// scene, and writing the records of a step and reading its results; no result depends on it
+    /// [default: as many as there are, at most 4]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub(crate) threads: Option<usize>,
     /// Whether independent collisions are computed side by side; no result depends on it [default:

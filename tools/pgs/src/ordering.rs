@@ -91,12 +91,12 @@ pub(crate) fn name(order: Order) -> String {
     found.map_or_else(|| "another".to_owned(), |name| name.text())
 }
 
-/// The orders that the steps of a run were sent in, and how many each: one order gives way to another where
-/// that would leave too many entries empty.
+/// The orders that the steps of a run were sent in, and how many each: one may give way to another
+/// ([`Order::HazardFreeNearby`]).
 #[derive(Debug, Default)]
-pub(crate) struct Taken(Vec<(Order, u32)>);
+pub(crate) struct OrdersSent(Vec<(Order, u64)>);
 
-impl Taken {
+impl OrdersSent {
     /// A step was sent.
     pub(crate) fn see(&mut self, order: Order) {
         match self.0.iter_mut().find(|(taken, _)| *taken == order) {
@@ -107,10 +107,10 @@ impl Taken {
 
     /// In words, the one met first before the others; nothing if all steps had one order.
     pub(crate) fn text(&self) -> Option<String> {
-        let all: u32 = self.0.iter().map(|(_, steps)| steps).sum();
-        let each = self.0.iter().map(|(order, steps)| format!("{} in {steps}", name(*order)));
-        let texts: Vec<String> = each.collect();
-        (texts.len() > 1).then(|| format!("of {all} steps {}", texts.join(", ")))
+        let all: u64 = self.0.iter().map(|(_, steps)| steps).sum();
+        let each = self.0.iter().map(|(order, steps)| (name(*order), grouped(*steps)));
+        let texts: Vec<String> = each.map(|(name, steps)| format!("{name} in {steps}")).collect();
+        (texts.len() > 1).then(|| format!("of {} steps {}", grouped(all), texts.join(", ")))
     }
 }
 

@@ -114,7 +114,7 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
     }
 }
 
-/// The first order gives way where it would leave too many entries empty: each step's report says which it was.
+/// One order gives way to another here and there: each step's report says which it was.
 #[test]
 fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
     let scene = ["run", "--hazards", "unchecked", "--grid", "9x9x9", "--steps", "66"];

@@ -39,35 +39,35 @@ pub(crate) enum Only {
     Yardstick,
     /// Pack its collisions, as they are given
     Pack,
-    /// Take it twice on the emulated board of a profile
+    /// Take it on the emulated board of a profile
     Emulated,
 }
 
 /// Does it, and says how many collisions and passes there were.
-pub(crate) fn run(
-    only: Only,
-    profile: &'static Profile,
-    step: &Step,
-) -> Result<(), Box<dyn Error>> {
-    match only {
-        Only::Yardstick => {
+pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), Box<dyn Error>> {
+    match (only, profile) {
+        (Only::Yardstick, None) => {
             let in_order = step.in_order(BoardConfig::default())?;
             let Step { shapes, bodies, parameters, .. } = step;
             Yardstick::new(shapes, bodies, &in_order, parameters).solve();
         }
-        Only::Pack => {
+        (Only::Pack, None) => {
             let mut packer = CollisionPacker::new(FLOAT.default_variant());
             black_box(packer.pack(&step.bodies, &step.collisions, &step.shapes));
         }
-        Only::Emulated => {
+        (Only::Emulated, Some(profile)) => {
+            let profile =
+                Profile::by_name(profile).ok_or("--profile: there is none of that name")?;
             let config = BoardConfig { profile, threads: 1, ..BoardConfig::default() };
-            let mut board = Emulated::new(step, config)?;
-            board.take()?;
-            board.take()?;
+            Emulated::new(step, config)?.take()?;
         }
+        _ => return Err("--profile belongs to --only emulated, which wants one".into()),
     }
     let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
-    println!("{} {contact_iterations} {friction_iterations}", step.collisions.len());
+    println!(
+        "done: {} collisions, {contact_iterations} contact and {friction_iterations} friction iterations",
+        step.collisions.len()
+    );
     Ok(())
 }
 
@@ -116,11 +116,7 @@ pub(crate) fn count(
     command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]);
     command.arg(format!("--toggle-collect={function}"));
     command.arg(std::env::current_exe()?).arg("--only");
-    command.arg(match only {
-        Only::Yardstick => "yardstick",
-        Only::Pack => "pack",
-        Only::Emulated => "emulated",
-    });
+    command.args(only.to_possible_value().map(|value| value.get_name().to_owned()));
     match &options.input {
         Some(folder) => command.arg("--input").arg(folder),
         None => command.args(["--grid", GRID, "--steps", "2"]),
@@ -130,7 +126,7 @@ pub(crate) fn count(
     if !output.status.success() {
         return Err(format!("valgrind: {log}").into());
     }
-    let numbers: Vec<u32> = text.split_whitespace().map(str::parse).collect::<Result<_, _>>()?;
+    let numbers: Vec<u32> = text.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     let [collisions, contact, friction] = numbers[..] else {
         return Err(format!("three numbers are expected, found {text:?}").into());
     };

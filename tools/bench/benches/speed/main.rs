@@ -28,7 +28,6 @@ use std::process::ExitCode;
 use bench::options::{Common, Pile};
 use bench::step::Step;
 use bitstream_model::BoardConfig;
-use bitstream_model::interface::profile::{FLOAT, Profile};
 use clap::{Parser, ValueEnum};
 use serde_json::{Map, Value, json};
 
@@ -50,12 +49,12 @@ struct Options {
     /// Steps of each run of the thesis' scene
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     run_steps: u32,
-    /// Only do this, once: for a tool that counts.
+    /// Only do this: for a tool that counts.
     #[arg(long, value_enum, hide = true)]
     only: Option<callgrind::Only>,
     /// On the emulated board of this profile
-    #[arg(long, value_parser = profile, default_value = FLOAT.name, hide = true)]
-    profile: &'static Profile,
+    #[arg(long, requires = "only", hide = true)]
+    profile: Option<String>,
     #[command(flatten)]
     common: Common,
 }
@@ -94,11 +93,6 @@ impl Options {
     }
 }
 
-/// The profile of that name.
-fn profile(name: &str) -> Result<&'static Profile, String> {
-    Profile::by_name(name).ok_or_else(|| "there is no such profile".to_owned())
-}
-
 /// What JSON says of a section; its text is printed as it comes.
 type Outcome = Result<Value, Box<dyn Error>>;
 
@@ -117,7 +111,7 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if let Some(only) = options.only {
-        return callgrind::run(only, options.profile, &options.step()?);
+        return callgrind::run(only, options.profile.as_deref(), &options.step()?);
     }
     let mut document = Map::new();
     document.insert("schema".to_owned(), 1.into());

@@ -166,7 +166,7 @@ pub(crate) fn run(
     args.planned.inject(&mut opened, &parameters)?;
     let variant = opened.accelerator.capabilities().variant;
     let mut footprint = Footprint::default();
-    let mut orders = ordering::Taken::default();
+    let mut orders = ordering::OrdersSent::default();
     let mut documents = Vec::new();
     let mut done = 0;
     let mut retries = 0;
