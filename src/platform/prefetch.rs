@@ -63,14 +63,17 @@ fn fetch_into<const CACHE: usize, T>(at: *const T) {
     {
         use core::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
         match CACHE {
-            // SAFETY: a prefetch neither reads nor faults, whatever the address.
+            // SAFETY: every x86-64 has PREFETCHT0. The address is a hint: nothing is loaded from it into a
+            // register or stored, and none faults, mapped or not.
             FIRST => unsafe { _mm_prefetch::<_MM_HINT_T0>(at) },
-            // SAFETY: as the other one, it neither reads nor faults, whatever the address.
+            // SAFETY: every x86-64 has PREFETCHT1. The address is a hint: nothing is loaded from it into a
+            // register or stored, and none faults, mapped or not.
             _ => unsafe { _mm_prefetch::<_MM_HINT_T1>(at) },
         }
     }
     #[cfg(target_arch = "aarch64")]
-    // SAFETY: a prefetch neither faults nor changes registers, whatever the address.
+    // SAFETY: every aarch64 has PRFM, of the first cache and of the second, and `CACHE` is one of these. The
+    // address is a hint: no register, flag or memory is changed, and none faults, mapped or not.
     unsafe {
         core::arch::asm!(
             "prfm pldl{}keep, [{}]", const CACHE, in(reg) at,

@@ -24,7 +24,8 @@ pub struct OpenOptions {
     /// Threads that write the records of a step and read its results, the caller's among them: 1 to 64,
     /// what is beyond is taken for the nearest. `None` takes as many as the machine has processors, at
     /// most four. What is written and read does not depend on it. Up to about 2,000 bodies or collisions
-    /// are the caller's alone; the others are started when there are more, and end with the accelerator.
+    /// are the caller's alone, and so are results where only live bodies are kept; the others are started
+    /// when there is more, and end with the accelerator.
     ///
     /// [`Bodies`](crate::Bodies) and [`Collisions`](crate::Collisions) are asked from these threads
     /// while the caller's waits for them. A container that needs the caller's own thread (what it

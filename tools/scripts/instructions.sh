@@ -92,7 +92,7 @@ hold() {
 	held=$((held + 1))
 }
 
-# Packing. Limits are a tenth above what was counted when this was written, here and below.
+# Packing. Limits are a tenth above what was counted when they were set, or less, here and below.
 while read -r profile thing limit; do
 	what="$profile $thing"
 	# In one stretch and in two: the difference is that of the runs of a stretch alone.
