@@ -168,8 +168,8 @@ pub use scene::{
 };
 pub use step::{
     Accelerator, AcceleratorError, Awaited, BoardChoice, BoardDescription, BoardKind, Cancellation,
-    ChannelState, ControlState, Diagnosis, Fault, HostTimes, InFlight, Limit, OpenOptions, Phase,
-    Prepared, StepCycles, StepReport, Subject,
+    ChannelState, ControlState, Diagnosis, Fault, HostTimes, InFlight, Limit, OpenOptions,
+    OrderChoice, Phase, Prepared, StepCycles, StepReport, Subject,
 };
 
 /// The README's library example is a test.

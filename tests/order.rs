@@ -124,13 +124,12 @@ fn a_pile_takes_the_same_way_whether_the_pipeline_waits_or_not() {
     assert!(differing(&stale) > 0);
 }
 
-/// Every order on hardware that waits is the sequential solve of that order, and the default there
-/// is the caller's.
+/// An order on hardware that waits is the sequential solve of that order.
 #[test]
-fn the_default_is_as_given_where_hazards_are_waited_for() {
-    let (given, reports) =
-        run(with(Hazards::Interlocked), pile("4x4x4", 0.0), 3, &StepParameters::default());
-    let (sequential, _) = run(sequential(), pile("4x4x4", 0.0), 3, &StepParameters::default());
+fn as_given_is_solved_one_collision_after_the_other_where_hazards_are_waited_for() {
+    let as_given = ordered(Order::AsGiven);
+    let (given, reports) = run(with(Hazards::Interlocked), pile("4x4x4", 0.0), 3, &as_given);
+    let (sequential, _) = run(sequential(), pile("4x4x4", 0.0), 3, &as_given);
     assert_eq!(given, sequential);
     assert!(reports.iter().all(|report| report.order == Order::AsGiven && report.empty == 0));
     assert!(reports[0].cycles.stalls > 0, "it stands on the ground");

@@ -8,6 +8,7 @@
 
 use bitstream_model::interface::profile::Inertia;
 use bitstream_model::{BoardConfig, EmulatedBoard};
+use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Body, Collision, Contact, OpenOptions, Pose, Shape, StepParameters,
     Velocity,
@@ -387,7 +388,10 @@ fn shapes_of_any_inertia_are_solved_as_the_formulae_say() {
         let (board, mut accelerator) = open(Inertia::World);
         accelerator.set_shapes(&shapes).expect("with world inertia");
         let (mut found, collisions) = scene(seed);
-        let (mut expected, parameters) = (found.clone(), StepParameters::default());
+        // The reference takes the collisions as they come.
+        let mut parameters = StepParameters::default();
+        parameters.order = Some(Order::AsGiven);
+        let mut expected = found.clone();
         let before = bits(&found);
         // The second step starts from other orientations.
         for step in 1..=2 {

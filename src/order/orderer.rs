@@ -1,6 +1,7 @@
 //! This file makes an order of the kind that is asked for.
 
 use super::groups::Groups;
+use super::interlock::{Interlock, StallCounter};
 use super::sweep::Sweep;
 use super::tail::Tail;
 use super::{IssueWindow, OrderError, OrderInput, Schedule, Ties, body_by_body, colours};
@@ -45,6 +46,7 @@ pub struct Orderer {
     schedule: Schedule,
     /// Collisions of each body.
     uses: Vec<u32>,
+    stalls: StallCounter,
     limit: usize,
     made: Order,
 }
@@ -68,6 +70,7 @@ impl Orderer {
             groups: Groups::default(),
             schedule: Schedule::default(),
             uses: Vec::new(),
+            stalls: StallCounter::default(),
             limit: Self::ENTRIES_MAX,
             made: Order::AsGiven,
         }
@@ -123,6 +126,62 @@ impl Orderer {
         Ok(&self.schedule)
     }
 
+    /// Orders the collisions of a step for a pipeline that waits on hazards: as given, or near to that
+    /// and without hazards, whichever takes fewer cycles. [`made`](Self::made) says which.
+    ///
+    /// Such a pipeline needs no empty entries, because it waits by itself: the order has none. A body
+    /// with many collisions makes both orders wait about as long; as given is taken unless the other
+    /// saves more than one cycle in a hundred, and where there is no window to order for. Time and
+    /// memory are linear in the input.
+    ///
+    /// # Errors
+    /// [`OrderError`]: arrays of unequal lengths, a pair that names a body that is not there or one
+    /// body twice, too many of either.
+    pub(crate) fn cheapest(
+        &mut self,
+        input: &OrderInput<'_>,
+        window: Option<IssueWindow>,
+        pipeline: &Interlock,
+    ) -> Result<OrderCosts, OrderError> {
+        input.check()?;
+        self.made = Order::AsGiven;
+        let given = || (0..).zip(input.pairs).map(|(index, _): (u32, _)| index);
+        let collisions = input.pairs.len();
+        let uses = self.most_uses(input);
+        let no_order_beats =
+            pipeline.cycles_without_hazards(collisions).max(pipeline.cycles_of_one_body(uses));
+        let longest = window.map_or(0, |window| hardly_longer(collisions, uses, window));
+        let counted_to = hardly_more(pipeline.cycles_without_hazards(longest).max(no_order_beats));
+        let mut as_given = self.stalls.cycles(input, given(), pipeline, counted_to);
+        let window = match window {
+            Some(window) if as_given > hardly_more(no_order_beats) => window,
+            _ => return Ok(OrderCosts { as_given, reordered: None }),
+        };
+        match self.order(input, Order::HazardFreeNearby, window) {
+            Ok(_) => {}
+            Err(OrderError::TooLong { .. }) => {
+                self.made = Order::AsGiven;
+                return Ok(OrderCosts { as_given, reordered: None });
+            }
+            Err(error) => return Err(error),
+        }
+        // Without its empty entries it takes no longer.
+        let mut reordered = pipeline.cycles_without_hazards(self.schedule.len());
+        self.schedule.drop_empty();
+        if as_given <= hardly_more(reordered) {
+            let entries = self.schedule.entries.iter().copied();
+            reordered = self.stalls.cycles(input, entries, pipeline, u64::MAX);
+            let enough = hardly_more(reordered);
+            if counted_to < enough {
+                as_given = self.stalls.cycles(input, given(), pipeline, enough);
+            }
+            if as_given <= enough {
+                self.made = Order::AsGiven;
+            }
+        }
+        Ok(OrderCosts { as_given, reordered: Some(reordered) })
+    }
+
     /// Collisions of the moving body that has the most.
     fn most_uses(&mut self, input: &OrderInput<'_>) -> usize {
         self.uses.clear();
@@ -165,6 +224,25 @@ pub(super) fn hardly_longer(collisions: usize, uses: usize, window: IssueWindow)
     let entries = collisions.max(uses.saturating_sub(1) * window.entries());
     // One empty entry in 64 is one beside each 63 others.
     entries + entries / 63 + 4 * window.entries()
+}
+
+/// What two orders cost a pipeline that waits on hazards: cycles of all passes of a step, stalls
+/// included, waits for memory and the filling of the pipeline left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct OrderCosts {
+    /// Of [`Order::AsGiven`]. Where the other order was taken this is a lower bound: counting ends
+    /// when it is known to be more.
+    pub as_given: u64,
+    /// Of [`Order::HazardFreeNearby`] without empty entries; `None` where none was made: hardly any
+    /// order takes less than as given, or a body has too many collisions to order them. Where it was
+    /// taken this is an upper bound.
+    pub reordered: Option<u64>,
+}
+
+/// One part in a hundred more: what another order must save at the least.
+const fn hardly_more(cycles: u64) -> u64 {
+    cycles.saturating_add(cycles / 100)
 }
 
 /// Number of colours of [`Order::Colours`].

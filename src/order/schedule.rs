@@ -53,6 +53,14 @@ impl Schedule {
         self.entries.iter().map(|index| if *index == EMPTY { None } else { Some(*index) })
     }
 
+    /// Keeps the order and leaves out its empty entries.
+    pub(super) fn drop_empty(&mut self) {
+        if self.empty > 0 {
+            self.entries.retain(|index| *index != EMPTY);
+            self.empty = 0;
+        }
+    }
+
     pub(super) fn clear(&mut self) {
         self.entries.clear();
         self.empty = 0;

@@ -27,19 +27,27 @@ pub struct StepParameters {
     /// Whether to integrate after the solver. Without it the poses come back unchanged, with the
     /// velocities that the solver left (undamped, without gravity).
     pub integrate: bool,
-    /// Order in which the collisions are sent. `None` is [`Order::HazardFreeNearby`] on a pipeline that
-    /// does not wait for velocities, [`Order::HazardFree`] on a design that keeps only live bodies, and
-    /// [`Order::AsGiven`] on one that waits.
+    /// Order in which the collisions are sent; `None` is the cheapest order on the board at hand:
     ///
-    /// A pipeline that waits gives what solving the collisions one after the other in this order
-    /// gives; orders with hazards cost it cycles. One that does not wait reads stale velocities at
-    /// every hazard and loses impulses: with any other order than the hazard-free ones piles gain
-    /// energy. One that keeps only live bodies also refuses an order in which a body lives too long,
-    /// or too many live at once, as they do where collisions are sorted by body.
+    /// | the pipeline | order |
+    /// |---|---|
+    /// | waits on hazards | [`Order::HazardFreeNearby`] without its empty entries, unless [`Order::AsGiven`] takes fewer cycles |
+    /// | does not wait | [`Order::HazardFreeNearby`] |
+    /// | keeps only live bodies on chip | [`Order::HazardFree`] |
+    ///
+    /// [`StepReport::order_choice`](crate::StepReport::order_choice) says what was compared.
+    ///
+    /// A pipeline that waits solves the collisions one after the other in the order sent; a hazard
+    /// costs it cycles. Another order is another valid solution: to compare with a sequential solver
+    /// ask for [`Order::AsGiven`]. A pipeline that does not wait reads stale velocities at every
+    /// hazard and loses impulses: with any order that has hazards piles gain energy. One that keeps
+    /// only live bodies also refuses an order in which a body lives too long, or too many live at
+    /// once, as they do where collisions are sorted by body.
     pub order: Option<Order>,
     /// Whether to prove, before anything is sent, that no moving body recurs within the hazard
-    /// window; the step is refused otherwise. For debugging: it takes host time, and memory anew in
-    /// every step.
+    /// window; the step is refused otherwise. Where no order is asked for, a pipeline that waits is
+    /// then sent [`Order::HazardFreeNearby`] with its empty entries, which can be proved. For
+    /// debugging: it takes host time, and memory anew in every step.
     pub verify_order: bool,
     /// How long a step may take on the accelerator; `None` follows from the work: four times what
     /// it takes if every collision waits for the one before it, what its bytes take at 100 MB/s,

@@ -187,6 +187,7 @@ impl<'a> InFlight<'a> {
             bodies: *bodies as u64,
             collisions: *collisions as u64,
             order: arranged.order,
+            order_choice: arranged.choice,
             empty: *empty as u64,
             verified: arranged.verified,
             live: arranged.live,

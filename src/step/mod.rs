@@ -57,7 +57,7 @@ pub use fault::{AcceleratorError, Awaited, Fault, Subject};
 pub use in_flight::InFlight;
 pub use phase::Phase;
 pub use prepared::Prepared;
-pub use report::{HostTimes, Limit, StepCycles, StepReport};
+pub use report::{HostTimes, Limit, OrderChoice, StepCycles, StepReport};
 #[cfg(feature = "bench")]
 pub(crate) use results::{Results, commit};
 pub use solver::Accelerator;

@@ -6,10 +6,11 @@
 
 use bitstream_model::interface::profile::Flow;
 
+use super::report::OrderChoice;
 use crate::accelerator::Capabilities;
 use crate::order::{
-    Checker, Crowded, InputBuffers, IssueWindow, LiveReport, Lives, Order, OrderError, OrderInput,
-    OrderReport, Orderer, Room, Schedule,
+    Checker, Crowded, InputBuffers, Interlock, IssueWindow, LiveReport, Lives, Order, OrderError,
+    OrderInput, OrderReport, Orderer, Room, Schedule,
 };
 use crate::scene::validate::{Limits, needed};
 use crate::scene::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
@@ -28,6 +29,8 @@ pub(super) struct Ordering {
 pub(super) struct Arranged {
     /// What was made.
     pub(super) order: Order,
+    /// Why.
+    pub(super) choice: OrderChoice,
     /// Whether there is a schedule; without one they are as given.
     pub(super) scheduled: bool,
     /// What the order is like, if it was to be verified.
@@ -36,12 +39,27 @@ pub(super) struct Arranged {
     pub(super) live: Option<LiveReport>,
 }
 
+impl Arranged {
+    /// Collisions that are sent as the caller gives them.
+    pub(super) const fn as_given(choice: OrderChoice) -> Self {
+        let order = Order::AsGiven;
+        Self { order, choice, scheduled: false, verified: None, live: None }
+    }
+}
+
 /// What a step runs on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hardware<'a> {
     pub(super) capabilities: &'a Capabilities,
     pub(super) limits: &'a Limits,
     pub(super) shapes: &'a [Shape],
+}
+
+impl Hardware<'_> {
+    /// Entries of an order that fit beside so many bodies.
+    fn entries_max(&self, bodies: usize) -> usize {
+        usize::try_from(self.limits.room_for_collisions(bodies)).unwrap_or(usize::MAX)
+    }
 }
 
 impl Ordering {
@@ -58,11 +76,16 @@ impl Ordering {
         parameters: &StepParameters,
         on: Hardware<'_>,
     ) -> Result<Arranged, InputError> {
-        let order = parameters.order.unwrap_or_else(|| automatic(on.capabilities));
         let design = on.capabilities.window;
-        if order == Order::AsGiven && !parameters.verify_order && design.is_none() {
-            return Ok(Arranged { order, scheduled: false, verified: None, live: None });
-        }
+        let (order, choice) = match Wanted::of(on.capabilities, parameters) {
+            Wanted::Cheapest => return self.cheapest(bodies, collisions, parameters, on),
+            Wanted::Order(Order::AsGiven, choice)
+                if !parameters.verify_order && design.is_none() =>
+            {
+                return Ok(Arranged::as_given(choice));
+            }
+            Wanted::Order(order, choice) => (order, choice),
+        };
         let window = IssueWindow::of(on.capabilities, parameters)?;
         let mut input = self.buffers.gather(bodies, collisions, on.shapes);
         let passes = parameters.contact_iterations.saturating_add(parameters.friction_iterations);
@@ -70,8 +93,7 @@ impl Ordering {
             // Without a pass there is nobody to take them.
             input.pairs = &[];
         }
-        let room = on.limits.room_for_collisions(bodies.len());
-        self.orderer.set_limit(usize::try_from(room).unwrap_or(usize::MAX));
+        self.orderer.set_limit(on.entries_max(input.moving.len()));
         let schedule = match self.orderer.order(&input, order, window) {
             Ok(schedule) => schedule,
             Err(OrderError::TooLong { depth, limit, .. }) => {
@@ -96,7 +118,29 @@ impl Ordering {
             }
             None => None,
         };
-        Ok(Arranged { order: self.orderer.made(), scheduled: true, verified, live })
+        Ok(Arranged { order: self.orderer.made(), choice, scheduled: true, verified, live })
+    }
+
+    /// Orders the collisions of a step for a pipeline that waits on hazards: whichever order takes
+    /// the fewest cycles.
+    fn cheapest<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &B,
+        collisions: &C,
+        parameters: &StepParameters,
+        on: Hardware<'_>,
+    ) -> Result<Arranged, InputError> {
+        let input = self.buffers.gather(bodies, collisions, on.shapes);
+        self.orderer.set_limit(on.entries_max(input.moving.len()));
+        // A window beyond what can be ordered leaves the order as given.
+        let window = IssueWindow::of(on.capabilities, parameters).ok();
+        let pipeline = Interlock::of(on.capabilities, parameters);
+        let costs = self.orderer.cheapest(&input, window, &pipeline)?;
+        let (order, choice) = (self.orderer.made(), OrderChoice::Cheapest(costs));
+        Ok(match order {
+            Order::AsGiven => Arranged::as_given(choice),
+            _ => Arranged { order, choice, scheduled: true, verified: None, live: None },
+        })
     }
 
     /// The schedule made last.
@@ -110,13 +154,42 @@ impl Ordering {
     }
 }
 
-/// The order of a step that asks for none.
-pub(super) fn automatic(capabilities: &Capabilities) -> Order {
-    match capabilities.window {
-        Some(_) => Order::HazardFree,
-        None if capabilities.interlocked => Order::AsGiven,
-        None => Order::HazardFreeNearby,
+/// The order that a step is to have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    /// This one.
+    Order(Order, OrderChoice),
+    /// Whichever costs a pipeline that waits on hazards least.
+    Cheapest,
+}
+
+impl Wanted {
+    fn of(capabilities: &Capabilities, parameters: &StepParameters) -> Self {
+        match (parameters.order, capabilities.window) {
+            (Some(order), _) => Self::Order(order, OrderChoice::Asked),
+            (None, Some(_)) => Self::Order(Order::HazardFree, OrderChoice::LiveBodies),
+            (None, None) if !capabilities.interlocked => {
+                Self::Order(Order::HazardFreeNearby, OrderChoice::NoInterlock)
+            }
+            // Only an order that keeps its empty entries can be verified.
+            (None, None) if parameters.verify_order => {
+                Self::Order(Order::HazardFreeNearby, OrderChoice::Asked)
+            }
+            (None, None) => Self::Cheapest,
+        }
     }
+}
+
+/// Whether the collisions of a step may be sent as the caller writes them, one after the other.
+pub(super) fn in_order_of_writing(
+    capabilities: &Capabilities,
+    parameters: &StepParameters,
+) -> bool {
+    let order = match parameters.order {
+        Some(order) => order == Order::AsGiven,
+        None => capabilities.interlocked,
+    };
+    order && !parameters.verify_order && capabilities.window.is_none()
 }
 
 /// An order without hazards does not fit. The moving body with the most collisions tells which

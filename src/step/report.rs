@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::order::{LiveReport, Order, OrderReport};
+use crate::order::{LiveReport, Order, OrderCosts, OrderReport};
 
 /// Clock cycles of a step on the accelerator, by what they were spent on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -51,6 +51,22 @@ pub enum Limit {
     Streams,
 }
 
+/// Why the collisions of a step were sent in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum OrderChoice {
+    /// The caller chose: [`StepParameters::order`](crate::StepParameters::order) names the order, or
+    /// the caller wrote the collisions one after the other.
+    Asked,
+    /// The board does not wait on hazards. Only an order without hazards is solved right.
+    NoInterlock,
+    /// The board keeps only live bodies on chip. The order keeps few bodies alive.
+    LiveBodies,
+    /// The board waits on hazards. Of the order given and the order without hazards this one takes
+    /// fewer cycles.
+    Cheapest(OrderCosts),
+}
+
 /// What one step did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -62,6 +78,8 @@ pub struct StepReport {
     /// The order in which they were sent: [`Order::HazardFree`] where [`Order::HazardFreeNearby`] gave way
     /// to it ([`Orderer::made`](crate::order::Orderer::made)).
     pub order: Order,
+    /// Why this order and no other.
+    pub order_choice: OrderChoice,
     /// Entries left empty between them, sent as collisions without contact points.
     pub empty: u64,
     /// What that order was proved to be, if it was to be [verified](crate::StepParameters::verify_order):
@@ -144,6 +162,7 @@ mod tests {
             bodies: 0,
             collisions: 0,
             order: Order::AsGiven,
+            order_choice: OrderChoice::Asked,
             empty: 0,
             verified: None,
             live: None,

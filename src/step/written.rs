@@ -3,15 +3,14 @@
 use super::bank::Bank;
 use super::in_flight::{InFlight, Stopwatch};
 use super::load::{Engines, Load, Ticket};
-use super::ordering::{Arranged, automatic};
+use super::ordering::{Arranged, in_order_of_writing};
 use super::plan::Plan;
 use super::prepared::Prepared;
-use super::report::HostTimes;
+use super::report::{HostTimes, OrderChoice};
 use super::solver::Accelerator;
 use crate::beat::target::Target;
 use crate::beat::writer::Writer;
 use crate::error::Error;
-use crate::order::Order;
 use crate::scene::validate::{Quick, preflight, validate};
 use crate::scene::{Bodies, Collision, Collisions, InputError, StepParameters};
 
@@ -20,10 +19,10 @@ impl Accelerator {
     /// records go straight into the memory that the board reads, and the caller needs no array of
     /// them.
     ///
-    /// They are solved in the order in which they are written, so that the parameters must ask for
-    /// [`Order::AsGiven`], or for none on a bitstream that waits for its hazards, where that is what
-    /// a step takes by itself. A design that keeps live bodies alone, and one that is asked to verify
-    /// its order, wants all of them at once.
+    /// The board solves them in the order in which they are written. The parameters must ask for
+    /// [`Order::AsGiven`](crate::order::Order::AsGiven), or for no order on a bitstream that waits on
+    /// hazards. A bitstream that keeps only live bodies wants all collisions at once, and so does a
+    /// step that is to verify its order.
     ///
     /// The step takes the place of the one that was started last; [`Self::start`] starts it. One that
     /// is stepped or submitted before that takes its place in turn: it is refused then.
@@ -87,10 +86,7 @@ impl Accelerator {
         self.forget(bank);
         let mut watch = Stopwatch::start();
         let mut host = HostTimes::default();
-        let capabilities = &self.device.capabilities;
-        let order = parameters.order.unwrap_or_else(|| automatic(capabilities));
-        let as_they_come = order == Order::AsGiven && !parameters.verify_order;
-        if !as_they_come || capabilities.window.is_some() {
+        if !in_order_of_writing(&self.device.capabilities, parameters) {
             return Err(InputError::WrittenInOrder.into());
         }
         let announced = Announced(announced);
@@ -122,7 +118,7 @@ impl Accelerator {
             bodies: bodies.len(),
             collisions: written,
             empty: 0,
-            arranged: Arranged { order, scheduled: false, verified: None, live: None },
+            arranged: Arranged::as_given(OrderChoice::Asked),
             shapes_loaded: self.shapes_loaded,
             host,
         };
