@@ -78,7 +78,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
 
     let open = |path: &Path| {
         let found = files.iter().find(|array| path.ends_with(array.name));
-        let found = found.ok_or(Problem::NotAFile)?;
+        let found = found.ok_or(Problem::NotAFile("nothing"))?;
         Ok((Cursor::new(&found.file[..]), found.file.len() as u64))
     };
     let mut tally = Tally::default();

@@ -114,9 +114,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let mut folder = Folder::load(&args.folder).map_err(|error| {
-        Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
-    })?;
+    let mut folder = origin::load(&args.folder)?;
     let parameters = args.parameters(&folder.parameters);
     let expected = match args.compare {
         true => expected(&folder, &parameters)?,
@@ -145,7 +143,12 @@ pub(crate) fn run(
         Err(error) => return Err(args.faults.failure(&opened, &parameters, error)),
     };
     if let Some(path) = &args.out {
-        folder::write_results(path, &bodies).map_err(Failure::input)?;
+        folder::write_results(path, &bodies).map_err(|error| {
+            Failure::input(error).next(format!(
+                "make room, or give another folder with --out; {} is as it was before",
+                path.display()
+            ))
+        })?;
     }
 
     let solved = Solved {
@@ -222,9 +225,7 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
     let path = folder.path.join(name);
     let size = |n: u32| usize::try_from(n).unwrap_or(usize::MAX);
     let shape = Dimensions(vec![Some(size(passes)), Some(n), Some(6)]);
-    let (_, mut values) = npy::read::<f32>(&path, &shape).map_err(Failure::input)?;
-    values.drain(..(size(pass) - 1) * n * 6);
-    values.truncate(n * 6);
+    let values = npy::read_row::<f32>(&path, &shape, size(pass) - 1).map_err(Failure::input)?;
     compare::check(&path, &values).map_err(Failure::input)?;
     let velocities =
         Expected { name: format!("{name}[{}]", pass - 1), values, kind: Kind::Velocities };

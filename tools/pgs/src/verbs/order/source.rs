@@ -13,6 +13,7 @@ use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::npy::{self, Dimensions};
 use crate::options::BuildArgs;
+use crate::origin;
 
 /// The order in which Bullet's GPU takes the collisions, if the folder has it.
 const GPU_ORDER: &str = "gpu_order.npy";
@@ -58,9 +59,7 @@ impl Source {
     }
 
     fn folder(path: &Path) -> Result<Self, Failure> {
-        let folder = Folder::load(path).map_err(|error| {
-            Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
-        })?;
+        let folder = origin::load(path)?;
         let gpu_order = gpu_order(&path.join(GPU_ORDER), folder.collisions.len())?;
         let Folder { bodies, collisions, shapes, .. } = folder;
         Ok(Self::new(path.display().to_string(), &bodies, &collisions, &shapes, gpu_order))
@@ -110,7 +109,8 @@ impl Source {
 
 /// A permutation of `count` collisions, if there is such a file.
 fn gpu_order(path: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure> {
-    if !path.exists() {
+    // A name that cannot be looked up is told when the file is opened.
+    if matches!(path.try_exists(), Ok(false)) {
         return Ok(None);
     }
     let shape = Dimensions(vec![Some(count)]);
