@@ -271,7 +271,7 @@ pub enum InputError {
 
     /// A normal is not of unit length.
     #[error(
-        "collision {collision}: the normal has length {length}, expected 1 within {tolerance}: \
+        "collision {collision}: the normal has length {length:?}, expected 1 within {tolerance}: \
          normalise it",
         tolerance = InputError::NORMAL_TOLERANCE
     )]

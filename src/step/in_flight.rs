@@ -6,7 +6,7 @@ use super::fault::Fault;
 use super::load::Load;
 use super::locate::locate;
 use super::report::{HostTimes, StepCycles, StepReport};
-use super::results::commit;
+use super::results::{commit, commit_velocities};
 use super::solver::Accelerator;
 use super::symptom::Symptom;
 use crate::accelerator::Counters;
@@ -139,7 +139,10 @@ impl<'a> InFlight<'a> {
         bodies: &mut B,
     ) -> StepReport {
         let Self { accelerator, flight } = self;
-        commit(&accelerator.spare, bodies);
+        match flight.load.parameters.integrate {
+            true => commit(&accelerator.spare, bodies),
+            false => commit_velocities(&accelerator.spare, bodies),
+        }
         flight.load.host.commit = flight.watch.lap();
         let mut report = ended.report;
         report.host = flight.load.host;

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bitstream_model::interface::control::ErrorCode;
+use bitstream_model::interface::profile::PROFILES;
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, FaultKind};
 
 use super::board::{BoardDescription, BoardKind, Found};
@@ -178,6 +179,24 @@ fn bodies_without_collisions_and_collisions_without_passes_are_steps_too() {
     let before = bits(&bodies);
     accelerator.step(&mut bodies, &collisions, &parameters).expect("no passes");
     assert_eq!(bits(&bodies), before, "nothing solved, nothing integrated");
+}
+
+/// Sixteen bits round the pose of a cube at 2.2 m; that of the caller is not theirs to change.
+#[test]
+fn without_integration_every_profile_leaves_the_poses_as_they_are() {
+    let parameters = StepParameters { integrate: false, ..StepParameters::default() };
+    for profile in PROFILES {
+        let (_, mut accelerator) = open(BoardConfig { profile, ..BoardConfig::default() });
+        let (mut bodies, collisions) = scene(3);
+        let before = bodies.clone();
+        accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
+        for (found, given) in bodies.iter().zip(&before) {
+            let bits =
+                |pose: Pose| (pose.position.map(f32::to_bits), pose.orientation.map(f32::to_bits));
+            assert_eq!(bits(found.pose), bits(given.pose), "{}", profile.name);
+        }
+        assert_ne!(bodies[1].velocity, before[1].velocity, "{}", profile.name);
+    }
 }
 
 #[test]

@@ -36,10 +36,33 @@ Examples:
   pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
   pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
 
-The folder holds one .npy array a property: params (8) and iterations (2); body_pos, body_linvel,
-body_angvel, body_inv_inertia (N, 3), body_quat (N, 4), body_inv_mass (N); contact_bodies (M, 2),
-contact_npoints (M), contact_normal (M, 3), contact_points (M, 4, 4). Types are <f4, and <u4 for
-iterations, contact_bodies and contact_npoints.";
+The folder holds one .npy array a property, in C order; metres, kilograms, seconds, radians, world frame:
+
+  params            (8) <f4        time step, position drift, position coefficient, friction, angular
+                                   damping, gravity x, y, z
+  iterations        (2) <u4        contact, friction
+  body_pos          (N, 3) <f4     centre of mass
+  body_quat         (N, 4) <f4     orientation, a unit quaternion in the order x, y, z, w
+  body_linvel       (N, 3) <f4     velocity of the centre of mass
+  body_angvel       (N, 3) <f4     angular velocity about world axes
+  body_inv_mass     (N) <f4        1/mass; 0 is a static body, whose velocities and inverse inertia are 0
+  body_inv_inertia  (N, 3) <f4     inverse inertia about the body's own axes x, y, z
+  contact_bodies    (M, 2) <u4     indices of bodies A and B, from 0
+  contact_npoints   (M) <u4        contact points of each collision, 1 to 4
+  contact_normal    (M, 3) <f4     unit normal, which points from B to A
+  contact_points    (M, 4, 4) <f4  x, y, z of a point on B's surface, and its signed distance d from A,
+                                   whose surface is at point + d * normal: negative is penetration.
+                                   Of the four only the first contact_npoints are read
+
+A step needs at least one body. One without collisions has contact arrays of M = 0; an array without rows may
+also have shape (0,) and any type, as numpy.array([]) has. With position drift 0 and a position coefficient
+equal to the time step a distance is a velocity in m/s: the point is pushed apart at least as fast as a negative
+one says, and may approach as fast as a positive one says.
+
+--no-integrate leaves the rest of a step to whoever calls: forces and gravity, damping, gyroscopic terms,
+motion. Poses come back as they were.
+
+--out replaces earlier results together: where one cannot be written all stay as they were.";
 
 /// Take one step from a folder of arrays.
 #[derive(Debug, Clone, Args)]
