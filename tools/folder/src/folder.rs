@@ -19,13 +19,14 @@ use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParame
 use crate::npy::{self, Dimensions, Element, NpyError, Problem};
 use crate::replace::{ReplaceError, Replacement};
 
-/// Parameters of the step but its iterations: (8).
+/// Parameters of the step but its iterations: (8). Time step, position drift, position coefficient,
+/// friction, angular damping, gravity x, y, z.
 pub const PARAMS: &str = "params.npy";
 /// Contact and friction iterations: (2).
 pub const ITERATIONS: &str = "iterations.npy";
 /// Centres of mass: (N, 3).
 pub const BODY_POSITION: &str = "body_pos.npy";
-/// Quaternions: (N, 4).
+/// Quaternions x, y, z, w: (N, 4).
 pub const BODY_ORIENTATION: &str = "body_quat.npy";
 /// Linear velocities: (N, 3).
 pub const BODY_LINEAR: &str = "body_linvel.npy";
@@ -39,9 +40,10 @@ pub const BODY_INVERSE_INERTIA: &str = "body_inv_inertia.npy";
 pub const COLLISION_BODIES: &str = "contact_bodies.npy";
 /// Numbers of contact points: (M).
 pub const COLLISION_COUNT: &str = "contact_npoints.npy";
-/// Normals: (M, 3).
+/// Unit normals, from B to A: (M, 3).
 pub const COLLISION_NORMAL: &str = "contact_normal.npy";
-/// Contact points: (M, 4, 4).
+/// Contact points: (M, 4, 4). x, y, z on B's surface, and the signed distance of A's, negative if they
+/// penetrate.
 pub const COLLISION_POINTS: &str = "contact_points.npy";
 
 /// More shapes than the board's table holds.

@@ -163,13 +163,16 @@ fn check(folder: &Folder, files: &[Array]) {
 }
 
 /// Words of a header, in the right and in the wrong place.
-const WORDS: [&[u8]; 12] = [
+const WORDS: [&[u8]; 15] = [
     b"{",
     b"}",
     b"(",
     b")",
     b",",
     b"'descr': '<f4'",
+    b"'descr': [('x', '<f4')]",
+    b"'shape': (0,)",
+    b"\x03\x00",
     b"'<u4'",
     b"True",
     b"'shape': (",

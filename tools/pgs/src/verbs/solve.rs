@@ -10,7 +10,7 @@ use zynq_pgs::{Body, StepParameters, StepReport};
 
 use super::SCHEMA;
 use super::run::{limit_text, milliseconds};
-use super::table::grouped;
+use super::table::{Bound, grouped};
 use crate::args::CommonArgs;
 use crate::board;
 use crate::compare::{self, Difference};
@@ -297,6 +297,7 @@ impl Solved {
 
     fn print(&self, out: &mut dyn Write) -> std::io::Result<()> {
         let report = &self.report;
+        let saturated = report.saturated;
         writeln!(
             out,
             "step       {} bodies, {} collisions, {} contact and {} friction iterations, {}",
@@ -311,9 +312,9 @@ impl Solved {
             out,
             "cycles     {} = {} by formula + {} stalls + {} waits; {:.3} ms modelled, limit: {}",
             grouped(report.cycles.total),
-            grouped(report.cycles.work),
-            grouped(report.cycles.stalls),
-            grouped(report.cycles.waits),
+            Bound::AtLeast.words(saturated.work, report.cycles.work),
+            Bound::AtMost.words(saturated.stalls(), report.cycles.stalls),
+            Bound::AtLeast.words(saturated.waits, report.cycles.waits),
             milliseconds(report.modelled_time()),
             limit_text(report.limit()),
         )?;
@@ -326,12 +327,19 @@ impl Solved {
         )?;
         writeln!(
             out,
-            "hazards    {} ({:.1} % of the collisions of a pass)",
-            grouped(report.hazards),
+            "hazards    {} ({}{:.1} % of the collisions of a pass)",
+            Bound::AtLeast.words(saturated.hazards, report.hazards),
+            if saturated.hazards { "at least " } else { "" },
             self.hazard_share() * 100.0,
         )?;
-        if let Some(sum) = report.impulse_sum {
-            writeln!(out, "impulses   {sum:.3} N s")?;
+        match report.impulse_sum {
+            Some(sum) => writeln!(out, "impulses   {sum:.3} N s")?,
+            None if saturated.impulse_sum => {
+                #[allow(clippy::cast_possible_truncation, reason = "a whole number, 2^44")]
+                let most = StepReport::IMPULSE_SUM_MAX as u64;
+                writeln!(out, "impulses   {} N s", Bound::AtLeast.words(true, most))?;
+            }
+            None => {}
         }
         if report.retries > 0 {
             writeln!(out, "retries    {}", report.retries)?;
@@ -374,7 +382,7 @@ impl Solved {
                 "integrate": self.parameters.integrate,
             },
             "step": super::report_json(&self.report),
-            "hazard_share": self.hazard_share(),
+            "hazard_share": (!self.report.saturated.hazards).then(|| self.hazard_share()),
             "kinetic_energy_before_j": self.energy[0],
             "kinetic_energy_j": self.energy[1],
             "digest": { "algorithm": digest::ALGORITHM, "value": self.digest },
