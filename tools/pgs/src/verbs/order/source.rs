@@ -67,6 +67,15 @@ impl Source {
 
     /// Cubes, after some steps on the board.
     fn grid(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
+        let bodies = u64::from(args.grid.cubes()) + 1;
+        if bodies > npy::ROWS_MAX as u64 {
+            let error = format!(
+                "a grid of {} is {bodies} bodies with the ground, no board takes more than {}",
+                args.grid,
+                npy::ROWS_MAX
+            );
+            return Err(Failure::input(error).next("give a smaller --grid"));
+        }
         let options = SceneOptions { grid: args.grid, drop: args.drop, ..Default::default() };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         if args.steps > 0 {
