@@ -150,7 +150,7 @@ mod record;
 pub mod scene;
 mod step;
 
-pub use accelerator::{Capabilities, ControlError, IdentityError};
+pub use accelerator::{Capabilities, ControlError, IdentityError, Saturated};
 pub use axi_dma::{
     ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
 };

@@ -162,6 +162,8 @@ fn control_registers_stand_at_their_published_offsets() {
     assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 1));
     assert_eq!(control::VERSION.reset, 0x0001_0001);
     assert_eq!(control::IMPULSE_SUM_FRACTION_BITS, 20);
+    assert_eq!(control::IMPULSE_SUM_MAX, 0xFFFF_FFFF_FFFF_FFFF);
+    assert_eq!(control::COUNTER_MAX, 0xFFFF_FFFF);
     assert_eq!(control::ITERATIONS_MAX, 255);
 }
 

@@ -10,8 +10,6 @@
 mod common;
 mod vectors;
 
-use std::path::PathBuf;
-
 use bitstream_model::{BoardConfig, Hazards};
 use common::{bits, by_hand, open, ordered};
 use scene::{Scene, SceneOptions, kinetic_energy};
@@ -252,9 +250,7 @@ fn an_order_that_does_not_fit_is_refused_with_its_numbers() {
 /// O3 and O6 on the step of the thesis' scene.
 #[test]
 fn the_full_step_gives_the_same_bits_and_keeps_its_energy() {
-    let folder =
-        std::env::var_os("PGS_VECTORS").map(|root| PathBuf::from(root).join("full_step186"));
-    let Some(folder) = folder.filter(|folder| folder.exists()) else {
+    let Some(folder) = vectors::full_step() else {
         println!("skipped: full_step186 (PGS_VECTORS does not lead there)");
         return;
     };

@@ -9,7 +9,6 @@
 mod common;
 mod vectors;
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bitstream_model::interface::profile::{
@@ -423,9 +422,7 @@ fn sixteen_bits_stay_near_single_precision() {
 /// The thesis' step, once on a grid for the bits, once as it is for the figures.
 #[test]
 fn the_full_step_gives_the_bits_of_one_collision_after_the_other() {
-    let folder =
-        std::env::var_os("PGS_VECTORS").map(|root| PathBuf::from(root).join("full_step186"));
-    let Some(folder) = folder.filter(|folder| folder.exists()) else {
+    let Some(folder) = vectors::full_step() else {
         println!("skipped: full_step186 (PGS_VECTORS does not lead there)");
         return;
     };

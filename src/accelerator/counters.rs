@@ -1,8 +1,9 @@
 //! This file reads what the accelerator counted in a step, and its sticky error.
 
 use bitstream_model::interface::control::{
-    CYCLES_HI, CYCLES_LO, ERROR, ERROR_DETAIL, HAZARDS, IMPULSE_SUM_FRACTION_BITS, IMPULSE_SUM_HI,
-    IMPULSE_SUM_LO, SUM_RECEIVED, SUM_SENT, WAIT_CYCLES, WORK_CYCLES,
+    COUNTER_MAX, CYCLES_HI, CYCLES_LO, ERROR, ERROR_DETAIL, HAZARDS, IMPULSE_SUM_FRACTION_BITS,
+    IMPULSE_SUM_HI, IMPULSE_SUM_LO, IMPULSE_SUM_MAX, SUM_RECEIVED, SUM_SENT, WAIT_CYCLES,
+    WORK_CYCLES,
 };
 
 use super::{Capabilities, Control};
@@ -29,8 +30,32 @@ pub(crate) struct Counters {
     pub(crate) hazards: u32,
     /// Sums of the words received and sent, if the bitstream has them.
     pub(crate) sums: Option<(u32, u32)>,
-    /// Sum of the accumulated normal impulses, N s, if the bitstream has it.
+    /// Sum of the accumulated normal impulses, N s, if the bitstream has it and it is known.
     pub(crate) impulse_sum: Option<f64>,
+    /// Which of them stand at their maximum.
+    pub(crate) saturated: Saturated,
+}
+
+/// Counters of a step that stopped at their maximum: what they count is that or more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct Saturated {
+    /// Cycles by the formula.
+    pub work: bool,
+    /// Cycles in which the accelerator waited for a stream.
+    pub waits: bool,
+    /// Collisions that met a hazard.
+    pub hazards: bool,
+    /// The sum of the impulses.
+    pub impulse_sum: bool,
+}
+
+impl Saturated {
+    /// Whether the stalls are not known: they are what work and waits leave of all cycles.
+    #[must_use]
+    pub const fn stalls(&self) -> bool {
+        self.work || self.waits
+    }
 }
 
 impl Control {
@@ -50,23 +75,31 @@ impl Control {
         let work = self.read(&WORK_CYCLES);
         let waits = self.read(&WAIT_CYCLES);
         let sums = capabilities.checksums.then(|| (self.read(&SUM_RECEIVED), self.read(&SUM_SENT)));
-        let impulse_sum = capabilities.impulse_sum.then(|| {
+        let impulses = capabilities.impulse_sum.then(|| {
             let low = self.read(&IMPULSE_SUM_LO);
-            impulse(wide(self.read(&IMPULSE_SUM_HI), low))
+            wide(self.read(&IMPULSE_SUM_HI), low)
         });
-        Counters { cycles, work, waits, hazards, sums, impulse_sum }
+        let saturated = Saturated {
+            work: work == COUNTER_MAX,
+            waits: waits == COUNTER_MAX,
+            hazards: hazards == COUNTER_MAX,
+            impulse_sum: impulses == Some(IMPULSE_SUM_MAX),
+        };
+        let impulse_sum = impulses.filter(|_| !saturated.impulse_sum).map(impulse);
+        Counters { cycles, work, waits, hazards, sums, impulse_sum, saturated }
     }
 }
 
 /// Fixed point to N s. Sums above 2^53 units (8.6e9 N s) are rounded.
 #[allow(clippy::cast_precision_loss, reason = "rounding of sums above 2^53 is documented")]
-fn impulse(units: u64) -> f64 {
-    units as f64 / f64::from(1u32 << IMPULSE_SUM_FRACTION_BITS)
+pub(crate) const fn impulse(units: u64) -> f64 {
+    units as f64 / (1_u64 << IMPULSE_SUM_FRACTION_BITS) as f64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accelerator::{fake, identify};
     use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
 
@@ -87,5 +120,28 @@ mod tests {
     fn impulses_are_counted_in_units_of_two_to_the_minus_twenty() {
         assert_eq!(impulse(1 << 20), 1.0);
         assert_eq!(impulse((1 << 32) + (1 << 19)), 4096.5);
+        assert_eq!(impulse(u64::MAX), 17_592_186_044_416.0);
+    }
+
+    #[test]
+    fn a_counter_at_its_maximum_is_no_number() {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
+        let control = Control::new(registers.window(RegisterMap::Control));
+        let counted = |low: u32, others: u32| {
+            registers.with(|state| {
+                state.values.extend([(0x1A4, low), (0x1A8, u32::MAX)]);
+                state.values.extend([(0x190, others), (0x194, others), (0x198, others)]);
+            });
+            control.counters(&capabilities)
+        };
+        let most = counted(u32::MAX - 1, u32::MAX - 1);
+        assert_eq!(most.saturated, Saturated::default());
+        assert_eq!(most.impulse_sum, Some(impulse(u64::MAX - 1)));
+        let stopped = counted(u32::MAX, u32::MAX);
+        let all = Saturated { work: true, waits: true, hazards: true, impulse_sum: true };
+        assert_eq!((stopped.saturated, stopped.impulse_sum), (all, None));
+        assert!(all.stalls() && !Saturated { impulse_sum: true, ..most.saturated }.stalls());
     }
 }

@@ -11,7 +11,8 @@ use thiserror::Error;
 use crate::platform::PlatformError;
 
 pub(crate) use control::Control;
-pub(crate) use counters::{Counters, StickyError};
+pub use counters::Saturated;
+pub(crate) use counters::{Counters, StickyError, impulse};
 pub(crate) use fingerprint::{Changed, Fingerprint};
 #[cfg(test)]
 pub(crate) use identity::fake;

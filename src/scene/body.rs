@@ -12,7 +12,8 @@ use bytemuck::{Pod, Zeroable};
 pub struct Pose {
     /// Centre of mass, m.
     pub position: [f32; 3],
-    /// Unit quaternion x, y, z, w.
+    /// Unit quaternion in the order x, y, z, w; it turns the body's own axes to the world's. No rotation is
+    /// `[0.0, 0.0, 0.0, 1.0]`.
     pub orientation: [f32; 4],
 }
 
@@ -28,6 +29,7 @@ pub struct Velocity {
 
 /// A rigid body.
 ///
+/// Metres, kilograms, seconds and radians, in the world frame; which of its axes points up, gravity says.
 /// Its words lie in this order, without a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]

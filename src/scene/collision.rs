@@ -14,11 +14,20 @@ use crate::platform::prefetch;
 pub struct Contact {
     /// The point on body B's surface, world frame, m.
     pub point: [f32; 3],
-    /// Signed distance along the normal, m; negative is penetration.
+    /// Signed distance along the normal, m: A's surface is at `point + distance * normal`, so that negative
+    /// is penetration.
+    ///
+    /// What a step makes of it says
+    /// [`StepParameters`](crate::StepParameters#a-distance-as-a-velocity), where it can also stand for a
+    /// velocity.
     pub distance: f32,
 }
 
 /// Two bodies in contact at one to four points.
+///
+/// Which of two bodies is A does not matter, as long as the normal points from B to A and the contact
+/// points lie on B. One of them may be static. All points have the one normal: a manifold with several, as
+/// that of a mesh, is several collisions.
 ///
 /// Its words lie in this order, without a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -28,7 +37,7 @@ pub struct Collision {
     pub body_a: u32,
     /// Index of body B.
     pub body_b: u32,
-    /// Unit normal, world frame, pointing from B to A.
+    /// Unit normal, world frame, pointing from B to A: the direction in which A is pushed.
     pub normal: [f32; 3],
     /// Number of contact points, 1 to [`CONTACT_POINTS`].
     pub count: u32,

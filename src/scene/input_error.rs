@@ -259,9 +259,19 @@ pub enum InputError {
         found: f32,
     },
 
+    /// A normal is zero.
+    #[error(
+        "collision {collision}: the normal is 0, so that the contact has no direction: leave the \
+         collision out, or give a unit normal from B to A"
+    )]
+    NormalZero {
+        /// The collision.
+        collision: usize,
+    },
+
     /// A normal is not of unit length.
     #[error(
-        "collision {collision}: the normal has length {length}, expected 1 within {tolerance}: \
+        "collision {collision}: the normal has length {length:?}, expected 1 within {tolerance}: \
          normalise it",
         tolerance = InputError::NORMAL_TOLERANCE
     )]
@@ -455,7 +465,10 @@ pub enum InputError {
     },
 
     /// The shape table is empty.
-    #[error("found no shapes, expected at least one: set the shapes that the bodies refer to")]
+    #[error(
+        "found no shapes, expected at least one: a step needs a body, and a body a shape; set the \
+         shapes that the bodies refer to"
+    )]
     NoShapes,
 
     /// More shapes than the table has entries.

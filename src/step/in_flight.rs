@@ -6,10 +6,10 @@ use super::fault::Fault;
 use super::load::Load;
 use super::locate::locate;
 use super::report::{HostTimes, StepCycles, StepReport};
-use super::results::commit;
+use super::results::{commit, commit_velocities};
 use super::solver::Accelerator;
 use super::symptom::Symptom;
-use crate::accelerator::Counters;
+use crate::accelerator::{Counters, Saturated};
 use crate::error::Error;
 use crate::platform::Deadline;
 use crate::scene::{Bodies, InputError};
@@ -139,13 +139,16 @@ impl<'a> InFlight<'a> {
         bodies: &mut B,
     ) -> StepReport {
         let Self { accelerator, flight } = self;
-        commit(&accelerator.spare, bodies);
+        match flight.load.parameters.integrate {
+            true => commit(&accelerator.spare, bodies),
+            false => commit_velocities(&accelerator.spare, bodies),
+        }
         flight.load.host.commit = flight.watch.lap();
         let mut report = ended.report;
         report.host = flight.load.host;
         log::debug!(
             "step: {} bodies, {} collisions and {} empty entries ({:?}), {} passes, {} cycles ({} \
-             stalled, {} waiting), {} hazards",
+             stalled, {} waiting), {} hazards{}",
             report.bodies,
             report.collisions,
             report.empty,
@@ -154,7 +157,8 @@ impl<'a> InFlight<'a> {
             report.cycles.total,
             report.cycles.stalls,
             report.cycles.waits,
-            report.hazards
+            report.hazards,
+            if report.saturated == Saturated::default() { "" } else { "; counters are saturated" },
         );
         report
     }
@@ -198,6 +202,7 @@ impl<'a> InFlight<'a> {
             bytes_from_device: plan.bytes_from_device(),
             hazards: u64::from(counters.hazards),
             impulse_sum: counters.impulse_sum,
+            saturated: counters.saturated,
             register_reads: reads - self.flight.accesses.0,
             register_writes: writes - self.flight.accesses.1,
             doorbells: 0,

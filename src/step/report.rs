@@ -2,9 +2,15 @@
 
 use std::time::Duration;
 
+use bitstream_model::interface::control::IMPULSE_SUM_MAX;
+
+use crate::accelerator::{Saturated, impulse};
 use crate::order::{LiveReport, Order, OrderCosts, OrderReport};
 
 /// Clock cycles of a step on the accelerator, by what they were spent on.
+///
+/// Where the counter of work or of waits is [saturated](StepReport::saturated), it is at least this, and the
+/// stalls are at most this.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StepCycles {
     /// From start to done.
@@ -49,6 +55,8 @@ pub enum Limit {
     Hazards,
     /// Memory that delivers less than the pipeline takes; in a tiny step, the latency of its start.
     Streams,
+    /// Not known, because a counter of cycles is [saturated](StepReport::saturated).
+    Unknown,
 }
 
 /// Why the collisions of a step were sent in their order.
@@ -99,9 +107,12 @@ pub struct StepReport {
     pub bytes_from_device: u64,
     /// Collisions that met a hazard, over all passes.
     pub hazards: u64,
-    /// Sum of the accumulated normal impulses after the last contact pass, N s; `None` if the
-    /// bitstream does not count it.
+    /// Sum of the accumulated normal impulses after the last contact pass, N s; `None` if the bitstream does
+    /// not count it, or if the sum is [`IMPULSE_SUM_MAX`](Self::IMPULSE_SUM_MAX) or more, as
+    /// [`saturated`](Self::saturated) says.
     pub impulse_sum: Option<f64>,
+    /// Which counters stopped at their maximum. What they count is that or more.
+    pub saturated: Saturated,
     /// 32-bit register reads.
     pub register_reads: u64,
     /// 32-bit register writes.
@@ -120,6 +131,9 @@ pub struct StepReport {
 }
 
 impl StepReport {
+    /// Where the sum of the impulses stops, N s.
+    pub const IMPULSE_SUM_MAX: f64 = impulse(IMPULSE_SUM_MAX);
+
     /// Time from start to done on the accelerator: cycles divided by the clock.
     ///
     /// Zero if the bitstream gives no clock.
@@ -136,6 +150,11 @@ impl StepReport {
     #[must_use]
     pub fn limit(&self) -> Limit {
         let StepCycles { work, stalls, waits, .. } = self.cycles;
+        if self.saturated.stalls() {
+            // Waits are at least so many, stalls at most.
+            let sure = !self.saturated.work && waits >= stalls && waits.saturating_mul(50) > work;
+            return if sure { Limit::Streams } else { Limit::Unknown };
+        }
         if stalls.max(waits).saturating_mul(50) <= work {
             Limit::Pipeline
         } else if stalls >= waits {
@@ -173,6 +192,7 @@ mod tests {
             bytes_from_device: 0,
             hazards: 0,
             impulse_sum: None,
+            saturated: Saturated::default(),
             register_reads: 0,
             register_writes: 0,
             doorbells: 0,
@@ -189,6 +209,21 @@ mod tests {
         assert_eq!(report(1000, 21, 20).limit(), Limit::Hazards);
         assert_eq!(report(1000, 20, 21).limit(), Limit::Streams);
         assert_eq!(report(0, 0, 0).limit(), Limit::Pipeline);
+    }
+
+    #[test]
+    fn a_saturated_counter_tells_the_limit_only_if_no_more_could_change_it() {
+        let limit = |work, stalls, waits, saturated| {
+            StepReport { saturated, ..report(work, stalls, waits) }.limit()
+        };
+        let waits = Saturated { waits: true, ..Saturated::default() };
+        assert_eq!(limit(1000, 20, 21, waits), Limit::Streams);
+        assert_eq!(limit(1000, 22, 21, waits), Limit::Unknown);
+        assert_eq!(limit(1000, 0, 20, waits), Limit::Unknown);
+        let work = Saturated { work: true, ..Saturated::default() };
+        assert_eq!(limit(1000, 20, 21, work), Limit::Unknown);
+        let others = Saturated { hazards: true, impulse_sum: true, ..Saturated::default() };
+        assert_eq!(limit(1000, 20, 20, others), Limit::Pipeline);
     }
 
     #[test]

@@ -183,6 +183,16 @@ pub(crate) fn commit<B: Bodies + ?Sized>(results: &[Record], bodies: &mut B) {
     }
 }
 
+/// Stores the velocities alone: what was not integrated has the caller's own poses, which a stream of
+/// sixteen bits would round on their way.
+pub(super) fn commit_velocities<B: Bodies + ?Sized>(results: &[Record], bodies: &mut B) {
+    for (index, record) in results.iter().enumerate() {
+        let (_, velocity) = result::decode(record);
+        let pose = bodies.body(index).pose;
+        bodies.commit(index, pose, velocity);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

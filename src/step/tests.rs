@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bitstream_model::interface::control::ErrorCode;
+use bitstream_model::interface::profile::PROFILES;
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, FaultKind};
 
 use super::board::{BoardDescription, BoardKind, Found};
@@ -178,6 +179,56 @@ fn bodies_without_collisions_and_collisions_without_passes_are_steps_too() {
     let before = bits(&bodies);
     accelerator.step(&mut bodies, &collisions, &parameters).expect("no passes");
     assert_eq!(bits(&bodies), before, "nothing solved, nothing integrated");
+}
+
+/// Sixteen bits round the pose of a cube at 2.2 m; that of the caller is not theirs to change.
+#[test]
+fn without_integration_every_profile_leaves_the_poses_as_they_are() {
+    let parameters = StepParameters { integrate: false, ..StepParameters::default() };
+    for profile in PROFILES {
+        let (_, mut accelerator) = open(BoardConfig { profile, ..BoardConfig::default() });
+        let (mut bodies, collisions) = scene(3);
+        let before = bodies.clone();
+        accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
+        for (found, given) in bodies.iter().zip(&before) {
+            let bits =
+                |pose: Pose| (pose.position.map(f32::to_bits), pose.orientation.map(f32::to_bits));
+            assert_eq!(bits(found.pose), bits(given.pose), "{}", profile.name);
+        }
+        assert_ne!(bodies[1].velocity, before[1].velocity, "{}", profile.name);
+    }
+}
+
+/// The velocity in y with which a ball leaves a step that it enters with `speed`, where the distance of its
+/// contact with the ground stands for a velocity.
+fn after_contact(speed: f32, distance: f32) -> f32 {
+    let (_, mut accelerator) = open(BoardConfig::default());
+    let (mut bodies, mut collisions) = scene(1);
+    bodies[1].velocity = Velocity { linear: [0.0, speed, 0.0], angular: [0.0; 3] };
+    collisions[0].count = 1;
+    collisions[0].contacts[0] = Contact { point: [2.2, -0.01, 0.0], distance };
+    let mut parameters = StepParameters { integrate: false, ..StepParameters::default() };
+    parameters.position_drift = 0.0;
+    parameters.position_coefficient = parameters.time_step;
+    accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
+    bodies[1].velocity.linear[1]
+}
+
+#[test]
+fn a_distance_is_a_velocity_where_the_coefficient_is_the_time_step() {
+    for (speed, distance, expected) in [
+        // Pushed apart at least so fast.
+        (0.0, -2.0, 2.0),
+        (-7.0, -2.0, 2.0),
+        (5.0, -2.0, 5.0),
+        // It may approach so fast, and no faster.
+        (-7.0, 3.0, -3.0),
+        (-2.5, 3.0, -2.5),
+        (-7.0, 0.0, 0.0),
+    ] {
+        let found: f32 = after_contact(speed, distance);
+        assert!((found - expected).abs() < 1e-5, "{speed} {distance}: {found}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! One step from a folder of arrays, as far as a test needs it: `.npy` files of format 1.0.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
@@ -9,6 +9,14 @@ pub(crate) struct Step {
     pub(crate) shapes: Vec<Shape>,
     pub(crate) bodies: Vec<Body>,
     pub(crate) collisions: Vec<Collision>,
+}
+
+/// The folder of the thesis' step, if the environment leads there; a variable that is blank leads nowhere.
+pub(crate) fn full_step() -> Option<PathBuf> {
+    let root = std::env::var_os("PGS_VECTORS")?;
+    let blank = root.to_str().is_some_and(|root| root.trim().is_empty());
+    let folder = Path::new(&root).join("full_step186");
+    (!blank && folder.exists()).then_some(folder)
 }
 
 /// The words of an array.

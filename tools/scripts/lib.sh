@@ -3,6 +3,12 @@
 # The exit code of a script that cannot do its work on this machine, and says why.
 readonly SKIPPED=77
 
+# A variable that is blank counts as unset, for cargo too.
+for variable in CARGO_TARGET_DIR PGS_VECTORS STEPS QEMU BOOT_LIMIT TEST_LIMIT VALGRIND_LIMIT MIRI_LIMIT \
+	MIRIFLAGS BOARD CHECKS TREE; do
+	[[ ${!variable-set} = *[![:space:]]* ]] || unset "$variable"
+done
+
 repository=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 target_root=${CARGO_TARGET_DIR:-$repository/target}
 [[ $target_root = /* ]] || target_root=$PWD/$target_root

@@ -4,14 +4,14 @@ use crate::cast::{high, low, register};
 use crate::config::{BoardConfig, Hazards, Subnormals};
 use crate::interface::control::{
     ANGULAR_DAMPING, AP_CTRL, BODIES, BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY,
-    COLLISIONS, CONTACT_DEPTH, CONTACT_ITERATIONS, CYCLES_HI, CYCLES_LO, DMA, ERROR, ERROR_DETAIL,
-    ErrorCode, FEATURES, FLAGS, FRICTION, FRICTION_DEPTH, FRICTION_ITERATIONS, GIE, GRAVITY_X,
-    GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO, ISR, ISSUE,
-    MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS, POSITION_COEFFICIENT, POSITION_DRIFT,
-    PROFILE, RESET, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS,
-    SHAPE_STRIDE, SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WINDOW,
-    WINDOW_CAPACITY, WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq,
-    issue, memory_per_record, numbers,
+    COLLISIONS, CONTACT_DEPTH, CONTACT_ITERATIONS, COUNTER_MAX, CYCLES_HI, CYCLES_LO, DMA, ERROR,
+    ERROR_DETAIL, ErrorCode, FEATURES, FLAGS, FRICTION, FRICTION_DEPTH, FRICTION_ITERATIONS, GIE,
+    GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO,
+    IMPULSE_SUM_MAX, ISR, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS,
+    POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, RESET, S2MM_WIDTHS, SHAPE_CAPACITY,
+    SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE, SUM_RECEIVED, SUM_SENT,
+    TIME_STEP, VERSION, WAIT_CYCLES, WINDOW, WINDOW_CAPACITY, WORK_CYCLES, ap_ctrl, channels,
+    depth, dma, error, features, flags, irq, issue, memory_per_record, numbers,
 };
 use crate::interface::number::Numbers;
 use crate::interface::profile::{Depth, Inertia, Window};
@@ -19,6 +19,14 @@ use crate::interface::profile::{Depth, Inertia, Window};
 use super::integrate::Integration;
 use super::solver::SolverParameters;
 use super::window;
+
+/// A counter of 32 bits, which saturates.
+fn counter(count: u64) -> u32 {
+    register(count.min(COUNTER_MAX.into()))
+}
+
+// The impulses are summed in 64 bits, and stay at their largest number.
+const _: () = assert!(IMPULSE_SUM_MAX == u64::MAX);
 
 /// The NUMBERS register.
 fn formats(of: &Numbers) -> u32 {
@@ -290,10 +298,10 @@ impl Registers {
             _ if offset == CYCLES_HI.offset => high(counters.cycles),
             _ if offset == WORK_CYCLES.offset => {
                 // A step that ended in an error may have counted a stall before it was over.
-                register(counters.cycles.saturating_sub(counters.stalls + counters.waits))
+                counter(counters.cycles.saturating_sub(counters.stalls + counters.waits))
             }
-            _ if offset == WAIT_CYCLES.offset => register(counters.waits),
-            _ if offset == HAZARDS.offset => register(counters.hazards),
+            _ if offset == WAIT_CYCLES.offset => counter(counters.waits),
+            _ if offset == HAZARDS.offset => counter(counters.hazards),
             _ if offset == SUM_RECEIVED.offset => counters.sum_received,
             _ if offset == SUM_SENT.offset => counters.sum_sent,
             _ if offset == IMPULSE_SUM_LO.offset => low(counters.impulse_sum),

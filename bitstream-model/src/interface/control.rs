@@ -348,18 +348,20 @@ pub const CYCLES_LO: Register = read_only("CYCLES_LO", 0x188, &[]);
 pub const CYCLES_HI: Register = read_only("CYCLES_HI", 0x18C, &[]);
 /// Cycles of it by the formula: neither waiting for a velocity to be written back nor for a stream.
 /// What is left of [`CYCLES_LO`] without these and [`WAIT_CYCLES`] are interlock stalls, which may
-/// take more than 32 bits.
+/// take more than 32 bits. It stops at [`COUNTER_MAX`].
 pub const WORK_CYCLES: Register = read_only("WORK_CYCLES", 0x190, &[]);
-/// Cycles of it in which the accelerator waited for a stream; stops at its maximum.
+/// Cycles of it in which the accelerator waited for a stream; stops at [`COUNTER_MAX`].
 pub const WAIT_CYCLES: Register = read_only("WAIT_CYCLES", 0x194, &[]);
-/// Collisions that met a hazard, over all passes: waited (interlocked) or read a stale velocity.
+/// Collisions that met a hazard, over all passes: waited (interlocked) or read a stale velocity. It stops
+/// at [`COUNTER_MAX`].
 pub const HAZARDS: Register = read_only("HAZARDS", 0x198, &[]);
 /// Sum modulo 2^32 of all 32-bit words received in the last step.
 pub const SUM_RECEIVED: Register = read_only("SUM_RECEIVED", 0x19C, &[]);
 /// Sum modulo 2^32 of all 32-bit words sent in the last step.
 pub const SUM_SENT: Register = read_only("SUM_SENT", 0x1A0, &[]);
 /// Sum of the accumulated normal impulses as the last contact pass leaves them, in units of
-/// 2^-[`IMPULSE_SUM_FRACTION_BITS`] N s (each collision's sum rounded down), bits 31:0.
+/// 2^-[`IMPULSE_SUM_FRACTION_BITS`] N s (each collision's sum rounded down), bits 31:0. It stops at
+/// [`IMPULSE_SUM_MAX`].
 pub const IMPULSE_SUM_LO: Register = read_only("IMPULSE_SUM_LO", 0x1A4, &[]);
 /// Sum of the accumulated normal impulses, bits 63:32.
 pub const IMPULSE_SUM_HI: Register = read_only("IMPULSE_SUM_HI", 0x1A8, &[]);
@@ -369,8 +371,13 @@ pub const RESET: Register = row("RESET", 0x1C0, Access::SelfClearing, 0, &[reset
 /// Most passes of each kind that the pass counters hold.
 pub const ITERATIONS_MAX: u32 = 255;
 
+/// Where the counters of 32 bits stop: this, and anything more.
+pub const COUNTER_MAX: u32 = u32::MAX;
+
 /// Fraction bits of the impulse sum.
 pub const IMPULSE_SUM_FRACTION_BITS: u32 = 20;
+/// Where the impulse sum stops: this, and anything more; a sum that is infinite, too. 2^44 N s.
+pub const IMPULSE_SUM_MAX: u64 = u64::MAX;
 
 /// First byte of the shape table.
 pub const SHAPE_TABLE: u32 = 0x400;

@@ -31,7 +31,7 @@ pub(super) fn check_collision(
     let [x, y, z] = collision.normal;
     let length = (x * x + y * y + z * z).sqrt();
     if (length - 1.0).abs() > InputError::NORMAL_TOLERANCE {
-        return Err(InputError::NormalLength { collision: index, length });
+        return Err(normal_length(index, collision.normal));
     }
     // All four points without a branch: counts follow no pattern that could be predicted.
     let mut finite = true;
@@ -42,6 +42,20 @@ pub(super) fn check_collision(
         return Err(contact_not_finite(index, &collision.contacts[..count]));
     }
     Ok(pair)
+}
+
+/// Says what is wrong with the length of a normal.
+#[cold]
+fn normal_length(collision: usize, normal: [f32; 3]) -> InputError {
+    // The squares of small numbers are 0 in f32, and those of large ones infinite.
+    let [x, y, z] = normal.map(f64::from);
+    let length = (x * x + y * y + z * z).sqrt();
+    if length == 0.0 {
+        return InputError::NormalZero { collision };
+    }
+    #[allow(clippy::cast_possible_truncation, reason = "it is rounded, to infinity if need be")]
+    let length = length as f32;
+    InputError::NormalLength { collision, length }
 }
 
 /// Names the number of these contact points that is known not to be finite. A refusal stands even if
@@ -148,12 +162,14 @@ mod tests {
 
     #[test]
     fn a_normal_off_unit_length_is_refused() {
-        for length in [0.0, 0.998_9, 1.001_1, 2.0] {
+        for length in [1e-30, 0.998_9, 1.001_1, 2.0, 2e20] {
             assert_eq!(
                 refused(&Collision { normal: [0.0, -length, 0.0], ..COLLISION }),
                 InputError::NormalLength { collision: 5, length }
             );
         }
+        let zero = Collision { normal: [0.0, -0.0, 0.0], ..COLLISION };
+        assert_eq!(refused(&zero), InputError::NormalZero { collision: 5 });
         let overflows = Collision { normal: [3e38; 3], ..COLLISION };
         assert_eq!(
             refused(&overflows),

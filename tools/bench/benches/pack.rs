@@ -99,7 +99,7 @@ impl Options {
     }
 
     fn step(&self) -> Result<Step, Box<dyn Error>> {
-        let vectors = std::env::var_os("PGS_VECTORS").filter(|_| self.grid.is_none());
+        let vectors = bench::variable("PGS_VECTORS").filter(|_| self.grid.is_none());
         let vectors = || vectors.map(|root| PathBuf::from(root).join("full_step186"));
         match self.input.clone().or_else(vectors) {
             Some(folder) => Step::load(&folder),

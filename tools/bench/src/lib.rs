@@ -16,12 +16,20 @@ pub mod options;
 pub mod step;
 pub mod yardstick;
 
+use std::ffi::OsString;
 use std::time::{Duration, Instant};
 
 use nix::time::{ClockId, clock_gettime};
 
 /// Something that is timed; its result is kept from being optimised away by the caller.
 pub type Run<'a> = Box<dyn FnMut() + 'a>;
+
+/// A variable of the environment; one that is blank counts as unset.
+#[must_use]
+pub fn variable(name: &str) -> Option<OsString> {
+    let blank = |text: &OsString| text.to_str().is_some_and(|text| text.trim().is_empty());
+    std::env::var_os(name).filter(|text| !blank(text))
+}
 
 /// Runs all in turn, so many times each; the median time of each.
 pub fn medians(runs: usize, contestants: &mut [Run<'_>]) -> Vec<Duration> {

@@ -21,7 +21,7 @@ fn every_step() -> Vec<PathBuf> {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden");
     let mut found = steps(&golden);
     assert_eq!(found.len(), 8, "{found:?}");
-    if let Some(root) = std::env::var_os("PGS_VECTORS") {
+    if let Some(root) = bench::variable("PGS_VECTORS") {
         found.extend(steps(Path::new(&root)));
     }
     found

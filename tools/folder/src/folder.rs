@@ -4,26 +4,29 @@
 //! (N, 4), `body_linvel`, `body_angvel` (N, 3), `body_inv_mass` (N), `body_inv_inertia` (N, 3);
 //! per collision `contact_bodies` (M, 2), `contact_npoints` (M), `contact_normal` (M, 3),
 //! `contact_points` (M, 4, 4). Everything is f32, or u32 for `iterations`, `contact_bodies` and
-//! `contact_npoints`.
+//! `contact_npoints`. An array of no rows may have the shape (0,) and any type: that is what
+//! `numpy.array([])` has.
 //!
 //! Only the files' form is checked here; the driver judges their values.
 
 use std::collections::HashMap;
-use std::io::Read;
+use std::io::{BufWriter, ErrorKind, Read, Write as _};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 
 use crate::npy::{self, Dimensions, Element, NpyError, Problem};
+use crate::replace::{ReplaceError, Replacement};
 
-/// Parameters of the step but its iterations: (8).
+/// Parameters of the step but its iterations: (8). Time step, position drift, position coefficient,
+/// friction, angular damping, gravity x, y, z.
 pub const PARAMS: &str = "params.npy";
 /// Contact and friction iterations: (2).
 pub const ITERATIONS: &str = "iterations.npy";
 /// Centres of mass: (N, 3).
 pub const BODY_POSITION: &str = "body_pos.npy";
-/// Quaternions: (N, 4).
+/// Quaternions x, y, z, w: (N, 4).
 pub const BODY_ORIENTATION: &str = "body_quat.npy";
 /// Linear velocities: (N, 3).
 pub const BODY_LINEAR: &str = "body_linvel.npy";
@@ -37,9 +40,10 @@ pub const BODY_INVERSE_INERTIA: &str = "body_inv_inertia.npy";
 pub const COLLISION_BODIES: &str = "contact_bodies.npy";
 /// Numbers of contact points: (M).
 pub const COLLISION_COUNT: &str = "contact_npoints.npy";
-/// Normals: (M, 3).
+/// Unit normals, from B to A: (M, 3).
 pub const COLLISION_NORMAL: &str = "contact_normal.npy";
-/// Contact points: (M, 4, 4).
+/// Contact points: (M, 4, 4). x, y, z on B's surface, and the signed distance of A's, negative if they
+/// penetrate.
 pub const COLLISION_POINTS: &str = "contact_points.npy";
 
 /// More shapes than the board's table holds.
@@ -148,7 +152,13 @@ impl Folder {
     /// # Errors
     /// [`NpyError`] names the first file that is not there or not as expected.
     pub fn load(path: &Path) -> Result<Self, NpyError> {
-        Self::load_with(path, npy::open)
+        let problem = match std::fs::metadata(path) {
+            Ok(metadata) if metadata.is_dir() => return Self::load_with(path, npy::open),
+            Ok(metadata) => Problem::NotAFolder(npy::kind(&metadata)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Problem::NotAFolder("nothing"),
+            Err(error) => Problem::Read(error),
+        };
+        Err(NpyError { path: path.to_path_buf(), problem })
     }
 
     /// Reads every array of the step from what `open` finds under the files' names: their content,
@@ -256,22 +266,68 @@ fn distinct(
     (shapes, first_bodies, shape_of)
 }
 
-/// Writes the state of all bodies as the four arrays of [`State`].
+/// Writes the state of all bodies as the four arrays of [`State`]; the folder is made if need be.
+///
+/// All four replace earlier ones together: after a failure the folder is as it was.
 ///
 /// # Errors
-/// [`NpyError`]: a file or the folder cannot be written.
-pub fn write_results(path: &Path, bodies: &[Body]) -> Result<(), NpyError> {
-    std::fs::create_dir_all(path)
-        .map_err(|error| NpyError { path: path.to_path_buf(), problem: Problem::Write(error) })?;
-    for state in State::ALL {
-        npy::write(&path.join(state.file()), &[bodies.len(), state.width()], state.of(bodies))?;
+/// [`ReplaceError`]: a file or the folder cannot be written.
+pub fn write_results(path: &Path, bodies: &[Body]) -> Result<(), ReplaceError> {
+    let made = first_missing(path);
+    let written = write_into(path, bodies);
+    if let (Err(_), Some(made)) = (&written, made) {
+        // Only what is empty goes.
+        for folder in path.ancestors().take_while(|folder| folder.starts_with(made)) {
+            if std::fs::remove_dir(folder).is_err() {
+                break;
+            }
+        }
     }
-    Ok(())
+    written
+}
+
+/// The outermost of the folders on the way that are not there yet.
+fn first_missing(path: &Path) -> Option<&Path> {
+    let ancestors = path.ancestors().filter(|folder| !folder.as_os_str().is_empty());
+    ancestors.take_while(|folder| std::fs::symlink_metadata(folder).is_err()).last()
+}
+
+fn write_into(path: &Path, bodies: &[Body]) -> Result<(), ReplaceError> {
+    std::fs::create_dir_all(path)
+        .map_err(|source| ReplaceError { path: path.to_path_buf(), source })?;
+    let mut results = Replacement::default();
+    for state in State::ALL {
+        results.stage(&path.join(state.file()), |file| {
+            let mut file = BufWriter::new(file);
+            npy::encode(&mut file, &[bodies.len(), state.width()], state.of(bodies))?;
+            file.flush()
+        })?;
+    }
+    results.commit()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_that_is_none_is_named() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let refused = |path: &Path| Folder::load(path).expect_err("no folder").problem.to_string();
+        let missing = folder.path().join("missing");
+        assert_eq!(refused(&missing), "expected a folder of .npy arrays, found nothing");
+        std::fs::write(&missing, "x").expect("written");
+        assert_eq!(refused(&missing), "expected a folder of .npy arrays, found a file");
+    }
+
+    #[test]
+    fn the_folders_that_are_made_are_those_that_were_missing() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let deep = folder.path().join("a/b/c");
+        assert_eq!(first_missing(&deep), Some(folder.path().join("a").as_path()));
+        assert_eq!(first_missing(folder.path()), None);
+        assert_eq!(first_missing(Path::new("no-such-folder/b")), Some(Path::new("no-such-folder")));
+    }
 
     #[test]
     fn shapes_are_the_distinct_rows_in_order() {

@@ -3,12 +3,13 @@
 use std::cell::RefCell;
 use std::fmt;
 use std::fs;
-use std::io;
+use std::io::{self, Write as _};
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 use std::time::Duration;
 
+use step_folder::replace::replace;
 use thiserror::Error;
 
 use crate::tally::Tally;
@@ -127,7 +128,7 @@ impl Finding {
         }
         fs::create_dir_all(folder)?;
         let path = folder.join(format!("{}-{}.txt", self.target, self.number));
-        fs::write(&path, text)?;
+        replace(&path, |file| file.write_all(text.as_bytes())).map_err(|error| error.source)?;
         Ok(path)
     }
 }

@@ -7,6 +7,7 @@ use clap::parser::ValueSource;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use zynq_pgs::MemoryChoice;
 
+use crate::environment::{BOARD, MEMORY, is_blank};
 use crate::memory::memory;
 use crate::verbs::check::CheckArgs;
 use crate::verbs::compare::CompareArgs;
@@ -49,7 +50,7 @@ struct Cli {
     #[command(subcommand)]
     verb: Option<Verb>,
     #[command(flatten)]
-    common: CommonArgs,
+    common: CommonOptions,
     #[command(flatten)]
     run: RunArgs,
 }
@@ -70,38 +71,46 @@ pub(crate) enum Verb {
     Faults(FaultsArgs),
 }
 
-/// What holds for every verb.
+/// What holds for every verb, as the command line says it.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct CommonArgs {
+struct CommonOptions {
     /// Print one JSON document instead of text.
     #[arg(long, global = true)]
-    pub(crate) json: bool,
+    json: bool,
     /// Board to use.
     #[arg(
         help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), uio, devmem \
                 (registers through /dev/mem, at the addresses of the interface; needs root), \
-                emulated or socket:PATH (one that `pgs serve` serves)",
+                emulated or socket:PATH (one that `pgs serve` serves) [env: PGS_BOARD] \
+                [default: auto]",
         long,
         global = true,
-        env = "PGS_BOARD",
         value_name = "BOARD",
-        default_value = "auto",
         value_parser = board_name
     )]
-    pub(crate) board: BoardName,
+    board: Option<BoardName>,
     /// DMA memory of a real board.
     #[arg(
         help = "DMA memory of a real board: auto (the u-dma-buf \"pgs\", else the UIO node \
                 \"pgs-memory\"), u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
-                devmem[:ADDRESS+BYTES]; of a served board: file:PATH",
+                devmem[:ADDRESS+BYTES]; of a served board: file:PATH [env: PGS_MEMORY] \
+                [default: auto]",
         long,
         global = true,
-        env = "PGS_MEMORY",
         value_name = "MEMORY",
-        default_value = "auto",
         value_parser = memory
     )]
+    memory: Option<MemoryChoice>,
+}
+
+/// What holds for every verb.
+#[derive(Debug, Clone)]
+pub(crate) struct CommonArgs {
+    pub(crate) json: bool,
+    pub(crate) board: BoardName,
     pub(crate) memory: MemoryChoice,
+    /// Whether the environment names the memory, and the command line does not.
+    pub(crate) memory_of_environment: bool,
 }
 
 /// A board, as it is named on the command line.
@@ -135,9 +144,11 @@ pub(crate) struct Command {
     pub(crate) common: CommonArgs,
 }
 
-/// Reads the command line; the error is also how help is asked for.
+/// Reads the command line, and from `variable` what it leaves to the environment; the error is also how
+/// help is asked for.
 pub(crate) fn parse(
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    variable: impl Fn(&str) -> Option<OsString>,
 ) -> Result<Command, clap::Error> {
     let mut command = Cli::command();
     let matches = command.try_get_matches_from_mut(arguments)?;
@@ -158,7 +169,47 @@ pub(crate) fn parse(
         }
     }
     let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
-    Ok(Command { verb: cli.verb.unwrap_or(Verb::Run(cli.run)), common: cli.common })
+    let verb = cli.verb.unwrap_or(Verb::Run(cli.run));
+    let CommonOptions { json, board, memory } = cli.common;
+    // Only what is used is read: a variable that is wrong breaks no command that does without it.
+    let with_board = !matches!(verb, Verb::Model(_) | Verb::Load(_));
+    let mut wrong = |message| command.error(clap::error::ErrorKind::ValueValidation, message);
+    let board = match board {
+        None if with_board => {
+            instead_of("--board", BOARD, &variable, board_name).map_err(&mut wrong)?
+        }
+        given => given,
+    };
+    let board = board.unwrap_or(BoardName::Auto);
+    // A served board is emulated, and yet on memory that is named.
+    let on_memory = board != BoardName::Emulated || matches!(verb, Verb::Serve(_));
+    let with_memory = with_board && on_memory && memory.is_none();
+    let named = match with_memory {
+        true => {
+            instead_of("--memory", MEMORY, &variable, crate::memory::memory).map_err(&mut wrong)?
+        }
+        false => None,
+    };
+    let memory_of_environment = named.is_some();
+    let memory = memory.or(named).unwrap_or(MemoryChoice::Automatic);
+    Ok(Command { verb, common: CommonArgs { json, board, memory, memory_of_environment } })
+}
+
+/// What a variable of the environment says in place of an option.
+fn instead_of<T>(
+    option: &str,
+    name: &str,
+    variable: impl Fn(&str) -> Option<OsString>,
+    read: impl Fn(&str) -> Result<T, String>,
+) -> Result<Option<T>, String> {
+    let Some(text) = variable(name).filter(|text| !is_blank(text)) else { return Ok(None) };
+    let found = text.to_str().ok_or_else(|| "expected text".to_owned()).and_then(read);
+    found.map(Some).map_err(|expected| {
+        format!(
+            "the environment variable {name} is {text:?}: {expected}; correct or unset it, or give \
+             {option}"
+        )
+    })
 }
 
 #[cfg(test)]
@@ -167,7 +218,64 @@ mod tests {
     use clap::error::ErrorKind;
 
     fn parsed(line: &str) -> Result<Command, ErrorKind> {
-        parse(line.split_whitespace()).map_err(|error| error.kind())
+        parse(line.split_whitespace(), |_| None).map_err(|error| error.kind())
+    }
+
+    /// The same where the environment has `PGS_BOARD` and `PGS_MEMORY`; or what is said.
+    fn parsed_in(board: &str, memory: &str, line: &str) -> Result<CommonArgs, String> {
+        let variable = |name: &str| match name {
+            BOARD => Some(board.into()),
+            MEMORY => Some(memory.into()),
+            _ => None,
+        };
+        let command = parse(line.split_whitespace(), variable);
+        command.map(|command| command.common).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_environment_says_what_the_command_line_does_not() {
+        let common = parsed_in("uio", "uio:m", "pgs run").expect("both");
+        assert_eq!(common.board, BoardName::Uio);
+        assert_eq!(common.memory, MemoryChoice::Uio { node: "m".to_owned() });
+        assert!(common.memory_of_environment);
+        let common = parsed_in("uio", "uio:m", "pgs run --board devmem --memory uio:n");
+        let common = common.expect("neither");
+        assert_eq!(common.board, BoardName::Devmem);
+        assert_eq!(common.memory, MemoryChoice::Uio { node: "n".to_owned() });
+        assert!(!common.memory_of_environment);
+    }
+
+    #[test]
+    fn a_blank_variable_is_none() {
+        for blank in ["", " ", "	 "] {
+            for line in ["pgs", "pgs run", "pgs list --json"] {
+                let common = parsed_in(blank, blank, line).expect("as if unset");
+                assert_eq!(common.board, BoardName::Auto, "{line}");
+                assert_eq!(common.memory, MemoryChoice::Automatic, "{line}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_variable_is_named_and_breaks_nothing_that_does_without() {
+        let said = parsed_in("abacus", "", "pgs run").expect_err("no board");
+        assert!(said.contains("PGS_BOARD is \"abacus\": expected auto"), "{said}");
+        assert!(said.contains("give --board"), "{said}");
+        let said = parsed_in("uio", "drum", "pgs run").expect_err("no memory");
+        assert!(
+            said.contains("PGS_MEMORY is \"drum\"") && said.contains("give --memory"),
+            "{said}"
+        );
+        for line in [
+            "pgs --board uio --memory uio run",
+            "pgs run --board emulated",
+            "pgs --board emulated",
+            "pgs solve x --memory uio --board uio",
+            "pgs model",
+            "pgs load x",
+        ] {
+            parsed_in("abacus", "drum", line).unwrap_or_else(|said| panic!("{line}: {said}"));
+        }
     }
 
     #[test]

@@ -16,6 +16,7 @@ use zynq_pgs::{
 use crate::args::{BoardName, CommonArgs};
 use crate::build::described;
 use crate::diagnosis;
+use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure};
 use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
 use crate::planned;
@@ -86,15 +87,22 @@ pub(crate) fn find(
     config: BoardConfig,
     given: Option<&'static str>,
 ) -> Result<Chosen, Failure> {
-    let CommonArgs { board: name, memory, .. } = common;
+    let CommonArgs { board: name, memory, memory_of_environment, .. } = common;
     let (kind, reason) = choose(name);
     let (board, observer) = if kind == BoardKind::Emulated {
         if *name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
         }
-        if *memory != MemoryChoice::Automatic {
-            let error = "--memory is for real boards, this one is emulated and has its own";
-            return Err(Failure::input(error).next("leave out --memory, or add --board uio"));
+        // One that is asked for by name has nothing to do with what the environment says of real ones.
+        let ignored = *memory_of_environment && *name == BoardName::Emulated;
+        if *memory != MemoryChoice::Automatic && !ignored {
+            let (option, next) = match memory_of_environment {
+                true => (MEMORY, "say which board is meant: --board emulated or --board uio"),
+                false => ("--memory", "leave out --memory, or add --board uio"),
+            };
+            let error =
+                format!("{option} is for real boards, this one is emulated and has its own");
+            return Err(Failure::input(error).next(next));
         }
         let emulated = EmulatedBoard::new(config).map_err(not_built)?;
         (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
@@ -114,8 +122,11 @@ pub(crate) fn find(
         (BoardChoice::Uio { node: UIO_NODE.to_owned() }, None)
     };
     let pack_threads = Some(config.threads);
-    let options =
-        OpenOptions { board, memory: memory.clone(), pack_threads, ..OpenOptions::default() };
+    let memory = match kind {
+        BoardKind::Emulated => MemoryChoice::Automatic,
+        _ => memory.clone(),
+    };
+    let options = OpenOptions { board, memory, pack_threads, ..OpenOptions::default() };
     Ok(Chosen { kind, options, observer, reason })
 }
 

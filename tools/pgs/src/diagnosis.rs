@@ -2,12 +2,13 @@
 //! report.
 
 use std::fmt::Write as _;
-use std::fs;
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use bitstream_model::EmulatedBoard;
 use clap::Args;
 use serde_json::{Value, json};
+use step_folder::replace::replace;
 use zynq_pgs::{Aftermath, ChannelState, Diagnosis, Error, Fault, StepParameters};
 
 use crate::board::Opened;
@@ -46,9 +47,9 @@ impl FaultArgs {
         let bundle = self.report.as_ref().filter(|_| error.fault().is_some());
         let Some(path) = bundle else { return opened.failure(error) };
         let document = bundle_json(opened, parameters, &error);
-        let said = match fs::write(path, format!("{document:#}\n")) {
+        let said = match replace(path, |file| writeln!(file, "{document:#}")) {
             Ok(()) => format!("for a bug report, see {}", path.display()),
-            Err(error) => format!("the report {} cannot be written: {error}", path.display()),
+            Err(error) => format!("the report {error}: {}", error.source),
         };
         opened.failure(error).hint(&said)
     }

@@ -11,6 +11,7 @@ mod build;
 mod compare;
 mod deviation;
 mod diagnosis;
+mod environment;
 mod failure;
 mod footprint;
 mod interrupt;
@@ -29,9 +30,21 @@ use std::process::ExitCode;
 
 use step_folder::{folder, npy};
 
+/// Has the log written to stderr: warnings, or what the environment asks for.
+fn log_to_stderr() {
+    let text = |name: &str, default: &str| {
+        let found = environment::variable(name).map(|text| text.to_string_lossy().into_owned());
+        found.unwrap_or_else(|| default.to_owned())
+    };
+    env_logger::Builder::new()
+        .parse_filters(&text(environment::LOG, "warn"))
+        .parse_write_style(&text(environment::LOG_STYLE, "auto"))
+        .init();
+}
+
 fn main() -> ExitCode {
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
-    let command = match args::parse(std::env::args_os()) {
+    log_to_stderr();
+    let command = match args::parse(std::env::args_os(), |name| std::env::var_os(name)) {
         Ok(command) => command,
         Err(message) => {
             // Help goes to stdout with code 0, a usage error to stderr with code 2. Nobody is left

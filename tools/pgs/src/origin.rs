@@ -1,15 +1,28 @@
-//! This file says which array of a folder the driver complains about.
+//! Loads a step from a folder, and says which of its arrays the driver complains about.
 
 use std::path::Path;
 
 use thiserror::Error;
 use zynq_pgs::InputError;
 
+use crate::failure::Failure;
 use crate::folder::{
     BODY_ANGULAR, BODY_INVERSE_INERTIA, BODY_INVERSE_MASS, BODY_LINEAR, BODY_ORIENTATION,
     BODY_POSITION, COLLISION_BODIES, COLLISION_COUNT, COLLISION_NORMAL, COLLISION_POINTS, Folder,
     ITERATIONS, PARAMS,
 };
+
+/// Loads the step in a folder that is named on the command line.
+pub(crate) fn load(path: &Path) -> Result<Folder, Failure> {
+    let folder = Folder::load(path).map_err(|error| {
+        Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
+    })?;
+    if folder.bodies.is_empty() {
+        // Said before anything else: without bodies there are no shapes, no indices and no board either.
+        return Err(Failure::input(locate(InputError::NoBodies.into(), &folder)));
+    }
+    Ok(folder)
+}
 
 /// Input that the driver refused, with the file that it stands in.
 #[derive(Debug, Error)]
@@ -75,7 +88,9 @@ fn file_of(error: &InputError) -> &'static str {
         | InputError::SpanTooLong { .. }
         | InputError::TooManyLive { .. } => COLLISION_BODIES,
         InputError::ContactCount { .. } => COLLISION_COUNT,
-        InputError::NormalNotFinite { .. } | InputError::NormalLength { .. } => COLLISION_NORMAL,
+        InputError::NormalNotFinite { .. }
+        | InputError::NormalZero { .. }
+        | InputError::NormalLength { .. } => COLLISION_NORMAL,
         InputError::ContactNotFinite { .. }
         | InputError::CollisionOutOfRange { contact: Some(_), .. } => COLLISION_POINTS,
         // Positions of its bodies; a normal of unit length is in range.

@@ -54,6 +54,7 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
         &["--grid", "0x1x1"],
         &["--window", "40000"],
         &["--grid", "180x1000x180"],
+        &["order", "--grid", "180x1000x180"],
         &["--steps", "5", "list"],
         &["--board", "abacus", "list"],
         &["solve"],

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Ran, copy, golden, patch, run, skipped};
+use common::{Ran, copy, golden, patch, run, skipped, variable};
 use serde_json::Value;
 
 fn json(ran: &Ran) -> Value {
@@ -311,7 +311,7 @@ fn formats_has_a_row_for_every_kind_of_number() {
 /// The figures of the specification's half precision, on the thesis' scene.
 #[test]
 fn the_full_step_shows_what_half_precision_costs() {
-    let folder = std::env::var_os("PGS_VECTORS").map(std::path::PathBuf::from);
+    let folder = variable("PGS_VECTORS").map(std::path::PathBuf::from);
     let Some(folder) = folder.map(|root| root.join("full_step186")).filter(|f| f.exists()) else {
         skipped("full_step186 (PGS_VECTORS does not lead there)");
         return;

@@ -8,13 +8,13 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use common::{run, skipped};
+use common::{run, skipped, variable};
 use serde_json::Value;
 
 /// The folder of all vectors, if there is one; says once if there is none.
 fn all_vectors() -> Option<PathBuf> {
     static ROOT: LazyLock<Option<PathBuf>> = LazyLock::new(|| {
-        let root = std::env::var_os("PGS_VECTORS").map(PathBuf::from);
+        let root = variable("PGS_VECTORS").map(PathBuf::from);
         if root.is_none() {
             skipped("the full golden vectors, full_step186 among them (PGS_VECTORS is not set)");
         }

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use common::{Tied, pgs, signal};
+use common::{Tied, pgs, signal, variable};
 
 /// Kills, if nobody says otherwise.
 const KILLS: u32 = 20;
@@ -48,7 +48,7 @@ fn next(state: &mut u64) -> u64 {
 
 #[test]
 fn a_board_whose_driver_was_killed_serves_the_next_one_as_if_nothing_had_been() {
-    let kills = std::env::var("PGS_KILLS").map_or(KILLS, |text| text.parse().expect("a number"));
+    let kills = variable("PGS_KILLS").map_or(KILLS, |text| text.parse().expect("a number"));
     let folder = tempfile::tempdir().expect("a directory");
     let socket = folder.path().join("board");
     let server = pgs()

@@ -4,7 +4,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{golden, run, skipped};
+use common::{golden, run, skipped, variable};
 use serde_json::Value;
 
 /// Runs `pgs order --json`; its document.
@@ -139,7 +139,7 @@ fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
 
 /// `full_step186`, if it is there; says once if it is not.
 fn full_step() -> Option<PathBuf> {
-    let Some(root) = std::env::var_os("PGS_VECTORS").map(PathBuf::from) else {
+    let Some(root) = variable("PGS_VECTORS").map(PathBuf::from) else {
         skipped("the orders of full_step186 (PGS_VECTORS is not set)");
         return None;
     };

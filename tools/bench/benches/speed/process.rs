@@ -12,7 +12,7 @@ use crate::{Options, Outcome};
 
 /// Builds this repository's `pgs`; where it is.
 fn build() -> Result<PathBuf, Box<dyn Error>> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let cargo = bench::variable("CARGO").unwrap_or_else(|| "cargo".into());
     let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.toml");
     let output = Command::new(cargo)
         .args(["build", "--release", "--locked", "-p", "pgs", "--message-format=json"])

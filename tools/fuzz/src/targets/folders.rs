@@ -78,7 +78,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
 
     let open = |path: &Path| {
         let found = files.iter().find(|array| path.ends_with(array.name));
-        let found = found.ok_or(Problem::NotAFile)?;
+        let found = found.ok_or(Problem::NotAFile("nothing"))?;
         Ok((Cursor::new(&found.file[..]), found.file.len() as u64))
     };
     let mut tally = Tally::default();
@@ -163,13 +163,16 @@ fn check(folder: &Folder, files: &[Array]) {
 }
 
 /// Words of a header, in the right and in the wrong place.
-const WORDS: [&[u8]; 12] = [
+const WORDS: [&[u8]; 15] = [
     b"{",
     b"}",
     b"(",
     b")",
     b",",
     b"'descr': '<f4'",
+    b"'descr': [('x', '<f4')]",
+    b"'shape': (0,)",
+    b"\x03\x00",
     b"'<u4'",
     b"True",
     b"'shape': (",

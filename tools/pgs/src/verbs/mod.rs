@@ -43,22 +43,28 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
 
 /// A step's report for programs.
 fn report_json(report: &StepReport) -> Value {
-    let StepReport { cycles, host, .. } = report;
+    let StepReport { cycles, host, saturated, .. } = report;
+    // What is not known is null; the key beside it says why.
+    let known = |saturated: bool, count: u64| (!saturated).then_some(count);
     json!({
         "bodies": report.bodies,
         "collisions": report.collisions,
         "order": crate::ordering::to_json(report),
         "passes": report.passes,
         "impulse_sum_n_s": report.impulse_sum,
+        "impulse_sum_saturated": saturated.impulse_sum,
         "cycles": {
             "total": cycles.total,
-            "formula": cycles.work,
-            "stalls": cycles.stalls,
-            "waits": cycles.waits,
+            "formula": known(saturated.work, cycles.work),
+            "formula_saturated": saturated.work,
+            "stalls": known(saturated.stalls(), cycles.stalls),
+            "waits": known(saturated.waits, cycles.waits),
+            "waits_saturated": saturated.waits,
         },
         "modelled_ms": run::milliseconds(report.modelled_time()),
         "limit": run::limit_text(report.limit()),
-        "hazards": report.hazards,
+        "hazards": known(saturated.hazards, report.hazards),
+        "hazards_saturated": saturated.hazards,
         "bytes_to_device": report.bytes_to_device,
         "bytes_from_device": report.bytes_from_device,
         "register_reads": report.register_reads,

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use zynq_pgs::{Limit, StepParameters, StepReport};
 
 use super::SCHEMA;
-use super::table::{Column, grouped, heading, line};
+use super::table::{Bound, Column, grouped, heading, line};
 use crate::args::CommonArgs;
 use crate::board::{self, Opened};
 use crate::diagnosis::FaultArgs;
@@ -99,22 +99,26 @@ impl Row {
     }
 
     fn cells(&self) -> [String; 18] {
-        let StepReport { cycles, host, .. } = &self.report;
-        let impulses = self.report.impulse_sum;
+        let StepReport { cycles, host, saturated, .. } = &self.report;
+        let impulses = match self.report.impulse_sum {
+            Some(sum) => format!("{sum:.1}"),
+            None if saturated.impulse_sum => Bound::AtLeast.short(StepReport::IMPULSE_SUM_MAX),
+            None => "-".to_owned(),
+        };
         [
             self.step.to_string(),
             grouped(self.report.collisions),
             grouped(self.ground_pairs as u64),
             grouped(self.report.empty),
-            impulses.map_or_else(|| "-".to_owned(), |sum| format!("{sum:.1}")),
+            impulses,
             format!("{:.3}", self.kinetic_energy / 1e3),
-            grouped(cycles.work),
-            grouped(cycles.stalls),
-            grouped(cycles.waits),
+            Bound::AtLeast.cell(saturated.work, cycles.work),
+            Bound::AtMost.cell(saturated.stalls(), cycles.stalls),
+            Bound::AtLeast.cell(saturated.waits, cycles.waits),
             format!("{:.3}", milliseconds(self.report.modelled_time())),
             format!("{:.1}", self.bytes() as f64 / 1e6),
             limit_text(self.report.limit()).to_owned(),
-            grouped(self.report.hazards),
+            Bound::AtLeast.cell(saturated.hazards, self.report.hazards),
             format!("{:.1}", milliseconds(self.detect)),
             format!("{:.1}", milliseconds(host.order)),
             format!("{:.1}", milliseconds(host.validate + host.pack)),
@@ -142,6 +146,7 @@ pub(super) fn limit_text(limit: Limit) -> &'static str {
         Limit::Pipeline => "pipeline",
         Limit::Hazards => "hazards",
         Limit::Streams => "streams",
+        Limit::Unknown => "unknown",
         _ => "other",
     }
 }

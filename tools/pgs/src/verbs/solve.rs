@@ -10,7 +10,7 @@ use zynq_pgs::{Body, StepParameters, StepReport};
 
 use super::SCHEMA;
 use super::run::{limit_text, milliseconds};
-use super::table::grouped;
+use super::table::{Bound, grouped};
 use crate::args::CommonArgs;
 use crate::board;
 use crate::compare::{self, Difference};
@@ -36,10 +36,33 @@ Examples:
   pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
   pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
 
-The folder holds one .npy array a property: params (8) and iterations (2); body_pos, body_linvel,
-body_angvel, body_inv_inertia (N, 3), body_quat (N, 4), body_inv_mass (N); contact_bodies (M, 2),
-contact_npoints (M), contact_normal (M, 3), contact_points (M, 4, 4). Types are <f4, and <u4 for
-iterations, contact_bodies and contact_npoints.";
+The folder holds one .npy array a property, in C order; metres, kilograms, seconds, radians, world frame:
+
+  params            (8) <f4        time step, position drift, position coefficient, friction, angular
+                                   damping, gravity x, y, z
+  iterations        (2) <u4        contact, friction
+  body_pos          (N, 3) <f4     centre of mass
+  body_quat         (N, 4) <f4     orientation, a unit quaternion in the order x, y, z, w
+  body_linvel       (N, 3) <f4     velocity of the centre of mass
+  body_angvel       (N, 3) <f4     angular velocity about world axes
+  body_inv_mass     (N) <f4        1/mass; 0 is a static body, whose velocities and inverse inertia are 0
+  body_inv_inertia  (N, 3) <f4     inverse inertia about the body's own axes x, y, z
+  contact_bodies    (M, 2) <u4     indices of bodies A and B, from 0
+  contact_npoints   (M) <u4        contact points of each collision, 1 to 4
+  contact_normal    (M, 3) <f4     unit normal, which points from B to A
+  contact_points    (M, 4, 4) <f4  x, y, z of a point on B's surface, and its signed distance d from A,
+                                   whose surface is at point + d * normal: negative is penetration.
+                                   Of the four only the first contact_npoints are read
+
+A step needs at least one body. One without collisions has contact arrays of M = 0; an array without rows may
+also have shape (0,) and any type, as numpy.array([]) has. With position drift 0 and a position coefficient
+equal to the time step a distance is a velocity in m/s: the point is pushed apart at least as fast as a negative
+one says, and may approach as fast as a positive one says.
+
+--no-integrate leaves the rest of a step to whoever calls: forces and gravity, damping, gyroscopic terms,
+motion. Poses come back as they were.
+
+--out replaces earlier results together: where one cannot be written all stay as they were.";
 
 /// Take one step from a folder of arrays.
 #[derive(Debug, Clone, Args)]
@@ -114,9 +137,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let mut folder = Folder::load(&args.folder).map_err(|error| {
-        Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
-    })?;
+    let mut folder = origin::load(&args.folder)?;
     let parameters = args.parameters(&folder.parameters);
     let expected = match args.compare {
         true => expected(&folder, &parameters)?,
@@ -145,7 +166,12 @@ pub(crate) fn run(
         Err(error) => return Err(args.faults.failure(&opened, &parameters, error)),
     };
     if let Some(path) = &args.out {
-        folder::write_results(path, &bodies).map_err(Failure::input)?;
+        folder::write_results(path, &bodies).map_err(|error| {
+            Failure::input(error).next(format!(
+                "make room, or give another folder with --out; {} is as it was before",
+                path.display()
+            ))
+        })?;
     }
 
     let solved = Solved {
@@ -222,9 +248,7 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
     let path = folder.path.join(name);
     let size = |n: u32| usize::try_from(n).unwrap_or(usize::MAX);
     let shape = Dimensions(vec![Some(size(passes)), Some(n), Some(6)]);
-    let (_, mut values) = npy::read::<f32>(&path, &shape).map_err(Failure::input)?;
-    values.drain(..(size(pass) - 1) * n * 6);
-    values.truncate(n * 6);
+    let values = npy::read_row::<f32>(&path, &shape, size(pass) - 1).map_err(Failure::input)?;
     compare::check(&path, &values).map_err(Failure::input)?;
     let velocities =
         Expected { name: format!("{name}[{}]", pass - 1), values, kind: Kind::Velocities };
@@ -273,6 +297,7 @@ impl Solved {
 
     fn print(&self, out: &mut dyn Write) -> std::io::Result<()> {
         let report = &self.report;
+        let saturated = report.saturated;
         writeln!(
             out,
             "step       {} bodies, {} collisions, {} contact and {} friction iterations, {}",
@@ -287,9 +312,9 @@ impl Solved {
             out,
             "cycles     {} = {} by formula + {} stalls + {} waits; {:.3} ms modelled, limit: {}",
             grouped(report.cycles.total),
-            grouped(report.cycles.work),
-            grouped(report.cycles.stalls),
-            grouped(report.cycles.waits),
+            Bound::AtLeast.words(saturated.work, report.cycles.work),
+            Bound::AtMost.words(saturated.stalls(), report.cycles.stalls),
+            Bound::AtLeast.words(saturated.waits, report.cycles.waits),
             milliseconds(report.modelled_time()),
             limit_text(report.limit()),
         )?;
@@ -302,12 +327,19 @@ impl Solved {
         )?;
         writeln!(
             out,
-            "hazards    {} ({:.1} % of the collisions of a pass)",
-            grouped(report.hazards),
+            "hazards    {} ({}{:.1} % of the collisions of a pass)",
+            Bound::AtLeast.words(saturated.hazards, report.hazards),
+            if saturated.hazards { "at least " } else { "" },
             self.hazard_share() * 100.0,
         )?;
-        if let Some(sum) = report.impulse_sum {
-            writeln!(out, "impulses   {sum:.3} N s")?;
+        match report.impulse_sum {
+            Some(sum) => writeln!(out, "impulses   {sum:.3} N s")?,
+            None if saturated.impulse_sum => {
+                #[allow(clippy::cast_possible_truncation, reason = "a whole number, 2^44")]
+                let most = StepReport::IMPULSE_SUM_MAX as u64;
+                writeln!(out, "impulses   {} N s", Bound::AtLeast.words(true, most))?;
+            }
+            None => {}
         }
         if report.retries > 0 {
             writeln!(out, "retries    {}", report.retries)?;
@@ -350,7 +382,7 @@ impl Solved {
                 "integrate": self.parameters.integrate,
             },
             "step": super::report_json(&self.report),
-            "hazard_share": self.hazard_share(),
+            "hazard_share": (!self.report.saturated.hazards).then(|| self.hazard_share()),
             "kinetic_energy_before_j": self.energy[0],
             "kinetic_energy_j": self.energy[1],
             "digest": { "algorithm": digest::ALGORITHM, "value": self.digest },

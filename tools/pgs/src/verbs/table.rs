@@ -56,6 +56,39 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
+/// On which side a number is known that a saturated counter has to do with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Bound {
+    AtLeast,
+    AtMost,
+}
+
+impl Bound {
+    /// A count that is exact unless a counter is saturated, in words.
+    pub(super) fn words(self, saturated: bool, count: u64) -> String {
+        let count = grouped(count);
+        match (saturated, self) {
+            (false, _) => count,
+            (true, Self::AtLeast) => format!("at least {count}"),
+            (true, Self::AtMost) => format!("at most {count}"),
+        }
+    }
+
+    /// The same in few characters.
+    pub(super) fn cell(self, saturated: bool, count: u64) -> String {
+        if saturated { self.short(count as f64) } else { grouped(count) }
+    }
+
+    /// A bound in three digits; rounded so that it is true.
+    pub(super) fn short(self, bound: f64) -> String {
+        let unit = 10_f64.powf(bound.max(1.0).log10().floor() - 2.0);
+        match self {
+            Self::AtLeast => format!(">={:.2e}", (bound / unit).floor() * unit),
+            Self::AtMost => format!("<={:.2e}", (bound / unit).ceil() * unit),
+        }
+    }
+}
+
 /// A number with its sign.
 pub(super) fn signed(value: f64) -> String {
     if value > 0.0 { format!("+{}", number(value)) } else { number(value) }
@@ -71,6 +104,19 @@ mod tests {
         assert_eq!(grouped(999), "999");
         assert_eq!(grouped(1000), "1,000");
         assert_eq!(grouped(2_066_270), "2,066,270");
+    }
+
+    #[test]
+    fn bounds_are_rounded_to_the_side_on_which_they_are_true() {
+        let most = u64::from(u32::MAX);
+        assert_eq!(Bound::AtLeast.words(true, most), "at least 4,294,967,295");
+        assert_eq!(Bound::AtMost.words(true, 7), "at most 7");
+        assert_eq!(Bound::AtMost.words(false, 1234), "1,234");
+        assert_eq!(Bound::AtLeast.cell(true, most), ">=4.29e9");
+        assert_eq!(Bound::AtMost.cell(true, most), "<=4.30e9");
+        assert_eq!(Bound::AtMost.cell(true, 0), "<=0.00e0");
+        assert_eq!(Bound::AtLeast.cell(false, 1234), "1,234");
+        assert_eq!(Bound::AtLeast.short(17_592_186_044_416.0), ">=1.75e13");
     }
 
     #[test]

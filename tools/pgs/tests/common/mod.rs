@@ -12,11 +12,17 @@ use tempfile::TempDir;
 /// Where the data of the golden arrays begins: `.npy` pads its header to 128 bytes here.
 pub(crate) const DATA: usize = 128;
 
+/// A variable of the environment; one that is blank counts as unset.
+pub(crate) fn variable(name: &str) -> Option<String> {
+    let text = std::env::var_os(name)?.into_string().expect("a variable in UTF-8");
+    Some(text).filter(|text| !text.trim().is_empty())
+}
+
 /// The command, on the emulated board and with errors only in its log.
 ///
 /// A command built for another processor is started by the program that `PGS_TEST_RUNNER` names.
 pub(crate) fn pgs() -> Command {
-    let runner = std::env::var("PGS_TEST_RUNNER").unwrap_or_default();
+    let runner = variable("PGS_TEST_RUNNER").unwrap_or_default();
     let mut words = runner.split_whitespace().chain([env!("CARGO_BIN_EXE_pgs")]);
     let mut command = Command::new(words.next().expect("at least the command itself"));
     command.args(words);

@@ -19,10 +19,10 @@ use super::run::progress_bar;
 use crate::args::{BoardName, CommonArgs};
 use crate::deviation::StateDeviation;
 use crate::failure::{Failure, Verdict};
-use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::{BuildArgs, DeadlineArgs};
 use crate::ordering::{OrderName, OrderingArgs};
+use crate::origin;
 use crate::scenes::SceneArgs;
 
 const EXAMPLES: &str = "\
@@ -181,12 +181,7 @@ pub(crate) fn run(
         let error = "`pgs compare` builds both boards itself, a real one is as its bitstream is";
         return Err(Failure::input(error).next("leave out --board (and PGS_BOARD)"));
     }
-    let folder = args.input.as_ref().map(|path| {
-        Folder::load(path).map_err(|error| {
-            Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
-        })
-    });
-    let folder = folder.transpose()?;
+    let folder = args.input.as_deref().map(origin::load).transpose()?;
     let parameters = match &folder {
         Some(folder) => folder.parameters,
         None => StepParameters::default(),

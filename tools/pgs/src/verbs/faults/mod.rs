@@ -21,6 +21,7 @@ use self::trial::{Bench, Verified};
 use super::SCHEMA;
 use super::run::progress_bar;
 use crate::args::CommonArgs;
+use crate::environment;
 use crate::failure::{Failure, Verdict};
 
 const EXAMPLES: &str = "\
@@ -61,7 +62,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    if std::env::var_os("RUST_LOG").is_none() {
+    if environment::variable(environment::LOG).is_none() {
         // Thousands of faults, and the driver warns of each.
         log::set_max_level(log::LevelFilter::Off);
     }

@@ -21,6 +21,7 @@ use crate::failure::{Failure, Verdict};
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::{BuildArgs, DeadlineArgs};
+use crate::origin;
 use crate::scenes::SceneArgs;
 use crate::sixteen::Sixteen;
 
@@ -70,10 +71,7 @@ pub(crate) fn run(
 ) -> Result<Verdict, Failure> {
     let Step { bodies, shapes, collisions } = match &args.input {
         Some(path) => {
-            let folder = Folder::load(path).map_err(|error| {
-                Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
-            })?;
-            let Folder { bodies, shapes, collisions, .. } = folder;
+            let Folder { bodies, shapes, collisions, .. } = origin::load(path)?;
             Step { bodies, shapes, collisions }
         }
         None => match stepped(args, common)? {

@@ -4,9 +4,10 @@
 //! orders differ by two powers of ten.
 
 use std::fmt::Write as _;
-use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use step_folder::replace::replace;
 use zynq_pgs::order::{IssueWindow, live_curve};
 
 use super::rows::Measured;
@@ -52,8 +53,8 @@ pub(super) fn write(
         Some(true) => picture(&curves, window),
         _ => table(&curves),
     };
-    fs::write(path, text).map_err(|error| {
-        Failure::new(Cause::Output, error).next(format!("could not write {}", path.display()))
+    replace(path, |file| file.write_all(text.as_bytes())).map_err(|error| {
+        Failure::new(Cause::Output, error).next("make room, or give another file with --curve")
     })
 }
 

@@ -13,6 +13,7 @@ use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::npy::{self, Dimensions};
 use crate::options::BuildArgs;
+use crate::origin;
 
 /// The order in which Bullet's GPU takes the collisions, if the folder has it.
 const GPU_ORDER: &str = "gpu_order.npy";
@@ -58,9 +59,7 @@ impl Source {
     }
 
     fn folder(path: &Path) -> Result<Self, Failure> {
-        let folder = Folder::load(path).map_err(|error| {
-            Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
-        })?;
+        let folder = origin::load(path)?;
         let gpu_order = gpu_order(&path.join(GPU_ORDER), folder.collisions.len())?;
         let Folder { bodies, collisions, shapes, .. } = folder;
         Ok(Self::new(path.display().to_string(), &bodies, &collisions, &shapes, gpu_order))
@@ -68,6 +67,15 @@ impl Source {
 
     /// Cubes, after some steps on the board.
     fn grid(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
+        let bodies = u64::from(args.grid.cubes()) + 1;
+        if bodies > npy::ROWS_MAX as u64 {
+            let error = format!(
+                "a grid of {} is {bodies} bodies with the ground, no board takes more than {}",
+                args.grid,
+                npy::ROWS_MAX
+            );
+            return Err(Failure::input(error).next("give a smaller --grid"));
+        }
         let options = SceneOptions { grid: args.grid, drop: args.drop, ..Default::default() };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         if args.steps > 0 {
@@ -110,7 +118,8 @@ impl Source {
 
 /// A permutation of `count` collisions, if there is such a file.
 fn gpu_order(path: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure> {
-    if !path.exists() {
+    // A name that cannot be looked up is told when the file is opened.
+    if matches!(path.try_exists(), Ok(false)) {
         return Ok(None);
     }
     let shape = Dimensions(vec![Some(count)]);

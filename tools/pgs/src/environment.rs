@@ -1,0 +1,38 @@
+//! Reads environment variables; one that is blank counts as unset.
+
+use std::ffi::OsString;
+
+/// The variable that names the board.
+pub(crate) const BOARD: &str = "PGS_BOARD";
+/// The variable that names the DMA memory.
+pub(crate) const MEMORY: &str = "PGS_MEMORY";
+/// The variable that says what is logged.
+pub(crate) const LOG: &str = "RUST_LOG";
+/// The variable that says whether the log has colours.
+pub(crate) const LOG_STYLE: &str = "RUST_LOG_STYLE";
+
+/// The text of a variable of this process.
+pub(crate) fn variable(name: &str) -> Option<OsString> {
+    std::env::var_os(name).filter(|text| !is_blank(text))
+}
+
+/// Whether a text holds nothing but white space.
+pub(crate) fn is_blank(text: &OsString) -> bool {
+    text.to_str().is_some_and(|text| text.trim().is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::ffi::OsStringExt;
+
+    #[test]
+    fn white_space_is_blank_and_what_is_no_text_is_not() {
+        for (text, blank) in
+            [("", true), (" ", true), ("\t\n ", true), ("x", false), (" x ", false)]
+        {
+            assert_eq!(is_blank(&text.into()), blank, "{text:?}");
+        }
+        assert!(!is_blank(&OsString::from_vec(vec![b' ', 0xFF])));
+    }
+}
