@@ -54,8 +54,8 @@ pub const DDR_LOW: core::ops::Range<u64> = 0..0x8000_0000;
 /// Where high DDR begins and ends on the ZCU102: the other 2 GiB of its 4.
 pub const DDR_HIGH: core::ops::Range<u64> = 0x8_0000_0000..0x8_8000_0000;
 
-/// Where the processors reach the programmable logic: M_AXI_HPM0_LPD, then M_AXI_HPM0_FPD and
-/// M_AXI_HPM1_FPD below 4 GiB, the 8 GiB that both share, and the upper window of each (UG1085).
+/// Where the processors reach the programmable logic: `M_AXI_HPM0_LPD`, then `M_AXI_HPM0_FPD` and
+/// `M_AXI_HPM1_FPD` below 4 GiB, the 8 GiB that both share, and the upper window of each (UG1085).
 pub const LOGIC_WINDOWS: [core::ops::Range<u64>; 6] = [
     0x8000_0000..0xA000_0000,
     0xA000_0000..0xB000_0000,
