@@ -219,14 +219,14 @@ mod tests {
     #[test]
     fn a_node_is_recognised_by_its_regions_whatever_its_name() {
         let part = |regions: &[fake::Map<'_>]| {
-            let map = |(index, (name, address, bytes)): (usize, &fake::Map<'_>)| UioMap {
-                index: index as u32,
+            let map = |(index, (name, address, bytes)): (u32, &fake::Map<'_>)| UioMap {
+                index,
                 name: (*name).to_owned(),
                 address: *address,
                 bytes: *bytes,
                 offset: 0,
             };
-            let maps = regions.iter().enumerate().map(map).collect();
+            let maps = (0..).zip(regions).map(map).collect();
             let node = UioNode { device: "uio7".to_owned(), name: "a@b".to_owned(), maps };
             (node.is_in_logic(), node.part())
         };

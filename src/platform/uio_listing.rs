@@ -95,7 +95,7 @@ impl UioListing {
         };
         match self.nodes.iter().find(like) {
             Some(UioNode { device, name, .. }) => {
-                format!("{none}, but {device} {name:?} has its regions; `pgs list` says more")
+                format!("{none}, but {device} {name:?} has its regions")
             }
             None => none,
         }
