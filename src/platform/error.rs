@@ -132,9 +132,7 @@ pub enum PlatformError {
     /// The programmable logic is not programmed, or the kernel does not know that it is.
     #[error(
         "no bitstream is loaded as far as the kernel knows: expected \"operating\" in {}, found \
-         {found:?}; refusing to touch the programmable logic: load one, for example with `pgs \
-         load`; if it was loaded past the kernel, as by JTAG, say so with --manager none \
-         (`OpenOptions::manager`)",
+         {found:?}; refusing to touch the programmable logic",
         path.display()
     )]
     NoBitstream {
@@ -145,7 +143,7 @@ pub enum PlatformError {
     },
     /// There is no such FPGA manager.
     #[error(
-        "no FPGA manager {wanted:?} (found: {}): name one of those",
+        "no FPGA manager {wanted:?} (found: {})",
         if found.is_empty() { "none" } else { found }
     )]
     NoManager {
@@ -155,10 +153,7 @@ pub enum PlatformError {
         found: String,
     },
     /// Several FPGA managers may be the logic's own.
-    #[error(
-        "several FPGA managers are named as the ZynqMP's own (found: {found}): name the one of \
-         this logic with --manager, as fpga1 (`OpenOptions::manager`)"
-    )]
+    #[error("several FPGA managers are named as the ZynqMP's own (found: {found})")]
     SeveralManagers {
         /// Those that there are, with their names.
         found: String,

@@ -1,4 +1,4 @@
-//! Says what to do about what the kernel refuses, by its error number.
+//! Says what to do next, by the error number or the state that the kernel gives.
 
 use std::io;
 use std::path::Path;
@@ -21,12 +21,40 @@ impl PlatformError {
                  device (docker run --device {})",
                 path.display()
             )),
+            Self::NoBitstream { found, .. } => Some(of_state(found)),
+            Self::NoManager { .. } => Some(format!("name one that is there {MANAGER}")),
+            Self::SeveralManagers { .. } => {
+                Some(format!("name the one that programs this logic {MANAGER}"))
+            }
+            Self::OtherManagers { .. } => Some(format!(
+                "if one of them programs this logic, name it {MANAGER}; if the logic is known to be \
+                 programmed, --manager none"
+            )),
             Self::DevMemRefused { source, .. } => Some(of_dev_mem(source)),
             Self::NoMaintenance { path, source } => Some(of_maintenance(path, source)),
             Self::SyncMode { path, source, .. } => Some(of_mode(path, source)),
             _ => None,
         }
     }
+}
+
+/// How an FPGA manager is named.
+const MANAGER: &str =
+    "with --manager, as fpga1 (`OpenOptions::manager`); `pgs list` shows them with their states";
+
+/// The kernel says that the logic does not run.
+fn of_state(state: &str) -> String {
+    match state {
+        // What was loaded past the kernel leaves its state as it was.
+        "unknown" | "power off" | "power up" => {
+            "load a bitstream, for example with `pgs load`; if one was loaded past the kernel, as by \
+             JTAG, say so with --manager none (`OpenOptions::manager`): an access to logic that is \
+             not programmed hangs the processor"
+        }
+        _ => "the last attempt to load has failed, or is not over: see dmesg | tail, then load again \
+              with `pgs load`",
+    }
+    .to_owned()
 }
 
 /// The error number, if the kernel gave one.
@@ -202,6 +230,16 @@ mod tests {
             let next = next(&mode(errno));
             assert!(next.contains(text) && next.contains("sync-mode = <2>"), "{errno}: {next}");
         }
+    }
+
+    #[test]
+    fn logic_that_does_not_run_is_loaded_or_known_to_run() {
+        let state = |found: &str| {
+            next(&PlatformError::NoBitstream { path: "state".into(), found: found.to_owned() })
+        };
+        assert!(state("unknown").contains("JTAG") && state("unknown").contains("--manager none"));
+        assert!(state("write error").contains("dmesg"), "{}", state("write error"));
+        assert!(!state("write error").contains("--manager"), "{}", state("write error"));
     }
 
     #[test]

@@ -163,11 +163,6 @@ impl LoadError {
             }
             Self::Attribute { source, .. } => attribute(source).to_owned(),
             Self::Copy { path, bytes, source } => copy(path, *bytes, source),
-            Self::Platform(
-                PlatformError::NoManager { .. }
-                | PlatformError::SeveralManagers { .. }
-                | PlatformError::OtherManagers { .. },
-            ) => "name it, as --manager fpga1; `pgs list` shows them with their states".to_owned(),
             Self::Platform(error) => error.next_step().unwrap_or_else(|| {
                 "see what there is with `pgs list`, then run the command again".to_owned()
             }),

@@ -144,7 +144,12 @@ fn the_bitstream_goes_to_the_logics_own_manager_by_its_name() {
 
     add_manager(&kernel, 0, OWN);
     let error = kernel.load(&kernel.installed(), false).expect_err("which?");
-    assert_refused(&kernel, &error, "name the one of this logic with --manager", "pgs list");
+    assert_refused(
+        &kernel,
+        &error,
+        "several FPGA managers",
+        "name the one that programs this logic with --manager",
+    );
     let to = |manager| Request { manager, ..request(&kernel.installed()) };
     let named = to(ManagerChoice::Device("fpga0".to_owned()));
     assert_eq!(load(&kernel, &named).expect("named").manager, "fpga0");
