@@ -21,8 +21,7 @@ Examples:
   pgs check --board emulated --quirk stale     see what a failure looks like
 
 Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
-3 if there is no board. The emulated board is tested only if --board emulated (or PGS_BOARD=emulated)
-asks for it.";
+3 if there is no board. The emulated board is tested only if --board or PGS_BOARD asks for it.";
 
 /// Test a board: identity, reset, DMA, data both ways, coherency, interrupt; what to do if it fails.
 #[derive(Debug, Clone, Args)]
