@@ -82,6 +82,16 @@ impl Error {
         matches!(self, Self::Step { aftermath: Aftermath::Ready, .. })
     }
 
+    /// What to do about a board that cannot be opened, where that depends on the kernel's answer and
+    /// is not in the messages.
+    #[must_use]
+    pub fn next_step(&self) -> Option<String> {
+        match self {
+            Self::Open(OpenError::Platform(error)) => error.next_step(),
+            _ => None,
+        }
+    }
+
     /// Whether the board must be opened again first.
     #[must_use]
     pub fn must_reopen(&self) -> bool {
@@ -95,12 +105,12 @@ impl Error {
 pub enum OpenError {
     /// There is no node, and no emulated board to fall back to.
     #[error(
-        "no UIO node named {wanted:?}, and this build has no emulated board: load the overlay, or \
-         build with the feature `emulation`"
+        "{reason}, and this build has no emulated board: load the overlay, or build with the \
+         feature `emulation`"
     )]
     NoEmulation {
-        /// The name that was looked for.
-        wanted: String,
+        /// What there is.
+        reason: String,
     },
     /// Memory was chosen for an emulated board.
     #[error("an emulated board has memory of its own: leave out the choice of memory")]

@@ -159,8 +159,8 @@ pub use bitstream_model::interface;
 pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use error::{Aftermath, Error, OpenError};
 pub use platform::{
-    AccessKind, Caching, DevMemWindows, MemoryChoice, PlatformError, RegisterAccess, UIO_CLASS,
-    UioMap, UioNode, uio_nodes,
+    AccessKind, Caching, DevMemWindows, ManagerChoice, MemoryChoice, PlatformError, RegisterAccess,
+    UIO_CLASS, UioMap, UioNode, uio_nodes,
 };
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Carriers, Collision, CollisionArrays, Collisions,

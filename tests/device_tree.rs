@@ -1,5 +1,5 @@
-//! The device trees say what the interface says: regions, sizes, names, interrupt; buffers lie
-//! where every DMA core reaches them; the udev rule names every node and gives nobody else rights.
+//! The device trees say what the interface says: regions, sizes, names, interrupt, clock, ports; buffers
+//! lie where every DMA core reaches them; the udev rule names every node and gives nobody else rights.
 
 #[path = "device_tree/mod.rs"]
 mod device_tree;
@@ -9,6 +9,7 @@ use std::fs;
 
 use device_tree::{Tree, sources, tools_found};
 use zynq_pgs::interface::address_map;
+use zynq_pgs::interface::profile::{FLOAT, PROFILES, Profile};
 
 /// GIC, in device tree bindings: shared peripheral interrupt, and level, active high.
 const SPI: u32 = 0;
@@ -64,6 +65,38 @@ fn check_node(
     equal(node, "interrupt-parent", tree.cells(node, "interrupt-parent"), expected)
 }
 
+/// Number of the PL clock 0 in the bindings of the chip's clock controller, `PL0_REF`.
+const PL0_REF: u32 = 71;
+/// Registers of the memory ports' widths, and what is 128 bits in them.
+const PORT_REGISTERS: std::ops::Range<u32> = 0..14;
+const PORT_128: u32 = 0;
+/// The register of the widths of `M_AXI_HPM0_FPD` and `M_AXI_HPM1_FPD`, and both of 128 bits.
+const FPD_REGISTER: u32 = 14;
+const FPD_128: u32 = 2 << 8 | 2 << 10;
+/// The profile of which the overlays are.
+const PROFILE: &Profile = &FLOAT;
+
+/// Holds the clock and the ports of an overlay against the profile.
+fn check_fabric(tree: &Tree, parent: &str) -> Result<(), String> {
+    let node = format!("{parent}/pgs-clock");
+    let compatible = |node: &str| tree.strings(node, "compatible").unwrap_or_default().concat();
+    equal(&node, "compatible", compatible(&node), "xlnx,fclk".to_owned())?;
+    let controller = tree.strings("/__symbols__", "zynqmp_clk").unwrap_or_default().concat();
+    let phandle = tree.cells(&controller, "phandle").unwrap_or_default();
+    let clock = [phandle, vec![PL0_REF]].concat();
+    for property in ["clocks", "assigned-clocks"] {
+        equal(&node, property, tree.cells(&node, property), Some(clock.clone()))?;
+    }
+    let rate = Some(vec![PROFILE.clock_khz * 1000]);
+    equal(&node, "rate", tree.cells(&node, "assigned-clock-rates"), rate)?;
+
+    let node = format!("{parent}/pgs-ports");
+    equal(&node, "compatible", compatible(&node), "xlnx,afi-fpga".to_owned())?;
+    let ports = PORT_REGISTERS.flat_map(|register| [register, PORT_128]);
+    let expected: Vec<_> = ports.chain([FPD_REGISTER, FPD_128]).collect();
+    equal(&node, "config-afi", tree.cells(&node, "config-afi"), Some(expected))
+}
+
 fn check_single(tree: &Tree, parent: &str) -> Result<(), String> {
     let node = format!("{parent}/{}@{:x}", address_map::UIO_NODE, address_map::DMA_BASE);
     check_node(tree, &node, address_map::UIO_NODE, &interface(), true)
@@ -109,6 +142,44 @@ fn the_separate_nodes_have_the_regions_and_control_has_the_interrupt() {
     }
     check_separate(&Tree::with_overlay("zynq-pgs-nodes.dtso", as_shipped))
         .expect("as the interface");
+}
+
+#[test]
+fn every_overlay_keeps_the_clock_at_the_profiles_rate_and_sets_the_ports_to_128_bits() {
+    if !tools_found() {
+        return;
+    }
+    let widest = PROFILE.mm2s_widths.iter().chain(PROFILE.s2mm_widths).max();
+    assert_eq!(widest, Some(&128), "the ports are as wide as the streams");
+    for (overlay, parent) in
+        [("zynq-pgs.dtso", ""), ("zynq-pgs-region.dtso", "/fpga-full"), ("zynq-pgs-nodes.dtso", "")]
+    {
+        check_fabric(&Tree::with_overlay(overlay, as_shipped), parent)
+            .unwrap_or_else(|error| panic!("{overlay}: {error}"));
+    }
+    for (original, mutant, noticed) in [
+        ("<275000000>", "<250000000>", "rate"),
+        ("clocks = <&zynqmp_clk 71>", "clocks = <&zynqmp_clk 72>", "clocks"),
+        ("<3 0>", "<3 1>", "config-afi"),
+        ("<14 0xa00>", "<14 0x200>", "config-afi"),
+        ("\"xlnx,fclk\"", "\"fixed-clock\"", "compatible"),
+    ] {
+        let mutate = |text: String| text.replace(original, mutant);
+        let error = check_fabric(&Tree::with_overlay("zynq-pgs.dtso", mutate), "")
+            .expect_err("a difference");
+        assert!(error.contains(noticed), "{original} -> {mutant}: {error}");
+    }
+}
+
+#[test]
+fn the_readme_has_the_rate_of_every_profile() {
+    let readme = fs::read_to_string(sources().join("README.md")).expect("the README");
+    for profile in PROFILES {
+        let rate = format!("{}", u64::from(profile.clock_khz) * 1000);
+        let row = readme.lines().find(|line| line.starts_with(&format!("| `{rate}` ")));
+        let row = row.unwrap_or_else(|| panic!("no row for {rate} Hz"));
+        assert!(row.contains(&format!("`{}`", profile.name)), "{}: {row}", profile.name);
+    }
 }
 
 #[test]
@@ -249,7 +320,7 @@ fn the_udev_rule_names_every_node_and_gives_rights_to_the_group_only() {
     let maps = interface().into_iter().map(|(map, _, _)| format!("{node}-{map}"));
     let expected: BTreeSet<_> = maps.chain([node.to_owned(), format!("{node}-memory")]).collect();
     assert_eq!(names(rule_value(uio, "ATTR{name}==").expect("by name")), expected);
-    let buffers = of("u-dma-buf");
+    let buffers = of("u-dma-buf|udmabuf");
     assert_eq!(buffers.len() + 1, rules.len(), "{text}");
     for rule in buffers {
         assert_eq!(rule_value(rule, "KERNEL=="), Some(node), "{rule}");
@@ -280,5 +351,7 @@ fn the_readme_says_of_every_file_what_it_is_for() {
     // No node beside those that the README and the rule know.
     let tree = Tree::with_overlay("zynq-pgs-nodes.dtso", as_shipped);
     let ours = tree.children("/").into_iter().filter(|name| name.starts_with("pgs")).count();
-    assert_eq!(ours, interface().len());
+    let fabric = ["`pgs-clock`", "`pgs-ports`"];
+    assert!(fabric.iter().all(|name| readme.contains(name)), "{fabric:?}");
+    assert_eq!(ours, interface().len() + fabric.len());
 }

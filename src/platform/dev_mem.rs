@@ -19,9 +19,10 @@ use bitstream_model::interface::address_map::{
 
 use super::lock::LockedFile;
 use super::mapped::Mapping;
-use super::sysfs::{read_if_present, read_number};
+use super::sysfs::{is_gone, read_if_present, read_number};
 use super::system::page_bytes;
-use super::{PlatformError, ReservedMemory, System, u_dma_buf_names, uio_nodes};
+use super::u_dma_buf::directory;
+use super::{PlatformError, ReservedMemory, System, u_dma_buf_names, uio_listing};
 
 /// What may be reached through `/dev/mem`. The default is the address map of the interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -126,16 +127,21 @@ fn lock_others(system: &System, windows: &[Range<u64>]) -> Result<Vec<LockedFile
         let shown = start..start.saturating_add(bytes);
         windows.iter().any(|window| overlap(window, &shown))
     };
-    let mut names = Vec::new();
-    for node in uio_nodes(&system.uio)? {
+    let listing = uio_listing(&system.uio)?;
+    // Nobody knows what a node shows that cannot be read.
+    let mut names: Vec<_> = listing.unreadable.into_iter().map(|node| node.device).collect();
+    for node in listing.nodes {
         if node.maps.iter().any(|map| shown(map.address, map.bytes)) {
             names.push(node.device);
         }
     }
     for name in u_dma_buf_names(system) {
-        let buffer = system.u_dma_buf.join(&name);
-        if shown(read_number(&buffer.join("phys_addr"))?, read_number(&buffer.join("size"))?) {
-            names.push(name);
+        let Ok(buffer) = directory(system, &name) else { continue };
+        let number = |attribute| read_number(&buffer.join(attribute));
+        match number("phys_addr").and_then(|start| Ok(shown(start, number("size")?))) {
+            Ok(false) => {}
+            Err(error) if is_gone(&error) => {}
+            Ok(true) | Err(_) => names.push(name),
         }
     }
     let mut locked = Vec::new();
@@ -304,6 +310,24 @@ mod tests {
         assert_eq!(busy(), [""; 0], "a refusal keeps nothing");
         fs::remove_file(system.dev.join("uio1")).expect("removed");
         open(&system, &windows).expect("what cannot be opened is in nobody's hands");
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_kept_too_unless_it_is_gone() {
+        let (_root, system, windows) = memory();
+        add_node(&system, 0, "foreign", &[("registers", 0xFD0B_0000, 0x1000)]);
+        write(system.uio.join("uio0/maps/map0/size"), "large");
+        for name in ["foreign", "leaving"] {
+            write(system.u_dma_buf.join(name).join("size"), "many");
+            write(system.dev.join(name), "");
+        }
+        write(system.u_dma_buf.join("foreign/phys_addr"), "0x60000000");
+        let mem = open(&system, &windows).expect("opened");
+        for (name, kept) in [("uio0", true), ("foreign", true), ("leaving", false)] {
+            let file = LockedFile::open(&system.dev.join(name), 0);
+            assert_eq!(matches!(file, Err(PlatformError::Busy { .. })), kept, "{name}");
+        }
+        drop(mem);
     }
 
     #[test]

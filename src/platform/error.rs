@@ -1,4 +1,7 @@
-//! This file holds why the platform could not do what it was asked for, and what to do about it.
+//! Why the platform could not do what it was asked for.
+//!
+//! A message says what to do, or [`PlatformError::next_step`] does where that depends on the kernel's
+//! answer.
 
 use std::path::PathBuf;
 
@@ -86,6 +89,17 @@ pub enum PlatformError {
         /// The names that there are.
         found: String,
     },
+    /// Several UIO nodes have one name.
+    #[error(
+        "several UIO nodes are named {wanted:?} ({devices}): give each its own `linux,uio-name` in \
+         the device tree, or remove the overlay of the others"
+    )]
+    SeveralNodes {
+        /// The name that was looked for.
+        wanted: String,
+        /// The nodes that have it.
+        devices: String,
+    },
     /// A node lacks a region.
     #[error(
         "UIO node {node:?} has no map named {map:?} (found: {}): is this the accelerator's \
@@ -101,11 +115,7 @@ pub enum PlatformError {
         found: String,
     },
     /// A device file may not be opened.
-    #[error(
-        "no right to open {}: install the udev rule of device-tree/ and join its group, or run \
-         as root",
-        path.display()
-    )]
+    #[error("no right to open {}", path.display())]
     Permission {
         /// Which file.
         path: PathBuf,
@@ -114,21 +124,49 @@ pub enum PlatformError {
         source: std::io::Error,
     },
     /// There is no device file.
-    #[error("there is no device file {}: does udev run, and has the kernel such a device?", path.display())]
+    #[error("there is no device file {}", path.display())]
     NoDevice {
         /// Which file.
         path: PathBuf,
     },
-    /// The programmable logic is not programmed.
+    /// The programmable logic is not programmed, or the kernel does not know that it is.
     #[error(
-        "no bitstream is loaded: expected \"operating\" in {}, found {found:?}; refusing to touch \
-         the programmable logic: load one first, for example with `pgs load`",
+        "no bitstream is loaded as far as the kernel knows: expected \"operating\" in {}, found \
+         {found:?}; refusing to touch the programmable logic",
         path.display()
     )]
     NoBitstream {
         /// Where the kernel says so.
         path: PathBuf,
         /// What it says.
+        found: String,
+    },
+    /// There is no such FPGA manager.
+    #[error(
+        "no FPGA manager {wanted:?} (found: {})",
+        if found.is_empty() { "none" } else { found }
+    )]
+    NoManager {
+        /// The one that was looked for.
+        wanted: String,
+        /// Those that there are, with their names.
+        found: String,
+    },
+    /// Several FPGA managers may be the logic's own.
+    #[error("several FPGA managers are named as the ZynqMP's own (found: {found})")]
+    SeveralManagers {
+        /// Those that there are, with their names.
+        found: String,
+    },
+    /// There are FPGA managers, and none is known to be the logic's own.
+    #[error(
+        "no FPGA manager is named {:?} (found: {found}): if one of those programs this logic, \
+         name it with --manager, as fpga0; if the logic is known to be programmed, --manager none \
+         (`OpenOptions::manager`)",
+        super::ZYNQMP_MANAGER
+    )]
+    OtherManagers {
+        /// Those that there are, with their names.
         found: String,
     },
     /// A UIO node has no interrupt.
@@ -207,8 +245,8 @@ pub enum PlatformError {
     },
     /// A u-dma-buf cannot be mapped as it should be.
     #[error(
-        "u-dma-buf {name:?} has sync_mode {found}, which cannot give {wanted}: write 2 to {} as \
-         root, or set `sync-mode = <2>` in its device-tree node",
+        "u-dma-buf {name:?} has sync_mode {found}, which cannot give {wanted}, and 2 cannot be \
+         written to {}",
         path.display()
     )]
     SyncMode {
@@ -220,6 +258,18 @@ pub enum PlatformError {
         wanted: &'static str,
         /// Where to change it.
         path: PathBuf,
+        /// What the kernel says.
+        #[source]
+        source: std::io::Error,
+    },
+    /// The caches of a u-dma-buf cannot be maintained.
+    #[error("cached DMA buffers need cache maintenance, which {} does not give", path.display())]
+    NoMaintenance {
+        /// The attribute that asks for it.
+        path: PathBuf,
+        /// What the kernel says.
+        #[source]
+        source: std::io::Error,
     },
     /// A u-dma-buf does not keep the mode that was written.
     #[error(

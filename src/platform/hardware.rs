@@ -8,17 +8,16 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use bitstream_model::interface::address_map::{
-    U_DMA_BUF, UIO_CONTROL_MAP, UIO_CONTROL_NODE, UIO_DMA_MAPS, UIO_DMA_NODES, UIO_MEMORY_NODE,
-    UIO_NODE,
+    U_DMA_BUF, UIO_CONTROL_MAP, UIO_DMA_MAPS, UIO_MEMORY_NODE,
 };
 
 use super::dev_mem::{DevMem, DevMemWindows};
 use super::pool::{Pool, Region};
 use super::u_dma_buf::{Caching, UDmaBuf};
-use super::uio::node_named;
+use super::uio_listing::part_name;
 use super::{
-    Access, DmaMemory, Platform, PlatformError, RegisterWindow, ReservedMemory, SharedMemory,
-    System, UioDevice, UioNode, require_bitstream, uio_nodes,
+    Access, DmaMemory, ManagerChoice, Platform, PlatformError, RegisterWindow, ReservedMemory,
+    SharedMemory, System, UioDevice, require_bitstream, uio_listing,
 };
 
 /// Where a real board's memory for DMA comes from.
@@ -65,7 +64,7 @@ enum Registers {
     /// One UIO node carries all regions.
     OneNode(UioDevice),
     /// Each region has a node of its own; absent DMAs have none.
-    Nodes { control: UioDevice, dma: Vec<(usize, UioDevice)> },
+    Nodes { board: String, control: UioDevice, dma: Vec<(usize, UioDevice)> },
     /// Through `/dev/mem`, at these places.
     DevMem(DevMem, DevMemWindows),
 }
@@ -83,7 +82,7 @@ pub(crate) struct HardwarePlatform {
 /// How to reach a real board's registers.
 #[derive(Debug, Clone)]
 pub(crate) enum RegisterChoice {
-    /// One node of that name; for the default name, separate nodes if there is no such one.
+    /// One node of that name, or a node for each region if there is no such one.
     Uio(String),
     /// These windows of `/dev/mem`.
     DevMem(DevMemWindows),
@@ -95,6 +94,7 @@ impl HardwarePlatform {
         system: &System,
         registers: RegisterChoice,
         memory: &MemoryChoice,
+        manager: &ManagerChoice,
     ) -> Result<Self, PlatformError> {
         let window = match (memory, &registers) {
             (MemoryChoice::DevMem { window }, _) => Some(window.clone()),
@@ -111,7 +111,7 @@ impl HardwarePlatform {
                 Registers::DevMem(DevMem::open(system, wanted)?, windows)
             }
         };
-        require_bitstream(system)?;
+        require_bitstream(system, manager)?;
         let region: Box<dyn Region> = match (&registers, window) {
             (Registers::DevMem(mem, _), Some(window)) => Box::new(mem.memory(&window)?),
             (_, Some(window)) => {
@@ -155,29 +155,25 @@ impl HardwarePlatform {
     }
 }
 
-/// Whether there are nodes of a board under this name.
-pub(crate) fn has_nodes(nodes: &[UioNode], name: &str) -> bool {
-    let named = |wanted: &str| nodes.iter().any(|node| node.name == wanted);
-    named(name) || (name == UIO_NODE && named(UIO_CONTROL_NODE))
-}
-
+/// Opens the node of that name, or the nodes `<name>-control`, `<name>-dma0` and so on.
 fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
-    let nodes = uio_nodes(&system.uio)?;
-    let one = nodes.iter().any(|node| node.name == name);
-    if one || !has_nodes(&nodes, name) {
-        let node = node_named(&nodes, name)?;
+    let mut listing = uio_listing(&system.uio)?;
+    let control = part_name(name, UIO_CONTROL_MAP);
+    if listing.has(name) || !listing.has(&control) {
+        let node = listing.node(name)?;
         // What lacks a control block is another device.
         node.map(UIO_CONTROL_MAP)?;
         return Ok(Registers::OneNode(UioDevice::of_node(system, node)?));
     }
-    let control = UioDevice::of_node(system, node_named(&nodes, UIO_CONTROL_NODE)?)?;
+    let control = UioDevice::of_node(system, listing.node(&control)?)?;
     let mut dma = Vec::new();
-    for (core, name) in UIO_DMA_NODES.into_iter().enumerate() {
-        if let Ok(node) = node_named(&nodes, name) {
-            dma.push((core, UioDevice::of_node(system, node)?));
+    for (core, region) in UIO_DMA_MAPS.into_iter().enumerate() {
+        let name = part_name(name, region);
+        if listing.has(&name) {
+            dma.push((core, UioDevice::of_node(system, listing.node(&name)?)?));
         }
     }
-    Ok(Registers::Nodes { control, dma })
+    Ok(Registers::Nodes { board: name.to_owned(), control, dma })
 }
 
 /// Opens memory that does not come from `/dev/mem`. Whichever it is, its device file is locked as
@@ -193,7 +189,7 @@ fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>
         MemoryChoice::UDmaBuf { name, caching } => u_dma_buf(name, *caching),
         MemoryChoice::Uio { node } => uio(node),
         _ if UDmaBuf::exists(system, U_DMA_BUF) => u_dma_buf(U_DMA_BUF, Caching::default()),
-        _ if has_nodes(&uio_nodes(&system.uio)?, UIO_MEMORY_NODE) => uio(UIO_MEMORY_NODE),
+        _ if uio_listing(&system.uio)?.has(UIO_MEMORY_NODE) => uio(UIO_MEMORY_NODE),
         _ => Err(PlatformError::NoMemory { u_dma_buf: U_DMA_BUF, node: UIO_MEMORY_NODE }),
     }
 }
@@ -203,13 +199,13 @@ impl Platform for HardwarePlatform {
         let map = UIO_DMA_MAPS.get(core).copied().unwrap_or_default();
         match &self.registers {
             Registers::OneNode(device) => Ok(device.window(map)?.into()),
-            Registers::Nodes { control, dma } => {
+            Registers::Nodes { board, control, dma } => {
                 let present = dma.iter().find(|(number, _)| *number == core);
                 let (_, device) = present.ok_or_else(|| {
                     let devices = dma.iter().map(|(_, device)| device).chain([control]);
                     let names: Vec<_> = devices.map(|device| device.node().name.as_str()).collect();
                     PlatformError::NoNode {
-                        wanted: UIO_DMA_NODES.get(core).copied().unwrap_or_default().to_owned(),
+                        wanted: part_name(board, &format!("dma{core}")),
                         found: names.join(", "),
                     }
                 })?;

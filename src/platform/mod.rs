@@ -47,6 +47,7 @@ mod lanes;
 mod lock;
 mod mapped;
 mod memory;
+mod next_step;
 mod pool;
 mod prefetch;
 #[cfg(feature = "emulation")]
@@ -58,6 +59,7 @@ mod system;
 mod u_dma_buf;
 mod uio;
 mod uio_device;
+mod uio_listing;
 mod uio_window;
 mod vectors;
 mod wait;
@@ -74,9 +76,11 @@ pub use dev_mem::DevMemWindows;
 pub(crate) use emulated::EmulatedPlatform;
 pub use error::PlatformError;
 pub(crate) use fence::{acquire_from_device, release_to_device};
-pub use fpga::require_bitstream;
+pub use fpga::{
+    FpgaManager, ManagerChoice, ZYNQMP_MANAGER, find_manager, fpga_managers, require_bitstream,
+};
 pub use hardware::MemoryChoice;
-pub(crate) use hardware::{HardwarePlatform, RegisterChoice, has_nodes};
+pub(crate) use hardware::{HardwarePlatform, RegisterChoice};
 pub(crate) use lanes::{Integer, Lanes};
 pub(crate) use memory::{DmaMemory, SharedMemory};
 pub(crate) use prefetch::{
@@ -85,16 +89,17 @@ pub(crate) use prefetch::{
 #[cfg(feature = "emulation")]
 pub(crate) use remote::{RemotePlatform, memory_beside};
 pub use reserved::ReservedMemory;
-pub use system::{System, UIO_CLASS};
-pub use u_dma_buf::{Caching, u_dma_buf_names};
-pub use uio::{UioMap, UioNode, uio_nodes};
+pub use system::{System, UIO_CLASS, try_device};
+pub use u_dma_buf::{Caching, try_u_dma_buf, u_dma_buf_names};
+pub use uio::{NodePart, UioMap, UioNode};
 pub use uio_device::UioDevice;
+pub use uio_listing::{UioListing, UnreadableNode, uio_listing, uio_nodes};
 pub use uio_window::UioWindow;
 pub(crate) use vectors::{Vectors, Work, in_wide_vectors};
 pub(crate) use wait::{Deadline, poll_until};
 pub(crate) use window::{AccessCounts, Decoded, RegisterMap, RegisterWindow, Window, fields};
 #[cfg(test)]
-pub(crate) use {uio::fake as uio_fake, window::fake};
+pub(crate) use {fpga::fake as fpga_fake, uio::fake as uio_fake, window::fake};
 
 /// What the device will do with a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! This file sees to the mode of a u-dma-buf in which its two mappings are what they are meant to be.
+//! Sees to the mode of a u-dma-buf in which its two mappings are what they are meant to be.
 //!
 //! Source: README and source of u-dma-buf 5.
 
@@ -41,8 +41,13 @@ pub(super) fn set_mode(
     if suits {
         return Ok(());
     }
-    let refused =
-        |_| PlatformError::SyncMode { name: name.to_owned(), found, wanted, path: path.clone() };
+    let refused = |source| PlatformError::SyncMode {
+        name: name.to_owned(),
+        found,
+        wanted,
+        path: path.clone(),
+        source,
+    };
     log::info!("u-dma-buf {name:?}: changing sync_mode from {found} to {MODE_WRITE_COMBINING}");
     fs::write(&path, format!("{MODE_WRITE_COMBINING}\n")).map_err(refused)?;
     // A driver may take the write and keep its mode: what is mapped depends on what it kept.

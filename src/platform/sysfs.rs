@@ -4,6 +4,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use nix::errno::Errno;
+
 use super::PlatformError;
 
 /// The entries `<prefix><number>` of a directory, by number; none if there is no such directory.
@@ -57,6 +59,12 @@ pub(super) fn read_number(path: &Path) -> Result<u64, PlatformError> {
         None => text.parse(),
     };
     number.map_err(|_| PlatformError::NotANumber { path: path.to_owned(), found: text })
+}
+
+/// Whether a file is not there any more: removed, or of a device that was.
+pub(super) fn is_gone(error: &PlatformError) -> bool {
+    matches!(error, PlatformError::File { source, .. } if source.kind() == io::ErrorKind::NotFound
+        || source.raw_os_error() == Some(Errno::ENODEV as i32))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! This file takes memory for DMA from the kernel module u-dma-buf.
+//! Takes memory for DMA from the kernel module u-dma-buf, also from before it was renamed.
 //!
 //! The device file is locked, and mapped twice. Buffers: cached, with maintenance by range when they change
 //! hands, or write-combining. Shared words: with `O_SYNC`, which the module maps uncached.
@@ -13,11 +13,14 @@
 //! It carries its range always: the attributes `sync_offset` and `sync_size` are shared by all who
 //! use the buffer.
 //!
-//! Source: README and source of u-dma-buf 5.
+//! Before the module was renamed its class was `udmabuf`, with the same attributes. The oldest versions
+//! take no range, and refuse the number.
+//!
+//! Source: README and source of u-dma-buf 5 and of udmabuf 1.4.
 #![allow(unsafe_code, reason = "beats in mapped memory promise that no others overlap")]
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write as _};
+use std::io::Write as _;
 use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -75,10 +78,7 @@ impl Sync {
             let path = buffer.join(name);
             match OpenOptions::new().write(true).open(&path) {
                 Ok(file) => Ok((path, file)),
-                Err(source) if source.kind() == io::ErrorKind::PermissionDenied => {
-                    Err(PlatformError::Permission { path, source })
-                }
-                Err(source) => Err(PlatformError::File { act: "open", path, source }),
+                Err(source) => Err(PlatformError::NoMaintenance { path, source }),
             }
         };
         Ok(Self { for_device: open("sync_for_device")?, for_cpu: open("sync_for_cpu")? })
@@ -105,17 +105,13 @@ fn synchronize(
     let mut text = [0; 18];
     write!(&mut text[..], "{:#018x}", command(at, bytes, access))
         .and_then(|()| file.write_all_at(&text, 0))
-        .map_err(|source| PlatformError::File {
-            act: "ask for cache maintenance by",
-            path: path.clone(),
-            source,
-        })
+        .map_err(|source| PlatformError::NoMaintenance { path: path.clone(), source })
 }
 
 impl UDmaBuf {
     /// Whether there is a buffer of that name.
     pub(super) fn exists(system: &System, name: &str) -> bool {
-        system.u_dma_buf.join(name).exists()
+        directory(system, name).is_ok()
     }
 
     /// Maps the buffer of that name.
@@ -124,11 +120,7 @@ impl UDmaBuf {
         name: &str,
         caching: Caching,
     ) -> Result<Self, PlatformError> {
-        let buffer = system.u_dma_buf.join(name);
-        if !Self::exists(system, name) {
-            let found = u_dma_buf_names(system).join(", ");
-            return Err(PlatformError::NoUDmaBuf { wanted: name.to_owned(), found });
-        }
+        let buffer = directory(system, name)?;
         let address = read_number(&buffer.join("phys_addr"))?;
         let bytes = read_number(&buffer.join("size"))?;
         let unusable = |reason| PlatformError::UnusableMemory {
@@ -144,8 +136,7 @@ impl UDmaBuf {
             return Err(unusable("it does not begin on a cache line: correct its reservation"));
         }
         let length = usize::try_from(bytes).map_err(|_| unusable("make it smaller"))?;
-        let coherent =
-            read_if_present(&buffer.join("dma_coherent"))?.is_some_and(|text| text == "1");
+        let coherent = is_coherent(&buffer)?;
         // The lock comes first: the mode is for all who map the buffer.
         let path = system.dev.join(name);
         let lock = Arc::new(LockedFile::open(&path, nix::libc::O_SYNC)?);
@@ -165,17 +156,48 @@ impl UDmaBuf {
     }
 }
 
+/// Whether the kernel knows that the device sees the CPU's caches.
+fn is_coherent(buffer: &Path) -> Result<bool, PlatformError> {
+    Ok(read_if_present(&buffer.join("dma_coherent"))?.is_some_and(|text| text == "1"))
+}
+
+/// The attributes of the buffer of that name.
+pub(super) fn directory(system: &System, name: &str) -> Result<PathBuf, PlatformError> {
+    let classes = [&system.u_dma_buf, &system.udmabuf];
+    let found = classes.into_iter().map(|class| class.join(name)).find(|path| path.exists());
+    found.ok_or_else(|| PlatformError::NoUDmaBuf {
+        wanted: name.to_owned(),
+        found: u_dma_buf_names(system).join(", "),
+    })
+}
+
 /// The names of the u-dma-buf buffers that there are.
 #[must_use]
 pub fn u_dma_buf_names(system: &System) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(&system.u_dma_buf)
+    let mut names: Vec<_> = [&system.u_dma_buf, &system.udmabuf]
         .into_iter()
+        .filter_map(|class| fs::read_dir(class).ok())
         .flatten()
         .flatten()
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .collect();
     names.sort_unstable();
+    names.dedup();
     names
+}
+
+/// Tries whether the buffer of that name can be opened, and maintained if it is cached.
+///
+/// # Errors
+/// [`PlatformError::NoMaintenance`] if it can be used with [`Caching::WriteCombining`] only; or
+/// another error if it cannot be used.
+pub fn try_u_dma_buf(system: &System, name: &str) -> Result<(), PlatformError> {
+    let buffer = directory(system, name)?;
+    open_device(&system.dev.join(name), nix::libc::O_SYNC)?;
+    if is_coherent(&buffer)? {
+        return Ok(());
+    }
+    Sync::open(&buffer).map(drop)
 }
 
 impl Region for UDmaBuf {
@@ -365,5 +387,27 @@ mod tests {
         write(system.u_dma_buf.join("pgs/phys_addr"), "0x70000000");
         let error = attribute("size", "65536");
         assert!(error.contains("sync_for_cpu"), "{error}");
+        let error = try_u_dma_buf(&system, "pgs").expect_err("not cached");
+        assert!(matches!(error, PlatformError::NoMaintenance { .. }), "{error}");
+        UDmaBuf::open(&system, "pgs", Caching::WriteCombining).expect("needs no maintenance");
+        write(system.u_dma_buf.join("pgs/dma_coherent"), "1");
+        try_u_dma_buf(&system, "pgs").expect("needs none either");
+        fs::remove_file(system.dev.join("pgs")).expect("removed");
+        let error = try_u_dma_buf(&system, "pgs").expect_err("no file");
+        assert!(matches!(error, PlatformError::NoDevice { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_buffer_of_the_module_before_its_new_name_is_the_same() {
+        let (_root, system) = system("2", "0");
+        fs::rename(&system.u_dma_buf, &system.udmabuf).expect("renamed");
+        assert_eq!(u_dma_buf_names(&system), ["pgs"]);
+        assert!(UDmaBuf::exists(&system, "pgs"));
+        try_u_dma_buf(&system, "pgs").expect("usable");
+        let buffer = UDmaBuf::open(&system, "pgs", Caching::Cached).expect("mapped");
+        let pool = Pool::new(Box::new(buffer));
+        pool.allocate_shared(32).expect("there is room");
+        let command = fs::read_to_string(system.udmabuf.join("pgs/sync_for_cpu")).expect("read");
+        assert_eq!(command.trim(), "0x0000000000000089");
     }
 }

@@ -1,14 +1,16 @@
-//! This file finds UIO nodes by name and says what they have.
+//! Says what a UIO node is: its names, its regions, and which part of the accelerator they are.
 //!
 //! The kernel numbers the nodes as it meets them; what stays is the name (`linux,uio-name` of the
 //! device tree). A node says where its regions lie in `maps/map*/{name,addr,size,offset}`.
 //!
 //! Source: Linux `Documentation/driver-api/uio-howto.rst`.
 
-use std::path::Path;
+use bitstream_model::interface::address_map::{
+    CONTROL_BASE, DMA_COUNT_MAX, MEMORY_BASE, UIO_CONTROL_MAP, UIO_DMA_MAPS, UIO_MEMORY_MAP,
+    dma_base, is_in_logic,
+};
 
 use super::PlatformError;
-use super::sysfs::{numbered, read, read_if_present, read_number};
 
 /// One region of a UIO node.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -63,41 +65,60 @@ impl UioNode {
     }
 }
 
-/// The UIO nodes under `class` (normally [`UIO_CLASS`](super::UIO_CLASS)), by number. A system
-/// without UIO has none.
-///
-/// # Errors
-/// A node whose description cannot be read or is not a number where one belongs; the path is in
-/// the error.
-pub fn uio_nodes(class: &Path) -> Result<Vec<UioNode>, PlatformError> {
-    let mut nodes = Vec::new();
-    for (number, path) in numbered(class, "uio")? {
-        let mut maps = Vec::new();
-        for (index, map) in numbered(&path.join("maps"), "map")? {
-            maps.push(UioMap {
-                index,
-                // The name is younger than the other files and may be absent.
-                name: read_if_present(&map.join("name"))?.unwrap_or_default(),
-                address: read_number(&map.join("addr"))?,
-                bytes: read_number(&map.join("size"))?,
-                offset: read_number(&map.join("offset"))?,
-            });
-        }
-        nodes.push(UioNode {
-            device: format!("uio{number}"),
-            name: read(&path.join("name"))?,
-            maps,
-        });
-    }
-    Ok(nodes)
+/// A part of the accelerator that a node shows by its regions, whatever its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NodePart {
+    /// The control block and DMA cores.
+    Accelerator,
+    /// The same by their addresses; the regions have not the names by which they are found.
+    Unnamed,
+    /// One region: the control block, or a DMA core.
+    Region(&'static str),
+    /// The memory that is reserved for DMA.
+    Memory,
 }
 
-/// The node of that name among `nodes`.
-pub(crate) fn node_named(nodes: &[UioNode], name: &str) -> Result<UioNode, PlatformError> {
-    nodes.iter().find(|node| node.name == name).cloned().ok_or_else(|| {
-        let names: Vec<_> = nodes.iter().map(|node| node.name.as_str()).collect();
-        PlatformError::NoNode { wanted: name.to_owned(), found: names.join(", ") }
-    })
+impl UioNode {
+    /// Whether any of its regions lies in the programmable logic.
+    #[must_use]
+    pub fn is_in_logic(&self) -> bool {
+        self.maps.iter().any(UioMap::is_in_logic)
+    }
+
+    /// What of the accelerator its regions are, by their names, else by their addresses.
+    #[must_use]
+    pub fn part(&self) -> Option<NodePart> {
+        let logic: Vec<_> = self.maps.iter().filter(|map| map.is_in_logic()).collect();
+        let region = |map: &UioMap| {
+            let mut regions = UIO_DMA_MAPS.into_iter().chain([UIO_CONTROL_MAP]);
+            let mut bases = (0..DMA_COUNT_MAX).map(dma_base).chain([CONTROL_BASE]);
+            let named = regions.clone().find(|name| map.name == *name);
+            named.or_else(|| regions.nth(bases.position(|base| map.address == base)?))
+        };
+        match (logic[..].split_first(), self.maps.as_slice()) {
+            (Some((only, [])), _) => Some(NodePart::Region(region(only)?)),
+            (Some(_), _) => {
+                let named = logic.iter().any(|map| map.name == UIO_CONTROL_MAP);
+                let found = logic.iter().any(|map| region(map) == Some(UIO_CONTROL_MAP));
+                let unnamed = found.then_some(NodePart::Unnamed);
+                if named { Some(NodePart::Accelerator) } else { unnamed }
+            }
+            (None, [only]) => {
+                let memory = only.name == UIO_MEMORY_MAP || only.address == MEMORY_BASE;
+                memory.then_some(NodePart::Memory)
+            }
+            (None, _) => None,
+        }
+    }
+}
+
+impl UioMap {
+    /// Whether any of it lies in the programmable logic.
+    #[must_use]
+    pub fn is_in_logic(&self) -> bool {
+        is_in_logic(self.address, self.bytes)
+    }
 }
 
 #[cfg(test)]
@@ -167,36 +188,8 @@ pub(crate) mod fake {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
-    use crate::platform::System;
-
-    #[test]
-    fn a_system_without_uio_has_no_nodes() {
-        assert_eq!(uio_nodes(Path::new("/nonexistent/uio")).expect("no error"), []);
-    }
-
-    #[test]
-    fn nodes_are_listed_by_number_with_their_regions() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        fake::add_node(&system, 10, "pgs", &fake::regions());
-        fake::add_node(&system, 2, "axi-pmon", &[]);
-        fs::write(system.uio.join("uevent"), "").expect("written");
-        let nodes = uio_nodes(&system.uio).expect("readable");
-        let names: Vec<_> =
-            nodes.iter().map(|node| (node.device.as_str(), node.name.as_str())).collect();
-        assert_eq!(names, [("uio2", "axi-pmon"), ("uio10", "pgs")]);
-        assert_eq!(nodes[1].maps.len(), 5);
-        let control = nodes[1].map("control").expect("named");
-        assert_eq!(
-            (control.index, control.address, control.bytes, control.offset),
-            (4, 0xA004_0000, 0x1000, 0)
-        );
-        let missing = node_named(&nodes, "other").expect_err("there is none").to_string();
-        assert!(missing.contains("\"other\" (found: axi-pmon, pgs)"), "{missing}");
-    }
+    use crate::platform::{System, uio_nodes};
 
     #[test]
     fn a_region_is_found_by_name_whatever_its_number() {
@@ -224,12 +217,35 @@ mod tests {
     }
 
     #[test]
-    fn a_size_that_is_no_number_is_an_error_with_its_path() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        fake::add_node(&system, 0, "pgs", &fake::regions());
-        fs::write(system.uio.join("uio0/maps/map3/size"), "large\n").expect("written");
-        let error = uio_nodes(&system.uio).expect_err("not a number").to_string();
-        assert!(error.contains("uio0/maps/map3/size") && error.contains("large"), "{error}");
+    fn a_node_is_recognised_by_its_regions_whatever_its_name() {
+        let part = |regions: &[fake::Map<'_>]| {
+            let map = |(index, (name, address, bytes)): (u32, &fake::Map<'_>)| UioMap {
+                index,
+                name: (*name).to_owned(),
+                address: *address,
+                bytes: *bytes,
+                offset: 0,
+            };
+            let maps = (0..).zip(regions).map(map).collect();
+            let node = UioNode { device: "uio7".to_owned(), name: "a@b".to_owned(), maps };
+            (node.is_in_logic(), node.part())
+        };
+        let regions = fake::regions();
+        assert_eq!(part(&regions), (true, Some(NodePart::Accelerator)));
+        // Elsewhere in the logic, by name.
+        let moved = [("dma0", 0x8000_0000, 0x1_0000), ("control", 0x4_0000_0000, 0x1000)];
+        assert_eq!(part(&moved), (true, Some(NodePart::Accelerator)));
+        let nameless: Vec<_> =
+            regions.iter().map(|(_, at, bytes)| ("pgs@a", *at, *bytes)).collect();
+        assert_eq!(part(&nameless), (true, Some(NodePart::Unnamed)));
+        assert_eq!(part(&regions[1..2]), (true, Some(NodePart::Region("dma1"))));
+        assert_eq!(part(&nameless[4..]), (true, Some(NodePart::Region("control"))));
+        assert_eq!(part(&[("memory", 0x6000_0000, 0x1000)]), (false, Some(NodePart::Memory)));
+        assert_eq!(part(&[("m@50000000", 0x5000_0000, 0x1000)]), (false, Some(NodePart::Memory)));
+        // Other logic, and names of ours outside the logic.
+        assert_eq!(part(&[("ctrl", 0xB000_0000, 0x1000)]), (true, None));
+        assert_eq!(part(&[("a", 0xB000_0000, 16), ("b", 0xB001_0000, 16)]), (true, None));
+        assert_eq!(part(&[("control", 0xFF00_0000, 0x1000)]), (false, None));
+        assert_eq!(part(&[]), (false, None));
     }
 }

@@ -17,9 +17,8 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use super::lock::LockedFile;
-use super::uio::node_named;
 use super::uio_window::Claims;
-use super::{PlatformError, System, UioMap, UioNode, UioWindow, uio_nodes};
+use super::{PlatformError, System, UioMap, UioNode, UioWindow, uio_listing};
 
 /// An open UIO node.
 ///
@@ -56,7 +55,7 @@ impl UioDevice {
     /// # Errors
     /// As [`Self::open`].
     pub fn open_in(system: &System, name: &str) -> Result<Self, PlatformError> {
-        Self::of_node(system, node_named(&uio_nodes(&system.uio)?, name)?)
+        Self::of_node(system, uio_listing(&system.uio)?.node(name)?)
     }
 
     /// Opens a node that was found.

@@ -1,4 +1,4 @@
-//! This file opens a board: the one place that knows every kind.
+//! Opens a board: the one place that knows every kind.
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,8 +7,8 @@ use bitstream_model::interface::address_map::UIO_NODE;
 
 use crate::error::OpenError;
 use crate::platform::{
-    DevMemWindows, HardwarePlatform, MemoryChoice, Platform, RegisterChoice, System, has_nodes,
-    uio_nodes,
+    DevMemWindows, HardwarePlatform, ManagerChoice, MemoryChoice, Platform, RegisterChoice, System,
+    uio_listing,
 };
 
 /// How to open the accelerator. The default takes whatever board is there.
@@ -18,6 +18,8 @@ pub struct OpenOptions {
     pub board: BoardChoice,
     /// Where a real board's memory for DMA comes from.
     pub memory: MemoryChoice,
+    /// Which FPGA manager is asked whether a real board's logic is programmed, before it is touched.
+    pub manager: ManagerChoice,
     /// Width of the DMA cores' length registers, bits; `None` believes the bitstream. Either is
     /// checked against the cores themselves.
     pub length_width: Option<u32>,
@@ -42,7 +44,8 @@ pub enum BoardChoice {
     /// any; else an emulated board, which is said at warn level.
     #[default]
     Automatic,
-    /// The UIO node of that name (`linux,uio-name`). `pgs` also means the separate nodes.
+    /// The UIO node of that name (`linux,uio-name`), or a node for each region: `<node>-control`, and
+    /// `<node>-dma0` to `<node>-dma3` as far as there are such cores.
     Uio {
         /// The name, as in `/sys/class/uio/uio*/name`.
         node: String,
@@ -105,11 +108,12 @@ pub(crate) struct Found {
 pub(super) fn find(
     choice: &BoardChoice,
     memory: &MemoryChoice,
+    manager: &ManagerChoice,
     system: &System,
 ) -> Result<Found, OpenError> {
     let real = |registers, kind, name: &str, reason: &str| -> Result<Found, OpenError> {
         Ok(Found {
-            platform: Arc::new(HardwarePlatform::open(system, registers, memory)?),
+            platform: Arc::new(HardwarePlatform::open(system, registers, memory, manager)?),
             description: BoardDescription {
                 kind,
                 name: name.to_owned(),
@@ -126,11 +130,12 @@ pub(super) fn find(
         return Err(OpenError::ServedMemory);
     }
     match choice {
-        BoardChoice::Automatic if has_nodes(&uio_nodes(&system.uio)?, UIO_NODE) => {
-            uio(UIO_NODE, "its UIO node is there")
-        }
         BoardChoice::Automatic => {
-            let found = fall_back()?;
+            let mut listing = uio_listing(&system.uio)?;
+            if listing.has_board(UIO_NODE)? {
+                return uio(UIO_NODE, "its UIO node is there");
+            }
+            let found = fall_back(&listing.without_board(UIO_NODE))?;
             own_memory(memory).map(|()| found)
         }
         BoardChoice::Uio { node } => uio(node, "asked for"),
@@ -156,15 +161,15 @@ fn own_memory(memory: &MemoryChoice) -> Result<(), OpenError> {
 }
 
 #[cfg(feature = "emulation")]
-fn fall_back() -> Result<Found, OpenError> {
-    log::warn!("no UIO node named \"{UIO_NODE}\": using the software-emulated board");
+fn fall_back(reason: &str) -> Result<Found, OpenError> {
+    log::warn!("{reason}: using the software-emulated board");
     let board = bitstream_model::EmulatedBoard::new(bitstream_model::BoardConfig::default())?;
-    Ok(emulated(board.cpu_port(), "no UIO node named \"pgs\""))
+    Ok(emulated(board.cpu_port(), reason))
 }
 
 #[cfg(not(feature = "emulation"))]
-fn fall_back() -> Result<Found, OpenError> {
-    Err(OpenError::NoEmulation { wanted: UIO_NODE.to_owned() })
+fn fall_back(reason: &str) -> Result<Found, OpenError> {
+    Err(OpenError::NoEmulation { reason: reason.to_owned() })
 }
 
 #[cfg(feature = "emulation")]
@@ -195,270 +200,4 @@ fn served(socket: &std::path::Path, memory: &MemoryChoice) -> Result<Found, Open
             reason: "asked for".to_owned(),
         },
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use super::*;
-    use crate::accelerator::fake as bitstream;
-    use crate::axi_dma::DmaError;
-    use crate::platform::fake::FakeRegisters;
-    use crate::platform::{Caching, PlatformError, uio_fake};
-    use crate::{Accelerator, Error};
-
-    fn uio(node: &str) -> BoardChoice {
-        BoardChoice::Uio { node: node.to_owned() }
-    }
-
-    /// A system with the nodes `fabric` and `pgs`, whose control block says what `describe` makes it.
-    fn system_with(describe: impl Fn(&FakeRegisters)) -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        uio_fake::add_node(&system, 0, "fabric", &[]);
-        uio_fake::add_node(&system, 1, "pgs", &uio_fake::regions());
-        let registers = FakeRegisters::default();
-        describe(&registers);
-        // Pages of up to 64 KiB; the control block is map 4.
-        let path = system.dev.join("uio1");
-        let mut device = fs::read(&path).expect("read");
-        for page in [1 << 12, 1 << 14, 1 << 16] {
-            registers.with(|state| {
-                for (at, value) in &state.values {
-                    let at = 4 * page + *at as usize;
-                    device[at..at + 4].copy_from_slice(&value.to_le_bytes());
-                }
-            });
-        }
-        fs::write(path, device).expect("written");
-        (root, system)
-    }
-
-    fn open(choice: &BoardChoice, system: &System) -> Result<Accelerator, Error> {
-        let found = find(choice, &MemoryChoice::Automatic, system).map_err(Error::Open)?;
-        Accelerator::on(found, None)
-    }
-
-    fn error_of(choice: &BoardChoice, system: &System) -> OpenError {
-        match open(choice, system).expect_err("no board") {
-            Error::Open(error) => error,
-            other => panic!("{other}"),
-        }
-    }
-
-    fn add_memory(system: &System) {
-        uio_fake::add_node(system, 7, "pgs-memory", &[("memory", 0x6000_0000, 0x1_0000)]);
-    }
-
-    #[test]
-    fn a_node_that_is_not_there_is_named_beside_those_that_are() {
-        let (_root, system) = system_with(bitstream::describe);
-        let text = error_of(&uio("pgs2"), &system).to_string();
-        assert!(text.contains("\"pgs2\" (found: fabric, pgs)"), "{text}");
-        let text = error_of(&uio("fabric"), &system).to_string();
-        assert!(text.contains("\"fabric\" has no map named \"control\""), "{text}");
-    }
-
-    #[test]
-    fn a_board_without_memory_says_what_it_looked_for() {
-        let (_root, system) = system_with(bitstream::describe);
-        for choice in [BoardChoice::Automatic, uio("pgs")] {
-            let error = error_of(&choice, &system);
-            assert!(
-                matches!(error, OpenError::Platform(PlatformError::NoMemory { .. })),
-                "{error}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_real_board_is_identified_and_never_replaced_by_an_emulated_one() {
-        let (_root, system) = system_with(bitstream::describe);
-        add_memory(&system);
-        for choice in [BoardChoice::Automatic, uio("pgs")] {
-            // The file of registers identifies itself; its cores do not come out of reset.
-            let error = error_of(&choice, &system);
-            assert!(
-                matches!(&error, OpenError::Core(DmaError::State { channel, .. }) if channel == "dma0 MM2S"),
-                "{error}"
-            );
-        }
-    }
-
-    #[test]
-    fn another_bitstream_behind_the_node_is_refused_as_such() {
-        let (_root, system) = system_with(|_| ());
-        add_memory(&system);
-        let error = error_of(&uio("pgs"), &system);
-        assert!(matches!(error, OpenError::Identity(_)), "{error}");
-    }
-
-    #[test]
-    fn nothing_is_touched_before_a_bitstream_is_loaded() {
-        let (_root, system) = system_with(bitstream::describe);
-        add_memory(&system);
-        uio_fake::write(system.fpga_manager.join("state"), "unknown");
-        let before = fs::read(system.dev.join("uio1")).expect("read");
-        let error = error_of(&uio("pgs"), &system);
-        assert!(matches!(error, OpenError::Platform(PlatformError::NoBitstream { .. })), "{error}");
-        assert!(fs::read(system.dev.join("uio1")).expect("read") == before);
-    }
-
-    #[test]
-    fn a_board_in_use_is_busy_until_it_is_closed() {
-        let (_root, system) = system_with(bitstream::describe);
-        add_memory(&system);
-        let memory = MemoryChoice::Automatic;
-        let first = find(&uio("pgs"), &memory, &system).expect("opened");
-        let error = error_of(&uio("pgs"), &system);
-        assert!(matches!(error, OpenError::Platform(PlatformError::Busy { .. })), "{error}");
-        drop(first);
-        find(&uio("pgs"), &memory, &system).expect("opened");
-    }
-
-    fn assert_busy(found: Result<Found, OpenError>, file: &str) {
-        let error = found.expect_err("in use");
-        assert!(
-            matches!(&error, OpenError::Platform(PlatformError::Busy { path }) if path.ends_with(file)),
-            "{file}: {error}"
-        );
-    }
-
-    #[test]
-    fn two_boards_do_not_share_memory() {
-        let (_root, system) = system_with(bitstream::describe);
-        add_memory(&system);
-        uio_fake::add_node(&system, 2, "pgs2", &uio_fake::regions());
-        let memory = MemoryChoice::Automatic;
-        let first = find(&uio("pgs"), &memory, &system).expect("opened");
-        assert_busy(find(&uio("pgs2"), &memory, &system), "uio7");
-        // Through /dev/mem it is the same memory.
-        uio_fake::write(system.dev.join("mem"), "");
-        let window = MemoryChoice::DevMem { window: 0x6000_0000..0x6000_1000 };
-        assert_busy(find(&uio("pgs2"), &window, &system), "uio7");
-        drop(first);
-        let second = find(&uio("pgs2"), &memory, &system).expect("the first is closed");
-
-        // With a buffer of its own it is another board.
-        for (name, text) in [("phys_addr", "0x70000000"), ("size", "4096"), ("sync_mode", "2")] {
-            uio_fake::write(system.u_dma_buf.join("own").join(name), text);
-        }
-        let device = fs::File::create(system.dev.join("own"));
-        device.and_then(|file| file.set_len(4096)).expect("resized");
-        let own =
-            MemoryChoice::UDmaBuf { name: "own".to_owned(), caching: Caching::WriteCombining };
-        let first = find(&uio("pgs"), &own, &system).expect("nothing is shared");
-        drop(second);
-        assert_busy(find(&uio("pgs2"), &own, &system), "own");
-        drop(first);
-        find(&uio("pgs2"), &own, &system).expect("the first is closed");
-    }
-
-    #[test]
-    fn each_dma_core_behind_a_node_of_its_own_has_one_user() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        add_memory(&system);
-        let regions = uio_fake::regions();
-        uio_fake::add_node(&system, 0, "pgs-control", &regions[4..]);
-        uio_fake::add_node(&system, 2, "pgs-dma1", &regions[1..2]);
-        let core = crate::platform::UioDevice::open_in(&system, "pgs-dma1").expect("opened");
-        let find = || find(&BoardChoice::Automatic, &MemoryChoice::Automatic, &system);
-        assert_busy(find(), "uio2");
-        drop(core);
-        find().expect("nobody has it");
-    }
-
-    #[test]
-    fn dev_mem_carries_registers_and_memory_of_one_board() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        uio_fake::write(system.dev.join("mem"), "");
-        let device = fs::File::create(system.dev.join("mem"));
-        device.and_then(|file| file.set_len(0x10_0000)).expect("resized");
-        let windows = DevMemWindows {
-            dma: [0, 0x1_0000, 0x2_0000, 0x3_0000],
-            control: 0x4_0000,
-            memory: 0x8_0000..0x9_0000,
-        };
-        let choice = BoardChoice::DevMem(windows);
-        for memory in [MemoryChoice::Automatic, MemoryChoice::DevMem { window: 0xA_0000..0xB_0000 }]
-        {
-            let Found { platform, .. } = find(&choice, &memory, &system).expect("opened once");
-            platform.dma_window(3).expect("mapped").write32(4, 0x66);
-            assert_eq!(fs::read(system.dev.join("mem")).expect("read")[0x3_0004], 0x66);
-            let (address, _) = platform.allocate(4).expect("there is room");
-            let expected = if memory == MemoryChoice::Automatic { 0x8_0000 } else { 0xA_0000 };
-            assert_eq!(address, expected);
-            assert_busy(find(&choice, &memory, &system), "mem");
-        }
-        find(&choice, &MemoryChoice::Automatic, &system).expect("nobody has it");
-    }
-
-    #[test]
-    fn separate_nodes_are_a_board_and_an_absent_core_is_named() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        add_memory(&system);
-        let regions = uio_fake::regions();
-        uio_fake::add_node(&system, 0, "pgs-control", &regions[4..]);
-        uio_fake::add_node(&system, 2, "pgs-dma1", &regions[1..2]);
-        let found = find(&BoardChoice::Automatic, &MemoryChoice::Automatic, &system);
-        let Found { platform, description } = found.expect("a board");
-        assert_eq!(description.to_string(), "pgs (its UIO node is there)");
-        assert_eq!(platform.control_window().expect("mapped").bytes(), 0x1000);
-        platform.dma_window(1).expect("mapped").write32(4, 0x55);
-        assert_eq!(fs::read(system.dev.join("uio2")).expect("read")[4], 0x55);
-        for core in [0, 2, 3, 4] {
-            let error = platform.dma_window(core).expect_err("absent").to_string();
-            assert!(error.contains("found: pgs-dma1, pgs-control"), "{error}");
-        }
-    }
-
-    #[test]
-    fn dev_mem_is_opened_on_request_only_and_refused_without_the_file() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        let error = error_of(&BoardChoice::DevMem(DevMemWindows::default()), &system);
-        assert!(matches!(error, OpenError::Platform(PlatformError::NoDevice { .. })), "{error}");
-    }
-
-    #[test]
-    fn memory_is_taken_from_where_it_is_asked_for() {
-        let (_root, system) = system_with(bitstream::describe);
-        add_memory(&system);
-        let open = |memory| find(&uio("pgs"), &memory, &system).map(|_| ());
-        open(MemoryChoice::Uio { node: "pgs-memory".to_owned() }).expect("it is there");
-        let other = open(MemoryChoice::Uio { node: "other".to_owned() }).expect_err("no such node");
-        assert!(other.to_string().contains("\"other\""), "{other}");
-        let name = "pgs".to_owned();
-        let other = open(MemoryChoice::UDmaBuf { name, caching: Caching::Cached });
-        let other = other.expect_err("no such buffer");
-        assert!(matches!(other, OpenError::Platform(PlatformError::NoUDmaBuf { .. })), "{other}");
-        let other = open(MemoryChoice::DevMem { window: 0..4096 }).expect_err("no such file");
-        assert!(matches!(other, OpenError::Platform(PlatformError::NoDevice { .. })), "{other}");
-    }
-
-    #[cfg(feature = "emulation")]
-    #[test]
-    fn an_emulated_board_takes_no_other_memory() {
-        let memory = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
-        let nothing = System::under(std::path::Path::new("/nonexistent"));
-        let refused = find(&BoardChoice::Automatic, &memory, &nothing).expect_err("no board");
-        assert!(matches!(refused, OpenError::EmulatedMemory), "{refused}");
-    }
-
-    #[test]
-    fn without_a_node_the_emulated_board_says_why_it_was_taken() {
-        let system = System::under(std::path::Path::new("/nonexistent"));
-        let found = find(&BoardChoice::Automatic, &MemoryChoice::Automatic, &system);
-        if cfg!(feature = "emulation") {
-            let description = found.expect("the emulated board").description;
-            assert_eq!(description.kind, BoardKind::Emulated);
-            assert_eq!(description.to_string(), "emulated (no UIO node named \"pgs\")");
-        } else {
-            assert!(matches!(found, Err(OpenError::NoEmulation { .. })));
-        }
-    }
 }

@@ -17,8 +17,8 @@ use super::board::{BoardDescription, BoardKind, Found};
 use super::tests::{bits, scene, undisturbed};
 use crate::check::check_found;
 use crate::platform::{
-    Access, Caching, DmaMemory, EmulatedPlatform, HardwarePlatform, MemoryChoice, Platform,
-    PlatformError, RegisterChoice, RegisterWindow, SharedMemory, System, uio_fake,
+    Access, Caching, DmaMemory, EmulatedPlatform, HardwarePlatform, ManagerChoice, MemoryChoice,
+    Platform, PlatformError, RegisterChoice, RegisterWindow, SharedMemory, System, uio_fake,
 };
 use crate::{Accelerator, Aftermath, Error, Fault, InputError, Outcome, Shape, StepParameters};
 
@@ -72,7 +72,8 @@ impl Composed {
         let physical = File::options().read(true).write(true).open(&file).expect("opened");
         physical.set_len(BYTES).expect("resized");
         let registers = RegisterChoice::Uio("pgs".to_owned());
-        let memory = HardwarePlatform::open(&system, registers, choice).expect("opened");
+        let memory = HardwarePlatform::open(&system, registers, choice, &ManagerChoice::Automatic)
+            .expect("opened");
         let engines = EmulatedPlatform::new(board.cpu_port());
         let (pieces, twins) = Default::default();
         Self { engines, memory, physical, pieces, twins, _root: root }

@@ -2,6 +2,8 @@
 
 mod bank;
 mod board;
+#[cfg(test)]
+mod board_tests;
 mod bring_up;
 mod cancellation;
 mod completion;

@@ -25,7 +25,7 @@ use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 
 /// Finds the board that the options ask for.
 pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
-    board::find(&options.board, &options.memory, &System::default())
+    board::find(&options.board, &options.memory, &options.manager, &System::default())
 }
 
 /// An open accelerator.

@@ -54,8 +54,54 @@ pub const DDR_LOW: core::ops::Range<u64> = 0..0x8000_0000;
 /// Where high DDR begins and ends on the ZCU102: the other 2 GiB of its 4.
 pub const DDR_HIGH: core::ops::Range<u64> = 0x8_0000_0000..0x8_8000_0000;
 
+/// Where the processors reach the programmable logic: `M_AXI_HPM0_LPD`, then `M_AXI_HPM0_FPD` and
+/// `M_AXI_HPM1_FPD` below 4 GiB, the 8 GiB that both share, and the upper window of each (UG1085).
+pub const LOGIC_WINDOWS: [core::ops::Range<u64>; 6] = [
+    0x8000_0000..0xA000_0000,
+    0xA000_0000..0xB000_0000,
+    0xB000_0000..0xC000_0000,
+    0x4_0000_0000..0x6_0000_0000,
+    0x10_0000_0000..0x48_0000_0000,
+    0x48_0000_0000..0x80_0000_0000,
+];
+
+/// Whether any of these bytes lie in the programmable logic. A range of no bytes is its address.
+#[must_use]
+pub fn is_in_logic(address: u64, bytes: u64) -> bool {
+    let end = address.saturating_add(bytes.max(1));
+    LOGIC_WINDOWS.iter().any(|window| address < window.end && window.start < end)
+}
+
 /// Physical address of AXI DMA `k`.
 #[must_use]
 pub const fn dma_base(k: usize) -> u64 {
     DMA_BASE + k as u64 * DMA_STRIDE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_regions_lie_in_the_logic_and_memory_does_not() {
+        for core in 0..DMA_COUNT_MAX {
+            assert!(is_in_logic(dma_base(core), DMA_BYTES.into()));
+        }
+        assert!(is_in_logic(CONTROL_BASE, CONTROL_BYTES.into()));
+        for memory in [MEMORY_BASE..MEMORY_BASE + MEMORY_BYTES, DDR_LOW, DDR_HIGH] {
+            assert!(!is_in_logic(memory.start, memory.end - memory.start), "{memory:x?}");
+        }
+        // QSPI, the peripherals, on-chip memory.
+        for other in [0xC000_0000, 0xFD00_0000, 0xFFFC_0000] {
+            assert!(!is_in_logic(other, 0x1000), "{other:#x}");
+        }
+    }
+
+    #[test]
+    fn a_range_counts_if_one_byte_of_it_does() {
+        assert!(is_in_logic(0x7FFF_F000, 0x1001));
+        assert!(!is_in_logic(0x7FFF_F000, 0x1000));
+        assert!(is_in_logic(0xBFFF_FFFF, 0));
+        assert!(!is_in_logic(u64::MAX, u64::MAX));
+    }
 }

@@ -3,11 +3,12 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
+use bitstream_model::interface::address_map::UIO_NODE;
 use clap::parser::ValueSource;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
-use zynq_pgs::MemoryChoice;
+use zynq_pgs::{ManagerChoice, MemoryChoice};
 
-use crate::environment::{BOARD, MEMORY, is_blank};
+use crate::environment::{BOARD, MANAGER, MEMORY, is_blank};
 use crate::memory::memory;
 use crate::verbs::check::CheckArgs;
 use crate::verbs::compare::CompareArgs;
@@ -32,7 +33,7 @@ Examples:
   pgs order --input vectors/full_step186
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
-  pgs check
+  pgs check                            test the board; --board emulated where there is none
   pgs faults                           every fault at every place, and what the driver makes of it
   pgs serve --socket /tmp/board        and elsewhere: pgs --board socket:/tmp/board
 
@@ -79,7 +80,8 @@ struct CommonOptions {
     json: bool,
     /// Board to use.
     #[arg(
-        help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), uio, devmem \
+        help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), uio[:NODE] \
+                (the UIO node of that name, or NODE-control, NODE-dma0 ... for each region), devmem \
                 (registers through /dev/mem, at the addresses of the interface; needs root), \
                 emulated or socket:PATH (one that `pgs serve` serves) [env: PGS_BOARD] \
                 [default: auto]",
@@ -101,6 +103,18 @@ struct CommonOptions {
         value_parser = memory
     )]
     memory: Option<MemoryChoice>,
+    /// FPGA manager of a real board's logic.
+    #[arg(
+        help = "FPGA manager of a real board's logic, which says whether it is programmed: auto (the \
+                ZynqMP's own, by its name), a device as fpga1, or none (do not ask: for logic that \
+                the kernel did not load, as by JTAG. WARNING: an access to logic that is not \
+                programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
+        long,
+        global = true,
+        value_name = "MANAGER",
+        value_parser = manager
+    )]
+    manager: Option<ManagerChoice>,
 }
 
 /// What holds for every verb.
@@ -111,13 +125,15 @@ pub(crate) struct CommonArgs {
     pub(crate) memory: MemoryChoice,
     /// Whether the environment names the memory, and the command line does not.
     pub(crate) memory_of_environment: bool,
+    pub(crate) manager: ManagerChoice,
 }
 
 /// A board, as it is named on the command line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum BoardName {
     Auto,
-    Uio,
+    /// The UIO node of that name, or a node for each region.
+    Uio(String),
     /// Registers through /dev/mem.
     Devmem,
     Emulated,
@@ -127,13 +143,27 @@ pub(crate) enum BoardName {
 
 /// Reads the name of a board.
 fn board_name(text: &str) -> Result<BoardName, String> {
-    match (text, text.strip_prefix("socket:")) {
-        ("auto", _) => Ok(BoardName::Auto),
-        ("uio", _) => Ok(BoardName::Uio),
-        ("devmem", _) => Ok(BoardName::Devmem),
-        ("emulated", _) => Ok(BoardName::Emulated),
-        (_, Some(path)) if !path.is_empty() => Ok(BoardName::Socket(path.into())),
-        _ => Err("expected auto, uio, devmem, emulated or socket:PATH".to_owned()),
+    match text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest))) {
+        ("auto", None) => Ok(BoardName::Auto),
+        ("uio", None) => Ok(BoardName::Uio(UIO_NODE.to_owned())),
+        ("uio", Some(node)) if !node.is_empty() => Ok(BoardName::Uio(node.to_owned())),
+        ("devmem", None) => Ok(BoardName::Devmem),
+        ("emulated", None) => Ok(BoardName::Emulated),
+        ("socket", Some(path)) if !path.is_empty() => Ok(BoardName::Socket(path.into())),
+        _ => Err("expected auto, uio[:NODE], devmem, emulated or socket:PATH".to_owned()),
+    }
+}
+
+/// Reads the choice of an FPGA manager.
+fn manager(text: &str) -> Result<ManagerChoice, String> {
+    let number = |text: &str| text.strip_prefix("fpga")?.parse::<u32>().ok();
+    match text.trim() {
+        "auto" => Ok(ManagerChoice::Automatic),
+        "none" => Ok(ManagerChoice::Unasked),
+        device if number(device).is_some() => Ok(ManagerChoice::Device(device.to_owned())),
+        _ => {
+            Err("expected auto, none, or a device of /sys/class/fpga_manager, as fpga0".to_owned())
+        }
     }
 }
 
@@ -155,7 +185,7 @@ pub(crate) fn parse(
     if let Some(verb) = matches.subcommand_name() {
         // `run`'s options stand here as well, and would silently mean nothing before another verb.
         let stray = matches.ids().find(|id| {
-            let common = matches!(id.as_str(), "json" | "board" | "memory");
+            let common = matches!(id.as_str(), "json" | "board" | "memory" | "manager");
             let is_argument = command.get_arguments().any(|argument| argument.get_id() == *id);
             let given = || matches.value_source(id.as_str()) == Some(ValueSource::CommandLine);
             !common && is_argument && given()
@@ -170,7 +200,7 @@ pub(crate) fn parse(
     }
     let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
     let verb = cli.verb.unwrap_or(Verb::Run(cli.run));
-    let CommonOptions { json, board, memory } = cli.common;
+    let CommonOptions { json, board, memory, manager } = cli.common;
     // Only what is used is read: a variable that is wrong breaks no command that does without it.
     let with_board = !matches!(verb, Verb::Model(_) | Verb::Load(_));
     let mut wrong = |message| command.error(clap::error::ErrorKind::ValueValidation, message);
@@ -192,7 +222,16 @@ pub(crate) fn parse(
     };
     let memory_of_environment = named.is_some();
     let memory = memory.or(named).unwrap_or(MemoryChoice::Automatic);
-    Ok(Command { verb, common: CommonArgs { json, board, memory, memory_of_environment } })
+    let real = !matches!(verb, Verb::Model(_)) && board != BoardName::Emulated;
+    let manager = match manager {
+        None if real => {
+            instead_of("--manager", MANAGER, &variable, self::manager).map_err(&mut wrong)?
+        }
+        given => given,
+    };
+    let manager = manager.unwrap_or_default();
+    let common = CommonArgs { json, board, memory, memory_of_environment, manager };
+    Ok(Command { verb, common })
 }
 
 /// What a variable of the environment says in place of an option.
@@ -235,7 +274,7 @@ mod tests {
     #[test]
     fn the_environment_says_what_the_command_line_does_not() {
         let common = parsed_in("uio", "uio:m", "pgs run").expect("both");
-        assert_eq!(common.board, BoardName::Uio);
+        assert_eq!(common.board, BoardName::Uio(UIO_NODE.to_owned()));
         assert_eq!(common.memory, MemoryChoice::Uio { node: "m".to_owned() });
         assert!(common.memory_of_environment);
         let common = parsed_in("uio", "uio:m", "pgs run --board devmem --memory uio:n");
@@ -300,14 +339,38 @@ mod tests {
     #[test]
     fn common_options_stand_on_either_side_of_the_verb() {
         for line in [
-            "pgs --json --board emulated --memory uio:m list",
-            "pgs list --json --board emulated --memory uio:m",
+            "pgs --json --board emulated --memory uio:m --manager fpga2 list",
+            "pgs list --json --board emulated --memory uio:m --manager fpga2",
         ] {
             let common = parsed(line).expect(line).common;
             assert!(common.json, "{line}");
             assert_eq!(common.memory, MemoryChoice::Uio { node: "m".to_owned() }, "{line}");
             assert_eq!(common.board, BoardName::Emulated, "{line}");
+            assert_eq!(common.manager, ManagerChoice::Device("fpga2".to_owned()), "{line}");
         }
+    }
+
+    #[test]
+    fn a_board_is_named_by_its_node_as_memory_is() {
+        let board =
+            |text: &str| parsed(&format!("pgs --board {text} check")).map(|c| c.common.board);
+        let uio = |node: &str| Ok(BoardName::Uio(node.to_owned()));
+        assert_eq!(board("uio"), uio("pgs"));
+        assert_eq!(board("uio:pgs@a0000000"), uio("pgs@a0000000"));
+        assert_eq!(board("uio:a:b"), uio("a:b"));
+    }
+
+    #[test]
+    fn a_manager_is_a_device_none_or_found_by_its_name() {
+        assert_eq!(manager("auto"), Ok(ManagerChoice::Automatic));
+        assert_eq!(manager("none"), Ok(ManagerChoice::Unasked));
+        assert_eq!(manager("fpga10"), Ok(ManagerChoice::Device("fpga10".to_owned())));
+        for wrong in ["fpga", "fpgax", "fpga0/..", "0", "Xilinx"] {
+            manager(wrong).expect_err(wrong);
+        }
+        let help = Cli::command().render_long_help().to_string();
+        let words = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains("WARNING") && words.contains("hangs the processor"), "{words}");
     }
 
     #[test]
@@ -346,6 +409,9 @@ mod tests {
             "pgs --memory udmabuf",
             "pgs --memory file:",
             "pgs --board socket:",
+            "pgs --board uio:",
+            "pgs --board auto:1",
+            "pgs --manager fpga",
             "pgs --board served",
             "pgs serve",
             "pgs model --collisions -1 --bodies 1",

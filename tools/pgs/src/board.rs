@@ -1,16 +1,16 @@
-//! This file opens the board that the command line asks for, and says what it is.
+//! Opens the board that the command line asks for, and says what it is.
 
 use std::io::{self, Write};
-use std::path::Path;
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, FaultPlan, Hazards, Subnormals};
 use serde_json::{Value, json};
+use zynq_pgs::platform::{System, uio_listing};
 use zynq_pgs::{
     Accelerator, BoardChoice, BoardKind, DevMemWindows, Fault, InputError, MemoryChoice,
-    OpenOptions, UIO_CLASS, uio_nodes,
+    OpenOptions,
 };
 
 use crate::args::{BoardName, CommonArgs};
@@ -48,26 +48,47 @@ pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
 }
 
 /// Which kind of board a name on the command line means here, and why.
-pub(crate) fn choose(name: &BoardName) -> (BoardKind, String) {
-    match name {
-        BoardName::Uio => (BoardKind::Uio, "as asked for".to_owned()),
-        BoardName::Devmem => (BoardKind::DevMem, "as asked for".to_owned()),
-        BoardName::Emulated => (BoardKind::Emulated, "as asked for".to_owned()),
-        BoardName::Socket(_) => (BoardKind::Served, "as asked for".to_owned()),
-        BoardName::Auto => match uio_nodes(Path::new(UIO_CLASS)) {
-            Ok(nodes) => {
-                let names = [UIO_NODE, UIO_CONTROL_NODE];
-                match names.iter().find(|name| nodes.iter().any(|node| node.name == **name)) {
-                    Some(name) => (BoardKind::Uio, format!("there is a UIO node named {name:?}")),
-                    None => {
-                        (BoardKind::Emulated, format!("there is no UIO node named {UIO_NODE:?}"))
-                    }
-                }
-            }
-            // An unreadable node may be the board: the attempt to open it says what is wrong.
-            Err(error) => (BoardKind::Uio, format!("UIO nodes cannot be listed: {error}")),
-        },
+pub(crate) fn choose(name: &BoardName, system: &System) -> (BoardKind, String) {
+    let kind = match name {
+        BoardName::Uio(_) => BoardKind::Uio,
+        BoardName::Devmem => BoardKind::DevMem,
+        BoardName::Emulated => BoardKind::Emulated,
+        BoardName::Socket(_) => BoardKind::Served,
+        BoardName::Auto => return find_kind(system),
+    };
+    (kind, "as asked for".to_owned())
+}
+
+/// Which kind of board there is, and why.
+fn find_kind(system: &System) -> (BoardKind, String) {
+    // What cannot be read may be the board: the attempt to open it says what is wrong.
+    let unreadable = |error| (BoardKind::Uio, format!("UIO nodes cannot be listed: {error}"));
+    let mut listing = match uio_listing(&system.uio) {
+        Ok(listing) => listing,
+        Err(error) => return unreadable(error),
+    };
+    match listing.has_board(UIO_NODE) {
+        Ok(true) => {
+            let names = [UIO_NODE, UIO_CONTROL_NODE];
+            let named = |name: &&str| listing.nodes.iter().any(|node| node.name == **name);
+            let name = names.into_iter().find(named).unwrap_or(UIO_NODE);
+            (BoardKind::Uio, format!("there is a UIO node named {name:?}"))
+        }
+        Ok(false) => (BoardKind::Emulated, listing.without_board(UIO_NODE)),
+        Err(error) => unreadable(error),
     }
+}
+
+/// Refuses a command that is about a board where there is none, and the emulated one would stand in.
+pub(crate) fn require(common: &CommonArgs) -> Result<(), Failure> {
+    let (kind, reason) = choose(&common.board, &System::default());
+    if kind != BoardKind::Emulated || common.board != BoardName::Auto {
+        return Ok(());
+    }
+    Err(Failure::new(Cause::NoBoard, format!("there is no board: {reason}")).next(
+        "see with `pgs list` what there is, and name a node with --board uio:NODE; or take the \
+         emulated board with --board emulated",
+    ))
 }
 
 /// A board that was chosen and not opened yet.
@@ -87,8 +108,8 @@ pub(crate) fn find(
     config: BoardConfig,
     given: Option<&'static str>,
 ) -> Result<Chosen, Failure> {
-    let CommonArgs { board: name, memory, memory_of_environment, .. } = common;
-    let (kind, reason) = choose(name);
+    let CommonArgs { board: name, memory, memory_of_environment, manager, .. } = common;
+    let (kind, reason) = choose(name, &System::default());
     let (board, observer) = if kind == BoardKind::Emulated {
         if *name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
@@ -119,14 +140,19 @@ pub(crate) fn find(
     } else if kind == BoardKind::DevMem {
         (BoardChoice::DevMem(DevMemWindows::default()), None)
     } else {
-        (BoardChoice::Uio { node: UIO_NODE.to_owned() }, None)
+        let node = match name {
+            BoardName::Uio(node) => node.as_str(),
+            _ => UIO_NODE,
+        };
+        (BoardChoice::Uio { node: node.to_owned() }, None)
     };
     let pack_threads = Some(config.threads);
     let memory = match kind {
         BoardKind::Emulated => MemoryChoice::Automatic,
         _ => memory.clone(),
     };
-    let options = OpenOptions { board, memory, pack_threads, ..OpenOptions::default() };
+    let manager = manager.clone();
+    let options = OpenOptions { board, memory, manager, pack_threads, ..OpenOptions::default() };
     Ok(Chosen { kind, options, observer, reason })
 }
 
@@ -159,8 +185,10 @@ pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Fai
 
 /// There is no board, or none that can be opened.
 pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
-    Failure::new(Cause::NoBoard, error)
-        .next("see what there is with `pgs list`, or use the emulated board with --board emulated")
+    let general =
+        || "see what there is with `pgs list`, or use the emulated board with --board emulated";
+    let next = error.next_step().unwrap_or_else(|| general().to_owned());
+    Failure::new(Cause::NoBoard, error).next(next)
 }
 
 /// Whether a step ended because Ctrl-C was pressed, and its channels are stopped.

@@ -6,6 +6,8 @@ use std::ffi::OsString;
 pub(crate) const BOARD: &str = "PGS_BOARD";
 /// The variable that names the DMA memory.
 pub(crate) const MEMORY: &str = "PGS_MEMORY";
+/// The variable that names the FPGA manager.
+pub(crate) const MANAGER: &str = "PGS_MANAGER";
 /// The variable that says what is logged.
 pub(crate) const LOG: &str = "RUST_LOG";
 /// The variable that says whether the log has colours.

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Ran, run};
+use common::{Ran, pgs, run, skipped};
 use serde_json::Value;
 
 fn check(arguments: &[&str]) -> Ran {
@@ -83,6 +83,28 @@ fn without_a_board_the_code_is_3() {
     assert_eq!(ran.code, Some(3), "{}", ran.stderr);
     assert!(ran.stderr.contains("no UIO node named") && ran.stderr.contains("next: "));
     assert!(ran.stdout.is_empty());
+}
+
+#[test]
+fn the_emulated_board_does_not_stand_in_for_one_that_is_missing() {
+    if std::path::Path::new("/sys/class/uio").exists() {
+        skipped("a check without a board (this machine has UIO nodes)");
+        return;
+    }
+    for arguments in [&["check"][..], &["check", "--json"], &["check", "--quirk", "stale"]] {
+        let mut command = pgs();
+        let ran: Ran =
+            command.env_remove("PGS_BOARD").args(arguments).output().expect("runs").into();
+        assert_eq!(ran.code, Some(3), "{arguments:?}: {}", ran.stderr);
+        assert!(ran.stdout.is_empty(), "{}", ran.stdout);
+        assert!(ran.stderr.contains("there is no UIO node named \"pgs\""), "{}", ran.stderr);
+        assert!(ran.stderr.contains("--board emulated"), "{}", ran.stderr);
+    }
+    // Asked for, by option or by variable.
+    let mut command = pgs();
+    let ran = command.env_remove("PGS_BOARD").args(["check", "--board", "emulated"]).output();
+    assert_eq!(ran.expect("runs").status.code(), Some(0));
+    assert_eq!(check(&[]).code, Some(0));
 }
 
 #[test]

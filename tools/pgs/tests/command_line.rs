@@ -349,7 +349,8 @@ fn list_names_the_board_that_would_be_opened() {
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     let document = json(&ran);
     assert_keys(&document, &["schema", "board", "uio_nodes", "uio_error", "emulated"]);
-    assert_keys(&document, &["u_dma_bufs", "logic_error"]);
+    assert_keys(&document, &["u_dma_bufs", "logic_error", "unreadable_uio_nodes"]);
+    assert_keys(&document, &["u_dma_buf_states", "fpga_managers"]);
     assert_eq!(document["board"]["kind"], "emulated");
     assert!(run(["list"]).stdout.contains("would open  emulated (as asked for)"));
 }

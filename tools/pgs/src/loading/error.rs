@@ -1,4 +1,4 @@
-//! This file says why a bitstream could not be loaded, whose fault it is and what to do.
+//! Why a bitstream could not be loaded, whose fault it is and what to do.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use zynq_pgs::PlatformError;
 
+use super::format::Advice;
 use crate::failure::Cause;
 
 /// Why loading was refused or failed.
@@ -13,10 +14,14 @@ use crate::failure::Cause;
 pub(crate) enum LoadError {
     #[error("cannot read {}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
-    #[error("{}: expected {expected}, found {found}", path.display())]
-    Kind { path: PathBuf, expected: &'static str, found: &'static str },
+    #[error("{}: expected a bitstream (.bit.bin), found {found}", path.display())]
+    Bitstream { path: PathBuf, found: &'static str, advice: Advice },
+    #[error("{}: expected a compiled overlay (.dtbo), found {found}", path.display())]
+    Overlay { path: PathBuf, found: String },
     #[error("{name:?} below the firmware folder cannot be given to the kernel: {reason}")]
     Name { name: String, reason: &'static str },
+    #[error("loading needs an FPGA manager, and --manager none names none")]
+    Unasked,
     #[error("no FPGA manager in {}: this kernel cannot load a bitstream", class.display())]
     NoManager { class: PathBuf },
     #[error(
@@ -28,6 +33,13 @@ pub(crate) enum LoadError {
     NoFlags { manager: String, directory: PathBuf },
     #[error("{device} is open in {users}: DMA cores may be running")]
     InUse { device: String, users: String },
+    #[error(
+        "other overlays are there, whose drivers may be bound to the logic: {}",
+        listed(overlays)
+    )]
+    OtherOverlays { overlays: Vec<(PathBuf, String)> },
+    #[error("drivers of the kernel are bound to the logic: {drivers}")]
+    Drivers { drivers: String },
     #[error("no overlays in {}: {reason}", searched.display())]
     NoOverlays { searched: PathBuf, reason: &'static str, mounted: bool },
     #[error("the overlay {} is there already, {status}", directory.display())]
@@ -36,12 +48,16 @@ pub(crate) enum LoadError {
         "the UIO node {node:?} (/dev/{device}) is there already, from another overlay or from the base tree"
     )]
     NodePresent { node: String, device: String },
-    #[error("cannot {act} {}", path.display())]
-    File { act: &'static str, path: PathBuf, source: io::Error },
+    /// A file of the kernel's.
+    #[error("cannot use {}", path.display())]
+    Attribute { path: PathBuf, source: io::Error },
+    /// The bitstream could not be put where the kernel looks for it.
+    #[error("cannot copy the bitstream to {}", path.display())]
+    Copy { path: PathBuf, bytes: u64, source: io::Error },
     #[error(transparent)]
     Platform(#[from] PlatformError),
     #[error("{manager} refused the bitstream; its state is {state:?}{detail}")]
-    Refused { manager: String, state: String, detail: String, source: io::Error },
+    Refused { manager: String, firmware: String, state: String, detail: String, source: io::Error },
     #[error(
         "{manager} took the bitstream, but its state is {state:?} instead of \"operating\"{detail}"
     )]
@@ -54,23 +70,39 @@ pub(crate) enum LoadError {
     NoNode,
 }
 
+/// Overlays, each with what it says of itself.
+fn listed(overlays: &[(PathBuf, String)]) -> String {
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let each = overlays.iter().map(|(path, status)| format!("{:?} ({status})", name(path)));
+    each.collect::<Vec<_>>().join(", ")
+}
+
+const DMESG: &str = "look for the cause in the kernel's log: dmesg | tail";
+
 impl LoadError {
     pub(super) fn unreadable(path: &Path, source: io::Error) -> Self {
         Self::Unreadable { path: path.to_owned(), source }
     }
 
-    pub(super) fn kind(path: &Path, expected: &'static str, found: &'static str) -> Self {
-        Self::Kind { path: path.to_owned(), expected, found }
+    pub(super) fn bitstream(path: &Path, found: &'static str, advice: Advice) -> Self {
+        Self::Bitstream { path: path.to_owned(), found, advice }
     }
 
-    pub(super) fn file(act: &'static str, path: &Path, source: io::Error) -> Self {
-        Self::File { act, path: path.to_owned(), source }
+    pub(super) fn attribute(path: &Path, source: io::Error) -> Self {
+        Self::Attribute { path: path.to_owned(), source }
     }
 
     /// Whose fault it is.
     pub(crate) fn cause(&self) -> Cause {
         match self {
-            Self::Unreadable { .. } | Self::Kind { .. } | Self::Name { .. } => Cause::Input,
+            Self::Unreadable { .. }
+            | Self::Bitstream { .. }
+            | Self::Overlay { .. }
+            | Self::Name { .. }
+            | Self::Unasked => Cause::Input,
+            Self::Refused { source, .. } if source.kind() == io::ErrorKind::NotFound => {
+                Cause::NoBoard
+            }
             Self::Refused { .. } | Self::NotOperating { .. } => Cause::Hardware,
             _ => Cause::NoBoard,
         }
@@ -79,11 +111,16 @@ impl LoadError {
     /// What to do.
     pub(crate) fn next(&self) -> String {
         match self {
-            Self::Unreadable { .. } => "give the path of a file that can be read".to_owned(),
-            Self::Kind { .. } => {
-                "see device-tree/README.md for how the files are made".to_owned()
+            Self::Unreadable { path, source } => unreadable(path, source),
+            Self::Bitstream { path, advice, .. } => advice.text(path),
+            Self::Overlay { found, .. } if found.contains("source") => {
+                "compile it: dtc -@ -I dts -O dtb -o x.dtbo x.dtso".to_owned()
+            }
+            Self::Overlay { .. } => {
+                "give the file that dtc -@ made; see device-tree/README.md".to_owned()
             }
             Self::Name { .. } => "rename the file, or give one from another folder".to_owned(),
+            Self::Unasked => "leave out --manager, or name one, as fpga0".to_owned(),
             Self::NoManager { .. } => {
                 "on the board: boot a kernel with CONFIG_FPGA_MGR_ZYNQMP_FPGA and a tree with its \
                  node; elsewhere there is nothing to load, and the other verbs take --board emulated"
@@ -96,6 +133,19 @@ impl LoadError {
             }
             Self::NoFlags { .. } => "load a full bitstream, without --partial".to_owned(),
             Self::InUse { .. } => "stop them, then run the command again".to_owned(),
+            Self::OtherOverlays { overlays } => {
+                let paths = overlays.iter().map(|(path, _)| path.display().to_string());
+                format!(
+                    "remove them: `xmutil unloadapp` if dfx-mgr applied them, else rmdir {}; or \
+                     load all the same with --replace-others",
+                    paths.collect::<Vec<_>>().join(" ")
+                )
+            }
+            Self::Drivers { .. } => "remove the overlay that made their devices (`xmutil \
+                                     unloadapp`, rmdir), or unbind them: echo DEVICE > \
+                                     /sys/bus/platform/drivers/DRIVER/unbind; or load all the same \
+                                     with --replace-others"
+                .to_owned(),
             Self::NoOverlays { mounted: false, searched, .. } => {
                 format!("mount -t configfs configfs {}", searched.display())
             }
@@ -111,25 +161,138 @@ impl LoadError {
             Self::NodePresent { .. } => {
                 "leave out --overlay to keep it, or remove the overlay that made it".to_owned()
             }
-            Self::File { source, .. } if source.kind() == io::ErrorKind::PermissionDenied => {
-                "run the command as root".to_owned()
-            }
-            Self::File { .. } | Self::Platform(_) => {
-                "look for the cause in the kernel's log: dmesg | tail".to_owned()
-            }
-            Self::Refused { .. } | Self::NotOperating { .. } => {
+            Self::Attribute { source, .. } => attribute(source).to_owned(),
+            Self::Copy { path, bytes, source } => copy(path, *bytes, source),
+            Self::Platform(error) => error.next_step().unwrap_or_else(|| {
+                "see what there is with `pgs list`, then run the command again".to_owned()
+            }),
+            Self::Refused { firmware, source, .. } => refused(firmware, source),
+            Self::NotOperating { .. } => {
                 "look into dmesg; is it a .bit.bin for this chip, made by bootgen -arch zynqmp? \
                  Do not touch the registers before the state is operating"
                     .to_owned()
             }
+            Self::NotApplied { source: Some(source), .. }
+                if source.kind() == io::ErrorKind::PermissionDenied =>
+            {
+                attribute(source).to_owned()
+            }
             Self::NotApplied { .. } => {
-                "look into dmesg; was the base tree compiled with -@ (is there \
-                 /proc/device-tree/__symbols__/gic)?"
+                "look into dmesg; was the base tree compiled with -@ (are gic and zynqmp_clk in \
+                 /proc/device-tree/__symbols__)?"
                     .to_owned()
             }
             Self::NoNode => "is uio_pdrv_genirq there, and uio_pdrv_genirq.of_id=generic-uio on \
                              the kernel's command line? See `pgs list`"
                 .to_owned(),
+        }
+    }
+}
+
+/// A file of the caller's cannot be read.
+fn unreadable(path: &Path, source: &io::Error) -> String {
+    match source.kind() {
+        io::ErrorKind::NotFound => format!(
+            "there is no {}: give the path of the file, and in a container one inside it",
+            path.display()
+        ),
+        io::ErrorKind::PermissionDenied => {
+            format!("run the command as root, or let it read {}", path.display())
+        }
+        _ => format!("is the disk or network whole that holds {}?", path.display()),
+    }
+}
+
+/// A file of the kernel's cannot be used.
+fn attribute(source: &io::Error) -> &'static str {
+    match source.kind() {
+        io::ErrorKind::PermissionDenied => {
+            "run the command as root; in a container: outside of it, or with --privileged"
+        }
+        io::ErrorKind::ReadOnlyFilesystem => {
+            "/sys is mounted read-only here, as in a container: run the command outside of it, or \
+             mount it writable (docker run --privileged)"
+        }
+        io::ErrorKind::ResourceBusy => "another program is loading: wait for it to end, then retry",
+        _ => DMESG,
+    }
+}
+
+/// The bitstream cannot be put where the kernel looks for it.
+fn copy(path: &Path, bytes: u64, source: &io::Error) -> String {
+    let folder = path.parent().unwrap_or(path).display();
+    let elsewhere = "name the folder of the file to the kernel, which looks there first: printf %s \
+                     FOLDER > /sys/module/firmware_class/parameters/path (as root), then run the \
+                     command again";
+    match source.kind() {
+        io::ErrorKind::ReadOnlyFilesystem => format!("{folder} is read-only: {elsewhere}"),
+        io::ErrorKind::PermissionDenied => {
+            format!("run the command as root, which may write {folder}; or {elsewhere}")
+        }
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            format!("make room for {bytes} bytes in {folder}; or {elsewhere}")
+        }
+        io::ErrorKind::AlreadyExists if path.exists() => {
+            format!("remove {}, which an earlier command has left", path.display())
+        }
+        _ => format!("see whether {folder} is a folder that can be written; or {elsewhere}"),
+    }
+}
+
+/// The manager did not take the bitstream.
+fn refused(firmware: &str, source: &io::Error) -> String {
+    match source.kind() {
+        io::ErrorKind::NotFound => format!(
+            "the kernel does not find {firmware:?}: it looks in the folder that \
+             /sys/module/firmware_class/parameters/path names and in /lib/firmware, of the system \
+             and not of a container"
+        ),
+        io::ErrorKind::ResourceBusy => {
+            "another program is loading: wait for it to end, then retry".to_owned()
+        }
+        io::ErrorKind::OutOfMemory => {
+            "the kernel has no memory in one piece for the bitstream: enlarge its CMA pool (cma=256M \
+             on its command line), or load after a reboot"
+                .to_owned()
+        }
+        io::ErrorKind::TimedOut => {
+            "the logic did not start in time: is it a bitstream for this chip, and the board's \
+             power in order? dmesg | tail says more"
+                .to_owned()
+        }
+        _ => "look into dmesg; is it a .bit.bin for this chip, made by bootgen -arch zynqmp? Do not \
+              touch the registers before the state is operating"
+            .to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn each_answer_of_the_kernel_has_a_next_step_of_its_own() {
+        use io::ErrorKind::{
+            NotFound, Other, OutOfMemory, PermissionDenied, ReadOnlyFilesystem, ResourceBusy,
+            StorageFull, TimedOut,
+        };
+        let error = io::Error::from;
+        let path = Path::new("/lib/firmware/pgs-load-7.bit.bin");
+        let copies = [ReadOnlyFilesystem, PermissionDenied, StorageFull, Other]
+            .map(|kind| copy(path, 12_345, &error(kind)));
+        assert!(copies[0].contains("/sys/module/firmware_class/parameters/path"), "{}", copies[0]);
+        assert!(copies[1].contains("as root"), "{}", copies[1]);
+        assert!(copies[2].contains("12345 bytes in /lib/firmware"), "{}", copies[2]);
+        let refusals =
+            [NotFound, ResourceBusy, OutOfMemory, TimedOut, Other].map(|k| refused("x", &error(k)));
+        assert!(refusals[0].contains("not of a container"), "{}", refusals[0]);
+        let files = [NotFound, PermissionDenied, Other].map(|k| unreadable(path, &error(k)));
+        let attributes = [PermissionDenied, ReadOnlyFilesystem, ResourceBusy, Other]
+            .map(|kind| attribute(&error(kind)).to_owned());
+        for texts in [&copies[..], &refusals, &files, &attributes] {
+            assert_eq!(texts.iter().collect::<BTreeSet<_>>().len(), texts.len(), "{texts:#?}");
         }
     }
 }

@@ -1,17 +1,19 @@
-//! This file puts a bitstream where the kernel looks for it.
+//! Puts a bitstream where the kernel looks for it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::LoadError;
-use super::system::System;
+use super::system::{System, read};
 
 /// Where the kernel looks for firmware, last.
 const FOLDER: &str = "lib/firmware";
+/// Names the folder where it looks first; empty if there is none.
+const FIRST_FOLDER: &str = "sys/module/firmware_class/parameters/path";
 /// The longest name that the manager takes: its buffer has 255 bytes with the terminator.
 const NAME_BYTES_MAX: usize = 254;
 
-/// A bitstream in the kernel's firmware folder. A copy goes when this does.
+/// A bitstream in a firmware folder of the kernel's. A copy goes when this does.
 #[derive(Debug)]
 pub(super) struct Firmware {
     name: String,
@@ -19,23 +21,32 @@ pub(super) struct Firmware {
 }
 
 impl Firmware {
-    /// Names the file if it lies below the firmware folder, else copies it there.
+    /// Names the file if it lies below a firmware folder, else copies it to the one that is looked
+    /// into first.
     pub(super) fn provide(system: &dyn System, bitstream: &Path) -> Result<Self, LoadError> {
-        let folder = system.path(FOLDER);
+        let first = read(&system.path(FIRST_FOLDER)).unwrap_or_default();
+        let first = Some(first.trim_start_matches('/')).filter(|path| !path.is_empty());
+        let folders: Vec<_> =
+            first.into_iter().chain([FOLDER]).map(|folder| system.path(folder)).collect();
         let real = fs::canonicalize(bitstream)
             .map_err(|source| LoadError::unreadable(bitstream, source))?;
-        // The folder is usually reached through a link, /lib -> /usr/lib.
-        if let Ok(below) = fs::canonicalize(&folder)
-            && let Ok(name) = real.strip_prefix(below)
-        {
-            return Ok(Self { name: kernel_name(name)?, copy: None });
+        for (place, folder) in folders.iter().enumerate() {
+            // The folder is usually reached through a link, /lib -> /usr/lib.
+            let below = fs::canonicalize(folder).ok();
+            let name = below.as_ref().and_then(|below| real.strip_prefix(below).ok());
+            let Some(name) = name else { continue };
+            // Another file of that name, where the kernel looks before.
+            if !folders[..place].iter().any(|before| before.join(name).exists()) {
+                return Ok(Self { name: kernel_name(name)?, copy: None });
+            }
         }
         let name = format!("pgs-load-{}.bit.bin", std::process::id());
+        let folder = &folders[0];
         let copy = folder.join(&name);
-        fs::create_dir_all(&folder).map_err(|source| LoadError::file("make", &folder, source))?;
-        system
-            .copy(&real, &copy)
-            .map_err(|source| LoadError::file("copy the bitstream to", &copy, source))?;
+        let bytes = fs::metadata(&real).map_or(0, |meta| meta.len());
+        let error = |source| LoadError::Copy { path: copy.clone(), bytes, source };
+        fs::create_dir_all(folder).map_err(error)?;
+        system.copy(&real, &copy).map_err(error)?;
         Ok(Self { name, copy: Some(copy) })
     }
 
@@ -51,9 +62,8 @@ impl Firmware {
 
 impl Drop for Firmware {
     fn drop(&mut self) {
-        if let Some(copy) = &self.copy
-            && let Err(error) = fs::remove_file(copy)
-        {
+        let Some(copy) = &self.copy else { return };
+        if let Err(error) = fs::remove_file(copy) {
             log::warn!("the copy {} stays: {error}", copy.display());
         }
     }

@@ -1,8 +1,9 @@
-//! This file has the kernel's FPGA manager program the logic.
+//! Has the kernel's FPGA manager program the logic.
 
-use std::fs;
 use std::io;
-use std::path::PathBuf;
+
+use zynq_pgs::ManagerChoice;
+use zynq_pgs::platform::{FpgaManager, find_manager};
 
 use super::system::{System, read};
 use super::{LoadError, OPERATING};
@@ -12,53 +13,48 @@ const CLASS: &str = "sys/class/fpga_manager";
 /// An FPGA manager that takes bitstreams from programs.
 #[derive(Debug)]
 pub(super) struct Manager {
-    id: String,
-    directory: PathBuf,
+    found: FpgaManager,
     has_flags: bool,
 }
 
 impl Manager {
-    /// The first manager by number; the chip has one.
-    pub(super) fn find(system: &dyn System, partial: bool) -> Result<Self, LoadError> {
+    /// The manager of choice; by itself the logic's own.
+    pub(super) fn find(
+        system: &dyn System,
+        choice: &ManagerChoice,
+        partial: bool,
+    ) -> Result<Self, LoadError> {
+        if *choice == ManagerChoice::Unasked {
+            return Err(LoadError::Unasked);
+        }
         let class = system.path(CLASS);
-        let entries = match fs::read_dir(&class) {
-            Err(source) if source.kind() == io::ErrorKind::NotFound => {
-                return Err(LoadError::NoManager { class });
-            }
-            entries => entries.map_err(|source| LoadError::file("list", &class, source))?,
+        let Some(found) = find_manager(&class, choice)? else {
+            return Err(LoadError::NoManager { class });
         };
-        let number = |id: &str| id.strip_prefix("fpga").and_then(|n| n.parse::<u32>().ok());
-        let first = entries
-            .filter_map(Result::ok)
-            .filter_map(|entry| entry.file_name().into_string().ok())
-            .filter_map(|id| Some((number(&id)?, id)))
-            .min();
-        let Some((_, id)) = first else { return Err(LoadError::NoManager { class }) };
-        let directory = class.join(&id);
+        let (manager, directory) = (found.device.clone(), found.directory.clone());
         if !directory.join("firmware").exists() {
-            return Err(LoadError::NoFirmwareFile { manager: id, directory });
+            return Err(LoadError::NoFirmwareFile { manager, directory });
         }
         // The oldest vendor kernels have no flags, and load full bitstreams.
         let has_flags = directory.join("flags").exists();
         if partial && !has_flags {
-            return Err(LoadError::NoFlags { manager: id, directory });
+            return Err(LoadError::NoFlags { manager, directory });
         }
-        Ok(Self { id, directory, has_flags })
+        Ok(Self { found, has_flags })
     }
 
     /// `fpga0`.
     pub(super) fn id(&self) -> &str {
-        &self.id
+        &self.found.device
     }
 
     /// What the driver calls itself.
-    pub(super) fn name(&self) -> String {
-        read(&self.directory.join("name")).unwrap_or_default()
+    pub(super) fn name(&self) -> &str {
+        &self.found.name
     }
 
     pub(super) fn state(&self) -> Result<String, LoadError> {
-        let path = self.directory.join("state");
-        read(&path).map_err(|source| LoadError::file("read", &path, source))
+        Ok(self.found.state()?)
     }
 
     /// Programs the logic and waits for it; the state afterwards, which is "operating".
@@ -68,33 +64,36 @@ impl Manager {
         firmware: &str,
         partial: bool,
     ) -> Result<String, LoadError> {
+        let attribute = |name| self.found.directory.join(name);
         if self.has_flags {
-            let path = self.directory.join("flags");
+            let path = attribute("flags");
             let flags = if partial { "1" } else { "0" };
             system
                 .write(&path, flags.as_bytes())
-                .map_err(|source| LoadError::file("write", &path, source))?;
+                .map_err(|source| LoadError::attribute(&path, source))?;
         }
         // The kernel answers this write when the logic is programmed, or when that failed.
-        let path = self.directory.join("firmware");
+        let path = attribute("firmware");
         if let Err(source) = system.write(&path, firmware.as_bytes()) {
-            if source.kind() == io::ErrorKind::PermissionDenied {
-                return Err(LoadError::file("write", &path, source));
+            let unwritable = [io::ErrorKind::PermissionDenied, io::ErrorKind::ReadOnlyFilesystem];
+            if unwritable.contains(&source.kind()) {
+                return Err(LoadError::attribute(&path, source));
             }
+            let (manager, firmware) = (self.id().to_owned(), firmware.to_owned());
             let (state, detail) = (self.state()?, self.detail());
-            return Err(LoadError::Refused { manager: self.id.clone(), state, detail, source });
+            return Err(LoadError::Refused { manager, firmware, state, detail, source });
         }
         let state = self.state()?;
         if state != OPERATING {
-            let detail = self.detail();
-            return Err(LoadError::NotOperating { manager: self.id.clone(), state, detail });
+            let (manager, detail) = (self.id().to_owned(), self.detail());
+            return Err(LoadError::NotOperating { manager, state, detail });
         }
         Ok(state)
     }
 
     /// What else the manager says of a failure.
     fn detail(&self) -> String {
-        match read(&self.directory.join("status")) {
+        match read(&self.found.directory.join("status")) {
             Ok(status) if !status.is_empty() => format!(" ({})", status.replace('\n', ", ")),
             _ => String::new(),
         }

@@ -1,8 +1,9 @@
-//! This folder loads a bitstream through the kernel: everything is looked at first, so that a
-//! refusal leaves the board as it was.
+//! Loads a bitstream through the kernel: everything is looked at first, so that a refusal leaves the
+//! board as it was.
 //!
 //! ```text
-//! users -> overlays -> firmware file -> users -> fpga_manager -> state? -> overlay -> status? -> UIO node?
+//! users -> other overlays and drivers -> ours -> formats -> firmware file -> users
+//!       -> fpga_manager -> state? -> overlay -> status? -> UIO node?
 //! ```
 //!
 //! Who opens a node between the second look for users and the write to the manager is not seen.
@@ -12,7 +13,9 @@
 
 mod error;
 mod firmware;
+mod format;
 mod manager;
+mod others;
 mod overlay;
 mod system;
 #[cfg(test)]
@@ -20,11 +23,14 @@ mod tests;
 mod users;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use bitstream_model::interface::address_map::UIO_NODE;
-use zynq_pgs::{UioNode, uio_nodes};
+use bitstream_model::interface::address_map::{
+    CONTROL_BASE, CONTROL_BYTES, DMA_BASE, UIO_MEMORY_NODE, UIO_NODE,
+};
+use zynq_pgs::platform::{UioListing, uio_listing};
+use zynq_pgs::{ManagerChoice, UioNode};
 
 pub(crate) use error::LoadError;
 pub(crate) use system::{Linux, System};
@@ -33,8 +39,6 @@ use firmware::Firmware;
 use manager::Manager;
 use overlay::Overlays;
 
-/// First bytes of every compiled device tree.
-const DEVICE_TREE_MAGIC: [u8; 4] = [0xD0, 0x0D, 0xFE, 0xED];
 /// The state of a manager whose logic runs.
 const OPERATING: &str = "operating";
 
@@ -44,6 +48,9 @@ pub(crate) struct Request {
     pub(crate) bitstream: PathBuf,
     pub(crate) overlay: Option<PathBuf>,
     pub(crate) partial: bool,
+    pub(crate) manager: ManagerChoice,
+    /// Whether overlays and drivers of others, bound to the logic, are no obstacle.
+    pub(crate) replace_others: bool,
 }
 
 /// What was loaded.
@@ -61,33 +68,42 @@ pub(crate) struct Loaded {
     pub(crate) time: Duration,
     /// Name of the overlay that was applied.
     pub(crate) overlay: Option<&'static str>,
-    /// The accelerator's UIO nodes, by number.
+    /// The UIO nodes of the logic, by number.
     pub(crate) nodes: Vec<UioNode>,
 }
 
 /// Loads a bitstream, and applies an overlay if one is asked for.
 pub(crate) fn load(system: &dyn System, request: &Request) -> Result<Loaded, LoadError> {
-    let bytes = check_bitstream(&request.bitstream)?;
-    let tree = request.overlay.as_deref().map(read_overlay).transpose()?;
-    let manager = Manager::find(system, request.partial)?;
-    let nodes = our_nodes(system)?;
-    users::refuse_if_open(system, &nodes)?;
-    let overlays = match tree {
-        Some(tree) => {
+    let bytes = format::length(&request.bitstream)?;
+    let tree = request.overlay.as_deref();
+    let tree = tree.map(|path| fs::read(path).map_err(|error| LoadError::unreadable(path, error)));
+    let tree = tree.transpose()?;
+    let manager = Manager::find(system, &request.manager, request.partial)?;
+    let listing = nodes(system)?;
+    users::refuse_if_open(system, &listing)?;
+    if !request.replace_others {
+        others::refuse_if_bound(system)?;
+    }
+    let overlays = match &tree {
+        Some(_) => {
             let overlays = Overlays::find(system)?;
-            if let Some(node) = nodes.iter().find(|node| is_accelerator(node)) {
+            if let Some(node) = listing.nodes.iter().find(|node| is_accelerator(node)) {
                 let (node, device) = (node.name.clone(), node.device.clone());
                 return Err(LoadError::NodePresent { node, device });
             }
-            Some((overlays, tree))
+            Some(overlays)
         }
         None => None,
     };
+    format::require_bitstream(&request.bitstream)?;
+    if let (Some(path), Some(tree)) = (&request.overlay, &tree) {
+        format::require_overlay(path, tree)?;
+    }
 
     let state_before = manager.state()?;
     let firmware = Firmware::provide(system, &request.bitstream)?;
     // Copying a bitstream takes long enough for a program to start.
-    users::refuse_if_open(system, &our_nodes(system)?)?;
+    users::refuse_if_open(system, &nodes(system)?)?;
     let start = Instant::now();
     let state = manager.program(system, firmware.name(), request.partial)?;
     let time = start.elapsed();
@@ -95,19 +111,20 @@ pub(crate) fn load(system: &dyn System, request: &Request) -> Result<Loaded, Loa
     drop(firmware);
 
     let mut applied = None;
-    if let Some((overlays, tree)) = overlays {
+    if let (Some(overlays), Some(tree)) = (overlays, tree) {
         applied = Some(overlays.apply(system, &tree)?);
     }
-    let nodes = our_nodes(system)?;
+    let mut nodes = nodes(system)?.nodes;
     if applied.is_some() && !nodes.iter().any(is_accelerator) {
         return Err(LoadError::NoNode);
     }
+    nodes.retain(|node| node.is_in_logic() || is_ours(node));
     Ok(Loaded {
         bytes,
         firmware: name,
         copied,
         manager: manager.id().to_owned(),
-        manager_name: manager.name(),
+        manager_name: manager.name().to_owned(),
         state_before,
         state,
         time,
@@ -116,57 +133,22 @@ pub(crate) fn load(system: &dyn System, request: &Request) -> Result<Loaded, Loa
     })
 }
 
-/// The accelerator's nodes, and that of its memory: the single one, or `pgs-...`.
-fn our_nodes(system: &dyn System) -> Result<Vec<UioNode>, LoadError> {
-    let mut nodes = uio_nodes(&system.path("sys/class/uio"))?;
-    nodes.retain(|node| {
-        let rest = node.name.strip_prefix(UIO_NODE);
-        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
-    });
-    Ok(nodes)
+/// The UIO nodes of the system.
+fn nodes(system: &dyn System) -> Result<UioListing, LoadError> {
+    Ok(uio_listing(&system.path("sys/class/uio"))?)
 }
 
-/// Whether a node has registers of the accelerator; its memory is in the base tree.
+/// Whether a node is one of the accelerator's, or of its memory, by its name.
+fn is_ours(node: &UioNode) -> bool {
+    let rest = node.name.strip_prefix(UIO_NODE);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+}
+
+/// Whether a node has registers of the accelerator, by its name or where they are; its memory is in
+/// the base tree.
 fn is_accelerator(node: &UioNode) -> bool {
-    !node.name.ends_with("-memory")
-}
-
-/// Looks at the file before the kernel does; its length in bytes.
-fn check_bitstream(path: &Path) -> Result<u64, LoadError> {
-    let meta = fs::metadata(path).map_err(|source| LoadError::unreadable(path, source))?;
-    let expected = "a bitstream (.bit.bin)";
-    if !meta.is_file() {
-        return Err(LoadError::kind(path, expected, "no plain file"));
-    }
-    if meta.len() == 0 {
-        return Err(LoadError::kind(path, expected, "an empty file"));
-    }
-    let start = beginning(path)?;
-    if start == DEVICE_TREE_MAGIC {
-        return Err(LoadError::kind(path, expected, "a compiled device tree"));
-    }
-    if start == *b"\x7fELF" {
-        return Err(LoadError::kind(path, expected, "a program"));
-    }
-    Ok(meta.len())
-}
-
-fn read_overlay(path: &Path) -> Result<Vec<u8>, LoadError> {
-    let tree = fs::read(path).map_err(|source| LoadError::unreadable(path, source))?;
-    if !tree.starts_with(&DEVICE_TREE_MAGIC) {
-        let expected = "a compiled overlay (.dtbo)";
-        return Err(LoadError::kind(path, expected, "something else; compile sources by dtc -@"));
-    }
-    Ok(tree)
-}
-
-/// The first four bytes of a file; zeros where it has none.
-fn beginning(path: &Path) -> Result<[u8; 4], LoadError> {
-    use std::io::Read;
-    let mut start = Vec::new();
-    fs::File::open(path)
-        .and_then(|file| file.take(4).read_to_end(&mut start))
-        .map_err(|source| LoadError::unreadable(path, source))?;
-    start.resize(4, 0);
-    Ok([start[0], start[1], start[2], start[3]])
+    let end = CONTROL_BASE + u64::from(CONTROL_BYTES);
+    let there = |address: u64| (DMA_BASE..end).contains(&address);
+    (is_ours(node) && node.name != UIO_MEMORY_NODE)
+        || node.maps.iter().any(|map| there(map.address))
 }

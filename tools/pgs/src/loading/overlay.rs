@@ -1,16 +1,46 @@
-//! This file applies an overlay to the kernel's device tree.
+//! Applies an overlay to the kernel's device tree.
 
 use std::path::PathBuf;
 
 use super::LoadError;
 use super::system::{System, read};
 
-/// Where configfs is mounted; the second is where the vendor's fpgautil mounts it.
+/// Where configfs usually is; the second is where the vendor's fpgautil mounts it.
 const MOUNTS: [&str; 2] = ["sys/kernel/config", "configfs"];
 /// Where the overlays are, below it.
 const OVERLAYS: &str = "device-tree/overlays";
 /// The name of ours.
-const NAME: &str = "pgs";
+pub(super) const NAME: &str = "pgs";
+
+/// The directory of the overlays.
+pub(super) fn interface(system: &dyn System) -> Result<PathBuf, LoadError> {
+    let usual = MOUNTS.map(|mount| system.path(mount));
+    let elsewhere = mounts(&read(&system.path("proc/mounts")).unwrap_or_default())
+        .map(|mount| system.path(mount))
+        .collect::<Vec<_>>();
+    let places = usual.iter().chain(&elsewhere).map(|mount| mount.join(OVERLAYS));
+    if let Some(overlays) = places.into_iter().find(|path| path.is_dir()) {
+        return Ok(overlays);
+    }
+    let searched = usual[0].clone();
+    // A mounted configfs has the entries of some subsystem.
+    let entries = searched.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+    let mounted = entries || !elsewhere.is_empty();
+    let reason = match mounted {
+        true => "this kernel does not apply overlays at run time (mainline kernels do not)",
+        false => "configfs is not mounted",
+    };
+    Err(LoadError::NoOverlays { searched, reason, mounted })
+}
+
+/// Where configfs is mounted, by the kernel's table of mounts; below the root.
+fn mounts(table: &str) -> impl Iterator<Item = &str> {
+    table.lines().filter_map(|line| {
+        let mut words = line.split_ascii_whitespace().skip(1);
+        let (place, kind) = (words.next()?, words.next()?);
+        (kind == "configfs").then(|| place.trim_start_matches('/'))
+    })
+}
 
 /// The place for an overlay that is not there yet.
 #[derive(Debug)]
@@ -21,20 +51,7 @@ pub(super) struct Overlays {
 impl Overlays {
     /// Finds the interface; refuses if the overlay is applied already.
     pub(super) fn find(system: &dyn System) -> Result<Self, LoadError> {
-        let mounts = MOUNTS.map(|mount| system.path(mount));
-        let Some(overlays) =
-            mounts.iter().map(|mount| mount.join(OVERLAYS)).find(|path| path.is_dir())
-        else {
-            let searched = mounts[0].clone();
-            // A mounted configfs has the entries of some subsystem.
-            let mounted = searched.read_dir().is_ok_and(|mut entries| entries.next().is_some());
-            let reason = match mounted {
-                true => "this kernel does not apply overlays at run time (mainline kernels do not)",
-                false => "configfs is not mounted",
-            };
-            return Err(LoadError::NoOverlays { searched, reason, mounted });
-        };
-        let directory = overlays.join(NAME);
+        let directory = interface(system)?.join(NAME);
         if directory.exists() {
             let status = read(&directory.join("status")).unwrap_or_else(|error| error.to_string());
             return Err(LoadError::OverlayPresent { directory, status });
@@ -46,7 +63,7 @@ impl Overlays {
     pub(super) fn apply(self, system: &dyn System, tree: &[u8]) -> Result<&'static str, LoadError> {
         system
             .make_directory(&self.directory)
-            .map_err(|source| LoadError::file("make", &self.directory, source))?;
+            .map_err(|source| LoadError::attribute(&self.directory, source))?;
         // The kernel applies it when the file is closed, and tells of failure in the status only.
         let written = system.write(&self.directory.join("dtbo"), tree);
         let status = read(&self.directory.join("status")).unwrap_or_else(|error| error.to_string());
@@ -57,5 +74,16 @@ impl Overlays {
             log::warn!("{} stays: {error}", self.directory.display());
         }
         Err(LoadError::NotApplied { status, source: written.err() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn configfs_is_found_wherever_it_is_mounted() {
+        let table = "sysfs /sys sysfs rw 0 0\nnone /config configfs rw,relatime 0 0\nodd\n";
+        assert_eq!(mounts(table).collect::<Vec<_>>(), ["config"]);
     }
 }

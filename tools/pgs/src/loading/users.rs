@@ -1,26 +1,52 @@
-//! This file finds the programs that may be using the logic: that have one of its UIO nodes, or
-//! `/dev/mem`, open or mapped.
+//! Finds the programs that may be using the logic: that have a UIO node of it, or `/dev/mem`, open or
+//! mapped.
 
 use std::fs;
 use std::io;
+use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 
-use zynq_pgs::UioNode;
+use zynq_pgs::platform::{UioListing, UnreadableNode};
 
-use super::LoadError;
 use super::system::{System, read};
+use super::{LoadError, is_ours};
 
 /// Through it every register is reached past the nodes.
-const ALL_MEMORY: &str = "/dev/mem";
+const ALL_MEMORY: &str = "dev/mem";
+/// Its number.
+const ALL_MEMORY_NUMBER: &str = "1:1";
 
-/// Refuses if a program has one of the nodes, or all memory.
-pub(super) fn refuse_if_open(system: &dyn System, nodes: &[UioNode]) -> Result<(), LoadError> {
-    let named = nodes.iter().map(|node| {
-        let path = Path::new("/dev").join(&node.device);
-        let name = format!("{} ({:?})", path.display(), node.name);
-        (path, name)
-    });
-    let devices: Vec<_> = named.chain([(ALL_MEMORY.into(), ALL_MEMORY.to_owned())]).collect();
+/// A device file through which the logic is reached.
+#[derive(Debug)]
+struct Device {
+    /// Where it is, below whatever root: a program in a chroot has it below another.
+    path: PathBuf,
+    /// Its number, as sysfs writes it, under whatever path it is opened.
+    number: Option<String>,
+    /// How a message names it.
+    text: String,
+}
+
+/// Refuses if a program has a node of the logic, or all memory.
+pub(super) fn refuse_if_open(system: &dyn System, listing: &UioListing) -> Result<(), LoadError> {
+    let device = |device: &str, name: &str| {
+        let path = Path::new("dev").join(device);
+        let number = read(&system.path("sys/class/uio").join(device).join("dev")).ok();
+        Device { text: format!("/{} ({name})", path.display()), path, number }
+    };
+    // What a node shows that cannot be read is not known: the logic, perhaps.
+    let unreadable =
+        listing.unreadable.iter().map(|UnreadableNode { device: id, name, .. }| {
+            device(id, &name.as_ref().map_or_else(|| "unreadable".to_owned(), |n| format!("{n:?}")))
+        });
+    let of_logic = listing.nodes.iter().filter(|node| node.is_in_logic() || is_ours(node));
+    let nodes = of_logic.map(|node| device(&node.device, &format!("{:?}", node.name)));
+    let all = Device {
+        path: ALL_MEMORY.into(),
+        number: Some(ALL_MEMORY_NUMBER.to_owned()),
+        text: format!("/{ALL_MEMORY}"),
+    };
+    let devices: Vec<_> = nodes.chain(unreadable).chain([all]).collect();
     let found = users(&system.path("proc"), &devices)?;
     let Some(first) = found.first() else { return Ok(()) };
     let device = first.device.to_owned();
@@ -35,11 +61,33 @@ struct User<'a> {
     text: String,
 }
 
+/// A file that a process has.
+#[derive(Debug)]
+struct Held {
+    path: PathBuf,
+    number: Option<String>,
+}
+
+impl Held {
+    /// By what the kernel shows of it, which it marks if the name is gone.
+    fn new(shown: &Path, number: Option<String>) -> Self {
+        let text = shown.to_string_lossy();
+        Self { path: text.strip_suffix(" (deleted)").unwrap_or(&text).into(), number }
+    }
+
+    fn is(&self, device: &Device) -> bool {
+        match (&self.number, &device.number) {
+            (Some(held), Some(number)) => held == number,
+            _ => self.path.ends_with(&device.path),
+        }
+    }
+}
+
 /// Processes that have one of the devices, by device and number; what ends meanwhile does not count.
-fn users<'a>(proc: &Path, devices: &'a [(PathBuf, String)]) -> Result<Vec<User<'a>>, LoadError> {
+fn users<'a>(proc: &Path, devices: &'a [Device]) -> Result<Vec<User<'a>>, LoadError> {
     let entries = match fs::read_dir(proc) {
         Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries.map_err(|source| LoadError::file("list", proc, source))?,
+        entries => entries.map_err(|source| LoadError::attribute(proc, source))?,
     };
     let mut users = Vec::new();
     let mut hidden = 0_usize;
@@ -51,11 +99,11 @@ fn users<'a>(proc: &Path, devices: &'a [(PathBuf, String)]) -> Result<Vec<User<'
         let seen = seen.and(add_mapped(&entry.path(), &mut files));
         let denied = |error: io::Error| error.kind() == io::ErrorKind::PermissionDenied;
         hidden += usize::from(seen.is_err_and(denied));
-        for (place, (path, device)) in devices.iter().enumerate() {
-            if files.contains(path) {
+        for (place, device) in devices.iter().enumerate() {
+            if files.iter().any(|file| file.is(device)) {
                 let name = read(&entry.path().join("comm")).unwrap_or_default();
                 let text = format!("process {id} ({name})");
-                users.push((place, id, User { device, text }));
+                users.push((place, id, User { device: &device.text, text }));
             }
         }
     }
@@ -67,16 +115,64 @@ fn users<'a>(proc: &Path, devices: &'a [(PathBuf, String)]) -> Result<Vec<User<'
 }
 
 /// Adds the files that a process has open.
-fn add_open(process: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
-    let open = fs::read_dir(process.join("fd"))?.filter_map(Result::ok);
-    files.extend(open.filter_map(|file| fs::read_link(file.path()).ok()));
+fn add_open(process: &Path, files: &mut Vec<Held>) -> io::Result<()> {
+    for file in fs::read_dir(process.join("fd"))?.filter_map(Result::ok) {
+        let Ok(shown) = fs::read_link(file.path()) else { continue };
+        let meta = fs::metadata(file.path()).ok();
+        let meta = meta.filter(|meta| meta.file_type().is_char_device());
+        files.push(Held::new(&shown, meta.map(|meta| number_text(meta.rdev()))));
+    }
     Ok(())
 }
 
+/// The number of a device as sysfs writes it, from the C library's.
+fn number_text(number: u64) -> String {
+    let major = ((number >> 32) & !0xFFF) | ((number >> 8) & 0xFFF);
+    let minor = ((number >> 12) & 0xFFFF_FF00) | (number & 0xFF);
+    format!("{major}:{minor}")
+}
+
 /// Adds the files that it has mapped: a mapping stays when its file is closed.
-fn add_mapped(process: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
+fn add_mapped(process: &Path, files: &mut Vec<Held>) -> io::Result<()> {
     // Addresses, rights, offset, device, inode, and the file if there is one.
     let file = |line: &str| line.split_ascii_whitespace().nth(5).map(PathBuf::from);
-    files.extend(fs::read_to_string(process.join("maps"))?.lines().filter_map(file));
+    let maps = fs::read_to_string(process.join("maps"))?;
+    files.extend(maps.lines().filter_map(file).map(|path| Held::new(&path, None)));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_is_known_by_its_number_or_else_by_its_place() {
+        let device = |number: Option<&str>| Device {
+            path: "dev/uio3".into(),
+            number: number.map(str::to_owned),
+            text: String::new(),
+        };
+        let held = |path: &str, number: Option<&str>| {
+            Held::new(Path::new(path), number.map(str::to_owned))
+        };
+        for (path, found) in [
+            ("/dev/uio3", true),
+            ("/srv/jail/dev/uio3", true),
+            ("/dev/uio3 (deleted)", true),
+            ("/dev/uio33", false),
+            ("/dev/uio", false),
+        ] {
+            assert_eq!(held(path, None).is(&device(None)), found, "{path}");
+            assert_eq!(held(path, None).is(&device(Some("240:3"))), found, "{path}");
+        }
+        assert!(held("/tmp/node", Some("240:3")).is(&device(Some("240:3"))), "another place");
+        assert!(!held("/dev/uio3", Some("1:3")).is(&device(Some("240:3"))), "another device");
+    }
+
+    #[test]
+    fn a_number_is_written_as_sysfs_writes_it() {
+        assert_eq!(number_text(0x0101), "1:1");
+        assert_eq!(number_text(0xF003), "240:3");
+        assert_eq!(number_text(0x1000_0010_0234_5678), "268436566:16786296");
+    }
 }

@@ -17,10 +17,11 @@ const EXAMPLES: &str = "\
 Examples:
   pgs check
   pgs check --json
+  pgs check --board uio:pgs@a0000000           a node of another name; `pgs list` shows them
   pgs check --board emulated --quirk stale     see what a failure looks like
 
 Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
-3 if there is no board.";
+3 if there is no board. The emulated board is tested only if --board or PGS_BOARD asks for it.";
 
 /// Test a board: identity, reset, DMA, data both ways, coherency, interrupt; what to do if it fails.
 #[derive(Debug, Clone, Args)]
@@ -96,6 +97,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
+    board::require(common)?;
     let Chosen { kind, options, reason, .. } = board::find(common, args.config(), args.given())?;
     let report = check(options).map_err(board::unusable)?;
     let kind = board::kind_text(kind);

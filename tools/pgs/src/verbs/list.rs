@@ -1,87 +1,73 @@
 //! The verb `list`: which boards there are, and what keeps one from being used.
 
-use std::fs::OpenOptions;
-use std::io::Write;
-use std::path::Path;
+mod inventory;
 
-use bitstream_model::interface::address_map::{
-    UIO_CONTROL_MAP, UIO_CONTROL_NODE, UIO_DMA_NODES, UIO_MEMORY_NODE, UIO_NODE,
-};
+use std::io::Write;
+use std::path::PathBuf;
+
 use clap::Args;
 use serde_json::{Value, json};
-use zynq_pgs::platform::{System, require_bitstream, u_dma_buf_names};
-use zynq_pgs::{UIO_CLASS, UioNode, uio_nodes};
+use zynq_pgs::platform::{
+    System, UioListing, fpga_managers, require_bitstream, u_dma_buf_names, uio_listing,
+};
 
 use super::SCHEMA;
 use crate::args::CommonArgs;
 use crate::board;
 use crate::failure::{Failure, Verdict};
+use inventory::{Buffer, Node, explained, state, unreadable_json};
 
 const EXAMPLES: &str = "\
 Examples:
   pgs list
-  pgs list --json";
+  pgs list --json
+
+A UIO node is recognised by its regions, whatever its name; the line says how to use it.";
 
 /// List the boards: UIO nodes, DMA buffers, what is inaccessible and why, and the emulated board.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
-pub(crate) struct ListArgs {}
-
-/// Why a node cannot be used; `None` if it can, as far as that shows without mapping it.
-fn obstacle(node: &UioNode) -> Option<String> {
-    let parts = [UIO_CONTROL_NODE, UIO_MEMORY_NODE].into_iter().chain(UIO_DMA_NODES);
-    if !parts.chain([UIO_NODE]).any(|name| node.name == name) {
-        return Some("another device".to_owned());
-    }
-    if node.name == UIO_NODE && !node.maps.iter().any(|map| map.name == UIO_CONTROL_MAP) {
-        return Some(format!(
-            "no map named {UIO_CONTROL_MAP:?}: is this the accelerator's overlay?"
-        ));
-    }
-    let path = Path::new("/dev").join(&node.device);
-    let error = OpenOptions::new().read(true).write(true).open(&path).err()?;
-    Some(format!("cannot open {}: {error}: is the udev rule installed?", path.display()))
+pub(crate) struct ListArgs {
+    /// Directory that holds the system's files, for tests.
+    #[arg(long, hide = true, default_value = "/")]
+    system_root: PathBuf,
 }
 
 /// Lists what there is.
 pub(crate) fn run(
-    _: &ListArgs,
+    args: &ListArgs,
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let (kind, reason) = board::choose(&common.board);
+    let system = System::under(&args.system_root);
+    let (kind, reason) = board::choose(&common.board, &system);
     let chosen = board::kind_text(kind);
-    let system = System::default();
-    let buffers = u_dma_buf_names(&system);
-    let logic_error = require_bitstream(&system).err().map(|error| Failure::input(error).chain());
-    let (nodes, error) = match uio_nodes(Path::new(UIO_CLASS)) {
-        Ok(nodes) => (nodes, None),
-        Err(error) => (Vec::new(), Some(Failure::input(error).chain())),
+    let (listing, error) = match uio_listing(&system.uio) {
+        Ok(listing) => (listing, None),
+        Err(error) => (UioListing::default(), Some(explained(&error))),
     };
+    let UioListing { nodes, unreadable, .. } = listing;
+    let nodes: Vec<_> = nodes.into_iter().map(|node| Node::new(node, &system)).collect();
+    let buffers = u_dma_buf_names(&system).into_iter().map(|name| Buffer::new(name, &system));
+    let buffers: Vec<_> = buffers.collect();
+    let managers = fpga_managers(&system.fpga_manager).unwrap_or_default();
+    let logic_error = require_bitstream(&system, &common.manager).err();
     if common.json {
-        let nodes: Vec<Value> = nodes
+        let logic_error = logic_error.map(|error| Failure::input(error).chain());
+        let managers: Vec<Value> = managers
             .iter()
-            .map(|node| {
-                let maps: Vec<Value> = node
-                    .maps
-                    .iter()
-                    .map(|m| json!({ "name": m.name, "address": m.address, "bytes": m.bytes }))
-                    .collect();
-                json!({
-                    "device": node.device,
-                    "name": node.name,
-                    "maps": maps,
-                    "obstacle": obstacle(node),
-                })
-            })
+            .map(|m| json!({ "device": m.device, "name": m.name, "state": state(m) }))
             .collect();
         let document = json!({
             "schema": SCHEMA,
             "verb": "list",
             "board": { "kind": chosen, "reason": reason },
-            "uio_nodes": nodes,
+            "uio_nodes": nodes.iter().map(Node::to_json).collect::<Vec<_>>(),
             "uio_error": error,
-            "u_dma_bufs": buffers,
+            "unreadable_uio_nodes": unreadable.iter().map(unreadable_json).collect::<Vec<_>>(),
+            "u_dma_bufs": buffers.iter().map(|buffer| &buffer.name).collect::<Vec<_>>(),
+            "u_dma_buf_states": buffers.iter().map(Buffer::to_json).collect::<Vec<_>>(),
+            "fpga_managers": managers,
             "logic_error": logic_error,
             "emulated": { "available": true },
         });
@@ -92,11 +78,11 @@ pub(crate) fn run(
     writeln!(out, "would open  {chosen} ({reason})")?;
     if let Some(error) = error {
         writeln!(out, "uio nodes   cannot be listed: {error}")?;
-    } else if nodes.is_empty() {
-        writeln!(out, "uio nodes   none in {UIO_CLASS}")?;
+    } else if nodes.is_empty() && unreadable.is_empty() {
+        writeln!(out, "uio nodes   none in {}", system.uio.display())?;
     }
-    for node in &nodes {
-        let state = obstacle(node).unwrap_or_else(|| "usable".to_owned());
+    for Node { node, obstacle, .. } in &nodes {
+        let state = obstacle.as_deref().unwrap_or("usable");
         writeln!(out, "uio node    {} {:?}: {state}", node.device, node.name)?;
         for map in &node.maps {
             writeln!(
@@ -106,11 +92,17 @@ pub(crate) fn run(
             )?;
         }
     }
-    for name in &buffers {
-        writeln!(out, "u-dma-buf   {name:?}")?;
+    for node in &unreadable {
+        writeln!(out, "uio node    {} cannot be read: {}", node.device, explained(&node.error))?;
+    }
+    for buffer in &buffers {
+        writeln!(out, "u-dma-buf   {:?}: {}", buffer.name, buffer.text())?;
+    }
+    for manager in &managers {
+        writeln!(out, "fpga        {manager}: {}", state(manager))?;
     }
     if let Some(error) = logic_error {
-        writeln!(out, "logic       {error}")?;
+        writeln!(out, "logic       {}", explained(&error))?;
     }
     writeln!(out, "emulated    always available")?;
     Ok(Verdict::Done)

@@ -17,8 +17,11 @@ Examples:
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs load zynq-pgs.bit.bin
   pgs load --json /lib/firmware/xilinx/zynq-pgs/zynq-pgs.bit.bin
+  pgs load zynq-pgs.bit.bin --manager fpga1    where several FPGA managers may be the ZynqMP's
 
-Needs root and the vendor's kernel. A file outside /lib/firmware is copied there while it is loaded.
+Needs root and the vendor's kernel. A file outside the kernel's firmware folders is copied there while
+it is loaded. Refused while a program has a UIO node of the logic or /dev/mem open; and, unless
+--replace-others is given, while another overlay is applied or a driver is bound to the logic.
 Remove the overlay by rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
 
 /// Load a bitstream into the board through the kernel's FPGA manager.
@@ -33,6 +36,10 @@ pub(crate) struct LoadArgs {
     /// The bitstream is a partial one.
     #[arg(long)]
     partial: bool,
+    /// Load although other overlays, or drivers of the kernel, are bound to the logic: they stay, and
+    /// what they do next with the new logic is not known.
+    #[arg(long)]
+    replace_others: bool,
     /// Directory that holds the system's files, for tests.
     #[arg(long, hide = true, default_value = "/")]
     system_root: PathBuf,
@@ -56,6 +63,8 @@ pub(crate) fn run(
         bitstream: args.file.clone(),
         overlay: args.overlay.clone(),
         partial: args.partial,
+        manager: common.manager.clone(),
+        replace_others: args.replace_others,
     };
     let loaded = loading::load(&system, &request)?;
     let kind = if args.partial { "partial" } else { "full" };

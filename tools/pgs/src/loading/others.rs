@@ -1,0 +1,70 @@
+//! Finds overlays, and drivers of the kernel, that are bound to the logic which a bitstream replaces.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use bitstream_model::interface::address_map::is_in_logic;
+
+use super::LoadError;
+use super::overlay::{self, NAME};
+use super::system::{System, read};
+
+/// The kernel's devices with an address.
+const DEVICES: &str = "sys/bus/platform/devices";
+/// Drivers that hand a device to programs, of which `users` knows.
+const UIO_DRIVERS: [&str; 2] = ["uio_pdrv_genirq", "uio_dmem_genirq"];
+
+/// Refuses if an overlay that is not ours is applied, or a driver of the kernel is bound to the logic.
+pub(super) fn refuse_if_bound(system: &dyn System) -> Result<(), LoadError> {
+    let overlays = overlays(system)?;
+    if !overlays.is_empty() {
+        return Err(LoadError::OtherOverlays { overlays });
+    }
+    let drivers = drivers(&system.path(DEVICES));
+    if !drivers.is_empty() {
+        return Err(LoadError::Drivers { drivers: drivers.join(", ") });
+    }
+    Ok(())
+}
+
+/// Overlays of other names that are applied, or may be, and what each says of itself.
+fn overlays(system: &dyn System) -> Result<Vec<(PathBuf, String)>, LoadError> {
+    let Ok(directory) = overlay::interface(system) else {
+        log::info!("there is no interface for overlays: whether one is applied is not known");
+        return Ok(Vec::new());
+    };
+    let entries = fs::read_dir(&directory);
+    let entries = entries.map_err(|source| LoadError::attribute(&directory, source))?;
+    let mut others = Vec::new();
+    for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
+        if !path.is_dir() || path.ends_with(NAME) {
+            continue;
+        }
+        let status = read(&path.join("status"));
+        let status = status.unwrap_or_else(|error| format!("its status cannot be read: {error}"));
+        // One that was made, and into which no tree was written, binds nothing.
+        if status != "unapplied" {
+            others.push((path, status));
+        }
+    }
+    others.sort_unstable();
+    Ok(others)
+}
+
+/// Drivers that are bound to devices of the logic, and to which.
+fn drivers(devices: &Path) -> Vec<String> {
+    let Ok(entries) = fs::read_dir(devices) else { return Vec::new() };
+    let bound = |path: PathBuf| {
+        // `a0000000.dma`: the address of its first register.
+        let id = path.file_name()?.to_str()?.to_owned();
+        let (address, _) = id.split_once('.')?;
+        let address = u64::from_str_radix(address, 16).ok()?;
+        let link = fs::read_link(path.join("driver")).ok()?;
+        let driver = link.file_name()?.to_str()?;
+        let counts = is_in_logic(address, 1) && !UIO_DRIVERS.contains(&driver);
+        counts.then(|| format!("{driver} to {id}"))
+    };
+    let mut drivers: Vec<_> = entries.filter_map(|entry| bound(entry.ok()?.path())).collect();
+    drivers.sort_unstable();
+    drivers
+}
