@@ -20,6 +20,7 @@ use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure};
 use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
 use crate::planned;
+use crate::verbs::facts::fact;
 
 /// What to do about bodies that the board's inertia is too simple for.
 const WORLD_INERTIA: &str =
@@ -250,37 +251,31 @@ impl Opened {
         described(&BoardConfig { profile, numbers, inertia, ..BoardConfig::default() })
     }
 
-    /// Two lines: which board and why, which bitstream.
+    /// In lines of at most 100 columns: which board and why, which bitstream.
     pub(crate) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
         let can = self.accelerator.capabilities();
-        writeln!(out, "board      {} ({})", self.kind(), self.reason)?;
-        writeln!(
-            out,
-            "bitstream  profile {}, {} kHz, {} + {} channels, one issue every {} cycles, {}, \
-             subnormals {}",
+        fact(out, "board", &format!("{} ({})", self.kind(), self.reason))?;
+        let bitstream = format!(
+            "profile {}, {} MHz, {} + {} channels, one issue every {} cycles, {}, subnormals {}",
             self.design(),
-            can.clock_khz,
+            f64::from(can.clock_khz) / 1e3,
             can.mm2s_channels,
             can.s2mm_channels,
             can.initiation_interval,
             hazards_text(can.interlocked),
             subnormals_text(can.flush_subnormals),
-        )?;
-        if let Some(config) = self.config() {
-            writeln!(
-                out,
-                "emulation  memory bandwidth {}, hazard window {}",
-                bandwidth_text(config.bandwidth),
-                match config.window_slots {
-                    Some(slots) => format!("{slots} slots"),
-                    None => format!(
-                        "{} cycles (contact), {} cycles (friction)",
-                        can.contact.window, can.friction.window
-                    ),
-                },
-            )?;
-        }
-        Ok(())
+        );
+        fact(out, "bitstream", &bitstream)?;
+        let Some(config) = self.config() else { return Ok(()) };
+        let window = match config.window_slots {
+            Some(slots) => format!("{slots} slots"),
+            None => format!(
+                "{} cycles (contact), {} cycles (friction)",
+                can.contact.window, can.friction.window
+            ),
+        };
+        let bandwidth = bandwidth_text(config.bandwidth);
+        fact(out, "emulation", &format!("memory bandwidth {bandwidth}, hazard window {window}"))
     }
 
     /// The same for programs.
@@ -317,7 +312,8 @@ impl Opened {
         })
     }
 
-    fn config(&self) -> Option<BoardConfig> {
+    /// How the board is built, where it is emulated.
+    pub(crate) fn config(&self) -> Option<BoardConfig> {
         self.observer.as_ref().map(EmulatedBoard::config)
     }
 }

@@ -23,6 +23,7 @@ mod origin;
 mod planned;
 mod scenes;
 mod sixteen;
+mod solver;
 mod verbs;
 
 use std::io::{self, Write};

@@ -4,7 +4,7 @@
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::order::{Order, Ties};
-use zynq_pgs::{StepParameters, StepReport};
+use zynq_pgs::{OrderChoice, StepParameters, StepReport};
 
 use crate::verbs::table::grouped;
 
@@ -23,8 +23,9 @@ pub(crate) struct OrderingArgs {
 /// An order of the collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OrderName {
-    /// hazard-free-nearby where the pipeline does not wait on hazards, hazard-free where only live
-    /// bodies are kept, as-given where it waits
+    /// The cheapest on the board: hazard-free-nearby, without empty entries where the pipeline waits
+    /// on hazards, or as-given where that takes fewer cycles; hazard-free where only live bodies are
+    /// kept on chip
     Auto,
     /// As detected, which is how Bullet sorts them: hazards abound
     AsGiven,
@@ -114,6 +115,37 @@ impl OrdersSent {
     }
 }
 
+/// In which order a step was sent, and why.
+pub(crate) fn with_reason(report: &StepReport) -> String {
+    match reason(&report.order_choice) {
+        Some(reason) => format!("{}: {reason}", name(report.order)),
+        None => name(report.order),
+    }
+}
+
+/// Why an order was taken; nothing where it was asked for.
+fn reason(choice: &OrderChoice) -> Option<String> {
+    let OrderChoice::Cheapest(costs) = choice else {
+        return match choice {
+            OrderChoice::NoInterlock => Some("this board does not wait on hazards".to_owned()),
+            OrderChoice::LiveBodies => Some("this board keeps only live bodies on chip".to_owned()),
+            _ => None,
+        };
+    };
+    let as_given = grouped(costs.as_given);
+    Some(match costs.reordered.map(|cycles| (grouped(cycles), cycles < costs.as_given)) {
+        Some((reordered, true)) => format!(
+            "this board waits on hazards; the passes take at most {reordered} cycles, more than \
+             {as_given} as given"
+        ),
+        Some((reordered, false)) => format!(
+            "this board waits on hazards; the passes take {as_given} cycles, {reordered} without \
+             hazards"
+        ),
+        None => format!("no order takes fewer cycles for the passes than {as_given}"),
+    })
+}
+
 /// In which order a step was sent, in words.
 pub(crate) fn text(report: &StepReport) -> String {
     let mut text = name(report.order);
@@ -144,6 +176,7 @@ pub(crate) fn text(report: &StepReport) -> String {
 pub(crate) fn to_json(report: &StepReport) -> Value {
     json!({
         "name": name(report.order),
+        "choice": choice_json(&report.order_choice),
         "empty": report.empty,
         "live": report.live.map(|live| json!({
             "most_alive": live.most_alive,
@@ -158,6 +191,25 @@ pub(crate) fn to_json(report: &StepReport) -> Value {
             "mean_span": verified.mean_span,
         })),
     })
+}
+
+/// Why an order was taken, for programs.
+fn choice_json(choice: &OrderChoice) -> Value {
+    let name = match choice {
+        OrderChoice::Asked => "asked",
+        OrderChoice::NoInterlock => "no_interlock",
+        OrderChoice::LiveBodies => "live_bodies",
+        OrderChoice::Cheapest(_) => "cheapest",
+        _ => "other",
+    };
+    match choice {
+        OrderChoice::Cheapest(costs) => json!({
+            "reason": name,
+            "as_given_cycles": costs.as_given,
+            "reordered_cycles": costs.reordered,
+        }),
+        _ => json!({ "reason": name }),
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,9 @@ use crate::failure::Failure;
 use crate::options::BuildArgs;
 use crate::verbs::table::grouped;
 
+/// Drop if not said otherwise, m: the pile lands within half a second.
+const DROP: f32 = 1.0;
+
 /// Which scene, and how large.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SceneArgs {
@@ -20,7 +23,7 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
     grid: Grid,
     /// Height of the lowest bodies above the ground at the start, m.
-    #[arg(long, value_name = "H", default_value_t = SceneOptions::default().drop, value_parser = drop_height)]
+    #[arg(long, value_name = "H", default_value_t = DROP, value_parser = drop_height)]
     drop: f32,
     /// Inverse inertia of the cubes: what Bullet computes (0.3676), or a textbook's (1.5) [default:
     /// bullet]
@@ -103,6 +106,11 @@ impl SceneArgs {
         Err(Failure::input(error).next("give a smaller --grid"))
     }
 
+    /// Whether these are the thesis' cubes.
+    pub(crate) fn is_cubes(&self) -> bool {
+        self.scene == SceneName::Cubes
+    }
+
     /// The scene for people.
     pub(crate) fn text(&self) -> String {
         let Self { grid, drop, .. } = self;
@@ -118,7 +126,7 @@ impl SceneArgs {
 
     /// The scene for programs.
     pub(crate) fn to_json(&self) -> Value {
-        let cubes = self.scene == SceneName::Cubes;
+        let cubes = self.is_cubes();
         json!({
             "scene": if cubes { "cubes" } else { "shapes" },
             "grid": self.grid.to_string(),

@@ -41,7 +41,8 @@ pub use geometry::Geometry;
 pub use grid::Grid;
 pub use measure::{
     KineticEnergy, Momentum, Penetration, carry_along, ground_pairs, kinetic_energy,
-    kinetic_energy_parts, momentum, penetration, potential_energy,
+    kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,
+    potential_energy,
 };
 pub use several::ShapesOptions;
 pub use spheres::{RADII, SPHERES_MAX, Spheres};

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::SCHEMA;
-use super::run::milliseconds;
+use super::milliseconds;
 use crate::args::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::loading::{self, Linux, LoadError, Request};

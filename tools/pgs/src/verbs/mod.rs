@@ -2,21 +2,24 @@
 
 pub(crate) mod check;
 pub(crate) mod compare;
+pub(crate) mod facts;
 pub(crate) mod faults;
 pub(crate) mod formats;
 pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
 pub(crate) mod order;
+mod progress;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;
 pub(crate) mod table;
 
 use std::io::Write;
+use std::time::Duration;
 
 use serde_json::{Value, json};
-use zynq_pgs::StepReport;
+use zynq_pgs::{Limit, StepReport};
 
 use crate::args::{Command, Verb};
 use crate::failure::{Failure, Verdict};
@@ -41,6 +44,22 @@ pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Fai
     }
 }
 
+/// A time in milliseconds.
+pub(crate) fn milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}
+
+/// The name of a limit.
+pub(crate) fn limit_text(limit: Limit) -> &'static str {
+    match limit {
+        Limit::Pipeline => "pipeline",
+        Limit::Hazards => "hazards",
+        Limit::Streams => "streams",
+        Limit::Unknown => "unknown",
+        _ => "other",
+    }
+}
+
 /// A step's report for programs.
 fn report_json(report: &StepReport) -> Value {
     let StepReport { cycles, host, saturated, .. } = report;
@@ -61,8 +80,8 @@ fn report_json(report: &StepReport) -> Value {
             "waits": known(saturated.waits, cycles.waits),
             "waits_saturated": saturated.waits,
         },
-        "modelled_ms": run::milliseconds(report.modelled_time()),
-        "limit": run::limit_text(report.limit()),
+        "modelled_ms": milliseconds(report.modelled_time()),
+        "limit": limit_text(report.limit()),
         "hazards": known(saturated.hazards, report.hazards),
         "hazards_saturated": saturated.hazards,
         "bytes_to_device": report.bytes_to_device,
@@ -74,13 +93,13 @@ fn report_json(report: &StepReport) -> Value {
         "descriptors": report.descriptors,
         "retries": report.retries,
         "host_ms": {
-            "validate": run::milliseconds(host.validate),
-            "order": run::milliseconds(host.order),
-            "pack": run::milliseconds(host.pack),
-            "start": run::milliseconds(host.start),
-            "wait": run::milliseconds(host.wait),
-            "unpack": run::milliseconds(host.unpack),
-            "commit": run::milliseconds(host.commit),
+            "validate": milliseconds(host.validate),
+            "order": milliseconds(host.order),
+            "pack": milliseconds(host.pack),
+            "start": milliseconds(host.start),
+            "wait": milliseconds(host.wait),
+            "unpack": milliseconds(host.unpack),
+            "commit": milliseconds(host.commit),
         },
     })
 }

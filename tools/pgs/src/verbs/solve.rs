@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 use zynq_pgs::{Body, StepParameters, StepReport};
 
 use super::SCHEMA;
-use super::run::{limit_text, milliseconds};
 use super::table::{Bound, grouped};
+use super::{limit_text, milliseconds};
 use crate::args::CommonArgs;
 use crate::board;
 use crate::compare::{self, Difference};

@@ -1,4 +1,4 @@
-//! This file measures the energy of a scene.
+//! Measures the energy of a scene.
 
 use zynq_pgs::{Body, Shape};
 
@@ -26,9 +26,29 @@ impl KineticEnergy {
 /// A body that cannot turn about an axis (inverse inertia 0) has no energy about it.
 #[must_use]
 pub fn kinetic_energy_parts(bodies: &[Body], shapes: &[Shape]) -> KineticEnergy {
+    kinetic_energy_less([0.0; 3], bodies, shapes)
+}
+
+/// Kinetic energy of the velocities that moved the bodies in the last step, J, by kind.
+///
+/// A step moves a body by v dt and adds g dt to v afterwards. Without this addition a body at rest
+/// has no energy.
+#[must_use]
+pub fn kinetic_energy_before_gravity(
+    bodies: &[Body],
+    shapes: &[Shape],
+    gravity: [f32; 3],
+    time_step: f32,
+) -> KineticEnergy {
+    // The product as the step rounds it.
+    kinetic_energy_less(gravity.map(|g| f64::from(g * time_step)), bodies, shapes)
+}
+
+/// Kinetic energy where each linear velocity is less by `addition`, m/s.
+fn kinetic_energy_less(addition: [f64; 3], bodies: &[Body], shapes: &[Shape]) -> KineticEnergy {
     let mut energy = KineticEnergy::default();
     for (body, shape) in moving(bodies, shapes) {
-        let v = body.velocity.linear.map(f64::from);
+        let v = [0, 1, 2].map(|k| f64::from(body.velocity.linear[k]) - addition[k]);
         energy.translational += dot(v, v) * inverted(shape.inverse_mass) / 2.0;
         let w = body.velocity.angular.map(f64::from);
         let inertia = shape.inverse_inertia.map(inverted);
@@ -46,6 +66,12 @@ pub fn kinetic_energy_parts(bodies: &[Body], shapes: &[Shape]) -> KineticEnergy 
 #[must_use]
 pub fn kinetic_energy(bodies: &[Body], shapes: &[Shape]) -> f64 {
     kinetic_energy_parts(bodies, shapes).total()
+}
+
+/// Mass of the moving bodies, kg.
+#[must_use]
+pub fn moving_mass(bodies: &[Body], shapes: &[Shape]) -> f64 {
+    moving(bodies, shapes).map(|(_, shape)| inverted(shape.inverse_mass)).sum()
 }
 
 /// Potential energy of the moving bodies in a uniform field, J: -m g.p, nothing at the origin.
@@ -80,6 +106,29 @@ mod tests {
         assert!((parts.translational - 9.0).abs() < 1e-12, "{parts:?}");
         assert!((parts.rotational - 4.0).abs() < 1e-12, "{parts:?}");
         assert!((kinetic_energy(&bodies, &shapes) - 13.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_body_at_rest_has_no_energy_before_gravity() {
+        let shapes = [Shape::STATIC, Shape::isotropic(0.5, 2.0)];
+        let (gravity, time_step) = ([0.0, -9.8, 0.0], 1.0 / 60.0);
+        let mut resting = body(1, LEVEL);
+        resting.velocity = Velocity { linear: [0.0, -9.8 * time_step, 0.0], angular: [0.0; 3] };
+        let bodies = [resting];
+        let energy = kinetic_energy_before_gravity(&bodies, &shapes, gravity, time_step);
+        assert_eq!(energy.total().to_bits(), 0.0_f64.to_bits());
+        assert!(kinetic_energy(&bodies, &shapes) > 0.02);
+        // 2 kg that moved at 3 m/s.
+        let moved = [body(1, LEVEL)];
+        let energy = kinetic_energy_before_gravity(&moved, &shapes, [0.0, 2.0, 0.0], 1.0);
+        assert!((energy.translational - 5.0).abs() < 1e-12, "{energy:?}");
+    }
+
+    #[test]
+    fn mass_counts_moving_bodies_only() {
+        let shapes = [Shape::STATIC, Shape::isotropic(0.5, 2.0)];
+        let bodies = [body(0, LEVEL), body(1, LEVEL), body(1, LEVEL), body(7, LEVEL)];
+        assert!((moving_mass(&bodies, &shapes) - 4.0).abs() < 1e-12);
     }
 
     #[test]

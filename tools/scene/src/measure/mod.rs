@@ -9,7 +9,10 @@ mod penetration;
 
 use zynq_pgs::{Body, Collision, Shape};
 
-pub use energy::{KineticEnergy, kinetic_energy, kinetic_energy_parts, potential_energy};
+pub use energy::{
+    KineticEnergy, kinetic_energy, kinetic_energy_before_gravity, kinetic_energy_parts,
+    moving_mass, potential_energy,
+};
 pub use momentum::{Momentum, momentum};
 pub use penetration::{Penetration, carry_along, penetration};
 

@@ -15,7 +15,7 @@ use zynq_pgs::StepParameters;
 
 use self::lane::{Lane, Measured, World};
 use super::SCHEMA;
-use super::run::progress_bar;
+use super::progress::progress_bar;
 use crate::args::{BoardName, CommonArgs};
 use crate::deviation::StateDeviation;
 use crate::failure::{Failure, Verdict};

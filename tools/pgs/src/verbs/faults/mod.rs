@@ -19,7 +19,7 @@ use self::cells::{Cell, Impossible};
 use self::table::Tally;
 use self::trial::{Bench, Verified};
 use super::SCHEMA;
-use super::run::progress_bar;
+use super::progress::progress_bar;
 use crate::args::CommonArgs;
 use crate::environment;
 use crate::failure::{Failure, Verdict};

@@ -13,7 +13,7 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 use self::numbers::{AS_STREAMED, EACH_ONCE, Numbers, SUMS, numbers};
 use self::tally::{Loss, Sizes};
 use super::SCHEMA;
-use super::run::progress_bar;
+use super::progress::progress_bar;
 use super::table::{Column, grouped, heading, line, number};
 use crate::args::CommonArgs;
 use crate::board;

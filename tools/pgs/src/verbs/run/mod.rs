@@ -1,0 +1,287 @@
+//! The verb `run`: steps a scene, shows what every step cost, and sums it up.
+
+mod row;
+mod summary;
+
+use std::io::{self, Write};
+
+use clap::Args;
+use scene::Scene;
+use serde_json::{Value, json};
+use zynq_pgs::{BoardKind, StepParameters, StepReport};
+
+use self::row::{ALL_COLUMNS, Row, columns, step};
+use self::summary::{Summary, Totals};
+use super::SCHEMA;
+use super::facts::fact;
+use super::progress::progress_bar;
+use super::table::{grouped, heading, line};
+use crate::args::CommonArgs;
+use crate::board::{self, Opened};
+use crate::diagnosis::FaultArgs;
+use crate::failure::{Failure, Verdict};
+use crate::footprint::Footprint;
+use crate::interrupt::Interrupt;
+use crate::options::{BuildArgs, DeadlineArgs, bandwidth_text};
+use crate::ordering::{self, OrderingArgs};
+use crate::planned::{self, PlannedArgs};
+use crate::scenes::SceneArgs;
+use crate::solver::{SolverArgs, time_step_text};
+use step_folder::digest;
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs run                                        the thesis' 38,880 cubes
+  pgs run --contact-iterations 4 --friction-iterations 4 --drop 5     the thesis' passes
+  pgs run --grid 10x10x10 --steps 600 --report-every 30
+  pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
+  pgs run --hazards unchecked --order as-given   the same as the thesis orders: piles gain energy
+  pgs run --order hazard-free --verify
+  pgs run --profile half --format thesis16       the thesis' design in sixteen bits
+  pgs run --scene shapes --inertia world --grid 8x8x8
+  pgs run --wide                                 every column: cycles by kind, host time by phase
+  pgs run --bandwidth unlimited --json > run.json
+  pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
+  pgs run --retries 2 --report fault.json        try a failed step again; keep all about the fault
+
+The grid, the cubes and the solver's constants are the thesis'. The drop is a choice: the thesis names
+no height. So are 10 + 10 iterations: with the thesis' 4 + 4 a pile of 30 layers sinks 0.2 m into
+itself and bounces.
+
+Columns: step; pairs of bodies in contact; deepest penetration of the contacts that the step is given;
+kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the step
+on the board, which is modelled where the board is emulated; time of this machine.";
+
+/// Rows of the table, if not said otherwise.
+const ROWS: u32 = 15;
+/// Contact and friction iterations of a step, if not said otherwise: enough to carry 30 layers.
+const ITERATIONS: u32 = 10;
+
+/// Step a pile dropped on the ground.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct RunArgs {
+    /// Steps to take.
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) steps: u32,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Show every N-th step [default: a fifteenth of the steps]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    report_every: Option<u32>,
+    /// Show every column, 170 characters a line.
+    #[arg(long)]
+    wide: bool,
+    #[command(flatten)]
+    solver: SolverArgs,
+    #[command(flatten)]
+    ordering: OrderingArgs,
+    #[command(flatten)]
+    deadline: DeadlineArgs,
+    #[command(flatten)]
+    faults: FaultArgs,
+    #[command(flatten)]
+    build: BuildArgs,
+    #[command(flatten)]
+    planned: PlannedArgs,
+}
+
+impl RunArgs {
+    fn parameters(&self) -> StepParameters {
+        let mut parameters = StepParameters::default();
+        parameters.contact_iterations = ITERATIONS;
+        parameters.friction_iterations = ITERATIONS;
+        let parameters = self.deadline.apply(self.solver.apply(parameters));
+        self.faults.apply(self.ordering.apply(parameters))
+    }
+
+    /// Whether a step has a row of its own.
+    fn is_shown(&self, step: u32) -> bool {
+        let every = self.report_every.unwrap_or(self.steps.div_ceil(ROWS));
+        step == 1 || step % every == 0 || step == self.steps
+    }
+}
+
+/// What a run has come to so far.
+#[derive(Default)]
+struct Course {
+    done: u32,
+    retries: u64,
+    totals: Totals,
+    footprint: Footprint,
+    orders: ordering::OrdersSent,
+    /// With `--json`, the document of every step.
+    documents: Vec<Value>,
+    last: Option<Row>,
+}
+
+/// Steps the scene.
+pub(crate) fn run(
+    args: &RunArgs,
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    let mut opened = board::open(common, &args.build)?;
+    args.scene.check_size(&opened)?;
+    let mut scene = args.scene.build(&args.build)?;
+    opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
+    let interrupt = Interrupt::install();
+    opened.accelerator.set_cancellation(interrupt.cancellation());
+    let parameters = args.parameters();
+    args.planned.inject(&mut opened, &parameters)?;
+
+    let course = take_steps(args, common, &parameters, &mut opened, &mut scene, &interrupt, out)?;
+    let complete = course.done == args.steps;
+    if common.json {
+        let document = document(args, &parameters, &opened, &mut scene, course, complete);
+        writeln!(out, "{document:#}")?;
+    } else {
+        print_end(args, &parameters, &opened, &mut scene, &course, out)?;
+    }
+    Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
+}
+
+/// Takes the steps and shows them, until the last one or Ctrl-C.
+fn take_steps(
+    args: &RunArgs,
+    common: &CommonArgs,
+    parameters: &StepParameters,
+    opened: &mut Opened,
+    scene: &mut Scene,
+    interrupt: &Interrupt,
+    out: &mut dyn Write,
+) -> Result<Course, Failure> {
+    let progress = progress_bar(args.steps);
+    let variant = opened.accelerator.capabilities().variant;
+    let mut course = Course::default();
+    while course.done < args.steps && !interrupt.is_set() {
+        let row = step(course.done + 1, parameters, &mut opened.accelerator, scene)
+            .map_err(|error| args.faults.failure(opened, parameters, error))?;
+        let Some(row) = row else { break };
+        course.done += 1;
+        course.retries += u64::from(row.report.retries);
+        course.totals.see(&row);
+        course.footprint.see(&variant, &row.report);
+        course.orders.see(row.report.order);
+        if course.done == 1 && !common.json {
+            // Only now: a scene that is refused prints nothing but the refusal.
+            progress.suspend(|| print_heading(args, opened, &row.report, out))?;
+        }
+        progress.inc(1);
+        if common.json {
+            course.documents.push(row.to_json());
+        } else if args.is_shown(course.done) {
+            progress.suspend(|| match args.wide {
+                true => line(out, &ALL_COLUMNS, row.all_cells()),
+                false => line(out, &columns(is_emulated(opened)), row.cells()),
+            })?;
+            out.flush()?;
+        }
+        course.last = Some(row);
+    }
+    progress.finish_and_clear();
+    Ok(course)
+}
+
+/// Whether the times of the board are modelled.
+fn is_emulated(opened: &Opened) -> bool {
+    matches!(opened.accelerator.board().kind, BoardKind::Emulated | BoardKind::Served)
+}
+
+/// Which board, which scene, the first step's order, and the names of the columns.
+fn print_heading(
+    args: &RunArgs,
+    opened: &Opened,
+    first: &StepReport,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    opened.print(out)?;
+    fact(out, "scene", &args.scene.text())?;
+    fact(out, "order", &ordering::with_reason(first))?;
+    writeln!(out)?;
+    match args.wide {
+        true => heading(out, &ALL_COLUMNS)?,
+        false => heading(out, &columns(is_emulated(opened)))?,
+    }
+    out.flush()
+}
+
+/// What is known of the run as a whole; nothing before the first step.
+fn summary<'a>(
+    args: &RunArgs,
+    parameters: &'a StepParameters,
+    opened: &Opened,
+    scene: &mut Scene,
+    course: &'a Course,
+) -> Option<Summary<'a>> {
+    let last = course.last.as_ref()?;
+    let facts = summary::Board {
+        profile: opened.accelerator.capabilities().variant.profile,
+        is_emulated: is_emulated(opened),
+        bandwidth: opened.config().map(|config| bandwidth_text(config.bandwidth)),
+    };
+    let cubes = args.scene.is_cubes();
+    Some(Summary::new(&course.totals, parameters, facts, cubes, (scene, last)))
+}
+
+fn print_end(
+    args: &RunArgs,
+    parameters: &StepParameters,
+    opened: &Opened,
+    scene: &mut Scene,
+    course: &Course,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    writeln!(out)?;
+    let Course { done, retries, orders, footprint, .. } = course;
+    if *done != args.steps {
+        writeln!(out, "interrupted after {done} of {} steps", args.steps)?;
+    }
+    if let Some(faults) = planned::text(opened) {
+        writeln!(out, "{faults}")?;
+    }
+    if *retries > 0 {
+        fact(out, "retries", &format!("{} of {done} steps", grouped(*retries)))?;
+    }
+    if let Some(summary) = summary(args, parameters, opened, scene, course) {
+        summary.print(out)?;
+    }
+    if let Some(orders) = orders.text() {
+        fact(out, "orders", &orders)?;
+    }
+    if let Some(memory) = footprint.text() {
+        fact(out, "memory", &memory)?;
+    }
+    writeln!(out, "digest     {} {:016x}", digest::ALGORITHM, digest::of_bodies(scene.bodies()))
+}
+
+fn document(
+    args: &RunArgs,
+    parameters: &StepParameters,
+    opened: &Opened,
+    scene: &mut Scene,
+    mut course: Course,
+    complete: bool,
+) -> Value {
+    let mut config = args.scene.to_json();
+    config["steps"] = args.steps.into();
+    config["contact_iterations"] = parameters.contact_iterations.into();
+    config["friction_iterations"] = parameters.friction_iterations.into();
+    config["time_step_s"] = parameters.time_step.into();
+    config["time_step"] = time_step_text(parameters.time_step).into();
+    let steps = std::mem::take(&mut course.documents);
+    let summary = summary(args, parameters, opened, scene, &course);
+    let digest = format!("{:016x}", digest::of_bodies(scene.bodies()));
+    json!({
+        "schema": SCHEMA,
+        "verb": "run",
+        "config": config,
+        "board": opened.to_json(),
+        "complete": complete,
+        "steps": steps,
+        "summary": summary.map(|summary| summary.to_json()),
+        "faults": planned::to_json(opened),
+        "memory": course.footprint.to_json(),
+        "digest": { "algorithm": digest::ALGORITHM, "value": digest },
+    })
+}

@@ -1,0 +1,157 @@
+//! Measures one step of a run, and shows it in a row or a document.
+
+use std::time::{Duration, Instant};
+
+use scene::Scene;
+use serde_json::Value;
+use zynq_pgs::{Accelerator, StepParameters, StepReport};
+
+use crate::board::is_cancelled;
+use crate::verbs::table::{Bound, Column, grouped};
+use crate::verbs::{limit_text, milliseconds, report_json};
+
+/// What one step did.
+pub(super) struct Row {
+    pub(super) step: u32,
+    pub(super) ground_pairs: usize,
+    /// Deepest penetration of the contacts that the step was given, m.
+    pub(super) deepest: f64,
+    /// Kinetic energy after the step, J.
+    pub(super) kinetic_energy: f64,
+    /// The same without what gravity added last, J: nothing for a pile at rest.
+    pub(super) before_gravity: f64,
+    pub(super) detect: Duration,
+    pub(super) report: StepReport,
+}
+
+/// The columns that a person reads. The times of an emulated board are modelled.
+pub(super) const fn columns(is_emulated: bool) -> [Column; 6] {
+    let (board, host) = if is_emulated { ("modelled", "emulated") } else { ("board", "host") };
+    [
+        Column { name: "step", unit: "", width: 6 },
+        Column { name: "pairs", unit: "", width: 9 },
+        Column { name: "deepest", unit: "mm", width: 9 },
+        Column { name: "kinetic", unit: "kJ", width: 11 },
+        Column { name: board, unit: "ms", width: 10 },
+        Column { name: host, unit: if is_emulated { "host ms" } else { "ms" }, width: 10 },
+    ]
+}
+
+/// All columns.
+pub(super) const ALL_COLUMNS: [Column; 18] = [
+    Column { name: "step", unit: "", width: 5 },
+    Column { name: "pairs", unit: "", width: 8 },
+    Column { name: "ground", unit: "pairs", width: 6 },
+    Column { name: "empty", unit: "entries", width: 7 },
+    Column { name: "impulses", unit: "N s", width: 10 },
+    Column { name: "energy", unit: "kJ", width: 9 },
+    Column { name: "formula", unit: "cycles", width: 10 },
+    Column { name: "stalls", unit: "cycles", width: 12 },
+    Column { name: "waits", unit: "cycles", width: 9 },
+    Column { name: "modelled", unit: "ms", width: 9 },
+    Column { name: "moved", unit: "MB", width: 7 },
+    Column { name: "limit", unit: "", width: 8 },
+    Column { name: "hazards", unit: "", width: 9 },
+    Column { name: "detect", unit: "host ms", width: 7 },
+    Column { name: "order", unit: "host ms", width: 7 },
+    Column { name: "pack", unit: "host ms", width: 7 },
+    Column { name: "device", unit: "host ms", width: 7 },
+    Column { name: "unpack", unit: "host ms", width: 7 },
+];
+
+impl Row {
+    /// Time of the host for the whole step, the emulation of the board included.
+    pub(super) fn host(&self) -> Duration {
+        let host = &self.report.host;
+        let around = host.validate + host.order + host.pack + host.start;
+        self.detect + around + host.wait + host.unpack + host.commit
+    }
+
+    pub(super) fn cells(&self) -> [String; 6] {
+        [
+            self.step.to_string(),
+            grouped(self.report.collisions),
+            format!("{:.1}", self.deepest * 1e3),
+            format!("{:.3}", self.before_gravity / 1e3),
+            format!("{:.3}", milliseconds(self.report.modelled_time())),
+            format!("{:.1}", milliseconds(self.host())),
+        ]
+    }
+
+    pub(super) fn all_cells(&self) -> [String; ALL_COLUMNS.len()] {
+        let StepReport { cycles, host, saturated, .. } = &self.report;
+        let impulses = match self.report.impulse_sum {
+            Some(sum) => format!("{sum:.1}"),
+            None if saturated.impulse_sum => Bound::AtLeast.short(StepReport::IMPULSE_SUM_MAX),
+            None => "-".to_owned(),
+        };
+        let bytes = self.report.bytes_to_device + self.report.bytes_from_device;
+        [
+            self.step.to_string(),
+            grouped(self.report.collisions),
+            grouped(self.ground_pairs as u64),
+            grouped(self.report.empty),
+            impulses,
+            format!("{:.3}", self.kinetic_energy / 1e3),
+            Bound::AtLeast.cell(saturated.work, cycles.work),
+            Bound::AtMost.cell(saturated.stalls(), cycles.stalls),
+            Bound::AtLeast.cell(saturated.waits, cycles.waits),
+            format!("{:.3}", milliseconds(self.report.modelled_time())),
+            format!("{:.1}", bytes as f64 / 1e6),
+            limit_text(self.report.limit()).to_owned(),
+            Bound::AtLeast.cell(saturated.hazards, self.report.hazards),
+            format!("{:.1}", milliseconds(self.detect)),
+            format!("{:.1}", milliseconds(host.order)),
+            format!("{:.1}", milliseconds(host.validate + host.pack)),
+            format!("{:.1}", milliseconds(host.start + host.wait)),
+            format!("{:.1}", milliseconds(host.unpack + host.commit)),
+        ]
+    }
+
+    pub(super) fn to_json(&self) -> Value {
+        let mut value = report_json(&self.report);
+        value["step"] = self.step.into();
+        value["ground_pairs"] = self.ground_pairs.into();
+        value["deepest_penetration_m"] = self.deepest.into();
+        value["kinetic_energy_j"] = self.kinetic_energy.into();
+        value["kinetic_energy_before_gravity_j"] = self.before_gravity.into();
+        value["host_ms"]["detect"] = milliseconds(self.detect).into();
+        value
+    }
+}
+
+/// Detects collisions and takes one step; nothing if Ctrl-C ended it.
+pub(super) fn step(
+    number: u32,
+    parameters: &StepParameters,
+    accelerator: &mut Accelerator,
+    scene: &mut Scene,
+) -> Result<Option<Row>, zynq_pgs::Error> {
+    let begin = Instant::now();
+    scene.detect();
+    let detect = begin.elapsed();
+    let ground_pairs = scene.ground_pairs();
+    let deepest = scene::penetration(scene.collisions()).largest;
+    let (bodies, collisions) = scene.parts_mut();
+    let report = match accelerator.step(bodies, collisions, parameters) {
+        Ok(report) => report,
+        Err(error) if is_cancelled(&error) => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    let kinetic_energy = scene::kinetic_energy(scene.bodies(), scene.shapes());
+    let before_gravity = scene::kinetic_energy_before_gravity(
+        scene.bodies(),
+        scene.shapes(),
+        parameters.gravity,
+        parameters.time_step,
+    );
+    Ok(Some(Row {
+        step: number,
+        ground_pairs,
+        deepest,
+        kinetic_energy,
+        before_gravity: before_gravity.total(),
+        detect,
+        report,
+    }))
+}

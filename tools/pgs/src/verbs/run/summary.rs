@@ -1,0 +1,363 @@
+//! Sums up a run: what was simulated, how long the board takes beside the thesis' figures, what
+//! limits it, and whether the pile is at rest.
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use bitstream_model::timing::thesis::{self, recorded};
+use bitstream_model::timing::{Records, StepCycles, StepShape};
+use scene::{Scene, moving_mass, penetration};
+use serde_json::{Value, json};
+use zynq_pgs::interface::profile::Profile;
+use zynq_pgs::{Limit, StepParameters};
+
+use super::row::Row;
+use crate::solver::time_step_text;
+use crate::verbs::facts::fact;
+use crate::verbs::table::grouped;
+use crate::verbs::{limit_text, milliseconds};
+
+/// A pile is at rest if its bodies move no faster than this on average (root of the mean of v²,
+/// weighted by mass, turning included), m/s.
+const REST: f64 = 0.05;
+
+/// Sums over the steps of a run.
+#[derive(Debug, Default)]
+pub(super) struct Totals {
+    steps: u32,
+    collisions_most: u64,
+    modelled: Duration,
+    modelled_most: Duration,
+    passes: u32,
+    bytes_to_device: u64,
+    bytes_from_device: u64,
+    cycles: u64,
+    stalls: u64,
+    waits: u64,
+    /// How many steps each limit held back.
+    limits: Vec<(Limit, u32)>,
+    host: HostSums,
+}
+
+/// Host time by what it was spent on.
+#[derive(Debug, Default)]
+struct HostSums {
+    all: Duration,
+    detect: Duration,
+    order: Duration,
+    pack: Duration,
+    board: Duration,
+    unpack: Duration,
+}
+
+impl Totals {
+    /// Takes a step into account.
+    pub(super) fn see(&mut self, row: &Row) {
+        let report = &row.report;
+        self.steps += 1;
+        self.collisions_most = self.collisions_most.max(report.collisions);
+        self.modelled += report.modelled_time();
+        self.modelled_most = self.modelled_most.max(report.modelled_time());
+        self.passes = report.passes;
+        self.bytes_to_device += report.bytes_to_device;
+        self.bytes_from_device += report.bytes_from_device;
+        self.cycles += report.cycles.total;
+        self.stalls += report.cycles.stalls;
+        self.waits += report.cycles.waits;
+        let limit = report.limit();
+        match self.limits.iter_mut().find(|(known, _)| *known == limit) {
+            Some((_, steps)) => *steps += 1,
+            None => self.limits.push((limit, 1)),
+        }
+        let host = &report.host;
+        self.host.all += row.host();
+        self.host.detect += row.detect;
+        self.host.order += host.order;
+        self.host.pack += host.validate + host.pack;
+        self.host.board += host.start + host.wait;
+        self.host.unpack += host.unpack + host.commit;
+    }
+
+    /// The limit of most steps, and how many they are.
+    fn limit(&self) -> Option<(Limit, u32)> {
+        self.limits.iter().copied().max_by_key(|(_, steps)| *steps)
+    }
+
+    /// Mean time of a step on the board, ms.
+    fn mean(&self) -> f64 {
+        milliseconds(self.modelled) / f64::from(self.steps.max(1))
+    }
+
+    /// Mean time of a pass over the collisions, what surrounds the passes included, ms.
+    fn per_pass(&self) -> Option<f64> {
+        (self.passes > 0).then(|| self.mean() / f64::from(self.passes))
+    }
+
+    /// Share of all cycles, percent.
+    fn percent(&self, cycles: u64) -> f64 {
+        100.0 * cycles as f64 / (self.cycles as f64).max(1.0)
+    }
+}
+
+/// What the thesis has beside a run.
+#[derive(Debug, Clone, Copy)]
+struct Thesis {
+    design: &'static recorded::Design,
+    /// Cycles of one of its passes.
+    pass: u64,
+    /// Its time for as many passes, ms.
+    same_passes_ms: f64,
+}
+
+/// Passes of the thesis' step.
+const THESIS_PASSES: u32 = 8;
+
+impl Thesis {
+    fn beside(profile: &Profile, passes: u32) -> Self {
+        let half = recorded::HALF_DESIGN.profile.name == profile.name;
+        let design = if half { &recorded::HALF_DESIGN } else { &recorded::FLOAT_DESIGN };
+        let shape = StepShape::new(thesis::BODIES, thesis::COLLISIONS);
+        let variant = design.profile.default_variant();
+        let pass = StepCycles::new(&variant, Records::Packed, &shape).pass;
+        let more = f64::from(passes) - f64::from(THESIS_PASSES);
+        let more_ms = more * pass as f64 / f64::from(design.profile.clock_khz);
+        Self { design, pass, same_passes_ms: design.latency_ms + more_ms }
+    }
+
+    fn text(self, passes: u32) -> String {
+        let Self { design, pass, same_passes_ms } = self;
+        let recorded::Design { latency_ms, profile, comparison, .. } = design;
+        let collisions = grouped(thesis::COLLISIONS);
+        let (gpu, cpu) = (recorded::GPU, recorded::CPU);
+        let scaled = match passes {
+            THESIS_PASSES => String::new(),
+            _ => format!(
+                "; {passes} passes are {same_passes_ms:.2} ms by its {} cycles a pass",
+                grouped(pass)
+            ),
+        };
+        format!(
+            "recorded for {collisions} collisions and {THESIS_PASSES} passes ({comparison}): its \
+             {} design {latency_ms} ms, {} {} ms, {} {} ms{scaled}",
+            profile.name, gpu.name, gpu.latency_ms, cpu.name, cpu.latency_ms
+        )
+    }
+}
+
+/// How the pile stands at the end.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    /// Without what gravity added last, J.
+    kinetic_energy: f64,
+    /// Speed that all bodies together have this energy at, m/s.
+    speed: f64,
+    /// m.
+    deepest: f64,
+}
+
+impl End {
+    fn of(scene: &mut Scene, last: &Row) -> Self {
+        scene.detect();
+        let deepest = penetration(scene.collisions()).largest;
+        let mass = moving_mass(scene.bodies(), scene.shapes());
+        let kinetic_energy = last.before_gravity;
+        let speed = if mass > 0.0 { (2.0 * kinetic_energy / mass).sqrt() } else { 0.0 };
+        Self { kinetic_energy, speed, deepest }
+    }
+
+    fn is_at_rest(&self) -> bool {
+        self.speed <= REST
+    }
+
+    fn text(&self) -> String {
+        format!(
+            "{}: {:.1} cm/s on average ({:.3} kJ), deepest penetration {:.1} mm",
+            if self.is_at_rest() { "at rest" } else { "not at rest" },
+            self.speed * 100.0,
+            self.kinetic_energy / 1e3,
+            self.deepest * 1e3,
+        )
+    }
+}
+
+/// The board of a run.
+#[derive(Debug)]
+pub(super) struct Board {
+    pub(super) profile: &'static Profile,
+    /// Whether its times are modelled.
+    pub(super) is_emulated: bool,
+    /// Its memory bandwidth, where that is known.
+    pub(super) bandwidth: Option<String>,
+}
+
+/// What there is to tell of a run.
+pub(super) struct Summary<'a> {
+    totals: &'a Totals,
+    parameters: &'a StepParameters,
+    board: Board,
+    /// Whether the scene is the thesis' cubes.
+    cubes: bool,
+    end: End,
+}
+
+impl<'a> Summary<'a> {
+    /// Measures how the scene stands after its last step.
+    pub(super) fn new(
+        totals: &'a Totals,
+        parameters: &'a StepParameters,
+        board: Board,
+        cubes: bool,
+        (scene, last): (&mut Scene, &Row),
+    ) -> Self {
+        Self { totals, parameters, board, cubes, end: End::of(scene, last) }
+    }
+
+    fn thesis(&self) -> Option<Thesis> {
+        self.cubes.then(|| Thesis::beside(self.board.profile, self.totals.passes))
+    }
+
+    /// For people.
+    pub(super) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
+        fact(out, "simulated", &self.simulated())?;
+        fact(out, "board", &self.board_times())?;
+        if let Some(thesis) = self.thesis() {
+            fact(out, "thesis", &thesis.text(self.totals.passes))?;
+        }
+        if let Some(limit) = self.limit() {
+            fact(out, "limit", &limit)?;
+        }
+        fact(out, "bytes", &self.bytes())?;
+        fact(out, "pile", &self.end.text())?;
+        fact(out, "host", &self.host())
+    }
+
+    fn simulated(&self) -> String {
+        let Self { totals, parameters, .. } = self;
+        let seconds = f64::from(parameters.time_step) * f64::from(totals.steps);
+        format!(
+            "{seconds:.2} s in {} steps of {} with {} contact and {} friction iterations, up to {} \
+             pairs",
+            grouped(totals.steps.into()),
+            time_step_text(parameters.time_step),
+            parameters.contact_iterations,
+            parameters.friction_iterations,
+            grouped(totals.collisions_most),
+        )
+    }
+
+    fn board_times(&self) -> String {
+        let Self { totals, board, .. } = self;
+        let mut text = format!(
+            "{}{:.3} ms a step on average, {:.3} ms at most",
+            if board.is_emulated { "modelled: " } else { "" },
+            totals.mean(),
+            milliseconds(totals.modelled_most)
+        );
+        if let Some(per_pass) = totals.per_pass() {
+            text += &format!(", {per_pass:.3} ms a pass");
+        }
+        text
+    }
+
+    fn limit(&self) -> Option<String> {
+        let Self { totals, board, .. } = self;
+        let (limit, held) = totals.limit()?;
+        let at = match &board.bandwidth {
+            Some(bandwidth) => format!(" (bandwidth {bandwidth})"),
+            None => String::new(),
+        };
+        Some(format!(
+            "{} in {} of {} steps: {:.1} % of the cycles wait for memory{at}, {:.1} % for velocities \
+             (hazards)",
+            limit_text(limit),
+            grouped(held.into()),
+            grouped(totals.steps.into()),
+            totals.percent(totals.waits),
+            totals.percent(totals.stalls),
+        ))
+    }
+
+    fn bytes(&self) -> String {
+        let totals = self.totals;
+        let megabytes = |bytes: u64| bytes as f64 / 1e6 / f64::from(totals.steps.max(1));
+        format!(
+            "{:.1} MB to the board and {:.1} MB back a step",
+            megabytes(totals.bytes_to_device),
+            megabytes(totals.bytes_from_device)
+        )
+    }
+
+    fn host(&self) -> String {
+        let HostSums { all, detect, order, pack, board, unpack } = &self.totals.host;
+        let seconds = Duration::as_secs_f64;
+        format!(
+            "{:.1} s: {:.1} s detect collisions, {:.1} s order and {:.1} s pack them, {:.1} s {}, \
+             {:.1} s read results",
+            seconds(all),
+            seconds(detect),
+            seconds(order),
+            seconds(pack),
+            seconds(board),
+            if self.board.is_emulated { "emulate the board" } else { "wait for the board" },
+            seconds(unpack),
+        )
+    }
+
+    /// For programs.
+    pub(super) fn to_json(&self) -> Value {
+        let Self { totals, end, .. } = self;
+        json!({
+            "modelled_ms": {
+                "mean": totals.mean(),
+                "most": milliseconds(totals.modelled_most),
+                "per_pass": totals.per_pass(),
+            },
+            "thesis": self.thesis().map(|thesis| json!({
+                "design": thesis.design.profile.name,
+                "recorded_ms": thesis.design.latency_ms,
+                "recorded_passes": THESIS_PASSES,
+                "recorded_collisions": thesis::COLLISIONS,
+                "same_passes_ms": thesis.same_passes_ms,
+                "gpu_ms": recorded::GPU.latency_ms,
+                "cpu_ms": recorded::CPU.latency_ms,
+            })),
+            "limit": totals.limit().map(|(limit, steps)| json!({
+                "name": limit_text(limit),
+                "steps": steps,
+                "wait_percent": totals.percent(totals.waits),
+                "stall_percent": totals.percent(totals.stalls),
+            })),
+            "bytes_to_device": totals.bytes_to_device,
+            "bytes_from_device": totals.bytes_from_device,
+            "end": {
+                "at_rest": end.is_at_rest(),
+                "kinetic_energy_before_gravity_j": end.kinetic_energy,
+                "speed_m_s": end.speed,
+                "deepest_penetration_m": end.deepest,
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED};
+
+    /// 254,000 cycles a pass at 275 MHz are 0.9236 ms; 190,500 at 250 MHz are 0.762 ms.
+    #[test]
+    fn the_thesis_is_shown_for_as_many_passes() {
+        let ms = |profile, passes| Thesis::beside(profile, passes).same_passes_ms;
+        assert!((ms(&FLOAT, 8) - 7.49).abs() < 1e-9);
+        assert!((ms(&FLOAT, 20) - (7.49 + 12.0 * 0.923_636)).abs() < 1e-3);
+        assert!((ms(&HALF, 9) - (6.23 + 0.762)).abs() < 1e-3);
+        assert!((ms(&MIXED, 8) - 7.49).abs() < 1e-9, "it has no design of its own there");
+        let text = Thesis::beside(&FLOAT, 8).text(8);
+        assert!(
+            text.ends_with("float design 7.49 ms, GTX 980 13.64 ms, i7-3770 53.01 ms"),
+            "{text}"
+        );
+        let text = Thesis::beside(&FLOAT, 20).text(20);
+        assert!(text.ends_with("; 20 passes are 18.57 ms by its 254,000 cycles a pass"), "{text}");
+    }
+}
