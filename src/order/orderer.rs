@@ -1,5 +1,7 @@
 //! This file makes an order of the kind that is asked for.
 
+use crew::float_env::standard;
+
 use super::groups::Groups;
 use super::sweep::Sweep;
 use super::tail::Tail;
@@ -93,6 +95,16 @@ impl Orderer {
         order: Order,
         window: IssueWindow,
     ) -> Result<&Schedule, OrderError> {
+        standard(|| self.make(input, order, window))?;
+        Ok(&self.schedule)
+    }
+
+    fn make(
+        &mut self,
+        input: &OrderInput<'_>,
+        order: Order,
+        window: IssueWindow,
+    ) -> Result<(), OrderError> {
         input.check()?;
         let schedule = &mut self.schedule;
         let mut made = order;
@@ -120,7 +132,7 @@ impl Orderer {
             }
         }
         self.made = made;
-        Ok(&self.schedule)
+        Ok(())
     }
 
     /// Collisions of the moving body that has the most.
