@@ -130,6 +130,22 @@
 //! moment that the board is through with the first. Collisions that are found one after the other
 //! need no array: [`Accelerator::write`] takes each as it is found.
 //!
+//! # The floating-point environment
+//!
+//! The caller's thread may round otherwise than to nearest, flush subnormal numbers to zero, or trap on
+//! exceptions, as game engines do. No result depends on it, and nothing traps: the driver and the emulated
+//! board compute in the standard environment, and the caller finds its own as it was, exception flags too.
+//! This holds on x86-64 and on `AArch64`.
+//!
+//! These calls set it, and restore the caller's on the way out: [`Accelerator::open`], `set_shapes`,
+//! `submit`, `write` and `start`; [`InFlight::wait`], `wait_and_start`, `prepare`, `write` and its drop;
+//! [`check`]; the constructors of [`Shape`]; the functions of [`order`] that order or measure. A
+//! [step](Accelerator::step) is a `submit` and a `wait`. The threads that share the work set it themselves, and
+//! so does the emulated board at each access.
+//!
+//! The methods of [`Bodies`] and [`Collisions`] are called in the standard environment. The narrow phase
+//! that `write` is given runs in the caller's, and [`Writer::push`] sets the standard one where it computes.
+//!
 //! # When something fails
 //!
 //! Every error says what was expected, what was found and what to do; the bodies are as they were.

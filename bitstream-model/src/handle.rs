@@ -1,9 +1,14 @@
-//! This file gives a board its two handles: what a driver may touch, and what its builder may see.
+//! The two handles of a board: what a driver may touch, and what its builder may see.
+//!
+//! Every call of either goes through [`enter`]: a board computes in the standard floating-point environment,
+//! whatever the caller's is.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicU32;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
+
+use crew::float_env::standard;
 
 use crate::axi_dma::PacketCount;
 use crate::board::{Board, Counts};
@@ -14,9 +19,10 @@ use crate::memory::{DeviceAccess, Memory, MemoryError};
 use crate::outside::DeviceMemory;
 use crate::violation::{RegisterAccess, Violation};
 
-fn lock(board: &Mutex<Board>) -> MutexGuard<'_, Board> {
+/// Does something with a board: the one door to it.
+fn enter<R>(board: &Mutex<Board>, act: impl FnOnce(&mut Board) -> R) -> R {
     // A panic elsewhere leaves numbers, never a broken structure.
-    board.lock().unwrap_or_else(PoisonError::into_inner)
+    standard(|| act(&mut board.lock().unwrap_or_else(PoisonError::into_inner)))
 }
 
 /// An emulated board, as its builder sees it.
@@ -30,8 +36,7 @@ impl EmulatedBoard {
     /// [`ConfigError`] if a number is outside its range.
     pub fn new(config: BoardConfig) -> Result<Self, ConfigError> {
         config.check()?;
-        let memory = Memory::new(config.address_width, config.quirks.coherency);
-        Ok(Self(Arc::new(Mutex::new(Board::new(config, memory)))))
+        Ok(Self::of(config, Memory::new(config.address_width, config.quirks.coherency)))
     }
 
     /// Builds a board on memory that somebody else keeps, of which the device may touch the
@@ -45,8 +50,11 @@ impl EmulatedBoard {
         granted: Vec<Range<u64>>,
     ) -> Result<Self, ConfigError> {
         config.check()?;
-        let memory = Memory::outside(memory, granted);
-        Ok(Self(Arc::new(Mutex::new(Board::new(config, memory)))))
+        Ok(Self::of(config, Memory::outside(memory, granted)))
+    }
+
+    fn of(config: BoardConfig, memory: Memory) -> Self {
+        Self(Arc::new(Mutex::new(standard(|| Board::new(config, memory)))))
     }
 
     /// What a driver of this board may touch.
@@ -58,63 +66,65 @@ impl EmulatedBoard {
     /// How the board was built.
     #[must_use]
     pub fn config(&self) -> BoardConfig {
-        lock(&self.0).config
+        enter(&self.0, |board| board.config)
     }
 
     /// What the driver did wrong, oldest first; the first 64 are kept.
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
-        lock(&self.0).log.violations().to_vec()
+        enter(&self.0, |board| board.log.violations().to_vec())
     }
 
     /// The last register accesses of the driver, oldest first; 32 are kept.
     #[must_use]
     pub fn register_accesses(&self) -> Vec<RegisterAccess> {
-        lock(&self.0).log.recent()
+        enter(&self.0, |board| board.log.recent())
     }
 
     /// What has happened so far.
     #[must_use]
     pub fn counts(&self) -> Counts {
-        lock(&self.0).counts()
+        enter(&self.0, |board| board.counts())
     }
 
     /// Whether the accelerator or a DMA engine has work.
     #[must_use]
     pub fn is_running(&self) -> bool {
-        lock(&self.0).running()
+        enter(&self.0, |board| board.running())
     }
 
     /// The level of the interrupt line.
     #[must_use]
     pub fn interrupt_level(&self) -> bool {
-        lock(&self.0).interrupt.level()
+        enter(&self.0, |board| board.interrupt.level())
     }
 
     /// Makes the board fail as planned, from now on. A fault of a part that does not exist never
     /// happens.
     pub fn inject(&self, plan: impl Into<FaultPlan>) {
-        let mut board = lock(&self.0);
-        for fault in plan.into().faults {
-            board.inject(fault);
-        }
+        let plan = plan.into();
+        enter(&self.0, |board| {
+            for fault in plan.faults {
+                board.inject(fault);
+            }
+        });
     }
 
     /// Forgets the faults that have not happened.
     pub fn clear_faults(&self) {
-        lock(&self.0).clear_faults();
+        enter(&self.0, |board| board.clear_faults());
     }
 
     /// How many faults have happened.
     #[must_use]
     pub fn faults(&self) -> u64 {
-        lock(&self.0).faults()
+        enter(&self.0, |board| board.faults())
     }
 
     /// The packets that have ended since the last step began, in that order.
     #[must_use]
     pub fn packets(&self) -> Vec<PacketCount> {
-        lock(&self.0).packets().to_vec()
+        enter(&self.0, |board| board.packets().to_vec())
     }
 }
 
@@ -126,43 +136,41 @@ impl CpuPort {
     /// Reads the register at a physical address.
     #[must_use]
     pub fn read32(&self, address: u64) -> u32 {
-        lock(&self.0).read32(address)
+        enter(&self.0, |board| board.read32(address))
     }
 
     /// Writes the register at a physical address.
     pub fn write32(&self, address: u64, value: u32) {
-        lock(&self.0).write32(address, value);
+        enter(&self.0, |board| board.write32(address, value));
     }
 
     /// Virtual time since the board was built.
     #[must_use]
     pub fn now(&self) -> Duration {
-        let board = lock(&self.0);
-        let nanoseconds =
-            u128::from(board.now) * 1_000_000 / u128::from(board.config.profile.clock_khz);
+        let nanoseconds = enter(&self.0, |board| {
+            u128::from(board.now) * 1_000_000 / u128::from(board.config.profile.clock_khz)
+        });
         Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
     }
 
     /// Lets virtual time pass.
     pub fn pause(&self, duration: Duration) {
-        let mut board = lock(&self.0);
-        let until = deadline(&board, duration);
-        board.advance(until, false);
+        enter(&self.0, |board| board.advance(deadline(board, duration), false));
     }
 
     /// Waits for the interrupt as a read of a UIO file does: an event masks the line and returns
     /// the number of events so far; `None` after `timeout`.
     #[must_use]
     pub fn wait_interrupt(&self, timeout: Duration) -> Option<u32> {
-        let mut board = lock(&self.0);
-        let until = deadline(&board, timeout);
-        board.advance(until, true);
-        board.interrupt.take()
+        enter(&self.0, |board| {
+            board.advance(deadline(board, timeout), true);
+            board.interrupt.take()
+        })
     }
 
     /// Lets the next event through, as a write of 1 to a UIO file does.
     pub fn unmask_interrupt(&self) {
-        lock(&self.0).interrupt.unmask();
+        enter(&self.0, |board| board.interrupt.unmask());
     }
 
     /// Allocates contiguous memory for DMA: its bus address, and the beats, which the CPU owns.
@@ -170,7 +178,7 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError::Exhausted`] if there is no room below the DMA's address limit.
     pub fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), MemoryError> {
-        lock(&self.0).memory.allocate(beats)
+        enter(&self.0, |board| board.memory.allocate(beats))
     }
 
     /// Allocates memory for descriptors, which both sides may touch at any time.
@@ -178,7 +186,7 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError::Exhausted`] if there is no room below the DMA's address limit.
     pub fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), MemoryError> {
-        lock(&self.0).memory.allocate_shared(words)
+        enter(&self.0, |board| board.memory.allocate_shared(words))
     }
 
     /// Moves a buffer to the device.
@@ -207,7 +215,7 @@ impl CpuPort {
         granted: usize,
         access: DeviceAccess,
     ) -> Result<(), MemoryError> {
-        lock(&self.0).memory.hand_over(address, beats, granted, access)
+        enter(&self.0, |board| board.memory.hand_over(address, beats, granted, access))
     }
 
     /// Moves a buffer back to the CPU.
@@ -215,7 +223,7 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError`] if nothing was allocated at `address`, or the device does not own it.
     pub fn take_back(&self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
-        lock(&self.0).take_back(address)
+        enter(&self.0, |board| board.take_back(address))
     }
 
     /// Gives memory back; from then on the device may not touch it.
@@ -223,7 +231,7 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError::Unknown`] if nothing was allocated at `address`.
     pub fn release(&self, address: u64) -> Result<(), MemoryError> {
-        lock(&self.0).release(address)
+        enter(&self.0, |board| board.release(address))
     }
 }
 

@@ -4,6 +4,7 @@
 use std::fmt;
 
 use bitstream_model::interface::record::Beat;
+use crew::float_env::standard;
 
 use super::collisions::{CollisionPacker, Marks};
 use super::deal::BLOCK;
@@ -64,6 +65,7 @@ impl<'a> Writer<'a> {
     ///
     /// Whether it is right is looked at a little later: what is wrong with one is said when all are
     /// written, and what comes after it is left out ([`Self::is_refused`]): the length stands still.
+    /// Whatever the caller's floating-point environment is, the records are the same.
     #[inline]
     pub fn push(&mut self, collision: &Collision) {
         if self.is_refused() {
@@ -105,8 +107,12 @@ impl<'a> Writer<'a> {
         self.refused.get_or_insert(InputError::MoreThanAnnounced { announced: self.room });
     }
 
-    /// Makes the records of what is held.
+    /// Makes the records of what is held: all that a writer computes, called from the caller's narrow phase.
     fn flush(&mut self) {
+        standard(|| self.make_records());
+    }
+
+    fn make_records(&mut self) {
         let count = std::mem::take(&mut self.held);
         if count == 0 {
             return;

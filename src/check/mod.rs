@@ -17,6 +17,8 @@ mod streams;
 
 pub use report::{CheckLine, CheckReport, Outcome};
 
+use crew::float_env::standard;
+
 use crate::error::Error;
 use crate::step::{Found, OpenOptions, find};
 use report::Lines;
@@ -44,7 +46,7 @@ use report::Lines;
 /// # Errors
 /// [`Error::Open`] if there is no board to be tested, or it cannot be reached.
 pub fn check(options: OpenOptions) -> Result<CheckReport, Error> {
-    check_found(find(&options)?, options.length_width)
+    standard(|| check_found(find(&options)?, options.length_width))
 }
 
 /// Tests a board that was found.

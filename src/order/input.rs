@@ -1,5 +1,7 @@
 //! This file says what an order is made from: pairs of bodies, which bodies move, where they are.
 
+use crew::float_env::standard;
+
 use super::OrderError;
 use crate::scene::{Bodies, Collisions, Shape};
 
@@ -70,6 +72,16 @@ impl InputBuffers {
         collisions: &C,
         shapes: &[Shape],
     ) -> OrderInput<'_> {
+        standard(|| self.read(bodies, collisions, shapes));
+        self.input()
+    }
+
+    fn read<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &B,
+        collisions: &C,
+        shapes: &[Shape],
+    ) {
         self.pairs.clear();
         self.pairs.extend((0..collisions.len()).map(|index| {
             let collision = collisions.collision(index);
@@ -83,7 +95,6 @@ impl InputBuffers {
             self.moving.push(shape.is_some_and(|shape| shape.inverse_mass != 0.0));
             self.positions.push(body.pose.position);
         }
-        self.input()
     }
 
     /// What was read last.

@@ -1,5 +1,7 @@
 //! This file makes an order of the kind that is asked for.
 
+use crew::float_env::standard;
+
 use super::groups::Groups;
 use super::interlock::{Interlock, StallCounter};
 use super::sweep::Sweep;
@@ -96,6 +98,16 @@ impl Orderer {
         order: Order,
         window: IssueWindow,
     ) -> Result<&Schedule, OrderError> {
+        standard(|| self.make(input, order, window))?;
+        Ok(&self.schedule)
+    }
+
+    fn make(
+        &mut self,
+        input: &OrderInput<'_>,
+        order: Order,
+        window: IssueWindow,
+    ) -> Result<(), OrderError> {
         input.check()?;
         let schedule = &mut self.schedule;
         let mut made = order;
@@ -123,7 +135,7 @@ impl Orderer {
             }
         }
         self.made = made;
-        Ok(&self.schedule)
+        Ok(())
     }
 
     /// Orders the collisions of a step for a pipeline that waits on hazards: as given, or near to that

@@ -1,5 +1,7 @@
 //! This file measures a schedule: hazards, lost updates, empty entries, bodies alive, spans.
 
+use crew::float_env::standard;
+
 use super::{IssueWindow, OrderError, OrderInput, Schedule};
 
 /// What a schedule costs on hardware of a window.
@@ -61,7 +63,7 @@ impl OrderReport {
             lost_updates,
             most_alive: curve.into_iter().max().unwrap_or(0) as usize,
             longest_span: spans().max().unwrap_or(0),
-            mean_span: if used == 0 { 0.0 } else { total as f64 / used as f64 },
+            mean_span: share(total, used),
         })
     }
 
@@ -92,7 +94,7 @@ pub fn live_curve(
 }
 
 fn share(part: usize, whole: usize) -> f64 {
-    if whole == 0 { 0.0 } else { part as f64 / whole as f64 }
+    if whole == 0 { 0.0 } else { standard(|| part as f64 / whole as f64) }
 }
 
 /// First and last slot of each moving body that is used; `each` sees every collision's slot and

@@ -47,7 +47,8 @@ pub struct Body {
 /// A step calls [`body`](Self::body) for every index below [`len`](Self::len), any number of
 /// times, and, only when it has succeeded, [`commit`](Self::commit) once for each. Several threads may
 /// ask at the same time, each for bodies of its own ([`OpenOptions::pack_threads`]), and for that a
-/// container must be [`Sync`]; [`commit`](Self::commit) is the caller's thread alone.
+/// container must be [`Sync`]; [`commit`](Self::commit) is the caller's thread alone. All of them run in the
+/// standard [floating-point environment](crate#the-floating-point-environment), and leave it as it is.
 ///
 /// [`OpenOptions::pack_threads`]: crate::OpenOptions::pack_threads
 pub trait Bodies: Sync {

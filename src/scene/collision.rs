@@ -62,7 +62,8 @@ impl Collision {
 /// arrays. The solver takes the collisions in the order that
 /// [`StepParameters::order`](crate::StepParameters::order) says. Several threads may ask at the same
 /// time, each for collisions of its own ([`OpenOptions::pack_threads`]), and for that a container must be
-/// [`Sync`].
+/// [`Sync`]. Its methods run in the standard [floating-point
+/// environment](crate#the-floating-point-environment), and leave it as it is.
 ///
 /// [`OpenOptions::pack_threads`]: crate::OpenOptions::pack_threads
 pub trait Collisions: Sync {

@@ -160,7 +160,7 @@ impl StepParameters {
 impl Default for StepParameters {
     fn default() -> Self {
         Self {
-            time_step: 1.0 / 60.0,
+            time_step: const { 1.0 / 60.0 },
             position_drift: 0.005,
             position_coefficient: 0.2,
             friction: 0.7,

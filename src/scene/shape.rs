@@ -1,5 +1,7 @@
 //! This file says what a shape is: the mass properties that bodies refer to by index.
 
+use crew::float_env::standard;
+
 use super::InputError;
 
 /// Mass properties shared by bodies.
@@ -92,6 +94,14 @@ impl Shape {
 
     /// A shape whose inertia per kg follows from its sizes.
     fn solid<const N: usize>(
+        mass: f32,
+        sizes: &[(&'static str, f32); N],
+        inertia: impl Fn([f64; N]) -> [f64; 3],
+    ) -> Result<Self, InputError> {
+        standard(|| Self::computed(mass, sizes, inertia))
+    }
+
+    fn computed<const N: usize>(
         mass: f32,
         sizes: &[(&'static str, f32); N],
         inertia: impl Fn([f64; N]) -> [f64; 3],

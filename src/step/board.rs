@@ -31,8 +31,9 @@ pub struct OpenOptions {
     ///
     /// [`Bodies`](crate::Bodies) and [`Collisions`](crate::Collisions) are asked from these threads
     /// while the caller's waits for them. A container that needs the caller's own thread (what it
-    /// keeps per thread, a lock that the caller holds) wants `Some(1)`, and so does a caller that
-    /// changes how its thread rounds or flushes.
+    /// keeps per thread, a lock that the caller holds) wants `Some(1)`. How the caller's thread rounds
+    /// or flushes is of no account: all threads compute in the standard [floating-point
+    /// environment](crate#the-floating-point-environment).
     pub pack_threads: Option<usize>,
 }
 

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use crew::float_env::standard;
+
 use super::fault::Fault;
 use super::load::Load;
 use super::locate::locate;
@@ -68,8 +70,10 @@ impl<'a> InFlight<'a> {
     /// were given: the step is then stopped, and the accelerator is ready for the next;
     /// [`Error::MustReopen`] in its place if the board could not be stopped.
     pub fn wait<B: Bodies + ?Sized>(mut self, bodies: &mut B) -> Result<StepReport, Error> {
-        let ended = self.collect(bodies)?;
-        self.finish(ended, bodies)
+        standard(move || {
+            let ended = self.collect(bodies)?;
+            self.finish(ended, bodies)
+        })
     }
 
     /// Checks, reads and stores the results.
@@ -218,7 +222,7 @@ impl Drop for InFlight<'_> {
     /// Stops a step that nobody waited for.
     fn drop(&mut self) {
         let Accelerator { device, shapes, .. } = &mut *self.accelerator;
-        device.abandon(shapes);
+        standard(|| device.abandon(shapes));
     }
 }
 

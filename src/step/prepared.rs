@@ -5,6 +5,8 @@
 //!   board           |     step 0    |     step 1      |     step 2 ...
 //! ```
 
+use crew::float_env::standard;
+
 use super::bank::Bank;
 use super::fault::Fault;
 use super::in_flight::{Flight, InFlight, Stopwatch};
@@ -74,11 +76,13 @@ impl InFlight<'_> {
         collisions: &C,
         parameters: &StepParameters,
     ) -> Result<Prepared, Error> {
-        let accelerator = &mut *self.accelerator;
-        let into = (self.flight.load.bank.other(), Engines::Working);
-        let mut watch = Stopwatch::start();
-        let load = accelerator.load(into, bodies, collisions, parameters, &mut watch)?;
-        self.hand_over(load)
+        standard(|| {
+            let accelerator = &mut *self.accelerator;
+            let into = (self.flight.load.bank.other(), Engines::Working);
+            let mut watch = Stopwatch::start();
+            let load = accelerator.load(into, bodies, collisions, parameters, &mut watch)?;
+            self.hand_over(load)
+        })
     }
 
     /// Hands what was packed while this step is on the board over to the device.
@@ -107,6 +111,14 @@ impl InFlight<'_> {
     /// # Errors
     /// First those of [`wait`](Self::wait), then those of [`Accelerator::start`].
     pub fn wait_and_start<B: Bodies + ?Sized>(
+        self,
+        bodies: &mut B,
+        next: &Prepared,
+    ) -> (Result<StepReport, Error>, Result<Self, Error>) {
+        standard(move || self.end_and_start(bodies, next))
+    }
+
+    fn end_and_start<B: Bodies + ?Sized>(
         mut self,
         bodies: &mut B,
         next: &Prepared,
@@ -174,8 +186,10 @@ impl Accelerator {
     /// were loaded since. [`Error::Step`] and [`Error::MustReopen`] as [`Self::step`]. Where
     /// [`Error::may_retry`] says so the prepared step may be started again.
     pub fn start(&mut self, prepared: &Prepared) -> Result<InFlight<'_>, Error> {
-        let flight = self.begin_prepared(prepared, Memory::Freed)?;
-        Ok(InFlight::new(self, flight))
+        standard(move || {
+            let flight = self.begin_prepared(prepared, Memory::Freed)?;
+            Ok(InFlight::new(self, flight))
+        })
     }
 
     fn begin_prepared(&mut self, prepared: &Prepared, memory: Memory) -> Result<Flight, Error> {

@@ -6,6 +6,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use crew::float_env::standard;
+
 use super::bank::{Bank, PerBank};
 use super::board::{self, BoardDescription, Found, OpenOptions};
 use super::cancellation::Cancellation;
@@ -68,9 +70,11 @@ impl Accelerator {
     /// [`Error::Open`]: no such board, not a bitstream that this driver knows, or DMA cores that
     /// do not behave as they should.
     pub fn open(options: OpenOptions) -> Result<Self, Error> {
-        let mut accelerator = Self::on(find(&options)?, options.length_width)?;
-        accelerator.device.packers = Packers::new(options.pack_threads);
-        Ok(accelerator)
+        standard(|| {
+            let mut accelerator = Self::on(find(&options)?, options.length_width)?;
+            accelerator.device.packers = Packers::new(options.pack_threads);
+            Ok(accelerator)
+        })
     }
 
     /// Opens the accelerator of a board that was found.
@@ -131,13 +135,15 @@ impl Accelerator {
     /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
     /// stay. [`Error::MustReopen`] after a fault that could not be cleared.
     pub fn set_shapes(&mut self, shapes: &[Shape]) -> Result<(), Error> {
-        self.device.settle(&self.shapes)?;
-        validate_shapes(shapes, &self.limits)?;
-        self.device.control.load_shapes(shapes, self.limits.variant.inertia);
-        self.shapes_loaded += 1;
-        self.shapes.clear();
-        self.shapes.extend_from_slice(shapes);
-        Ok(())
+        standard(|| {
+            self.device.settle(&self.shapes)?;
+            validate_shapes(shapes, &self.limits)?;
+            self.device.control.load_shapes(shapes, self.limits.variant.inertia);
+            self.shapes_loaded += 1;
+            self.shapes.clear();
+            self.shapes.extend_from_slice(shapes);
+            Ok(())
+        })
     }
 
     /// From now on this ends steps early, in place of an earlier one.
@@ -187,13 +193,15 @@ impl Accelerator {
         collisions: &C,
         parameters: &StepParameters,
     ) -> Result<InFlight<'_>, Error> {
-        self.device.settle(&self.shapes)?;
-        let mut watch = Stopwatch::start();
-        let into = (self.bank, Engines::Idle);
-        let accesses = self.accesses();
-        let load = self.load(into, bodies, collisions, parameters, &mut watch)?;
-        let flight = self.begin(load, watch, accesses)?;
-        Ok(InFlight::new(self, flight))
+        standard(move || {
+            self.device.settle(&self.shapes)?;
+            let mut watch = Stopwatch::start();
+            let into = (self.bank, Engines::Idle);
+            let accesses = self.accesses();
+            let load = self.load(into, bodies, collisions, parameters, &mut watch)?;
+            let flight = self.begin(load, watch, accesses)?;
+            Ok(InFlight::new(self, flight))
+        })
     }
 
     /// Register reads and writes so far.

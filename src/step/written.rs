@@ -1,5 +1,7 @@
 //! This file brings a step into a bank of buffers whose collisions the caller writes as it finds them.
 
+use crew::float_env::standard_around;
+
 use super::bank::Bank;
 use super::in_flight::{InFlight, Stopwatch};
 use super::load::{Engines, Load, Ticket};
@@ -27,6 +29,8 @@ impl Accelerator {
     /// The step takes the place of the one that was started last; [`Self::start`] starts it. One that
     /// is stepped or submitted before that takes its place in turn: it is refused then.
     /// [`StepReport::host`](crate::StepReport::host) counts the narrow phase as packing.
+    ///
+    /// `narrow_phase` runs in the caller's own [floating-point environment](crate#the-floating-point-environment).
     ///
     /// ```
     /// use zynq_pgs::{Accelerator, Body, Collision, Contact, OpenOptions, Pose, Shape};
@@ -68,10 +72,13 @@ impl Accelerator {
         parameters: &StepParameters,
         narrow_phase: impl FnOnce(&mut Writer<'_>),
     ) -> Result<Prepared, Error> {
-        self.device.settle(&self.shapes)?;
-        let into = (self.bank, Engines::Idle);
-        let load = self.load_written(into, bodies, announced, parameters, narrow_phase)?;
-        Ok(Prepared { bank: load.bank, ticket: load.ticket })
+        standard_around(|caller| {
+            let narrow_phase = |writer: &mut Writer<'_>| caller.run(|| narrow_phase(writer));
+            self.device.settle(&self.shapes)?;
+            let into = (self.bank, Engines::Idle);
+            let load = self.load_written(into, bodies, announced, parameters, narrow_phase)?;
+            Ok(Prepared { bank: load.bank, ticket: load.ticket })
+        })
     }
 
     /// As [`load`](Self::load), of collisions that are written.
@@ -139,10 +146,13 @@ impl InFlight<'_> {
         parameters: &StepParameters,
         narrow_phase: impl FnOnce(&mut Writer<'_>),
     ) -> Result<Prepared, Error> {
-        let into = (self.flight.load.bank.other(), Engines::Working);
-        let load =
-            self.accelerator.load_written(into, bodies, announced, parameters, narrow_phase)?;
-        self.hand_over(load)
+        standard_around(|caller| {
+            let narrow_phase = |writer: &mut Writer<'_>| caller.run(|| narrow_phase(writer));
+            let into = (self.flight.load.bank.other(), Engines::Working);
+            let load =
+                self.accelerator.load_written(into, bodies, announced, parameters, narrow_phase)?;
+            self.hand_over(load)
+        })
     }
 }
 

@@ -241,6 +241,12 @@ impl Machine {
 
     /// A step with those beats on the streams instead of its own.
     pub(crate) fn step_with(&mut self, step: &Step, lanes: &[Lane]) -> Result<Outcome, Failure> {
+        let flight = self.drive(step, lanes)?;
+        Ok(self.collect(&flight, step.bodies.len()))
+    }
+
+    /// Takes a step as far as its results are in memory. What is computed of it, the board computes.
+    pub(crate) fn drive(&mut self, step: &Step, lanes: &[Lane]) -> Result<Flight, Failure> {
         step.write_arguments(&self.host);
         let mut flight = Flight::default();
         let beats = result_beats(&self.host.variant(), step.bodies.len());
@@ -251,7 +257,7 @@ impl Machine {
         let stalls = u32::try_from(step.collisions.len()).expect("some thousands");
         self.wait(&flight, LONG + microseconds(300) * stalls)?;
         match self.is_done() {
-            true => Ok(self.collect(&flight, step.bodies.len())),
+            true => Ok(flight),
             false => Err(Failure::NotDone),
         }
     }

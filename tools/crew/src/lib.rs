@@ -3,6 +3,9 @@
 //!
 //! Nobody waits for a thread that has not begun: one that comes late finds nothing to do.
 //!
+//! All work is done in the [standard floating-point environment](float_env), on every thread: what is
+//! computed depends neither on the thread that computes it nor on who started that.
+//!
 //! ```
 //! let mut crew = crew::Crew::new("sums", 1);
 //! let (numbers, mut sums) = ([1, 2, 3, 4, 5, 6], [0; 2]);
@@ -10,8 +13,12 @@
 //! assert_eq!(sums, [6, 15]);
 //! ```
 
-#![allow(unsafe_code, reason = "threads that outlive a call borrow what it borrows")]
+#![allow(
+    unsafe_code,
+    reason = "threads that outlive a call borrow what it borrows; a register has no other access"
+)]
 
+pub mod float_env;
 #[cfg(test)]
 mod tests;
 
@@ -20,6 +27,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 use std::{fmt, io, mem};
+
+use float_env::standard;
 
 /// What every thread does that comes in time; it is told its number, the caller 0.
 type Work = dyn Fn(usize) + Sync;
@@ -62,7 +71,7 @@ impl Shared {
             };
             state.busy += 1;
             drop(state);
-            let done = catch_unwind(AssertUnwindSafe(|| work(number)));
+            let done = catch_unwind(AssertUnwindSafe(|| standard(|| work(number))));
             state = self.state();
             state.busy -= 1;
             // The first is passed on.
@@ -145,7 +154,7 @@ impl Crew {
     /// As `work` does, on whichever thread; then some shares may be left out. The crew works on.
     pub fn each<T>(&mut self, shares: impl Iterator<Item = T> + Send, work: impl Fn(T) + Sync) {
         if self.is_alone() || matches!(shares.size_hint().1, Some(0 | 1)) {
-            shares.for_each(work);
+            standard(|| shares.for_each(work));
             return;
         }
         let shares = Mutex::new(shares);
@@ -166,7 +175,7 @@ impl Crew {
     /// As `work` does, on whichever thread, when all have ended. The crew works on.
     pub fn run(&mut self, work: &(dyn Fn(usize) + Sync)) {
         if self.is_alone() {
-            work(0);
+            standard(|| work(0));
             return;
         }
         // SAFETY: `Leave` takes the work back and waits for the helpers that are at it, also when
@@ -181,7 +190,7 @@ impl Crew {
         drop(state);
         drop(untold);
         self.shared.begun.notify_all();
-        work(0);
+        standard(|| work(0));
         drop(leave);
         let panic = self.shared.state().panic.take();
         if let Some(panic) = panic {

@@ -1,5 +1,6 @@
 //! This file builds the scene and holds its bodies and collisions.
 
+use crew::float_env::standard;
 use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
 
 use crate::detect::{Detector, Geometries};
@@ -74,6 +75,10 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Drop`] if the drop is negative, not a number or above [`DROP_MAX`].
     pub fn new(options: &SceneOptions) -> Result<Self, SceneError> {
+        standard(|| Self::build(options))
+    }
+
+    fn build(options: &SceneOptions) -> Result<Self, SceneError> {
         let drop = check_drop(options.drop)?;
         let mut bodies = Vec::new();
         for i in 0..options.grid.x() {
@@ -159,8 +164,9 @@ impl Scene {
     /// of two other bodies the one with the lower index is. A body whose pose is not finite collides with
     /// nothing; a step refuses it.
     pub fn detect(&mut self) -> &[Collision] {
-        self.detector.detect(&self.bodies, Geometries(&self.geometries), &mut self.collisions);
-        &self.collisions
+        let Self { geometries, bodies, collisions, detector, .. } = self;
+        standard(|| detector.detect(bodies, Geometries(geometries), collisions));
+        collisions
     }
 }
 

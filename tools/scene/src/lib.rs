@@ -21,7 +21,8 @@
 //!
 //! The bits of every result are the same on every architecture and with every number of threads:
 //! arithmetic is f32 in a written order, parry3d is built with `enhanced-determinism`, and neither
-//! threads nor what is kept from an earlier detection decide an order.
+//! threads nor what is kept from an earlier detection decide an order. Scenes are built, and collisions
+//! detected, in the standard floating-point environment, whatever the caller's is.
 
 mod build;
 mod detect;

@@ -1,5 +1,6 @@
 //! This file builds a pile of several shapes and masses.
 
+use crew::float_env::standard;
 use zynq_pgs::{Body, Shape};
 
 use crate::build::{at_rest, check_drop};
@@ -52,6 +53,10 @@ impl Scene {
     /// [`SceneError::Drop`] if the drop is negative, not a number or above
     /// [`DROP_MAX`](crate::DROP_MAX). [`SceneError::Shape`] does not happen with the kinds above.
     pub fn of_shapes(options: &ShapesOptions) -> Result<Self, SceneError> {
+        standard(|| Self::build_of_shapes(options))
+    }
+
+    fn build_of_shapes(options: &ShapesOptions) -> Result<Self, SceneError> {
         let drop = check_drop(options.drop)?;
         let mut random = SplitMix64::new(options.seed);
         let (x, y, z) = (options.grid.x(), options.grid.y(), options.grid.z());

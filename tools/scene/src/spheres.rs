@@ -7,6 +7,7 @@
 //! Numbers are drawn by `SplitMix64` and every sum is f32 in a written order: a seed gives the same
 //! bits everywhere.
 
+use crew::float_env::standard;
 use zynq_pgs::{Body, Collision, Contact, Shape};
 
 use crate::build::at_rest;
@@ -45,6 +46,10 @@ impl Spheres {
         if !(1..=SPHERES_MAX).contains(&count) {
             return Err(SceneError::Spheres { found: count, most: SPHERES_MAX });
         }
+        Ok(standard(|| Self::pack(count, seed)))
+    }
+
+    fn pack(count: u32, seed: u64) -> Self {
         let mut pile = Pile::new(count, seed);
         pile.settle();
         let shape = |radius: f32| {
@@ -56,7 +61,7 @@ impl Spheres {
         let spheres = (0..3).cycle().zip(&pile.centres);
         bodies.extend(spheres.map(|(size, centre)| at_rest(*centre, 1 + size)));
         let collisions = pile.collisions();
-        Ok(Self { shapes: [Shape::STATIC, small, middle, large], bodies, collisions })
+        Self { shapes: [Shape::STATIC, small, middle, large], bodies, collisions }
     }
 
     /// The shape table: 0 is static, then the three sizes.
