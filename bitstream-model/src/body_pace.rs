@@ -152,7 +152,7 @@ impl BodyPace {
         for engine in 0..left.len() {
             let moved = room[engine] - left[engine];
             flowed.beats[engine] += moved;
-            if engine.is_multiple_of(2) {
+            if engine % 2 == 0 {
                 standing.held[engine] += moved;
             } else {
                 standing.held[engine] -= moved;

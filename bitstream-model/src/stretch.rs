@@ -41,10 +41,9 @@ impl Board {
             return;
         }
         for ((core, stream), beats) in self.cores.iter_mut().zip(&mut self.inputs).zip(beats) {
-            if let Some((at, _)) = core.flows(Direction::Mm2s, self.now)
-                && let Ok(Some(source)) = self.memory.source(at, beats)
-                && beats > 0
-            {
+            let Some((at, _)) = core.flows(Direction::Mm2s, self.now) else { continue };
+            let Ok(Some(source)) = self.memory.source(at, beats) else { continue };
+            if beats > 0 {
                 stream.push_span(source, beats);
                 core.flowed(Direction::Mm2s, beats);
                 self.moved.beats_read += beats as u64;

@@ -76,9 +76,8 @@ fn step(host: &Host, step: &Step, spare: usize) -> (Vec<Body>, Vec<u32>) {
         assert!(host.port.now() < deadline, "the step takes too long");
         for core in 0..CORES {
             busy[core] &= !completed(host, core, Direction::Mm2s);
-            if !busy[core]
-                && let Some((address, bytes)) = queues[core].pop()
-            {
+            let next = if busy[core] { None } else { queues[core].pop() };
+            if let Some((address, bytes)) = next {
                 transfer(host, core, Direction::Mm2s, address, bytes);
                 busy[core] = true;
             }

@@ -59,9 +59,7 @@ proptest! {
     ) {
         let mut step = with_gaps(scene(bodies, collisions, seed, apart), seed, config.profile);
         step.iterations = iterations;
-        if let Some((at, how)) = spoilt
-            && collisions > 0
-        {
+        if let Some((at, how)) = spoilt.filter(|_| collisions > 0) {
             let collision = &mut step.collisions[below(at, collisions) as usize];
             match how {
                 0 => collision.count = 5,

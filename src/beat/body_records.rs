@@ -2,6 +2,7 @@
 
 use bitstream_model::interface::profile::Inertia;
 use bitstream_model::interface::record::{Beat, pose, velocity};
+use crew::chunks::Chunks;
 
 use super::deal::Dealer;
 use super::format::Records;
@@ -82,7 +83,7 @@ impl Records<{ velocity::ROWS }> for Isotropic<'_> {
 
     #[inline(always)]
     fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
-        give::<_, N>(self.0, nth, record::velocity::encode, to)
+        give::<{ velocity::ROWS }, N>(self.0, nth, record::velocity::encode, to)
     }
 }
 
@@ -102,7 +103,7 @@ impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
     #[inline(always)]
     fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
         let record = |body: &Body| world_velocity(body, self.shapes);
-        give::<_, N>(self.bodies, nth, record, to)
+        give::<{ velocity::WORLD_ROWS }, N>(self.bodies, nth, record, to)
     }
 }
 
@@ -118,7 +119,8 @@ impl Records<{ pose::ROWS }> for OfPoses<'_> {
 
     #[inline(always)]
     fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
-        give::<_, N>(self.0, nth, |body| record::pose::encode(body).into(), to)
+        let record = |body: &Body| record::pose::encode(body).into();
+        give::<{ pose::ROWS }, N>(self.0, nth, record, to)
     }
 }
 
@@ -130,7 +132,7 @@ fn give<const ROWS: usize, const N: usize>(
     record: impl Fn(&Body) -> Record<ROWS>,
     to: &mut impl Rows,
 ) -> Option<()> {
-    for body in bodies.as_chunks::<N>().0.get(nth)? {
+    for body in bodies.split_arrays::<N>().0.get(nth)? {
         record(body).give(to);
     }
     Some(())

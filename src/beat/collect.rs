@@ -5,6 +5,7 @@
 //! upwards, with nothing in between.
 
 use bitstream_model::interface::record::{Beat, result};
+use crew::chunks::Chunks;
 
 use super::format::Format;
 use super::pattern::{self, Pattern, Places};
@@ -46,12 +47,13 @@ pub(super) fn read<V: Vectors, F: Format>(
     macro_rules! unit {
         ($places:ident: $records:literal are $beats:literal: $($channel:ident $share:literal),*) => {
             if $records * result::ROWS == $beats * F::PER_BEAT {
-                let units = records.as_chunks_mut::<$records>().0;
+                let units = records.split_arrays_mut::<$records>().0;
                 let count = units.len();
                 let mut rest = rest.iter_mut();
                 $(let Some($channel) = part::<$share>(rest.next(), count) else { return 0 };)*
+                const CHANNELS: usize = [$($share),*].len();
                 for at in 0..count {
-                    units[at] = read_unit::<pattern::$places, V, F, $records, $beats, _>(
+                    units[at] = read_unit::<pattern::$places, V, F, $records, $beats, CHANNELS>(
                         vectors, [$(&$channel[at]),*], tally,
                     );
                 }
@@ -72,7 +74,7 @@ fn part<'b, const S: usize>(
     let rest = rest?;
     let (part, behind) = rest.split_at(count * S);
     *rest = behind;
-    part.as_chunks().0.get(..count)
+    part.split_arrays().0.get(..count)
 }
 
 /// Reads one unit.

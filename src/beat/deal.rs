@@ -147,6 +147,7 @@ mod tests {
     use bitstream_model::interface::number::StreamFormat;
     use bitstream_model::interface::record::LANES;
     use bitstream_model::interface::stripe::Stripe;
+    use crew::chunks::Chunks;
     use proptest::prelude::*;
 
     use super::super::stripe::Place;
@@ -168,7 +169,7 @@ mod tests {
 
         #[inline(always)]
         fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
-            for record in self.0.as_chunks::<N>().0.get(nth)? {
+            for record in self.0.split_arrays::<N>().0.get(nth)? {
                 let mut record = Record::from(record.map(Lanes::new));
                 record.integers[0] = Some(Integer::new::<{ LANES - 1 }>(record.rows[0]));
                 record.give(to);
@@ -220,7 +221,7 @@ mod tests {
                 match Sixteen::of(format) {
                     None => beats[at] = Beat(*row),
                     Some(sixteen) => {
-                        let integer = at.is_multiple_of(ROWS);
+                        let integer = at % ROWS == 0;
                         let row = narrowed(sixteen, *row, integer).map(u32::from);
                         let to = &mut beats[at / 2].0[at % 2 * 2..][..2];
                         to.copy_from_slice(&[row[0] | row[1] << 16, row[2] | row[3] << 16]);

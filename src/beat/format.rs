@@ -3,6 +3,7 @@
 use std::marker::PhantomData;
 
 use bitstream_model::interface::record::Beat;
+use crew::chunks::Chunks;
 
 use crate::platform::{Lanes, Vectors};
 use crate::record::end::{Ends, Lookup, LowEnds};
@@ -161,7 +162,7 @@ macro_rules! sixteen {
             #[inline(always)]
             fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS] {
                 let mut rows = [Lanes::all(0); ROWS];
-                for (to, beat) in rows.as_chunks_mut::<2>().0.iter_mut().zip(beats) {
+                for (to, beat) in rows.split_arrays_mut::<2>().0.iter_mut().zip(beats) {
                     *to = Sixteen::$format.widen(vectors, bytemuck::cast(*beat));
                 }
                 rows

@@ -293,7 +293,7 @@ mod tests {
                 prop_assert_eq!(deal.next(), place.channel);
                 prop_assert_eq!(layout.beat_at(*place), beat);
             }
-            prop_assert_eq!(deal.at_end_of_group(), beats.is_multiple_of(layout.stripe.streams.len()));
+            prop_assert_eq!(deal.at_end_of_group(), beats % layout.stripe.streams.len() == 0);
             places.sort_unstable();
             let mut every_slot = Vec::new();
             for channel in 0..profile.mm2s_widths.len() {

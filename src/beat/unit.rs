@@ -7,6 +7,7 @@
 use std::mem;
 
 use bitstream_model::interface::record::Beat;
+use crew::chunks::Chunks;
 
 use super::format::{Beats, Join, Records};
 use super::pattern::{self, Pattern, Places};
@@ -37,8 +38,9 @@ pub(super) fn write<V: Vectors, F: Join, R: Records<ROWS>, const ROWS: usize>(
                     $(let Some($channel) = part::<$share>(rest.next(), count) else {
                         return (records, sum, 0);
                     };)*
+                    const CHANNELS: usize = [$($share),*].len();
                     for at in 0..count {
-                        unit::<pattern::$places, V, F, R, ROWS, $records, $beats, _>(
+                        unit::<pattern::$places, V, F, R, ROWS, $records, $beats, CHANNELS>(
                             vectors, &mut records, at, [$(&mut $channel[at]),*], &mut sum,
                         );
                     }
@@ -61,7 +63,7 @@ fn part<'b, const S: usize>(
     let rest = rest?;
     let (part, behind) = mem::take(rest).split_at_mut(count * S);
     *rest = behind;
-    part.as_chunks_mut().0.get_mut(..count)
+    part.split_arrays_mut().0.get_mut(..count)
 }
 
 /// Writes one unit.
@@ -107,9 +109,8 @@ struct Made<'a, V, F> {
 impl<V: Vectors, F: Join> Rows for Made<'_, V, F> {
     #[inline(always)]
     fn row(&mut self, row: Row) {
-        if let Some(beat) = self.beats.with(row)
-            && let Some(to) = self.to.get_mut(self.at)
-        {
+        let Some(beat) = self.beats.with(row) else { return };
+        if let Some(to) = self.to.get_mut(self.at) {
             *to = beat;
             self.at += 1;
         }

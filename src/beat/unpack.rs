@@ -151,6 +151,7 @@ mod tests {
     use bitstream_model::interface::address_map::DMA_COUNT_MAX;
     use bitstream_model::interface::record::LANES;
     use bitstream_model::interface::stripe::Stripe;
+    use crew::chunks::Chunks;
 
     use super::super::stripe::{Place, Segment};
     use super::*;
@@ -342,7 +343,7 @@ mod tests {
             let mut segments: Vec<Vec<Beat>> = (0..DMA_COUNT_MAX)
                 .map(|channel| vec![Beat::default(); layout.beats_on_channel(count, channel)])
                 .collect();
-            let mut beats = words.iter().flat_map(|record| record.as_chunks().0).map(|it| Beat(*it));
+            let mut beats = words.iter().flat_map(|record| record.split_arrays().0).map(|it| Beat(*it));
             for at in 0..layout.beats(count) {
                 let Place { channel, slot } = layout.place(at);
                 // Padding is of any words.
@@ -355,7 +356,7 @@ mod tests {
                     let beat = segments[channel][slot];
                     let Some(sixteen) = Sixteen::of(format) else { return beat };
                     let halves: [u16; 8] = bytemuck::cast(beat);
-                    let halves = halves.as_chunks::<LANES>().0[row % 2];
+                    let halves = halves.split_arrays::<LANES>().0[row % 2];
                     Beat(halves.map(|word| number(sixteen, word)))
                 }))
                 .collect();

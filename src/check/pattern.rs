@@ -8,6 +8,7 @@
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::Variant;
 use bitstream_model::interface::record::{Beat, LANES, WORD_LANE, result};
+use crew::chunks::Chunks;
 
 use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
@@ -75,7 +76,7 @@ impl Pattern {
             if self.results.rows_per_beat() == 1 {
                 of.map(Beat).into_iter().for_each(&mut put);
             } else {
-                let (pairs, _) = of.as_chunks::<2>();
+                let (pairs, _) = of.split_arrays::<2>();
                 pairs.iter().map(pair).for_each(&mut put);
             }
         }

@@ -186,6 +186,7 @@ mod aarch64 {
 mod tests {
     use super::super::vectors::{Vectors, Work, in_wide_vectors};
     use super::*;
+    use crew::chunks::Chunks;
 
     /// Numbers around every border of binary16, and others.
     fn wide() -> Vec<f32> {
@@ -227,7 +228,7 @@ mod tests {
     fn numbers_are_rounded_as_by_integers_and_integers_are_cut() {
         let mut wide: Vec<u32> = wide().into_iter().map(f32::to_bits).collect();
         wide.resize(wide.len().next_multiple_of(2 * LANES), 0);
-        let pairs = wide.as_chunks::<LANES>().0.as_chunks::<2>().0;
+        let pairs = wide.split_arrays::<LANES>().0.split_arrays::<2>().0;
         let words = [0x1234_5678, 0x9ABC_DEF0, 0x0FED_CBA9, 0x8765_4321];
         let any = |words| (0..LANES).map(move |at| Some((words, at))).chain([None]);
         let ends = any(words).flat_map(|first| {
@@ -270,7 +271,7 @@ mod tests {
     #[test]
     fn every_word_is_widened_as_by_integers() {
         let words: Vec<u16> = (0..=u16::MAX).collect();
-        let pairs = words.as_chunks::<LANES>().0.as_chunks::<2>().0;
+        let pairs = words.split_arrays::<LANES>().0.split_arrays::<2>().0;
         let anywhere = pairs.iter().map(|rows| to_f32(*rows).map(Lanes::words));
         let here = in_wide_vectors(Widening(pairs));
         assert_eq!(here.len(), pairs.len());

@@ -28,7 +28,7 @@ pub(super) fn region_lengths(node: &Path) -> Result<Option<Vec<u64>>, PlatformEr
         }
     };
     let (address, length) = (4 * cells("#address-cells", 2)?, 4 * cells("#size-cells", 1)?);
-    if reg.is_empty() || !reg.len().is_multiple_of(address + length) {
+    if reg.is_empty() || reg.len() % (address + length) != 0 {
         let expected = "whole entries of an address and a length";
         return Err(PlatformError::DeviceTree { path, expected, found: reg });
     }

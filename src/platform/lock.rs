@@ -6,8 +6,11 @@
 //! lock as long as it exists. That is what makes a mapping the only one of its memory. It binds
 //! those who ask for the lock; a second device file of the same device (`mknod`) has another one.
 
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::path::{Path, PathBuf};
+
+use nix::errno::Errno;
+use nix::fcntl::{Flock, FlockArg};
 
 use super::PlatformError;
 use super::system::open_device;
@@ -15,7 +18,7 @@ use super::system::open_device;
 /// A device file that nobody else who asks can open; until this is dropped.
 #[derive(Debug)]
 pub(super) struct LockedFile {
-    file: File,
+    file: Flock<File>,
     path: PathBuf,
     /// Other device files that show the same, held for the same time.
     others: Vec<LockedFile>,
@@ -32,12 +35,10 @@ impl LockedFile {
     /// Locks a file that is open.
     pub(super) fn of_file(file: File, path: &Path) -> Result<Self, PlatformError> {
         let path = path.to_owned();
-        match file.try_lock() {
-            Ok(()) => Ok(Self { file, path, others: Vec::new() }),
-            Err(TryLockError::WouldBlock) => Err(PlatformError::Busy { path }),
-            Err(TryLockError::Error(source)) => {
-                Err(PlatformError::File { act: "lock", path, source })
-            }
+        match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
+            Ok(file) => Ok(Self { file, path, others: Vec::new() }),
+            Err((_, Errno::EWOULDBLOCK)) => Err(PlatformError::Busy { path }),
+            Err((_, errno)) => Err(PlatformError::File { act: "lock", path, source: errno.into() }),
         }
     }
 

@@ -101,7 +101,7 @@ impl ReservedMemory {
         let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
         let inside = at.checked_add(bytes).is_some_and(|end| end <= self.bytes());
         match usize::try_from(at) {
-            Ok(place) if inside && place.is_multiple_of(BEAT_BYTES) => Ok(place),
+            Ok(place) if inside && place % BEAT_BYTES == 0 => Ok(place),
             _ => Err(PlatformError::OutOfRegion {
                 region: self.name.clone(),
                 at,

@@ -132,7 +132,7 @@ impl UDmaBuf {
         if bytes > BYTES_MAX {
             return Err(unusable("maintenance by range takes less than 4 GiB: make it smaller"));
         }
-        if !address.is_multiple_of(LINE as u64) {
+        if address % (LINE as u64) != 0 {
             return Err(unusable("it does not begin on a cache line: correct its reservation"));
         }
         let length = usize::try_from(bytes).map_err(|_| unusable("make it smaller"))?;

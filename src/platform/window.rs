@@ -210,9 +210,7 @@ pub(crate) mod fake {
 
         fn read32(&self, at: u32) -> u32 {
             self.with(|state| {
-                if let Some(queue) = state.scripted.get_mut(&at)
-                    && !queue.is_empty()
-                {
+                if let Some(queue) = state.scripted.get_mut(&at).filter(|queue| !queue.is_empty()) {
                     return queue.remove(0);
                 }
                 state.values.get(&at).copied().unwrap_or(0)

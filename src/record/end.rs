@@ -1,7 +1,6 @@
 //! This file says what the record of a collision takes from either of its bodies.
 
 use std::fmt;
-use std::hint::cold_path;
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
@@ -261,7 +260,7 @@ impl<'a> Lookup<'a> for Ends<'a> {
             Some(end) => end,
             None => {
                 // A jump that is foreseen costs less than to choose.
-                cold_path();
+                crew::cold_path();
                 &End::MISSING
             }
         }

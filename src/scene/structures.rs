@@ -1,12 +1,12 @@
 //! This file says where the collisions lie that a caller keeps as structures: they are read there, without a
 //! copy.
 
-use std::hint::cold_path;
 use std::iter;
 use std::ops::Range;
 
 use super::Collision;
 use crate::platform::{later_with_those_behind, soon_alone, soon_with_those_behind};
+use crew::chunks::Chunks;
 
 /// Where collisions lie ([`Collisions::structures`](super::Collisions::structures)).
 #[derive(Debug, Clone, Copy)]
@@ -121,7 +121,7 @@ impl<'a> Lying<'a> for InArray<'a> {
 
     #[inline(always)]
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
-        self.0.as_chunks::<N>().0.get(nth).map(<[_; N]>::each_ref)
+        self.0.split_arrays::<N>().0.get(nth).map(<[_; N]>::each_ref)
     }
 
     #[inline(always)]
@@ -161,7 +161,7 @@ impl<'a> InOrder<'a> {
             Some(collision) => collision,
             None => {
                 // As in `Ends::get`.
-                cold_path();
+                crew::cold_path();
                 &Collision::NOTHING
             }
         }
@@ -203,7 +203,7 @@ impl<'a> Lying<'a> for InOrder<'a> {
 
     #[inline(always)]
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
-        let places = self.order.get(..self.count)?.as_chunks::<N>().0.get(nth)?;
+        let places = self.order.get(..self.count)?.split_arrays::<N>().0.get(nth)?;
         Some(self.those(places))
     }
 
@@ -300,7 +300,7 @@ mod tests {
             let there = super::part(expected, range);
             assert_eq!((part.len(), names(part.iter())), (there.len(), there.to_vec()));
             assert!(part.some::<2>(there.len() / 2).is_none());
-            for (nth, pair) in there.as_chunks::<2>().0.iter().enumerate() {
+            for (nth, pair) in there.split_arrays::<2>().0.iter().enumerate() {
                 let next = part.next::<2>(nth).expect("as many");
                 assert_eq!(names(next.these), pair);
             }

@@ -44,10 +44,9 @@ impl Lane {
         address_width: u32,
     ) -> Result<(), PlatformError> {
         let held = &mut self.held[bank];
-        if let Held::Cpu(buffer) = held
-            && buffer.beats().len() >= beats.max(1)
-        {
-            return Ok(());
+        match held {
+            Held::Cpu(buffer) if buffer.beats().len() >= beats.max(1) => return Ok(()),
+            _ => {}
         }
         // The old buffer goes first: memory for DMA is scarce.
         *held = Held::Nobody;

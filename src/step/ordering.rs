@@ -218,10 +218,9 @@ fn too_long(
         let Ok(window) = IssueWindow::of_profile(variant.profile, parameters) else { return false };
         let apart = window.depth() as usize * window.per_issue() as usize;
         let of_body = uses.saturating_sub(1).saturating_mul(apart).saturating_add(1);
-        if let Flow::Window(window) = variant.profile.flow
-            && of_body > window.lag as usize
-        {
-            return false;
+        match variant.profile.flow {
+            Flow::Window(window) if of_body > window.lag as usize => return false,
+            _ => {}
         }
         // What took more than the limit here takes no less at a greater depth.
         let as_here = if window.depth() >= depth { limit.saturating_add(1) } else { 0 };

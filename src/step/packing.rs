@@ -112,7 +112,9 @@ struct Cut<'a> {
 impl<'a> Cut<'a> {
     /// One borrow of each buffer, for what it was made large enough for.
     fn of(lanes: &'a mut [Lane], plan: &Plan, bank: Bank) -> Self {
-        let (mut velocities, mut poses, mut entries) = <([_; _], [_; _], [_; _])>::default();
+        type Channels<'a> = [&'a mut [Beat]; DMA_COUNT_MAX];
+        let (mut velocities, mut poses, mut entries) =
+            <(Channels<'_>, Channels<'_>, Channels<'_>)>::default();
         for (place, lane) in lanes.iter_mut().enumerate() {
             let segments = plan.segments(place);
             let beats = &mut lane.beats_mut(bank)[..segments.end()];

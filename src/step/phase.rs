@@ -79,9 +79,7 @@ impl Outline {
         let (load, a_pass) = (count(segments.velocities.len()), count(segments.collisions.len()));
         let Some(behind_load) = descriptor.checked_sub(load) else { return Phase::Load };
         let round = behind_load.checked_div(a_pass).and_then(|round| u32::try_from(round).ok());
-        if let Some(round) = round
-            && u64::from(round) < self.plan.rounds()
-        {
+        if let Some(round) = round.filter(|round| u64::from(*round) < self.plan.rounds()) {
             return match self.plan.variant.profile.flow {
                 Flow::Window(_) => Phase::Collisions,
                 Flow::Passes => match round.checked_sub(self.contact_passes) {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crew::chunks::Chunks;
 use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
 /// A step of Bullet's.
@@ -25,7 +26,7 @@ fn words(folder: &Path, name: &str) -> Vec<u32> {
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"), "{}", path.display());
     let header = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let (words, rest) = bytes[10 + header..].as_chunks::<4>();
+    let (words, rest) = bytes[10 + header..].split_arrays::<4>();
     assert!(rest.is_empty(), "{}", path.display());
     words.iter().map(|word| u32::from_le_bytes(*word)).collect()
 }
@@ -33,7 +34,7 @@ fn words(folder: &Path, name: &str) -> Vec<u32> {
 /// The rows of an array of f32.
 fn rows<const N: usize>(folder: &Path, name: &str) -> Vec<[f32; N]> {
     let words = words(folder, name);
-    let (rows, rest) = words.as_chunks::<N>();
+    let (rows, rest) = words.split_arrays::<N>();
     assert!(rest.is_empty(), "{name}");
     rows.iter().map(|row| row.map(f32::from_bits)).collect()
 }
@@ -69,7 +70,7 @@ pub(crate) fn load(folder: &Path) -> Step {
     let pairs = words(folder, "contact_bodies.npy");
     let collisions = counts
         .iter()
-        .zip(pairs.as_chunks::<2>().0)
+        .zip(pairs.split_arrays::<2>().0)
         .zip(rows::<3>(folder, "contact_normal.npy"))
         .zip(rows::<16>(folder, "contact_points.npy"))
         .map(|(((count, pair), normal), points)| Collision {

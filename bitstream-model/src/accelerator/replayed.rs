@@ -63,7 +63,7 @@ impl Accelerator {
             }
         }
         // In the middle of an issue that has entered, or before one that does.
-        let enters = !records.is_multiple_of(together) || cycles <= limit;
+        let enters = records % together != 0 || cycles <= limit;
         if records == known && enters && refused {
             self.compute_to(number, segment.done + records);
             self.replay.on = false;

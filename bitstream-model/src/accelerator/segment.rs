@@ -79,9 +79,7 @@ impl Segment {
                 }
                 _ => {}
             }
-            if let Some(partial) = stream.next_partial()
-                && partial < now
-            {
+            if let Some(partial) = stream.next_partial().filter(|partial| *partial < now) {
                 return Err(error(ErrorCode::PartialBeat, self.taken[k] + partial));
             }
         }
@@ -94,9 +92,7 @@ impl Segment {
         for (k, stream) in streams.iter().enumerate() {
             // What comes behind the end of this packet is the next one.
             let left = self.beats_on(k) - self.taken[k];
-            if let Some(last) = stream.next_last()
-                && last + 1 < left
-            {
+            if let Some(last) = stream.next_last().filter(|last| last + 1 < left) {
                 let beat = register(self.taken[k] + last);
                 return Err(PacketError { code: ErrorCode::TlastEarly, channel: k, beat });
             }

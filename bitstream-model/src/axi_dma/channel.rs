@@ -290,8 +290,7 @@ impl Channel {
         }
         self.length = value & mask;
         let beat = BEAT_BYTES as u64;
-        let whole_beats =
-            self.direction == Direction::Mm2s || u64::from(self.length).is_multiple_of(beat);
+        let whole_beats = self.direction == Direction::Mm2s || u64::from(self.length) % beat == 0;
         if !self.address.is_multiple_of(beat) || !whole_beats {
             let (address, length) = (self.address, self.length);
             log.violation(ViolationKind::Misaligned { core, direction, address, length });
@@ -303,9 +302,7 @@ impl Channel {
     }
 
     pub(super) fn tick(&mut self, now: u64) {
-        if let Some((at, what)) = self.transition
-            && at <= now
-        {
+        if let Some((_, what)) = self.transition.filter(|(at, _)| *at <= now) {
             self.transition = None;
             match what {
                 Transition::Run => self.halted = false,

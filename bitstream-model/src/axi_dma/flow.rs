@@ -42,7 +42,7 @@ impl Core {
         let Work::Descriptor(bd) = channel.work else { return None };
         let at = bd.buffer + u64::from(bd.moved);
         let left = bd.length - bd.moved;
-        let whole = at.is_multiple_of(BEAT.into()) && self.reset_until.is_none();
+        let whole = at % u64::from(BEAT) == 0 && self.reset_until.is_none();
         let beats = (left / BEAT) as usize;
         (whole && channel.in_order(now, beat_shift)).then_some((at, beats))
     }
@@ -74,10 +74,11 @@ impl Core {
 
     /// So many beats of a channel have been moved, fewer than the descriptor had.
     pub(crate) fn flowed(&mut self, direction: Direction, beats: usize) {
+        if beats == 0 {
+            return;
+        }
         let channel = self.channel(direction);
-        if let Work::Descriptor(bd) = &mut channel.work
-            && beats > 0
-        {
+        if let Work::Descriptor(bd) = &mut channel.work {
             bd.moved += register(beats * BEAT_BYTES);
             bd.rxsof |= !channel.in_packet;
             channel.in_packet = true;

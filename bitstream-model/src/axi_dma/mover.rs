@@ -287,7 +287,7 @@ impl Channel {
         if whole && last && !self.faulty.cut && self.ends_packet(build, with) {
             stream.mark_last();
         }
-        if whole && !left.is_multiple_of(BEAT) && !self.faulty.cut {
+        if whole && left % BEAT != 0 && !self.faulty.cut {
             stream.mark_partial();
         }
         Some(whole && last)
@@ -386,7 +386,7 @@ impl Channel {
         }
         let buffer = join(BUFFER, BUFFER_MSB);
         let whole_beats = length.is_multiple_of(BEAT) || (direction == Direction::Mm2s && eof);
-        if !buffer.is_multiple_of(u64::from(BEAT)) || !whole_beats {
+        if buffer % u64::from(BEAT) != 0 || !whole_beats {
             let kind = ViolationKind::Misaligned { core, direction, address: buffer, length };
             with.log.violation(kind);
         }

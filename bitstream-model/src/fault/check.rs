@@ -10,14 +10,10 @@ impl Fault {
         let elsewhere = |found: String, expected| {
             Err(FaultError::Elsewhere { fault: self.kind.name(), found, expected })
         };
-        if let Some(place) = self.place
-            && !self.fits_place(place)
-        {
+        if let Some(place) = self.place.filter(|place| !self.fits_place(*place)) {
             return elsewhere(format!("in {place}"), self.expected_place());
         }
-        if let Some(phase) = self.phase
-            && !self.fits_phase(phase)
-        {
+        if let Some(phase) = self.phase.filter(|phase| !self.fits_phase(*phase)) {
             return elsewhere(format!("in phase {phase}"), self.expected_phase());
         }
         if self.when.is_some_and(|when| !self.fits_occasion(when)) {

@@ -65,9 +65,11 @@ impl StepCycles {
     #[must_use]
     pub fn new(variant: &Variant, records: Records, step: &StepShape) -> Self {
         let profile = variant.profile;
-        if let Flow::Window(design) = &profile.flow
-            && let Some(window) = WindowCycles::new(variant, &WindowStep::longest(design, *step))
-        {
+        let window = match &profile.flow {
+            Flow::Window(design) => WindowCycles::new(variant, &WindowStep::longest(design, *step)),
+            Flow::Passes => None,
+        };
+        if let Some(window) = window {
             return Self {
                 load: 0,
                 pass: window.stream,

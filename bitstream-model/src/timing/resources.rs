@@ -84,9 +84,11 @@ impl MemoryUse {
                     OnChipArray::ContactLines | OnChipArray::FrictionLines => (0, 0),
                 };
                 let (array, copies, simple) = (ports.array, ports.copies, ports.simple());
-                if let Flow::Window(design) = &variant.profile.flow
-                    && let Some(of) = window::array(variant, design, array)
-                {
+                let of_window = match &variant.profile.flow {
+                    Flow::Window(design) => window::array(variant, design, array),
+                    Flow::Passes => None,
+                };
+                if let Some(of) = of_window {
                     let (rows, row_bytes, copies) = (of.rows, of.row_bytes, of.memories);
                     let memory = ports.memory;
                     return ArrayUse { array, memory, rows, row_bytes, copies, simple };

@@ -173,10 +173,10 @@ pub(crate) fn scene(bodies: u32, collisions: u32, seed: u64, apart: bool) -> Ste
         let random = |k: u64| scatter(seed ^ 0x55, 8 * u64::from(n) + k);
         let of = |k: u64| unit(seed ^ 0xAA, 32 * u64::from(n) + k);
         let b = if apart { 1 + n % (bodies - 1) } else { 1 + below(random(0), bodies - 1) };
-        let b = if b.is_multiple_of(8) { b - 1 } else { b };
+        let b = if b % 8 == 0 { b - 1 } else { b };
         let a = if apart { 0 } else { below(random(1), bodies) };
         let a = if a == b { 0 } else { a };
-        let count = if random(2).is_multiple_of(16) { 0 } else { 1 + below(random(3), 4) };
+        let count = if random(2) % 16 == 0 { 0 } else { 1 + below(random(3), 4) };
         let length = (of(0).mul_add(of(0), of(1) * of(1)) + 0.01).sqrt();
         Collision {
             bodies: [a, b],

@@ -18,6 +18,7 @@ use std::time::Duration;
 
 use bitstream_model::interface::axi_dma::dmasr;
 use bitstream_model::interface::descriptor::{self, status};
+use crew::chunks::Chunks;
 
 use super::{
     Channel, Descriptor, Direction, DmaError, Dmacr, Dmasr, Progress, Ring, pieces, reset_core,
@@ -74,7 +75,7 @@ impl Core {
         let mut buffer = CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH).expect("memory");
         let mut padded = bytes.to_vec();
         padded.resize(16 * beats, 0);
-        let (words, _) = padded.as_chunks::<4>();
+        let (words, _) = padded.split_arrays::<4>();
         let there = buffer.beats_mut().iter_mut().flat_map(|beat| &mut beat.0);
         for (word, bytes) in there.zip(words) {
             *word = u32::from_le_bytes(*bytes);

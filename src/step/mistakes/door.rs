@@ -121,9 +121,7 @@ impl Door {
             Some(Mistake::OneDirectionReset) if state.opened => {
                 if resets {
                     state.believed.insert((region, true), true);
-                } else if let Some(halted) = state.believed.get_mut(&key)
-                    && !tail
-                {
+                } else if let Some(halted) = state.believed.get_mut(&key).filter(|_| !tail) {
                     *halted = !(controls && dmacr::RS.is_set(value));
                     return;
                 }

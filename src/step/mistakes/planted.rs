@@ -244,11 +244,11 @@ impl Planted {
         if fitting.is_some() {
             state.fitted.push(channel);
         }
-        if let (Some(Trouble::StaleDescriptor(wanted)), [_, second, ..]) =
-            (state.trouble, &chain[..])
-            && wanted == channel
-        {
-            second.set(STATUS, status::CMPLTED.mask());
+        match (state.trouble, &chain[..]) {
+            (Some(Trouble::StaleDescriptor(wanted)), [_, second, ..]) if wanted == channel => {
+                second.set(STATUS, status::CMPLTED.mask());
+            }
+            _ => {}
         }
     }
 

@@ -18,6 +18,7 @@
     reason = "threads that outlive a call borrow what it borrows; a register has no other access"
 )]
 
+pub mod chunks;
 pub mod float_env;
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,11 @@ use std::thread::{Builder, JoinHandle};
 use std::{fmt, io, mem};
 
 use float_env::standard;
+
+/// Says that the path which calls this is seldom taken, as `std::hint::cold_path` does from Rust 1.95 on.
+#[cold]
+#[inline]
+pub const fn cold_path() {}
 
 /// What every thread does that comes in time; it is told its number, the caller 0.
 type Work = dyn Fn(usize) + Sync;

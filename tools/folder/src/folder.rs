@@ -13,6 +13,7 @@ use std::collections::HashMap;
 use std::io::{BufWriter, ErrorKind, Read, Write as _};
 use std::path::{Path, PathBuf};
 
+use crew::chunks::Chunks;
 use thiserror::Error;
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 
@@ -141,7 +142,7 @@ fn rows<T: Element, const N: usize>(
 }
 
 fn as_rows<T: Element, const N: usize>(elements: &[T]) -> Vec<[T; N]> {
-    let (rows, rest) = elements.as_chunks();
+    let (rows, rest) = elements.split_arrays();
     debug_assert!(rest.is_empty(), "the shape was checked");
     rows.to_vec()
 }
@@ -199,7 +200,7 @@ impl Folder {
         let shape = Dimensions(vec![m, Some(CONTACT_POINTS), Some(4)]);
         let (_, points) = array(COLLISION_POINTS, shape)?;
         let points: Vec<[f32; 4]> = as_rows(&points);
-        let contacts = points.as_chunks::<CONTACT_POINTS>().0;
+        let contacts = points.split_arrays::<CONTACT_POINTS>().0;
         let collisions = (0..pairs.len())
             .map(|k| Collision {
                 body_a: pairs[k][0],

@@ -4,7 +4,7 @@
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::order::{Order, Ties};
-use zynq_pgs::{OrderChoice, StepParameters, StepReport};
+use zynq_pgs::{Capabilities, OrderChoice, StepParameters, StepReport};
 
 use crate::verbs::table::grouped;
 
@@ -84,6 +84,38 @@ impl OrderingArgs {
         parameters.verify_order |= self.verify;
         parameters
     }
+
+    /// The same for a step that is to be compared with others: where the board solves one collision
+    /// after the other, and no order is asked for, the collisions stay as given. That is Bullet's
+    /// order, and the same on every such board.
+    pub(crate) fn apply_to_compare(
+        self,
+        parameters: StepParameters,
+        capabilities: &Capabilities,
+    ) -> StepParameters {
+        let mut parameters = self.apply(parameters);
+        if self.order.is_none() && is_sequential(capabilities) {
+            parameters.order = Some(Order::AsGiven);
+        }
+        parameters
+    }
+}
+
+/// Whether a board gives what solving one collision after the other gives, in any order.
+fn is_sequential(capabilities: &Capabilities) -> bool {
+    capabilities.interlocked && capabilities.window.is_none()
+}
+
+/// Whether the order of a step is Bullet's, in words; nothing where it is and that does not help.
+pub(crate) fn beside_bullet(
+    report: &StepReport,
+    capabilities: &Capabilities,
+) -> Option<&'static str> {
+    match report.order {
+        Order::AsGiven if is_sequential(capabilities) => Some("Bullet's own, to compare with it"),
+        Order::AsGiven => None,
+        _ => Some("not Bullet's: results differ by the order alone"),
+    }
 }
 
 /// The name of an order that was sent.
@@ -117,16 +149,16 @@ impl OrdersSent {
 
 /// In which order a step was sent, and why.
 pub(crate) fn with_reason(report: &StepReport) -> String {
-    match reason(&report.order_choice) {
+    match reason(report) {
         Some(reason) => format!("{}: {reason}", name(report.order)),
         None => name(report.order),
     }
 }
 
 /// Why an order was taken; nothing where it was asked for.
-fn reason(choice: &OrderChoice) -> Option<String> {
-    let OrderChoice::Cheapest(costs) = choice else {
-        return match choice {
+pub(crate) fn reason(report: &StepReport) -> Option<String> {
+    let OrderChoice::Cheapest(costs) = report.order_choice else {
+        return match report.order_choice {
             OrderChoice::NoInterlock => Some("this board does not wait on hazards".to_owned()),
             OrderChoice::LiveBodies => Some("this board keeps only live bodies on chip".to_owned()),
             _ => None,

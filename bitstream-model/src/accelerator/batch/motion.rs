@@ -77,9 +77,8 @@ impl Bodies<'_> {
         let mut sums = [0; 2];
         let Range { start, end } = bodies;
         let mut last = start;
-        if let Some(integration) = self.integration
-            && !matches!(self.width, Width::One)
-        {
+        let side_by_side = self.integration.filter(|_| !matches!(self.width, Width::One));
+        if let Some(integration) = side_by_side {
             let first = start.next_multiple_of(period).min(end);
             last = first + (end - first) / group * group;
             let places_before = take(&mut places, turns, start..first);

@@ -4,6 +4,7 @@ use super::super::array::Row;
 use super::block::{Block, LANES, ROWS_APART, Words};
 use super::lanes::{Lanes, Numbers, Quad, Work};
 use crate::interface::record::{Beat, WORD_LANE, collision};
+use crew::chunks::Chunks;
 
 /// Streams that records come on.
 pub(super) const STREAMS: usize = 4;
@@ -39,7 +40,7 @@ impl<'a> Records<'a> {
         const { assert!(collision::NORMAL == 0 && collision::BODY_A == 1 && collision::BODY_B == 2) };
         let [normals, bodies_a, bodies_b, _] = self.streams;
         let from =
-            |stream: &'a [Beat]| stream.as_chunks::<2>().0.get(first..).unwrap_or(&[]).iter();
+            |stream: &'a [Beat]| stream.split_arrays::<2>().0.get(first..).unwrap_or(&[]).iter();
         let word = |[beat, _]: &[Beat; 2]| beat.0[WORD_LANE];
         let bodies = from(bodies_a).zip(from(bodies_b));
         from(normals).zip(bodies).map(move |(n, (a, b))| [word(n), word(a), word(b)])
@@ -87,7 +88,7 @@ impl Work for Fill<'_> {
     fn with<L: Lanes>(self, lanes: L) {
         let Self { records, first, kinds, blocks, sums } = self;
         let apart = lanes.splat(f32::from_bits(ROWS_APART));
-        let sums = sums.as_chunks_mut::<LANES>().0;
+        let sums = sums.split_arrays_mut::<LANES>().0;
         for (number, ((block, kinds), sums)) in blocks.iter_mut().zip(kinds).zip(sums).enumerate() {
             block.begin(kinds);
             let mut at = 0;
@@ -119,7 +120,7 @@ impl Fill<'_> {
     /// The same, one record after the other.
     pub(super) fn one_by_one(self) {
         let Self { records, mut first, kinds, blocks, sums } = self;
-        let sums = sums.as_chunks_mut::<LANES>().0;
+        let sums = sums.split_arrays_mut::<LANES>().0;
         for ((block, kinds), sums) in blocks.iter_mut().zip(kinds).zip(sums) {
             *block = Block::EMPTY;
             for (lane, (kind, sum_of)) in kinds.iter().zip(sums).enumerate() {

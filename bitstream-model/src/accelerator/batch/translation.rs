@@ -16,6 +16,7 @@ use super::records::{BEATS, STREAMS};
 use crate::cast::register;
 use crate::interface::number::StreamFormat;
 use crate::interface::record::{Beat, LANES, WORD_LANE, collision, relative};
+use crew::chunks::Chunks;
 
 /// Records that are translated at once.
 const TOGETHER: usize = 4096;
@@ -154,8 +155,8 @@ impl Part<'_> {
             (&streams[stream][first * share + number..], share)
         });
         const { assert!(BEATS[0] == 2 && BEATS[1] == 2 && BEATS[2] == 2 && BEATS[3] == 1) };
-        let pairs = a.as_chunks_mut::<2>().0.iter_mut().zip(b.as_chunks_mut::<2>().0);
-        let to = pairs.zip(c.as_chunks_mut::<2>().0.iter_mut().zip(d));
+        let pairs = a.split_arrays_mut::<2>().0.iter_mut().zip(b.split_arrays_mut::<2>().0);
+        let to = pairs.zip(c.split_arrays_mut::<2>().0.iter_mut().zip(d));
         for (record, (sum, ((a, b), (c, d)))) in sums.iter_mut().zip(to).enumerate() {
             let beats = from.map(|(beats, share)| beats[record * share]);
             *sum = beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add);
@@ -176,14 +177,14 @@ impl Part<'_> {
             let share = layout.share[stream];
             (&streams[stream][first / PAIR * share + number..], share)
         });
-        let [a, b, c] = [a, b, c].map(|beats| beats.as_chunks_mut::<2>().0.chunks_mut(PAIR));
+        let [a, b, c] = [a, b, c].map(|beats| beats.split_arrays_mut::<2>().0.chunks_mut(PAIR));
         let to = a.zip(b).zip(c.zip(d.chunks_mut(PAIR)));
         for (issue, (sums, ((a, b), (c, d)))) in sums.chunks_mut(PAIR).zip(to).enumerate() {
             let beats = from.map(|(beats, share)| beats[issue * share]);
             let rows = rows_of_pair(format, &beats);
             sums.fill(0);
             sums[0] = beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add);
-            let records = rows.as_chunks::<{ collision::ROWS }>().0;
+            let records = rows.split_arrays::<{ collision::ROWS }>().0;
             let to = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
             for (rows, ((a, b), (c, d))) in records.iter().zip(to) {
                 let [a0, b0, c0, d0, a1, b1, c1] = rows.map(Beat);
@@ -201,7 +202,7 @@ fn rows_of_pair(
 ) -> [Row; PAIR * collision::ROWS] {
     // All words alike, for the compiler to take several at once; then those that are no numbers.
     let mut rows = [[0; LANES]; PAIR * collision::ROWS];
-    for (rows, beat) in rows.as_chunks_mut::<2>().0.iter_mut().zip(beats) {
+    for (rows, beat) in rows.split_arrays_mut::<2>().0.iter_mut().zip(beats) {
         let words: [u16; 2 * LANES] = bytemuck::cast(*beat);
         for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
             *to = decode::number(format, u32::from(word)).to_bits();

@@ -2,10 +2,10 @@
 
 use super::lanes::{Lanes, Portable, Work};
 
+#[cfg(target_arch = "x86_64")]
+use super::lanes::Avx2;
 #[cfg(target_arch = "aarch64")]
 use super::lanes::Neon;
-#[cfg(target_arch = "x86_64")]
-use super::lanes::{Avx2, Avx512};
 
 /// The lanes to compute with.
 #[derive(Debug, Clone, Copy)]
@@ -15,8 +15,6 @@ pub(super) enum Width {
     Portable(Portable),
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
-    #[cfg(target_arch = "x86_64")]
-    Avx512(Avx512),
     #[cfg(target_arch = "aarch64")]
     Neon(Neon),
 }
@@ -25,7 +23,7 @@ impl Width {
     /// All that the processor has, the widest first.
     pub(super) fn all() -> impl Iterator<Item = Self> {
         #[cfg(target_arch = "x86_64")]
-        let own = [Avx512::found().map(Self::Avx512), Avx2::found().map(Self::Avx2)];
+        let own = [Avx2::found().map(Self::Avx2)];
         #[cfg(target_arch = "aarch64")]
         let own = [Some(Self::Neon(Neon))];
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
@@ -46,8 +44,6 @@ impl Width {
             Self::Portable(lanes) => lanes.run(work),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(lanes) => lanes.run(work),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(lanes) => lanes.run(work),
             #[cfg(target_arch = "aarch64")]
             Self::Neon(lanes) => lanes.run(work),
         }

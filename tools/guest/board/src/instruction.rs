@@ -48,10 +48,9 @@ impl Registers {
 
     /// Takes note that the access was made; `loaded` is what a load found.
     pub fn complete(&mut self, access: &MemoryAccess, loaded: u32) {
-        if !access.store
-            && let Some(x) = self.x.get_mut(usize::from(access.register))
-        {
-            *x = u64::from(loaded);
+        match self.x.get_mut(usize::from(access.register)) {
+            Some(x) if !access.store => *x = u64::from(loaded),
+            _ => {}
         }
         match access.write_back {
             Some((ZERO_OR_SP, value)) => self.sp = value,

@@ -90,7 +90,8 @@ pub(crate) fn run(
         MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(Failure::input)?;
     let addresses = memory.addresses();
     let mut server = Server::bind(config, memory, &args.socket).map_err(|error| {
-        if made && let Err(error) = fs::remove_file(&path) {
+        let removed = if made { fs::remove_file(&path) } else { Ok(()) };
+        if let Err(error) = removed {
             log::warn!("{} stays: {error}", path.display());
         }
         match error {

@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use clap::Args;
 use scene::kinetic_energy;
 use serde_json::{Value, json};
-use zynq_pgs::{Body, StepParameters, StepReport};
+use zynq_pgs::{Body, Capabilities, StepParameters, StepReport};
 
 use super::SCHEMA;
+use super::facts::fact;
 use super::table::{Bound, grouped};
 use super::{limit_text, milliseconds};
 use crate::args::CommonArgs;
@@ -23,6 +24,7 @@ use crate::options::{BuildArgs, DeadlineArgs};
 use crate::ordering::{self, OrderingArgs};
 use crate::origin;
 use crate::planned::{self, PlannedArgs};
+use crate::solver::SolverArgs;
 use step_folder::digest;
 
 const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
@@ -81,15 +83,11 @@ pub(crate) struct SolveArgs {
     /// Print the digest of the final state alone.
     #[arg(long, conflicts_with = "json")]
     digest: bool,
-    /// Contact iterations [default: those of the folder]
-    #[arg(long, value_name = "K")]
-    contact_iterations: Option<u32>,
-    /// Friction iterations [default: those of the folder]
-    #[arg(long, value_name = "K")]
-    friction_iterations: Option<u32>,
     /// Stop after the solver: poses stay, velocities are undamped and without gravity.
     #[arg(long)]
     no_integrate: bool,
+    #[command(flatten)]
+    solver: SolverArgs,
     #[command(flatten)]
     ordering: OrderingArgs,
     #[command(flatten)]
@@ -103,17 +101,19 @@ pub(crate) struct SolveArgs {
 }
 
 impl SolveArgs {
-    /// The folder's parameters, with what the command line says otherwise.
+    /// The folder's parameters, with what the command line says otherwise, but for the order.
     fn parameters(&self, folder: &StepParameters) -> StepParameters {
         let mut parameters = *folder;
         parameters.integrate = !self.no_integrate;
-        if let Some(iterations) = self.contact_iterations {
-            parameters.contact_iterations = iterations;
+        self.faults.apply(self.deadline.apply(self.solver.apply(parameters)))
+    }
+
+    /// The same with the order that a board is to be sent.
+    fn ordered(&self, parameters: StepParameters, capabilities: &Capabilities) -> StepParameters {
+        match self.compare {
+            true => self.ordering.apply_to_compare(parameters, capabilities),
+            false => self.ordering.apply(parameters),
         }
-        if let Some(iterations) = self.friction_iterations {
-            parameters.friction_iterations = iterations;
-        }
-        self.faults.apply(self.ordering.apply(self.deadline.apply(parameters)))
     }
 }
 
@@ -147,6 +147,7 @@ pub(crate) fn run(
     folder
         .check_shapes(opened.accelerator.capabilities().shape_capacity)
         .map_err(Failure::input)?;
+    let parameters = args.ordered(parameters, opened.accelerator.capabilities());
     args.planned.inject(&mut opened, &parameters)?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
@@ -174,8 +175,13 @@ pub(crate) fn run(
         })?;
     }
 
+    let beside_bullet = match args.compare {
+        true => ordering::beside_bullet(&report, opened.accelerator.capabilities()),
+        false => None,
+    };
     let solved = Solved {
         parameters,
+        beside_bullet,
         report,
         energy: [energy_before, kinetic_energy(&bodies, &folder.shapes)],
         digest: format!("{:016x}", digest::of_bodies(&bodies)),
@@ -281,6 +287,8 @@ fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
 /// What there is to tell.
 struct Solved {
     parameters: StepParameters,
+    /// How the order relates to Bullet's, where that is compared with.
+    beside_bullet: Option<&'static str>,
     report: StepReport,
     /// Before and after the step, J.
     energy: [f64; 2],
@@ -307,7 +315,11 @@ impl Solved {
             self.parameters.friction_iterations,
             if self.parameters.integrate { "integrated" } else { "not integrated" },
         )?;
-        writeln!(out, "order      {}", ordering::text(report))?;
+        let mut order = ordering::text(report);
+        if let Some(text) = self.beside_bullet.map(str::to_owned).or(ordering::reason(report)) {
+            order += &format!(" ({text})");
+        }
+        fact(out, "order", &order)?;
         writeln!(
             out,
             "cycles     {} = {} by formula + {} stalls + {} waits; {:.3} ms modelled, limit: {}",
@@ -387,6 +399,7 @@ impl Solved {
             "kinetic_energy_j": self.energy[1],
             "digest": { "algorithm": digest::ALGORITHM, "value": self.digest },
             "comparison": differences,
+            "beside_bullet": self.beside_bullet,
         })
     }
 }

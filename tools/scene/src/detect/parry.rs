@@ -94,10 +94,14 @@ impl Parry {
         .ok()?;
         // To the points of two features parry adds the nearest one, last and without a feature.
         // Where a capsule lies flat that is any point of a line whose ends are there already.
-        if let [others @ .., nearest] = &self.manifold.points[..]
-            && nearest.fid1 == PackedFeatureId::UNKNOWN
-            && others.iter().any(|other| other.dist <= nearest.dist + SAME_DEPTH)
-        {
+        let is_spare = match &self.manifold.points[..] {
+            [others @ .., nearest] => {
+                nearest.fid1 == PackedFeatureId::UNKNOWN
+                    && others.iter().any(|other| other.dist <= nearest.dist + SAME_DEPTH)
+            }
+            [] => false,
+        };
+        if is_spare {
             self.manifold.points.pop();
         }
         Some(true)

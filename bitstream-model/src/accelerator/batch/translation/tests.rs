@@ -6,6 +6,7 @@ use crate::config::BoardConfig;
 use crate::interface::control::ErrorCode;
 use crate::interface::number::Numbers;
 use crate::interface::profile::{HALF, MIXED, Profile};
+use crew::chunks::Chunks;
 
 static RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
 /// Bodies, of which the first is static.
@@ -28,7 +29,7 @@ fn record(format: StreamFormat, seed: &mut u64) -> [Row; relative::ROWS] {
     let mut rows = [[0; 4]; relative::ROWS];
     rows.as_flattened_mut().iter_mut().for_each(|word| *word = random() & mask);
     for row in &mut rows[relative::CONTACTS..] {
-        if random().is_multiple_of(4) {
+        if random() % 4 == 0 {
             row[WORD_LANE] = infinity;
         }
     }
@@ -157,9 +158,9 @@ fn dealt_in_pairs(
 ) -> ([Vec<Beat>; STREAMS_MAX], Vec<u32>) {
     let mut streams = [const { Vec::new() }; STREAMS_MAX];
     let mut sums = Vec::new();
-    for pair in records.as_chunks::<PAIR>().0 {
+    for pair in records.split_arrays::<PAIR>().0 {
         let mut sum = 0_u32;
-        for (beat, rows) in pair.as_flattened().as_chunks::<2>().0.iter().enumerate() {
+        for (beat, rows) in pair.as_flattened().split_arrays::<2>().0.iter().enumerate() {
             let beat_of_rows = beat_of(rows[0], rows[1]);
             sum = beat_of_rows.0.into_iter().fold(sum, u32::wrapping_add);
             streams[layout.places[beat].0].push(beat_of_rows);

@@ -152,7 +152,8 @@ impl<'a> Lane<'a> {
         if self.failed.is_some() {
             return None;
         }
-        let parameters = &self.side.ordering.apply(*parameters);
+        let capabilities = self.opened.accelerator.capabilities();
+        let parameters = &self.side.ordering.apply_to_compare(*parameters, capabilities);
         let before = self.world.bodies().to_vec();
         let accelerator = &mut self.opened.accelerator;
         let stepped = match &mut self.world {

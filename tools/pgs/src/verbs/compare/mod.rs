@@ -24,6 +24,7 @@ use crate::options::{BuildArgs, DeadlineArgs};
 use crate::ordering::{OrderName, OrderingArgs};
 use crate::origin;
 use crate::scenes::SceneArgs;
+use crate::solver::SolverArgs;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -38,7 +39,8 @@ are binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocke
 flush, isotropic, world; the rest is window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
 length-width=BITS and address-width=BITS. The order in which a board is sent the collisions is one of
 auto, as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest,
-colours. Each board finds its own collisions.
+colours. Without one a board that waits on hazards takes the collisions as given, so that two such
+boards solve them in one order. Each board finds its own collisions.
 
 Only moving bodies are compared; A is the original. Relative deviations are |B - A| / |A| of each
 component (thesis eq. 4.1); where A's component is 0 they leave it out. A velocity is within 1 % if it
@@ -67,7 +69,7 @@ pub(crate) struct CompareArgs {
     /// Take one step from this folder of .npy arrays instead of a scene.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "steps", "every"])]
     input: Option<PathBuf>,
-    /// Steps of 1/60 s.
+    /// Steps to take.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Show every N-th step [default: a tenth of the steps]
@@ -79,6 +81,8 @@ pub(crate) struct CompareArgs {
     /// the board fails otherwise
     #[arg(long)]
     verify: bool,
+    #[command(flatten)]
+    solver: SolverArgs,
     #[command(flatten)]
     deadline: DeadlineArgs,
 }
@@ -186,7 +190,7 @@ pub(crate) fn run(
         Some(folder) => folder.parameters,
         None => StepParameters::default(),
     };
-    let mut parameters = args.deadline.apply(parameters);
+    let mut parameters = args.deadline.apply(args.solver.apply(parameters));
     parameters.verify_order |= args.verify;
     let open = |name, side: Side| {
         let world = |opened: &_| match &folder {
@@ -258,6 +262,9 @@ pub(crate) fn run(
         };
         config["steps"] = steps.into();
         config["every"] = every.into();
+        config["contact_iterations"] = parameters.contact_iterations.into();
+        config["friction_iterations"] = parameters.friction_iterations.into();
+        config["time_step_s"] = parameters.time_step.into();
         config["a"] = args.a.to_string().into();
         config["b"] = args.b.to_string().into();
         let document = json!({

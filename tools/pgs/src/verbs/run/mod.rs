@@ -98,7 +98,7 @@ impl RunArgs {
     /// Whether a step has a row of its own.
     fn is_shown(&self, step: u32) -> bool {
         let every = self.report_every.unwrap_or(self.steps.div_ceil(ROWS));
-        step == 1 || step % every == 0 || step == self.steps
+        step == 1 || step.is_multiple_of(every) || step == self.steps
     }
 }
 

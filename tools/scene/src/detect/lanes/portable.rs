@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use wide::f32x4;
+use wide::{CmpEq, CmpGe, CmpGt, f32x4};
 
 use super::{Lanes, Mask, Numbers, Row, Work};
 
@@ -84,17 +84,17 @@ impl Numbers for Four {
 
     #[inline(always)]
     fn above(self, other: Self) -> FourMask {
-        FourMask(self.0.simd_gt(other.0))
+        FourMask(self.0.cmp_gt(other.0))
     }
 
     #[inline(always)]
     fn at_least(self, other: Self) -> FourMask {
-        FourMask(self.0.simd_ge(other.0))
+        FourMask(self.0.cmp_ge(other.0))
     }
 
     #[inline(always)]
     fn is(self, other: Self) -> FourMask {
-        FourMask(self.0.simd_eq(other.0))
+        FourMask(self.0.cmp_eq(other.0))
     }
 
     #[inline(always)]
@@ -121,7 +121,7 @@ impl Mask for FourMask {
 
     #[inline(always)]
     fn bits(self) -> u32 {
-        self.0.to_bitmask() & 0b1111
+        self.0.move_mask().cast_unsigned() & 0b1111
     }
 }
 
