@@ -256,7 +256,7 @@ impl Opened {
         let can = self.accelerator.capabilities();
         fact(out, "board", &format!("{} ({})", self.kind(), self.reason))?;
         let bitstream = format!(
-            "profile {}, {} MHz, {} + {} channels, initiation interval {}, {}, subnormals {}",
+            "{}, {} MHz, {} + {} channels, initiation interval {}, {}, subnormals {}",
             self.design(),
             f64::from(can.clock_khz) / 1e3,
             can.mm2s_channels,

@@ -61,7 +61,8 @@ fn a_board_does_not_differ_from_itself() {
 
 #[test]
 fn free_fall_is_measured_as_it_is_computed() {
-    let document = compare(&["float", "float,unchecked", "--grid", "2x1x2", "--steps", "30"]);
+    let document =
+        compare(&["float", "float,unchecked", "--grid", "2x1x2", "--steps", "30", "--drop", "5"]);
     let rows = document["rows"].as_array().expect("rows");
     // Four cubes of 1 kg, their centres 6 m up.
     near(&rows[0]["a"]["potential_energy_j"], 4.0 * 9.8 * 6.0, 1e-3);
@@ -191,7 +192,7 @@ fn strays(row: &Value, start: f64) -> Option<String> {
 
 #[test]
 fn over_many_steps_mixed_stays_with_float_and_half_freezes() {
-    let scene = ["--grid", "6x6x6", "--steps", "300"];
+    let scene = ["--grid", "6x6x6", "--steps", "300", "--drop", "5"];
     let against_float = |build| compare(&[&["float", build], &scene[..]].concat());
     let rows = |document: &Value| document["rows"].as_array().expect("rows").clone();
 

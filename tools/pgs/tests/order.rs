@@ -117,7 +117,8 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
 /// One order gives way to another here and there: each step's report says which it was.
 #[test]
 fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
-    let scene = ["run", "--hazards", "unchecked", "--grid", "9x9x9", "--steps", "66"];
+    let scene =
+        ["run", "--hazards", "unchecked", "--grid", "9x9x9", "--steps", "66", "--drop", "5"];
     let ran = run([&["--json"], &scene[..]].concat());
     let document: Value = serde_json::from_str(&ran.stdout).expect("a document");
     let steps = document["steps"].as_array().expect("steps");
