@@ -167,8 +167,8 @@ pub(crate) fn reason(report: &StepReport) -> Option<String> {
     let as_given = grouped(costs.as_given);
     Some(match costs.reordered.map(|cycles| (grouped(cycles), cycles < costs.as_given)) {
         Some((reordered, true)) => format!(
-            "this board waits on hazards; the passes take at most {reordered} cycles, more than \
-             {as_given} as given"
+            "this board waits on hazards; the passes take at most {reordered} cycles, as given \
+             they take more than {as_given}"
         ),
         Some((reordered, false)) => format!(
             "this board waits on hazards; the passes take {as_given} cycles, {reordered} without \

@@ -219,7 +219,7 @@ impl<'a> Summary<'a> {
     /// For people.
     pub(super) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
         fact(out, "simulated", &self.simulated())?;
-        fact(out, "board", &self.board_times())?;
+        fact(out, "time", &self.board_times())?;
         if let Some(thesis) = self.thesis() {
             fact(out, "thesis", &thesis.text(self.totals.passes))?;
         }
@@ -248,10 +248,10 @@ impl<'a> Summary<'a> {
     fn board_times(&self) -> String {
         let Self { totals, board, .. } = self;
         let mut text = format!(
-            "{}{:.3} ms a step on average, {:.3} ms at most",
-            if board.is_emulated { "modelled: " } else { "" },
+            "{:.3} ms a step on the board on average, {:.3} ms at most{}",
             totals.mean(),
-            milliseconds(totals.modelled_most)
+            milliseconds(totals.modelled_most),
+            if board.is_emulated { " (modelled)" } else { "" },
         );
         if let Some(per_pass) = totals.per_pass() {
             text += &format!(", {per_pass:.3} ms a pass");
@@ -291,8 +291,8 @@ impl<'a> Summary<'a> {
         let HostSums { all, detect, order, pack, board, unpack } = &self.totals.host;
         let seconds = Duration::as_secs_f64;
         format!(
-            "{:.1} s: {:.1} s detect collisions, {:.1} s order and {:.1} s pack them, {:.1} s {}, \
-             {:.1} s read results",
+            "{:.2} s: {:.2} s detect collisions, {:.2} s order and {:.2} s pack them, {:.2} s {}, \
+             {:.2} s read results",
             seconds(all),
             seconds(detect),
             seconds(order),
