@@ -148,6 +148,14 @@ mod tests {
         }
     }
 
+    /// What the thesis' float design asks of the memory that it states, 16 GB/s (§5.4.2).
+    #[test]
+    fn a_pass_of_float_needs_15_4_gigabytes_a_second() {
+        let pass = time(&FLOAT, Bandwidth::Unlimited).pass;
+        let rate = pass.bytes as f64 / pass.seconds / 1e9;
+        assert!((rate - 15.4).abs() < 0.01, "{rate} GB/s");
+    }
+
     #[test]
     fn each_part_says_what_limits_it() {
         use PartLimit::{Memory, Pipeline, Streams};

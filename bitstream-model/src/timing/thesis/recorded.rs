@@ -1,6 +1,7 @@
 //! This file holds the figures that the thesis reports of its designs and of other machines
 //! (§4.4.2, Tables 6.4 to 6.11, equation 6.5).
 
+use crate::config::Bandwidth;
 use crate::interface::profile::{FLOAT, HALF, Profile};
 
 /// A machine that the thesis compares with.
@@ -29,6 +30,9 @@ pub const GPU: Platform = Platform {
 /// The CPU of Table 6.3.
 pub const CPU: Platform =
     Platform { name: "i7-3770", latency_ms: 53.01, watts: 133.0, joules: 7.05, design_watts: 77.0 };
+/// Bandwidth of the memory that the thesis reckons with (§5.4.2): what others had found the most to be.
+/// Its cycles contain no wait for memory.
+pub const MEMORY_BANDWIDTH: Bandwidth = Bandwidth::BytesPerSecond(16_000_000_000);
 /// Power of the ZCU102 that the thesis calculates with, W: its maximum, not measured.
 pub const ZCU102_WATTS: f64 = 15.0;
 /// Share of a whole step that the accelerator takes over (§4.4).

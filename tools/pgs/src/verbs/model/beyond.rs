@@ -70,8 +70,8 @@ fn against_float(scene: &Scene, mixed: &Variant) -> Table {
     let ours = time(mixed, Bandwidth::ZCU102_SUSTAINED).seconds * 1e3;
     if scene.is_thesis_step() {
         table.note(format!(
-            "At 12.8 GB/s {ours:.3} ms, modelled; the thesis records {} ms for its float design at \
-             unlimited bandwidth.",
+            "At 12.8 GB/s {ours:.3} ms, modelled; the thesis records {} ms for its float design, \
+             without a wait for memory.",
             FLOAT_DESIGN.latency_ms
         ));
     }

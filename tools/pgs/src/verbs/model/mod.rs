@@ -62,8 +62,8 @@ pub(crate) struct ModelArgs {
     /// Profiles with the world inertia of every body, streamed and kept on chip
     #[arg(long)]
     world_inertia: bool,
-    /// Memory bandwidth in GB/s, or "unlimited", of the table of times [default: unlimited, 17.07 and
-    /// 12.8 in turn]
+    /// Memory bandwidth in GB/s, or "unlimited", of the table of times [default: unlimited, 17.07, 16
+    /// and 12.8 in turn]
     #[arg(long, value_name = "GBPS", value_parser = bandwidth)]
     bandwidth: Option<Bandwidth>,
     /// Which tables [default: all]
@@ -117,8 +117,12 @@ fn names() -> PossibleValuesParser {
     PROFILES.iter().map(|profile| profile.name).chain([ALL]).collect::<Vec<_>>().into()
 }
 
-const BANDWIDTHS: [Bandwidth; 3] =
-    [Bandwidth::Unlimited, Bandwidth::ZCU102_PEAK, Bandwidth::ZCU102_SUSTAINED];
+const BANDWIDTHS: [Bandwidth; 4] = [
+    Bandwidth::Unlimited,
+    Bandwidth::ZCU102_PEAK,
+    thesis::recorded::MEMORY_BANDWIDTH,
+    Bandwidth::ZCU102_SUSTAINED,
+];
 
 impl ModelArgs {
     fn scene(&self) -> Scene {

@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# Builds the static binary for the board by the README's two commands, and compares Bullet's vectors
+# with it as a Cortex-A53, under user-mode QEMU.
+#
+# usage: board-binary.sh
+#
+# Exit code: 0 done, 1 the build or a comparison failed, 77 skipped: not on this machine.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+cd "$repository"
+need_packages qemu-user-static file
+
+readonly target=aarch64-unknown-linux-musl
+command -v rustup >/dev/null || skip "needs rustup, which brings the standard library for $target"
+grep -qx "rustup target add $target" README.md || fail "README.md does not show how to add $target"
+attend timeout 300 rustup target add "$target" || skip "$target cannot be had here"
+build=$(sed -n "s/^\(cargo build --release --target $target\)$/\1/p" README.md | head -n 1)
+[ -n "$build" ] || fail "README.md does not show how to build for $target"
+# shellcheck disable=SC2086 # a command and its options
+attend timeout 1800 $build --locked
+binary=$target_root/$target/release/pgs
+file -b "$binary" | grep -q 'ARM aarch64.*statically linked' ||
+	fail "expected a static aarch64 binary in $binary"
+echo "$binary: $(stat -c %s "$binary") bytes"
+
+for folder in tests/golden/*/ ${PGS_VECTORS:+"$PGS_VECTORS"/*/}; do
+	[ -e "$folder/params.npy" ] || continue
+	attend timeout 600 qemu-aarch64-static -cpu cortex-a53 "$binary" \
+		solve "$folder" --compare --board emulated >/dev/null || fail "$folder: not Bullet's bits"
+	echo "Bullet's bits as a Cortex-A53: $(basename "$folder")"
+done
