@@ -85,7 +85,10 @@ fn percent(share: &Value) -> String {
 fn the_readmes_table_of_bitstreams_holds_what_its_commands_measure() {
     let readme = readme();
     let words = readme.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("`pgs compare float half --grid 12x10x12 --drop 5 --steps 120`"), "the command");
+    assert!(
+        words.contains("`pgs compare float half --grid 12x10x12 --drop 5 --steps 120`"),
+        "the command"
+    );
     assert!(words.contains("ends with seven times the kinetic energy"), "what it ends with");
     let last = |profile: &str| {
         let command = format!("compare float {profile} --grid 12x10x12 --drop 5 --steps 120");

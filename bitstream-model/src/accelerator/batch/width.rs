@@ -4,6 +4,8 @@ use super::lanes::{Lanes, Portable, Work};
 
 #[cfg(target_arch = "x86_64")]
 use super::lanes::Avx2;
+#[cfg(all(target_arch = "x86_64", avx512))]
+use super::lanes::Avx512;
 #[cfg(target_arch = "aarch64")]
 use super::lanes::Neon;
 
@@ -15,6 +17,8 @@ pub(super) enum Width {
     Portable(Portable),
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
+    #[cfg(all(target_arch = "x86_64", avx512))]
+    Avx512(Avx512),
     #[cfg(target_arch = "aarch64")]
     Neon(Neon),
 }
@@ -22,7 +26,9 @@ pub(super) enum Width {
 impl Width {
     /// All that the processor has, the widest first.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", avx512))]
+        let own = [Avx512::found().map(Self::Avx512), Avx2::found().map(Self::Avx2)];
+        #[cfg(all(target_arch = "x86_64", not(avx512)))]
         let own = [Avx2::found().map(Self::Avx2)];
         #[cfg(target_arch = "aarch64")]
         let own = [Some(Self::Neon(Neon))];
@@ -44,6 +50,8 @@ impl Width {
             Self::Portable(lanes) => lanes.run(work),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(lanes) => lanes.run(work),
+            #[cfg(all(target_arch = "x86_64", avx512))]
+            Self::Avx512(lanes) => lanes.run(work),
             #[cfg(target_arch = "aarch64")]
             Self::Neon(lanes) => lanes.run(work),
         }
