@@ -2,12 +2,14 @@
 //!
 //! Whole system calls, no mapping: nothing here can be changed under a reference.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions};
 use std::io;
 use std::ops::Range;
 use std::os::unix::fs::{FileExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 
+use nix::errno::Errno;
+use nix::fcntl::{Flock, FlockArg};
 use thiserror::Error;
 
 use crate::interface::record::Beat;
@@ -105,13 +107,13 @@ impl MemoryFile {
             .open(path)
             .map_err(failed("opened"))?;
         // Only to see that nobody has it: a driver holds the lock as long as it has the board.
-        match file.try_lock() {
-            Ok(()) => file.unlock().map_err(failed("unlocked"))?,
-            Err(TryLockError::WouldBlock) => {
+        let file = match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
+            Ok(locked) => locked.unlock().map_err(|(_, errno)| failed("unlocked")(errno.into()))?,
+            Err((_, Errno::EWOULDBLOCK)) => {
                 return Err(MemoryFileError::Busy { path: path_buf() });
             }
-            Err(TryLockError::Error(source)) => return Err(failed("locked")(source)),
-        }
+            Err((_, errno)) => return Err(failed("locked")(errno.into())),
+        };
         let metadata = file.metadata().map_err(failed("measured"))?;
         let bytes = match metadata.len() {
             0 => {
