@@ -1,20 +1,21 @@
 //! This file lets a benchmark pack and unpack without a board: feature `bench`.
 
-use bitstream_model::interface::address_map::DMA_COUNT_MAX;
-use bitstream_model::interface::profile::Variant;
-use bitstream_model::interface::record::{BEAT_BYTES, Beat};
+use pgs_interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::profile::Variant;
+use pgs_interface::record::{BEAT_BYTES, Beat};
 
 use crate::beat::bare;
-use crate::beat::bodies::{pack_bodies, survey};
-use crate::beat::collisions::{Entries, pack_collisions};
-use crate::beat::ranges::Packers;
+use crate::beat::pack::bodies::{pack_bodies, survey};
+use crate::beat::pack::collisions::{Entries, pack_collisions};
+use crate::beat::pack::pool::Packers;
+use crate::beat::pack::target::Target;
 use crate::beat::stripe::Segment;
-use crate::beat::target::Target;
-use crate::record::end::{Survey, Table};
+use crate::record::body_table::{Survey, Table};
 use crate::record::result::Record;
-use crate::scene::validate::{Limits, Quick, preflight};
-use crate::scene::{Bodies, Collisions, InputError, Shape, StepParameters};
+use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 use crate::step::{Results, commit};
+use crate::validate::InputError;
+use crate::validate::{Limits, Quick, preflight};
 
 /// Packs collisions as a step does, into memory of its own instead of a board's.
 #[derive(Debug)]
@@ -272,8 +273,8 @@ fn channels<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile::FLOAT;
     use crate::scene::{Body, Collision, Contact, Pose, Velocity};
+    use pgs_interface::profile::FLOAT;
 
     #[test]
     fn every_collision_is_packed() {

@@ -2,11 +2,11 @@
 
 use thiserror::Error;
 
-use crate::accelerator::{ControlError, IdentityError};
 use crate::axi_dma::DmaError;
+use crate::control_block::{ControlError, IdentityError};
+use crate::fault::{Diagnosis, Fault};
 use crate::platform::PlatformError;
-use crate::scene::InputError;
-use crate::step::{Diagnosis, Fault};
+use crate::validate::InputError;
 
 /// Why a call failed. The cause is the [`source`](std::error::Error::source).
 #[derive(Debug, Error)]

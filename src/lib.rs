@@ -153,40 +153,47 @@
 //! [`StepParameters::retries`] goes on by itself. [`Error::fault`] is the cause, and
 //! [`Error::diagnosis`] how every channel stood before the board was reset.
 
-mod accelerator;
 mod axi_dma;
 mod beat;
 #[cfg(feature = "bench")]
 pub mod bench;
+mod board;
 mod check;
+mod control_block;
 mod error;
+mod fault;
 pub mod order;
 pub mod platform;
 mod record;
 pub mod scene;
+mod simd;
 mod step;
+mod validate;
 
-pub use accelerator::{Capabilities, ControlError, IdentityError, Saturated};
 pub use axi_dma::{
     ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
 };
-pub use beat::writer::Writer;
-pub use bitstream_model::interface;
+pub use beat::pack::writer::Writer;
+pub use board::{BoardChoice, BoardDescription, BoardKind, Cancellation, OpenOptions};
 pub use check::{CheckLine, CheckReport, Outcome, check};
+pub use control_block::{Capabilities, ControlError, IdentityError, Saturated};
 pub use error::{Aftermath, Error, OpenError};
+pub use fault::{
+    AcceleratorError, Awaited, ChannelState, ControlState, Diagnosis, Fault, Phase, Subject,
+};
+pub use pgs_interface as interface;
 pub use platform::{
     AccessKind, Caching, DevMemWindows, ManagerChoice, MemoryChoice, PlatformError, RegisterAccess,
     UIO_CLASS, UioMap, UioNode, uio_nodes,
 };
 pub use scene::{
-    Bodies, Body, BodyArrays, CONTACT_POINTS, Carriers, Collision, CollisionArrays, Collisions,
-    Contact, InputError, Pose, Shape, StepParameters, Structures, Velocity,
+    Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
+    Pose, Shape, StepParameters, Structures, Velocity,
 };
 pub use step::{
-    Accelerator, AcceleratorError, Awaited, BoardChoice, BoardDescription, BoardKind, Cancellation,
-    ChannelState, ControlState, Diagnosis, Fault, HostTimes, InFlight, Limit, OpenOptions,
-    OrderChoice, Phase, Prepared, StepCycles, StepReport, Subject,
+    Accelerator, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles, StepReport,
 };
+pub use validate::{Carriers, InputError};
 
 /// The README's library example is a test.
 #[cfg(all(doctest, feature = "emulation"))]

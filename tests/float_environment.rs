@@ -13,7 +13,7 @@ use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, PROFILES, Profile};
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use common::bits;
-use crew::float_env::foreign::{Environment, environments, under};
+use pgs_support::float_env::foreign::{Environment, environments, under};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderInput, Orderer};
 use zynq_pgs::{

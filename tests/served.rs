@@ -13,11 +13,11 @@ use std::time::Duration;
 
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::interface::profile::Profile;
-use bitstream_model::remote::message::{ANSWER_BYTES, Answer, Request, Status, VERSION};
 use bitstream_model::remote::{
     Ended, MemoryFile, MemoryFileError, ServeError, Server, Stopper, Visit,
 };
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault, FaultKind};
+use pgs_interface::message::{ANSWER_BYTES, Answer, Request, Status, VERSION};
 use zynq_pgs::{
     Accelerator, BoardChoice, BoardKind, Body, Collision, Contact, Error, MemoryChoice, OpenError,
     OpenOptions, PlatformError, Pose, Shape, StepParameters, StepReport, Velocity,
@@ -259,7 +259,7 @@ impl Relay {
             let mut board = UnixStream::connect(board).expect("a board");
             let ends = [&driver, &board].map(|end| end.try_clone().expect("cloned"));
             tell.send(ends).expect("the test waits");
-            let mut request = [0; bitstream_model::remote::message::REQUEST_BYTES];
+            let mut request = [0; pgs_interface::message::REQUEST_BYTES];
             let mut number = 0;
             while driver.read_exact(&mut request).is_ok() {
                 let mut answer = vec![0; ANSWER_BYTES];

@@ -8,16 +8,16 @@ use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 
 use crate::axi_dma::PacketCount;
+use crate::board::violation::{RegisterAccess, Violation};
 use crate::board::{Board, Counts};
 use crate::config::{BoardConfig, ConfigError};
 use crate::fault::FaultPlan;
-use crate::interface::record::Beat;
+use crate::memory::external::DeviceMemory;
 use crate::memory::{DeviceAccess, Memory, MemoryError};
-use crate::outside::DeviceMemory;
-use crate::violation::{RegisterAccess, Violation};
+use pgs_interface::record::Beat;
 
 /// Does something with a board: the one door to it.
 fn enter<R>(board: &Mutex<Board>, act: impl FnOnce(&mut Board) -> R) -> R {

@@ -1,63 +1,30 @@
-//! The interface of the zynq-pgs accelerator, and a software-emulated board that implements it.
+//! A software-emulated board with the zynq-pgs accelerator.
 //!
-//! [`interface`] is the contract with a bitstream. Everything else, behind the feature
-//! `emulation`, is a board that sees register accesses, physical memory and interrupts and nothing
-//! of the driver.
+//! The board sees register accesses, physical memory and interrupts, and nothing of the driver. It
+//! follows the contract of [`interface`], as a bitstream does.
 
-pub mod interface;
-
-#[cfg(feature = "emulation")]
 mod accelerator;
-#[cfg(feature = "emulation")]
 mod axi_dma;
-#[cfg(feature = "emulation")]
 mod board;
-#[cfg(feature = "emulation")]
-mod body_pace;
-#[cfg(feature = "emulation")]
-mod bus;
-#[cfg(feature = "emulation")]
 mod cast;
-#[cfg(feature = "emulation")]
 mod config;
-#[cfg(feature = "emulation")]
+pub mod estimate;
 mod fault;
-#[cfg(feature = "emulation")]
 mod handle;
-#[cfg(feature = "emulation")]
-mod interrupt;
-#[cfg(feature = "emulation")]
 mod memory;
-#[cfg(feature = "emulation")]
-mod outside;
-#[cfg(feature = "emulation")]
-mod pace;
-#[cfg(feature = "emulation")]
-mod quirks;
-#[cfg(feature = "emulation")]
-mod recurrence;
-#[cfg(all(feature = "emulation", unix))]
+#[cfg(unix)]
 pub mod remote;
-#[cfg(feature = "emulation")]
-mod span;
-#[cfg(feature = "emulation")]
-mod stream;
-#[cfg(feature = "emulation")]
-mod stretch;
-#[cfg(feature = "emulation")]
-pub mod timing;
-#[cfg(feature = "emulation")]
-mod violation;
+mod shortcut;
 
-#[cfg(feature = "emulation")]
+pub use pgs_interface as interface;
 pub use {
     axi_dma::{Direction, PacketCount},
     board::Counts,
+    board::violation::{RegisterAccess, Violation, ViolationKind},
+    config::quirks::{Coherency, InterruptWiring, Quirks, Resettable},
     config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, Subnormals, THREADS_MAX},
     fault::{Consequence, Fault, FaultError, FaultKind, FaultPlan, Place, StepPhase, When},
     handle::{CpuPort, EmulatedBoard},
+    memory::external::DeviceMemory,
     memory::{Denied, DeviceAccess, MemoryError},
-    outside::DeviceMemory,
-    quirks::{Coherency, InterruptWiring, Quirks, Resettable},
-    violation::{RegisterAccess, Violation, ViolationKind},
 };

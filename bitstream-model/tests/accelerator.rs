@@ -2,13 +2,13 @@
 
 mod common;
 
-use bitstream_model::interface::axi_dma::dmasr;
-use bitstream_model::interface::control::{self, ErrorCode, ap_ctrl, irq};
-use bitstream_model::interface::profile::FLOAT;
-use bitstream_model::interface::record::Beat;
-use bitstream_model::interface::register::Register;
-use bitstream_model::timing::{Records, StepCycles, StepTime};
+use bitstream_model::estimate::{Records, StepCycles, StepTime};
 use bitstream_model::{Bandwidth, BoardConfig, Direction, Hazards, Subnormals, ViolationKind};
+use pgs_interface::axi_dma::dmasr;
+use pgs_interface::control::{self, ErrorCode, ap_ctrl, irq};
+use pgs_interface::profile::FLOAT;
+use pgs_interface::record::Beat;
+use pgs_interface::register::Register;
 
 use common::ring::{EOF, SOF};
 use common::scene::{

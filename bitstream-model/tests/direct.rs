@@ -4,12 +4,10 @@ mod common;
 
 use std::time::Duration;
 
-use bitstream_model::interface::axi_dma::{
-    ADDRESS, ADDRESS_MSB, DMACR, DMASR, LENGTH, dmacr, dmasr,
-};
-use bitstream_model::interface::control::{self, ap_ctrl};
-use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use bitstream_model::{BoardConfig, Denied, Direction, ViolationKind};
+use pgs_interface::axi_dma::{ADDRESS, ADDRESS_MSB, DMACR, DMASR, LENGTH, dmacr, dmasr};
+use pgs_interface::control::{self, ap_ctrl};
+use pgs_interface::record::{BEAT_BYTES, Beat};
 
 use common::ring::halves;
 use common::scene::{Body, Step, bits, unpack};

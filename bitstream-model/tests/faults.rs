@@ -3,10 +3,10 @@
 
 mod common;
 
-use bitstream_model::interface::axi_dma::{DMACR, dmacr, dmasr};
-use bitstream_model::interface::control::{self, ErrorCode};
-use bitstream_model::interface::profile::WINDOWED;
 use bitstream_model::{BoardConfig, Direction, Fault, FaultKind, FaultPlan, StepPhase, When};
+use pgs_interface::axi_dma::{DMACR, dmacr, dmasr};
+use pgs_interface::control::{self, ErrorCode};
+use pgs_interface::profile::WINDOWED;
 
 use common::scene::{Step, bits};
 use common::sg::{Failure, Machine};

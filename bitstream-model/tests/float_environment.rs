@@ -5,9 +5,9 @@
 mod common;
 
 use bitstream_model::BoardConfig;
-use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{HALF, Inertia, PROFILES, Profile};
-use crew::float_env::foreign::{Environment, environments, under};
+use pgs_interface::number::{Numbers, StreamFormat};
+use pgs_interface::profile::{HALF, Inertia, PROFILES, Profile};
+use pgs_support::float_env::foreign::{Environment, environments, under};
 
 use common::replaying::{Visible, scene, visible};
 use common::scene::{AT_REST, Body, Step};

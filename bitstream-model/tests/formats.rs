@@ -4,10 +4,10 @@
 
 mod common;
 
-use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
-use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Subnormals};
 use half::f16;
+use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile};
 use proptest::prelude::*;
 
 use common::packing::{decode, encode};

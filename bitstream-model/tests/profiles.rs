@@ -4,15 +4,15 @@
 
 mod common;
 
-use bitstream_model::interface::control::{self, ErrorCode};
-use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
-use bitstream_model::interface::profile::{
+use bitstream_model::estimate::{Records, StepCycles};
+use bitstream_model::{Bandwidth, BoardConfig, Delays, EmulatedBoard, Hazards};
+use pgs_interface::control::{self, ErrorCode};
+use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::profile::{
     FLOAT, Flow, HALF, Inertia, MIXED, NAIVE, OnChipMemory, PROFILES, Profile, Variant,
 };
-use bitstream_model::interface::record::Beat;
-use bitstream_model::interface::stripe::Stripe;
-use bitstream_model::timing::{Records, StepCycles};
-use bitstream_model::{Bandwidth, BoardConfig, Delays, EmulatedBoard, Hazards};
+use pgs_interface::record::Beat;
+use pgs_interface::stripe::Stripe;
 
 use common::packing::{Row, beats, result_beats};
 use common::scene::{AT_REST, Body, Collision, STATIC, Step, bits, ground_contact};

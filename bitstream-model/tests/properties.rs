@@ -3,15 +3,15 @@
 
 mod common;
 
-use bitstream_model::interface::address_map::{CONTROL_BASE, dma_base};
-use bitstream_model::interface::axi_dma::{ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, DMACR, LENGTH};
-use bitstream_model::interface::control::{self, ap_ctrl};
-use bitstream_model::interface::descriptor::WORDS;
-use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{Flow, HALF, Inertia, PROFILES, Profile, Variant};
 use bitstream_model::{
     Bandwidth, BoardConfig, Delays, Direction, EmulatedBoard, Hazards, Subnormals,
 };
+use pgs_interface::address_map::{CONTROL_BASE, dma_base};
+use pgs_interface::axi_dma::{ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, DMACR, LENGTH};
+use pgs_interface::control::{self, ap_ctrl};
+use pgs_interface::descriptor::WORDS;
+use pgs_interface::number::{Numbers, StreamFormat};
+use pgs_interface::profile::{Flow, HALF, Inertia, PROFILES, Profile, Variant};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;

@@ -4,12 +4,12 @@ mod common;
 
 use std::time::Duration;
 
-use bitstream_model::interface::axi_dma::{DMACR, LENGTH, dmacr};
-use bitstream_model::interface::control::{
-    AP_CTRL, CLOCK_KHZ, DMA, GIE, IDENTIFICATION, IER, ISR, RESET, VERSION,
-};
 use bitstream_model::{BoardConfig, InterruptWiring, Quirks, Resettable};
 use common::{BOTH, CORES, Host};
+use pgs_interface::axi_dma::{DMACR, LENGTH, dmacr};
+use pgs_interface::control::{
+    AP_CTRL, CLOCK_KHZ, DMA, GIE, IDENTIFICATION, IER, ISR, RESET, VERSION,
+};
 
 fn built_with(quirks: Quirks) -> Host {
     Host::new(BoardConfig { quirks, ..BoardConfig::default() })

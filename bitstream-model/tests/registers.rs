@@ -2,14 +2,14 @@
 
 mod common;
 
-use bitstream_model::interface::address_map::{CONTROL_BASE, dma_base};
-use bitstream_model::interface::axi_dma::{
+use bitstream_model::{BoardConfig, Direction, ViolationKind};
+use pgs_interface::address_map::{CONTROL_BASE, dma_base};
+use pgs_interface::axi_dma::{
     ADDRESS, ADDRESS_MSB, CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, TAILDESC, TAILDESC_MSB,
     dmacr, dmasr,
 };
-use bitstream_model::interface::control;
-use bitstream_model::interface::descriptor::status;
-use bitstream_model::{BoardConfig, Direction, ViolationKind};
+use pgs_interface::control;
+use pgs_interface::descriptor::status;
 
 use common::ring::{Ring, WHOLE, halves};
 use common::{BOTH, CORES, Host, numbered};

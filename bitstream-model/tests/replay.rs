@@ -3,9 +3,9 @@
 
 mod common;
 
-use bitstream_model::interface::control;
-use bitstream_model::interface::profile::{FLOAT, HALF, MIXED};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
+use pgs_interface::control;
+use pgs_interface::profile::{FLOAT, HALF, MIXED};
 use proptest::prelude::*;
 
 use common::replaying::{OTHERS, begin, begin_once, below, same, scene, with_gaps};

@@ -3,11 +3,11 @@
 
 mod common;
 
-use bitstream_model::interface::control;
-use bitstream_model::interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
-use bitstream_model::interface::record::Beat;
 use bitstream_model::{BoardConfig, DeviceAccess, Direction, FaultPlan};
 use half::f16;
+use pgs_interface::control;
+use pgs_interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
+use pgs_interface::record::Beat;
 
 use common::packing::result_beats;
 use common::replaying::{PROFILES, Seen, begin, begin_once, large, same, scene, whole_length};

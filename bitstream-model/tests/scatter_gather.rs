@@ -2,10 +2,10 @@
 
 mod common;
 
-use bitstream_model::interface::axi_dma::{CURDESC, CURDESC_MSB, DMACR, DMASR, dmacr, dmasr};
-use bitstream_model::interface::descriptor::{CONTROL, STATUS, status};
-use bitstream_model::interface::record::Beat;
 use bitstream_model::{BoardConfig, Denied, DeviceAccess, Direction, ViolationKind};
+use pgs_interface::axi_dma::{CURDESC, CURDESC_MSB, DMACR, DMASR, dmacr, dmasr};
+use pgs_interface::descriptor::{CONTROL, STATUS, status};
+use pgs_interface::record::Beat;
 
 use common::ring::{EOF, Ring, SOF, WHOLE, halves};
 use common::scene::{Body, Step, bits};

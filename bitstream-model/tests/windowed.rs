@@ -3,14 +3,12 @@
 
 mod common;
 
-use bitstream_model::interface::control::{self, ErrorCode};
-use bitstream_model::interface::descriptor::status;
-use bitstream_model::interface::profile::{
-    Flow, Geometry, Inertia, Profile, WINDOWED, WINDOWED16, Window,
-};
-use bitstream_model::interface::record::{BEAT_BYTES, Beat, live};
-use bitstream_model::interface::stripe::Stripe;
 use bitstream_model::{Bandwidth, BoardConfig, Delays, EmulatedBoard, Hazards, Subnormals};
+use pgs_interface::control::{self, ErrorCode};
+use pgs_interface::descriptor::status;
+use pgs_interface::profile::{Flow, Geometry, Inertia, Profile, WINDOWED, WINDOWED16, Window};
+use pgs_interface::record::{BEAT_BYTES, Beat, live};
+use pgs_interface::stripe::Stripe;
 use proptest::prelude::*;
 
 use common::clock::{Clock, Counted};

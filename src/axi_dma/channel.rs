@@ -3,10 +3,10 @@
 use std::fmt;
 use std::sync::Arc;
 
-use bitstream_model::interface::axi_dma::{
+use pgs_interface::axi_dma::{
     CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, S2MM_OFFSET, TAILDESC, TAILDESC_MSB,
 };
-use bitstream_model::interface::register::Register;
+use pgs_interface::register::Register;
 
 use super::{ChannelName, DmaError, Dmacr, Dmasr, STATE_CHANGE};
 use crate::platform::{BusAddress, Deadline, Platform, Window, poll_until};
@@ -44,7 +44,7 @@ pub(crate) struct Channel {
     window: Arc<Window>,
     name: ChannelName,
     address_width: u32,
-    control: Dmacr,
+    pub(crate) control: Dmacr,
 }
 
 impl Channel {

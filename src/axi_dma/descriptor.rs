@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use bitstream_model::interface::descriptor::{self, control, status};
+use pgs_interface::descriptor::{self, control, status};
 
 use crate::platform::BusAddress;
 

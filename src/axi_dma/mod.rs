@@ -3,11 +3,11 @@
 mod channel;
 mod descriptor;
 // QEMU is started by the test itself, which as a Cortex-A53 would run under QEMU already.
-#[cfg(all(test, target_arch = "x86_64"))]
-mod qtest;
 mod registers;
 mod reset;
 mod ring;
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests;
 
 use std::fmt;
 use std::time::Duration;

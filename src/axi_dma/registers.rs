@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use bitstream_model::interface::axi_dma::{DMACR, DMASR, dmacr, dmasr};
+use pgs_interface::axi_dma::{DMACR, DMASR, dmacr, dmasr};
 
 use crate::platform::fields;
 

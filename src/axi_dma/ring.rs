@@ -12,9 +12,7 @@
 
 use std::sync::Arc;
 
-use bitstream_model::interface::descriptor::{
-    CONTROL, NXTDESC, NXTDESC_MSB, STATUS, WORDS, control,
-};
+use pgs_interface::descriptor::{CONTROL, NXTDESC, NXTDESC_MSB, STATUS, WORDS, control};
 
 use super::Direction;
 use super::descriptor::{Descriptor, DescriptorStatus};

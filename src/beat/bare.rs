@@ -1,20 +1,21 @@
 //! This file deals collisions out without making records of them: feature `bench`.
 //!
 //! Every word of each is read, and as many bytes as its record has go to the channels, through the loops of
-//! [units](super::unit); no body is looked up, nothing is masked, converted or looked at. About that is the
+//! [units](super::pack::unrolled); no body is looked up, nothing is masked, converted or looked at. About that is the
 //! least that packing can take.
 
-use bitstream_model::interface::profile::{Geometry, Variant};
-use bitstream_model::interface::record::{Beat, LANES, collision, relative};
+use pgs_interface::profile::{Geometry, Variant};
+use pgs_interface::record::{Beat, LANES, collision, relative};
 
-use super::collision_records::each;
 use super::format::{Join, Records};
-use super::pattern::Pattern;
+use super::pack::encode::each;
+use super::pack::pattern::Pattern;
+use super::pack::source::{InArray, InOrder, Lying, Next};
+use super::pack::unrolled;
 use super::stripe::Segment;
-use super::unit;
-use crate::platform::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::record::{Record, Row, Rows};
-use crate::scene::{Collision, Collisions, InArray, InOrder, Lying, Next, Structures};
+use crate::scene::{Collision, Collisions, Structures};
+use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
 
 /// Deals out all collisions but those at the end that fill no unit; how many were dealt out. None are of a
 /// stripe that no profile has, or where they do not lie as structures.
@@ -76,7 +77,7 @@ impl<'p, L: Lying<'p>> Work for Dealing<'_, '_, L> {
         let (records, sum) = (&mut AsTheyLie(collisions), &mut Lanes::all(0));
         macro_rules! written {
             ($join:ty, $rows:expr) => {
-                unit::write::<V, $join, _, { $rows }>(pattern, vectors, records, rest, sum)
+                unrolled::write::<V, $join, _, { $rows }>(pattern, vectors, records, rest, sum)
             };
         }
         match (geometry, per_beat) {
@@ -148,8 +149,8 @@ fn rows<const ROWS: usize>(collision: &Collision) -> [Lanes; ROWS] {
 
 #[cfg(test)]
 mod tests {
-    use bitstream_model::interface::address_map::DMA_COUNT_MAX;
-    use bitstream_model::interface::profile::PROFILES;
+    use pgs_interface::address_map::DMA_COUNT_MAX;
+    use pgs_interface::profile::PROFILES;
 
     use super::*;
     use crate::order::{Ordered, Schedule};

@@ -2,20 +2,20 @@
 
 use std::marker::PhantomData;
 
-use bitstream_model::interface::record::Beat;
-use crew::chunks::Chunks;
+use pgs_interface::record::Beat;
+use pgs_support::chunks::Chunks;
 
-use crate::platform::{Lanes, Vectors};
-use crate::record::end::{Ends, Lookup, LowEnds};
+use crate::record::body_table::{Ends, Lookup, LowEnds};
 use crate::record::sixteen::Sixteen;
 use crate::record::{Row, Rows};
+use crate::simd::{Lanes, Vectors};
 
 /// Records on their way.
 ///
 /// `some` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation. A loop has
 /// a copy of its own, which no pointer leads to: it lies in registers. Whoever takes such a copy puts it back:
 /// what was seen of the records on their way is in it.
-pub(super) trait Records<const ROWS: usize>: Copy {
+pub(crate) trait Records<const ROWS: usize>: Copy {
     /// How many there are.
     fn len(&self) -> usize;
 
@@ -28,7 +28,7 @@ pub(super) trait Records<const ROWS: usize>: Copy {
 }
 
 /// What beats are made of rows.
-pub(super) trait Join {
+pub(crate) trait Join {
     /// Rows of a beat.
     const PER_BEAT: usize;
 
@@ -37,7 +37,7 @@ pub(super) trait Join {
 }
 
 /// What rows become in a stream.
-pub(super) trait Format: Join {
+pub(crate) trait Format: Join {
     /// What its words are, if they have sixteen bits.
     const SIXTEEN: Option<Sixteen>;
 
@@ -51,7 +51,7 @@ pub(super) trait Format: Join {
 /// Rows of which beats are made.
 ///
 /// All of it is a part of the loop that gives them: no row goes through memory.
-pub(super) struct Beats<V, F> {
+pub(crate) struct Beats<V, F> {
     vectors: V,
     format: PhantomData<F>,
     /// That which fills no beat alone.
@@ -61,13 +61,13 @@ pub(super) struct Beats<V, F> {
 
 impl<V: Vectors, F: Join> Beats<V, F> {
     #[inline(always)]
-    pub(super) fn new(vectors: V) -> Self {
+    pub(crate) fn new(vectors: V) -> Self {
         Self { vectors, format: PhantomData, waiting: Row::zero(), half: false }
     }
 
     /// The beat that is full with one more.
     #[inline(always)]
-    pub(super) fn with(&mut self, row: Row) -> Option<Beat> {
+    pub(crate) fn with(&mut self, row: Row) -> Option<Beat> {
         const { assert!(F::PER_BEAT <= 2, "one waits at most") };
         if const { F::PER_BEAT == 1 } {
             return Some(F::beat(self.vectors, [row, Row::zero()]));
@@ -82,7 +82,7 @@ impl<V: Vectors, F: Join> Beats<V, F> {
 
     /// The last one, if it is not full; zeros are beside its row.
     #[inline(always)]
-    pub(super) fn last(self) -> Option<Beat> {
+    pub(crate) fn last(self) -> Option<Beat> {
         self.half.then(|| F::beat(self.vectors, [self.waiting, Row::zero()]))
     }
 }
@@ -107,10 +107,10 @@ macro_rules! in_format {
         }
     };
 }
-pub(super) use in_format;
+pub(crate) use in_format;
 
 /// Words of f32.
-pub(super) struct Whole;
+pub(crate) struct Whole;
 
 impl Join for Whole {
     const PER_BEAT: usize = 1;
@@ -137,10 +137,10 @@ impl Format for Whole {
 }
 
 /// Words of binary16.
-pub(super) struct Binary16;
+pub(crate) struct Binary16;
 
 /// Words of the thesis' sixteen bits.
-pub(super) struct Thesis16;
+pub(crate) struct Thesis16;
 
 /// A format of two rows a beat.
 macro_rules! sixteen {

@@ -23,10 +23,10 @@
 //!
 //! Source: interface specification, streams.
 
-use bitstream_model::interface::number::StreamFormat;
-use bitstream_model::interface::profile::Variant;
-use bitstream_model::interface::record::{LANES, pose, result};
-use bitstream_model::interface::stripe::Stripe;
+use pgs_interface::number::StreamFormat;
+use pgs_interface::profile::Variant;
+use pgs_interface::record::{LANES, pose, result};
+use pgs_interface::stripe::Stripe;
 
 /// What a segment of beats carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,14 +154,14 @@ impl Deal {
 }
 
 // A row of f32 is a beat.
-const _: () = assert!(LANES * 4 == bitstream_model::interface::record::BEAT_BYTES);
+const _: () = assert!(LANES * 4 == pgs_interface::record::BEAT_BYTES);
 
 #[cfg(test)]
 mod tests {
     use super::Segment::{Collisions, Poses, Results, Velocities};
     use super::*;
-    use bitstream_model::interface::address_map::DMA_COUNT_MAX;
-    use bitstream_model::interface::profile::{
+    use pgs_interface::address_map::DMA_COUNT_MAX;
+    use pgs_interface::profile::{
         FLOAT, Flow, Geometry, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile,
     };
     use proptest::prelude::*;

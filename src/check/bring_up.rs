@@ -2,17 +2,18 @@
 
 use std::sync::Arc;
 
-use bitstream_model::interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
-use bitstream_model::interface::control::{IDENTIFICATION_VALUE, VERSION, VERSION_MAJOR, version};
-use bitstream_model::interface::number::StreamFormat;
-use bitstream_model::interface::profile::{Inertia, Variant};
+use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+use pgs_interface::control::{IDENTIFICATION_VALUE, VERSION, VERSION_MAJOR, version};
+use pgs_interface::number::StreamFormat;
+use pgs_interface::profile::{Inertia, Variant};
 
 use super::report::{Line, Lines, Outcome};
-use crate::accelerator::{Capabilities, Control, ControlError, IdentityError, identify};
 use crate::axi_dma::{DmaError, STATE_CHANGE};
+use crate::board::{Core, Device, Found, check_given_width, connect, drain_interrupt};
+use crate::control_block::{Capabilities, Control, ControlError, IdentityError, identify};
 use crate::error::OpenError;
 use crate::platform::{AccessCounts, RegisterMap, Window};
-use crate::step::{Accelerator, Core, Device, Found, check_given_width, connect, drain_interrupt};
+use crate::step::Accelerator;
 
 const SAME_DRIVER: &str = "use the driver that belongs to the bitstream";
 const CLOCK: &str = "load the bitstream, and look whether the clock of the PL runs";
@@ -294,9 +295,9 @@ pub(super) fn chain(error: &dyn std::error::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accelerator::fake;
-    use crate::interface::profile::{FLOAT, HALF};
+    use crate::control_block::fake;
     use crate::platform::fake::FakeRegisters;
+    use pgs_interface::profile::{FLOAT, HALF};
 
     #[test]
     fn capabilities_that_contradict_each_other_are_named() {

@@ -3,8 +3,8 @@
 
 use std::fmt;
 
-use bitstream_model::interface::profile::Variant;
-use bitstream_model::interface::record::{BEAT_BYTES, Beat};
+use pgs_interface::profile::Variant;
+use pgs_interface::record::{BEAT_BYTES, Beat};
 
 use super::pattern::Pattern;
 use crate::axi_dma::Direction;
@@ -169,7 +169,7 @@ fn elsewhere(run: &Run<'_>, found: Beat) -> Origin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile::FLOAT;
+    use pgs_interface::profile::FLOAT;
 
     const BODIES: u32 = 9;
 

@@ -17,10 +17,11 @@ mod streams;
 
 pub use report::{CheckLine, CheckReport, Outcome};
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 
+use crate::board::{Found, OpenOptions};
 use crate::error::Error;
-use crate::step::{Found, OpenOptions, find};
+use crate::step::find;
 use report::Lines;
 
 /// Tests a board from its identification to its interrupt. Every wait is bounded: it takes well

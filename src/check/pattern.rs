@@ -5,10 +5,10 @@
 //! arithmetic for bodies has sixteen bits, that is sign, exponents of -14 to 15 and ten bits of
 //! mantissa, which are the same words in binary16 and in the thesis' format.
 
-use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
-use bitstream_model::interface::profile::Variant;
-use bitstream_model::interface::record::{Beat, LANES, WORD_LANE, result};
-use crew::chunks::Chunks;
+use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::profile::Variant;
+use pgs_interface::record::{Beat, LANES, WORD_LANE, result};
+use pgs_support::chunks::Chunks;
 
 use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
@@ -160,7 +160,7 @@ fn short_number(seed: u32, index: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile::{FLOAT, HALF, MIXED};
+    use pgs_interface::profile::{FLOAT, HALF, MIXED};
 
     fn of(variant: &Variant) -> (Pattern, usize) {
         (Pattern::of(variant), variant.profile.s2mm_widths.len())

@@ -1,6 +1,6 @@
 //! This file says what a self-test reports: one line for each thing tested, in a fixed order.
 
-use crate::step::BoardDescription;
+use crate::board::BoardDescription;
 
 /// What was tested, and how it went.
 #[derive(Debug, Clone, PartialEq, Eq)]

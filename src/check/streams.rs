@@ -2,16 +2,18 @@
 
 use std::time::Duration;
 
-use bitstream_model::interface::record::Beat;
+use pgs_interface::record::Beat;
 
 use super::bring_up::chain;
 use super::judge::{Difference, Origin, Run, judge};
 use super::pattern::{Pattern, SHAPES};
 use super::report::{Line, Lines, Outcome};
 use crate::axi_dma::Direction;
-use crate::beat::unpack::sum_of_words;
+use crate::beat::unpack::results::sum_of_words;
+use crate::board::BoardKind;
 use crate::error::Error;
-use crate::step::{Accelerator, BoardKind, ChannelState, ECHO_LIMIT, Echo, Echoed, Fault};
+use crate::fault::{ChannelState, Fault};
+use crate::step::{Accelerator, ECHO_LIMIT, Echo, Echoed};
 
 /// Bodies of the echoes: the least, odd numbers that leave channels of different lengths, and one
 /// that fills a length register of 14 bits more than once.

@@ -1,6 +1,6 @@
 //! This file says what an order is made from: pairs of bodies, which bodies move, where they are.
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 
 use super::OrderError;
 use crate::scene::{Bodies, Collisions, Shape};

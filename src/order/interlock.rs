@@ -8,7 +8,7 @@
 //! Source: interface specification, hazards.
 
 use super::OrderInput;
-use crate::accelerator::Capabilities;
+use crate::control_block::Capabilities;
 use crate::scene::StepParameters;
 
 /// A pipeline that waits on hazards, as the passes of one step use it.

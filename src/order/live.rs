@@ -24,8 +24,8 @@
 //!
 //! Source: interface specification, the windowed flow.
 
-use bitstream_model::interface::profile::Window;
-use bitstream_model::interface::record::live::{FIRST, LAST, PLACE};
+use pgs_interface::profile::Window;
+use pgs_interface::record::live::{FIRST, LAST, PLACE};
 
 use super::{OrderInput, Schedule};
 
@@ -345,7 +345,7 @@ mod tests {
         room: Room,
         /// Entries that each pass has issued.
         issued: Vec<usize>,
-        velocities: VecDeque<u32>,
+        pub(crate) velocities: VecDeque<u32>,
         places: Vec<Option<u32>>,
         results: Vec<u32>,
         /// Bodies of each entry, as they were found in their places.

@@ -1,6 +1,6 @@
 //! This file makes an order of the kind that is asked for.
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 
 use super::groups::Groups;
 use super::interlock::{Interlock, StallCounter};

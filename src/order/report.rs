@@ -1,6 +1,6 @@
 //! This file measures a schedule: hazards, lost updates, empty entries, bodies alive, spans.
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 
 use super::{IssueWindow, OrderError, OrderInput, Schedule};
 

@@ -1,9 +1,9 @@
 //! This file says how far apart the uses of a body must be, counted in issue slots.
 
-use bitstream_model::interface::profile::{Flow, Profile};
+use pgs_interface::profile::{Flow, Profile};
 
 use super::OrderError;
-use crate::accelerator::Capabilities;
+use crate::control_block::Capabilities;
 use crate::scene::StepParameters;
 
 /// Hazard window of a pipeline in issue slots, and how many collisions enter in one of them.
@@ -102,7 +102,7 @@ impl IssueWindow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile;
+    use pgs_interface::profile;
 
     #[test]
     fn a_window_without_slots_is_refused() {

@@ -31,75 +31,48 @@
 //! # }
 //! ```
 
-mod access_log;
-mod buffer;
-mod convert;
-mod copy;
-mod dev_mem;
-mod device_tree;
-#[cfg(feature = "emulation")]
-mod emulated;
+pub(crate) mod boards;
 mod error;
 mod fence;
-mod fpga;
-mod hardware;
-mod lanes;
-mod lock;
-mod mapped;
-mod memory;
+pub(crate) mod linux;
+pub(crate) mod memory;
 mod next_step;
-mod pool;
-mod prefetch;
-#[cfg(feature = "emulation")]
-mod remote;
-mod reserved;
-mod sync_mode;
-mod sysfs;
-mod system;
-mod u_dma_buf;
-mod uio;
-mod uio_device;
-mod uio_listing;
-mod uio_window;
-mod vectors;
+pub(crate) mod registers;
 mod wait;
-mod window;
 
 use std::fmt;
 use std::time::Duration;
 
-pub use access_log::{AccessKind, RegisterAccess};
-pub(crate) use buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
-pub(crate) use convert::Narrow;
-pub use dev_mem::DevMemWindows;
 #[cfg(feature = "emulation")]
-pub(crate) use emulated::EmulatedPlatform;
+pub(crate) use boards::emulated::EmulatedPlatform;
+pub use boards::hardware::MemoryChoice;
+pub(crate) use boards::hardware::{HardwarePlatform, RegisterChoice};
+#[cfg(feature = "emulation")]
+pub(crate) use boards::served::{RemotePlatform, memory_beside};
 pub use error::PlatformError;
 pub(crate) use fence::{acquire_from_device, release_to_device};
-pub use fpga::{
+pub use linux::dev_mem::DevMemWindows;
+pub use linux::fpga::{
     FpgaManager, ManagerChoice, ZYNQMP_MANAGER, find_manager, fpga_managers, require_bitstream,
 };
-pub use hardware::MemoryChoice;
-pub(crate) use hardware::{HardwarePlatform, RegisterChoice};
-pub(crate) use lanes::{Integer, Lanes};
-pub(crate) use memory::{DmaMemory, SharedMemory};
-pub(crate) use prefetch::{
-    fetch, later_with_those_behind, prefetch, soon_alone, soon_with_those_behind,
+pub use linux::system::{System, UIO_CLASS, try_device};
+pub use linux::uio::{NodePart, UioMap, UioNode};
+pub use linux::uio_device::UioDevice;
+pub use linux::uio_listing::{UioListing, UnreadableNode, uio_listing, uio_nodes};
+pub use linux::uio_window::UioWindow;
+pub(crate) use memory::buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
+pub use memory::reserved::ReservedMemory;
+pub use memory::u_dma_buf::{Caching, try_u_dma_buf, u_dma_buf_names};
+pub(crate) use memory::volatile::{DmaMemory, SharedMemory};
+pub use registers::access_log::{AccessKind, RegisterAccess};
+pub(crate) use registers::window::{
+    AccessCounts, Decoded, RegisterMap, RegisterWindow, Window, fields,
 };
-#[cfg(feature = "emulation")]
-pub(crate) use remote::{RemotePlatform, memory_beside};
-pub use reserved::ReservedMemory;
-pub use system::{System, UIO_CLASS, try_device};
-pub use u_dma_buf::{Caching, try_u_dma_buf, u_dma_buf_names};
-pub use uio::{NodePart, UioMap, UioNode};
-pub use uio_device::UioDevice;
-pub use uio_listing::{UioListing, UnreadableNode, uio_listing, uio_nodes};
-pub use uio_window::UioWindow;
-pub(crate) use vectors::{Vectors, Work, in_wide_vectors};
 pub(crate) use wait::{Deadline, poll_until};
-pub(crate) use window::{AccessCounts, Decoded, RegisterMap, RegisterWindow, Window, fields};
 #[cfg(test)]
-pub(crate) use {fpga::fake as fpga_fake, uio::fake as uio_fake, window::fake};
+pub(crate) use {
+    linux::fpga::fake as fpga_fake, linux::uio::fake as uio_fake, registers::window::fake,
+};
 
 /// What the device will do with a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -63,7 +63,7 @@ pub(crate) fn poll_until<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::platform::window::fake::FakePlatform;
+    use crate::platform::registers::window::fake::FakePlatform;
 
     #[test]
     fn a_wait_that_never_succeeds_ends_at_its_deadline() {

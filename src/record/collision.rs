@@ -2,11 +2,11 @@
 
 use std::mem::offset_of;
 
-use super::end::End;
+use super::body_table::End;
 use super::{Counted, NORMAL, Record, bodies, contact_rows, row_of, used};
-use crate::interface::record::{CONTACT_POINTS, WORD_LANE, collision};
-use crate::platform::{Integer, Lanes};
 use crate::scene::Collision;
+use crate::simd::{Integer, Lanes};
+use pgs_interface::record::{CONTACT_POINTS, WORD_LANE, collision};
 
 /// The collision record: normal and count, positions and indices of both bodies, contact points.
 ///
@@ -40,8 +40,8 @@ const _: () = assert!(offset_of!(Collision, count) == 4 * (NORMAL + WORD_LANE));
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::record::Beat;
     use crate::scene::Contact;
+    use pgs_interface::record::Beat;
 
     #[test]
     fn a_collision_record_is_these_bytes() {

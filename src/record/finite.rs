@@ -1,8 +1,8 @@
 //! This file finds out on the way whether all numbers of results are finite.
 
 use super::result::Record;
-use crate::interface::record::{Beat, LANES, WORD_LANE, result};
-use crate::platform::Lanes;
+use crate::simd::Lanes;
+use pgs_interface::record::{Beat, LANES, WORD_LANE, result};
 
 /// What has been seen of results.
 ///

@@ -1,7 +1,7 @@
 //! This file finds out at once whether all numbers of a record are within their limits.
 
-use crate::interface::record::{Beat, LANES, WORD_LANE};
-use crate::platform::Lanes;
+use crate::simd::Lanes;
+use pgs_interface::record::{Beat, LANES, WORD_LANE};
 
 /// An f32 without its sign; as a limit, any word at all.
 pub(crate) const MAGNITUDE: u32 = u32::MAX >> 1;

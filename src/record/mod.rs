@@ -2,11 +2,11 @@
 //!
 //! One file a record kind makes rows of 32-bit words, each of which is a beat of an f32 stream;
 //! `sixteen` narrows rows for the streams of sixteen bits and widens what comes back. The layout is
-//! that of [`interface::record`](crate::interface::record); which channel a beat travels on is
+//! that of [`interface::record`](pgs_interface::record); which channel a beat travels on is
 //! decided elsewhere (`beat`).
 
+pub(crate) mod body_table;
 pub(crate) mod collision;
-pub(crate) mod end;
 pub(crate) mod finite;
 pub(crate) mod inertia;
 pub(crate) mod largest;
@@ -22,9 +22,9 @@ use std::slice;
 
 use bytemuck::Pod;
 
-use crate::interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
-use crate::platform::{Integer, Lanes};
 use crate::scene::{Body, Collision, Contact};
+use crate::simd::{Integer, Lanes};
+use pgs_interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
 
 use self::largest::MAGNITUDE;
 

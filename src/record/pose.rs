@@ -1,9 +1,9 @@
 //! This file makes the pose record of a body.
 
 use super::{ORIENTATION, POSITION, row_of};
-use crate::interface::record::pose;
-use crate::platform::Lanes;
 use crate::scene::Body;
+use crate::simd::Lanes;
+use pgs_interface::record::pose;
 
 /// The pose record: position beside 0, orientation.
 ///
@@ -21,8 +21,8 @@ pub(crate) fn encode(body: &Body) -> [Lanes; pose::ROWS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::record::Beat;
     use crate::scene::{Pose, Velocity};
+    use pgs_interface::record::Beat;
 
     #[test]
     fn a_pose_record_is_these_bytes() {

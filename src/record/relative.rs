@@ -1,10 +1,10 @@
 //! This file makes the record of a collision relative to body A.
 
-use super::end::End;
+use super::body_table::End;
 use super::{Counted, NORMAL, Record, contact_rows, row_of, used};
-use crate::interface::record::{CONTACT_POINTS, LANES, relative};
-use crate::platform::{Integer, Lanes};
 use crate::scene::Collision;
+use crate::simd::{Integer, Lanes};
+use pgs_interface::record::{CONTACT_POINTS, LANES, relative};
 
 /// The row of a contact point which is not there.
 const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
@@ -68,8 +68,8 @@ const _: () = assert!(relative::CONTACTS + CONTACT_POINTS == relative::ROWS);
 mod tests {
     use super::super::bodies;
     use super::*;
-    use crate::interface::record::Beat;
     use crate::scene::Contact;
+    use pgs_interface::record::Beat;
 
     #[test]
     fn a_static_body_stands_where_the_other_one_is() {

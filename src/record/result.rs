@@ -1,8 +1,8 @@
 //! This file reads the result record of a body, and makes that of one which stays as it is.
 
 use super::{to_vec3, to_vec4, vec3_and_word, vec4};
-use crate::interface::record::{Beat, result};
 use crate::scene::{Pose, Velocity};
+use pgs_interface::record::{Beat, result};
 
 /// A record of results, in f32.
 pub(crate) type Record = [Beat; result::ROWS];

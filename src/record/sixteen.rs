@@ -1,10 +1,10 @@
 //! This file narrows rows to words of sixteen bits and widens them again.
 
-use bitstream_model::interface::number::StreamFormat;
-use bitstream_model::interface::record::WORD_LANE;
+use pgs_interface::number::StreamFormat;
+use pgs_interface::record::WORD_LANE;
 
 use super::{Row, thesis16};
-use crate::platform::{Integer, Lanes, Narrow, Vectors};
+use crate::simd::{Integer, Lanes, Narrow, Vectors};
 
 /// A format of sixteen bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,10 +61,10 @@ impl Sixteen {
 
 #[cfg(test)]
 mod tests {
-    use bitstream_model::interface::record::{Beat, LANES};
+    use pgs_interface::record::{Beat, LANES};
 
     use super::*;
-    use crate::platform::{Work, in_wide_vectors};
+    use crate::simd::{Work, in_wide_vectors};
 
     fn narrowed_pair(
         format: Sixteen,

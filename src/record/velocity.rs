@@ -2,9 +2,9 @@
 
 use super::inertia::Inverse;
 use super::{ANGULAR, LINEAR, Record, SHAPE, row_of, vec3_and_word};
-use crate::interface::record::velocity;
-use crate::platform::{Integer, Lanes};
 use crate::scene::Body;
+use crate::simd::{Integer, Lanes};
+use pgs_interface::record::velocity;
 
 /// The velocity record: linear velocity beside the shape index, angular velocity beside 0.
 ///
@@ -43,8 +43,8 @@ const _: () = assert!(velocity::LINEAR == 0 && velocity::ANGULAR == 1);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::record::Beat;
     use crate::scene::{Pose, Velocity};
+    use pgs_interface::record::Beat;
 
     #[test]
     fn a_velocity_record_is_these_bytes() {

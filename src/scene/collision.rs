@@ -1,12 +1,12 @@
 //! This file says what a collision is, and how a caller's own arrays are seen as collisions.
 
 /// Contact points of a collision, at most.
-pub use bitstream_model::interface::record::CONTACT_POINTS;
+pub use pgs_interface::record::CONTACT_POINTS;
 
 use bytemuck::{Pod, Zeroable};
 
 use super::Structures;
-use crate::platform::prefetch;
+use crate::simd::prefetch;
 
 /// One point at which two bodies touch.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -77,7 +77,7 @@ pub trait Collisions: Sync {
     ///
     /// There are [`len`](Self::len) of them, each what [`collision`](Self::collision) gives. A view that
     /// changes anything leaves this as it is. What is wrong there, and right as `collision` gives it, a step
-    /// refuses as [`InputError::Unsteady`](super::InputError::Unsteady).
+    /// refuses as [`InputError::Unsteady`](crate::validate::InputError::Unsteady).
     fn structures(&self) -> Option<Structures<'_>> {
         None
     }

@@ -1,8 +1,8 @@
 //! This file says what a shape is: the mass properties that bodies refer to by index.
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 
-use super::InputError;
+use crate::validate::InputError;
 
 /// Mass properties shared by bodies.
 ///

@@ -3,17 +3,17 @@
 
 use std::time::Duration;
 
-use bitstream_model::interface::axi_dma::LENGTH_WIDTH_MIN;
-use bitstream_model::interface::profile::{Flow, Variant};
-use bitstream_model::interface::record::Beat;
+use pgs_interface::axi_dma::LENGTH_WIDTH_MIN;
+use pgs_interface::profile::{Flow, Variant};
+use pgs_interface::record::Beat;
 
+use super::accelerator::Accelerator;
 use super::packing::Source;
-use super::plan::{Plan, bytes};
 use super::results::received;
-use super::solver::Accelerator;
-use super::symptom::Symptom;
 use crate::axi_dma::{Direction, largest_piece};
 use crate::beat::stripe::{Place, Segment};
+use crate::board::plan::{Plan, bytes};
+use crate::board::symptom::Symptom;
 use crate::error::Error;
 use crate::order::{Ordered, Schedule};
 use crate::platform::{Deadline, PlatformError};
@@ -172,7 +172,7 @@ pub(crate) fn source_of(bodies: usize, variant: &Variant, result: Place) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile::{FLOAT, HALF, Inertia};
+    use pgs_interface::profile::{FLOAT, HALF, Inertia};
 
     #[test]
     fn a_result_is_traced_to_the_beat_that_was_sent() {

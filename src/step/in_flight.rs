@@ -2,19 +2,20 @@
 
 use std::time::{Duration, Instant};
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 
-use super::fault::Fault;
-use super::load::Load;
+use super::accelerator::Accelerator;
 use super::locate::locate;
+use super::pack::Load;
 use super::report::{HostTimes, StepCycles, StepReport};
 use super::results::{commit, commit_velocities};
-use super::solver::Accelerator;
-use super::symptom::Symptom;
-use crate::accelerator::{Counters, Saturated};
+use crate::board::symptom::Symptom;
+use crate::control_block::{Counters, Saturated};
 use crate::error::Error;
+use crate::fault::Fault;
 use crate::platform::Deadline;
-use crate::scene::{Bodies, InputError};
+use crate::scene::Bodies;
+use crate::validate::InputError;
 
 /// A step that the board works on.
 ///

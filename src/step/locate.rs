@@ -1,8 +1,8 @@
 //! This file says which of the caller's collisions and bodies an error of the accelerator is about:
 //! it counts them in the order in which they were sent.
 
-use super::fault::{Fault, Subject};
 use crate::error::Error;
+use crate::fault::{Fault, Subject};
 use crate::order::{Lives, Schedule};
 
 /// Gives the caller's own index to an error about what was sent in this order. Where only live bodies
@@ -24,14 +24,14 @@ pub(super) fn locate(error: &mut Error, schedule: &Schedule, lives: Option<&Live
 
 #[cfg(test)]
 mod tests {
-    use bitstream_model::interface::control::ErrorCode;
+    use pgs_interface::control::ErrorCode;
 
     use super::*;
-    use crate::accelerator::StickyError;
+    use crate::board::root_cause::decoded;
+    use crate::control_block::StickyError;
     use crate::error::Aftermath;
+    use crate::fault::Phase;
     use crate::order::{OrderInput, Room};
-    use crate::step::Phase;
-    use crate::step::root_cause::decoded;
 
     /// What is said of an error with that code and detail, sent in that order.
     fn told(code: ErrorCode, detail: u32, lives: Option<&Lives>) -> String {

@@ -4,16 +4,17 @@
 //! what moves are read into memory that is kept, ordered, and proved free of hazards if that was
 //! asked for. Where only live bodies are kept, every body is then given its place.
 
-use bitstream_model::interface::profile::Flow;
+use pgs_interface::profile::Flow;
 
 use super::report::OrderChoice;
-use crate::accelerator::Capabilities;
+use crate::control_block::Capabilities;
 use crate::order::{
     Checker, Crowded, InputBuffers, Interlock, IssueWindow, LiveReport, Lives, Order, OrderError,
     OrderInput, OrderReport, Orderer, Room, Schedule,
 };
-use crate::scene::validate::{Limits, needed};
-use crate::scene::{Bodies, Collisions, Demand, InputError, Shape, StepParameters};
+use crate::scene::{Bodies, Collisions, Shape, StepParameters};
+use crate::validate::{Demand, InputError};
+use crate::validate::{Limits, needed};
 
 /// Orders the collisions of steps, keeping its memory from one to the next.
 #[derive(Debug, Default)]

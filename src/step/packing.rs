@@ -1,20 +1,21 @@
 //! This file writes the records of a step into the buffers of its lanes.
 
-use bitstream_model::interface::address_map::DMA_COUNT_MAX;
-use bitstream_model::interface::record::Beat;
+use pgs_interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::record::Beat;
 
-use super::bank::Bank;
-use super::device::Device;
-use super::lane::Lane;
-use super::plan::Plan;
-use crate::beat::bodies::{Chosen, pack_bodies, pack_poses, pack_velocities, survey};
-use crate::beat::collisions::{Entries, pack_collisions};
-use crate::beat::target::Target;
-use crate::beat::writer::Writer;
+use crate::beat::pack::bodies::{Chosen, pack_bodies, pack_poses, pack_velocities, survey};
+use crate::beat::pack::collisions::{Entries, pack_collisions};
+use crate::beat::pack::target::Target;
+use crate::beat::pack::writer::Writer;
+use crate::board::bank::Bank;
+use crate::board::device::Device;
+use crate::board::plan::Plan;
+use crate::board::port::Lane;
 use crate::order::Lives;
-use crate::record::end::Survey;
-use crate::scene::validate::Quick;
-use crate::scene::{Bodies, Collisions, InputError, Shape};
+use crate::record::body_table::Survey;
+use crate::scene::{Bodies, Collisions, Shape};
+use crate::validate::InputError;
+use crate::validate::Quick;
 
 /// What a step sent, for comparison with what the accelerator received.
 #[derive(Debug, Clone, Copy)]

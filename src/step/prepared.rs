@@ -5,16 +5,17 @@
 //!   board           |     step 0    |     step 1      |     step 2 ...
 //! ```
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 
-use super::bank::Bank;
-use super::fault::Fault;
+use super::accelerator::Accelerator;
 use super::in_flight::{Flight, InFlight, Stopwatch};
-use super::load::{Engines, Load, Ticket};
+use super::pack::{Engines, Load, Ticket};
 use super::report::StepReport;
-use super::solver::Accelerator;
+use crate::board::bank::Bank;
 use crate::error::{Aftermath, Error};
-use crate::scene::{Bodies, Collisions, InputError, StepParameters};
+use crate::fault::Fault;
+use crate::scene::{Bodies, Collisions, StepParameters};
+use crate::validate::InputError;
 
 /// A step whose records lie in DMA memory, ready to be [started](Accelerator::start).
 ///

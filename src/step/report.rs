@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use bitstream_model::interface::control::IMPULSE_SUM_MAX;
+use pgs_interface::control::IMPULSE_SUM_MAX;
 
-use crate::accelerator::{Saturated, impulse};
+use crate::control_block::{Saturated, impulse};
 use crate::order::{LiveReport, Order, OrderCosts, OrderReport};
 
 /// Clock cycles of a step on the accelerator, by what they were spent on.

@@ -2,21 +2,21 @@
 //!
 //! Each beat is read once: what is checked is checked on its way.
 
-use bitstream_model::interface::address_map::DMA_COUNT_MAX;
-use bitstream_model::interface::record::Beat;
+use pgs_interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::record::Beat;
 
-use super::bank::Bank;
-use super::device::Device;
-use super::fault::Fault;
-use super::lane::Lane;
+use super::accelerator::Accelerator;
 use super::packing::Sent;
-use super::plan::Plan;
-use super::solver::Accelerator;
-use crate::accelerator::Counters;
 use crate::axi_dma::Direction;
-use crate::beat::ranges::Packers;
+use crate::beat::pack::pool::Packers;
 use crate::beat::stripe::{Layout, Segment};
-use crate::beat::unpack::{BLOCK, Reader, read_all};
+use crate::beat::unpack::results::{BLOCK, Reader, read_all};
+use crate::board::bank::Bank;
+use crate::board::device::Device;
+use crate::board::plan::Plan;
+use crate::board::port::Lane;
+use crate::control_block::Counters;
+use crate::fault::Fault;
 use crate::order::LiveReport;
 use crate::record::finite::finite;
 use crate::record::result::{self, Record};
@@ -196,9 +196,9 @@ pub(super) fn commit_velocities<B: Bodies + ?Sized>(results: &[Record], bodies: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interface::profile::FLOAT;
-    use crate::interface::record::result::{ORIENTATION, POSITION};
     use crate::scene::{Body, Pose, Velocity};
+    use pgs_interface::profile::FLOAT;
+    use pgs_interface::record::result::{ORIENTATION, POSITION};
 
     const COUNT: usize = 40;
 

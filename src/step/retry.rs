@@ -1,7 +1,7 @@
 //! This file takes a step again that failed, as often as it may be.
 
-use super::fault::Fault;
 use crate::error::Error;
+use crate::fault::Fault;
 
 /// Attempts until one succeeds, at most `retries` times more than once and only while the board is
 /// ready for it; what came of it, and how often it was taken again.

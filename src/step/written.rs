@@ -1,20 +1,21 @@
 //! This file brings a step into a bank of buffers whose collisions the caller writes as it finds them.
 
-use crew::float_env::standard_around;
+use pgs_support::float_env::standard_around;
 
-use super::bank::Bank;
+use super::accelerator::Accelerator;
 use super::in_flight::{InFlight, Stopwatch};
-use super::load::{Engines, Load, Ticket};
 use super::ordering::{Arranged, in_order_of_writing};
-use super::plan::Plan;
+use super::pack::{Engines, Load, Ticket};
 use super::prepared::Prepared;
 use super::report::{HostTimes, OrderChoice};
-use super::solver::Accelerator;
-use crate::beat::target::Target;
-use crate::beat::writer::Writer;
+use crate::beat::pack::target::Target;
+use crate::beat::pack::writer::Writer;
+use crate::board::bank::Bank;
+use crate::board::plan::Plan;
 use crate::error::Error;
-use crate::scene::validate::{Quick, preflight, validate};
-use crate::scene::{Bodies, Collision, Collisions, InputError, StepParameters};
+use crate::scene::{Bodies, Collision, Collisions, StepParameters};
+use crate::validate::InputError;
+use crate::validate::{Quick, preflight, validate};
 
 impl Accelerator {
     /// Packs a step whose collisions `narrow_phase` writes, at most `announced` of them: their

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crew::chunks::Chunks;
+use pgs_support::chunks::Chunks;
 use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
 /// A step of Bullet's.

@@ -43,7 +43,7 @@ pack=$(built pack)
 speed=$(built speed)
 
 # All of packing is in the first of these functions, all that the board does in the last.
-packers=('zynq_pgs::beat::collisions::CollisionPacker::write*' 'zynq_pgs::beat::bodies::BodyPacker::write')
+packers=('zynq_pgs::beat::pack::collisions::CollisionPacker::write*' 'zynq_pgs::beat::pack::bodies::BodyPacker::write')
 board='bitstream_model::board::Board::advance'
 log=$(mktemp)
 litter+=("$log")

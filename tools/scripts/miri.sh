@@ -19,8 +19,8 @@ cd "$repository"
 export MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-strict-provenance ${MIRIFLAGS:-}"
 # What maps a file cannot run; names are those of the tests.
 attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs --lib -- \
-	platform::mapped::tests::words_and_beats platform::mapped::tests::pieces_of \
-	platform::copy:: platform::fence:: platform::buffer:: axi_dma::ring::
+	platform::linux::mapped::tests::words_and_beats platform::linux::mapped::tests::pieces_of \
+	platform::memory::copy:: platform::fence:: platform::memory::buffer:: axi_dma::ring::
 # The threads that packing, detection and the emulated board share their work among: they outlive what
 # they borrow.
-attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs-crew --lib
+attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p pgs-support --lib

@@ -2,7 +2,7 @@
 
 use crate::cast::{high, low, register};
 use crate::config::{BoardConfig, Hazards, Subnormals};
-use crate::interface::control::{
+use pgs_interface::control::{
     ANGULAR_DAMPING, AP_CTRL, BODIES, BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY,
     COLLISIONS, CONTACT_DEPTH, CONTACT_ITERATIONS, COUNTER_MAX, CYCLES_HI, CYCLES_LO, DMA, ERROR,
     ERROR_DETAIL, ErrorCode, FEATURES, FLAGS, FRICTION, FRICTION_DEPTH, FRICTION_ITERATIONS, GIE,
@@ -13,8 +13,8 @@ use crate::interface::control::{
     TIME_STEP, VERSION, WAIT_CYCLES, WINDOW, WINDOW_CAPACITY, WORK_CYCLES, ap_ctrl, channels,
     depth, dma, error, features, flags, irq, issue, memory_per_record, numbers,
 };
-use crate::interface::number::Numbers;
-use crate::interface::profile::{Depth, Inertia, Window};
+use pgs_interface::number::Numbers;
+use pgs_interface::profile::{Depth, Inertia, Window};
 
 use super::integrate::Integration;
 use super::solver::SolverParameters;
@@ -41,34 +41,34 @@ fn formats(of: &Numbers) -> u32 {
 
 /// An entry of the shape table.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Shape {
-    pub(super) inverse_mass: f32,
+pub(crate) struct Shape {
+    pub(crate) inverse_mass: f32,
     /// Isotropic; with world inertia it means nothing.
-    pub(super) inverse_inertia: f32,
+    pub(crate) inverse_inertia: f32,
 }
 
 /// What the accelerator has counted in a step.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Counters {
+pub(crate) struct Counters {
     pub(super) cycles: u64,
-    pub(super) stalls: u64,
-    pub(super) waits: u64,
-    pub(super) hazards: u64,
+    pub(crate) stalls: u64,
+    pub(crate) waits: u64,
+    pub(crate) hazards: u64,
     pub(super) sum_received: u32,
-    pub(super) sum_sent: u32,
-    pub(super) impulse_sum: u64,
+    pub(crate) sum_sent: u32,
+    pub(crate) impulse_sum: u64,
 }
 
 /// The arguments of a step, as they are taken at the start.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Arguments {
+pub(crate) struct Arguments {
     pub(super) bodies: u32,
-    pub(super) collisions: u32,
-    pub(super) contact_iterations: u32,
+    pub(crate) collisions: u32,
+    pub(crate) contact_iterations: u32,
     pub(super) friction_iterations: u32,
-    pub(super) integrate: bool,
-    pub(super) solver: SolverParameters,
-    pub(super) integration: Integration,
+    pub(crate) integrate: bool,
+    pub(crate) solver: SolverParameters,
+    pub(crate) integration: Integration,
 }
 
 /// Writable words between AP_CTRL and the capabilities.
@@ -347,7 +347,7 @@ impl Registers {
             _ if offset == RESET.offset && value & 1 != 0 => return Some(Request::Reset),
             _ => {
                 // The rest is read-only or does not exist.
-                return crate::interface::control::REGISTERS
+                return pgs_interface::control::REGISTERS
                     .iter()
                     .any(|register| register.offset == offset)
                     .then_some(Request::None);

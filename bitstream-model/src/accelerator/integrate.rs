@@ -2,28 +2,28 @@
 //!
 //! Source: Bullet (integrateTransforms of the OpenCL pipeline): position first, then gravity.
 
-use super::number::{Format, Number};
+use super::arithmetic::number::{Format, Number};
+use super::arithmetic::vector::Vec3;
 use super::solver::Velocity;
-use super::vector::Vec3;
-use crate::interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
+use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
 
 /// Position and orientation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Pose {
+pub(crate) struct Pose {
     pub(super) position: [f32; 3],
     pub(super) orientation: [f32; 4],
 }
 
 /// Parameters of the integration.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Integration {
-    pub(super) time_step: f32,
-    pub(super) angular_damping: f32,
-    pub(super) gravity: [f32; 3],
+pub(crate) struct Integration {
+    pub(crate) time_step: f32,
+    pub(crate) angular_damping: f32,
+    pub(crate) gravity: [f32; 3],
 }
 
 /// The state of a moving body one time step later.
-pub(super) fn integrate<U: Format>(
+pub(crate) fn integrate<U: Format>(
     parameters: &Integration,
     pose: &Pose,
     velocity: &Velocity,
@@ -61,8 +61,8 @@ pub(super) fn integrate<U: Format>(
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "the expected values are exact")]
 mod tests {
-    use super::super::number::Single;
     use super::*;
+    use crate::accelerator::arithmetic::number::Single;
 
     const AT_ORIGIN: Pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
     const STEP: Integration =

@@ -14,54 +14,42 @@
 //! what has arrived on the streams, keeps account of the clock cycles that this costs, and knows
 //! nothing of who sent it.
 
-mod array;
-mod batch;
-mod bodies;
-mod control;
-mod decode;
-mod inertia;
-mod integrate;
-mod layout;
-mod number;
+pub(crate) mod arithmetic;
+pub(crate) mod control;
+pub(crate) mod hazards;
+pub(crate) mod integrate;
+pub(crate) mod per_record;
 mod phases;
-mod pipeline;
-mod replay;
-mod replayed;
-mod results;
-mod segment;
-mod sixteen;
-mod solver;
-pub(crate) mod striping;
-mod turn;
-mod vector;
+pub(crate) mod records;
+pub(crate) mod solver;
 pub(crate) mod window;
 
+use crate::board::stream::Stream;
+use crate::board::violation::{Log, ViolationKind};
 use crate::cast::register;
 use crate::config::BoardConfig;
+use crate::config::quirks::Resettable;
 use crate::fault::{FaultKind, Faults, Place, StepPhase, StepShape, Streamed};
-use crate::interface::control::{
+use crate::memory::Memory;
+use pgs_interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
-use crate::interface::profile::{Flow, Inertia, Variant};
-use crate::interface::record::{Beat, CONTACT_POINTS};
-use crate::memory::Memory;
-use crate::quirks::Resettable;
-use crate::stream::Stream;
-use crate::violation::{Log, ViolationKind};
+use pgs_interface::profile::{Flow, Inertia, Variant};
+use pgs_interface::record::{Beat, CONTACT_POINTS};
 
+use crate::shortcut::deferred::decode_once::Replay;
 use control::{Arguments, Counters, Registers, Request};
-use pipeline::Pipeline;
-use replay::Replay;
-use results::Results;
-use segment::Segment;
+use hazards::Pipeline;
+use records::results::Results;
+use records::segment::Segment;
 use solver::{Impulses, Velocity};
 
-pub(crate) use replay::Coming;
+pub(crate) use crate::shortcut::deferred::decode_once::Coming;
 
 /// Where a step stands.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::large_enum_variant, reason = "an accelerator has one")]
-enum Phase {
+pub(crate) enum Phase {
     Idle,
     Load(Segment),
     Pass {
@@ -92,28 +80,28 @@ pub(crate) struct Ran {
 #[derive(Debug)]
 pub(crate) struct Accelerator {
     config: BoardConfig,
-    variant: Variant,
+    pub(crate) variant: Variant,
     registers: Registers,
-    arguments: Arguments,
-    phase: Phase,
+    pub(crate) arguments: Arguments,
+    pub(crate) phase: Phase,
     start_due: bool,
     reset_until: Option<u64>,
     /// Takes and sends nothing until it is reset.
-    hung: bool,
+    pub(crate) hung: bool,
     /// Cycles since the start of the step.
-    clock: u64,
+    pub(crate) clock: u64,
     /// Cycles that the last action still takes.
-    debt: u64,
-    counters: Counters,
-    pipeline: Pipeline,
-    velocities: Vec<Velocity>,
-    shape_of: Vec<u8>,
+    pub(crate) debt: u64,
+    pub(crate) counters: Counters,
+    pub(crate) pipeline: Pipeline,
+    pub(crate) velocities: Vec<Velocity>,
+    pub(crate) shape_of: Vec<u8>,
     /// With world inertia, that of each body.
-    inertias: Vec<inertia::Stored>,
-    impulses: Vec<Impulses>,
-    replay: Replay,
+    inertias: Vec<arithmetic::inertia::Stored>,
+    pub(crate) impulses: Vec<Impulses>,
+    pub(crate) replay: Replay,
     /// Rows of results on their way to each stream.
-    rows: [Vec<Beat>; striping::STREAMS_MAX],
+    pub(crate) rows: [Vec<Beat>; records::striping::STREAMS_MAX],
     window: Option<Box<window::Windowed>>,
 }
 
@@ -349,7 +337,7 @@ impl Accelerator {
         fault.is_some()
     }
 
-    fn fail(&mut self, code: ErrorCode, channel: usize, detail: u32) {
+    pub(crate) fn fail(&mut self, code: ErrorCode, channel: usize, detail: u32) {
         log::debug!("accelerator: {} (stream {channel}, detail {detail})", code.describe());
         self.registers.fail(code, channel, detail);
         if let Phase::Pass { number, segment } = self.phase {
@@ -401,7 +389,7 @@ impl Accelerator {
         self.shape_of.resize(bodies, 0);
         self.inertias.clear();
         if variant.inertia == Inertia::World {
-            self.inertias.resize(bodies, inertia::Stored::default());
+            self.inertias.resize(bodies, arithmetic::inertia::Stored::default());
         }
         let collisions = arguments.collisions as usize;
         self.replay.begin(collisions, self.registers.shapes());

@@ -1,24 +1,24 @@
 //! This file works through the phases of a step on what has arrived: load, passes, integration.
 
-use super::array::{Array, Records};
+use super::arithmetic::inertia::{self, Isotropic, World};
+use super::arithmetic::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
 use super::control::Arguments;
-use super::decode::{self, Collision};
-use super::inertia::{self, Isotropic, World};
-use super::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
-use super::pipeline::Entry;
-use super::results::Results;
-use super::segment::{PacketError, Reader, Segment};
+use super::hazards::Entry;
+use super::records::array::{Array, Records};
+use super::records::decode::{self, Collision};
+use super::records::results::Results;
+use super::records::segment::{PacketError, Reader, Segment};
+use super::records::striping::Striping;
 use super::solver::Mass;
-use super::striping::Striping;
 use super::{Accelerator, Phase};
+use crate::board::stream::Stream;
 use crate::cast::register;
 use crate::config::{Hazards, Subnormals};
-use crate::interface::control::ErrorCode;
-use crate::interface::number::{Precision, StreamFormat};
-use crate::interface::profile::{Depth, Geometry, Inertia, Variant};
-use crate::interface::record::{CONTACT_POINTS, pose, result};
 use crate::memory::Memory;
-use crate::stream::Stream;
+use pgs_interface::control::ErrorCode;
+use pgs_interface::number::{Precision, StreamFormat};
+use pgs_interface::profile::{Depth, Geometry, Inertia, Variant};
+use pgs_interface::record::{CONTACT_POINTS, pose, result};
 
 impl Accelerator {
     fn body_records(&self, format: StreamFormat, rows: usize) -> Records {
@@ -56,7 +56,7 @@ impl Accelerator {
         Results::new(Array::new(striping, self.body_records(numbers.poses, result::ROWS)))
     }
 
-    pub(super) fn received(&mut self, sum: u32) {
+    pub(crate) fn received(&mut self, sum: u32) {
         self.counters.sum_received = self.counters.sum_received.wrapping_add(sum);
     }
 
@@ -116,13 +116,13 @@ impl Accelerator {
     }
 
     /// Depth of the pipeline that a pass goes through.
-    pub(super) fn depth(&self, pass: u32) -> Depth {
+    pub(crate) fn depth(&self, pass: u32) -> Depth {
         let profile = self.variant.profile;
         let contact = pass < self.arguments.contact_iterations;
         self.config.depth(if contact { profile.contact } else { profile.friction })
     }
 
-    pub(super) fn start_pass(&mut self, number: u32) {
+    pub(crate) fn start_pass(&mut self, number: u32) {
         if number == self.passes() {
             self.compute_to(number, 0);
             let (poses, results) = (self.poses_in(), self.results_out());
@@ -135,7 +135,7 @@ impl Accelerator {
     }
 
     /// Solves the collisions that have arrived, for up to `limit` cycles.
-    pub(super) fn pass(
+    pub(crate) fn pass(
         &mut self,
         number: u32,
         segment: Segment,

@@ -8,23 +8,23 @@
 //! Source: Bullet (b3ContactSolver of the OpenCL pipeline's host reference), in the order of
 //! evaluation that the golden vectors were made with.
 
-use super::decode::Collision;
-use super::inertia::{Inertia, Stored, Times};
-use super::number::{Format, Number};
-use super::vector::Vec3;
-use crate::interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
-use crate::interface::record::CONTACT_POINTS;
+use super::arithmetic::inertia::{Inertia, Stored, Times};
+use super::arithmetic::number::{Format, Number};
+use super::arithmetic::vector::Vec3;
+use super::records::decode::Collision;
+use pgs_interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
+use pgs_interface::record::CONTACT_POINTS;
 
 /// Mass properties of a body.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Mass {
-    pub(super) inverse_mass: f32,
-    pub(super) inverse_inertia: Stored,
+pub(crate) struct Mass {
+    pub(crate) inverse_mass: f32,
+    pub(crate) inverse_inertia: Stored,
 }
 
 impl Mass {
     /// The same in numbers of a format.
-    pub(super) fn rounded<F: Format>(&self) -> Self {
+    pub(crate) fn rounded<F: Format>(&self) -> Self {
         let round = |number| Number::<F>::new(number).value();
         Self {
             inverse_mass: round(self.inverse_mass),
@@ -35,27 +35,27 @@ impl Mass {
 
 /// Velocities of a body, as they lie in block RAM.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Velocity {
-    pub(super) linear: [f32; 3],
-    pub(super) angular: [f32; 3],
+pub(crate) struct Velocity {
+    pub(crate) linear: [f32; 3],
+    pub(crate) angular: [f32; 3],
 }
 
 /// Accumulated impulses of a collision, as they lie in block RAM: four normal impulses during the
 /// contact passes; during the friction passes their sum, then the two friction impulses.
-pub(super) type Impulses = [f32; CONTACT_POINTS];
+pub(crate) type Impulses = [f32; CONTACT_POINTS];
 
 /// Parameters that both solvers need.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct SolverParameters {
-    pub(super) time_step: f32,
-    pub(super) drift: f32,
-    pub(super) coefficient: f32,
-    pub(super) friction: f32,
+pub(crate) struct SolverParameters {
+    pub(crate) time_step: f32,
+    pub(crate) drift: f32,
+    pub(crate) coefficient: f32,
+    pub(crate) friction: f32,
 }
 
 impl SolverParameters {
     /// The same in numbers of a format.
-    pub(super) fn rounded<F: Format>(&self) -> Self {
+    pub(crate) fn rounded<F: Format>(&self) -> Self {
         let Self { time_step, drift, coefficient, friction } = *self;
         let [time_step, drift, coefficient, friction] = [time_step, drift, coefficient, friction]
             .map(|number| Number::<F>::new(number).value());
@@ -179,7 +179,7 @@ fn tangents<R: Format>(n: Vec3<R>) -> [Vec3<R>; 2] {
 
 /// One contact pass over one collision.
 #[inline]
-pub(super) fn contact<R: Format, U: Format, I: Inertia>(
+pub(crate) fn contact<R: Format, U: Format, I: Inertia>(
     collision: &Collision,
     parameters: &SolverParameters,
     masses: &[Mass; 2],
@@ -215,7 +215,7 @@ pub(super) fn contact<R: Format, U: Format, I: Inertia>(
 
 /// Sum of the four normal impulses, as the friction passes use it.
 #[inline]
-pub(super) fn normal_sum<U: Format>(impulses: &Impulses) -> f32 {
+pub(crate) fn normal_sum<U: Format>(impulses: &Impulses) -> f32 {
     let [l0, l1, l2, l3] = impulses.map(Number::<U>::new);
     (((l0 + l1) + l2) + l3).value()
 }
@@ -223,7 +223,7 @@ pub(super) fn normal_sum<U: Format>(impulses: &Impulses) -> f32 {
 /// One friction pass over one collision; `impulses` holds the normal sum and the two friction
 /// impulses.
 #[inline]
-pub(super) fn friction<R: Format, U: Format, I: Inertia>(
+pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
     collision: &Collision,
     parameters: &SolverParameters,
     masses: &[Mass; 2],
@@ -277,9 +277,9 @@ pub(super) fn friction<R: Format, U: Format, I: Inertia>(
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "the expected values are exact")]
 mod tests {
-    use super::super::inertia::Isotropic;
-    use super::super::number::Single;
     use super::*;
+    use crate::accelerator::arithmetic::inertia::Isotropic;
+    use crate::accelerator::arithmetic::number::Single;
 
     const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: [0.0; 6] };
     const GROUND: Mass = Mass { inverse_mass: 0.0, inverse_inertia: [0.0; 6] };

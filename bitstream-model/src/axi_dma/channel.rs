@@ -1,22 +1,22 @@
 //! This file holds the registers of one DMA channel and what reading and writing them does.
 
-use super::faulty::Faulty;
+use super::faults::Faulty;
 use super::{Build, Direction};
+use crate::board::violation::{Log, ViolationKind};
 use crate::cast::{high, low, register};
-use crate::interface::axi_dma::{
+use pgs_interface::axi_dma::{
     ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, TAILDESC,
     TAILDESC_MSB, dmacr, dmasr,
 };
-use crate::interface::descriptor;
-use crate::interface::record::BEAT_BYTES;
-use crate::violation::{Log, ViolationKind};
+use pgs_interface::descriptor;
+use pgs_interface::record::BEAT_BYTES;
 
 /// Clocks of one tick of the delay timer.
 const DELAY_TICK: u64 = 125;
 
 /// What the engine is doing.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Work {
+pub(crate) enum Work {
     /// Nothing: stopped, idle, or never started.
     None,
     /// Waiting for a descriptor.
@@ -29,15 +29,15 @@ pub(super) enum Work {
 
 /// A fetched descriptor.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Descriptor {
+pub(crate) struct Descriptor {
     pub(super) address: u64,
     pub(super) next: u64,
-    pub(super) buffer: u64,
-    pub(super) length: u32,
-    pub(super) moved: u32,
+    pub(crate) buffer: u64,
+    pub(crate) length: u32,
+    pub(crate) moved: u32,
     pub(super) eof: bool,
     /// S2MM: the packet's first beat went into this descriptor.
-    pub(super) rxsof: bool,
+    pub(crate) rxsof: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -49,9 +49,9 @@ enum Transition {
 /// One direction of a core.
 #[derive(Debug)]
 pub(crate) struct Channel {
-    pub(super) direction: Direction,
+    pub(crate) direction: Direction,
     /// DMACR as last written, without Reset.
-    pub(super) control: u32,
+    pub(crate) control: u32,
     /// Error and interrupt bits of DMASR.
     latched: u32,
     packets_to_go: u32,
@@ -63,17 +63,17 @@ pub(crate) struct Channel {
     pub(super) tail: u64,
     pub(super) address: u64,
     pub(super) length: u32,
-    pub(super) work: Work,
+    pub(crate) work: Work,
     /// The descriptor after the last completed one.
     pub(super) resume: Option<u64>,
     /// A packet has begun and not ended.
-    pub(super) in_packet: bool,
+    pub(crate) in_packet: bool,
     /// The engine's clock; it may run a little behind the board's.
-    pub(super) time: u64,
+    pub(crate) time: u64,
     /// Beats of the packet that were moved, and descriptors that were completed.
-    pub(super) beats: u64,
+    pub(crate) beats: u64,
     pub(super) descriptors: u32,
-    pub(super) faulty: Faulty,
+    pub(crate) faulty: Faulty,
 }
 
 impl Channel {
@@ -323,7 +323,7 @@ impl Channel {
         }
     }
 
-    pub(super) fn next_event(&self) -> Option<u64> {
+    pub(crate) fn next_event(&self) -> Option<u64> {
         let fetch = match self.work {
             Work::Fetch { ready_at, .. } => Some(ready_at),
             _ => None,

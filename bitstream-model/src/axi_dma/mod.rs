@@ -6,21 +6,20 @@
 //!
 //! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
 
-mod channel;
-mod faulty;
-mod flow;
-mod mover;
+pub(crate) mod channel;
+mod faults;
+pub(crate) mod mover;
 
 use std::fmt;
 
-use crate::accelerator::striping::beat_cycles;
+use crate::accelerator::records::striping::beat_cycles;
+use crate::board::stream::Stream;
+use crate::board::violation::Log;
+use crate::config::quirks::Resettable;
 use crate::config::{BoardConfig, Delays, cycles_of};
 use crate::fault::{FaultKind, Faults, Place, StepPhase};
-use crate::interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 use crate::memory::Memory;
-use crate::quirks::Resettable;
-use crate::stream::Stream;
-use crate::violation::Log;
+use pgs_interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 
 use channel::{Channel, Work};
 
@@ -44,14 +43,14 @@ impl fmt::Display for Direction {
 
 /// How a core was built.
 #[derive(Debug, Clone, Copy)]
-struct Build {
+pub(crate) struct Build {
     core: usize,
     length_width: u32,
     address_width: u32,
     scatter_gather: bool,
     /// Binary logarithm of the clocks that a beat takes on the streams.
-    mm2s_beat_shift: u32,
-    s2mm_beat_shift: u32,
+    pub(crate) mm2s_beat_shift: u32,
+    pub(crate) s2mm_beat_shift: u32,
     delays: Delays,
     clock_khz: u32,
 }
@@ -101,11 +100,11 @@ pub(crate) struct Surroundings<'a> {
 /// One AXI DMA.
 #[derive(Debug)]
 pub(crate) struct Core {
-    build: Build,
+    pub(crate) build: Build,
     config: BoardConfig,
-    mm2s: Channel,
-    s2mm: Channel,
-    reset_until: Option<u64>,
+    pub(crate) mm2s: Channel,
+    pub(crate) s2mm: Channel,
+    pub(crate) reset_until: Option<u64>,
 }
 
 impl Core {

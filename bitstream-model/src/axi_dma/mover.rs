@@ -5,22 +5,22 @@
 //! of many clocks is moved in a few block copies.
 
 use super::channel::{Channel, Descriptor, Work};
-use super::faulty::Next;
+use super::faults::Next;
 use super::{Build, Direction, PacketCount, Surroundings};
+use crate::board::stream::Stream;
+use crate::board::violation::ViolationKind;
 use crate::cast::register;
 use crate::fault::FaultKind;
-use crate::interface::axi_dma::{dmacr, dmasr};
-use crate::interface::descriptor::{
+use crate::memory::Denied;
+use pgs_interface::axi_dma::{dmacr, dmasr};
+use pgs_interface::descriptor::{
     self, BUFFER, BUFFER_MSB, BYTES, CONTROL, FETCHED_WORDS, NXTDESC, NXTDESC_MSB, STATUS, status,
 };
-use crate::interface::record::{BEAT_BYTES, Beat};
-use crate::interface::register::Field;
-use crate::memory::Denied;
-use crate::stream::Stream;
-use crate::violation::ViolationKind;
+use pgs_interface::record::{BEAT_BYTES, Beat};
+use pgs_interface::register::Field;
 
 #[expect(clippy::cast_possible_truncation, reason = "it is 16")]
-pub(super) const BEAT: u32 = BEAT_BYTES as u32;
+pub(crate) const BEAT: u32 = BEAT_BYTES as u32;
 const KEYHOLE_BEATS: usize = 1;
 
 /// What a descriptor or transfer still has.

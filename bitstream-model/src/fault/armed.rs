@@ -3,7 +3,7 @@
 
 use super::{Fault, FaultKind, Place, Site, StepPhase, StepShape, When};
 use crate::axi_dma::Direction;
-use crate::interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::address_map::DMA_COUNT_MAX;
 
 /// Where a channel stands in its packet.
 #[derive(Debug, Clone, Copy)]

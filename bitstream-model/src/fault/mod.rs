@@ -19,7 +19,7 @@ mod shape;
 mod text;
 
 use crate::axi_dma::Direction;
-use crate::interface::control::ErrorCode;
+use pgs_interface::control::ErrorCode;
 
 pub(crate) use armed::{Due, Faults, Turn};
 pub(crate) use shape::{StepShape, Streamed};

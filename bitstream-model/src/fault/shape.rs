@@ -1,7 +1,7 @@
 //! This file says which packet of a channel carries which phase of a step.
 
 use super::StepPhase;
-use crate::interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::address_map::DMA_COUNT_MAX;
 
 /// How often the collisions go in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

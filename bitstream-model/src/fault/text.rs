@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use super::{Fault, FaultKind, FaultPlan, Place, StepPhase, When};
 use crate::axi_dma::Direction;
-use crate::interface::address_map::DMA_COUNT_MAX;
-use crate::interface::control::ErrorCode;
+use pgs_interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::control::ErrorCode;
 
 /// A line that is no fault plan.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

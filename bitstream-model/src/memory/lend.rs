@@ -2,7 +2,7 @@
 
 use super::{Content, DeviceAccess, Memory, Source, part};
 use crate::cast::index;
-use crate::interface::record::{BEAT_BYTES, Beat};
+use pgs_interface::record::{BEAT_BYTES, Beat};
 
 /// Beats of several buffers: to be read, and to be written.
 pub(crate) type Lent<'a, const N: usize> = ([&'a [Beat]; N], [&'a mut [Beat]; N]);
@@ -58,7 +58,7 @@ impl Memory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quirks::Coherency;
+    use crate::config::quirks::Coherency;
 
     /// A buffer of 8 beats, numbered from `first` on, that the device may access so.
     fn buffer(memory: &mut Memory, first: u32, access: DeviceAccess, granted: usize) -> u64 {

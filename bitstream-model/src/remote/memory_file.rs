@@ -12,8 +12,8 @@ use nix::errno::Errno;
 use nix::fcntl::{Flock, FlockArg};
 use thiserror::Error;
 
-use crate::interface::record::Beat;
-use crate::outside::DeviceMemory;
+use crate::memory::external::DeviceMemory;
+use pgs_interface::record::Beat;
 
 /// The least that is of any use, bytes.
 const LEAST: u64 = 1 << 16;

@@ -8,11 +8,9 @@
 //!   DMA buffers ---------------> the file <---------------------- DMA engines
 //! ```
 //!
-//! [`message`] is what both sides share. Everything else here is the board's side: it serves one
+//! [`pgs_interface::message`] is what both sides share. This module is the board's side: it serves one
 //! driver after the other. One that vanishes leaves the board as it is, engines running, as a
 //! process that is killed leaves a real one.
-
-pub mod message;
 
 mod memory_file;
 mod server;

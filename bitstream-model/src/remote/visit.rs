@@ -4,8 +4,10 @@ use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
-use super::message::{ANSWER_BYTES, Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION};
 use crate::handle::{CpuPort, EmulatedBoard};
+use pgs_interface::message::{
+    ANSWER_BYTES, Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION,
+};
 
 /// How much virtual time passes between two looks whether the driver is still there.
 const SLICE: Duration = Duration::from_micros(20);

@@ -1,10 +1,10 @@
 //! A windowed design cycle by cycle, from its rules alone: which cycle each entry issues in, when everything
 //! is there from the start.
 
-use bitstream_model::interface::profile::Window;
+use pgs_interface::profile::Window;
 
 use super::scene::Step;
-use bitstream_model::interface::record::live;
+use pgs_interface::record::live;
 
 /// What a design needs to be known of.
 #[derive(Debug, Clone)]

@@ -15,15 +15,15 @@ pub(crate) mod windowed;
 
 use std::time::Duration;
 
-use bitstream_model::interface::address_map::{CONTROL_BASE, dma_base};
-use bitstream_model::interface::axi_dma::{DMACR, DMASR, S2MM_OFFSET, dmacr, dmasr};
-use bitstream_model::interface::control;
-use bitstream_model::interface::profile::Variant;
-use bitstream_model::interface::record::Beat;
-use bitstream_model::interface::register::Register;
 use bitstream_model::{
     BoardConfig, CpuPort, DeviceAccess, Direction, EmulatedBoard, ViolationKind,
 };
+use pgs_interface::address_map::{CONTROL_BASE, dma_base};
+use pgs_interface::axi_dma::{DMACR, DMASR, S2MM_OFFSET, dmacr, dmasr};
+use pgs_interface::control;
+use pgs_interface::profile::Variant;
+use pgs_interface::record::Beat;
+use pgs_interface::register::Register;
 
 /// DMAs of the `float` profile.
 pub(crate) const CORES: usize = 4;

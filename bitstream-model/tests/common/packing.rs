@@ -1,11 +1,11 @@
 //! How a step's input lies on the streams of any profile, and its output back: words, rows, beats,
 //! stripes, padding, written from the interface's tables.
 
-use bitstream_model::interface::number::StreamFormat;
-use bitstream_model::interface::profile::{Geometry, Inertia, Variant};
-use bitstream_model::interface::record::{BEAT_BYTES, Beat};
-use bitstream_model::interface::stripe::Stripe;
 use half::f16;
+use pgs_interface::number::StreamFormat;
+use pgs_interface::profile::{Geometry, Inertia, Variant};
+use pgs_interface::record::{BEAT_BYTES, Beat};
+use pgs_interface::stripe::Stripe;
 
 use super::scene::{Body, Collision, Lane, Step};
 

@@ -1,11 +1,11 @@
 //! Steps that are seen with and without replaying, and what they are made of.
 
-use bitstream_model::interface::control;
-use bitstream_model::interface::number::Numbers;
-use bitstream_model::interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
-use bitstream_model::interface::record::Beat;
-use bitstream_model::interface::stripe::{Stripe, Stripes};
 use bitstream_model::{BoardConfig, Counts, FaultPlan, PacketCount, RegisterAccess, ViolationKind};
+use pgs_interface::control;
+use pgs_interface::number::Numbers;
+use pgs_interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
+use pgs_interface::record::Beat;
+use pgs_interface::stripe::{Stripe, Stripes};
 
 use super::packing::result_beats;
 use super::ring::WHOLE;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use bitstream_model::Direction;
-use bitstream_model::interface::axi_dma::{CURDESC, CURDESC_MSB, TAILDESC, TAILDESC_MSB};
-use bitstream_model::interface::descriptor::{
+use pgs_interface::axi_dma::{CURDESC, CURDESC_MSB, TAILDESC, TAILDESC_MSB};
+use pgs_interface::descriptor::{
     BUFFER, BUFFER_MSB, BYTES, CONTROL, NXTDESC, NXTDESC_MSB, STATUS, WORDS, control,
 };
 

@@ -1,9 +1,9 @@
 //! A step's input and output as plain numbers.
 
-use bitstream_model::interface::control;
-use bitstream_model::interface::profile::{FLOAT, Variant};
-use bitstream_model::interface::record::Beat;
-use bitstream_model::timing::StepShape;
+use bitstream_model::estimate::StepShape;
+use pgs_interface::control;
+use pgs_interface::profile::{FLOAT, Variant};
+use pgs_interface::record::Beat;
 
 use super::Host;
 use super::packing;
@@ -263,7 +263,7 @@ trait Moved {
     fn moved(self, offset: u32) -> Self;
 }
 
-impl Moved for bitstream_model::interface::register::Register {
+impl Moved for pgs_interface::register::Register {
     fn moved(self, offset: u32) -> Self {
         Self { offset, ..self }
     }

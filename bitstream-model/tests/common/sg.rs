@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use bitstream_model::interface::axi_dma::{DMASR, dmacr, dmasr};
-use bitstream_model::interface::control::{self, ap_ctrl, irq};
-use bitstream_model::interface::descriptor::status;
-use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use bitstream_model::{BoardConfig, Direction};
+use pgs_interface::axi_dma::{DMASR, dmacr, dmasr};
+use pgs_interface::control::{self, ap_ctrl, irq};
+use pgs_interface::descriptor::status;
+use pgs_interface::record::{BEAT_BYTES, Beat};
 
 use super::packing::{result_beats, unpack};
 use super::ring::{EOF, Ring, SOF};

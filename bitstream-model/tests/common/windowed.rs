@@ -1,8 +1,8 @@
 //! How a step lies on the streams of a design that streams the collisions once: places, marks, records in
 //! the order in which bodies come and go.
 
-use bitstream_model::interface::profile::{Flow, Variant, Window};
-use bitstream_model::interface::record::live;
+use pgs_interface::profile::{Flow, Variant, Window};
+use pgs_interface::record::live;
 
 use super::packing::{beats, collision_rows, deal, pose_rows, velocity_rows};
 use super::scene::{Body, Collision, Lane, Step};

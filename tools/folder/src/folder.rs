@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::io::{BufWriter, ErrorKind, Read, Write as _};
 use std::path::{Path, PathBuf};
 
-use crew::chunks::Chunks;
+use pgs_support::chunks::Chunks;
 use thiserror::Error;
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 

@@ -1,6 +1,6 @@
 //! This file builds the scene and holds its bodies and collisions.
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
 
 use crate::detect::{Detector, Geometries};

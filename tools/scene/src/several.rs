@@ -1,6 +1,6 @@
 //! This file builds a pile of several shapes and masses.
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 use zynq_pgs::{Body, Shape};
 
 use crate::build::{at_rest, check_drop};

@@ -7,7 +7,7 @@
 //! Numbers are drawn by `SplitMix64` and every sum is f32 in a written order: a seed gives the same
 //! bits everywhere.
 
-use crew::float_env::standard;
+use pgs_support::float_env::standard;
 use zynq_pgs::{Body, Collision, Contact, Shape};
 
 use crate::build::at_rest;

@@ -2,8 +2,8 @@
 #![allow(unsafe_code, reason = "Rust does not say what it computes in a foreign environment")]
 #![allow(clippy::print_stdout, reason = "what is skipped is said")]
 
-use crew::float_env::foreign::{Environment, environments, under};
-use crew::float_env::standard;
+use pgs_support::float_env::foreign::{Environment, environments, under};
+use pgs_support::float_env::standard;
 use scene::{Scene, SceneOptions, ShapesOptions, Spheres};
 use zynq_pgs::{Body, Collision};
 

@@ -1,11 +1,11 @@
 //! This file is one collision on its way through the passes, and what its index words say.
 
-use super::super::decode::Collision;
-use super::super::segment::PacketError;
 use super::super::solver::Impulses;
+use crate::accelerator::records::decode::Collision;
+use crate::accelerator::records::segment::PacketError;
 use crate::cast::register;
-use crate::interface::control::ErrorCode;
-use crate::interface::record::{CONTACT_POINTS, live};
+use pgs_interface::control::ErrorCode;
+use pgs_interface::record::{CONTACT_POINTS, live};
 
 /// A collision's use of a place.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

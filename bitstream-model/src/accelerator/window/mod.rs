@@ -12,18 +12,16 @@
 //! `flow.rs` says which pass may issue when, `session.rs` works through what has arrived. `check.rs`
 //! says what cannot be built. What happens to one collision in one pass is that of every other design.
 
-mod check;
 mod entry;
 mod flow;
 mod place;
 mod session;
 
-pub(crate) use check::contradiction;
 pub(super) use session::Windowed;
 
 use super::{Accelerator, Phase};
-use crate::interface::control::{COLLISIONS, ErrorCode, window, window_capacity};
-use crate::interface::profile::{Flow, Window};
+use pgs_interface::control::{COLLISIONS, ErrorCode, window, window_capacity};
+use pgs_interface::profile::{Flow, Window};
 
 /// The WINDOW register.
 pub(super) fn units(flow: &Flow) -> u32 {

@@ -1,22 +1,22 @@
 //! This file works through what has arrived: it lets passes issue, bodies come alive and leave, cycle
 //! by cycle, until something is missing on a stream.
 
-use super::super::decode;
-use super::super::inertia::{Isotropic, World};
-use super::super::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
-use super::super::results::Results;
-use super::super::segment::{PacketError, Segment};
 use super::super::solver::{Impulses, Mass, Velocity};
 use super::super::{Accelerator, Phase};
 use super::entry::{Entry, Use};
 use super::flow::{Flow, NEVER, Next};
 use super::place::Place;
+use crate::accelerator::arithmetic::inertia::{Isotropic, World};
+use crate::accelerator::arithmetic::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
+use crate::accelerator::records::decode;
+use crate::accelerator::records::results::Results;
+use crate::accelerator::records::segment::{PacketError, Segment};
+use crate::board::stream::Stream;
 use crate::cast::register;
 use crate::config::Subnormals;
-use crate::interface::control::ErrorCode;
-use crate::interface::number::Precision;
-use crate::interface::profile::Inertia;
-use crate::stream::Stream;
+use pgs_interface::control::ErrorCode;
+use pgs_interface::number::Precision;
+use pgs_interface::profile::Inertia;
 
 /// Cycles for which the passes go on while a stream lacks something, before the streams are looked
 /// at again.

@@ -1,7 +1,7 @@
 //! This file keeps bodies and collisions in one array of numbers each, as an engine with records of
 //! its own would: fields anywhere in a record, and words between them that nobody may change.
 
-use crew::chunks::Chunks;
+use pgs_support::chunks::Chunks;
 use zynq_pgs::{Bodies, Body, CONTACT_POINTS, Collision, Collisions, Contact, Pose, Velocity};
 
 /// What lies between the fields.

@@ -6,7 +6,7 @@
 //! is known without looking at pairs: each has moved by something between the least and the most that
 //! any has, and of a pile that falls as a whole these are the same.
 
-use crew::Crew;
+use pgs_support::Crew;
 
 use super::bounds::{Bounds, GAP};
 use super::cells::{Cells, GAP_MAX};

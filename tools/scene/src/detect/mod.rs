@@ -18,7 +18,7 @@ mod reduce;
 use std::num::NonZero;
 use std::thread;
 
-use crew::Crew;
+use pgs_support::Crew;
 use zynq_pgs::{Body, Collision};
 
 use bounds::{Bounds, GAP};

@@ -1,9 +1,9 @@
 //! This file holds `mixed` against `float`: what the first design beyond the thesis gains.
 
 use bitstream_model::Bandwidth;
+use bitstream_model::estimate::thesis::recorded::FLOAT_DESIGN;
+use bitstream_model::estimate::{MemoryUse, PortAccount, Records, StepTime};
 use bitstream_model::interface::profile::{FLOAT, MIXED, Variant};
-use bitstream_model::timing::thesis::recorded::FLOAT_DESIGN;
-use bitstream_model::timing::{MemoryUse, PortAccount, Records, StepTime};
 
 use super::ports::PUMP;
 use super::report::{Cell, Kind, Table, text};

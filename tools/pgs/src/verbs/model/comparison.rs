@@ -4,12 +4,12 @@
 //! is modelled.
 
 use bitstream_model::Bandwidth;
-use bitstream_model::interface::profile::Variant;
-use bitstream_model::timing::thesis::amdahl;
-use bitstream_model::timing::thesis::recorded::{
+use bitstream_model::estimate::thesis::amdahl;
+use bitstream_model::estimate::thesis::recorded::{
     ACCELERATED_SHARE, CPU, Design, GPU, Platform, ZCU102_WATTS,
 };
-use bitstream_model::timing::{Records, StepTime};
+use bitstream_model::estimate::{Records, StepTime};
+use bitstream_model::interface::profile::Variant;
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, difference};

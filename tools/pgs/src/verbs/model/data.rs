@@ -1,7 +1,7 @@
 //! This file has Tables 4.1 to 4.6: words in and out, before and after each reduction.
 
-use bitstream_model::timing::thesis::data::{DataTable, TABLES};
-use bitstream_model::timing::{Records, StepTraffic};
+use bitstream_model::estimate::thesis::data::{DataTable, TABLES};
+use bitstream_model::estimate::{Records, StepTraffic};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, printed_mib};

@@ -1,10 +1,10 @@
 //! This file is each profile's estimate for programs.
 
-use bitstream_model::interface::profile::Variant;
-use bitstream_model::timing::thesis::recorded::Design;
-use bitstream_model::timing::{
+use bitstream_model::estimate::thesis::recorded::Design;
+use bitstream_model::estimate::{
     MemoryUse, OnChipArray, PortAccount, Records, StepCycles, StepTime, StreamDemand,
 };
+use bitstream_model::interface::profile::Variant;
 use serde_json::{Value, json};
 
 use super::scene::Scene;

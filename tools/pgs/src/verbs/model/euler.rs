@@ -1,6 +1,6 @@
 //! This file has Figure 2.6: a fall of ten seconds by explicit Euler.
 
-use bitstream_model::timing::thesis::euler::{exact, explicit, explicit_single};
+use bitstream_model::estimate::thesis::euler::{exact, explicit, explicit_single};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::difference;

@@ -1,8 +1,8 @@
 //! This file has the tables of on-chip memory, logic and streams.
 
 use bitstream_model::Bandwidth;
-use bitstream_model::timing::thesis::recorded::Design;
-use bitstream_model::timing::{BLOCKS, HP_PORTS, MemoryUse, StreamDemand};
+use bitstream_model::estimate::thesis::recorded::Design;
+use bitstream_model::estimate::{BLOCKS, HP_PORTS, MemoryUse, StreamDemand};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, printed_mib, yes_or_no};

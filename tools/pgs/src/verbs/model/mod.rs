@@ -17,8 +17,8 @@ mod window;
 use std::io::Write;
 
 use bitstream_model::Bandwidth;
+use bitstream_model::estimate::{StepShape, thesis};
 use bitstream_model::interface::profile::{Inertia, MIXED, PROFILES, Profile, Variant};
-use bitstream_model::timing::{StepShape, thesis};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use serde_json::json;

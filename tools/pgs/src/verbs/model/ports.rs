@@ -1,7 +1,7 @@
 //! This file has the tables of the block RAM ports: which initiation interval they allow, and who
 //! has which port when.
 
-use bitstream_model::timing::{Access, AccessKind, PortAccount, PortUse, Slot};
+use bitstream_model::estimate::{Access, AccessKind, PortAccount, PortUse, Slot};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, yes_or_no};

@@ -1,8 +1,8 @@
 //! This file is what was asked for: a step, profiles, bandwidths.
 
 use bitstream_model::Bandwidth;
+use bitstream_model::estimate::{StepShape, thesis};
 use bitstream_model::interface::profile::Variant;
-use bitstream_model::timing::{StepShape, thesis};
 
 use super::report::Cell;
 

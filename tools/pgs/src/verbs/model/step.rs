@@ -1,9 +1,9 @@
 //! This file has the tables of cycles and time of a step.
 
 use bitstream_model::Bandwidth;
+use bitstream_model::estimate::thesis::recorded::{Design, MEMORY_BANDWIDTH};
+use bitstream_model::estimate::{MemoryUse, Records, StepCycles, StepTime};
 use bitstream_model::interface::profile::{Inertia, Variant};
-use bitstream_model::timing::thesis::recorded::{Design, MEMORY_BANDWIDTH};
-use bitstream_model::timing::{MemoryUse, Records, StepCycles, StepTime};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, difference, mib, yes_or_no};

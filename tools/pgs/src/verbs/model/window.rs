@@ -1,10 +1,10 @@
 //! This file shows the designs that stream the collisions once: cycles, bytes, memory, logic.
 
 use bitstream_model::Bandwidth;
-use bitstream_model::interface::profile::{FLOAT, Flow, Variant, Window};
-use bitstream_model::timing::{
+use bitstream_model::estimate::{
     MemoryUse, Records, StepTime, StepTraffic, WindowCycles, WindowLogic, WindowStep,
 };
+use bitstream_model::interface::profile::{FLOAT, Flow, Variant, Window};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, yes_or_no};

@@ -4,8 +4,8 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use bitstream_model::timing::thesis::{self, recorded};
-use bitstream_model::timing::{Records, StepCycles, StepShape};
+use bitstream_model::estimate::thesis::{self, recorded};
+use bitstream_model::estimate::{Records, StepCycles, StepShape};
 use scene::{Scene, moving_mass, penetration};
 use serde_json::{Value, json};
 use zynq_pgs::interface::profile::Profile;

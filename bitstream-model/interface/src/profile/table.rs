@@ -1,0 +1,169 @@
+//! This file is the table of profiles.
+//!
+//! The depths of every profile are those of a pipeline generated for this purpose at two cycles a
+//! collision and bit-exact with the vectors, until a better source exists; the thesis gives none.
+
+use super::{Depth, Flow, Geometry, OnChipMemory, Profile, Window};
+use crate::number::{Numbers, StreamFormat};
+use crate::stripe::{Stripe, Stripes};
+
+const CONTACT: Depth = Depth { fill: 364, window: 316 };
+const FRICTION: Depth = Depth { fill: 306, window: 182 };
+
+/// Block RAM of the XCZU9EG as the thesis counts it, bytes.
+const BLOCK_RAM: u32 = 4 << 20;
+
+/// One copy of the velocities, at the accelerator's clock.
+const ONE_COPY: OnChipMemory =
+    OnChipMemory { bytes: BLOCK_RAM, velocity_copies: 1, pump: 1, shape_index_bytes: 1 };
+
+/// One 32-bit stream each way, f32, bound by it (thesis §5.3).
+///
+/// The thesis' first design ran conversion, contact solver, friction solver and integration one
+/// after the other, with everything between them in DDR, and gives no figures for it. This one
+/// keeps the fused conversion, so that its driver is that of every profile: what it costs is a lower
+/// bound for the thesis' design.
+pub const NAIVE: Profile = Profile {
+    id: 2,
+    name: "naive",
+    geometry: Geometry::Absolute,
+    numbers: Numbers::F32,
+    mm2s_widths: &[32],
+    s2mm_widths: &[32],
+    stripes: Stripes::new(
+        Stripe { streams: &[0], padded: false },
+        Stripe { streams: &[0], padded: false },
+    ),
+    initiation_interval: 28,
+    collisions_per_issue: 1,
+    flow: Flow::Passes,
+    contact: CONTACT,
+    friction: FRICTION,
+    clock_khz: 275_000,
+    memory: ONE_COPY,
+    body_capacity: 131_072,
+    shape_capacity: 64,
+    source: "thesis §5.3",
+};
+
+/// Four 128-bit streams, f32, one collision every two cycles at 275 MHz (thesis §5.4).
+pub const FLOAT: Profile = Profile {
+    id: 1,
+    name: "float",
+    geometry: Geometry::Absolute,
+    numbers: Numbers::F32,
+    mm2s_widths: &[128; 4],
+    s2mm_widths: &[128; 4],
+    stripes: Stripes::new(
+        Stripe { streams: &[0, 1, 2, 3, 0, 1, 2], padded: false },
+        Stripe { streams: &[0, 1, 2, 3], padded: false },
+    ),
+    initiation_interval: 2,
+    collisions_per_issue: 1,
+    flow: Flow::Passes,
+    contact: CONTACT,
+    friction: FRICTION,
+    clock_khz: 275_000,
+    memory: ONE_COPY,
+    body_capacity: 131_072,
+    shape_capacity: 64,
+    source: "thesis §5.4, §4.4.2",
+};
+
+/// Two 128-bit streams and one of 64 bits, sixteen bits throughout, two collisions every three
+/// cycles at 250 MHz, two copies of the velocities (thesis §5.5).
+pub const HALF: Profile = Profile {
+    id: 3,
+    name: "half",
+    geometry: Geometry::Absolute,
+    numbers: Numbers::BINARY16,
+    mm2s_widths: &[128, 128, 64],
+    s2mm_widths: &[128, 128, 64],
+    stripes: Stripes::new(
+        Stripe { streams: &[0, 0, 0, 1, 1, 1, 2], padded: true },
+        Stripe { streams: &[0, 0, 1, 1, 2], padded: true },
+    ),
+    initiation_interval: 3,
+    collisions_per_issue: 2,
+    flow: Flow::Passes,
+    contact: CONTACT,
+    friction: FRICTION,
+    clock_khz: 250_000,
+    memory: OnChipMemory { velocity_copies: 2, ..ONE_COPY },
+    body_capacity: 131_072,
+    shape_capacity: 64,
+    source: "thesis §5.5, §4.4.2",
+};
+
+/// Three 128-bit streams, collisions relative to body A in binary16, everything else in f32, one
+/// collision a cycle at 250 MHz with block RAM at twice that clock. This project's.
+pub const MIXED: Profile = Profile {
+    id: 4,
+    name: "mixed",
+    geometry: Geometry::Relative,
+    numbers: Numbers { collisions: StreamFormat::Binary16, ..Numbers::F32 },
+    mm2s_widths: &[128; 3],
+    s2mm_widths: &[128; 3],
+    stripes: Stripes::new(
+        Stripe { streams: &[0, 1, 2], padded: false },
+        Stripe { streams: &[0, 1, 2], padded: false },
+    ),
+    initiation_interval: 1,
+    collisions_per_issue: 1,
+    flow: Flow::Passes,
+    contact: CONTACT,
+    friction: FRICTION,
+    clock_khz: 250_000,
+    memory: OnChipMemory { pump: 2, ..ONE_COPY },
+    body_capacity: 131_072,
+    shape_capacity: 64,
+    source: "this project",
+};
+
+/// Collisions on two streams, velocities and poses on one each, results on all four: what is
+/// needed at different times cannot wait for each other.
+const WINDOWED_STRIPES: Stripes = Stripes {
+    collisions: Stripe { streams: &[0, 1], padded: false },
+    velocities: Stripe { streams: &[2], padded: false },
+    poses: Stripe { streams: &[3], padded: false },
+    results: Stripe { streams: &[0, 1, 2, 3], padded: false },
+};
+
+/// Two contact and two friction units, each with half of the passes.
+const WINDOW: Window = Window { contact_units: 2, friction_units: 2, slots: 8192, lag: 2816 };
+
+/// Collisions stream once while eight passes run one behind the other, f32, relative coordinates
+/// (thesis §4.7 and §7.3 propose it). This project's.
+pub const WINDOWED: Profile = Profile {
+    id: 5,
+    name: "windowed",
+    geometry: Geometry::Relative,
+    numbers: Numbers::F32,
+    mm2s_widths: &[128; 4],
+    s2mm_widths: &[128; 4],
+    stripes: WINDOWED_STRIPES,
+    initiation_interval: 2,
+    collisions_per_issue: 1,
+    flow: Flow::Window(WINDOW),
+    contact: CONTACT,
+    friction: FRICTION,
+    clock_khz: 275_000,
+    memory: OnChipMemory { pump: 2, ..ONE_COPY },
+    body_capacity: 1 << 20,
+    shape_capacity: 64,
+    source: "this project, after thesis §4.7",
+};
+
+/// As `windowed`, with sixteen-bit arithmetic, collisions and velocities in binary16, poses in f32.
+/// This project's.
+pub const WINDOWED16: Profile = Profile {
+    id: 6,
+    name: "windowed16",
+    numbers: Numbers { poses: StreamFormat::F32, ..Numbers::BINARY16 },
+    initiation_interval: 3,
+    collisions_per_issue: 2,
+    ..WINDOWED
+};
+
+/// Every profile.
+pub const PROFILES: &[&Profile] = &[&NAIVE, &FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16];

@@ -1,0 +1,164 @@
+//! This file is what both flows do to one record: a body as it comes in, a collision in one pass, a body
+//! as it leaves.
+
+use super::Accelerator;
+use super::arithmetic::inertia;
+use super::arithmetic::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
+use super::integrate::{Pose, integrate};
+use super::records::decode::{self, Collision};
+use super::records::segment::{PacketError, Reader};
+use super::solver::{self, Impulses, Mass, Velocity};
+use crate::cast::register;
+use crate::config::Subnormals;
+use pgs_interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
+use pgs_interface::number::{Precision, StreamFormat};
+use pgs_interface::profile::Inertia;
+use pgs_interface::record::velocity;
+
+/// The integer part, toward zero and stopped at the ends, as the accumulator takes it.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+fn to_fixed(value: f64) -> u64 {
+    value as u64
+}
+
+/// The normal impulses of a collision after the last contact pass, as they are counted.
+#[inline]
+pub(crate) fn fixed_impulse<U: Format>(impulses: &Impulses) -> u64 {
+    let sum = f64::from(solver::normal_sum::<U>(impulses));
+    to_fixed(sum * f64::from(1_u32 << IMPULSE_SUM_FRACTION_BITS))
+}
+
+/// A body as it is loaded.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrival {
+    pub(super) velocity: Velocity,
+    pub(super) shape: u8,
+    /// With world inertia.
+    pub(super) inertia: inertia::Stored,
+}
+
+impl Accelerator {
+    /// Numbers as an on-chip array of that precision holds them.
+    #[inline]
+    fn stored<const N: usize>(&self, precision: Precision, numbers: [f32; N]) -> [f32; N] {
+        fn rounded<F: Format, const N: usize>(numbers: [f32; N]) -> [f32; N] {
+            numbers.map(|number| Number::<F>::new(number).value())
+        }
+        match (precision, self.config.subnormals) {
+            // What the arithmetic left, as it is.
+            (Precision::F32, _) => numbers,
+            (Precision::Binary16, Subnormals::Keep) => rounded::<Half, N>(numbers),
+            (Precision::Binary16, Subnormals::Flush) => rounded::<HalfFlushed, N>(numbers),
+        }
+    }
+
+    #[inline]
+    pub(super) fn stored_velocity(&self, velocity: Velocity) -> Velocity {
+        let precision = self.variant.numbers.velocities;
+        Velocity {
+            linear: self.stored(precision, velocity.linear),
+            angular: self.stored(precision, velocity.angular),
+        }
+    }
+
+    /// The next velocity record, that of body `body`, as the on-chip arrays hold it.
+    pub(super) fn arrival(
+        &self,
+        body: usize,
+        reader: &mut Reader<'_>,
+    ) -> Result<Arrival, PacketError> {
+        let format = self.variant.numbers.bodies;
+        let ((velocity, shape), inertia) = match self.variant.inertia {
+            Inertia::Isotropic => {
+                let rows = reader.record::<{ velocity::ROWS }>();
+                (decode::velocity(format, &rows), [0.0; 6])
+            }
+            Inertia::World => {
+                let rows = reader.record::<{ velocity::WORLD_ROWS }>();
+                let inertia = decode::world_inertia(format, &rows);
+                let rows = [rows[velocity::LINEAR], rows[velocity::ANGULAR]];
+                let inertia = self.stored(self.variant.numbers.velocities, inertia);
+                (decode::velocity(format, &rows), inertia)
+            }
+        };
+        let known = (shape as usize) < self.registers.shapes().len();
+        let Some(shape) = u8::try_from(shape).ok().filter(|_| known) else {
+            return Err(PacketError {
+                code: ErrorCode::ShapeIndex,
+                channel: 0,
+                beat: register(body),
+            });
+        };
+        // A static body's words are not looked at: thesis16 has none for 0.
+        let moves = self.registers.shapes()[usize::from(shape)].inverse_mass != 0.0;
+        let velocity = if moves { velocity } else { Velocity::default() };
+        Ok(Arrival { velocity: self.stored_velocity(velocity), shape, inertia })
+    }
+
+    /// Mass properties of a body of that shape; with world inertia its own.
+    #[inline]
+    pub(super) fn mass(&self, shape: u8, inertia: inertia::Stored) -> Mass {
+        let shape = self.registers.shapes()[usize::from(shape)];
+        let inverse_inertia = match self.variant.inertia {
+            Inertia::Isotropic => [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
+            Inertia::World => inertia,
+        };
+        Mass { inverse_mass: shape.inverse_mass, inverse_inertia }
+    }
+
+    /// What a pass does to one collision: velocities and impulses as they are written back.
+    #[inline]
+    pub(super) fn compute<R: Format, U: Format, I: inertia::Inertia>(
+        &mut self,
+        pass: u32,
+        collision: &Collision,
+        masses: &[Mass; 2],
+        velocities: &mut [Velocity; 2],
+        impulses: &mut Impulses,
+    ) {
+        let parameters = &self.arguments.solver;
+        let contacts = self.arguments.contact_iterations;
+        let precision = self.variant.numbers.impulses;
+        if pass < contacts {
+            solver::contact::<R, U, I>(collision, parameters, masses, velocities, impulses);
+            *impulses = self.stored(precision, *impulses);
+            if pass + 1 == contacts {
+                self.counters.impulse_sum =
+                    self.counters.impulse_sum.saturating_add(fixed_impulse::<U>(impulses));
+            }
+        } else {
+            if pass == contacts {
+                let sum = solver::normal_sum::<U>(impulses);
+                *impulses = self.stored(precision, [sum, 0.0, 0.0, 0.0]);
+            }
+            solver::friction::<R, U, I>(collision, parameters, masses, velocities, impulses);
+            *impulses = self.stored(precision, *impulses);
+        }
+        *velocities = velocities.map(|velocity| self.stored_velocity(velocity));
+    }
+
+    /// The state that a body leaves with.
+    pub(super) fn integrated(
+        &self,
+        moves: bool,
+        pose: Pose,
+        velocity: Velocity,
+    ) -> (Pose, Velocity) {
+        if !moves || !self.arguments.integrate {
+            return (pose, velocity);
+        }
+        let numbers = self.variant.numbers;
+        let precision = match numbers.poses {
+            // A position in f32 moves by less than a binary16 step.
+            StreamFormat::F32 => Precision::F32,
+            StreamFormat::Binary16 | StreamFormat::Thesis16 => numbers.updates,
+        };
+        let step = match (precision, self.config.subnormals) {
+            (Precision::F32, Subnormals::Keep) => integrate::<Single>,
+            (Precision::F32, Subnormals::Flush) => integrate::<SingleFlushed>,
+            (Precision::Binary16, Subnormals::Keep) => integrate::<Half>,
+            (Precision::Binary16, Subnormals::Flush) => integrate::<HalfFlushed>,
+        };
+        step(&self.arguments.integration, &pose, &velocity)
+    }
+}

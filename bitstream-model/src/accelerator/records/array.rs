@@ -1,0 +1,83 @@
+//! This file says how the records of an array lie in beats, and the beats on streams.
+//!
+//! A row is a beat of 32-bit words, or half a beat of sixteen-bit words, in which case two records
+//! may share a beat.
+
+use super::striping::{PerStream, Striping};
+use pgs_interface::number::StreamFormat;
+use pgs_interface::record::{Beat, LANES};
+
+/// The four words of a row. Sixteen-bit ones are in the low bits.
+pub(crate) type Row = [u32; LANES];
+
+/// Records of one kind.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Records {
+    pub(crate) format: StreamFormat,
+    /// Rows of a record.
+    pub(crate) rows: usize,
+    pub(crate) count: usize,
+    /// Records come in as many together; padding records fill the last ones up.
+    pub(crate) together: usize,
+}
+
+/// An array of records on its streams.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Array {
+    pub(crate) striping: Striping,
+    pub(crate) rows: usize,
+    pub(crate) rows_per_beat: usize,
+    pub(crate) records: usize,
+    /// Beats, with padding, altogether and on each stream.
+    pub(crate) beats: usize,
+    pub(crate) packets: PerStream,
+}
+
+impl Array {
+    pub(crate) fn new(striping: Striping, records: Records) -> Self {
+        let rows_per_beat = (u32::BITS / records.format.bits()) as usize;
+        let rows = records.count.next_multiple_of(records.together) * records.rows;
+        let beats = striping.padded(rows.div_ceil(rows_per_beat));
+        Self {
+            striping,
+            rows: records.rows,
+            rows_per_beat,
+            records: records.count,
+            beats,
+            packets: striping.counts(beats),
+        }
+    }
+
+    /// Beats that belong to the first `records` records alone; after the last one, the padding too.
+    pub(crate) fn beats_of(&self, records: usize) -> usize {
+        if records == self.records { self.beats } else { records * self.rows / self.rows_per_beat }
+    }
+
+    /// Records that lie within the first `beats` beats, the last one with the padding behind it.
+    pub(crate) fn records_in(&self, beats: usize) -> usize {
+        if beats >= self.beats {
+            self.records
+        } else {
+            (beats * self.rows_per_beat / self.rows).min(self.records.saturating_sub(1))
+        }
+    }
+
+    /// Clock cycles that the streams take for the first `records` records.
+    pub(crate) fn cycles(&self, records: usize) -> u64 {
+        self.striping.cycles(self.beats_of(records))
+    }
+}
+
+/// Row `half` of a beat that holds two.
+#[inline]
+pub(crate) fn half_of(Beat(words): Beat, half: usize) -> Row {
+    let [low, high] = [words[2 * half], words[2 * half + 1]];
+    [low & 0xFFFF, low >> 16, high & 0xFFFF, high >> 16]
+}
+
+/// The beat of two rows of sixteen-bit words.
+pub(crate) fn beat_of(first: Row, second: Row) -> Beat {
+    let half = |[a, b, c, d]: Row| [a | (b << 16), c | (d << 16)];
+    let ([a, b], [c, d]) = (half(first), half(second));
+    Beat([a, b, c, d])
+}

@@ -1,0 +1,147 @@
+//! This file decodes rows into records and encodes results, from the interface's layouts alone.
+//!
+//! What a word means is looked up for every word; inlined where the format is known, the look-up is
+//! gone.
+
+use super::array::Row;
+use crate::accelerator::arithmetic::sixteen;
+use crate::accelerator::integrate::Pose;
+use crate::accelerator::solver::Velocity;
+use pgs_interface::number::StreamFormat;
+use pgs_interface::record::{
+    CONTACT_POINTS, LANES, WORD_LANE, collision, pose, relative, result, velocity,
+};
+
+/// A number in a word of that format.
+#[inline(always)]
+pub(crate) fn number(format: StreamFormat, word: u32) -> f32 {
+    match format {
+        StreamFormat::F32 => f32::from_bits(word),
+        StreamFormat::Binary16 => sixteen::from_binary16(word),
+        StreamFormat::Thesis16 => sixteen::from_thesis16(word),
+    }
+}
+
+/// The word of that format nearest to a number.
+#[inline(always)]
+fn word(format: StreamFormat, number: f32) -> u32 {
+    match format {
+        StreamFormat::F32 => number.to_bits(),
+        StreamFormat::Binary16 => sixteen::to_binary16(number),
+        StreamFormat::Thesis16 => sixteen::to_thesis16(number),
+    }
+}
+
+#[inline(always)]
+fn vec3(format: StreamFormat, [x, y, z, _]: Row) -> [f32; 3] {
+    [number(format, x), number(format, y), number(format, z)]
+}
+
+#[inline(always)]
+fn vec4(format: StreamFormat, [x, y, z, w]: Row) -> [f32; 4] {
+    [number(format, x), number(format, y), number(format, z), number(format, w)]
+}
+
+/// A collision as it comes in. `count` is as received and may be out of range.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Collision {
+    pub(crate) body_a: u32,
+    pub(crate) body_b: u32,
+    pub(crate) count: usize,
+    pub(crate) normal: [f32; 3],
+    pub(crate) position_a: [f32; 3],
+    pub(crate) position_b: [f32; 3],
+    /// x, y, z and distance.
+    pub(crate) contacts: [[f32; 4]; CONTACT_POINTS],
+}
+
+impl Collision {
+    /// A record in world coordinates.
+    #[inline(always)]
+    pub(crate) fn absolute(format: StreamFormat, rows: &[Row; collision::ROWS]) -> Self {
+        let contact = |k: usize| vec4(format, rows[collision::CONTACTS + k]);
+        Self {
+            body_a: rows[collision::BODY_A][WORD_LANE],
+            body_b: rows[collision::BODY_B][WORD_LANE],
+            count: rows[collision::NORMAL][WORD_LANE] as usize,
+            normal: vec3(format, rows[collision::NORMAL]),
+            position_a: vec3(format, rows[collision::BODY_A]),
+            position_b: vec3(format, rows[collision::BODY_B]),
+            contacts: [contact(0), contact(1), contact(2), contact(3)],
+        }
+    }
+
+    /// A record relative to body A, which then stands at the origin. Points at a distance of
+    /// +infinity are left out.
+    #[inline(always)]
+    pub(crate) fn relative(format: StreamFormat, rows: &[Row; relative::ROWS]) -> Self {
+        // All words alike, for the compiler to take several at once; those that are none are not used.
+        let mut numbers = [[0.0_f32; LANES]; relative::ROWS];
+        for (to, word) in numbers.as_flattened_mut().iter_mut().zip(rows.as_flattened()) {
+            *to = number(format, *word);
+        }
+        let mut contacts = [[0.0; 4]; CONTACT_POINTS];
+        let mut count = 0;
+        for contact in &numbers[relative::CONTACTS..] {
+            if contact[WORD_LANE].to_bits() != f32::INFINITY.to_bits() {
+                contacts[count] = *contact;
+                count += 1;
+            }
+        }
+        let vec3 = |[x, y, z, _]: [f32; LANES]| [x, y, z];
+        Self {
+            body_a: rows[relative::NORMAL][WORD_LANE],
+            body_b: rows[relative::OFFSET][WORD_LANE],
+            count,
+            normal: vec3(numbers[relative::NORMAL]),
+            position_a: [0.0; 3],
+            position_b: vec3(numbers[relative::OFFSET]),
+            contacts,
+        }
+    }
+}
+
+/// A velocity record: the velocity and the shape index.
+#[inline(always)]
+pub(crate) fn velocity(
+    format: StreamFormat,
+    [linear, angular]: &[Row; velocity::ROWS],
+) -> (Velocity, u32) {
+    const _: () = assert!(velocity::LINEAR == 0 && velocity::ANGULAR == 1);
+    let velocity = Velocity { linear: vec3(format, *linear), angular: vec3(format, *angular) };
+    (velocity, linear[WORD_LANE])
+}
+
+/// The rows that world inertia adds to a velocity record: xx, yy, zz, xy, xz, yz.
+pub(crate) fn world_inertia(format: StreamFormat, rows: &[Row; velocity::WORLD_ROWS]) -> [f32; 6] {
+    let [xx, yy, zz] = vec3(format, rows[velocity::DIAGONAL]);
+    let [xy, xz, yz] = vec3(format, rows[velocity::OFF_DIAGONAL]);
+    [xx, yy, zz, xy, xz, yz]
+}
+
+/// A pose record.
+#[inline(always)]
+pub(crate) fn pose(format: StreamFormat, rows: &[Row; pose::ROWS]) -> Pose {
+    Pose {
+        position: vec3(format, rows[pose::POSITION]),
+        orientation: vec4(format, rows[pose::ORIENTATION]),
+    }
+}
+
+/// The result record of a body.
+#[inline(always)]
+pub(crate) fn result(
+    format: StreamFormat,
+    pose: &Pose,
+    velocity: &Velocity,
+) -> [Row; result::ROWS] {
+    let word = |number| word(format, number);
+    let row = |[x, y, z]: [f32; 3], w| [word(x), word(y), word(z), w];
+    let [x, y, z, w] = pose.orientation;
+    let mut rows = [[0; 4]; result::ROWS];
+    rows[result::POSITION] = row(pose.position, 0);
+    rows[result::ORIENTATION] = row([x, y, z], word(w));
+    rows[result::LINEAR] = row(velocity.linear, 0);
+    rows[result::ANGULAR] = row(velocity.angular, 0);
+    rows
+}

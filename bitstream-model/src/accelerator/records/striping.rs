@@ -1,0 +1,279 @@
+//! This file deals the beats of an array out to streams: which stream a beat is on, how many are on
+//! each, how long they take.
+
+use pgs_interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::record::{BEAT_BYTES, pose, result, velocity};
+use pgs_interface::stripe::Stripe;
+
+/// The most streams that a profile has.
+pub(crate) const STREAMS_MAX: usize = DMA_COUNT_MAX;
+/// The most beats of a group.
+pub(crate) const GROUP_MAX: usize = 8;
+
+/// Clock cycles that a beat takes on a stream of that width.
+pub(crate) const fn beat_cycles(width: u32) -> u64 {
+    8 * BEAT_BYTES as u64 / width as u64
+}
+
+/// A count for each stream.
+pub(crate) type PerStream = [usize; STREAMS_MAX];
+
+/// Rows that come for a body at once, of its velocity as of its pose.
+pub(crate) const ROWS_IN: usize = 2;
+/// Rows of a result.
+pub(crate) const ROWS_OUT: usize = 4;
+const _: () = assert!(velocity::ROWS == ROWS_IN && pose::ROWS == ROWS_IN);
+const _: () = assert!(result::ROWS == ROWS_OUT);
+
+/// Streams that take turns, a beat each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Turns {
+    pub(crate) streams: usize,
+}
+
+impl Turns {
+    /// Those of a stripe over all of the streams, if they take turns on it.
+    pub(crate) fn of(stripe: &Stripe, streams: usize) -> Option<Self> {
+        let all = stripe.streams.iter().map(|stream| usize::from(*stream)).eq(0..streams);
+        (all && !stripe.padded).then_some(Self { streams })
+    }
+
+    /// The stream of a beat, and its number there.
+    #[inline(always)]
+    pub(crate) const fn place(self, beat: usize) -> (usize, usize) {
+        (beat % self.streams, beat / self.streams)
+    }
+
+    /// How many of the first `beats` beats are on each stream.
+    #[inline(always)]
+    pub(crate) fn counts(self, beats: usize) -> PerStream {
+        let streams = self.streams;
+        std::array::from_fn(|k| if k < streams { (beats + streams - 1 - k) / streams } else { 0 })
+    }
+
+    /// How many beats in one piece, from the first one, there are when each stream has so many.
+    #[inline]
+    pub(crate) fn contiguous(self, on_stream: impl Fn(usize) -> usize) -> usize {
+        let missing = |k: usize| on_stream(k) * self.streams + k;
+        (0..self.streams).map(missing).min().unwrap_or(0)
+    }
+
+    /// Clock cycles that the first `beats` beats take, one on each stream.
+    pub(crate) fn cycles(self, beats: usize) -> u64 {
+        beats.div_ceil(self.streams) as u64
+    }
+}
+
+/// A stripe over streams of known widths.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Striping {
+    /// Beats of a group.
+    group: usize,
+    padded: bool,
+    /// For each beat of a group its stream, and how many of the group are on each stream before it.
+    place: [(u8, [u8; STREAMS_MAX]); GROUP_MAX],
+    /// For each stream which beats of a group it carries.
+    carried: [[u8; GROUP_MAX]; STREAMS_MAX],
+    /// Beats of a group on each stream.
+    share: [u8; STREAMS_MAX],
+    /// Bits of each stream.
+    widths: [u32; STREAMS_MAX],
+}
+
+impl Striping {
+    /// The stripe of a profile that the configuration has checked.
+    pub(crate) fn new(stripe: &Stripe, widths: &[u32]) -> Self {
+        let mut place = [(0, [0; STREAMS_MAX]); GROUP_MAX];
+        let mut carried = [[0; GROUP_MAX]; STREAMS_MAX];
+        let mut share = [0; STREAMS_MAX];
+        for (beat, (place, stream)) in (0..).zip(place.iter_mut().zip(stripe.streams)) {
+            *place = (*stream, share);
+            let k = usize::from(*stream);
+            carried[k][usize::from(share[k])] = beat;
+            share[k] += 1;
+        }
+        let mut known = [0; STREAMS_MAX];
+        for (known, width) in known.iter_mut().zip(widths) {
+            *known = *width;
+        }
+        Self {
+            group: stripe.streams.len(),
+            padded: stripe.padded,
+            place,
+            carried,
+            share,
+            widths: known,
+        }
+    }
+
+    /// Beats that go out for an array of that many: with the padding of the last group.
+    pub(crate) fn padded(&self, beats: usize) -> usize {
+        if self.padded { beats.next_multiple_of(self.group) } else { beats }
+    }
+
+    /// Walks over the beats from `beat` on: the stream of each, and its number on it.
+    #[inline]
+    pub(crate) fn places(&self, beat: usize) -> Places<'_> {
+        Places { striping: self, group: beat / self.group, at: beat % self.group }
+    }
+
+    /// How many of the first `beats` beats are on each stream.
+    pub(crate) fn counts(&self, beats: usize) -> PerStream {
+        let (groups, rest) = (beats / self.group, beats % self.group);
+        let before = self.place[rest].1;
+        std::array::from_fn(|k| groups * usize::from(self.share[k]) + usize::from(before[k]))
+    }
+
+    /// How many beats in one piece, from the first one, there are when each stream has so many.
+    pub(crate) fn contiguous(&self, on_stream: impl Fn(usize) -> usize) -> usize {
+        let mut beats = usize::MAX;
+        for (k, share) in self.share.into_iter().enumerate() {
+            if share > 0 {
+                // The first beat that this stream does not have.
+                let (have, share) = (on_stream(k), usize::from(share));
+                let missing = usize::from(self.carried[k][have % share]);
+                beats = beats.min(have / share * self.group + missing);
+            }
+        }
+        beats
+    }
+
+    /// Clock cycles that the first `beats` beats take: what the busiest stream takes.
+    pub(crate) fn cycles(&self, beats: usize) -> u64 {
+        let mut cycles = 0;
+        for (beats, width) in self.counts(beats).into_iter().zip(self.widths) {
+            if width > 0 {
+                cycles = cycles.max(beats as u64 * beat_cycles(width));
+            }
+        }
+        cycles
+    }
+}
+
+/// Stream and number on it of one beat after the other.
+#[derive(Debug, Clone)]
+pub(crate) struct Places<'a> {
+    striping: &'a Striping,
+    group: usize,
+    /// Beat of the group.
+    at: usize,
+}
+
+impl Places<'_> {
+    /// The next beat's.
+    #[inline(always)]
+    pub(crate) fn take(&mut self) -> (usize, usize) {
+        let (stream, before) = self.striping.place[self.at];
+        let stream = usize::from(stream);
+        let share = usize::from(self.striping.share[stream]);
+        let number = self.group * share + usize::from(before[stream]);
+        self.at += 1;
+        if self.at == self.striping.group {
+            self.at = 0;
+            self.group += 1;
+        }
+        (stream, number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
+    use pgs_interface::stripe::Stripes;
+
+    fn collisions(profile: &Profile) -> Striping {
+        Striping::new(&profile.stripes.collisions, profile.mm2s_widths)
+    }
+
+    fn bodies(profile: &Profile) -> Striping {
+        Striping::new(&profile.stripes.results, profile.mm2s_widths)
+    }
+
+    #[test]
+    fn beats_lie_as_the_tables_of_the_specification_say() {
+        let first = |striping: &Striping, beats: usize| -> Vec<_> {
+            let mut places = striping.places(0);
+            (0..beats).map(|_| places.take()).collect()
+        };
+        assert_eq!(
+            first(&collisions(&FLOAT), 9),
+            [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (2, 1), (0, 2), (1, 2)]
+        );
+        assert_eq!(
+            first(&collisions(&HALF), 9),
+            [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (0, 3), (0, 4)]
+        );
+        assert_eq!(
+            first(&bodies(&HALF), 7),
+            [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (0, 2), (0, 3)]
+        );
+        assert_eq!(first(&bodies(&MIXED), 4), [(0, 0), (1, 0), (2, 0), (0, 1)]);
+    }
+
+    #[test]
+    fn counts_and_prefixes_agree_with_a_walk() {
+        for profile in [&NAIVE, &FLOAT, &HALF, &MIXED] {
+            for striping in [collisions(profile), bodies(profile)] {
+                let mut walk = striping.places(0);
+                let mut counts = [0; STREAMS_MAX];
+                for beats in 0..40 {
+                    assert_eq!(striping.counts(beats), counts, "{} {beats}", profile.name);
+                    assert_eq!(striping.contiguous(|stream| counts[stream]), beats);
+                    let (stream, number) = walk.take();
+                    assert_eq!(number, counts[stream]);
+                    // A beat too early on the other streams changes nothing.
+                    let ahead = |k: usize| counts[k] + usize::from(k != stream);
+                    if profile.mm2s_widths.len() > 1 {
+                        assert_eq!(striping.contiguous(ahead), beats);
+                    }
+                    counts[stream] += 1;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn streams_that_take_turns_lie_as_their_stripes_say() {
+        for profile in [&FLOAT, &MIXED] {
+            let Stripes { velocities, poses, results, .. } = profile.stripes;
+            for stripe in [velocities, poses, results] {
+                let streams = profile.mm2s_widths.len();
+                let turns = Turns::of(&stripe, streams).expect("they take turns");
+                let striping = Striping::new(&stripe, profile.mm2s_widths);
+                let mut places = striping.places(0);
+                for beats in 0..40 {
+                    assert_eq!(turns.counts(beats), striping.counts(beats), "{beats}");
+                    assert_eq!(turns.cycles(beats), striping.cycles(beats), "{beats}");
+                    assert_eq!(turns.place(beats), places.take(), "{beats}");
+                    let there = turns.counts(beats);
+                    assert_eq!(turns.contiguous(|k| there[k]), beats);
+                    let more = |k: usize| there[k] + k * beats % 3;
+                    assert_eq!(turns.contiguous(more), striping.contiguous(more), "{beats}");
+                }
+            }
+        }
+        let not = [&FLOAT.stripes.collisions, &HALF.stripes.velocities];
+        assert!(not.into_iter().all(|stripe| Turns::of(stripe, 3).is_none()));
+    }
+
+    #[test]
+    fn the_busiest_stream_says_how_long_beats_take() {
+        assert_eq!(bodies(&FLOAT).cycles(77_760), 19_440);
+        assert_eq!(bodies(&FLOAT).cycles(5), 2);
+        // 28 words one after the other.
+        assert_eq!(collisions(&NAIVE).cycles(7), 28);
+        // Three beats on each wide stream take longer than one on the narrow one.
+        assert_eq!(collisions(&HALF).cycles(7), 3);
+        assert_eq!(bodies(&HALF).cycles(38_880), 15_552);
+        assert_eq!(collisions(&MIXED).cycles(3), 1);
+    }
+
+    #[test]
+    fn only_a_padded_stripe_fills_its_last_group() {
+        assert_eq!(bodies(&HALF).padded(6), 10);
+        assert_eq!(bodies(&HALF).padded(10), 10);
+        assert_eq!(collisions(&HALF).padded(4), 7);
+        assert_eq!(bodies(&FLOAT).padded(6), 6);
+    }
+}

@@ -1,0 +1,396 @@
+//! This file puts the parts together: DMAs, streams, accelerator, memory, one clock.
+//!
+//! Time is virtual. It passes with each register access, and when the CPU waits; nothing happens
+//! inside a register write. The clock is the accelerator's; the DMAs run on it too.
+pub(crate) mod bus;
+pub(crate) mod interrupt;
+pub(crate) mod span;
+pub(crate) mod stream;
+pub(crate) mod violation;
+
+use self::bus::Target;
+use self::interrupt::InterruptLine;
+use self::stream::Stream;
+use self::violation::{Log, RegisterAccess, ViolationKind};
+use crate::accelerator::Accelerator;
+use crate::axi_dma::{Core, Direction, Moved, PacketCount, Surroundings};
+use crate::cast::index;
+use crate::config::quirks::InterruptWiring;
+use crate::config::{Bandwidth, BoardConfig};
+use crate::fault::{Fault, FaultKind, Faults};
+use crate::memory::{Memory, MemoryError};
+use crate::shortcut::flow::periods::Recurrence;
+use pgs_interface::control::IDENTIFICATION;
+use pgs_interface::record::{BEAT_BYTES, Beat};
+
+/// Beats that an engine moves before the next one has its turn at the memory: an AXI burst.
+pub(crate) const BURST_BEATS: u64 = 16;
+/// Cycles after which an accelerator that waits looks at its streams again.
+pub(crate) const STARVED_CYCLES: u64 = 64;
+
+/// What happened on a board since it was built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct Counts {
+    /// Register reads by the CPU.
+    pub register_reads: u64,
+    /// Register writes by the CPU.
+    pub register_writes: u64,
+    /// Writes that started something: TAILDESC, LENGTH, `ap_start`.
+    pub doorbells: u64,
+    /// Rising edges of the interrupt line.
+    pub interrupts: u64,
+    /// Beats read from memory by the DMAs.
+    pub beats_read: u64,
+    /// Beats written to memory by the DMAs.
+    pub beats_written: u64,
+    /// Descriptors completed.
+    pub descriptors: u64,
+    /// Violations, also those of which no record was kept.
+    pub violations: u64,
+    /// Clock cycles since the board was built.
+    pub cycles: u64,
+}
+
+/// The board's state.
+#[derive(Debug)]
+pub(crate) struct Board {
+    pub(crate) config: BoardConfig,
+    pub(crate) now: u64,
+    pub(crate) memory: Memory,
+    pub(crate) interrupt: InterruptLine,
+    pub(crate) log: Log,
+    pub(crate) cores: Vec<Core>,
+    pub(crate) accelerator: Accelerator,
+    pub(crate) inputs: Vec<Stream>,
+    pub(crate) outputs: Vec<Stream>,
+    pub(crate) moved: Moved,
+    pub(crate) faults: Faults,
+    /// The programmable logic has lost its power.
+    powerless: bool,
+    /// Another design was loaded; what its IDENTIFICATION reads.
+    other_design: Option<u32>,
+    counts: Counts,
+    /// What the memory can still deliver at once, in bytes times the clock in kHz.
+    pub(crate) credit: u64,
+    /// The engine that has the first turn at the memory.
+    pub(crate) turn: usize,
+    /// What is known of how collisions flow.
+    pub(crate) recurrence: Recurrence,
+}
+
+impl Board {
+    pub(crate) fn new(config: BoardConfig, memory: Memory) -> Self {
+        let profile = config.profile;
+        let streams = |widths: &[u32]| {
+            widths.iter().map(|_| Stream::new(config.delays.fifo_beats)).collect::<Vec<_>>()
+        };
+        let inputs = streams(profile.mm2s_widths);
+        let outputs = streams(profile.s2mm_widths);
+        let cores = inputs.len().max(outputs.len());
+        Self {
+            config,
+            now: 0,
+            memory,
+            interrupt: InterruptLine::default(),
+            log: Log::new(),
+            cores: (0..cores).map(|core| Core::new(core, &config)).collect(),
+            accelerator: Accelerator::new(&config),
+            inputs,
+            outputs,
+            moved: Moved::default(),
+            faults: Faults::default(),
+            powerless: false,
+            other_design: None,
+            counts: Counts::default(),
+            credit: 0,
+            turn: 0,
+            recurrence: Recurrence::default(),
+        }
+    }
+
+    pub(crate) fn counts(&self) -> Counts {
+        Counts {
+            interrupts: self.interrupt.rising_edges,
+            beats_read: self.moved.beats_read,
+            beats_written: self.moved.beats_written,
+            descriptors: self.moved.descriptors,
+            violations: self.log.count,
+            cycles: self.now,
+            ..self.counts
+        }
+    }
+
+    pub(crate) fn inject(&mut self, fault: Fault) {
+        self.faults.inject(fault);
+    }
+
+    pub(crate) fn clear_faults(&mut self) {
+        self.faults.clear();
+    }
+
+    /// Faults that have happened.
+    pub(crate) fn faults(&self) -> u64 {
+        self.faults.happened()
+    }
+
+    /// The packets that ended since the last step began.
+    pub(crate) fn packets(&self) -> &[PacketCount] {
+        &self.moved.packets
+    }
+
+    /// Lets what concerns the whole board happen, at a register access if there is one now.
+    fn meet(&mut self, access: bool) {
+        match self.faults.of_board(access) {
+            Some(FaultKind::PowerLost) => self.powerless = true,
+            Some(FaultKind::OtherBitstream { identification }) => {
+                self.other_design = Some(identification);
+                self.log.pardon();
+                for (number, core) in self.cores.iter_mut().enumerate() {
+                    *core = Core::new(number, &self.config);
+                }
+                self.accelerator = Accelerator::new(&self.config);
+                self.inputs.iter_mut().chain(&mut self.outputs).for_each(Stream::clear);
+            }
+            Some(FaultKind::IrqSpurious) => self.interrupt.disturb(1),
+            Some(FaultKind::IrqStorm { count }) => self.interrupt.disturb(count),
+            _ => {}
+        }
+    }
+
+    /// Whether the accelerator or a DMA engine has work.
+    pub(crate) fn running(&self) -> bool {
+        self.accelerator.running() || self.cores.iter().any(Core::running)
+    }
+
+    /// A strict board is dead after its first violation, and any without power.
+    fn dead(&self) -> bool {
+        self.powerless || self.config.strict && self.log.count > 0
+    }
+
+    fn access_cycles(&self) -> u64 {
+        let cycles =
+            self.config.delays.register_access_ns * u64::from(self.config.profile.clock_khz);
+        cycles.div_ceil(1_000_000)
+    }
+
+    fn record(&mut self, address: u64, write: bool, value: u32) {
+        self.log.access(RegisterAccess { cycle: self.now, address, write, value });
+    }
+
+    pub(crate) fn read32(&mut self, address: u64) -> u32 {
+        self.counts.register_reads += 1;
+        self.advance(self.now + self.access_cycles(), false);
+        self.meet(true);
+        if self.dead() {
+            self.record(address, false, u32::MAX);
+            return u32::MAX;
+        }
+        let found = match bus::decode(address, self.cores.len()) {
+            Target::Dma { core, offset } => {
+                self.cores[core].read(offset).ok_or(ViolationKind::ReservedRegister { address })
+            }
+            Target::Control { offset } if self.other_design.is_some() => {
+                let identification = self.other_design.filter(|_| offset == IDENTIFICATION.offset);
+                Ok(identification.unwrap_or(0))
+            }
+            Target::Control { offset } => {
+                self.accelerator.read(offset).ok_or(ViolationKind::ReservedRegister { address })
+            }
+            Target::Nothing => Err(ViolationKind::UnmappedRegister { address }),
+            Target::Unaligned => Err(ViolationKind::UnalignedRegister { address }),
+        };
+        let value = found.as_ref().copied().unwrap_or(0);
+        self.record(address, false, value);
+        if let Err(kind) = found {
+            self.log.violation(kind);
+        }
+        self.update_interrupt();
+        if self.dead() { u32::MAX } else { value }
+    }
+
+    pub(crate) fn write32(&mut self, address: u64, value: u32) {
+        self.counts.register_writes += 1;
+        self.advance(self.now + self.access_cycles(), false);
+        self.meet(true);
+        self.record(address, true, value);
+        if self.dead() {
+            return;
+        }
+        let (now, log, faults) = (self.now, &mut self.log, &mut self.faults);
+        let done = match bus::decode(address, self.cores.len()) {
+            Target::Dma { core, offset } => self.cores[core]
+                .write(now, offset, value, log, faults)
+                .ok_or(ViolationKind::ReservedRegister { address }),
+            Target::Control { .. } if self.other_design.is_some() => Ok(false),
+            Target::Control { offset } => self
+                .accelerator
+                .write(now, offset, value, log, faults)
+                .ok_or(ViolationKind::ReservedRegister { address }),
+            Target::Nothing => Err(ViolationKind::UnmappedRegister { address }),
+            Target::Unaligned => Err(ViolationKind::UnalignedRegister { address }),
+        };
+        match done {
+            Ok(doorbell) => self.counts.doorbells += u64::from(doorbell),
+            Err(kind) => self.log.violation(kind),
+        }
+        self.update_interrupt();
+    }
+
+    fn update_interrupt(&mut self) {
+        let source = || self.accelerator.interrupt() || self.cores.iter().any(Core::interrupt);
+        let level = match self.config.quirks.interrupt {
+            InterruptWiring::Connected => source(),
+            InterruptWiring::Disconnected => false,
+            InterruptWiring::StuckHigh => true,
+        };
+        let level = level && !self.dead();
+        if self.interrupt.rises(level) {
+            match self.faults.at_edge() {
+                Some(FaultKind::IrqDelay { ns }) => {
+                    let until = self.now.saturating_add(self.config.cycles(ns));
+                    self.interrupt.withhold(until);
+                }
+                Some(_) => self.interrupt.withhold(u64::MAX),
+                None => {}
+            }
+        }
+        self.interrupt.set(level, self.now);
+    }
+
+    /// Lets time pass until `until`, or until the interrupt wants attention if `watch` says so.
+    pub(crate) fn advance(&mut self, until: u64, watch: bool) {
+        while self.now < until && !(watch && self.interrupt.pending()) {
+            self.log.at(self.now);
+            if self.dead() {
+                self.now = until;
+                break;
+            }
+            self.tick();
+            self.stretch(until);
+            let event = self.next_event().map_or(until, |event| event.min(until));
+            let limit = event - self.now;
+            if self.accelerator.starts() {
+                self.moved.packets.clear();
+            }
+            let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
+            let ran = self.accelerator.run(limit, inputs, outputs, &mut self.faults, &self.memory);
+            let waits = ran.cycles == 0;
+            let mut slice = if waits { limit.min(STARVED_CYCLES) } else { ran.cycles };
+            if waits && ran.progressed {
+                slice = 0;
+            }
+            let moved = self.move_beats(self.now, self.now + slice);
+            if waits && !ran.progressed && !moved {
+                // Nothing will change before the next event.
+                slice = limit;
+            }
+            if waits && slice > 0 && self.accelerator.running() {
+                self.accelerator.starve(slice);
+            }
+            self.now += slice;
+            self.meet(false);
+            self.tick();
+            self.update_interrupt();
+        }
+        self.log.at(self.now);
+    }
+
+    /// Moves a buffer back to the CPU; beats of it that are on the way are there already.
+    pub(crate) fn take_back(&mut self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
+        self.fetch();
+        self.memory.take_back(address)
+    }
+
+    /// Gives memory back.
+    pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
+        self.fetch();
+        self.memory.release(address)
+    }
+
+    /// Lets all beats that are on the way be in the streams themselves.
+    fn fetch(&mut self) {
+        for stream in &mut self.inputs {
+            stream.fetch(stream.len(), &self.memory);
+        }
+    }
+
+    fn tick(&mut self) {
+        for core in &mut self.cores {
+            core.tick(self.now);
+        }
+        if self.accelerator.tick(self.now) {
+            self.inputs.iter_mut().chain(&mut self.outputs).for_each(Stream::clear);
+        }
+    }
+
+    /// The next time after now at which something changes by itself.
+    fn next_event(&self) -> Option<u64> {
+        self.cores
+            .iter()
+            .map(Core::next_event)
+            .chain([self.accelerator.next_event(), self.interrupt.next_event()])
+            .flatten()
+            .filter(|event| *event > self.now)
+            .min()
+    }
+
+    /// Lets every DMA engine work between two clocks; returns whether any did something.
+    fn move_beats(&mut self, start: u64, end: u64) -> bool {
+        match self.config.bandwidth {
+            Bandwidth::Unlimited => {
+                let mut any = false;
+                for engine in 0..2 * self.cores.len() {
+                    any |= self.run_engine(engine, start, end, usize::MAX).1;
+                }
+                any
+            }
+            Bandwidth::BytesPerSecond(bytes) => self.share_memory(start, end, bytes),
+        }
+    }
+
+    /// Gives every engine a burst in turn until the memory's bandwidth is used up.
+    fn share_memory(&mut self, start: u64, end: u64, bytes_per_second: u64) -> bool {
+        let engines = 2 * self.cores.len();
+        let beat_cost = BEAT_BYTES as u64 * u64::from(self.config.profile.clock_khz);
+        let income = (end - start).saturating_mul(bytes_per_second / 1000);
+        let reserve = BURST_BEATS * engines as u64 * beat_cost;
+        self.credit = self.credit.min(reserve).saturating_add(income);
+        let mut any = false;
+        let mut without_beats = 0;
+        while without_beats < engines {
+            let beats = (self.credit / beat_cost).min(BURST_BEATS);
+            if beats == 0 {
+                // The bandwidth is what holds the engines up: time alone brings progress.
+                return true;
+            }
+            let (moved, changed) = self.run_engine(self.turn, start, end, index(beats));
+            any |= changed;
+            self.credit -= moved as u64 * beat_cost;
+            self.turn = (self.turn + 1) % engines;
+            without_beats = if moved == 0 { without_beats + 1 } else { 0 };
+        }
+        any
+    }
+
+    fn run_engine(&mut self, engine: usize, start: u64, end: u64, limit: usize) -> (usize, bool) {
+        let number = engine / 2;
+        let (direction, stream) = if engine.is_multiple_of(2) {
+            (Direction::Mm2s, self.inputs.get_mut(number))
+        } else {
+            (Direction::S2mm, self.outputs.get_mut(number))
+        };
+        let Some(stream) = stream else { return (0, false) };
+        if self.config.quirks.unconnected == Some((number, direction)) {
+            return (0, false);
+        }
+        let mut with = Surroundings {
+            memory: &mut self.memory,
+            log: &mut self.log,
+            moved: &mut self.moved,
+            faults: &mut self.faults,
+            by_reference: self.accelerator.by_reference(),
+        };
+        self.cores[number].run(direction, start, end, limit, stream, &mut with)
+    }
+}

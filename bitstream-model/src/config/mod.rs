@@ -1,0 +1,402 @@
+//! This file says how an emulated board can be built: the choices that a bitstream, a block design
+//! and a device tree fix on a real one.
+pub(crate) mod contradiction;
+pub(crate) mod quirks;
+
+use std::num::NonZero;
+use std::sync::OnceLock;
+
+use self::quirks::Quirks;
+use crate::accelerator::records::striping::{GROUP_MAX, STREAMS_MAX};
+use crate::fault::FaultKind;
+use pgs_interface::address_map::CONTROL_BYTES;
+use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
+use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
+use pgs_interface::stripe::Stripe;
+
+/// What the pipeline does when a collision needs a velocity that is still being computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hazards {
+    /// It waits: right, and slow on an unfavourable order.
+    Interlocked,
+    /// It reads the stale velocity, and the later write-back overwrites the earlier one, as in the
+    /// thesis (§5.4.4).
+    Unchecked,
+}
+
+/// What the arithmetic does with subnormal numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Subnormals {
+    /// IEEE 754.
+    Keep,
+    /// Subnormal operands count as zero and results that are subnormal after rounding become zero,
+    /// with their sign, as in the vendor's floating-point operators.
+    Flush,
+}
+
+/// What the memory delivers to all streams together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bandwidth {
+    /// Every stream always has data, as the thesis assumes.
+    Unlimited,
+    /// Bytes per second, reads and writes together.
+    BytesPerSecond(u64),
+}
+
+impl Bandwidth {
+    /// Peak of the ZCU102 preset, DDR4-2133 at 64 bit: 17.07 GB/s.
+    pub const ZCU102_PEAK: Self = Self::BytesPerSecond(17_070_000_000);
+    /// What a published measurement sustains on the ZCU102, about 75 % of the peak: 12.8 GB/s.
+    pub const ZCU102_SUSTAINED: Self = Self::BytesPerSecond(12_800_000_000);
+}
+
+/// Delays and depths of the emulated parts, clock cycles unless said otherwise.
+///
+/// None of them is a property of a real board that somebody measured: they are there so that a
+/// driver meets every intermediate state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Delays {
+    /// A register access by the CPU, ns (AXI-Lite through the HPM port: 100 to 200 ns).
+    pub register_access_ns: u64,
+    /// RS written to Halted following it.
+    pub halt: u64,
+    /// Reset of a DMA core, or of the accelerator, to its end.
+    pub reset: u64,
+    /// First fetch of a descriptor after a doorbell; later ones are fetched ahead.
+    pub descriptor_fetch: u64,
+    /// Depth of the FIFO between a DMA channel and the accelerator, beats.
+    pub fifo_beats: usize,
+}
+
+impl Default for Delays {
+    fn default() -> Self {
+        Self {
+            register_access_ns: 150,
+            halt: 100,
+            reset: 200,
+            descriptor_fetch: 60,
+            fifo_beats: 512,
+        }
+    }
+}
+
+/// Clocks of that many kHz that pass in a time.
+pub(crate) fn cycles_of(ns: u64, clock_khz: u32) -> u64 {
+    let cycles = u128::from(ns) * u128::from(clock_khz) / 1_000_000;
+    u64::try_from(cycles).unwrap_or(u64::MAX)
+}
+
+/// Copies, clocks and collisions of an issue that a profile may have.
+const SIZE_MAX: u32 = 16;
+/// Shapes that the control block has room for.
+pub(crate) const SHAPES_MAX: u32 = (CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE;
+/// 32-bit words of a beat.
+const BEAT_WORDS: u32 = 4;
+
+/// Threads of [`BoardConfig::threads`], at most; more than a few have nothing to do.
+pub const THREADS_MAX: usize = 31;
+const THREADS_DEFAULT_MAX: usize = 4;
+
+/// How to build an emulated board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BoardConfig {
+    /// The design.
+    pub profile: &'static Profile,
+    /// Its formats, instead of the profile's own; of the same widths on the streams.
+    pub numbers: Option<Numbers>,
+    /// How it knows the inertia of its bodies.
+    pub inertia: Inertia,
+    /// Behaviour on read-after-write hazards.
+    pub hazards: Hazards,
+    /// Hazard window of both solvers in issue slots, instead of the profile's cycles.
+    pub window_slots: Option<u32>,
+    /// Arithmetic on subnormal numbers.
+    pub subnormals: Subnormals,
+    /// Memory bandwidth.
+    pub bandwidth: Bandwidth,
+    /// Width of the DMA length registers, 8 to 26 bits.
+    pub length_width: u32,
+    /// Width of the DMA's memory addresses, 32 to 64 bits.
+    pub address_width: u32,
+    /// Whether the DMAs have the scatter-gather engine.
+    pub scatter_gather: bool,
+    /// Whether the board goes dead after the first violation, as a test wants it.
+    pub strict: bool,
+    /// Delays and depths.
+    pub delays: Delays,
+    /// What is built wrongly.
+    pub quirks: Quirks,
+    /// Threads of the host that the arithmetic may take, the caller's among them. Like the next two
+    /// without any influence on results, counters and cycles.
+    pub threads: usize,
+    /// Whether collisions that have no body in common, and bodies, are computed side by side, where the
+    /// host can.
+    pub lanes: bool,
+    /// Whether collisions are decoded once and replayed in the other passes, where the design allows
+    /// for it and the bytes are the same.
+    pub replay: bool,
+}
+
+impl Default for BoardConfig {
+    /// The `float` profile, interlocked, sustained bandwidth of the ZCU102, 26-bit lengths, 40-bit
+    /// addresses, strict, nothing built wrongly.
+    fn default() -> Self {
+        Self {
+            profile: &FLOAT,
+            numbers: None,
+            inertia: Inertia::Isotropic,
+            hazards: Hazards::Interlocked,
+            window_slots: None,
+            subnormals: Subnormals::Keep,
+            bandwidth: Bandwidth::ZCU102_SUSTAINED,
+            length_width: LENGTH_WIDTH_MAX,
+            address_width: 40,
+            scatter_gather: true,
+            strict: true,
+            delays: Delays::default(),
+            quirks: Quirks::default(),
+            threads: threads_of_host(),
+            lanes: true,
+            replay: true,
+        }
+    }
+}
+
+/// Threads that are worth their while here.
+fn threads_of_host() -> usize {
+    static THREADS: OnceLock<usize> = OnceLock::new();
+    *THREADS.get_or_init(|| {
+        std::thread::available_parallelism().map_or(1, NonZero::get).min(THREADS_DEFAULT_MAX)
+    })
+}
+
+/// A board that cannot be built.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// Formats that do not fit the streams of the profile.
+    #[error(
+        "{stream} records of {found} bits a number, expected {expected} as the profile has them"
+    )]
+    StreamFormat {
+        /// Which records.
+        stream: &'static str,
+        /// Bits of the format asked for.
+        found: u32,
+        /// Bits of the profile's format.
+        expected: u32,
+    },
+    /// A format that has no word for the distance of a contact point that is not there.
+    #[error(
+        "collisions relative to body A in thesis16, which has no infinity to mark an unused contact \
+         point with; expected f32 or binary16"
+    )]
+    NoInfinity,
+    /// World inertia in a format without zero, which static bodies need.
+    #[error(
+        "world inertia in thesis16, which has no zero for the inverse inertia of a static body; \
+         expected f32 or binary16"
+    )]
+    NoZero,
+    /// Rows of more precision than what is computed with them.
+    #[error(
+        "constraint rows in f32 and updates in binary16, which cannot take them; expected updates \
+         in f32, or both in binary16"
+    )]
+    RowsBeyondUpdates,
+    /// A design that streams the collisions once, without its scoreboard.
+    #[error(
+        "profile {name:?} built `unchecked`: its passes run side by side and always wait for their \
+         bodies; expected `interlocked`"
+    )]
+    UncheckedWindow {
+        /// The profile.
+        name: &'static str,
+    },
+    /// A profile that is not one of the table's and contradicts itself.
+    #[error("profile {name:?}: {what}")]
+    Profile {
+        /// Its name.
+        name: &'static str,
+        /// What is wrong, and what is expected.
+        what: &'static str,
+    },
+    /// A number outside its range.
+    #[error("{what} is {found}, expected {low} to {high}")]
+    OutOfRange {
+        /// Which number.
+        what: &'static str,
+        /// What was asked for.
+        found: u64,
+        /// Smallest value.
+        low: u64,
+        /// Largest value.
+        high: u64,
+    },
+}
+
+impl BoardConfig {
+    /// The profile with what was chosen.
+    #[must_use]
+    pub fn variant(&self) -> Variant {
+        Variant {
+            profile: self.profile,
+            numbers: self.numbers.unwrap_or(self.profile.numbers),
+            inertia: self.inertia,
+        }
+    }
+
+    /// Depth of one kind of pass as this board has it: a pass ends no sooner than its last
+    /// write-back.
+    pub(crate) fn depth(&self, profile: Depth) -> Depth {
+        let window = match self.window_slots {
+            Some(slots) => slots.saturating_mul(self.profile.initiation_interval),
+            None => profile.window,
+        };
+        Depth { fill: profile.fill.max(window), window }
+    }
+
+    /// Clocks that pass in a time.
+    pub(crate) fn cycles(&self, ns: u64) -> u64 {
+        cycles_of(ns, self.profile.clock_khz)
+    }
+
+    /// When a reset ends that is asked for now.
+    pub(crate) fn end_of_reset(&self, now: u64, fault: Option<FaultKind>) -> u64 {
+        let end = now + self.delays.reset;
+        match fault {
+            Some(FaultKind::ResetNever) => u64::MAX,
+            Some(FaultKind::ResetSlow { ns }) => end.saturating_add(self.cycles(ns)),
+            _ => end,
+        }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let range = |what, found: u64, low: u64, high: u64| {
+            if (low..=high).contains(&found) {
+                Ok(())
+            } else {
+                Err(ConfigError::OutOfRange { what, found, low, high })
+            }
+        };
+        range(
+            "length register width",
+            self.length_width.into(),
+            LENGTH_WIDTH_MIN.into(),
+            LENGTH_WIDTH_MAX.into(),
+        )?;
+        range("threads of the host", self.threads as u64, 1, THREADS_MAX as u64)?;
+        range("FIFO depth in beats", self.delays.fifo_beats as u64, 16, 1 << 20)?;
+        check_profile(self.profile)?;
+        let name = self.profile.name;
+        if let Flow::Window(design) = &self.profile.flow {
+            if self.hazards == Hazards::Unchecked {
+                return Err(ConfigError::UncheckedWindow { name });
+            }
+            if let Some(what) = contradiction::contradiction(self.profile, design) {
+                return Err(ConfigError::Profile { name, what });
+            }
+        }
+        self.check_numbers()?;
+        self.check_sizes(range)?;
+        range("address width", self.address_width.into(), 32, 64)?;
+        // The capability register carries the window in cycles in 16 bits.
+        let slots_max = u64::from(u16::MAX) / u64::from(self.profile.initiation_interval);
+        range("hazard window in slots", self.window_slots.unwrap_or(1).into(), 1, slots_max)?;
+        for (what, cycles) in [
+            ("halt delay in cycles", self.delays.halt),
+            ("reset delay in cycles", self.delays.reset),
+            ("descriptor fetch in cycles", self.delays.descriptor_fetch),
+        ] {
+            range(what, cycles, 0, 1 << 32)?;
+        }
+        range("register access time in ns", self.delays.register_access_ns, 1, 1_000_000)?;
+        for (what, found, low, high) in self.quirks.ranges() {
+            range(what, found, low, high)?;
+        }
+        if let Bandwidth::BytesPerSecond(bytes) = self.bandwidth {
+            range("memory bandwidth in bytes per second", bytes, 1_000_000, 1_000_000_000_000)?;
+        }
+        Ok(())
+    }
+
+    /// What registers, tables and FIFOs have room for.
+    fn check_sizes(
+        &self,
+        range: impl Fn(&'static str, u64, u64, u64) -> Result<(), ConfigError>,
+    ) -> Result<(), ConfigError> {
+        let (profile, memory) = (self.profile, self.profile.memory);
+        for (what, found, high) in [
+            ("copies of the velocities", memory.velocity_copies, SIZE_MAX),
+            ("clock of the block RAM in clocks of the accelerator", memory.pump, SIZE_MAX),
+            ("collisions of an issue", profile.collisions_per_issue, SIZE_MAX),
+            ("shape table in entries", profile.shape_capacity, SHAPES_MAX),
+        ] {
+            range(what, found.into(), 1, high.into())?;
+        }
+        // An issue enters the pipeline when all of it is there.
+        let words = self.variant().words().collision * profile.collisions_per_issue;
+        let beats = words.div_ceil(BEAT_WORDS);
+        range("beats of an issue", beats.into(), 1, self.delays.fifo_beats as u64)
+    }
+
+    fn check_numbers(&self) -> Result<(), ConfigError> {
+        let (asked, own) = (self.variant().numbers, self.profile.numbers);
+        for (stream, asked, own) in [
+            ("collision", asked.collisions, own.collisions),
+            ("velocity", asked.bodies, own.bodies),
+            ("pose", asked.poses, own.poses),
+        ] {
+            let (found, expected) = (asked.bits(), own.bits());
+            if found != expected {
+                return Err(ConfigError::StreamFormat { stream, found, expected });
+            }
+        }
+        let relative = self.profile.geometry == Geometry::Relative;
+        if relative && asked.collisions == StreamFormat::Thesis16 {
+            return Err(ConfigError::NoInfinity);
+        }
+        if self.inertia == Inertia::World && asked.bodies == StreamFormat::Thesis16 {
+            return Err(ConfigError::NoZero);
+        }
+        if (asked.rows, asked.updates) == (Precision::F32, Precision::Binary16) {
+            return Err(ConfigError::RowsBeyondUpdates);
+        }
+        Ok(())
+    }
+}
+
+/// A caller may bring a profile of its own.
+fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
+    let streams = [profile.mm2s_widths, profile.s2mm_widths];
+    let stripe = |stripe: &Stripe, widths: &[u32]| {
+        (1..=GROUP_MAX).contains(&stripe.streams.len())
+            && stripe.streams.iter().all(|stream| usize::from(*stream) < widths.len())
+    };
+    let stripes = &profile.stripes;
+    let wrong = [
+        (
+            streams.iter().any(|widths| !(1..=STREAMS_MAX).contains(&widths.len())),
+            "1 to 4 streams each way are expected",
+        ),
+        (
+            streams.into_iter().flatten().any(|width| ![32, 64, 128].contains(width)),
+            "streams of 32, 64 or 128 bits are expected",
+        ),
+        (
+            ![stripes.collisions, stripes.velocities, stripes.poses]
+                .iter()
+                .all(|of| stripe(of, profile.mm2s_widths))
+                || !stripe(&stripes.results, profile.s2mm_widths),
+            "stripes of 1 to 8 beats on streams that exist are expected",
+        ),
+        (profile.initiation_interval == 0, "an issue of at least one cycle is expected"),
+        (profile.clock_khz == 0, "a clock of at least 1 kHz is expected"),
+    ];
+    match wrong.into_iter().find(|(wrong, _)| *wrong) {
+        Some((_, what)) => Err(ConfigError::Profile { name: profile.name, what }),
+        None => Ok(()),
+    }
+}

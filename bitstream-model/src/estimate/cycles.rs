@@ -1,0 +1,181 @@
+//! This file is the cycle formula of a step.
+//!
+//! `cycles = load + passes x (ceil(C / collisions per issue) x II + fill) + max(pose in, result out)`
+//!
+//! A design that streams the collisions once has a formula of its own ([`window`](super::window)).
+//!
+//! Source: thesis Tables 6.4 and 6.8 (which the formula meets within 0.6 %); fill is this
+//! project's.
+
+use super::traffic::{Records, StepTraffic};
+use super::window::{WindowCycles, WindowStep};
+use pgs_interface::profile::{Flow, Profile, Variant};
+
+/// How large a step is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StepShape {
+    /// Bodies B.
+    pub bodies: u64,
+    /// Collisions C.
+    pub collisions: u64,
+    /// Contact passes.
+    pub contact_iterations: u64,
+    /// Friction passes.
+    pub friction_iterations: u64,
+}
+
+impl StepShape {
+    /// Four contact and four friction passes.
+    #[must_use]
+    pub const fn new(bodies: u64, collisions: u64) -> Self {
+        Self { bodies, collisions, contact_iterations: 4, friction_iterations: 4 }
+    }
+
+    /// Passes over the collisions; none without collisions.
+    #[must_use]
+    pub const fn passes(&self) -> u64 {
+        if self.collisions == 0 {
+            0
+        } else {
+            self.contact_iterations.saturating_add(self.friction_iterations)
+        }
+    }
+}
+
+/// Clock cycles of a step by the formula, part by part. Counts beyond 64 bits saturate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StepCycles {
+    /// Velocities in; 0 where they come beside the passes.
+    pub load: u64,
+    /// One pass over the collisions, without fill; all of them where they run side by side.
+    pub pass: u64,
+    /// Fill of all passes together; where they run side by side, by how much the last is behind the
+    /// first if the order needs all of the delay lines, and its fill.
+    pub fill: u64,
+    /// Poses in; 0 where they come beside the passes.
+    pub pose_in: u64,
+    /// Results out; likewise.
+    pub result_out: u64,
+    /// All together.
+    pub total: u64,
+}
+
+impl StepCycles {
+    /// The formula for a variant of a profile, with its records counted as `records` says.
+    #[must_use]
+    pub fn new(variant: &Variant, records: Records, step: &StepShape) -> Self {
+        let profile = variant.profile;
+        let window = match &profile.flow {
+            Flow::Window(design) => WindowCycles::new(variant, &WindowStep::longest(design, *step)),
+            Flow::Passes => None,
+        };
+        if let Some(window) = window {
+            return Self {
+                load: 0,
+                pass: window.stream,
+                fill: window.behind.saturating_add(window.fill),
+                pose_in: 0,
+                result_out: 0,
+                total: window.passes,
+            };
+        }
+        let traffic = StepTraffic::new(variant, records, step);
+        let issues = step.collisions.div_ceil(u64::from(profile.collisions_per_issue).max(1));
+        let pass = issues.saturating_mul(profile.initiation_interval.into());
+        let fill = if step.passes() == 0 {
+            0
+        } else {
+            let contact = step.contact_iterations.saturating_mul(profile.contact.fill.into());
+            let friction = step.friction_iterations.saturating_mul(profile.friction.fill.into());
+            contact.saturating_add(friction)
+        };
+        let (load, pose_in, result_out) =
+            (traffic.velocities.cycles, traffic.poses.cycles, traffic.results.cycles);
+        let total = pass
+            .saturating_mul(step.passes())
+            .saturating_add(load)
+            .saturating_add(fill)
+            .saturating_add(pose_in.max(result_out));
+        Self { load, pass, fill, pose_in, result_out, total }
+    }
+
+    /// Poses in or results out, whichever takes longer.
+    #[must_use]
+    pub fn integration(&self) -> u64 {
+        self.pose_in.max(self.result_out)
+    }
+
+    /// The time of that many cycles, s.
+    #[must_use]
+    pub fn seconds(&self, profile: &Profile) -> f64 {
+        self.total as f64 / (f64::from(profile.clock_khz) * 1e3)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE};
+
+    const THESIS_STEP: StepShape = StepShape::new(38_880, 127_000);
+
+    fn cycles(profile: &'static Profile, records: Records) -> StepCycles {
+        StepCycles::new(&profile.default_variant(), records, &THESIS_STEP)
+    }
+
+    fn parts(cycles: &StepCycles) -> [u64; 5] {
+        [cycles.load, cycles.pass, cycles.fill, cycles.pose_in, cycles.result_out]
+    }
+
+    fn deviation(ours: u64, theirs: u64) -> f64 {
+        (ours as f64 - theirs as f64) / theirs as f64 * 100.0
+    }
+
+    #[test]
+    fn one_formula_meets_both_designs_of_the_thesis_within_0_6_percent() {
+        let float = cycles(&FLOAT, Records::Packed);
+        assert_eq!(parts(&float), [14_580, 254_000, 2_680, 17_010, 14_580]);
+        assert_eq!(float.total - float.fill, 2_063_590);
+        assert_eq!(float.total, 2_066_270);
+        assert!((deviation(float.total, 2_062_697) - 0.17).abs() < 0.005);
+        let half = cycles(&HALF, Records::Packed);
+        assert_eq!(parts(&half), [11_664, 190_500, 2_680, 13_608, 11_664]);
+        assert_eq!(half.total - half.fill, 1_549_272);
+        assert_eq!(half.total, 1_551_952);
+        assert!((deviation(half.total, 1_557_317) + 0.34).abs() < 0.005);
+    }
+
+    #[test]
+    fn the_streamed_records_take_what_their_beats_take() {
+        let float = cycles(&FLOAT, Records::Streamed);
+        assert_eq!(parts(&float), [19_440, 254_000, 2_680, 19_440, 38_880]);
+        assert_eq!(float.total, 2_093_000);
+        // One-beat records go five every two cycles, results are two beats.
+        let half = cycles(&HALF, Records::Streamed);
+        assert_eq!(parts(&half), [15_552, 190_500, 2_680, 15_552, 31_104]);
+        assert_eq!(half.total, 1_573_336);
+        let mixed = cycles(&MIXED, Records::Streamed);
+        assert_eq!(parts(&mixed), [25_920, 127_000, 2_680, 25_920, 51_840]);
+        assert_eq!(mixed.total, 1_096_440);
+        // Eight words a velocity, sixteen a result, one a cycle.
+        let naive = cycles(&NAIVE, Records::Streamed);
+        assert_eq!(parts(&naive), [311_040, 3_556_000, 2_680, 311_040, 622_080]);
+        assert_eq!(naive.total, 29_383_800);
+    }
+
+    #[test]
+    fn an_issue_that_is_not_full_counts_as_one() {
+        let half = |collisions| {
+            let step = StepShape::new(1, collisions);
+            StepCycles::new(&HALF.default_variant(), Records::Streamed, &step).pass
+        };
+        assert_eq!([half(1), half(2), half(3)], [3, 3, 6]);
+    }
+
+    #[test]
+    fn without_collisions_there_are_no_passes() {
+        let step = StepShape::new(4, 0);
+        let cycles = StepCycles::new(&FLOAT.default_variant(), Records::Streamed, &step);
+        assert_eq!(cycles.total, 2 + 4);
+    }
+}

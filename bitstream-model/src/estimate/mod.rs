@@ -1,0 +1,25 @@
+//! Cycles, memory bandwidth, ports and on-chip memory of a profile, by formula.
+//!
+//! What a step costs when nothing stalls: the emulated board counts the same cycles, plus stalls
+//! and waits; this module says them without running anything. Everything follows from the table of
+//! profiles ([`interface::profile`](pgs_interface::profile)); [`thesis`] holds what the thesis
+//! states, to be shown beside it.
+
+mod blocks;
+mod cycles;
+mod ports;
+mod resources;
+mod schedule;
+pub mod thesis;
+mod time;
+mod traffic;
+mod window;
+
+pub use blocks::{BLOCK_BITS, BLOCKS, BlockShape, ShapedBlocks};
+pub use cycles::{StepCycles, StepShape};
+pub use ports::{LoadPorts, MemoryKind, OnChipArray, PORTS, PortAccount, PortUse};
+pub use resources::{ArrayUse, MemoryUse};
+pub use schedule::{Access, AccessKind, Schedule, Slot};
+pub use time::{PartLimit, PartTime, StepTime};
+pub use traffic::{HP_PORT_BITS, HP_PORTS, Records, StepTraffic, StreamDemand, Transfer};
+pub use window::{WindowCycles, WindowLogic, WindowStep};

@@ -1,0 +1,331 @@
+//! This file is the account of block RAM ports: which initiation interval the on-chip arrays allow.
+//!
+//! A block RAM has two ports, each of which reads or writes one row a clock. A collision reads the
+//! velocities of two bodies and writes both back; its accumulated impulses are read and written
+//! once. A read goes to one copy of an array, a write to every copy, so that copies help reads
+//! alone; a block RAM clock that is a multiple of the accelerator's (a *pump*) helps both.
+//!
+//! ```text
+//! II by ports = ceil((reads / copies + writes) x collisions per issue / (2 x pump))
+//!   float  (2 / 1 + 2) x 1 / 2 = 2        half   (2 / 2 + 2) x 2 / 2 = 3
+//!   mixed  (2 / 1 + 2) x 1 / 4 = 1        naive  (2 / 1 + 2) x 1 / 2 = 2, its stream needs 28
+//! ```
+//!
+//! Without its pump `mixed` could not issue every cycle with any number of copies: (2 / n + 2) / 2
+//! stays above 1 (thesis §5.5.3). The pump is a design assumption of this project that no synthesis
+//! has confirmed.
+//!
+//! Where the passes run side by side every unit has a memory of its own, in which it reads and writes
+//! the bodies of an entry, and into which the last uses of the pass before are written:
+//!
+//! ```text
+//!   windowed  (2 + 2 + 2) x 1 / 4 = 2     windowed16  (2 + 2 + 2) x 2 / 4 = 3
+//! ```
+//!
+//! Considered instead: banks by body colour, so that the two bodies of a collision never share one;
+//! a bank then takes one read and one write a cycle and needs neither copy nor pump. It binds the
+//! colours to the order of the collisions, which the driver would have to find (2 banks are enough
+//! for some steps, piles need 5 to 6), and body memory that is divided unevenly.
+
+use super::cycles::StepShape;
+use super::schedule::Schedule;
+use super::traffic::{Records, StepTraffic};
+use super::window;
+use pgs_interface::profile::{Flow, Inertia, Variant};
+
+/// Ports of a block RAM, and of a distributed RAM in its dual-port form.
+pub const PORTS: u32 = 2;
+
+/// An array that stays on chip while a step runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnChipArray {
+    /// Linear and angular velocity of each body.
+    Velocities,
+    /// World inverse inertia of each body.
+    Inertia,
+    /// Accumulated impulses of each collision.
+    Impulses,
+    /// Shape index of each body.
+    ShapeIndices,
+    /// Records with their impulses on the way to a contact pass.
+    ContactLines,
+    /// Records without distances, with their impulses, on the way to a friction pass.
+    FrictionLines,
+}
+
+impl OnChipArray {
+    /// Whether it has a row a body, and not a row a collision.
+    #[must_use]
+    pub const fn is_of_bodies(self) -> bool {
+        matches!(self, Self::Velocities | Self::Inertia | Self::ShapeIndices)
+    }
+
+    /// Name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Velocities => "velocities",
+            Self::Inertia => "world inertia",
+            Self::Impulses => "impulses",
+            Self::ShapeIndices => "shape indices",
+            Self::ContactLines => "contact lines",
+            Self::FrictionLines => "friction lines",
+        }
+    }
+}
+
+/// Where an array lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MemoryKind {
+    /// Block RAM.
+    Block,
+    /// Distributed RAM, made of lookup tables.
+    Distributed,
+}
+
+impl MemoryKind {
+    /// Name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Block => "block RAM",
+            Self::Distributed => "distributed RAM",
+        }
+    }
+}
+
+/// Who uses the ports of one array during a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PortUse {
+    /// The array.
+    pub array: OnChipArray,
+    /// Where it lies.
+    pub memory: MemoryKind,
+    /// Rows that a collision reads.
+    pub reads: u32,
+    /// Rows that a collision writes.
+    pub writes: u32,
+    /// Collisions that are issued together.
+    pub collisions: u32,
+    /// Copies of the array.
+    pub copies: u32,
+    /// Accesses of a port in one cycle of the accelerator.
+    pub pump: u32,
+}
+
+impl PortUse {
+    /// Accesses of one issue to the busiest copy.
+    #[must_use]
+    pub fn accesses(&self) -> u32 {
+        let reads = self.reads * self.collisions;
+        reads.div_ceil(self.copies.max(1)) + self.writes * self.collisions
+    }
+
+    /// Cycles that one issue occupies the ports of the busiest copy.
+    #[must_use]
+    pub fn interval(&self) -> u32 {
+        self.accesses().div_ceil(PORTS * self.pump.max(1)).max(1)
+    }
+
+    /// Whether an issue reads no more than one row and writes no more than one: a port for each is
+    /// then enough, and the block takes its wide shape.
+    #[must_use]
+    pub const fn simple(&self) -> bool {
+        self.reads * self.collisions <= 1 && self.writes * self.collisions <= 1
+    }
+
+    /// The same array with other copies and another pump.
+    #[must_use]
+    pub const fn with(self, copies: u32, pump: u32) -> Self {
+        Self { copies, pump, ..self }
+    }
+
+    /// Which access has which port in which cycle, in an interval that the ports allow.
+    #[must_use]
+    pub fn schedule(&self) -> Schedule {
+        Schedule::new(self)
+    }
+}
+
+/// What is written while the velocities come in, against the ports that write it.
+///
+/// Each record is one row of every array of bodies, in every copy. Block RAM writes a row on each
+/// of its ports, distributed RAM on one of them. Where that is too slow the array needs banks by
+/// body number: no more bits, and the passes lose nothing, because at worst all accesses of an
+/// issue meet in one bank, which has the ports of the undivided array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LoadPorts {
+    /// The array.
+    pub array: OnChipArray,
+    /// Cycles that the streams take.
+    pub by_streams: u64,
+    /// Cycles that the ports take with all bodies in one bank.
+    pub by_ports: u64,
+    /// Banks with which the ports are as fast as the streams.
+    pub banks: u64,
+}
+
+/// The ports of a variant of a profile.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PortAccount {
+    /// Each array.
+    pub arrays: Vec<PortUse>,
+    /// Interval that the streams allow: cycles of the busiest stream for one issue.
+    pub by_streams: u32,
+    /// Interval in the table of profiles.
+    pub claimed: u32,
+}
+
+impl PortAccount {
+    /// The account of a variant of a profile.
+    #[must_use]
+    pub fn new(variant: &Variant) -> Self {
+        let profile = variant.profile;
+        let memory = profile.memory;
+        let velocities = PortUse {
+            array: OnChipArray::Velocities,
+            memory: MemoryKind::Block,
+            reads: 2,
+            writes: 2,
+            collisions: profile.collisions_per_issue,
+            copies: memory.velocity_copies,
+            pump: memory.pump,
+        };
+        // Nothing else needs copies or a pump.
+        let plain = velocities.with(1, 1);
+        let once = |array| PortUse { array, reads: 1, writes: 1, ..plain };
+        let mut arrays = match profile.flow {
+            Flow::Passes => vec![velocities, once(OnChipArray::Impulses)],
+            Flow::Window(_) => vec![
+                PortUse { writes: 4, ..velocities },
+                once(OnChipArray::ContactLines),
+                once(OnChipArray::FrictionLines),
+            ],
+        };
+        if variant.inertia == Inertia::World {
+            arrays.push(PortUse { array: OnChipArray::Inertia, writes: 0, ..plain });
+        }
+        if memory.shape_index_bytes > 0 {
+            let distributed = MemoryKind::Distributed;
+            let array = OnChipArray::ShapeIndices;
+            arrays.push(PortUse { array, memory: distributed, writes: 0, ..plain });
+        }
+        Self { arrays, by_streams: stream_interval(variant), claimed: profile.initiation_interval }
+    }
+
+    /// Interval that the ports of all arrays allow.
+    #[must_use]
+    pub fn by_ports(&self) -> u32 {
+        self.arrays.iter().map(PortUse::interval).max().unwrap_or(1)
+    }
+
+    /// The smallest interval that ports and streams allow.
+    #[must_use]
+    pub fn smallest(&self) -> u32 {
+        self.by_ports().max(self.by_streams)
+    }
+
+    /// The velocities' ports, which decide.
+    #[must_use]
+    pub fn velocities(&self) -> Option<&PortUse> {
+        self.arrays.iter().find(|array| array.array == OnChipArray::Velocities)
+    }
+
+    /// What the ports make of loading that many bodies, for each array of bodies.
+    #[must_use]
+    pub fn load(&self, variant: &Variant, bodies: u64) -> Vec<LoadPorts> {
+        let step = StepShape::new(bodies, 0);
+        let traffic = StepTraffic::new(variant, Records::Streamed, &step);
+        let by_streams = traffic.velocities.cycles;
+        let of_bodies = self.arrays.iter().filter(|ports| ports.array.is_of_bodies());
+        of_bodies
+            .map(|ports| {
+                let writers = match ports.memory {
+                    MemoryKind::Block => PORTS,
+                    MemoryKind::Distributed => 1,
+                };
+                let by_ports = bodies.div_ceil(u64::from(writers * ports.pump.max(1)));
+                let banks = by_ports.div_ceil(by_streams.max(1)).max(1);
+                LoadPorts { array: ports.array, by_streams, by_ports, banks }
+            })
+            .collect()
+    }
+}
+
+/// Cycles of the busiest stream for one issue, over as many issues as make whole groups. Where the
+/// passes run side by side an entry that is streamed once is issued several times.
+fn stream_interval(variant: &Variant) -> u32 {
+    let profile = variant.profile;
+    let issues = u32::try_from(profile.stripes.collisions.streams.len()).unwrap_or(1).max(1);
+    let step = StepShape::new(0, u64::from(issues) * u64::from(profile.collisions_per_issue));
+    let traffic = StepTraffic::new(variant, Records::Streamed, &step);
+    let mut entries = u64::from(issues);
+    if let Flow::Window(design) = &profile.flow {
+        entries *= u64::from(window::issues_per_entry(design));
+    }
+    let interval = traffic.collisions.cycles.div_ceil(entries);
+    u32::try_from(interval).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, PROFILES, Profile};
+
+    fn account(profile: &'static Profile) -> PortAccount {
+        PortAccount::new(&profile.default_variant())
+    }
+
+    #[test]
+    fn the_tables_intervals_are_what_ports_and_streams_allow() {
+        let both = |profile| {
+            let account = account(profile);
+            (account.by_ports(), account.by_streams)
+        };
+        assert_eq!(both(&FLOAT), (2, 2));
+        assert_eq!(both(&HALF), (3, 3));
+        assert_eq!(both(&MIXED), (1, 1));
+        assert_eq!(both(&NAIVE), (2, 28));
+        for profile in PROFILES {
+            for inertia in [Inertia::Isotropic, Inertia::World] {
+                let variant = Variant { inertia, ..profile.default_variant() };
+                let account = PortAccount::new(&variant);
+                assert_eq!(account.smallest(), profile.initiation_interval, "{}", profile.name);
+                assert_eq!(account.claimed, profile.initiation_interval);
+            }
+        }
+    }
+
+    #[test]
+    fn without_the_pump_no_number_of_copies_lets_mixed_issue_every_cycle() {
+        let account = account(&MIXED);
+        let velocities = account.velocities().expect("they are on chip");
+        for copies in 1..1000 {
+            assert_eq!(velocities.with(copies, 1).interval(), 2, "{copies} copies");
+        }
+    }
+
+    /// Thesis §5.5.3: one copy 4, two copies 3, more copies still 3.
+    #[test]
+    fn two_copies_bring_half_from_four_to_three_and_no_lower() {
+        let account = account(&HALF);
+        let velocities = account.velocities().expect("they are on chip");
+        let interval = |copies| velocities.with(copies, 1).interval();
+        assert_eq!([interval(1), interval(2), interval(3), interval(1000)], [4, 3, 3, 3]);
+    }
+
+    #[test]
+    fn some_arrays_need_banks_to_be_loaded_as_fast_as_the_streams() {
+        let load =
+            |profile: &'static Profile| account(profile).load(&profile.default_variant(), 38_880);
+        let half = load(&HALF);
+        assert_eq!((half[0].array, half[0].by_streams), (OnChipArray::Velocities, 15_552));
+        assert_eq!((half[0].by_ports, half[0].banks), (19_440, 2));
+        assert_eq!((half[1].array, half[1].by_ports), (OnChipArray::ShapeIndices, 38_880));
+        let banks = |profile| load(profile).iter().map(|load| load.banks).collect::<Vec<_>>();
+        assert_eq!(banks(&NAIVE), [1, 1]);
+        assert_eq!(banks(&FLOAT), [1, 2]);
+        assert_eq!(banks(&HALF), [2, 3]);
+        assert_eq!(banks(&MIXED), [1, 2]);
+    }
+}

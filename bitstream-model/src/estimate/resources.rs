@@ -1,0 +1,231 @@
+//! This file is the account of on-chip memory: by array and copy, in bytes and in block RAMs.
+//!
+//! Source: thesis §4.4.2 (24 bytes a body and 16 a collision; 4.0 MiB on the XCZU9EG).
+
+use super::blocks::{BLOCK_BITS, ShapedBlocks};
+use super::ports::{MemoryKind, OnChipArray, PortAccount};
+use super::window;
+use pgs_interface::profile::{Flow, Variant, Window};
+
+/// Numbers of a velocity, and of a world inverse inertia.
+const SIX: u32 = 6;
+/// Numbers of the accumulated impulses of a collision.
+const FOUR: u32 = 4;
+/// Numbers of a position.
+const THREE: u32 = 3;
+const BITS_PER_BYTE: u32 = 8;
+
+/// On-chip memory of one array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ArrayUse {
+    /// The array.
+    pub array: OnChipArray,
+    /// Where it lies.
+    pub memory: MemoryKind,
+    /// Rows: bodies or collisions.
+    pub rows: u64,
+    /// Bytes of a row.
+    pub row_bytes: u32,
+    /// Copies; of a design whose passes run side by side, memories of as many units or passes.
+    pub copies: u32,
+    /// Whether one port to read and one to write are enough for every issue.
+    pub simple: bool,
+}
+
+impl ArrayUse {
+    /// Bytes of all copies.
+    #[must_use]
+    pub const fn bytes(&self) -> u64 {
+        self.rows.saturating_mul((self.row_bytes * self.copies) as u64)
+    }
+
+    /// Blocks of all copies if no bit of a block were lost.
+    #[must_use]
+    pub const fn ideal_blocks(&self) -> u64 {
+        self.bytes().saturating_mul(BITS_PER_BYTE as u64).div_ceil(BLOCK_BITS)
+    }
+
+    /// Blocks of all copies by the shapes of the block; nothing for distributed RAM.
+    #[must_use]
+    pub fn shaped_blocks(&self) -> Option<ShapedBlocks> {
+        let bits = u64::from(self.row_bytes * BITS_PER_BYTE);
+        let one = ShapedBlocks::fewest(self.rows, bits, self.simple);
+        let blocks = one.blocks.saturating_mul(self.copies.into());
+        (self.memory == MemoryKind::Block).then_some(ShapedBlocks { blocks, ..one })
+    }
+}
+
+/// On-chip memory of a step.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MemoryUse {
+    /// Each array.
+    pub arrays: Vec<ArrayUse>,
+    /// Block RAM that there is, bytes.
+    pub capacity: u64,
+    /// Bytes that the positions of all bodies would take beside them, in as many copies as the
+    /// velocities have.
+    pub positions: u64,
+}
+
+impl MemoryUse {
+    /// What that many bodies and collisions take in a variant of a profile.
+    #[must_use]
+    pub fn new(variant: &Variant, bodies: u64, collisions: u64) -> Self {
+        let memory = variant.profile.memory;
+        let number = variant.numbers.velocities.bytes();
+        let arrays = PortAccount::new(variant)
+            .arrays
+            .into_iter()
+            .map(|ports| {
+                let (rows, row_bytes) = match ports.array {
+                    OnChipArray::Velocities | OnChipArray::Inertia => (bodies, SIX * number),
+                    OnChipArray::Impulses => (collisions, FOUR * variant.numbers.impulses.bytes()),
+                    OnChipArray::ShapeIndices => (bodies, memory.shape_index_bytes),
+                    OnChipArray::ContactLines | OnChipArray::FrictionLines => (0, 0),
+                };
+                let (array, copies, simple) = (ports.array, ports.copies, ports.simple());
+                let of_window = match &variant.profile.flow {
+                    Flow::Window(design) => window::array(variant, design, array),
+                    Flow::Passes => None,
+                };
+                if let Some(of) = of_window {
+                    let (rows, row_bytes, copies) = (of.rows, of.row_bytes, of.memories);
+                    let memory = ports.memory;
+                    return ArrayUse { array, memory, rows, row_bytes, copies, simple };
+                }
+                ArrayUse { array, memory: ports.memory, rows, row_bytes, copies, simple }
+            })
+            .collect();
+        let position = THREE * number * memory.velocity_copies;
+        let bodies = match &variant.profile.flow {
+            Flow::Passes => bodies,
+            Flow::Window(design) => design.slots.into(),
+        };
+        Self {
+            arrays,
+            capacity: memory.bytes.into(),
+            positions: bodies.saturating_mul(position.into()),
+        }
+    }
+
+    /// Bytes of one array; 0 if it is not on chip.
+    #[must_use]
+    pub fn bytes_of(&self, array: OnChipArray) -> u64 {
+        self.arrays.iter().filter(|a| a.array == array).map(ArrayUse::bytes).sum()
+    }
+
+    fn block_arrays(&self) -> impl Iterator<Item = &ArrayUse> {
+        self.arrays.iter().filter(|array| array.memory == MemoryKind::Block)
+    }
+
+    fn sum(&self, of: impl Fn(&ArrayUse) -> u64) -> u64 {
+        self.block_arrays().map(of).fold(0, u64::saturating_add)
+    }
+
+    /// Block RAM used, bytes.
+    #[must_use]
+    pub fn block_ram(&self) -> u64 {
+        self.sum(ArrayUse::bytes)
+    }
+
+    /// Block RAM used if the positions were kept as well, bytes (thesis §4.4.2).
+    #[must_use]
+    pub fn with_positions(&self) -> u64 {
+        self.block_ram().saturating_add(self.positions)
+    }
+
+    /// Blocks used if no bit of a block were lost.
+    #[must_use]
+    pub fn ideal_blocks(&self) -> u64 {
+        self.block_ram().saturating_mul(BITS_PER_BYTE.into()).div_ceil(BLOCK_BITS)
+    }
+
+    /// Blocks used by the shapes that a block can take.
+    #[must_use]
+    pub fn shaped_blocks(&self) -> u64 {
+        self.sum(|array| array.shaped_blocks().map_or(0, |shaped| shaped.blocks))
+    }
+
+    /// Whether it fits, by bytes: what the capacity registers say.
+    #[must_use]
+    pub fn fits(&self) -> bool {
+        self.block_ram() <= self.capacity
+    }
+
+    /// Collisions that fit beside that many bodies; what the counters hold, where none of them is kept.
+    #[must_use]
+    pub fn collisions_beside(variant: &Variant, bodies: u64) -> u64 {
+        let memory = variant.profile.memory;
+        let taken = bodies.saturating_mul(variant.bytes_per_body().into());
+        u64::from(memory.bytes)
+            .saturating_sub(taken)
+            .checked_div(u64::from(variant.bytes_per_collision()))
+            .unwrap_or(Window::COLLISIONS_MAX.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile};
+
+    fn thesis_step(profile: &'static Profile) -> MemoryUse {
+        MemoryUse::new(&profile.default_variant(), 38_880, 127_000)
+    }
+
+    fn hundredths_of_mib(bytes: u64) -> u64 {
+        (bytes * 100 + (1 << 19)) >> 20
+    }
+
+    /// Thesis §4.4.2: 2.83 and 1.86, with positions 3.27 and 2.30; the positions alone 0.44 in
+    /// float, and 0.22 in each of half's two copies.
+    #[test]
+    fn float_and_half_take_what_the_thesis_says() {
+        let float = thesis_step(&FLOAT);
+        assert_eq!(float.block_ram(), 2_965_120);
+        assert_eq!(hundredths_of_mib(float.block_ram()), 283);
+        assert_eq!(hundredths_of_mib(float.with_positions()), 327);
+        assert_eq!(hundredths_of_mib(float.positions), 44);
+        let half = thesis_step(&HALF);
+        assert_eq!(half.block_ram(), 1_949_120);
+        assert_eq!(hundredths_of_mib(half.block_ram()), 186);
+        assert_eq!(hundredths_of_mib(half.with_positions()), 230);
+        assert_eq!(hundredths_of_mib(half.positions / 2), 22);
+        assert_eq!(hundredths_of_mib(half.block_ram() - half.arrays[0].bytes() / 2), 141);
+        for profile in [&MIXED, &NAIVE] {
+            assert_eq!(thesis_step(profile).block_ram(), float.block_ram(), "{}", profile.name);
+        }
+    }
+
+    /// By hand: float 38 x 11 + 63 x 15, half 2 x 19 x 11 + 125 x 4: two collisions an issue read
+    /// and write two rows of impulses, so that the wide shape of one port each way does not do.
+    #[test]
+    fn shaped_blocks_are_a_little_more_than_the_bits() {
+        let blocks = |profile| {
+            let memory = thesis_step(profile);
+            (memory.ideal_blocks(), memory.shaped_blocks())
+        };
+        assert_eq!(blocks(&FLOAT), (1_287, 418 + 945));
+        assert_eq!(blocks(&HALF), (846, 418 + 500));
+    }
+
+    #[test]
+    fn the_arrays_are_what_the_interface_counts_for_each_record() {
+        for profile in PROFILES.iter().filter(|profile| profile.flow == Flow::Passes) {
+            for inertia in [Inertia::Isotropic, Inertia::World] {
+                let variant = Variant { inertia, ..profile.default_variant() };
+                let memory = MemoryUse::new(&variant, 7, 5);
+                let by_record = 7 * variant.bytes_per_body() + 5 * variant.bytes_per_collision();
+                assert_eq!(memory.block_ram(), u64::from(by_record), "{}", profile.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_full_scene_has_room_for_203_822_collisions() {
+        let most = MemoryUse::collisions_beside(&FLOAT.default_variant(), 38_881);
+        assert_eq!(most, 203_822);
+        assert!(MemoryUse::new(&FLOAT.default_variant(), 38_881, most).fits());
+        assert!(!MemoryUse::new(&FLOAT.default_variant(), 38_881, most + 1).fits());
+    }
+}

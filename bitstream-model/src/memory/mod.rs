@@ -1,0 +1,570 @@
+//! This file is the board's physical memory: who may touch what, checked on every access.
+//!
+//! Memory for DMA is allocated in ranges. A range of beats belongs to the CPU or to the device. What
+//! the CPU owns is not here at all: handing a buffer over *moves* it into the board, so that an
+//! access of the device to a buffer of the CPU is a decode error by construction. Ranges of words
+//! (descriptors) are shared for good.
+//!
+//! A board can be built on memory outside instead (`outside.rs`); then it allocates none.
+
+pub(crate) mod external;
+mod lend;
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use self::external::{DeviceMemory, Outside};
+use crate::cast::index;
+use crate::config::quirks::{Coherency, stale_from};
+use pgs_interface::address_map::{DDR_HIGH, DDR_LOW};
+use pgs_interface::record::{BEAT_BYTES, Beat};
+
+/// What the device may do with a buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeviceAccess {
+    /// Read it (MM2S).
+    Read,
+    /// Write it (S2MM).
+    Write,
+}
+
+/// A request of the CPU that the memory cannot meet.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MemoryError {
+    /// No room for the range.
+    #[error("no contiguous memory for {bytes} bytes below {limit:#x}")]
+    Exhausted {
+        /// Bytes asked for.
+        bytes: u64,
+        /// The end of the addresses that the DMAs can carry.
+        limit: u64,
+    },
+    /// No range begins there.
+    #[error("no buffer was allocated at {address:#x}")]
+    Unknown {
+        /// The address.
+        address: u64,
+    },
+    /// The range belongs to the other side, or has another length.
+    #[error("the buffer at {address:#x} is not in the state for this: {state}")]
+    State {
+        /// The address.
+        address: u64,
+        /// What it is.
+        state: &'static str,
+    },
+}
+
+/// Why the device may not touch an address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Denied {
+    /// No buffer there.
+    #[error("no buffer is granted there")]
+    Unmapped,
+    /// The access leaves the buffer in which it begins.
+    #[error("it runs past the end of its buffer")]
+    PastEnd,
+    /// The CPU owns the buffer.
+    #[error("the CPU owns the buffer")]
+    CpuOwned,
+    /// The buffer was granted for the other direction.
+    #[error("the buffer was granted for the other direction")]
+    Direction,
+    /// Descriptors where data is expected, or data where descriptors are.
+    #[error("descriptor memory and data buffers are not interchangeable")]
+    Kind,
+    /// Memory outside the board that cannot be reached; the log says why.
+    #[error("the memory there does not answer")]
+    NoAnswer,
+}
+
+/// Beats in a buffer that the device reads. While it owns the buffer they stay as they are, so that
+/// beats of equal sources are equal: each hand-over makes sources of its own. The default is none's.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Source {
+    /// Where the first one is.
+    address: u64,
+    /// Which hand-over it was.
+    grant: u64,
+}
+
+impl Source {
+    /// The same from so many beats further on.
+    pub(crate) fn further(self, beats: u64) -> Self {
+        Self { address: self.address + beats * BEAT_BYTES as u64, ..self }
+    }
+}
+
+#[derive(Debug)]
+enum Content {
+    Cpu,
+    /// Of which the device may touch the first beats only, so many.
+    Device(Box<[Beat]>, DeviceAccess, usize),
+    Words(Arc<[AtomicU32]>),
+}
+
+#[derive(Debug)]
+struct Region {
+    bytes: u64,
+    content: Content,
+    /// The number of its last hand-over.
+    grant: u64,
+    /// What the CPU's caches hold of it, where they do not agree with memory.
+    cached: Option<Box<[Beat]>>,
+}
+
+/// Ranges are kept apart by this much, so that running off an end meets nothing.
+const GUARD: u64 = 4096;
+
+/// Which beats of a buffer `count` of them are, from that offset in bytes on, if they are among the
+/// first `granted`.
+fn part(beats: &[Beat], granted: usize, offset: u64, count: usize) -> Option<Range<usize>> {
+    let first = index(offset / BEAT_BYTES as u64);
+    let end = first + count;
+    (end <= beats.len().min(granted)).then_some(first..end)
+}
+
+/// Physical memory.
+#[derive(Debug)]
+pub(crate) struct Memory {
+    /// By their addresses.
+    regions: Vec<(u64, Region)>,
+    /// What was never allocated, on both sides of 4 GiB.
+    low: Range<u64>,
+    high: Range<u64>,
+    /// Released ranges, guard included. They are reused only when nothing else is left, so that a
+    /// use after release meets no other buffer.
+    released: Vec<Range<u64>>,
+    address_limit: u64,
+    next_is_high: bool,
+    coherency: Coherency,
+    /// Hand-overs so far.
+    grants: u64,
+    /// Memory that is not kept here, instead of all ranges.
+    outside: Option<Outside>,
+}
+
+impl Memory {
+    /// Memory for DMAs with addresses of that many bits.
+    pub(crate) fn new(address_width: u32, coherency: Coherency) -> Self {
+        // The kernel and the rest of the system keep one gigabyte of each part, and not the same:
+        // a high address cut to 32 bits must not meet a buffer.
+        const SYSTEM: u64 = 1 << 30;
+        Self {
+            regions: Vec::new(),
+            low: DDR_LOW.start + SYSTEM..DDR_LOW.end,
+            high: DDR_HIGH.start..DDR_HIGH.end - SYSTEM,
+            released: Vec::new(),
+            address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
+            next_is_high: false,
+            coherency,
+            grants: 0,
+            outside: None,
+        }
+    }
+
+    /// Memory outside the board, of which the device may touch what is granted.
+    pub(crate) fn outside(memory: Box<dyn DeviceMemory>, granted: Vec<Range<u64>>) -> Self {
+        Self {
+            regions: Vec::new(),
+            low: 0..0,
+            high: 0..0,
+            released: Vec::new(),
+            address_limit: 0,
+            next_is_high: false,
+            coherency: Coherency::Coherent,
+            grants: 0,
+            outside: Some(Outside::new(memory, granted)),
+        }
+    }
+
+    fn place(&mut self, bytes: u64, content: Content) -> Result<u64, MemoryError> {
+        let take = bytes.next_multiple_of(GUARD) + GUARD;
+        let limit = self.address_limit;
+        let fits = |part: &Range<u64>| part.end - part.start >= take && part.end <= limit;
+        // In turn from both sides of 4 GiB, so that no driver gets by on 32 bits by luck.
+        let use_high = if self.next_is_high { fits(&self.high) } else { !fits(&self.low) };
+        self.next_is_high = !self.next_is_high;
+        let part = if use_high { &mut self.high } else { &mut self.low };
+        let part = if fits(part) {
+            part
+        } else {
+            let released = self.released.iter_mut().find(|part| fits(part));
+            released.ok_or(MemoryError::Exhausted { bytes, limit })?
+        };
+        let address = part.start;
+        part.start += take;
+        let place = self.regions.partition_point(|(start, _)| *start < address);
+        let region = Region { bytes, content, grant: 0, cached: None };
+        self.regions.insert(place, (address, region));
+        Ok(address)
+    }
+
+    pub(crate) fn allocate(&mut self, beats: usize) -> Result<(u64, Box<[Beat]>), MemoryError> {
+        let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
+        if bytes > DDR_LOW.end {
+            return Err(MemoryError::Exhausted { bytes, limit: self.address_limit });
+        }
+        let address = self.place(bytes, Content::Cpu)?;
+        Ok((address, vec![Beat::default(); beats].into()))
+    }
+
+    pub(crate) fn allocate_shared(
+        &mut self,
+        words: usize,
+    ) -> Result<(u64, Arc<[AtomicU32]>), MemoryError> {
+        let bytes = (words as u64).saturating_mul(4);
+        if bytes > DDR_LOW.end {
+            return Err(MemoryError::Exhausted { bytes, limit: self.address_limit });
+        }
+        let shared: Arc<[AtomicU32]> = (0..words).map(|_| AtomicU32::new(0)).collect();
+        let address = self.place(bytes, Content::Words(Arc::clone(&shared)))?;
+        Ok((address, shared))
+    }
+
+    /// The place of the range that begins there.
+    fn begins_at(&self, address: u64) -> Result<usize, MemoryError> {
+        let place = self.regions.binary_search_by_key(&address, |(start, _)| *start);
+        place.map_err(|_| MemoryError::Unknown { address })
+    }
+
+    fn region_at(&mut self, address: u64) -> Result<&mut Region, MemoryError> {
+        let place = self.begins_at(address)?;
+        Ok(&mut self.regions[place].1)
+    }
+
+    /// Gives the device the first `granted` beats of a buffer.
+    pub(crate) fn hand_over(
+        &mut self,
+        address: u64,
+        beats: Box<[Beat]>,
+        granted: usize,
+        access: DeviceAccess,
+    ) -> Result<(), MemoryError> {
+        let coherency = self.coherency;
+        self.grants += 1;
+        let grant = self.grants;
+        let region = self.region_at(address)?;
+        if !matches!(region.content, Content::Cpu) {
+            return Err(MemoryError::State { address, state: "the CPU does not own it" });
+        }
+        if (beats.len() * BEAT_BYTES) as u64 != region.bytes {
+            return Err(MemoryError::State { address, state: "its length is another" });
+        }
+        let visible = match (coherency, access) {
+            (Coherency::StaleReads { from_byte }, DeviceAccess::Read) => {
+                let before = region.cached.replace(beats.clone());
+                stale_from(from_byte, beats, before.as_deref())
+            }
+            (Coherency::StaleWrites { .. }, DeviceAccess::Write) if region.cached.is_some() => {
+                region.cached = Some(beats.clone());
+                beats
+            }
+            _ => beats,
+        };
+        region.content = Content::Device(visible, access, granted);
+        region.grant = grant;
+        Ok(())
+    }
+
+    pub(crate) fn take_back(&mut self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
+        let coherency = self.coherency;
+        let region = self.region_at(address)?;
+        match std::mem::replace(&mut region.content, Content::Cpu) {
+            Content::Device(beats, access, _) => Ok(match (coherency, access) {
+                (Coherency::StaleReads { .. }, DeviceAccess::Read) => {
+                    region.cached.clone().unwrap_or(beats)
+                }
+                (Coherency::StaleWrites { from_byte }, DeviceAccess::Write) => {
+                    let seen = stale_from(from_byte, beats, region.cached.as_deref());
+                    region.cached = Some(seen.clone());
+                    seen
+                }
+                _ => beats,
+            }),
+            other => {
+                region.content = other;
+                Err(MemoryError::State { address, state: "the device does not own it" })
+            }
+        }
+    }
+
+    pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
+        let place = self.begins_at(address)?;
+        let (_, region) = self.regions.remove(place);
+        self.released.retain(|range| !range.is_empty());
+        self.released.push(address..address + region.bytes.next_multiple_of(GUARD) + GUARD);
+        Ok(())
+    }
+
+    /// The range that holds `address`, and the offset in it.
+    fn find(&self, address: u64, bytes: u64) -> Result<(&Region, u64), Denied> {
+        let (place, offset) = self.place_of(address, bytes)?;
+        Ok((&self.regions[place].1, offset))
+    }
+
+    /// The place of that range, and the offset.
+    fn place_of(&self, address: u64, bytes: u64) -> Result<(usize, u64), Denied> {
+        let behind = self.regions.partition_point(|(start, _)| *start <= address);
+        let place = behind.checked_sub(1).ok_or(Denied::Unmapped)?;
+        let (start, region) = &self.regions[place];
+        let offset = address - start;
+        if offset >= region.bytes {
+            return Err(Denied::Unmapped);
+        }
+        if bytes > region.bytes - offset {
+            return Err(Denied::PastEnd);
+        }
+        Ok((place, offset))
+    }
+
+    /// Beats that the device reads. The address is a multiple of a beat.
+    pub(crate) fn beats(&mut self, address: u64, count: usize) -> Result<&[Beat], Denied> {
+        if let Some(ref mut outside) = self.outside {
+            return outside.read(address, count);
+        }
+        self.owned(address, count).map(|(_, beats)| beats)
+    }
+
+    /// Where beats are that the device reads, if they stay as they are while it owns them: memory
+    /// outside may change at any time. The address is a multiple of a beat.
+    pub(crate) fn source(&self, address: u64, count: usize) -> Result<Option<Source>, Denied> {
+        if self.outside.is_some() {
+            return Ok(None);
+        }
+        let grant = self.owned(address, count).map(|(region, _)| region.grant)?;
+        Ok(Some(Source { address, grant }))
+    }
+
+    /// Beats of a source, if the device owns its buffer still.
+    pub(crate) fn view(&self, from: Source, count: usize) -> Option<&[Beat]> {
+        let (region, beats) = self.owned(from.address, count).ok()?;
+        (region.grant == from.grant).then_some(beats)
+    }
+
+    /// Beats that the device reads in a buffer that it owns.
+    fn owned(&self, address: u64, count: usize) -> Result<(&Region, &[Beat]), Denied> {
+        let (region, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
+        match &region.content {
+            Content::Cpu => Err(Denied::CpuOwned),
+            Content::Words(_) => Err(Denied::Kind),
+            Content::Device(_, DeviceAccess::Write, _) => Err(Denied::Direction),
+            Content::Device(beats, DeviceAccess::Read, granted) => {
+                let part = part(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
+                Ok((region, &beats[part]))
+            }
+        }
+    }
+
+    fn beats_mut(&mut self, address: u64, count: usize) -> Result<&mut [Beat], Denied> {
+        let (place, offset) = self.place_of(address, (count * BEAT_BYTES) as u64)?;
+        match &mut self.regions[place].1.content {
+            Content::Cpu => Err(Denied::CpuOwned),
+            Content::Words(_) => Err(Denied::Kind),
+            Content::Device(_, DeviceAccess::Read, _) => Err(Denied::Direction),
+            Content::Device(beats, DeviceAccess::Write, granted) => {
+                let part = part(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
+                Ok(&mut beats[part])
+            }
+        }
+    }
+
+    /// Whether the device may write those beats in a buffer that it owns.
+    pub(crate) fn may_write(&self, address: u64, count: usize) -> bool {
+        let Ok((region, offset)) = self.find(address, (count * BEAT_BYTES) as u64) else {
+            return false;
+        };
+        let Content::Device(beats, DeviceAccess::Write, granted) = &region.content else {
+            return false;
+        };
+        part(beats, *granted, offset, count).is_some()
+    }
+
+    /// Whether the device may write those beats.
+    pub(crate) fn check_write(&mut self, address: u64, count: usize) -> Result<(), Denied> {
+        match &self.outside {
+            Some(outside) => outside.check(address, (count * BEAT_BYTES) as u64),
+            None => self.beats_mut(address, count).map(|_| ()),
+        }
+    }
+
+    /// Beats that the device writes: `fill` gives them, if the device may. The address is a multiple
+    /// of a beat.
+    pub(crate) fn write(
+        &mut self,
+        address: u64,
+        count: usize,
+        fill: impl FnOnce(&mut [Beat]),
+    ) -> Result<(), Denied> {
+        match &mut self.outside {
+            Some(outside) => outside.write(address, count, fill),
+            None => self.beats_mut(address, count).map(fill),
+        }
+    }
+
+    fn words(&self, address: u64, count: usize) -> Result<&[AtomicU32], Denied> {
+        let (region, offset) = self.find(address, (count * 4) as u64)?;
+        match &region.content {
+            Content::Words(words) => {
+                let first = index(offset / 4);
+                words.get(first..first + count).ok_or(Denied::PastEnd)
+            }
+            _ => Err(Denied::Kind),
+        }
+    }
+
+    /// Words of a descriptor that the device fetches. The address is a multiple of 4.
+    pub(crate) fn read_words(&mut self, address: u64, to: &mut [u32]) -> Result<(), Denied> {
+        if let Some(outside) = &mut self.outside {
+            return outside.read_words(address, to);
+        }
+        let words = self.words(address, to.len())?;
+        for (to, from) in to.iter_mut().zip(words) {
+            *to = from.load(Ordering::Acquire);
+        }
+        Ok(())
+    }
+
+    /// The word of a descriptor that the device updates. The address is a multiple of 4.
+    pub(crate) fn write_word(&mut self, address: u64, value: u32) -> Result<(), Denied> {
+        if let Some(outside) = &mut self.outside {
+            return outside.write_word(address, value);
+        }
+        self.words(address, 1)?[0].store(value, Ordering::Release);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every beat of a buffer is granted.
+    const ALL: usize = usize::MAX;
+
+    #[test]
+    fn a_buffer_of_the_cpu_is_out_of_the_devices_reach() {
+        let mut memory = Memory::new(40, Coherency::Coherent);
+        let (address, beats) = memory.allocate(4).expect("fits");
+        assert_eq!(memory.beats(address, 1).err(), Some(Denied::CpuOwned));
+        memory.hand_over(address, beats, ALL, DeviceAccess::Read).expect("the CPU owns it");
+        assert_eq!(memory.beats(address, 4).map(<[Beat]>::len), Ok(4));
+        assert_eq!(memory.beats_mut(address, 1).err(), Some(Denied::Direction));
+        memory.take_back(address).expect("the device owns it");
+        assert_eq!(memory.beats(address, 1).err(), Some(Denied::CpuOwned));
+    }
+
+    #[test]
+    fn one_beat_past_the_end_is_denied() {
+        let mut memory = Memory::new(40, Coherency::Coherent);
+        let (address, beats) = memory.allocate(4).expect("fits");
+        memory.hand_over(address, beats, ALL, DeviceAccess::Read).expect("the CPU owns it");
+        assert_eq!(memory.beats(address + 48, 2).err(), Some(Denied::PastEnd));
+        assert_eq!(memory.beats(address + 64, 1).err(), Some(Denied::Unmapped));
+        assert_eq!(memory.beats(address - 16, 1).err(), Some(Denied::Unmapped));
+    }
+
+    #[test]
+    fn a_released_buffer_is_gone_and_its_address_is_not_reused() {
+        let mut memory = Memory::new(40, Coherency::Coherent);
+        let (address, beats) = memory.allocate(4).expect("fits");
+        memory.hand_over(address, beats, ALL, DeviceAccess::Write).expect("the CPU owns it");
+        memory.release(address).expect("it is there");
+        assert_eq!(memory.beats_mut(address, 1).err(), Some(Denied::Unmapped));
+        for _ in 0..8 {
+            assert_ne!(memory.allocate(4).expect("fits").0, address);
+        }
+    }
+
+    #[test]
+    fn released_memory_is_reused_when_nothing_else_is_left() {
+        let mut memory = Memory::new(32, Coherency::Coherent);
+        for _ in 0..100 {
+            let address = memory.place(64 << 20, Content::Cpu).expect("released ones are reused");
+            memory.release(address).expect("it is there");
+        }
+    }
+
+    #[test]
+    fn buffers_stand_on_both_sides_of_4_gib_unless_addresses_have_32_bits() {
+        let mut memory = Memory::new(40, Coherency::Coherent);
+        let addresses: Vec<_> = (0..4).map(|_| memory.allocate(1).expect("fits").0).collect();
+        assert!(addresses.iter().any(|a| *a < 1 << 32) && addresses.iter().any(|a| *a >= 1 << 32));
+        let mut memory = Memory::new(32, Coherency::Coherent);
+        assert!((0..4).all(|_| memory.allocate(1).expect("fits").0 < 1 << 32));
+        let too_much = (1_usize << 30) / BEAT_BYTES;
+        assert!(matches!(memory.allocate(too_much), Err(MemoryError::Exhausted { .. })));
+    }
+
+    #[test]
+    fn descriptors_are_shared_and_are_no_data() {
+        let mut memory = Memory::new(40, Coherency::Coherent);
+        let (address, words) = memory.allocate_shared(16).expect("fits");
+        words[3].store(7, Ordering::Relaxed);
+        let mut read = [0; 2];
+        memory.read_words(address + 8, &mut read).expect("granted");
+        assert_eq!(read, [0, 7]);
+        assert_eq!(memory.read_words(address + 60, &mut read).err(), Some(Denied::PastEnd));
+        assert_eq!(memory.beats(address, 1).err(), Some(Denied::Kind));
+        memory.write_word(address + 4, 9).expect("granted");
+        assert_eq!(words[1].load(Ordering::Relaxed), 9);
+    }
+
+    /// Hands beats of that value over, lets the device read them or write others, and returns what
+    /// the device has read and what the CPU finds afterwards.
+    fn round(memory: &mut Memory, address: u64, value: u32, access: DeviceAccess) -> [Vec<u32>; 2] {
+        let first = |beats: &[Beat]| beats.iter().map(|beat| beat.0[0]).collect::<Vec<_>>();
+        let beats = vec![Beat([value; 4]); 8].into();
+        memory.hand_over(address, beats, ALL, access).expect("the CPU owns it");
+        let read = match access {
+            DeviceAccess::Read => first(memory.beats(address, 8).expect("granted")),
+            DeviceAccess::Write => {
+                memory.beats_mut(address, 8).expect("granted").fill(Beat([value + 100; 4]));
+                Vec::new()
+            }
+        };
+        [read, first(&memory.take_back(address).expect("handed over"))]
+    }
+
+    #[test]
+    fn stale_reads_are_those_of_the_hand_over_before_and_the_cpu_does_not_notice() {
+        let mut memory = Memory::new(40, Coherency::StaleReads { from_byte: 64 });
+        let (address, _) = memory.allocate(8).expect("fits");
+        let mut rounds = (1..=3).map(|v| round(&mut memory, address, v, DeviceAccess::Read));
+        assert_eq!(rounds.next(), Some([vec![1; 8], vec![1; 8]]));
+        assert_eq!(rounds.next(), Some([vec![2, 2, 2, 2, 1, 1, 1, 1], vec![2; 8]]));
+        assert_eq!(rounds.next(), Some([vec![3, 3, 3, 3, 2, 2, 2, 2], vec![3; 8]]));
+    }
+
+    #[test]
+    fn stale_writes_leave_the_cpu_with_what_it_handed_over() {
+        let mut memory = Memory::new(40, Coherency::StaleWrites { from_byte: 64 });
+        let (address, _) = memory.allocate(8).expect("fits");
+        let mut rounds =
+            (1..=3).map(|v| round(&mut memory, address, v, DeviceAccess::Write)[1].clone());
+        assert_eq!(rounds.next(), Some(vec![101; 8]));
+        assert_eq!(rounds.next(), Some(vec![102, 102, 102, 102, 2, 2, 2, 2]));
+        assert_eq!(rounds.next(), Some(vec![103, 103, 103, 103, 3, 3, 3, 3]));
+    }
+
+    #[test]
+    fn only_the_first_beats_of_a_buffer_may_be_granted() {
+        let mut memory = Memory::new(40, Coherency::Coherent);
+        for access in [DeviceAccess::Read, DeviceAccess::Write] {
+            let (address, beats) = memory.allocate(8).expect("there is room");
+            memory.hand_over(address, beats, 3, access).expect("the CPU owns it");
+            let mut touch = |beat: u64, count| match access {
+                DeviceAccess::Read => memory.beats(address + 16 * beat, count).map(|_| ()),
+                DeviceAccess::Write => memory.write(address + 16 * beat, count, |_| ()),
+            };
+            assert_eq!(touch(0, 3), Ok(()));
+            for (beat, count) in [(0, 4), (2, 2), (3, 1), (7, 1)] {
+                assert_eq!(touch(beat, count), Err(Denied::PastEnd), "{access:?}");
+            }
+            assert_eq!(memory.take_back(address).expect("it is there").len(), 8);
+        }
+    }
+}

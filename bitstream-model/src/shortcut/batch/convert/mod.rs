@@ -1,0 +1,238 @@
+//! This file translates collisions of other designs into those that a batch takes in: f32, in world
+//! coordinates, on four streams. So many at a time that they stay in the cache.
+//!
+//! A record relative to body A is one whose body A stands at the origin. Of two records of three and a
+//! half beats the first takes the sum of the words of both, and what pads the last one up.
+
+use super::Batch;
+use super::lanes::{Lanes, Work};
+use super::records::{BEATS, STREAMS};
+use crate::accelerator::records::array::{Row, half_of};
+use crate::accelerator::records::decode::{self, Collision};
+use crate::accelerator::records::segment::PacketError;
+use crate::accelerator::records::striping::STREAMS_MAX;
+use crate::accelerator::solver::Mass;
+use crate::cast::register;
+use crate::shortcut::deferred::eligible::Layout;
+use pgs_interface::number::StreamFormat;
+use pgs_interface::record::{Beat, LANES, WORD_LANE, collision, relative};
+use pgs_support::chunks::Chunks;
+
+/// Records that are translated at once.
+const TOGETHER: usize = 4096;
+/// And by one thread.
+const OF_THREAD: usize = 512;
+
+/// Records that share a beat.
+const PAIR: usize = 2;
+const _: () = assert!(TOGETHER.is_multiple_of(PAIR) && OF_THREAD.is_multiple_of(PAIR));
+
+/// Records that have been translated.
+#[derive(Debug)]
+pub(crate) struct Translation {
+    layout: Layout,
+    streams: [Box<[Beat]>; STREAMS],
+    /// The sum of the words of each as it came.
+    sums: Box<[u32]>,
+}
+
+/// The rows of a collision in world coordinates.
+#[inline(always)]
+fn rows(collision: &Collision) -> [Row; collision::ROWS] {
+    let row = |[x, y, z]: [f32; 3], word| [x.to_bits(), y.to_bits(), z.to_bits(), word];
+    let mut rows = [[0; 4]; collision::ROWS];
+    rows[collision::NORMAL] = row(collision.normal, register(collision.count));
+    rows[collision::BODY_A] = row(collision.position_a, collision.body_a);
+    rows[collision::BODY_B] = row(collision.position_b, collision.body_b);
+    for (row, contact) in rows[collision::CONTACTS..].iter_mut().zip(collision.contacts) {
+        *row = contact.map(f32::to_bits);
+    }
+    rows
+}
+
+impl Translation {
+    pub(crate) fn new(layout: Layout) -> Self {
+        Self {
+            layout,
+            streams: BEATS.map(|beats| vec![Beat::default(); TOGETHER * beats].into()),
+            sums: vec![0; TOGETHER].into(),
+        }
+    }
+
+    /// As [`Batch::decode`], of records as the design has them.
+    pub(crate) fn decode(
+        &mut self,
+        batch: &mut Batch,
+        streams: [&[Beat]; STREAMS_MAX],
+        count: usize,
+        shape_of: &[u8],
+        masses: &[Mass],
+        sums: &mut [u32],
+    ) -> Result<(), PacketError> {
+        for (part, sums) in (0..).zip(sums[..count].chunks_mut(TOGETHER)) {
+            self.translate(batch, streams, part * TOGETHER, sums.len());
+            let mut translated: [&[Beat]; STREAMS] = [&[]; STREAMS];
+            for ((to, from), beats) in translated.iter_mut().zip(&self.streams).zip(BEATS) {
+                *to = &from[..sums.len() * beats];
+            }
+            let decoded = batch.decode(translated, sums.len(), shape_of, masses, sums);
+            sums.copy_from_slice(&self.sums[..sums.len()]);
+            decoded?;
+        }
+        Ok(())
+    }
+
+    /// Translates records from `first` on.
+    fn translate(
+        &mut self,
+        batch: &mut Batch,
+        streams: [&[Beat]; STREAMS_MAX],
+        first: usize,
+        count: usize,
+    ) {
+        let (layout, width) = (&self.layout, batch.width);
+        let [a, b, c, d] = self.streams.each_mut().map(|stream| &mut stream[..]);
+        let parts = a
+            .chunks_mut(OF_THREAD * BEATS[0])
+            .zip(b.chunks_mut(OF_THREAD * BEATS[1]))
+            .zip(c.chunks_mut(OF_THREAD * BEATS[2]))
+            .zip(d.chunks_mut(OF_THREAD * BEATS[3]))
+            .zip(self.sums[..count].chunks_mut(OF_THREAD));
+        let parts = (first..).step_by(OF_THREAD).zip(parts);
+        batch.crew.each(parts, |(first, ((((a, b), c), d), sums))| {
+            let part = Part { layout, streams, first, to: [a, b, c, d], sums };
+            if let Err(part) = width.run(part) {
+                part.translate();
+            }
+        });
+    }
+}
+
+/// Records that one thread translates, as many as there are sums, and where they go.
+struct Part<'a> {
+    layout: &'a Layout,
+    streams: [&'a [Beat]; STREAMS_MAX],
+    /// The first record on the streams.
+    first: usize,
+    to: [&'a mut [Beat]; STREAMS],
+    sums: &'a mut [u32],
+}
+
+impl Work for Part<'_> {
+    /// The same instructions, of which the processor has more.
+    #[inline(always)]
+    fn with<L: Lanes>(self, _: L) {
+        self.translate();
+    }
+}
+
+impl Part<'_> {
+    #[inline(always)]
+    fn translate(self) {
+        if self.layout.together == PAIR {
+            let format = self.layout.format;
+            self.translate_pairs(format);
+            return;
+        }
+        match self.layout.format {
+            StreamFormat::F32 => self.translate_of::<{ relative::ROWS }>(StreamFormat::F32),
+            StreamFormat::Binary16 => {
+                self.translate_of::<{ relative::ROWS / 2 }>(StreamFormat::Binary16);
+            }
+            StreamFormat::Thesis16 => {
+                self.translate_of::<{ relative::ROWS / 2 }>(StreamFormat::Thesis16);
+            }
+        }
+    }
+
+    /// The same of a format, in which a record takes so many beats.
+    #[inline(always)]
+    fn translate_of<const COUNT: usize>(self, format: StreamFormat) {
+        let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
+        let from: [_; COUNT] = std::array::from_fn(|beat| {
+            let (stream, number) = layout.places[beat];
+            let share = layout.share[stream];
+            (&streams[stream][first * share + number..], share)
+        });
+        const { assert!(BEATS[0] == 2 && BEATS[1] == 2 && BEATS[2] == 2 && BEATS[3] == 1) };
+        let pairs = a.split_arrays_mut::<2>().0.iter_mut().zip(b.split_arrays_mut::<2>().0);
+        let to = pairs.zip(c.split_arrays_mut::<2>().0.iter_mut().zip(d));
+        for (record, (sum, ((a, b), (c, d)))) in sums.iter_mut().zip(to).enumerate() {
+            let beats = from.map(|(beats, share)| beats[record * share]);
+            *sum = beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add);
+            let rows = rows(&Collision::relative(format, &rows_in(&beats)));
+            let [a0, b0, c0, d0, a1, b1, c1] = rows.map(Beat);
+            (*a, *b, *c, *d) = ([a0, a1], [b0, b1], [c0, c1], d0);
+        }
+    }
+}
+
+impl Part<'_> {
+    /// The same of pairs of records in world coordinates of sixteen-bit words.
+    #[inline(always)]
+    fn translate_pairs(self, format: StreamFormat) {
+        let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
+        let from: [_; collision::ROWS] = std::array::from_fn(|beat| {
+            let (stream, number) = layout.places[beat];
+            let share = layout.share[stream];
+            (&streams[stream][first / PAIR * share + number..], share)
+        });
+        let [a, b, c] = [a, b, c].map(|beats| beats.split_arrays_mut::<2>().0.chunks_mut(PAIR));
+        let to = a.zip(b).zip(c.zip(d.chunks_mut(PAIR)));
+        for (issue, (sums, ((a, b), (c, d)))) in sums.chunks_mut(PAIR).zip(to).enumerate() {
+            let beats = from.map(|(beats, share)| beats[issue * share]);
+            let rows = rows_of_pair(format, &beats);
+            sums.fill(0);
+            sums[0] = beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add);
+            let records = rows.split_arrays::<{ collision::ROWS }>().0;
+            let to = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
+            for (rows, ((a, b), (c, d))) in records.iter().zip(to) {
+                let [a0, b0, c0, d0, a1, b1, c1] = rows.map(Beat);
+                (*a, *b, *c, *d) = ([a0, a1], [b0, b1], [c0, c1], d0);
+            }
+        }
+    }
+}
+
+/// The rows of two records in world coordinates, which share their beats.
+#[inline(always)]
+fn rows_of_pair(
+    format: StreamFormat,
+    beats: &[Beat; collision::ROWS],
+) -> [Row; PAIR * collision::ROWS] {
+    // All words alike, for the compiler to take several at once; then those that are no numbers.
+    let mut rows = [[0; LANES]; PAIR * collision::ROWS];
+    for (rows, beat) in rows.split_arrays_mut::<2>().0.iter_mut().zip(beats) {
+        let words: [u16; 2 * LANES] = bytemuck::cast(*beat);
+        for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
+            *to = decode::number(format, u32::from(word)).to_bits();
+        }
+    }
+    for record in 0..PAIR {
+        for row in [collision::NORMAL, collision::BODY_A, collision::BODY_B] {
+            let row = record * collision::ROWS + row;
+            rows[row][WORD_LANE] = half_of(beats[row / 2], row % 2)[WORD_LANE];
+        }
+    }
+    rows
+}
+
+/// The rows in the beats of a record: of 32-bit words, or two in each of sixteen-bit words.
+#[inline(always)]
+fn rows_in<const COUNT: usize>(beats: &[Beat; COUNT]) -> [Row; relative::ROWS] {
+    let mut rows = [[0; LANES]; relative::ROWS];
+    if COUNT == relative::ROWS {
+        for (row, beat) in rows.iter_mut().zip(beats) {
+            *row = beat.0;
+        }
+    } else {
+        let words: &[u16] = bytemuck::cast_slice(beats);
+        for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
+            *to = u32::from(*word);
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests;

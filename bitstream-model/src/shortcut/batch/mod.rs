@@ -1,0 +1,330 @@
+//! The collisions of a step decoded once, and the passes over them, many at a time.
+//!
+//! ```text
+//! beats -> intake.rs: place.rs (which are independent), block.rs (side by side) -> passes
+//!   translation.rs, if they are those of another design
+//! ```
+//!
+//! Only collisions that share no moving body change places, so that every bit is that of
+//! `solver.rs` taking one after the other. It is for arithmetic in f32 or in binary16, with isotropic
+//! inertia and subnormals kept.
+
+mod block;
+mod convert;
+mod decode;
+mod grouping;
+mod kernel;
+mod lanes;
+mod motion;
+mod order;
+mod queue;
+mod records;
+#[cfg(test)]
+mod tests;
+mod wavefront;
+mod width;
+
+use std::ops::Range;
+
+use pgs_support::Crew;
+
+use crate::accelerator::arithmetic::inertia::Isotropic;
+use crate::accelerator::arithmetic::number::{Format, Half, Single};
+use crate::accelerator::hazards::Entry;
+use crate::accelerator::per_record::fixed_impulse;
+use crate::accelerator::records::decode::Collision;
+use crate::accelerator::solver::{self, Impulses, Mass, SolverParameters, Velocity};
+use crate::config::THREADS_MAX;
+use pgs_interface::number::Precision;
+use pgs_interface::record::CONTACT_POINTS;
+
+use block::{Block, LANES, ROWS_APART};
+use decode::{Group, PUT_OFF};
+use grouping::Places;
+use wavefront::{Fronts, Line, Passes};
+use width::Width;
+
+pub(crate) use convert::Translation;
+pub(crate) use motion::ResultPlaces;
+pub(crate) use records::PLACES;
+
+/// The slot of a padding entry.
+const NO_SLOT: u32 = u32::MAX;
+
+/// Bodies that a thread copies at once.
+const COPIED_TOGETHER: usize = 2048;
+
+/// What a pass is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stage {
+    contact: bool,
+    /// The last contact pass, of which the impulses are counted, or the first friction pass, which
+    /// finds their sums.
+    turning: bool,
+}
+
+impl Stage {
+    fn new(pass: u32, contact: u32) -> Self {
+        if pass < contact {
+            Self { contact: true, turning: pass + 1 == contact }
+        } else {
+            Self { contact: false, turning: pass == contact }
+        }
+    }
+
+    /// The pass over one collision; returns its share of the impulse sum.
+    fn solve<F: Format>(
+        self,
+        collision: &Collision,
+        parameters: &SolverParameters,
+        masses: &[Mass; 2],
+        velocities: &mut [Velocity; 2],
+        impulses: &mut Impulses,
+    ) -> u64 {
+        if self.contact {
+            solver::contact::<F, F, Isotropic>(collision, parameters, masses, velocities, impulses);
+            return if self.turning { fixed_impulse::<F>(impulses) } else { 0 };
+        }
+        if self.turning {
+            *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
+        }
+        solver::friction::<F, F, Isotropic>(collision, parameters, masses, velocities, impulses);
+        0
+    }
+}
+
+/// The collisions of a step.
+#[derive(Debug)]
+pub(crate) struct Batch {
+    /// Those of the places, then what earlier steps have left.
+    blocks: Vec<Block>,
+    places: Places,
+    /// Block and lane of each collision.
+    slots: Vec<u32>,
+    impulse_sum: u64,
+    width: Width,
+    /// Of the arithmetic.
+    precision: Precision,
+    crew: Crew,
+    fronts: Fronts,
+    /// Whether the fronts know all that is decoded.
+    measured: bool,
+    /// Whether the blocks say which spins are damped.
+    spins: bool,
+    /// Bodies that the collisions are about.
+    bodies: usize,
+    lines: Vec<Line>,
+    /// Whether the lines have the velocities of all bodies.
+    entered: bool,
+    /// Records that wait for their blocks while these are filled.
+    put_off: Vec<Group>,
+}
+
+impl Batch {
+    /// Takes at most `threads` threads, of which one is the caller's, and SIMD lanes or not.
+    pub(crate) fn new(threads: usize, lanes: bool) -> Self {
+        Self::with_width(threads, if lanes { Width::found() } else { Width::One })
+    }
+
+    fn with_width(threads: usize, width: Width) -> Self {
+        let crew = Crew::new("board", threads.clamp(1, THREADS_MAX) - 1);
+        if let Some(error) = crew.refused() {
+            log::warn!("no thread to help the board: {error}");
+        }
+        Self {
+            blocks: Vec::new(),
+            places: Places::default(),
+            slots: Vec::new(),
+            impulse_sum: 0,
+            width,
+            precision: Precision::F32,
+            crew,
+            fronts: Fronts::default(),
+            measured: false,
+            spins: false,
+            bodies: 0,
+            lines: Vec::new(),
+            entered: false,
+            put_off: Vec::with_capacity(PUT_OFF),
+        }
+    }
+
+    /// The same in arithmetic of a precision, of collisions that enter so many together.
+    pub(crate) fn of(mut self, precision: Precision, together: usize) -> Self {
+        self.precision = precision;
+        self.places = Places::of_issues(together);
+        self
+    }
+
+    /// Begins a step: forgets the last one's collisions and makes room for so many.
+    pub(crate) fn begin(&mut self, collisions: usize) {
+        // Decoded in parts they want some more at the end of each.
+        let blocks = collisions.div_ceil(LANES) + 2 * LANES;
+        self.blocks.reserve(blocks.saturating_sub(self.blocks.len()));
+        self.slots.clear();
+        self.slots.reserve(collisions);
+        self.places.begin(collisions);
+        self.impulse_sum = 0;
+        self.measured = false;
+        self.spins = false;
+        self.bodies = 0;
+        self.entered = false;
+    }
+
+    /// Collisions decoded, padding entries among them.
+    pub(crate) fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Takes the velocities of all bodies, unless it has them.
+    pub(crate) fn enter(&mut self, velocities: &[Velocity], shape_of: &[u8], masses: &[Mass]) {
+        if self.entered {
+            return;
+        }
+        let lines = (ROWS_APART as usize + self.bodies.max(velocities.len())).div_ceil(2);
+        if self.lines.len() < lines {
+            self.lines.resize(lines, Line::default());
+        }
+        let own = &mut self.lines[ROWS_APART as usize / 2..];
+        let bodies = velocities.chunks(COPIED_TOGETHER).zip(shape_of.chunks(COPIED_TOGETHER));
+        let rounded = self.precision == Precision::Binary16;
+        self.crew.each(
+            bodies.zip(own.chunks_mut(COPIED_TOGETHER / 2)),
+            |((velocities, shapes), lines)| {
+                for (body, (velocity, shape)) in velocities.iter().zip(shapes).enumerate() {
+                    let mass = &masses[usize::from(*shape)];
+                    let line = &mut lines[body / 2];
+                    if rounded {
+                        line.put(body % 2 == 1, velocity, &mass.rounded::<Half>());
+                    } else {
+                        line.put(body % 2 == 1, velocity, mass);
+                    }
+                }
+            },
+        );
+        self.entered = true;
+    }
+
+    /// Does something with each of some things on all threads, in no particular order.
+    pub(crate) fn share<T>(
+        &mut self,
+        things: impl Iterator<Item = T> + Send,
+        with: impl Fn(T) + Sync,
+    ) {
+        self.crew.each(things, with);
+    }
+
+    /// Block and lane of a collision, or `None` for a padding entry.
+    fn slot(&self, index: usize) -> Option<(usize, usize)> {
+        let slot = *self.slots.get(index)?;
+        (slot != NO_SLOT).then_some((slot as usize / LANES, slot as usize % LANES))
+    }
+
+    /// The bodies of a decoded collision and which of them move, or `None` for a padding entry.
+    pub(crate) fn entry(&self, index: usize) -> Option<Entry> {
+        self.slot(index).map(|(block, lane)| self.blocks[block].entry(lane))
+    }
+
+    /// A decoded collision, or `None` for a padding entry.
+    #[cfg(test)]
+    pub(crate) fn collision(&self, index: usize) -> Option<Collision> {
+        self.slot(index).map(|(block, lane)| self.blocks[block].collision(lane))
+    }
+
+    /// The smallest distance, in issues, of two that share a moving body; `u32::MAX` without.
+    pub(crate) fn distance(&self) -> u32 {
+        self.places.distance()
+    }
+
+    /// Runs whole passes over all collisions. Of the step's passes, numbered from 0, the first
+    /// `contact` are contact passes. `velocities` are those of all bodies.
+    pub(crate) fn run(
+        &mut self,
+        passes: Range<u32>,
+        contact: u32,
+        parameters: &SolverParameters,
+        shape_of: &[u8],
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+    ) {
+        if passes.is_empty() || self.places.blocks() == 0 {
+            return;
+        }
+        if !self.measured {
+            self.fronts.measure(&self.places);
+            self.measured = true;
+        }
+        self.enter(velocities, shape_of, masses);
+        let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
+        let (width, precision) = (self.width, self.precision);
+        let rounded;
+        let parameters = match precision {
+            Precision::F32 => parameters,
+            Precision::Binary16 => {
+                rounded = parameters.rounded::<Half>();
+                &rounded
+            }
+        };
+        let run = Passes { numbers: &passes, contact, finding, parameters, width, precision };
+        let blocks = &mut self.blocks[..self.places.blocks()];
+        let sum = self.fronts.run(run, blocks, &mut self.lines, &mut self.crew);
+        self.impulse_sum = self.impulse_sum.saturating_add(sum);
+        self.spins |= finding.is_some();
+        let own = &self.lines[ROWS_APART as usize / 2..];
+        let bodies = velocities.chunks_mut(COPIED_TOGETHER).zip(own.chunks(COPIED_TOGETHER / 2));
+        self.crew.each(bodies, |(velocities, lines)| {
+            for (body, velocity) in velocities.iter_mut().enumerate() {
+                *velocity = lines[body / 2].velocity(body % 2 == 1);
+            }
+        });
+    }
+
+    /// Runs a part of one pass, one collision after the other in the order received.
+    #[expect(clippy::too_many_arguments, reason = "those of `run` and which part")]
+    pub(crate) fn run_part(
+        &mut self,
+        pass: u32,
+        part: Range<usize>,
+        contact: u32,
+        parameters: &SolverParameters,
+        shape_of: &[u8],
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+    ) {
+        let stage = Stage::new(pass, contact);
+        self.entered = false;
+        for index in part {
+            let Some((block, lane)) = self.slot(index) else { continue };
+            let block = &mut self.blocks[block];
+            let Entry { bodies, moving } = block.entry(lane);
+            let sides = bodies.map(|body| body as usize);
+            let mut pair = sides.map(|body| velocities[body]);
+            let mut impulses = block.impulses(lane);
+            let masses = sides.map(|body| masses[usize::from(shape_of[body])]);
+            let collision = block.collision(lane);
+            let solve = match self.precision {
+                Precision::F32 => Stage::solve::<Single>,
+                Precision::Binary16 => Stage::solve::<Half>,
+            };
+            let sum = solve(stage, &collision, parameters, &masses, &mut pair, &mut impulses);
+            self.impulse_sum = self.impulse_sum.saturating_add(sum);
+            block.put_impulses(lane, impulses);
+            for side in 0..2 {
+                if moving[side] {
+                    velocities[sides[side]] = pair[side];
+                }
+            }
+        }
+    }
+
+    /// The accumulated impulses of a collision after the passes run so far.
+    pub(crate) fn impulses(&self, index: usize) -> Impulses {
+        self.slot(index)
+            .map_or([0.0; CONTACT_POINTS], |(block, lane)| self.blocks[block].impulses(lane))
+    }
+
+    /// What the last contact pass has added to the accelerator's impulse sum.
+    pub(crate) fn impulse_sum(&self) -> u64 {
+        self.impulse_sum
+    }
+}

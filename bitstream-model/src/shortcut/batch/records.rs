@@ -1,0 +1,134 @@
+//! This file reads collision records where their beats are, and puts sixteen of them side by side.
+
+use super::block::{Block, LANES, ROWS_APART, Words};
+use super::lanes::{Lanes, Numbers, Quad, Work};
+use crate::accelerator::records::array::Row;
+use pgs_interface::record::{Beat, WORD_LANE, collision};
+use pgs_support::chunks::Chunks;
+
+/// Streams that records come on.
+pub(crate) const STREAMS: usize = 4;
+/// Beats of a record on each stream, which take turns.
+pub(crate) const BEATS: [usize; STREAMS] = [2, 2, 2, 1];
+
+/// The stream of each row of a record, and its number among the record's there.
+pub(crate) const PLACES: [(usize, usize); collision::ROWS] =
+    [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (2, 1)];
+
+/// Records that have arrived, on four streams.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Records<'a> {
+    pub(crate) streams: [&'a [Beat]; STREAMS],
+}
+
+impl<'a> Records<'a> {
+    #[inline(always)]
+    fn row(&self, record: usize, row: usize) -> Row {
+        let stream = row % STREAMS;
+        self.streams[stream][record * BEATS[stream] + row / STREAMS].0
+    }
+
+    /// All rows of a record.
+    #[inline]
+    pub(crate) fn rows(&self, record: usize) -> [Row; collision::ROWS] {
+        std::array::from_fn(|row| self.row(record, row))
+    }
+
+    /// The number of contacts and the two bodies of records, from one on.
+    #[inline(always)]
+    pub(crate) fn heads(&self, first: usize) -> impl Iterator<Item = [u32; 3]> {
+        const { assert!(collision::NORMAL == 0 && collision::BODY_A == 1 && collision::BODY_B == 2) };
+        let [normals, bodies_a, bodies_b, _] = self.streams;
+        let from =
+            |stream: &'a [Beat]| stream.split_arrays::<2>().0.get(first..).unwrap_or(&[]).iter();
+        let word = |[beat, _]: &[Beat; 2]| beat.0[WORD_LANE];
+        let bodies = from(bodies_a).zip(from(bodies_b));
+        from(normals).zip(bodies).map(move |(n, (a, b))| [word(n), word(a), word(b)])
+    }
+}
+
+/// Puts records side by side, sixteen in each block, of kinds that are known, and adds the words of
+/// each up.
+pub(crate) struct Fill<'a> {
+    pub(crate) records: &'a Records<'a>,
+    pub(crate) first: usize,
+    pub(crate) kinds: &'a [Words<u32>],
+    pub(crate) blocks: &'a mut [Block],
+    pub(crate) sums: &'a mut [u32],
+}
+
+/// The sum of all words of a record.
+pub(crate) fn sum(rows: &[Row; collision::ROWS]) -> u32 {
+    rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
+}
+
+/// A row of records, one for each lane, from record `first` on.
+#[inline(always)]
+fn columns<L: Lanes>(lanes: L, records: &Records<'_>, first: usize, row: usize) -> [L::Numbers; 4] {
+    let stream = row % STREAMS;
+    let first = first * BEATS[stream] + row / STREAMS;
+    let quads: &[Quad] = bytemuck::cast_slice(&records.streams[stream][first..]);
+    lanes.transposed(quads, BEATS[stream])
+}
+
+#[inline(always)]
+fn store<L: Lanes>(lanes: L, columns: [L::Numbers; 4], words: &mut [Words], at: usize) {
+    for (words, column) in words.iter_mut().zip(columns) {
+        lanes.store(column, words, at);
+    }
+}
+
+#[inline(always)]
+fn added<N: Numbers>([a, b, c, d]: [N; 4]) -> N {
+    a.with_words(b).with_words(c.with_words(d))
+}
+
+impl Work for Fill<'_> {
+    #[inline(always)]
+    fn with<L: Lanes>(self, lanes: L) {
+        let Self { records, first, kinds, blocks, sums } = self;
+        let apart = lanes.splat(f32::from_bits(ROWS_APART));
+        let sums = sums.split_arrays_mut::<LANES>().0;
+        for (number, ((block, kinds), sums)) in blocks.iter_mut().zip(kinds).zip(sums).enumerate() {
+            block.begin(kinds);
+            let mut at = 0;
+            while at < LANES {
+                let row = |row| columns(lanes, records, first + number * LANES + at, row);
+                let normal = row(collision::NORMAL);
+                store(lanes, normal, &mut block.normal, at);
+                let [body_a, body_b] = [row(collision::BODY_A), row(collision::BODY_B)];
+                store(lanes, body_a, &mut block.position_a, at);
+                store(lanes, body_b, &mut block.position_b, at);
+                for (rows, body) in block.rows.iter_mut().zip([body_a, body_b]) {
+                    let rows = bytemuck::cast_mut(rows);
+                    lanes.store(body[WORD_LANE].with_words(apart), rows, at);
+                }
+                let mut sum = added(normal).with_words(added(body_a)).with_words(added(body_b));
+                for (contact, words) in block.contacts.iter_mut().enumerate() {
+                    let contact = row(collision::CONTACTS + contact);
+                    store(lanes, contact, words, at);
+                    sum = sum.with_words(added(contact));
+                }
+                lanes.store(sum, bytemuck::cast_mut(sums), at);
+                at += L::WIDTH;
+            }
+        }
+    }
+}
+
+impl Fill<'_> {
+    /// The same, one record after the other.
+    pub(crate) fn one_by_one(self) {
+        let Self { records, mut first, kinds, blocks, sums } = self;
+        let sums = sums.split_arrays_mut::<LANES>().0;
+        for ((block, kinds), sums) in blocks.iter_mut().zip(kinds).zip(sums) {
+            *block = Block::EMPTY;
+            for (lane, (kind, sum_of)) in kinds.iter().zip(sums).enumerate() {
+                let rows = records.rows(first + lane);
+                block.put(lane, &rows, *kind);
+                *sum_of = sum(&rows);
+            }
+            first += LANES;
+        }
+    }
+}

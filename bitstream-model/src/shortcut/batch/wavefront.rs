@@ -1,0 +1,408 @@
+//! This file runs passes over blocks as moving fronts: a pass follows the one before as soon as that
+//! has finished with the bodies.
+//!
+//! ```text
+//! pass 0   ################>            chunks of blocks, in their order
+//! pass 1   ##########>                  behind by as far as the bodies of a chunk reach
+//! pass 2   ####>
+//! ```
+//!
+//! So the collisions are read from memory once for several passes, and threads take different ones.
+//! Each thread takes the next few passes that nobody has. While these have to wait for the pass before
+//! them, and when there are no more, it helps with the passes of others, the last ones first.
+
+#![allow(unsafe_code, reason = "threads share blocks and rows and take turns by passes")]
+
+use std::marker::PhantomData;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+
+use bytemuck::{Pod, Zeroable};
+use pgs_support::Crew;
+
+use super::Stage;
+use super::block::{Block, LANES, kind};
+use super::grouping::Places;
+use super::kernel::{self, Pass};
+use super::lanes::{Computed, Lanes, Quad, Work, prefetch};
+use super::order::Order;
+use super::width::Width;
+use crate::accelerator::arithmetic::number::{Half, Single};
+use crate::accelerator::per_record::fixed_impulse;
+use crate::accelerator::solver::{Mass, SolverParameters, Velocity};
+use crate::cast::register;
+use pgs_interface::number::Precision;
+
+/// Blocks of a chunk.
+const CHUNK: usize = 8;
+/// Passes that a thread takes at once.
+const BUNDLE: usize = 4;
+/// Looks at another thread's front before the processor is given away.
+const SPINS: u32 = 200;
+
+/// How far a pass has come, in chunks; alone in its cache lines.
+#[derive(Debug, Default)]
+#[repr(align(128))]
+struct Progress {
+    chunks: AtomicUsize,
+    /// A thread works on the next one.
+    taken: AtomicBool,
+}
+
+/// What the fronts are made of, kept from step to step.
+#[derive(Debug, Default)]
+pub(crate) struct Fronts {
+    order: Order,
+    /// For each chunk the last one that must have been left by the pass before.
+    needs: Vec<u32>,
+    progress: Vec<Progress>,
+}
+
+/// The passes of one run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Passes<'a> {
+    pub(crate) numbers: &'a Range<u32>,
+    pub(crate) contact: u32,
+    /// The friction pass that finds which spins are damped.
+    pub(crate) finding: Option<u32>,
+    pub(crate) parameters: &'a SolverParameters,
+    pub(crate) width: Width,
+    /// Of the arithmetic.
+    pub(crate) precision: Precision,
+}
+
+impl Fronts {
+    /// Finds the order of the blocks and how far each chunk's bodies reach in it.
+    pub(crate) fn measure(&mut self, places: &Places) {
+        self.order.find(places.again());
+        let chunk = |block: u32| self.order.places[block as usize] / register(CHUNK);
+        self.needs.clear();
+        self.needs.extend((0..places.blocks().div_ceil(CHUNK)).map(register));
+        for [first, last] in places.uses() {
+            let need = &mut self.needs[chunk(first) as usize];
+            *need = (*need).max(chunk(last));
+        }
+    }
+
+    /// Runs passes over all blocks; returns the impulses that the last contact pass counts. The rows
+    /// of the blocks are in `lines`.
+    pub(crate) fn run(
+        &mut self,
+        passes: Passes<'_>,
+        blocks: &mut [Block],
+        lines: &mut [Line],
+        crew: &mut Crew,
+    ) -> u64 {
+        let count = passes.numbers.len();
+        if self.progress.len() < count {
+            self.progress.resize_with(count, Progress::default);
+        }
+        for progress in &mut self.progress {
+            *progress = Progress::default();
+        }
+        let field = Field {
+            passes,
+            blocks: blocks.as_mut_ptr(),
+            order: &self.order.blocks,
+            quads: lines.as_mut_ptr().cast(),
+            needs: &self.needs,
+            progress: &self.progress[..count],
+            next: AtomicUsize::new(0),
+            sum: AtomicU64::new(0),
+            broken: AtomicBool::new(false),
+            alone: crew.is_alone(),
+        };
+        crew.run(&|thread| field.work(thread));
+        field.sum.into_inner()
+    }
+}
+
+/// Rows of velocities: two to a cache line. A row is the linear velocity and the inverse mass, then
+/// the angular velocity and the inverse inertia.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(crate) struct Line([Quad; 4]);
+
+impl Line {
+    pub(crate) fn put(&mut self, second: bool, velocity: &Velocity, mass: &Mass) {
+        let ([x, y, z], [p, q, r]) = (velocity.linear, velocity.angular);
+        let at = 2 * usize::from(second);
+        self.0[at] = [x, y, z, mass.inverse_mass];
+        self.0[at + 1] = [p, q, r, mass.inverse_inertia[0]];
+    }
+
+    pub(crate) fn velocity(&self, second: bool) -> Velocity {
+        let at = 2 * usize::from(second);
+        let ([x, y, z, _], [p, q, r, _]) = (self.0[at], self.0[at + 1]);
+        Velocity { linear: [x, y, z], angular: [p, q, r] }
+    }
+
+    /// Whether a body moves.
+    pub(crate) fn moves(&self, second: bool) -> bool {
+        self.0[2 * usize::from(second)][3] != 0.0
+    }
+}
+
+/// What the threads of a run share.
+struct Field<'a> {
+    passes: Passes<'a>,
+    blocks: *mut Block,
+    /// All blocks, each once.
+    order: &'a [u32],
+    quads: *mut Quad,
+    needs: &'a [u32],
+    progress: &'a [Progress],
+    /// The next pass that nobody has taken.
+    next: AtomicUsize,
+    sum: AtomicU64,
+    /// A thread has panicked: its fronts stand still.
+    broken: AtomicBool,
+    /// There is one thread only.
+    alone: bool,
+}
+
+// SAFETY: blocks and rows are accessed in `chunk` alone, for the next chunk of a pass that one thread
+// has taken. Those of the pass before over the same bodies or blocks have ended, which `progress` says
+// with release and acquire, and so have those of this pass that came before.
+unsafe impl Sync for Field<'_> {}
+
+/// Marks the field as broken when it goes, unless it was taken off before.
+struct Breaks<'a>(Option<&'a AtomicBool>);
+
+impl Drop for Breaks<'_> {
+    fn drop(&mut self) {
+        if let Some(broken) = self.0 {
+            broken.store(true, Ordering::Release);
+        }
+    }
+}
+
+impl Field<'_> {
+    /// What a thread does: takes passes while there are any, then helps.
+    fn work(&self, thread: usize) {
+        let mut breaks = Breaks(Some(&self.broken));
+        let mut own = 0..0;
+        let mut idle = 0;
+        loop {
+            if own.clone().all(|pass| self.ended(pass)) {
+                own = self.next_bundle();
+            }
+            if own.is_empty() && self.ended(self.progress.len() - 1) {
+                break;
+            }
+            if self.bundle(own.clone(), thread) || !self.alone && self.help(thread) {
+                idle = 0;
+                continue;
+            }
+            idle += 1;
+            if self.broken.load(Ordering::Acquire) {
+                break;
+            }
+            if idle > SPINS {
+                std::thread::yield_now();
+            } else {
+                std::hint::spin_loop();
+            }
+        }
+        breaks.0 = None;
+    }
+
+    /// The next passes that nobody has.
+    fn next_bundle(&self) -> Range<usize> {
+        let count = self.progress.len();
+        if self.next.load(Ordering::Relaxed) >= count {
+            return 0..0;
+        }
+        let first = self.next.fetch_add(BUNDLE, Ordering::Relaxed).min(count);
+        first..(first + BUNDLE).min(count)
+    }
+
+    /// Whether a pass has come to its end.
+    fn ended(&self, pass: usize) -> bool {
+        self.progress[pass].chunks.load(Ordering::Acquire) == self.needs.len()
+    }
+
+    /// Runs neighbouring passes, the later ones as close behind as they may be: the first by one
+    /// chunk, the others as far as they can. Returns whether any went on.
+    fn bundle(&self, passes: Range<usize>, thread: usize) -> bool {
+        let mut worked = false;
+        for pass in passes.clone() {
+            while self.go_on(pass, thread) {
+                worked = true;
+                if pass == passes.start {
+                    break;
+                }
+            }
+        }
+        worked
+    }
+
+    /// Runs a chunk of the last pass that can go on. Returns whether there was one.
+    fn help(&self, thread: usize) -> bool {
+        (0..self.progress.len()).rev().any(|pass| self.go_on(pass, thread))
+    }
+
+    /// Runs the next chunk of a pass if the pass before has left its bodies behind and no other
+    /// thread has it. Returns whether it did.
+    fn go_on(&self, pass: usize, thread: usize) -> bool {
+        let Progress { chunks, taken } = &self.progress[pass];
+        let limit = match pass {
+            0 => self.needs.len(),
+            _ => self.progress[pass - 1].chunks.load(Ordering::Acquire),
+        };
+        let free = |at: usize| self.needs.get(at).is_some_and(|need| (*need as usize) < limit);
+        let mut at = chunks.load(Ordering::Acquire);
+        if !free(at) {
+            return false;
+        }
+        if !self.alone {
+            if taken.load(Ordering::Relaxed) || taken.swap(true, Ordering::Acquire) {
+                return false;
+            }
+            // It may have gone on until then.
+            at = chunks.load(Ordering::Acquire);
+        }
+        let free = free(at);
+        if free {
+            self.chunk(pass, at, thread);
+            chunks.store(at + 1, Ordering::Release);
+        }
+        if !self.alone {
+            taken.store(false, Ordering::Release);
+        }
+        free
+    }
+
+    /// Runs a pass over a chunk that the pass before has left behind.
+    fn chunk(&self, pass: usize, chunk: usize, thread: usize) {
+        match self.passes.precision {
+            Precision::F32 => self.chunk_in::<Single>(pass, chunk, thread),
+            Precision::Binary16 => self.chunk_in::<Half>(pass, chunk, thread),
+        }
+    }
+
+    /// The same in a format.
+    fn chunk_in<F: Computed>(&self, pass: usize, chunk: usize, thread: usize) {
+        let number = self.passes.numbers.start + register(pass);
+        let stage = Stage::new(number, self.passes.contact);
+        let pass = Pass {
+            stage,
+            finds: self.passes.finding == Some(number),
+            parameters: self.passes.parameters,
+            spare: 2 * (register(thread) + 1),
+        };
+        let mut sum = 0;
+        let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
+        let format = PhantomData::<F>;
+        let work = ChunkWork { field: self, pass, blocks, sum: &mut sum, format };
+        if let Err(work) = self.passes.width.run(work) {
+            work.one_by_one();
+        }
+        if sum > 0 {
+            let add = |before: u64| Some(before.saturating_add(sum));
+            let _ = self.sum.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
+        }
+    }
+}
+
+/// A pass over the blocks of a chunk.
+struct ChunkWork<'a, F> {
+    field: &'a Field<'a>,
+    pass: Pass<'a>,
+    blocks: &'a [u32],
+    sum: &'a mut u64,
+    format: PhantomData<F>,
+}
+
+impl<F: Computed> Work for ChunkWork<'_, F> {
+    #[inline(always)]
+    fn with<L: Lanes>(self, lanes: L) {
+        let lanes = F::of(lanes);
+        for (at, &index) in self.blocks.iter().enumerate() {
+            if let Some(ahead) = self.blocks.get(at + 1) {
+                let ahead = self.field.blocks.wrapping_add(*ahead as usize);
+                prefetch(ahead);
+            }
+            // SAFETY: `order` has numbers of blocks.
+            let block = unsafe { self.field.blocks.add(index as usize) };
+            // SAFETY: and this one is the thread's: see `Sync`.
+            let block = unsafe { &mut *block };
+            if block.serial() {
+                // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
+                // has the chunk those of its bodies are its own: see `Sync`.
+                let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.quads) };
+                *self.sum = self.sum.saturating_add(sum);
+                continue;
+            }
+            // SAFETY: the same holds for the rows of its bodies, and for the spare one.
+            unsafe { kernel::solve(lanes, &self.pass, block, self.field.quads) };
+            if self.pass.stage.contact && self.pass.stage.turning {
+                *self.sum = self.sum.saturating_add(counted::<F>(block));
+            }
+        }
+    }
+}
+
+impl<F: Computed> ChunkWork<'_, F> {
+    fn one_by_one(self) {
+        for &index in self.blocks {
+            // SAFETY: `order` has numbers of blocks.
+            let block = unsafe { self.field.blocks.add(index as usize) };
+            // SAFETY: and this one is the thread's: see `Sync`.
+            let block = unsafe { &mut *block };
+            // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
+            // has the chunk those of its bodies are its own: see `Sync`.
+            let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.quads) };
+            *self.sum = self.sum.saturating_add(sum);
+        }
+    }
+}
+
+/// The impulses of a block after the last contact pass; empty lanes have none.
+#[inline(always)]
+fn counted<F: Computed>(block: &Block) -> u64 {
+    (0..LANES).fold(0, |sum, lane| sum.saturating_add(fixed_impulse::<F>(&block.impulses(lane))))
+}
+
+/// A pass over the collisions of a block, one after the other.
+///
+/// # Safety
+///
+/// The rows of the block exist. Nobody writes those while this runs, nor reads those of moving bodies.
+unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, quads: *mut Quad) -> u64 {
+    let mut sum = 0_u64;
+    for lane in 0..LANES {
+        let collision = block.collision(lane);
+        if collision.count == 0 {
+            continue;
+        }
+        let mut masses = [Mass::default(); 2];
+        let mut velocities = [Velocity::default(); 2];
+        for side in 0..2 {
+            // SAFETY: the caller promises that the row exists.
+            let row = unsafe { quads.cast::<[Quad; 2]>().add(block.rows[side][lane] as usize) };
+            // SAFETY: the caller promises that it can be read.
+            let [[x, y, z, m], [p, q, r, k]] = unsafe { row.read() };
+            velocities[side] = Velocity { linear: [x, y, z], angular: [p, q, r] };
+            masses[side] = Mass { inverse_mass: m, inverse_inertia: [k, 0.0, 0.0, 0.0, 0.0, 0.0] };
+        }
+        let mut impulses = block.impulses(lane);
+        let stage = pass.stage;
+        let share =
+            stage.solve::<F>(&collision, pass.parameters, &masses, &mut velocities, &mut impulses);
+        sum = sum.saturating_add(share);
+        block.put_impulses(lane, impulses);
+        for side in 0..2 {
+            if block.kind[lane] & kind::MOVES[side] != 0 {
+                let (Velocity { linear: [x, y, z], angular: [p, q, r] }, mass) =
+                    (velocities[side], masses[side]);
+                let row = [[x, y, z, mass.inverse_mass], [p, q, r, mass.inverse_inertia[0]]];
+                // SAFETY: the caller promises that the row exists.
+                let at = unsafe { quads.cast::<[Quad; 2]>().add(block.rows[side][lane] as usize) };
+                // SAFETY: the caller promises that a moving body's can be written.
+                unsafe { at.write(row) };
+            }
+        }
+    }
+    sum
+}

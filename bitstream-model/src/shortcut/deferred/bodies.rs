@@ -1,0 +1,354 @@
+//! This file loads and integrates bodies whose beats are still in their buffers, on streams that take
+//! turns.
+//!
+//! ```text
+//! four streams    0 1 | 2 3 |              two rows of a body, of the next one...
+//! three           0 1 | 2 0 | 1 2 |
+//! ```
+//!
+//! After a period of two bodies, or three, it begins again with stream 0.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
+
+use super::decode_once::Replay;
+use crate::accelerator::control::Arguments;
+use crate::accelerator::records::array::Row;
+use crate::accelerator::records::decode;
+use crate::accelerator::records::results::Results;
+use crate::accelerator::records::segment::{PacketError, Segment};
+use crate::accelerator::records::striping::{PerStream, ROWS_IN, ROWS_OUT, STREAMS_MAX, Turns};
+use crate::accelerator::solver::{Mass, Velocity};
+use crate::accelerator::{Accelerator, Phase};
+use crate::board::stream::Stream;
+use crate::cast::register;
+use crate::config::SHAPES_MAX;
+use crate::memory::{Memory, Source};
+use crate::shortcut::batch::ResultPlaces;
+use crate::shortcut::flow::bodies::{BodyPace, BodyPhase};
+use pgs_interface::control::ErrorCode;
+use pgs_interface::number::StreamFormat;
+use pgs_interface::record::{Beat, LANES, WORD_LANE, velocity};
+
+/// The beats of some bodies on each stream, where they are.
+pub(crate) type Views<'a> = [&'a [Beat]; STREAMS_MAX];
+
+/// Bodies that a thread loads at once.
+const LOADED_TOGETHER: usize = 2048;
+
+// Whatever shape the table has fits, so that a body is refused only if `bodies_known` has found it.
+const _: () = assert!(SHAPES_MAX <= 1 << u8::BITS);
+
+/// Beats of the results of bodies on each stream.
+pub(crate) fn beats_of_results(turns: Turns, bodies: Range<usize>) -> PerStream {
+    let [before, after] = [bodies.start, bodies.end].map(|body| turns.counts(ROWS_OUT * body));
+    std::array::from_fn(|k| after[k] - before[k])
+}
+
+/// Bodies after which streams that take turns begin again.
+pub(crate) const fn period(streams: usize) -> usize {
+    if streams.is_multiple_of(ROWS_IN) { streams / ROWS_IN } else { streams }
+}
+
+/// Two rows of each of some bodies, of which the views begin with body `first`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BodyRows<'a> {
+    pub(crate) views: Views<'a>,
+    pub(crate) turns: Turns,
+    pub(crate) first: usize,
+}
+
+impl BodyRows<'_> {
+    /// Beats on each stream before those of the views.
+    pub(crate) fn before(&self) -> PerStream {
+        self.turns.counts(ROWS_IN * self.first)
+    }
+
+    /// The rows of a body.
+    pub(crate) fn of(&self, body: usize) -> [Row; ROWS_IN] {
+        let before = self.before();
+        std::array::from_fn(|row| {
+            let (k, number) = self.turns.place(ROWS_IN * body + row);
+            self.views[k][number - before[k]].0
+        })
+    }
+
+    /// Loads bodies from `first` on; the sum of the words of their rows, and the first body that has no
+    /// shape.
+    fn load(
+        &self,
+        first: usize,
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+        shape_of: &mut [u8],
+    ) -> (u32, Option<usize>) {
+        match self.turns.streams {
+            4 => self.load_from::<4>(first, masses, velocities, shape_of),
+            3 => self.load_from::<3>(first, masses, velocities, shape_of),
+            2 => self.load_from::<2>(first, masses, velocities, shape_of),
+            _ => self.load_from::<1>(first, masses, velocities, shape_of),
+        }
+    }
+
+    /// The same from so many streams.
+    fn load_from<const STREAMS: usize>(
+        &self,
+        first: usize,
+        masses: &[Mass],
+        velocities: &mut [Velocity],
+        shape_of: &mut [u8],
+    ) -> (u32, Option<usize>) {
+        let turns = Turns { streams: STREAMS };
+        let (period, stride) = const { (period(STREAMS), period(STREAMS) * ROWS_IN / STREAMS) };
+        let before = self.before();
+        let (mut sum, mut wrong) = ([0_u32; LANES], None);
+        for own in 0..period.min(velocities.len()) {
+            let rows = |row: usize| {
+                let (k, number) = turns.place(ROWS_IN * (first + own) + row);
+                &self.views[k][number - before[k]..]
+            };
+            let (linears, angulars) = (rows(0), rows(1));
+            for at in 0..(velocities.len() - own).div_ceil(period) {
+                let (linear, angular) = (&linears[at * stride], &angulars[at * stride]);
+                let body = own + at * period;
+                for (sum, words) in sum.iter_mut().zip(linear.0.into_iter().zip(angular.0)) {
+                    *sum = sum.wrapping_add(words.0).wrapping_add(words.1);
+                }
+                let (loaded, shape) = decode::velocity(StreamFormat::F32, &[linear.0, angular.0]);
+                let (Some(mass), Ok(shape)) = (masses.get(shape as usize), u8::try_from(shape))
+                else {
+                    wrong = wrong.into_iter().chain([first + body]).min();
+                    continue;
+                };
+                // A static body's words are not looked at.
+                let moves = mass.inverse_mass != 0.0;
+                velocities[body] = if moves { loaded } else { Velocity::default() };
+                shape_of[body] = shape;
+            }
+        }
+        (sum.into_iter().fold(0, u32::wrapping_add), wrong)
+    }
+
+    /// The first of so many bodies from the first one on that has a shape which is not there.
+    fn without_shape(&self, bodies: usize, shapes: usize) -> Option<usize> {
+        let (period, before) = (period(self.turns.streams), self.before());
+        let stride = period * ROWS_IN / self.turns.streams;
+        let found = (self.first..self.first + period.min(bodies)).filter_map(|begin| {
+            let (k, number) = self.turns.place(ROWS_IN * begin + velocity::LINEAR);
+            let linear = self.views[k].iter().skip(number - before[k]).step_by(stride);
+            let most = (self.first + bodies - begin).div_ceil(period);
+            let unknown = |beat: &Beat| beat.0[WORD_LANE] as usize >= shapes;
+            linear.take(most).position(unknown).map(|at| begin + at * period)
+        });
+        found.min()
+    }
+}
+
+impl Accelerator {
+    /// Where the beats of the next bodies are, if they are all in their buffers.
+    pub(crate) fn views<'a>(
+        &self,
+        segment: &Segment,
+        records: usize,
+        inputs: &[Stream],
+        memory: &'a Memory,
+    ) -> Option<BodyRows<'a>> {
+        let turns = self.replay.bodies()?;
+        let counts = segment.beats_of_next(records);
+        let mut views: Views<'a> = [&[]; STREAMS_MAX];
+        for ((view, stream), count) in views.iter_mut().zip(inputs).zip(counts) {
+            if count > 0 {
+                let (_, source) =
+                    Some(stream.piece(0, count)).filter(|(there, _)| *there == count)?;
+                *view = memory.view(source?, count)?;
+            }
+        }
+        Some(BodyRows { views, turns, first: segment.done })
+    }
+
+    /// Loads the next bodies.
+    pub(crate) fn load_views(
+        &mut self,
+        records: usize,
+        rows: BodyRows<'_>,
+    ) -> Result<u32, PacketError> {
+        let bodies = rows.first..rows.first + records;
+        let Replay { batch, masses, .. } = &mut self.replay;
+        let velocities = self.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
+        let shapes = self.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
+        let (sum, wrong) = (AtomicU32::new(0), AtomicUsize::new(usize::MAX));
+        let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes));
+        batch.share(parts, |(first, (velocities, shapes))| {
+            let (of_part, wrong_body) = rows.load(first, masses, velocities, shapes);
+            sum.fetch_add(of_part, Ordering::Relaxed);
+            wrong.fetch_min(wrong_body.unwrap_or(usize::MAX), Ordering::Relaxed);
+        });
+        match wrong.into_inner() {
+            usize::MAX => Ok(sum.into_inner()),
+            body => {
+                let beat = register(body);
+                Err(PacketError { code: ErrorCode::ShapeIndex, channel: 0, beat })
+            }
+        }
+    }
+
+    /// Integrates the next bodies and sends their results; the sums of what has come and gone.
+    pub(crate) fn integrate_views(
+        &mut self,
+        results: &mut Results,
+        records: usize,
+        poses: BodyRows<'_>,
+        outputs: &mut [Stream],
+    ) -> [u32; 2] {
+        let first = poses.first;
+        let mut rows = self.room(poses.turns, first..first + records);
+        let places = rows.each_mut().map(Vec::as_mut_slice);
+        let sums = self.results(first..first + records, poses, places);
+        results.send_rows(records, &rows, outputs);
+        self.rows = rows;
+        sums
+    }
+
+    /// Room for the results of bodies.
+    fn room(&mut self, turns: Turns, bodies: Range<usize>) -> [Vec<Beat>; STREAMS_MAX] {
+        let mut rows = std::mem::take(&mut self.rows);
+        for (rows, beats) in rows.iter_mut().zip(beats_of_results(turns, bodies)) {
+            rows.resize(beats, Beat::default());
+        }
+        rows
+    }
+
+    /// Makes the results of bodies, for which the places have room. Returns the sums of what has come
+    /// and gone.
+    fn results(
+        &mut self,
+        bodies: Range<usize>,
+        poses: BodyRows<'_>,
+        places: ResultPlaces<'_>,
+    ) -> [u32; 2] {
+        let Replay { batch, masses, .. } = &mut self.replay;
+        batch.enter(&self.velocities, &self.shape_of, masses);
+        let Arguments { integrate, integration, .. } = &self.arguments;
+        batch.integrate(integrate.then_some(integration), bodies, poses, places)
+    }
+
+    /// What happens to the bodies, if nothing else can be next for it, and how they lie on the streams.
+    pub(crate) fn flowing_bodies(&self) -> Option<(BodyPhase, Turns)> {
+        let turns = self.replay.bodies().filter(|_| self.debt == 0 && !self.hung)?;
+        match self.phase {
+            Phase::Load(_) => Some((BodyPhase::Load, turns)),
+            Phase::Integrate { .. } => Some((BodyPhase::Integrate, turns)),
+            _ => None,
+        }
+    }
+
+    /// Which body is next, and from how many on something may happen that is not for here; as far as
+    /// is to be known for so many cycles. `sources` say where the beats are.
+    pub(crate) fn bodies_known(
+        &self,
+        sources: &[(Source, usize); STREAMS_MAX],
+        cycles: u64,
+        memory: &Memory,
+    ) -> Option<(usize, usize)> {
+        let (segment, load) = match &self.phase {
+            Phase::Load(segment) => (segment, true),
+            Phase::Integrate { poses, .. } => (poses, false),
+            _ => return None,
+        };
+        let (first, turns) = (segment.done, self.replay.bodies()?);
+        // The last ones end packets.
+        let ending = turns.streams.div_ceil(ROWS_IN);
+        let mut records = (segment.left() + 1).saturating_sub(ending);
+        if load {
+            // So many a cycle, if there are that many.
+            let most = usize::try_from(cycles).unwrap_or(usize::MAX).saturating_mul(turns.streams);
+            records = records.min((most / ROWS_IN).saturating_add(1));
+            let mut views: Views<'_> = [&[]; STREAMS_MAX];
+            for (view, (source, count)) in views.iter_mut().zip(sources).take(turns.streams) {
+                *view = memory.view(*source, *count)?;
+            }
+            let rows = BodyRows { views, turns, first };
+            let shapes = self.replay.masses.len();
+            let bad = rows.without_shape(records, shapes);
+            records = bad.map_or(records, |body| body - first);
+        }
+        Some((first, records))
+    }
+
+    /// Bodies have flowed, and the beats with them that are on the streams now. `views` are theirs;
+    /// `places` is where the results go that have left their FIFOs.
+    pub(crate) fn flowed_bodies(
+        &mut self,
+        pace: &BodyPace,
+        views: Views<'_>,
+        places: ResultPlaces<'_>,
+        inputs: &mut [Stream],
+        outputs: &mut [Stream],
+    ) {
+        let (records, turns) = (pace.flowed.records, pace.turns);
+        self.clock += pace.flowed.cycles;
+        self.counters.waits += pace.flowed.waits;
+        self.phase = match self.phase {
+            Phase::Load(mut segment) => {
+                let rows = BodyRows { views, turns, first: segment.done };
+                match self.load_views(records, rows) {
+                    Ok(sum) => self.received(sum),
+                    // They were looked at before.
+                    Err(error) => return self.fail(error.code, error.channel, error.beat),
+                }
+                segment.skip(records, inputs);
+                Phase::Load(segment)
+            }
+            Phase::Integrate { mut poses, mut results } => {
+                let poses_there = BodyRows { views, turns, first: poses.done };
+                let [received, sent] = self.flowed_results(poses_there, records, places, outputs);
+                self.received(received);
+                self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sent);
+                poses.skip(records, inputs);
+                results.pass(records);
+                Phase::Integrate { poses, results }
+            }
+            other => other,
+        };
+    }
+
+    /// Integrates bodies. The results go where there is place for them, behind those that wait on the
+    /// streams, and the last ones onto the streams. Returns the sums of what has come and gone.
+    fn flowed_results(
+        &mut self,
+        poses: BodyRows<'_>,
+        records: usize,
+        mut places: ResultPlaces<'_>,
+        outputs: &mut [Stream],
+    ) -> [u32; 2] {
+        for (place, stream) in places.iter_mut().zip(&mut *outputs) {
+            let waiting = stream.len().min(place.len());
+            let (from_stream, behind) = std::mem::take(place).split_at_mut(waiting);
+            stream.pop_into(from_stream);
+            *place = behind;
+        }
+        let (turns, bodies) = (poses.turns, poses.first..poses.first + records);
+        let went = turns.counts(ROWS_OUT * bodies.start);
+        let whole = turns.contiguous(|k| went[k] + places[k].len()) / ROWS_OUT;
+        let whole = whole.min(bodies.end);
+        let beats = beats_of_results(turns, bodies.start..whole);
+        let mut of = beats.into_iter();
+        let now = places.each_mut().map(|place| {
+            let beats = of.next().unwrap_or(0);
+            let (now, behind) = std::mem::take(place).split_at_mut(beats);
+            *place = behind;
+            now
+        });
+        let before = self.results(bodies.start..whole, poses, now);
+        let mut rows = self.room(turns, whole..bodies.end);
+        let places_of_rows = rows.each_mut().map(Vec::as_mut_slice);
+        let behind = self.results(whole..bodies.end, poses, places_of_rows);
+        for ((rows, place), stream) in rows.iter().zip(places).zip(outputs) {
+            let (leaving, staying) = rows.split_at(place.len());
+            place.copy_from_slice(leaving);
+            stream.push(staying);
+        }
+        self.rows = rows;
+        [before[0].wrapping_add(behind[0]), before[1].wrapping_add(behind[1])]
+    }
+}

@@ -1,0 +1,172 @@
+//! This file says which designs can be replayed, and how their collisions and bodies lie on the streams.
+
+use crate::accelerator::records::striping::{PerStream, Striping, Turns, beat_cycles};
+use crate::config::{BoardConfig, Hazards, Subnormals};
+use crate::shortcut::batch;
+use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::profile::{Flow, Geometry, Inertia};
+use pgs_interface::record::collision;
+use pgs_interface::stripe::{Stripe, Stripes};
+
+/// Beats of an issue, at most.
+pub(crate) const BEATS_MAX: usize = collision::ROWS;
+
+/// Where the beats of each issue are, the same for all of them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layout {
+    pub(crate) format: StreamFormat,
+    /// Of all arithmetic.
+    pub(crate) precision: Precision,
+    /// Collisions that enter together: an issue, but for the last one, of which padding is a part. Of
+    /// two, records are in world coordinates and sixteen bits.
+    pub(crate) together: usize,
+    /// Beats of an issue on each stream; every stream of the design has some.
+    pub(crate) share: PerStream,
+    /// The stream of each beat, and its number among the issue's there.
+    pub(crate) places: [(usize, usize); BEATS_MAX],
+    /// Whether a batch takes the beats as they are.
+    pub(crate) in_place: bool,
+    /// How velocities, poses and results lie on the streams, if all of them in turn.
+    pub(crate) bodies: Option<Turns>,
+}
+
+impl Layout {
+    /// That of a design that can be replayed.
+    pub(crate) fn of(config: &BoardConfig) -> Option<Self> {
+        let variant = config.variant();
+        let (profile, numbers) = (variant.profile, variant.numbers);
+        let precision = if numbers == (Numbers { collisions: numbers.collisions, ..Numbers::F32 }) {
+            Precision::F32
+        } else if numbers == Numbers::BINARY16 {
+            Precision::Binary16
+        } else {
+            return None;
+        };
+        let computed = variant.inertia == Inertia::Isotropic
+            && matches!(profile.flow, Flow::Passes)
+            && config.subnormals == Subnormals::Keep
+            && config.hazards == Hazards::Interlocked;
+        let widths = profile.mm2s_widths;
+        let (format, geometry) = (numbers.collisions, profile.geometry);
+        let together = profile.collisions_per_issue as usize;
+        let rows = together * variant.collision_rows();
+        let rows_per_beat = (u32::BITS / format.bits()) as usize;
+        let beats = rows / rows_per_beat;
+        let group = profile.stripes.collisions.streams.len();
+        // Every issue begins with a beat and with a group.
+        let alike = rows.is_multiple_of(rows_per_beat) && beats.is_multiple_of(group);
+        let as_it_is = (geometry, format) == (Geometry::Absolute, StreamFormat::F32);
+        let known = match together {
+            1 => as_it_is || geometry == Geometry::Relative,
+            2 => (geometry, format) == (Geometry::Absolute, StreamFormat::Binary16),
+            _ => false,
+        };
+        if !(computed && alike && known) {
+            return None;
+        }
+        let striping = Striping::new(&profile.stripes.collisions, widths);
+        let share = striping.counts(beats);
+        if share[..widths.len()].contains(&0) {
+            return None;
+        }
+        let mut places = [(0, 0); BEATS_MAX];
+        let mut walk = striping.places(0);
+        places[..beats].fill_with(|| walk.take());
+        let in_place = as_it_is && places == batch::PLACES;
+        if as_it_is && !in_place {
+            return None;
+        }
+        let Stripes { velocities, poses, results, .. } = profile.stripes;
+        let of = |stripe: &Stripe, widths: &[u32]| Turns::of(stripe, widths.len());
+        let wide = widths.iter().chain(profile.s2mm_widths).all(|width| beat_cycles(*width) == 1);
+        let bodies = of(&velocities, widths)
+            .filter(|_| wide && precision == Precision::F32)
+            .filter(|turns| of(&poses, widths) == Some(*turns))
+            .filter(|turns| of(&results, profile.s2mm_widths) == Some(*turns));
+        Some(Self { format, precision, together, share, places, in_place, bodies })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED, WINDOWED16};
+
+    fn layout(profile: &'static Profile) -> Option<Layout> {
+        Layout::of(&BoardConfig { profile, ..BoardConfig::default() })
+    }
+
+    #[test]
+    fn collisions_of_float_are_taken_as_they_are_and_those_of_mixed_are_translated() {
+        let float = layout(&FLOAT).expect("it can be replayed");
+        assert!(float.in_place);
+        assert_eq!(float.bodies, Some(Turns { streams: 4 }));
+        assert_eq!(float.share, [2, 2, 2, 1]);
+        let mixed = layout(&MIXED).expect("it can be replayed");
+        assert!(!mixed.in_place);
+        assert_eq!(mixed.bodies, Some(Turns { streams: 3 }));
+        assert_eq!(mixed.share, [1, 1, 1, 0]);
+        assert_eq!(mixed.places[..3], [(0, 0), (1, 0), (2, 0)]);
+    }
+
+    #[test]
+    fn issues_of_half_are_translated_and_its_bodies_go_the_long_way() {
+        let half = layout(&HALF).expect("it can be replayed");
+        assert_eq!((half.in_place, half.together, half.precision), (false, 2, Precision::Binary16));
+        assert_eq!((half.share, half.bodies), ([3, 3, 1, 0], None));
+        let on = |stream| [(stream, 0), (stream, 1), (stream, 2)];
+        assert_eq!(half.places[..3], on(0));
+        assert_eq!(half.places[3..6], on(1));
+        assert_eq!(half.places[6], (2, 0));
+    }
+
+    #[test]
+    fn bodies_that_lie_otherwise_go_the_long_way_alone() {
+        static APART: Profile = Profile {
+            stripes: Stripes {
+                velocities: Stripe { streams: &[2], padded: false },
+                ..MIXED.stripes
+            },
+            ..MIXED
+        };
+        static PADDED: Profile = Profile {
+            stripes: Stripes {
+                results: Stripe { streams: &[0, 1, 2], padded: true },
+                ..MIXED.stripes
+            },
+            ..MIXED
+        };
+        static FEWER_OUT: Profile = Profile { s2mm_widths: &[128; 2], ..MIXED };
+        for profile in [&APART, &PADDED, &FEWER_OUT] {
+            let layout = layout(profile).expect("its collisions can be replayed");
+            assert_eq!(layout.bodies, None, "{:?}", profile.stripes);
+        }
+    }
+
+    /// What a design must have, one by one.
+    #[test]
+    fn others_go_the_long_way() {
+        for profile in [&NAIVE, &WINDOWED, &WINDOWED16] {
+            assert!(layout(profile).is_none(), "{}", profile.name);
+        }
+        let usual = BoardConfig { profile: &MIXED, ..BoardConfig::default() };
+        for config in [
+            BoardConfig { inertia: Inertia::World, ..usual },
+            BoardConfig { hazards: Hazards::Unchecked, ..usual },
+            BoardConfig { subnormals: Subnormals::Flush, ..usual },
+        ] {
+            assert!(Layout::of(&config).is_none(), "{config:?}");
+        }
+        // Groups across collisions, a stream without any, collisions on other streams.
+        const fn striped(streams: &'static [u8], of: Profile) -> Profile {
+            let collisions = Stripe { streams, padded: false };
+            Profile { stripes: Stripes { collisions, ..of.stripes }, ..of }
+        }
+        static ACROSS: Profile = striped(&[0, 1], MIXED);
+        static WITHOUT: Profile = striped(&[0, 1, 0], MIXED);
+        static OTHER: Profile = striped(&[0, 1, 2, 3, 2, 1, 0], FLOAT);
+        for profile in [&ACROSS, &WITHOUT, &OTHER] {
+            assert!(layout(profile).is_none(), "{:?}", profile.stripes.collisions);
+        }
+    }
+}

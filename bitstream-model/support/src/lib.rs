@@ -1,0 +1,230 @@
+//! Threads that share work which borrows from the caller. They wait from one time to the next:
+//! nothing is started and nothing allocated in between.
+//!
+//! Nobody waits for a thread that has not begun: one that comes late finds nothing to do.
+//!
+//! All work is done in the [standard floating-point environment](float_env), on every thread: what is
+//! computed depends neither on the thread that computes it nor on who started that.
+//!
+//! ```
+//! let mut crew = pgs_support::Crew::new("sums", 1);
+//! let (numbers, mut sums) = ([1, 2, 3, 4, 5, 6], [0; 2]);
+//! crew.each(sums.iter_mut().zip(numbers.chunks(3)), |(to, part)| *to = part.iter().sum());
+//! assert_eq!(sums, [6, 15]);
+//! ```
+
+#![allow(
+    unsafe_code,
+    reason = "threads that outlive a call borrow what it borrows; a register has no other access"
+)]
+
+pub mod chunks;
+pub mod float_env;
+#[cfg(test)]
+mod tests;
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{Builder, JoinHandle};
+use std::{fmt, io, mem};
+
+use float_env::standard;
+
+/// Says that the path which calls this is seldom taken, as `std::hint::cold_path` does from Rust 1.95 on.
+#[cold]
+#[inline]
+pub const fn cold_path() {}
+
+/// What every thread does that comes in time; it is told its number, the caller 0.
+type Work = dyn Fn(usize) + Sync;
+
+#[derive(Default)]
+struct State {
+    work: Option<&'static Work>,
+    /// How often there was work.
+    times: u64,
+    /// Helpers that are at work.
+    busy: usize,
+    /// What a helper panicked with.
+    panic: Option<Box<dyn Any + Send>>,
+    end: bool,
+}
+
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+    begun: Condvar,
+    left: Condvar,
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Nothing that may panic is done under the lock.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What a helper does as long as there is a crew.
+    fn help(&self, number: usize) {
+        let mut seen = 0;
+        let mut state = self.state();
+        while !state.end {
+            let work = if state.times == seen { None } else { state.work };
+            seen = state.times;
+            let Some(work) = work else {
+                state = self.begun.wait(state).unwrap_or_else(PoisonError::into_inner);
+                continue;
+            };
+            state.busy += 1;
+            drop(state);
+            let done = catch_unwind(AssertUnwindSafe(|| standard(|| work(number))));
+            state = self.state();
+            state.busy -= 1;
+            // The first is passed on.
+            let another = done.err().and_then(|panic| match &mut state.panic {
+                Some(_) => Some(panic),
+                none => {
+                    *none = Some(panic);
+                    None
+                }
+            });
+            // Nobody but the caller waits for it.
+            self.left.notify_one();
+            if another.is_some() {
+                drop(state);
+                // What it carried may panic, too.
+                let _ = catch_unwind(AssertUnwindSafe(|| drop(another)));
+                state = self.state();
+            }
+        }
+    }
+}
+
+/// The calling thread and its helpers, which end when it goes. By default there are none.
+#[derive(Default)]
+pub struct Crew {
+    shared: Arc<Shared>,
+    helpers: Vec<JoinHandle<()>>,
+    refused: Option<io::Error>,
+}
+
+impl fmt::Debug for Crew {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Crew").field("helpers", &self.helpers.len()).finish_non_exhaustive()
+    }
+}
+
+impl Crew {
+    /// The caller and so many helpers, or as many as the system gives. The helpers' threads are
+    /// called `name` and their number, from 1.
+    #[must_use]
+    pub fn new(name: &str, helpers: usize) -> Self {
+        let mut crew = Self::default();
+        for number in 1..=helpers {
+            let shared = Arc::clone(&crew.shared);
+            let thread = Builder::new().name(format!("{name} {number}"));
+            match thread.spawn(move || shared.help(number)) {
+                Ok(helper) => crew.helpers.push(helper),
+                Err(error) => {
+                    crew.refused = Some(error);
+                    break;
+                }
+            }
+        }
+        crew
+    }
+
+    /// How many threads there are, the caller's among them.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.helpers.len() + 1
+    }
+
+    /// Whether there is no thread but the caller's.
+    #[must_use]
+    pub fn is_alone(&self) -> bool {
+        self.helpers.is_empty()
+    }
+
+    /// Why there are fewer helpers than were asked for; `None` if all came.
+    #[must_use]
+    pub fn refused(&self) -> Option<&io::Error> {
+        self.refused.as_ref()
+    }
+
+    /// Does something with each of some shares, whichever thread comes first; all are done when it
+    /// returns. For a single one nobody is woken.
+    ///
+    /// # Panics
+    ///
+    /// As `work` does, on whichever thread; then some shares may be left out. The crew works on.
+    pub fn each<T>(&mut self, shares: impl Iterator<Item = T> + Send, work: impl Fn(T) + Sync) {
+        if self.is_alone() || matches!(shares.size_hint().1, Some(0 | 1)) {
+            standard(|| shares.for_each(work));
+            return;
+        }
+        let shares = Mutex::new(shares);
+        self.run(&|_| {
+            loop {
+                let share = shares.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some(share) = share else { break };
+                work(share);
+            }
+        });
+    }
+
+    /// Has the caller, who is number 0, and every helper that comes in time do some work, each once;
+    /// returns when the caller's has ended and no helper is at it.
+    ///
+    /// # Panics
+    ///
+    /// As `work` does, on whichever thread, when all have ended. The crew works on.
+    pub fn run(&mut self, work: &(dyn Fn(usize) + Sync)) {
+        if self.is_alone() {
+            standard(|| work(0));
+            return;
+        }
+        // SAFETY: `Leave` takes the work back and waits for the helpers that are at it, also when
+        // the caller's part panics: no helper has it when this returns and the borrow ends.
+        let lent = unsafe { mem::transmute::<&(dyn Fn(usize) + Sync), &'static Work>(work) };
+        let leave = Leave(&self.shared);
+        let mut state = self.shared.state();
+        state.work = Some(lent);
+        // One that nobody was told of, because the caller panicked too.
+        let untold = state.panic.take();
+        state.times += 1;
+        drop(state);
+        drop(untold);
+        self.shared.begun.notify_all();
+        standard(|| work(0));
+        drop(leave);
+        let panic = self.shared.state().panic.take();
+        if let Some(panic) = panic {
+            resume_unwind(panic);
+        }
+    }
+}
+
+/// Ends the work: no helper begins it any more, and those that have are waited for.
+struct Leave<'a>(&'a Shared);
+
+impl Drop for Leave<'_> {
+    fn drop(&mut self) {
+        let mut state = self.0.state();
+        state.work = None;
+        while state.busy > 0 {
+            state = self.0.left.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+impl Drop for Crew {
+    fn drop(&mut self) {
+        self.shared.state().end = true;
+        self.shared.begun.notify_all();
+        for helper in self.helpers.drain(..) {
+            // What it panicked with was passed on.
+            let _ = helper.join();
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! The driver's AXI DMA against a model that is not ours.
+
+mod qemu;

@@ -1,0 +1,307 @@
+//! This file writes the velocity and pose segments of a step into the channels' buffers.
+//!
+//! The buffers may be write-combining memory of a board, so they are written once, each thread's range
+//! of them upwards, in whole beats, and never read: the sum that the accelerator is checked with is
+//! taken from the values on their way.
+//!
+//! A range goes by blocks of bodies that lie in the cache, for each is read more than once: what the
+//! caller has is looked at and made rows of ([`record`](crate::record)), which are dealt out to the
+//! channels in the format of the stream ([`Dealer`](super::stripe_writer::Dealer)). What is wrong with the input is
+//! not said here, only that something is.
+
+use std::mem;
+use std::ops::Range;
+
+use pgs_interface::record::Beat;
+
+use super::body_records::{Poses, Velocities};
+use super::pool::{Packers, Piece, Pieces, ranges, whole};
+use super::stripe_writer::BODIES;
+use super::target::Target;
+use crate::beat::stripe::Segment;
+use crate::record::body_table::{End, Survey, Tags};
+use crate::scene::{Bodies, Body, Pose, Velocity};
+use crate::simd::{Vectors, Work, in_wide_vectors};
+
+/// Looks at all bodies and remembers what their collisions' records are made from, and which never
+/// move; whether validation refuses none.
+pub(crate) fn survey<B: Bodies + ?Sized>(
+    target: Target<'_>,
+    bodies: &B,
+    count: usize,
+    into: Survey<'_>,
+    packers: &mut Packers,
+) -> bool {
+    let wanted = Wanted { into: Some(into), velocities: None, poses: None };
+    let (.., good) = pack(target, bodies, count, wanted, packers);
+    good
+}
+
+/// Surveys `count` bodies and writes their velocity and pose records, the first with their inertia
+/// where the bitstream wants it; the sums of both, modulo 2^32, and whether validation refuses
+/// none.
+///
+/// Shape: each channel is as long as [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says.
+pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
+    target: Target<'_>,
+    bodies: &B,
+    count: usize,
+    into: Survey<'_>,
+    (velocities, poses): (&mut [&mut [Beat]], &mut [&mut [Beat]]),
+    packers: &mut Packers,
+) -> (u32, u32, bool) {
+    let wanted =
+        Wanted { into: Some(into), velocities: Some(whole(velocities)), poses: Some(whole(poses)) };
+    pack(target, bodies, count, wanted, packers)
+}
+
+/// Writes the velocity records of `count` bodies, and their inertia where the bitstream wants it; the
+/// sum of the words written, modulo 2^32, and whether validation refuses none of what is read for it.
+///
+/// Shape: each channel is as long as [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says.
+pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
+    target: Target<'_>,
+    bodies: &B,
+    count: usize,
+    channels: &mut [&mut [Beat]],
+    packers: &mut Packers,
+) -> (u32, bool) {
+    let wanted = Wanted { into: None, velocities: Some(whole(channels)), poses: None };
+    let (sum, _, good) = pack(target, bodies, count, wanted, packers);
+    (sum, good)
+}
+
+/// Writes the pose records of `count` bodies; otherwise as [`pack_velocities`].
+pub(crate) fn pack_poses<B: Bodies + ?Sized>(
+    target: Target<'_>,
+    bodies: &B,
+    count: usize,
+    channels: &mut [&mut [Beat]],
+    packers: &mut Packers,
+) -> (u32, bool) {
+    let wanted = Wanted { into: None, velocities: None, poses: Some(whole(channels)) };
+    let (_, sum, good) = pack(target, bodies, count, wanted, packers);
+    (sum, good)
+}
+
+/// What is wanted of bodies.
+struct Wanted<'a> {
+    into: Option<Survey<'a>>,
+    velocities: Option<Piece<'a>>,
+    poses: Option<Piece<'a>>,
+}
+
+/// Surveys `count` bodies and writes their records, whatever of it is wanted; the sums of velocity and
+/// of pose records, and whether validation refuses none.
+fn pack<B: Bodies + ?Sized>(
+    target: Target<'_>,
+    bodies: &B,
+    count: usize,
+    wanted: Wanted<'_>,
+    packers: &mut Packers,
+) -> (u32, u32, bool) {
+    let Wanted { mut into, velocities, poses } = wanted;
+    let ends = into.as_mut().map(|into| into.ends(count));
+    let cut = |size| parts(target, (count, size), ends, velocities, poses);
+    let mut all = Outcome::default();
+    let work = |part| pack_part(target, bodies, part);
+    packers.each(count, cut, work, |of_part| all.join(of_part));
+    let Outcome { velocities, poses, good, still } = all;
+    if let Some(into) = &mut into {
+        into.settle(still);
+    }
+    (velocities, poses, good)
+}
+
+/// A range of bodies, and where that goes which is wanted of them.
+struct Part<'a> {
+    range: Range<usize>,
+    ends: Option<&'a mut [End]>,
+    velocities: Option<Piece<'a>>,
+    poses: Option<Piece<'a>>,
+}
+
+/// Cuts `count` bodies into parts of `size`.
+fn parts<'a>(
+    target: Target<'_>,
+    (count, size): (usize, usize),
+    ends: Option<&'a mut [End]>,
+    velocities: Option<Piece<'a>>,
+    poses: Option<Piece<'a>>,
+) -> impl Iterator<Item = Part<'a>> + Send {
+    let [of_velocities, of_poses] =
+        [Segment::Velocities, Segment::Poses].map(|segment| segment.layout(target.variant));
+    let mut ends = ends.map(|ends| ends.chunks_mut(size));
+    let mut velocities = velocities.map(|channels| Pieces::new(&of_velocities, size, channels));
+    let mut poses = poses.map(|channels| Pieces::new(&of_poses, size, channels));
+    ranges(count, size).map(move |range| Part {
+        range,
+        ends: ends.as_mut().map(|ends| ends.next().unwrap_or_default()),
+        velocities: velocities.as_mut().map(Pieces::cut),
+        poses: poses.as_mut().map(Pieces::cut),
+    })
+}
+
+/// What comes of bodies: the sums of the words written, whether validation refuses none, and between
+/// which indices those are that never move.
+struct Outcome {
+    velocities: u32,
+    poses: u32,
+    good: bool,
+    still: Range<usize>,
+}
+
+/// Around it and another range is the other.
+const NONE: Range<usize> = Range { start: usize::MAX, end: 0 };
+
+impl Default for Outcome {
+    fn default() -> Self {
+        Self { velocities: 0, poses: 0, good: true, still: NONE }
+    }
+}
+
+impl Outcome {
+    fn join(&mut self, other: Self) {
+        self.velocities = self.velocities.wrapping_add(other.velocities);
+        self.poses = self.poses.wrapping_add(other.poses);
+        self.good &= other.good;
+        self.still = around(&self.still, &other.still);
+    }
+}
+
+/// The least range with both in it.
+fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
+    one.start.min(other.start)..one.end.max(other.end)
+}
+
+/// Does with one part what is wanted.
+///
+/// Here is only what depends on the caller's container: where the bodies of a block lie.
+fn pack_part<B: Bodies + ?Sized>(target: Target<'_>, bodies: &B, mut part: Part<'_>) -> Outcome {
+    let Part { range, .. } = &part;
+    let (first, until) = (range.start, range.end);
+    let mut packer = BodyPacker::new(target, &mut part);
+    let mut copies = [NOBODY; BODIES];
+    for first in (first..until).step_by(BODIES) {
+        let block = &mut copies[..(until - first).min(BODIES)];
+        let lying = bodies.structures().and_then(|all| all.get(first..first + block.len()));
+        packer.write(lying.unwrap_or_else(|| {
+            for (at, to) in block.iter_mut().enumerate() {
+                *to = bodies.body(first + at);
+            }
+            block
+        }));
+    }
+    packer.finish()
+}
+
+/// Surveys bodies and writes their records, whatever of it is wanted, a block at a time.
+struct BodyPacker<'a, 'b> {
+    target: Target<'a>,
+    tags: Tags<'a>,
+    /// The index of the next.
+    next: usize,
+    /// The ends that are not written yet.
+    ends: Option<&'a mut [End]>,
+    velocities: Option<Velocities<'a, 'b>>,
+    poses: Option<Poses<'a, 'b>>,
+    good: bool,
+    still: Range<usize>,
+}
+
+impl<'a, 'b> BodyPacker<'a, 'b> {
+    fn new(target: Target<'a>, part: &'a mut Part<'b>) -> Self {
+        let Part { range, ends, velocities, poses } = part;
+        let Outcome { good, still, .. } = Outcome::default();
+        Self {
+            target,
+            tags: Tags::new(target.shapes),
+            next: range.start,
+            ends: ends.as_deref_mut(),
+            velocities: velocities.as_mut().map(|channels| Velocities::new(target, channels)),
+            poses: poses.as_mut().map(|channels| Poses::new(target, channels)),
+            good,
+            still,
+        }
+    }
+
+    /// Does it with the next bodies, at most [`BODIES`].
+    fn write(&mut self, bodies: &[Body]) {
+        in_wide_vectors(Writing { packer: self, bodies });
+    }
+
+    /// Ends the segments.
+    fn finish(self) -> Outcome {
+        let Self { velocities, poses, good, still, .. } = self;
+        let [velocities, poses] = [velocities.map(Velocities::finish), poses.map(Poses::finish)]
+            .map(Option::unwrap_or_default);
+        Outcome { velocities, poses, good, still }
+    }
+}
+
+/// A block of bodies, and where it goes.
+struct Writing<'p, 'a, 'b> {
+    packer: &'p mut BodyPacker<'a, 'b>,
+    bodies: &'p [Body],
+}
+
+impl Work for Writing<'_, '_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) {
+        let Self { packer, bodies } = self;
+        let BodyPacker { target, tags, next, ends, velocities, poses, good, still } = packer;
+        let quick = target.quick;
+        let range = *next..*next + bodies.len();
+        *next = range.end;
+        if let Some(rest) = ends {
+            let (ends, behind) = mem::take(rest).split_at_mut(bodies.len());
+            *rest = behind;
+            let any_still = tags.ends(bodies, ends);
+            *good &= quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends, any_still));
+            if any_still {
+                *still = around(still, &range);
+            }
+        } else if let Some(quick) = quick {
+            // Read anew they may be others.
+            let mut ends = [End::MISSING; BODIES];
+            let any_still = tags.ends(bodies, &mut ends);
+            *good &= quick.bodies(range.start, bodies, &ends, any_still);
+        }
+        if let Some(velocities) = velocities {
+            velocities.write(vectors, bodies);
+        }
+        if let Some(poses) = poses {
+            poses.write(vectors, bodies);
+        }
+    }
+}
+
+/// Some of the bodies, in an order of their own: a view of what is packed.
+#[derive(Debug)]
+pub(crate) struct Chosen<'a, B: ?Sized> {
+    pub(crate) bodies: &'a B,
+    /// Their indices.
+    pub(crate) order: &'a [u32],
+}
+
+impl<B: Bodies + ?Sized> Bodies for Chosen<'_, B> {
+    fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    fn body(&self, index: usize) -> Body {
+        self.bodies.body(self.order[index] as usize)
+    }
+
+    /// Nothing is stored through a view.
+    fn commit(&mut self, _: usize, _: Pose, _: Velocity) {}
+}
+
+/// What a block of bodies holds before it is read.
+const NOBODY: Body = Body {
+    pose: Pose { position: [0.0; 3], orientation: [0.0; 4] },
+    velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] },
+    shape: 0,
+};

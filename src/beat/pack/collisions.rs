@@ -1,0 +1,302 @@
+//! This file writes the collision segments of a step into the channels' buffers.
+//!
+//! As [`bodies`](super::bodies) writes theirs: by ranges for several threads, and in these block by block,
+//! once, upwards, never read back.
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use pgs_interface::profile::Geometry;
+use pgs_interface::record::Beat;
+
+use super::encode::{Absolute, Encoding, Kind, Relative, Worded, most_are_full};
+use super::pool::{Packers, Piece, Pieces, ranges, whole};
+use super::source::{InArray, InNearbyOrder, InOrder, Lying};
+use super::stripe_writer::{BLOCK, CHECKED, Dealer, MANY};
+use super::target::Target;
+use crate::beat::format::{Format, in_format};
+use crate::beat::stripe::Segment;
+use crate::record::body_table::{Ends, Lookup};
+use crate::record::sixteen::Sixteen;
+use crate::scene::{Collision, Collisions, Structures};
+use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
+use crate::validate::{Block, Look, Quick};
+
+/// The collisions of a step, as they are sent.
+#[derive(Debug)]
+pub(crate) struct Entries<'a, C: ?Sized> {
+    pub(crate) collisions: &'a C,
+    /// Records, those that an order added included.
+    pub(crate) count: usize,
+    /// How many were added by the order that was made for them; `None` if there is none.
+    pub(crate) added: Option<usize>,
+    /// What stands in place of the bodies' indices, of each record. Only for
+    /// [`Geometry::Relative`].
+    pub(crate) words: Option<&'a [[u32; 2]]>,
+}
+
+/// Writes the records of collisions; the sum of the words written, modulo 2^32, and whether
+/// validation refuses none.
+///
+/// A body that does not exist has its position written as zeros, and one without a shape is static. Where
+/// indices are sent in sixteen bits, the lower halves of them count; of more bodies than these name nothing
+/// is written, and any is refused.
+/// Should a caller's [`Collisions`] answer differently from one look to the next, validation looks at
+/// what is written; of what looks like padding it refuses more than the order added.
+pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
+    target: Target<'_>,
+    ends: Ends<'_>,
+    entries: &Entries<'_, C>,
+    channels: &mut [&mut [Beat]],
+    packers: &mut Packers,
+) -> (u32, bool) {
+    let layout = Segment::Collisions.layout(target.variant);
+    let (mut sum, mut good, mut paddings) = (0_u32, true, 0);
+    let channels = whole(channels);
+    let cut = |size| {
+        let mut pieces = Pieces::new(&layout, size, channels);
+        ranges(entries.count, size).map(move |range| (range, pieces.cut()))
+    };
+    let work = |part: (Range<usize>, Piece<'_>)| pack_range(target, ends, entries, part);
+    packers.each(entries.count, cut, work, |(of_range, seen): (u32, Seen)| {
+        sum = sum.wrapping_add(of_range);
+        good &= seen.good;
+        paddings += seen.paddings;
+    });
+    let as_many = target.quick.is_none() || entries.added.is_none_or(|added| added == paddings);
+    (sum, good & as_many)
+}
+
+/// What was seen of collisions on their way.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen {
+    /// Whether validation refuses none.
+    pub(crate) good: bool,
+    /// How many look like padding, where an order may have added some.
+    paddings: usize,
+}
+
+impl Seen {
+    /// Of none.
+    const NOTHING: Self = Self { good: true, paddings: 0 };
+
+    /// Of what is not written: there are more bodies than the stream's indices name, or none was looked at.
+    const REFUSED: Self = Self { good: false, paddings: 0 };
+
+    fn and(self, other: Self) -> Self {
+        Self { good: self.good & other.good, paddings: self.paddings + other.paddings }
+    }
+}
+
+/// Writes the records of a range of collisions, otherwise as [`pack_collisions`].
+///
+/// Here is only what depends on the caller's container: where they lie. Those that lie nowhere as
+/// structures, or are not as many there, are asked for one by one.
+fn pack_range<C: Collisions + ?Sized>(
+    target: Target<'_>,
+    ends: Ends<'_>,
+    entries: &Entries<'_, C>,
+    (range, mut channels): (Range<usize>, Piece<'_>),
+) -> (u32, Seen) {
+    let Entries { collisions, count, added, words } = *entries;
+    let marks = Marks { scheduled: added.is_some(), words };
+    let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
+    let seen = match collisions.structures().filter(|all| all.len() == count) {
+        Some(Structures::Array(all)) => packer.write(InArray(all).part(range)),
+        Some(Structures::Ordered { all, order }) => {
+            let order = InOrder::new(all, order).part(range.clone());
+            match order.nearby(range.start) {
+                Some(order) => packer.write_nearby(order),
+                None => packer.write_ordered(order),
+            }
+        }
+        None => {
+            let mut copies = [Collision::NOTHING; BLOCK];
+            let blocks =
+                range.clone().step_by(BLOCK).map(|first| first..range.end.min(first + BLOCK));
+            blocks.fold(Seen::NOTHING, |seen, block| {
+                let copies = &mut copies[..block.len()];
+                // All of a block are on their way while the first are copied.
+                block.clone().for_each(|index| collisions.soon(index));
+                for (to, index) in copies.iter_mut().zip(block) {
+                    *to = collisions.collision(index);
+                    ends.soon([to.body_a, to.body_b]);
+                }
+                seen.and(packer.write(InArray(copies)))
+            })
+        }
+    };
+    (packer.finish(), seen)
+}
+
+/// What is said of collisions beside what they hold.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Marks<'a> {
+    /// Whether they are in an order that was made for them, which may have added some.
+    pub(crate) scheduled: bool,
+    /// As in [`Entries`].
+    pub(crate) words: Option<&'a [[u32; 2]]>,
+}
+
+/// Writes collisions that lie somewhere.
+///
+/// It knows nothing of the caller's container, so that it is compiled once, with the driver.
+pub(crate) struct CollisionPacker<'a, 'b> {
+    quick: Option<&'a Quick<'a>>,
+    ends: Ends<'a>,
+    marks: Marks<'a>,
+    dealer: Dealer<'a, 'b>,
+    geometry: Geometry,
+    /// The index of the next.
+    next: usize,
+    /// Whether most collisions are expected to have all contact points, as those written last have. Of the first
+    /// ones it is expected.
+    most_full: bool,
+}
+
+impl<'a, 'b> CollisionPacker<'a, 'b> {
+    /// From collision `first` on, with which a group begins.
+    ///
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel)
+    /// says of what is written.
+    pub(crate) fn new(
+        target: Target<'a>,
+        ends: Ends<'a>,
+        marks: Marks<'a>,
+        first: usize,
+        channels: &'a mut [&'b mut [Beat]],
+    ) -> Self {
+        let layout = Segment::Collisions.layout(target.variant);
+        let geometry = target.variant.profile.geometry;
+        let dealer = Dealer::new(&layout, channels);
+        Self { quick: target.quick, ends, marks, dealer, geometry, next: first, most_full: true }
+    }
+
+    /// The same, but that it is expected of the first ones that few have all contact points.
+    #[cfg(test)]
+    pub(crate) const fn expecting_few_full(mut self) -> Self {
+        self.most_full = false;
+        self
+    }
+
+    /// Writes the next collisions. Their number is divisible by [`BLOCK`], unless they are the last.
+    pub(crate) fn write(&mut self, collisions: InArray<'_>) -> Seen {
+        self.write_lying(collisions)
+    }
+
+    /// The same.
+    fn write_ordered(&mut self, collisions: InOrder<'_>) -> Seen {
+        self.write_lying(collisions)
+    }
+
+    /// The same.
+    fn write_nearby(&mut self, collisions: InNearbyOrder<'_>) -> Seen {
+        self.write_lying(collisions)
+    }
+
+    #[inline(always)]
+    fn write_lying<'p, L: Lying<'p>>(&'p mut self, collisions: L) -> Seen {
+        let Self { quick, ends, marks, dealer, geometry, next, most_full } = self;
+        let Marks { scheduled, words } = *marks;
+        let (quick, first) = (*quick, *next);
+        *next += collisions.len();
+        let all = Block { first, collisions, ends: *ends, scheduled };
+        macro_rules! writing {
+            ($kind:expr) => {
+                Writing { kind: $kind, rows: PhantomData, quick, all, dealer, most_full }
+            };
+        }
+        match (*geometry, words) {
+            (Geometry::Absolute, _) => in_wide_vectors(writing!(Absolute)),
+            (Geometry::Relative, None) => in_wide_vectors(writing!(Relative)),
+            (Geometry::Relative, Some(words)) => in_wide_vectors(writing!(Worded(words))),
+        }
+    }
+
+    /// The index of the next collision.
+    pub(crate) const fn next(&self) -> usize {
+        self.next
+    }
+
+    /// Ends the segment; the sum of the words written, modulo 2^32.
+    pub(crate) fn finish(self) -> u32 {
+        self.dealer.finish()
+    }
+}
+
+/// Collisions, and where they go.
+struct Writing<'p, 'a, 'b, K, L, const ROWS: usize> {
+    kind: K,
+    rows: PhantomData<[Lanes; ROWS]>,
+    quick: Option<&'p Quick<'p>>,
+    all: Block<'p, L>,
+    dealer: &'p mut Dealer<'a, 'b>,
+    most_full: &'p mut bool,
+}
+
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_, '_, K, L, ROWS> {
+    type Output = Seen;
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) -> Seen {
+        in_format!(self.dealer.format(), F => self.run_as::<V, F>(vectors))
+    }
+}
+
+impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, L, ROWS> {
+    /// Whether a loop that looks jumps where all contact points are used: in loops of f32, and in those that do not
+    /// look, that costs what the masks do; what is cut to the thesis' format takes far longer than either.
+    const fn jumps<F: Format>() -> bool {
+        matches!(F::SIXTEEN, Some(Sixteen::Binary16))
+    }
+
+    /// Encodes, looks at and deals out, block by block. Those behind are on their way meanwhile.
+    #[inline(always)]
+    fn run_as<V: Vectors, F: Format>(self, vectors: V) -> Seen {
+        let Self { kind, quick, all, dealer, most_full, .. } = self;
+        let Some(ends) = <K::Among<'p, F> as Lookup>::of(all.ends) else {
+            return Seen::REFUSED;
+        };
+        let mut seen = Seen::NOTHING;
+        // Validation goes by blocks. Without it, as packing alone is measured, there is nothing to be done
+        // for each that is worth it.
+        let size = if quick.is_some() { CHECKED } else { MANY };
+        for at in (0..all.collisions.len()).step_by(size) {
+            let collisions = all.collisions.part(at..at + size);
+            let block = Block { first: all.first + at, collisions, ..all };
+            // One loop each, in which nothing is asked of what is looked for.
+            macro_rules! written {
+                ($witness:expr, $most_full:literal) => {{
+                    let mut records =
+                        Encoding::<_, _, _, _, $most_full>::new(kind, &block, ends, $witness);
+                    dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
+                    records
+                }};
+            }
+            macro_rules! looked_at {
+                ($quick:ident, $reaches:literal) => {{
+                    let look = Look::<$reaches>::new($quick);
+                    if const { Self::jumps::<F>() } && *most_full {
+                        written!(look, true).good($quick, &block)
+                    } else {
+                        written!(look, false).good($quick, &block)
+                    }
+                }};
+            }
+            let (good, paddings) = match quick {
+                None => {
+                    written!((), false);
+                    continue;
+                }
+                Some(quick) if quick.asks_how_far() => looked_at!(quick, true),
+                Some(quick) => looked_at!(quick, false),
+            };
+            // For the next block: of that nothing is in a cache yet.
+            if const { Self::jumps::<F>() } {
+                *most_full = most_are_full(collisions);
+            }
+            seen = seen.and(Seen { good, paddings });
+        }
+        seen
+    }
+}

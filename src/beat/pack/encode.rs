@@ -1,0 +1,332 @@
+//! This file makes the records of a block of collisions, and has them looked at on their way.
+
+use pgs_interface::record::{CONTACT_POINTS, collision, relative};
+
+use super::source::{Lying, Next};
+use crate::beat::format::{Format, Records};
+use crate::record::body_table::{End, Ends, Lookup};
+use crate::record::largest::MAGNITUDE;
+use crate::record::{self, Counted, FULL, Record, Rows};
+use crate::scene::Collision;
+use crate::simd::{Integer, Lanes};
+use crate::validate::{Block, Locations, Look, Quick};
+
+/// Every so many collisions one is looked at to find out whether most have all contact points: eight of a block
+/// that is looked at, two of one that a caller's collisions are copied to.
+const SAMPLED: usize = 15;
+
+/// Whether most of these have all contact points, a few of which tell: of eight one may be another, as a jump
+/// that is not foreseen costs about as much as eight times the masks.
+#[inline(always)]
+pub(crate) fn most_are_full<'p>(collisions: impl Lying<'p>) -> bool {
+    let sampled = (0..collisions.len()).step_by(SAMPLED);
+    let full =
+        |nth: &usize| collisions.some::<1>(*nth).is_some_and(|[collision]| collision.count == FULL);
+    let others = sampled.clone().filter(|nth| !full(nth)).count();
+    others * 8 <= sampled.len()
+}
+
+/// A kind of collision record of `ROWS` rows.
+pub(crate) trait Kind<const ROWS: usize>: Copy {
+    /// Where the bodies of a collision are looked up whose record is sent in a format.
+    type Among<'a, F: Format>: Lookup<'a>;
+
+    /// The ends that a record is made from, given those of the collision's bodies.
+    fn anchors(ends: [&End; 2]) -> [&End; 2];
+
+    /// The record of collision `index`, from its [anchors](Self::anchors).
+    fn encode(self, index: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<ROWS>;
+
+    /// The locations that it holds.
+    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations;
+}
+
+/// Records in world coordinates.
+#[derive(Clone, Copy)]
+pub(crate) struct Absolute;
+
+impl Kind<{ collision::ROWS }> for Absolute {
+    type Among<'a, F: Format> = F::Among<'a>;
+
+    #[inline(always)]
+    fn anchors(ends: [&End; 2]) -> [&End; 2] {
+        ends
+    }
+
+    #[inline(always)]
+    fn encode(self, _: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<{ collision::ROWS }> {
+        record::collision::encode(of, anchors)
+    }
+
+    #[inline(always)]
+    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
+        let record = record::collision::encode(of, anchors);
+        let [_, a, b, points @ ..] = record.rows;
+        let magnitudes = points.map(|point| point.and(Lanes::all(MAGNITUDE)));
+        let [of_a, of_b] = [a, b].map(|position| position.and(magnitude_of_vec3()));
+        let sum = added(magnitudes).plus_f32(of_a.plus_f32(of_b));
+        Locations { positions: [a, b], points, sum }
+    }
+}
+
+/// Records relative to body A.
+#[derive(Clone, Copy)]
+pub(crate) struct Relative;
+
+impl Kind<{ relative::ROWS }> for Relative {
+    type Among<'a, F: Format> = F::Among<'a>;
+
+    #[inline(always)]
+    fn anchors(ends: [&End; 2]) -> [&End; 2] {
+        anchored(ends)
+    }
+
+    #[inline(always)]
+    fn encode(self, _: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<{ relative::ROWS }> {
+        record::relative::encode(of, anchors, record::bodies(of.collision))
+    }
+
+    #[inline(always)]
+    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
+        let (offset, points) = record::relative::seen(of.collision, anchors);
+        let mut magnitudes = points;
+        for (point, used) in magnitudes.iter_mut().zip(record::used_magnitudes(of.count())) {
+            *point = point.and(used);
+        }
+        let sum = added(magnitudes).plus_f32(offset.and(magnitude_of_vec3()));
+        Locations { positions: [Lanes::all(0), offset], points, sum }
+    }
+}
+
+/// The ends that a relative record is made from.
+#[inline(always)]
+fn anchored([a, b]: [&End; 2]) -> [&End; 2] {
+    // Whether one never moves is mostly foreseen, as few collisions are with what never moves or nearly all
+    // are: a jump costs less then than to choose.
+    if a.is_static() | b.is_static() { one_still(a, b) } else { [a, b] }
+}
+
+/// The same of bodies one of which never moves.
+#[cold]
+#[inline(never)]
+fn one_still<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
+    record::relative::anchors([a, b], [!a.is_static(), !b.is_static()])
+}
+
+/// Records relative to body A, with these words in place of the indices of each one's bodies.
+#[derive(Clone, Copy)]
+pub(crate) struct Worded<'a>(pub(crate) &'a [[u32; 2]]);
+
+impl Kind<{ relative::ROWS }> for Worded<'_> {
+    /// The words are short and the indices are not: there may be more bodies than sixteen bits name.
+    type Among<'a, F: Format> = Ends<'a>;
+
+    #[inline(always)]
+    fn anchors(ends: [&End; 2]) -> [&End; 2] {
+        anchored(ends)
+    }
+
+    #[inline(always)]
+    fn encode(
+        self,
+        index: usize,
+        of: Counted<'_>,
+        anchors: [&End; 2],
+    ) -> Record<{ relative::ROWS }> {
+        let [word_a, word_b] = self.0[index];
+        let words = Lanes::new([word_a, word_b, 0, 0]);
+        let bodies = [Integer::new::<0>(words), Integer::new::<1>(words)];
+        record::relative::encode(of, anchors, bodies)
+    }
+
+    #[inline(always)]
+    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
+        Relative::locations(of, anchors)
+    }
+}
+
+/// The sum of magnitudes.
+#[inline(always)]
+fn added([first, second, third, fourth]: [Lanes; CONTACT_POINTS]) -> Lanes {
+    first.plus_f32(second).plus_f32(third.plus_f32(fourth))
+}
+
+/// The bits of the magnitude of a vec3, and none beside it.
+#[inline(always)]
+fn magnitude_of_vec3() -> Lanes {
+    Lanes::new([MAGNITUDE, MAGNITUDE, MAGNITUDE, 0])
+}
+
+/// The ends of a collision's bodies.
+#[inline(always)]
+fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
+    [ends.get(collision.body_a), ends.get(collision.body_b)]
+}
+
+/// The records of a block of collisions, seen by a witness on their way. What is behind it is fetched
+/// meanwhile.
+///
+/// `MOST_FULL` says whether most have all contact points: where all that are made together have, nothing is
+/// masked. That is a jump, which is foreseen then.
+#[derive(Clone, Copy)]
+pub(crate) struct Encoding<K, L, E, W, const MOST_FULL: bool> {
+    kind: K,
+    first: usize,
+    collisions: L,
+    ends: E,
+    witness: W,
+}
+
+impl<'p, K, L: Lying<'p>, E: Lookup<'p>, W, const MOST_FULL: bool> Encoding<K, L, E, W, MOST_FULL> {
+    /// Those of a block, whose bodies are looked up here.
+    #[inline(always)]
+    pub(crate) fn new(kind: K, block: &Block<'p, L>, ends: E, witness: W) -> Self {
+        let Block { first, collisions, .. } = *block;
+        Self { kind, first, collisions, ends, witness }
+    }
+}
+
+/// Who sees the records on their way. An `#[inline(always)]` belongs to every implementation.
+pub(crate) trait Witness: Copy {
+    /// Sees the collision of one, the ends of its bodies as they were looked up, and those that the record is
+    /// made from.
+    fn see<K: Kind<ROWS>, const ROWS: usize>(
+        &mut self,
+        of: Counted<'_>,
+        ends: [&End; 2],
+        anchors: [&End; 2],
+    );
+}
+
+/// Nobody.
+impl Witness for () {
+    #[inline(always)]
+    fn see<K: Kind<ROWS>, const ROWS: usize>(
+        &mut self,
+        _: Counted<'_>,
+        _: [&End; 2],
+        _: [&End; 2],
+    ) {
+    }
+}
+
+/// Whoever looks at them as validation does.
+impl<const REACHES: bool> Witness for Look<REACHES> {
+    #[inline(always)]
+    fn see<K: Kind<ROWS>, const ROWS: usize>(
+        &mut self,
+        of: Counted<'_>,
+        ends: [&End; 2],
+        anchors: [&End; 2],
+    ) {
+        self.take(of, ends, &K::locations(of, anchors));
+    }
+}
+
+impl<'p, K, L: Lying<'p>, E: Lookup<'p>, const REACHES: bool, const MOST_FULL: bool>
+    Encoding<K, L, E, Look<REACHES>, MOST_FULL>
+{
+    /// Whether validation refuses none of the block, all of whose records were taken; and how many of it look
+    /// like padding, if the block is scheduled.
+    #[inline(always)]
+    pub(crate) fn good<const ROWS: usize>(
+        self,
+        quick: &Quick<'_>,
+        block: &Block<'p, L>,
+    ) -> (bool, usize)
+    where
+        K: Kind<ROWS>,
+    {
+        let Self { ends, witness, .. } = self;
+        // These are asked for only where every record was made of its own bodies' ends, or is padding.
+        let locations = block
+            .collisions
+            .iter()
+            .map(|collision| K::locations(collision.into(), K::anchors(both(ends, collision))));
+        witness.good(quick, block, ends, locations)
+    }
+}
+
+/// Does something with each of so many. A loop of so much is not unrolled, and its rows would go through
+/// memory.
+macro_rules! each {
+    ($count:ident, $at:ident => $work:expr) => {
+        each!($count, $at => $work; 0 1 2 3 4)
+    };
+    ($count:ident, $at:ident => $work:expr; $($nth:literal)*) => {
+        const { assert!($count <= [$($nth),*].len(), "all of them are written out") };
+        // What there is not is not compiled.
+        $(if const { $nth < $count } {
+            let $at = $nth;
+            $work;
+        })*
+    };
+}
+#[cfg(feature = "bench")]
+pub(crate) use each;
+
+impl<'p, K, L, E: Lookup<'p>, W: Witness, const MOST_FULL: bool> Encoding<K, L, E, W, MOST_FULL> {
+    /// The record of one of the block, which the witness sees.
+    #[inline(always)]
+    fn record<const ROWS: usize>(&mut self, at: usize, of: Counted<'_>) -> Record<ROWS>
+    where
+        K: Kind<ROWS>,
+    {
+        let ends = both(self.ends, of.collision);
+        let anchors = K::anchors(ends);
+        let record = self.kind.encode(self.first + at, of, anchors);
+        self.witness.see::<K, ROWS>(of, ends, anchors);
+        record
+    }
+}
+
+impl<'p, K, L, E, W, const ROWS: usize, const MOST_FULL: bool> Records<ROWS>
+    for Encoding<K, L, E, W, MOST_FULL>
+where
+    K: Kind<ROWS>,
+    L: Lying<'p>,
+    E: Lookup<'p>,
+    W: Witness,
+{
+    #[inline(always)]
+    fn len(&self) -> usize {
+        self.collisions.len()
+    }
+
+    #[inline(always)]
+    fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+        let Next { these, soon } = self.collisions.next::<N>(nth)?;
+        if let Some(soon) = soon {
+            for collision in soon {
+                self.ends.soon([collision.body_a, collision.body_b]);
+            }
+        }
+        if MOST_FULL && these.iter().all(|collision| collision.count == FULL) {
+            each!(N, at => self.record(nth * N + at, Counted::full(these[at])).give(to));
+        } else {
+            each!(N, at => self.record(nth * N + at, these[at].into()).give(to));
+        }
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::beat::pack::source::InArray;
+
+    #[test]
+    fn most_are_full_where_few_of_those_looked_at_are_not() {
+        let full = Collision { count: FULL, ..Collision::NOTHING };
+        let mut collisions = vec![full; 16 * SAMPLED];
+        let most = |collisions: &[Collision]| most_are_full(InArray(collisions));
+        assert!(most(&collisions) && most(&[]) && most(&[full]));
+        assert!(!most(&[Collision::NOTHING]));
+        for (nth, count) in [(0, 3), (15, 5)] {
+            collisions[nth * SAMPLED].count = count;
+            assert!(most(&collisions), "{nth}");
+        }
+        collisions[7 * SAMPLED].count = 0;
+        assert!(!most(&collisions));
+    }
+}

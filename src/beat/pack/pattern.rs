@@ -1,0 +1,110 @@
+//! This file knows the stripes of the profiles and their units when it is compiled.
+
+use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
+
+use crate::beat::stripe::Place;
+
+/// A stripe of one of the profiles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pattern {
+    FloatCollisions,
+    HalfCollisions,
+    HalfBodies,
+    /// A beat for each of so many channels, in their order.
+    One,
+    Two,
+    Three,
+    Four,
+}
+
+/// Where the beats of a unit go, by channels from the first of the stripe on.
+pub(crate) trait Places<const BEATS: usize> {
+    const PLACES: [Place; BEATS];
+}
+
+macro_rules! places {
+    ($($pattern:ident: $streams:expr;)*) => {
+        impl Pattern {
+            /// That of a group, if it is one of these, and its first channel.
+            pub(crate) fn of(group: &[u8]) -> Option<(Self, usize)> {
+                let first = *group.iter().min()?;
+                let is = |streams: &[u8]| {
+                    streams.len() == group.len()
+                        && streams.iter().zip(group).all(|(to, stream)| *to + first == *stream)
+                };
+                let found = None
+                    $(.or_else(|| is($streams).then_some(Self::$pattern)))*;
+                found.map(|pattern| (pattern, usize::from(first)))
+            }
+        }
+        $(
+            pub(crate) struct $pattern;
+            impl<const BEATS: usize> Places<BEATS> for $pattern {
+                const PLACES: [Place; BEATS] = dealt($streams);
+            }
+        )*
+    };
+}
+places! {
+    FloatCollisions: FLOAT.stripes.collisions.streams;
+    HalfCollisions: HALF.stripes.collisions.streams;
+    HalfBodies: HALF.stripes.poses.streams;
+    One: NAIVE.stripes.collisions.streams;
+    Two: WINDOWED.stripes.collisions.streams;
+    Three: MIXED.stripes.collisions.streams;
+    Four: FLOAT.stripes.poses.streams;
+}
+
+/// Units of a pattern: so many records, which are so many beats, and on each channel so many of them.
+/// Each is told to the macro `each`, which returns if it is the one.
+macro_rules! units {
+    ($pattern:expr, $each:ident) => {
+        match $pattern {
+            Pattern::FloatCollisions => $each!(FloatCollisions: 1 are 7: a 2, b 2, c 2, d 1),
+            Pattern::HalfCollisions => $each!(HalfCollisions: 2 are 7: a 3, b 3, c 1),
+            Pattern::HalfBodies => {
+                $each!(HalfBodies: 5 are 5: a 2, b 2, c 1);
+                $each!(HalfBodies: 5 are 10: a 4, b 4, c 2);
+            }
+            Pattern::One => {
+                $each!(One: 1 are 7: a 7);
+                $each!(One: 1 are 1: a 1);
+                $each!(One: 1 are 2: a 2);
+                $each!(One: 1 are 4: a 4);
+            }
+            Pattern::Two => {
+                $each!(Two: 2 are 14: a 7, b 7);
+                $each!(Two: 1 are 6: a 3, b 3);
+                $each!(Two: 2 are 6: a 3, b 3);
+            }
+            Pattern::Three => {
+                $each!(Three: 2 are 6: a 2, b 2, c 2);
+                $each!(Three: 3 are 6: a 2, b 2, c 2);
+                $each!(Three: 3 are 12: a 4, b 4, c 4);
+            }
+            Pattern::Four => {
+                $each!(Four: 2 are 4: a 1, b 1, c 1, d 1);
+                $each!(Four: 1 are 4: a 1, b 1, c 1, d 1);
+            }
+        }
+    };
+}
+pub(crate) use units;
+
+/// Where beats go that are dealt out in groups.
+const fn dealt<const BEATS: usize>(streams: &[u8]) -> [Place; BEATS] {
+    let mut places = [Place { channel: 0, slot: 0 }; BEATS];
+    let mut at = 0;
+    while at < BEATS {
+        places[at].channel = streams[at % streams.len()] as usize;
+        let mut before = 0;
+        while before < at {
+            if places[before].channel == places[at].channel {
+                places[at].slot += 1;
+            }
+            before += 1;
+        }
+        at += 1;
+    }
+    places
+}

@@ -1,0 +1,366 @@
+//! This file says where the collisions lie that a caller keeps as structures: they are read there, without a
+//! copy.
+
+use std::iter;
+use std::ops::Range;
+
+use crate::scene::Collision;
+use crate::simd::{later_with_those_behind, soon_alone, soon_with_those_behind};
+use pgs_support::chunks::Chunks;
+
+/// Where collisions lie ([`Collisions::structures`](crate::scene::Collisions::structures)).
+#[derive(Debug, Clone, Copy)]
+pub enum Structures<'a> {
+    /// One behind the other, in their order.
+    Array(&'a [Collision]),
+    /// In an order of their own.
+    Ordered {
+        /// One behind the other.
+        all: &'a [Collision],
+        /// Where each of them lies in `all`. Beyond its end is one without contact points, which has no
+        /// effect, and which a step refuses if it is a caller's.
+        order: &'a [u32],
+    },
+}
+
+impl Structures<'_> {
+    /// Number of collisions.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        match self {
+            Self::Array(all) => all.len(),
+            Self::Ordered { order, .. } => order.len(),
+        }
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Collisions that lie somewhere, to look up.
+///
+/// All of it is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
+pub(crate) trait Lying<'a>: Copy {
+    /// How many there are.
+    fn len(self) -> usize;
+
+    /// The `nth` so many of them, if there are as many.
+    fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]>;
+
+    /// The `nth` so many of them, of which there are as many, while those are fetched whose turn it is soon.
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>>;
+
+    /// Those of a range, as many as there are.
+    fn part(self, range: Range<usize>) -> Self;
+
+    /// One after the other.
+    #[inline(always)]
+    fn iter(self) -> impl Iterator<Item = &'a Collision> {
+        let mut at = 0;
+        iter::from_fn(move || {
+            let [next] = self.some(at)?;
+            at += 1;
+            Some(next)
+        })
+    }
+}
+
+/// Collisions whose turn it is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Next<'a, const N: usize> {
+    pub(crate) these: [&'a Collision; N],
+    /// Those whose bodies are to be fetched. `None` shortly before the end, and where it costs more than it
+    /// brings: where collisions lie one behind the other, or about so, their bodies do, too.
+    pub(crate) soon: Option<[&'a Collision; N]>,
+}
+
+/// How far behind a collision is asked for: so far that it is there in time, so near that it is not gone
+/// again.
+const SOON: usize = 30;
+
+/// The same in an array, which comes without being looked up, and so sooner.
+const SOON_IN_ARRAY: usize = 70;
+
+/// The same of its bodies, which it has to say by then.
+const BODIES_SOON: usize = SOON / 2;
+
+/// How far behind what lies about there is fetched, where the order is near to that in memory: line by line
+/// into the second cache. As far as nearly all go astray, and so few that they lie there until it is their
+/// turn; at the end of a part that a thread has, what the next one begins with is on its way, too.
+const NEARBY_LATER: usize = 1100;
+
+/// How far behind a collision is asked for there, by its place: most come from the second cache then.
+const NEARBY_SOON: usize = 14;
+
+/// Entries from which on one is no longer where it would lie in an array: so many collisions are in
+/// none of the inner caches.
+const NEARBY: usize = 4096;
+
+/// Every so many entries one is looked at to find out.
+const SAMPLED: usize = 64;
+
+/// Those of a range, as many as there are.
+#[inline(always)]
+fn part<T>(all: &[T], range: Range<usize>) -> &[T] {
+    let until = range.end.min(all.len());
+    all.get(range.start..until).unwrap_or_default()
+}
+
+/// [`Structures::Array`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InArray<'a>(pub(crate) &'a [Collision]);
+
+impl<'a> Lying<'a> for InArray<'a> {
+    #[inline(always)]
+    fn len(self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
+        self.0.split_arrays::<N>().0.get(nth).map(<[_; N]>::each_ref)
+    }
+
+    #[inline(always)]
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
+        let these = self.some(nth)?;
+        // Beyond the end, too: that is memory of somebody else's, which stays as it is.
+        soon_with_those_behind::<N, _>(self.0, nth * N + SOON_IN_ARRAY);
+        Some(Next { these, soon: None })
+    }
+
+    #[inline(always)]
+    fn part(self, range: Range<usize>) -> Self {
+        Self(part(self.0, range))
+    }
+}
+
+/// [`Structures::Ordered`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InOrder<'a> {
+    all: &'a [Collision],
+    /// Places of these, and of what is behind them.
+    order: &'a [u32],
+    /// How many these are.
+    count: usize,
+}
+
+impl<'a> InOrder<'a> {
+    /// Those at all places of an order.
+    pub(crate) fn new(all: &'a [Collision], order: &'a [u32]) -> Self {
+        Self { all, order, count: order.len() }
+    }
+
+    /// That at a place; one without contact points beyond the end.
+    #[inline(always)]
+    fn at(self, place: u32) -> &'a Collision {
+        match self.all.get(place as usize) {
+            Some(collision) => collision,
+            None => {
+                // As in `Ends::get`.
+                pgs_support::cold_path();
+                &Collision::NOTHING
+            }
+        }
+    }
+
+    /// Has those fetched whose turn it is `soon` entries behind the `nth` so many; the places of these and of all
+    /// up to there. None if there are fewer.
+    #[inline(always)]
+    fn fetch_behind<const N: usize>(self, nth: usize, soon: usize) -> Option<&'a [u32]> {
+        let places = self.order.get(nth * N..)?.get(..soon + N)?;
+        for place in &places[soon..] {
+            soon_alone(self.all, *place as usize);
+        }
+        Some(places)
+    }
+
+    /// The `nth` so many, behind which there are too few for anything to be fetched.
+    #[inline(always)]
+    fn last<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
+        Some(self.those(self.order.get(nth * N..)?.first_chunk()?))
+    }
+
+    /// Those at these places.
+    #[inline(always)]
+    fn those<const N: usize>(self, places: &[u32; N]) -> [&'a Collision; N] {
+        let mut those = [&Collision::NOTHING; N];
+        for (to, place) in those.iter_mut().zip(places) {
+            *to = self.at(*place);
+        }
+        those
+    }
+}
+
+impl<'a> Lying<'a> for InOrder<'a> {
+    #[inline(always)]
+    fn len(self) -> usize {
+        self.count
+    }
+
+    #[inline(always)]
+    fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
+        let places = self.order.get(..self.count)?.split_arrays::<N>().0.get(nth)?;
+        Some(self.those(places))
+    }
+
+    #[inline(always)]
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
+        // It is looked at once how many there are, for all of them.
+        let Some(places) = self.fetch_behind::<N>(nth, SOON) else {
+            return Some(Next { these: self.last(nth)?, soon: None });
+        };
+        let soon = places[BODIES_SOON..].first_chunk().map(|places| self.those(places));
+        Some(Next { these: self.those(places.first_chunk()?), soon })
+    }
+
+    #[inline(always)]
+    fn part(self, range: Range<usize>) -> Self {
+        let count = range.end.min(self.count).saturating_sub(range.start);
+        Self { order: self.order.get(range.start..).unwrap_or_default(), count, ..self }
+    }
+}
+
+/// [`Structures::Ordered`], where each lies about where it would in an array.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InNearbyOrder<'a> {
+    order: InOrder<'a>,
+    /// The index of the first of these.
+    first: usize,
+}
+
+impl<'a> InOrder<'a> {
+    /// The same, if nearly all of these lie about where they would in an array; entry `first` is the first
+    /// of them. Those that are not there lie nowhere.
+    pub(crate) fn nearby(self, first: usize) -> Option<InNearbyOrder<'a>> {
+        let order = self.order.get(..self.count)?;
+        let sampled = (first..).step_by(SAMPLED).zip(order.iter().step_by(SAMPLED));
+        let (mut near, mut far) = (0, 0);
+        for (entry, place) in sampled {
+            let place = *place as usize;
+            match entry.abs_diff(place) < NEARBY {
+                true => near += 1,
+                false => far += usize::from(place < self.all.len()),
+            }
+        }
+        (near > 15 * far).then_some(InNearbyOrder { order: self, first })
+    }
+}
+
+impl<'a> Lying<'a> for InNearbyOrder<'a> {
+    #[inline(always)]
+    fn len(self) -> usize {
+        self.order.len()
+    }
+
+    #[inline(always)]
+    fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
+        self.order.some(nth)
+    }
+
+    #[inline(always)]
+    fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
+        let Self { order, first } = self;
+        later_with_those_behind::<N, _>(order.all, first + nth * N + NEARBY_LATER);
+        let Some(places) = order.fetch_behind::<N>(nth, NEARBY_SOON) else {
+            return Some(Next { these: order.last(nth)?, soon: None });
+        };
+        Some(Next { these: order.those(places.first_chunk()?), soon: None })
+    }
+
+    #[inline(always)]
+    fn part(self, range: Range<usize>) -> Self {
+        let first = self.first + range.start;
+        Self { order: self.order.part(range), first }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// So many collisions, which name their place.
+    fn collisions(count: u32) -> Vec<Collision> {
+        (0..count).map(|body_a| Collision { body_a, ..Collision::NOTHING }).collect()
+    }
+
+    fn names<'a>(some: impl IntoIterator<Item = &'a Collision>) -> Vec<u32> {
+        some.into_iter().map(|collision| collision.body_a).collect()
+    }
+
+    /// A part ends where it says, also if there is more behind it.
+    fn parts_are_as_long_as_they_say<'a>(all: impl Lying<'a>, expected: &[u32]) {
+        let whole = all.part(10..90).part(15..200);
+        assert_eq!(names(whole.iter()), expected[25..90]);
+        for range in [0..0, 0..7, 30..60, 60..100, 95..130, 100..101, 200..230] {
+            let part = all.part(range.clone());
+            let there = super::part(expected, range);
+            assert_eq!((part.len(), names(part.iter())), (there.len(), there.to_vec()));
+            assert!(part.some::<2>(there.len() / 2).is_none());
+            for (nth, pair) in there.split_arrays::<2>().0.iter().enumerate() {
+                let next = part.next::<2>(nth).expect("as many");
+                assert_eq!(names(next.these), pair);
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_is_as_long_as_it_says() {
+        let all = collisions(100);
+        let in_turn: Vec<u32> = (0..100).collect();
+        parts_are_as_long_as_they_say(InArray(&all), &in_turn);
+        // Backwards, with one that is not there.
+        let mut order: Vec<u32> = in_turn.into_iter().rev().collect();
+        order[40] = u32::MAX;
+        let mut expected = order.clone();
+        expected[40] = Collision::NOTHING.body_a;
+        parts_are_as_long_as_they_say(InOrder::new(&all, &order), &expected);
+        let near = InOrder::new(&all, &order).nearby(0).expect("a hundred lie near each other");
+        parts_are_as_long_as_they_say(near, &expected);
+        // What is fetched goes by the entry.
+        let part = near.part(10..90).part(15..200);
+        assert_eq!(part.first, 25);
+        assert!(part.next::<2>(3).expect("as many").soon.is_none());
+    }
+
+    #[test]
+    fn an_order_is_nearby_where_nearly_all_of_it_lies_about_where_it_would() {
+        let all = collisions(100_000);
+        let in_turn: Vec<u32> = (0..100_000).collect();
+        let nearby = |order: &[u32], range: Range<usize>| {
+            let first = range.start;
+            InOrder::new(&all, order).part(range).nearby(first).is_some()
+        };
+        assert!(nearby(&in_turn, 0..100_000) && nearby(&in_turn, 90_000..100_000));
+        // Swapped in pairs, and with some that are not there.
+        let mut swapped: Vec<u32> = in_turn.iter().map(|place| place ^ 1).collect();
+        swapped.iter_mut().step_by(3).for_each(|place| *place = u32::MAX);
+        assert!(nearby(&swapped, 0..100_000));
+        let backwards: Vec<u32> = in_turn.iter().rev().copied().collect();
+        assert!(!nearby(&backwards, 0..100_000) && !nearby(&backwards, 0..10_000));
+        assert!(nearby(&backwards, 49_000..51_000));
+        // A tenth lies elsewhere.
+        let mut scattered = in_turn.clone();
+        scattered.iter_mut().step_by(10).for_each(|place| *place = 99_999 - *place);
+        assert!(!nearby(&scattered, 0..40_000));
+        assert!(!nearby(&[], 0..0));
+    }
+
+    #[test]
+    fn those_whose_bodies_are_fetched_are_a_little_behind() {
+        let all = collisions(100);
+        let order: Vec<u32> = (0..100).rev().collect();
+        let part = InOrder::new(&all, &order).part(30..60);
+        let soon = |nth| part.next::<2>(nth).expect("as many").soon.map(names);
+        // Entries 30 + 15 and the next; beyond the part, too.
+        assert_eq!(soon(0), Some(vec![54, 53]));
+        assert_eq!(soon(14), Some(vec![26, 25]));
+        // Of the last none are.
+        let last = InOrder::new(&all, &order).part(90..100);
+        assert!(last.next::<2>(0).expect("as many").soon.is_none());
+        assert!(InArray(&all).next::<2>(0).expect("as many").soon.is_none());
+    }
+}

@@ -1,0 +1,259 @@
+//! This file deals the records of a segment out to its channels.
+//!
+//! They go by units ([`unit`](mod@unit)), from registers, and beat by beat what is left at a segment's end, or has
+//! a stripe that no profile has: in whole beats, on each channel upwards, as memory that combines
+//! writes wants them. Nothing is read back: the sum that the accelerator is checked with is taken on
+//! the way.
+
+use std::mem;
+
+use pgs_interface::record::Beat;
+
+use super::pattern::Pattern;
+use super::unrolled;
+use crate::beat::format::{Beats, Format, Records, in_format};
+use crate::beat::stripe::{Deal, Layout};
+use crate::beat::unpack::results::total;
+use crate::record::sixteen::Sixteen;
+use crate::record::{Row, Rows};
+use crate::simd::{Lanes, Vectors};
+
+/// Records of a block. Divisible by the records of a group of every stripe, so that each block
+/// begins with a group; and so few that those of a block and those fetched meanwhile lie in the innermost
+/// cache.
+pub(crate) const BLOCK: usize = 30;
+
+/// Records of many blocks: so many that beginning one costs next to nothing a record.
+pub(crate) const MANY: usize = 32 * BLOCK;
+
+/// Collisions in an array that are looked at together: as many as lie in the innermost cache, should they be
+/// looked at again.
+pub(crate) const CHECKED: usize = 4 * BLOCK;
+
+/// Bodies of a block, as [`BLOCK`]: more, as they are small and lie one behind the other.
+pub(crate) const BODIES: usize = 120;
+const _: () = assert!(BODIES.is_multiple_of(BLOCK), "so that each begins with a group");
+
+/// Writes the records of one segment.
+pub(crate) struct Dealer<'a, 'b> {
+    /// What is not written yet.
+    channels: &'a mut [&'b mut [Beat]],
+    format: Option<Sixteen>,
+    /// The stripe, if it is known, and its first channel.
+    pattern: Option<(Pattern, usize)>,
+    deal: Deal,
+    padded: bool,
+    sum: Lanes,
+}
+
+impl<'a, 'b> Dealer<'a, 'b> {
+    /// From the first record on.
+    ///
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+    pub(crate) fn new(layout: &Layout, channels: &'a mut [&'b mut [Beat]]) -> Self {
+        Self {
+            channels,
+            format: Sixteen::of(layout.format),
+            pattern: Pattern::of(layout.stripe.streams),
+            deal: Deal::new(layout.stripe),
+            padded: layout.stripe.padded,
+            sum: Lanes::all(0),
+        }
+    }
+
+    /// Writes the next records; only the last block may be one that is not whole.
+    #[inline(always)]
+    pub(crate) fn write<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
+        &mut self,
+        vectors: V,
+        records: &mut R,
+    ) {
+        in_format!(self.format, F => self.write_as::<V, F, R, ROWS>(vectors, records));
+    }
+
+    /// The format in which they are written, if its words have sixteen bits.
+    #[inline(always)]
+    pub(crate) const fn format(&self) -> Option<Sixteen> {
+        self.format
+    }
+
+    /// As [`Self::write`], in this format, which is [`Self::format`].
+    #[inline(always)]
+    pub(crate) fn write_as<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
+        &mut self,
+        vectors: V,
+        records: &mut R,
+    ) {
+        debug_assert_eq!(F::SIXTEEN, self.format, "the words are those of the stream");
+        let mut sum = self.sum;
+        let done = match self.pattern {
+            Some((pattern, first)) if self.deal.at_end_of_group() => {
+                let rest = self.channels.get_mut(first..).unwrap_or_default();
+                unrolled::write::<V, F, R, ROWS>(pattern, vectors, records, rest, &mut sum)
+            }
+            _ => 0,
+        };
+        self.sum = sum;
+        // What is left of them fills no unit.
+        let mut rest = Rest { dealer: self, beats: Beats::<V, F>::new(vectors) };
+        for at in done..records.len() {
+            if records.some::<1>(at, &mut rest).is_none() {
+                break;
+            }
+        }
+        let Rest { dealer, beats } = rest;
+        if let Some(beat) = beats.last() {
+            dealer.put(beat);
+        }
+    }
+
+    /// Writes the next beat. Where it becomes a part of the loops of units these are in want of registers.
+    #[inline(never)]
+    fn put(&mut self, beat: Beat) {
+        let channel = self.deal.next();
+        let (to, behind) = mem::take(&mut self.channels[channel]).split_at_mut(1);
+        to[0] = beat;
+        self.channels[channel] = behind;
+        self.sum = self.sum.plus(beat.into());
+    }
+
+    /// Fills the last group if the stripe says so; the sum of all words, modulo 2^32.
+    #[inline(always)]
+    pub(crate) fn finish(mut self) -> u32 {
+        while self.padded && !self.deal.at_end_of_group() {
+            self.put(Beat::default());
+        }
+        total(self.sum)
+    }
+}
+
+/// Where rows go whose beats are written one by one.
+struct Rest<'d, 'a, 'b, V, F> {
+    dealer: &'d mut Dealer<'a, 'b>,
+    beats: Beats<V, F>,
+}
+
+impl<V: Vectors, F: Format> Rows for Rest<'_, '_, '_, V, F> {
+    #[inline(always)]
+    fn row(&mut self, row: Row) {
+        if let Some(beat) = self.beats.with(row) {
+            self.dealer.put(beat);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pgs_interface::number::StreamFormat;
+    use pgs_interface::record::LANES;
+    use pgs_interface::stripe::Stripe;
+    use pgs_support::chunks::Chunks;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::beat::stripe::Place;
+    use crate::record::Record;
+    use crate::simd::{Integer, Work, in_wide_vectors};
+
+    const ROWS: usize = 3;
+
+    /// Records of three rows, whose first word is an integer.
+    #[derive(Clone, Copy)]
+    struct Made<'a>(&'a [[[u32; LANES]; ROWS]]);
+
+    impl Records<ROWS> for Made<'_> {
+        #[inline(always)]
+        fn len(&self) -> usize {
+            self.0.len()
+        }
+
+        #[inline(always)]
+        fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
+            for record in self.0.split_arrays::<N>().0.get(nth)? {
+                let mut record = Record::from(record.map(Lanes::new));
+                record.integers[0] = Some(Integer::new::<{ LANES - 1 }>(record.rows[0]));
+                record.give(to);
+            }
+            Some(())
+        }
+    }
+
+    struct Dealing<'p, 'a, 'b>(&'p mut Dealer<'a, 'b>, Made<'p>);
+
+    impl Work for Dealing<'_, '_, '_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<V: Vectors>(mut self, vectors: V) {
+            self.0.write(vectors, &mut self.1);
+        }
+    }
+
+    proptest! {
+        /// Of stripes that no profile has, and of some that one has.
+        #[test]
+        fn every_beat_goes_where_the_definition_says(
+            records in prop::collection::vec(prop::array::uniform3(any::<[u32; LANES]>()), 0..100),
+            streams in prop::sample::select(vec![
+                &[1, 0][..], &[0, 1, 1], &[3, 2, 1, 0, 0, 1], &[0, 0, 0, 1, 1, 1, 2], &[2], &[0, 1],
+            ]),
+            padded in any::<bool>(),
+            format in prop::sample::select(vec![
+                StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16,
+            ]),
+        ) {
+            let layout = Layout { rows: ROWS, format, stripe: Stripe { streams, padded } };
+            // Full of ones, so that a beat left out is seen.
+            let mut segments: Vec<Vec<Beat>> = (0..4)
+                .map(|channel| vec![Beat([u32::MAX; LANES]); layout.beats_on_channel(records.len(), channel)])
+                .collect();
+            let mut channels: Vec<&mut [Beat]> = segments.iter_mut().map(Vec::as_mut_slice).collect();
+            let mut dealer = Dealer::new(&layout, &mut channels);
+            for block in records.chunks(BLOCK) {
+                in_wide_vectors(Dealing(&mut dealer, Made(block)));
+            }
+            let sum = dealer.finish();
+
+            // Row by row, with the conversion of one row alone.
+            let rows: Vec<[u32; LANES]> = records.iter().flatten().copied().collect();
+            let mut beats = vec![Beat::default(); layout.beats(records.len())];
+            for (at, row) in rows.iter().enumerate() {
+                match Sixteen::of(format) {
+                    None => beats[at] = Beat(*row),
+                    Some(sixteen) => {
+                        let integer = at % ROWS == 0;
+                        let row = narrowed(sixteen, *row, integer).map(u32::from);
+                        let to = &mut beats[at / 2].0[at % 2 * 2..][..2];
+                        to.copy_from_slice(&[row[0] | row[1] << 16, row[2] | row[3] << 16]);
+                    }
+                }
+            }
+            let mut expected: Vec<Vec<Beat>> =
+                segments.iter().map(|segment| vec![Beat::default(); segment.len()]).collect();
+            for (at, beat) in beats.iter().enumerate() {
+                let Place { channel, slot } = layout.place(at);
+                expected[channel][slot] = *beat;
+            }
+            prop_assert_eq!(&segments, &expected);
+            let words = expected.iter().flatten().flat_map(|beat| beat.0);
+            prop_assert_eq!(sum, words.fold(0, u32::wrapping_add));
+        }
+    }
+
+    fn narrowed(format: Sixteen, row: [u32; LANES], integer: bool) -> [u16; LANES] {
+        struct One(Sixteen, [u32; LANES], bool);
+        impl Work for One {
+            type Output = [u16; LANES];
+
+            #[inline(always)]
+            fn run<V: Vectors>(self, vectors: V) -> [u16; LANES] {
+                let Self(format, row, integer) = self;
+                let numbers = Lanes::new(row);
+                let integer = integer.then(|| Integer::new::<{ LANES - 1 }>(numbers));
+                let [narrow, _] = format.narrow(vectors, [Row { numbers, integer }, Row::zero()]);
+                narrow
+            }
+        }
+        in_wide_vectors(One(format, row, integer))
+    }
+}

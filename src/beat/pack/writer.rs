@@ -1,0 +1,211 @@
+//! This file writes collisions into the channels' buffers as a caller finds them, one after the
+//! other.
+
+use std::fmt;
+
+use pgs_interface::record::Beat;
+use pgs_support::float_env::standard;
+
+use super::collisions::{CollisionPacker, Marks};
+use super::source::InArray;
+use super::stripe_writer::BLOCK;
+use super::target::Target;
+use crate::record::body_table::Ends;
+use crate::scene::Collision;
+use crate::validate::InputError;
+use crate::validate::{Block, Quick};
+
+/// Takes the collisions of a step straight into the memory that the board reads.
+///
+/// A few of them lie in the cache until their records are made; no copy of the others is kept.
+pub struct Writer<'a> {
+    quick: Option<&'a Quick<'a>>,
+    ends: Ends<'a>,
+    packer: CollisionPacker<'a, 'a>,
+    /// Collisions whose records are not made yet.
+    block: [Collision; BLOCK],
+    held: usize,
+    room: usize,
+    refused: Option<InputError>,
+}
+
+impl fmt::Debug for Writer<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { room, refused, .. } = self;
+        f.debug_struct("Writer")
+            .field("len", &self.len())
+            .field("room", room)
+            .field("refused", refused)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Writer<'a> {
+    /// From the first collision on, with room for so many.
+    ///
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel)
+    /// says for `room`.
+    pub(crate) fn new(
+        target: Target<'a>,
+        ends: Ends<'a>,
+        room: usize,
+        channels: &'a mut [&'a mut [Beat]],
+    ) -> Self {
+        let marks = Marks { scheduled: false, words: None };
+        Self {
+            quick: target.quick,
+            ends,
+            packer: CollisionPacker::new(target, ends, marks, 0, channels),
+            block: [Collision::NOTHING; BLOCK],
+            held: 0,
+            room,
+            refused: None,
+        }
+    }
+
+    /// Writes the next collision. Its index is that of [`Self::len`] before.
+    ///
+    /// Whether it is right is looked at a little later: what is wrong with one is said when all are
+    /// written, and what comes after it is left out ([`Self::is_refused`]): the length stands still.
+    /// Whatever the caller's floating-point environment is, the records are the same.
+    #[inline]
+    pub fn push(&mut self, collision: &Collision) {
+        if self.is_refused() {
+            return;
+        }
+        if self.len() == self.room {
+            self.overfull();
+            return;
+        }
+        self.block[self.held] = *collision;
+        self.held += 1;
+        if self.held == BLOCK {
+            self.flush();
+        }
+    }
+
+    /// Number of collisions written so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.packer.next() + self.held
+    }
+
+    /// Whether there are none so far.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether a collision was found to be wrong: the step is refused, whatever is written after it.
+    #[must_use]
+    pub fn is_refused(&self) -> bool {
+        self.refused.is_some()
+    }
+
+    #[cold]
+    fn overfull(&mut self) {
+        // What was wrong before is said first.
+        self.flush();
+        self.refused.get_or_insert(InputError::MoreThanAnnounced { announced: self.room });
+    }
+
+    /// Makes the records of what is held: all that a writer computes, called from the caller's narrow phase.
+    fn flush(&mut self) {
+        standard(|| self.make_records());
+    }
+
+    fn make_records(&mut self) {
+        let count = std::mem::take(&mut self.held);
+        if count == 0 {
+            return;
+        }
+        let (first, collisions) = (self.packer.next(), InArray(&self.block[..count]));
+        if !self.packer.write(collisions).good {
+            let ends = self.ends;
+            let block = Block { first, collisions, ends, scheduled: false };
+            let found = self.quick.and_then(|quick| quick.refusal(&block).err());
+            // What was not written is never sent.
+            self.refused = Some(found.unwrap_or(InputError::Unsteady));
+        }
+    }
+
+    /// Ends the segment; the sum of the words written, modulo 2^32, and how many collisions there are.
+    ///
+    /// # Errors
+    /// What validation refuses of the first collision that is wrong;
+    /// [`InputError::MoreThanAnnounced`]; [`InputError::Unsteady`] of what was not written although nothing is
+    /// wrong with it, which the driver's limits on bodies rule out.
+    pub(crate) fn finish(mut self) -> Result<(u32, usize), InputError> {
+        self.flush();
+        match self.refused {
+            Some(refused) => Err(refused),
+            None => {
+                let written = self.packer.next();
+                Ok((self.packer.finish(), written))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable as _;
+
+    use super::super::bodies::survey;
+    use super::*;
+    use crate::beat::pack::pool::Packers;
+    use crate::beat::stripe::Segment;
+    use crate::record::body_table::{Survey, Table};
+    use crate::scene::{Body, Contact, Shape, StepParameters};
+    use crate::validate::{Limits, preflight};
+    use pgs_interface::profile::HALF;
+
+    /// The driver's limits on bodies rule it out; that such a step is refused does not rest on them.
+    #[test]
+    fn what_is_not_written_is_refused() {
+        let shapes = [Shape::isotropic(1.0, 1.0)];
+        let mut body = Body::zeroed();
+        body.pose.orientation = [0.0, 0.0, 0.0, 1.0];
+        let collision = Collision {
+            body_a: 0,
+            body_b: 1,
+            normal: [0.0, 1.0, 0.0],
+            count: 1,
+            contacts: [Contact::default(); 4],
+        };
+        let variant = HALF.default_variant();
+        for (count, fits) in [(1 << 16, true), ((1 << 16) + 1, false)] {
+            let bodies = vec![body; count];
+            let limits = Limits {
+                variant,
+                flush_subnormals: false,
+                body_capacity: u32::MAX,
+                collision_capacity: u32::MAX,
+                shape_capacity: u32::MAX,
+                memory_bytes: u32::MAX,
+                bytes_per_body: 1,
+                bytes_per_collision: 1,
+            };
+            let list = vec![collision; BLOCK];
+            let parameters = StepParameters::default();
+            let scene = preflight(&bodies, &list, &shapes, &parameters, &limits);
+            let quick = Quick::new(scene.expect("limits that rule nothing out"));
+            for quick in [None, Some(&quick)] {
+                let target = Target { variant: &variant, shapes: &shapes, quick };
+                let (mut ends, mut statics) = (Table::default(), Vec::new());
+                let into = Survey { ends: &mut ends, statics: &mut statics };
+                assert!(survey(target, &bodies, count, into, &mut Packers::alone()));
+                let layout = Segment::Collisions.layout(&variant);
+                let mut buffers: [Vec<Beat>; 3] = std::array::from_fn(|channel| {
+                    vec![Beat::default(); layout.beats_on_channel(BLOCK, channel)]
+                });
+                let mut views = buffers.each_mut().map(Vec::as_mut_slice);
+                let mut writer = Writer::new(target, ends.ends(), BLOCK, &mut views);
+                list.iter().for_each(|collision| writer.push(collision));
+                let finished = writer.finish();
+                let expected = if fits { Ok(BLOCK) } else { Err(InputError::Unsteady) };
+                assert_eq!(finished.map(|(_, written)| written), expected, "{count}");
+            }
+        }
+    }
+}

@@ -1,0 +1,385 @@
+//! This file reads the results out of the channels' beats.
+//!
+//! The memory may be slow to read, so each beat is read once, and what is to be known of it is found out
+//! on the way. They come by units ([`collect`]), and beat by beat what is left at a segment's end, or has
+//! a stripe that no profile has.
+
+use pgs_interface::record::{Beat, result};
+
+use super::stripe_reader::{self, Tally};
+use crate::beat::format::{Format, in_format};
+use crate::beat::pack::pattern::Pattern;
+use crate::beat::pack::pool::{Packers, PieceRead, Pieces, whole_read};
+pub(crate) use crate::beat::pack::stripe_writer::BLOCK;
+use crate::beat::stripe::{Deal, Layout};
+use crate::record::finite::Finite;
+use crate::record::result::Record;
+use crate::record::sixteen::Sixteen;
+use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
+
+/// Reads the results of all these records from the result segments, one a channel, on several threads where
+/// they are many; the sum as [`Reader::finish`] gives it, and whether all their numbers are finite.
+///
+/// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+pub(crate) fn read_all(
+    layout: &Layout,
+    channels: &[&[Beat]],
+    records: &mut [Record],
+    packers: &mut Packers,
+) -> (u32, bool) {
+    let (mut sum, mut all_finite) = (0_u32, true);
+    let count = records.len();
+    let cut = |size| {
+        let (mut pieces, all) = (Pieces::new(layout, size, whole_read(channels)), records);
+        all.chunks_mut(size).map(move |records| (records, pieces.cut()))
+    };
+    let work = |(records, piece): (&mut [Record], PieceRead<'_>)| {
+        let mut reader = Reader::new(layout, &piece);
+        let finite = reader.read(records);
+        (reader.finish(), finite)
+    };
+    packers.each(count, cut, work, |(of_range, finite)| {
+        sum = sum.wrapping_add(of_range);
+        all_finite &= finite;
+    });
+    (sum, all_finite)
+}
+
+/// Reads results from the result segments, one a channel.
+///
+/// A number that the accelerator could not hold is not finite.
+pub(crate) struct Reader<'a> {
+    /// What is not read yet.
+    channels: PieceRead<'a>,
+    format: Option<Sixteen>,
+    /// The stripe, if it is known, and its first channel.
+    pattern: Option<(Pattern, usize)>,
+    deal: Deal,
+    sum: Lanes,
+}
+
+impl<'a> Reader<'a> {
+    /// From the first record on.
+    ///
+    /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
+    pub(crate) fn new(layout: &Layout, channels: &[&'a [Beat]]) -> Self {
+        Self {
+            channels: whole_read(channels),
+            format: Sixteen::of(layout.format),
+            pattern: Pattern::of(layout.stripe.streams),
+            deal: Deal::new(layout.stripe),
+            sum: Lanes::all(0),
+        }
+    }
+
+    /// Reads the next records. Whether all their numbers are finite.
+    pub(crate) fn read(&mut self, records: &mut [Record]) -> bool {
+        in_wide_vectors(Reading { reader: self, records })
+    }
+
+    #[inline(always)]
+    fn read_as<V: Vectors, F: Format>(&mut self, vectors: V, records: &mut [Record]) -> bool {
+        let mut tally = Tally { sum: self.sum, finite: Finite::new() };
+        let done = match self.pattern {
+            Some((pattern, first)) if self.deal.at_end_of_group() => {
+                let rest = self.channels.get_mut(first..).unwrap_or_default();
+                stripe_reader::read::<V, F>(pattern, vectors, rest, records, &mut tally)
+            }
+            _ => 0,
+        };
+        // What is left of them fills no unit.
+        for record in records.iter_mut().skip(done) {
+            let mut beats = [Beat::default(); result::ROWS];
+            let beats = &mut beats[..result::ROWS / F::PER_BEAT];
+            for beat in &mut *beats {
+                *beat = self.take();
+            }
+            *record = tally.record::<V, F>(vectors, beats);
+        }
+        self.sum = tally.sum;
+        tally.finite.all()
+    }
+
+    /// The next beat.
+    fn take(&mut self) -> Beat {
+        let channel = &mut self.channels[self.deal.next()];
+        let (beat, behind) = channel.split_at(1);
+        *channel = behind;
+        beat[0]
+    }
+
+    /// The sum of all 32-bit words of the segments, modulo 2^32, of those that fill the last group too:
+    /// what the accelerator counts of what it sent.
+    pub(crate) fn finish(self) -> u32 {
+        total(self.channels.iter().copied().flatten().fold(self.sum, plus))
+    }
+}
+
+/// Reading of records, which is compiled for the vectors of this processor.
+struct Reading<'r, 'a> {
+    reader: &'r mut Reader<'a>,
+    records: &'r mut [Record],
+}
+
+impl Work for Reading<'_, '_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) -> bool {
+        let Self { reader, records } = self;
+        in_format!(reader.format, F => reader.read_as::<V, F>(vectors, records))
+    }
+}
+
+/// Sum of all 32-bit words, modulo 2^32.
+pub(crate) fn sum_of_words(beats: &[Beat]) -> u32 {
+    total(beats.iter().fold(Lanes::all(0), plus))
+}
+
+/// Word by word, modulo 2^32.
+fn plus(sum: Lanes, beat: &Beat) -> Lanes {
+    sum.plus((*beat).into())
+}
+
+/// The lanes' sums in one.
+pub(crate) fn total(sum: Lanes) -> u32 {
+    sum.words().into_iter().fold(0, u32::wrapping_add)
+}
+
+#[cfg(test)]
+mod tests {
+    use pgs_interface::address_map::DMA_COUNT_MAX;
+    use pgs_interface::record::LANES;
+    use pgs_interface::stripe::Stripe;
+    use pgs_support::chunks::Chunks;
+
+    use super::*;
+    use crate::beat::stripe::{Place, Segment};
+    use crate::record::finite::finite;
+    use crate::record::result::decode;
+    use crate::scene::{Pose, Velocity};
+    use pgs_interface::number::{Numbers, StreamFormat};
+    use pgs_interface::profile::{HALF, PROFILES, Variant};
+    use proptest::prelude::*;
+
+    /// Everything that is read, and the sum.
+    fn read(layout: &Layout, channels: &[&[Beat]], count: usize) -> (Vec<(Pose, Velocity)>, u32) {
+        let mut reader = Reader::new(layout, channels);
+        let mut records = vec![Record::default(); count];
+        assert_eq!(reader.read(&mut records), records.iter().all(finite));
+        (records.iter().map(decode).collect(), reader.finish())
+    }
+
+    /// Word by word, in 64 bits.
+    fn sum_of(segments: &[Vec<Beat>]) -> u32 {
+        let words = segments.iter().flatten().flat_map(|beat| beat.0);
+        let sum: u64 = words.map(u64::from).sum();
+        u32::try_from(sum & 0xFFFF_FFFF).expect("32 bits")
+    }
+
+    #[test]
+    fn the_sum_wraps_and_holds_the_padding() {
+        let layout = Segment::Results.layout(&HALF.default_variant());
+        // A body fills two beats of five.
+        let segments = [
+            vec![Beat([1, 2, 3, 4]), Beat([10, 20, 30, 40])],
+            vec![Beat([u32::MAX, 0, 0, 0]), Beat([0, 0, 0, 3])],
+            vec![Beat([100; 4])],
+        ];
+        let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
+        assert_eq!(read(&layout, &views, 1).1, 110 + 2 + 400);
+        assert_eq!(read(&layout, &[&[], &[], &[]], 0).1, 0);
+    }
+
+    /// In a unit of each profile and behind the last.
+    #[test]
+    fn what_is_not_finite_is_found_wherever_it_is_and_nothing_else_is() {
+        const COUNT: usize = 7;
+        for profile in PROFILES.iter().filter(|profile| profile.numbers.poses == StreamFormat::F32)
+        {
+            let layout = Segment::Results.layout(&profile.default_variant());
+            let good = |at: usize, value: f32| {
+                let mut segments = vec![Vec::new(); profile.s2mm_widths.len()];
+                for beat in 0..layout.beats(COUNT) {
+                    let numbers = [f32::MAX, f32::MIN, -0.0, f32::from_bits(1)];
+                    let mut beats = [Beat(numbers.map(f32::to_bits))];
+                    if beat == at / LANES {
+                        beats[0].0[at % LANES] = value.to_bits();
+                    }
+                    segments[layout.place(beat).channel].extend(beats);
+                }
+                let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
+                Reader::new(&layout, &views).read(&mut [Record::default(); COUNT])
+            };
+            for at in 0..COUNT * result::ROWS * LANES {
+                let beside = [3, 11, 15].contains(&(at % 16));
+                for value in [f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -f32::NAN] {
+                    assert_eq!(good(at, value), beside, "{} {value} {at}", profile.name);
+                }
+                assert!(good(at, f32::MIN));
+            }
+        }
+    }
+
+    /// So many others stand beside the one that all of a block but it are finite.
+    #[test]
+    fn what_is_not_finite_in_sixteen_bits_is_found_wherever_it_is_and_nothing_else_is() {
+        for poses in [StreamFormat::Binary16, StreamFormat::Thesis16] {
+            let numbers = Numbers { poses, ..HALF.numbers };
+            let layout = Segment::Results.layout(&Variant { numbers, ..HALF.default_variant() });
+            let good = |at: usize, word: u16| {
+                let largest = 0x7BFF_7BFF;
+                // Three records fill six beats of ten: 0 0 1 1 2, 0.
+                let mut beats = [Beat([largest; 4]); 6];
+                let half = &mut bytemuck::cast_slice_mut::<_, u16>(&mut beats)[16 + at];
+                *half = word;
+                let [a, b, c, d, e, f] = beats;
+                let channels = [[a, b, f], [c, d, Beat::default()], [e; 3]];
+                let views = [&channels[0][..], &channels[1][..2], &channels[2][..1]];
+                let mut records = [Record::default(); 3];
+                Reader::new(&layout, &views).read(&mut records)
+            };
+            assert!(good(0, 0x7BFF) && good(0, 0xFBFF));
+            for word in [0x7C00, 0xFC00, 0x7C01, 0x7FFF, 0xFFFF] {
+                for at in 0..16 {
+                    let beside = [3, 11, 15].contains(&at);
+                    assert_eq!(good(at, word), beside, "{poses:?} {word:#x} {at}");
+                }
+            }
+        }
+    }
+
+    /// Numbers of a record in the order of its rows.
+    fn numbers(pose: Pose, velocity: Velocity) -> Vec<u32> {
+        let Velocity { linear, angular } = velocity;
+        let rows = [&pose.position[..], &pose.orientation, &linear, &angular];
+        rows.concat().into_iter().map(f32::to_bits).collect()
+    }
+
+    /// The number of a word, as the bits of an f32.
+    fn number(format: Sixteen, word: u16) -> u32 {
+        let (sign, f, m) = (u32::from(word >> 15) << 31, word >> 10 & 31, word & 1023);
+        let (exponent, fraction) = (i32::from(f) - 15, f32::from(m) / 1024.0);
+        let thesis = format == Sixteen::Thesis16;
+        let magnitude = match (f, m) {
+            // A NaN keeps its bits and is quiet.
+            (31, 1..) if !thesis => return sign | 0x7FC0_0000 | u32::from(m) << 13,
+            (31, _) => f32::INFINITY,
+            (0, _) if !thesis => fraction * 2.0_f32.powi(-14),
+            _ => (1.0 + fraction) * 2.0_f32.powi(exponent),
+        };
+        sign | magnitude.to_bits()
+    }
+
+    /// Those of the sixteen words of a record that are numbers.
+    fn of_words<T: Copy>(words: &[T]) -> Vec<T> {
+        [&words[0..3], &words[4..8], &words[8..11], &words[12..15]].concat()
+    }
+
+    proptest! {
+        /// The beats are laid out as the record table and the stripe say, without `place`.
+        #[test]
+        fn every_f32_result_comes_back_bit_for_bit(
+            words in prop::collection::vec(any::<[u32; 16]>(), 0..100),
+            profile in prop::sample::select(PROFILES.to_vec()),
+        ) {
+            prop_assume!(profile.numbers.poses == StreamFormat::F32);
+            let group = profile.stripes.results.streams;
+            let mut segments = vec![Vec::new(); profile.s2mm_widths.len()];
+            for (index, lanes) in words.iter().flat_map(|record| record.chunks(4)).enumerate() {
+                let stream = usize::from(group[index % group.len()]);
+                segments[stream].push(Beat([lanes[0], lanes[1], lanes[2], lanes[3]]));
+            }
+            let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
+            let layout = Segment::Results.layout(&profile.default_variant());
+            let (states, sum) = read(&layout, &views, words.len());
+            prop_assert_eq!(sum, sum_of(&segments));
+            for (expected, (pose, velocity)) in words.iter().zip(states) {
+                prop_assert_eq!(numbers(pose, velocity), of_words(expected));
+            }
+        }
+
+        #[test]
+        fn every_sixteen_bit_result_comes_back_as_its_number(
+            words in prop::collection::vec(any::<[u16; 16]>(), 0..100),
+            thesis in any::<bool>(),
+        ) {
+            // half: 0 0 1 1 2, two beats a record.
+            let mut segments = vec![Vec::new(); 3];
+            for (index, halves) in words.iter().flat_map(|record| record.chunks(8)).enumerate() {
+                let lane = |at: usize| u32::from(halves[2 * at]) | u32::from(halves[2 * at + 1]) << 16;
+                segments[index % 5 / 2].push(Beat([0, 1, 2, 3].map(lane)));
+            }
+            let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
+            let poses = if thesis { StreamFormat::Thesis16 } else { StreamFormat::Binary16 };
+            let numbers_of = Numbers { poses, ..HALF.numbers };
+            let layout =
+                Segment::Results.layout(&Variant { numbers: numbers_of, ..HALF.default_variant() });
+            let (states, sum) = read(&layout, &views, words.len());
+            prop_assert_eq!(sum, sum_of(&segments));
+            for (expected, (pose, velocity)) in words.iter().zip(states) {
+                let format = Sixteen::of(poses).expect("one of sixteen bits");
+                let expected: Vec<u32> =
+                    of_words(expected).into_iter().map(|word| number(format, word)).collect();
+                prop_assert_eq!(numbers(pose, velocity), expected);
+            }
+        }
+
+        /// Of the stripes of the profiles and of others, in every format, however many are read at a time.
+        #[test]
+        fn every_split_reads_what_the_definition_says(
+            words in prop::collection::vec(any::<[u32; 16]>(), 0..40),
+            blocks in prop::collection::vec(0_usize..12, 0..12),
+            streams in prop::sample::select(
+                PROFILES.iter().map(|profile| profile.stripes.results.streams)
+                    .chain([&[1, 0][..], &[0, 1, 1], &[3, 2, 1, 0, 0, 1], &[2], &[1, 2, 3]])
+                    .collect::<Vec<_>>(),
+            ),
+            padded in any::<bool>(),
+            format in prop::sample::select(StreamFormat::ALL.to_vec()),
+        ) {
+            let layout = Layout { rows: result::ROWS, format, stripe: Stripe { streams, padded } };
+            let count = words.len();
+            let mut segments: Vec<Vec<Beat>> = (0..DMA_COUNT_MAX)
+                .map(|channel| vec![Beat::default(); layout.beats_on_channel(count, channel)])
+                .collect();
+            let mut beats = words.iter().flat_map(|record| record.split_arrays().0).map(|it| Beat(*it));
+            for at in 0..layout.beats(count) {
+                let Place { channel, slot } = layout.place(at);
+                // Padding is of any words.
+                segments[channel][slot] = beats.next().unwrap_or(Beat([3; LANES]));
+            }
+            let expected: Vec<Record> = (0..count)
+                .map(|record| std::array::from_fn(|row| {
+                    let row = record * result::ROWS + row;
+                    let Place { channel, slot } = layout.place(row / layout.rows_per_beat());
+                    let beat = segments[channel][slot];
+                    let Some(sixteen) = Sixteen::of(format) else { return beat };
+                    let halves: [u16; 8] = bytemuck::cast(beat);
+                    let halves = halves.split_arrays::<LANES>().0[row % 2];
+                    Beat(halves.map(|word| number(sixteen, word)))
+                }))
+                .collect();
+
+            let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
+            let mut reader = Reader::new(&layout, &views);
+            let mut found = vec![Record::default(); count];
+            let mut rest = found.as_mut_slice();
+            for block in blocks.into_iter().chain([count]) {
+                let (block, behind) = rest.split_at_mut(block.min(rest.len()));
+                let good = reader.read(block);
+                prop_assert_eq!(good, block.iter().all(finite));
+                rest = behind;
+            }
+            prop_assert_eq!(found, expected);
+            prop_assert_eq!(reader.finish(), sum_of(&segments));
+        }
+
+        #[test]
+        fn the_sum_is_that_of_the_words_one_by_one(
+            beats in prop::collection::vec(any::<[u32; 4]>().prop_map(Beat), 0..40),
+        ) {
+            prop_assert_eq!(sum_of_words(&beats), sum_of(&[beats]));
+        }
+    }
+}

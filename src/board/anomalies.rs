@@ -1,0 +1,75 @@
+//! This file says, once a board, what is odd and was dealt with.
+
+/// Something odd that costs no step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Oddity {
+    /// A step ended and no interrupt said so.
+    MissedInterrupt,
+    /// Interrupts have not come for some steps.
+    NoInterrupts,
+    /// An interrupt came and no channel had anything to say.
+    SpuriousInterrupt,
+    /// They come one after the other.
+    InterruptStorm,
+    /// A channel did not stop for a new ring.
+    NoHalt,
+    /// A packet was complete, and its descriptors did not say so yet.
+    LateStatus,
+}
+
+impl Oddity {
+    const fn text(self) -> &'static str {
+        match self {
+            Self::MissedInterrupt => "a step ended without an interrupt; found by looking",
+            Self::NoInterrupts => {
+                "no interrupts come: polling until one does; is the interrupt connected?"
+            }
+            Self::SpuriousInterrupt => {
+                "an interrupt came that no channel had asked for; is the line shared?"
+            }
+            Self::InterruptStorm => {
+                "interrupts come without end and end nothing: ignored until the step is over"
+            }
+            Self::NoHalt => "a channel did not stop in time; the board was reset before the step",
+            Self::LateStatus => {
+                "an interrupt came before the status of the descriptors was in memory; waiting for it"
+            }
+        }
+    }
+}
+
+/// Which oddities were told.
+#[derive(Debug, Default)]
+pub(crate) struct Oddities(u32);
+
+impl Oddities {
+    /// Tells of an oddity unless it was told before; whether it was told.
+    pub(crate) fn tell(&mut self, oddity: Oddity) -> bool {
+        let bit = 1 << oddity as u32;
+        let first = self.0 & bit == 0;
+        if first {
+            self.0 |= bit;
+            log::warn!("{}", oddity.text());
+        }
+        first
+    }
+
+    /// Whether an oddity was told.
+    #[cfg(test)]
+    pub(crate) fn told(&self, oddity: Oddity) -> bool {
+        self.0 & (1 << oddity as u32) != 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_oddity_is_told_once() {
+        let mut oddities = Oddities::default();
+        assert!(oddities.tell(Oddity::LateStatus) && !oddities.tell(Oddity::LateStatus));
+        assert!(oddities.tell(Oddity::MissedInterrupt));
+        assert!(oddities.told(Oddity::LateStatus) && !oddities.told(Oddity::InterruptStorm));
+    }
+}

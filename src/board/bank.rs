@@ -1,0 +1,49 @@
+//! This file tells the two banks of buffers apart.
+//!
+//! Every lane has a buffer in each. A step is packed into one bank and stays there; the next one may
+//! be packed into the other meanwhile. The second has no memory before a step is first prepared.
+
+use std::ops::{Index, IndexMut};
+
+/// One of the two.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Bank {
+    First,
+    Second,
+}
+
+impl Bank {
+    pub(crate) const BOTH: [Self; 2] = [Self::First, Self::Second];
+
+    /// The other one.
+    pub(crate) const fn other(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+        }
+    }
+}
+
+/// What there is one of in each bank.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PerBank<T>([T; 2]);
+
+impl<T> Index<Bank> for PerBank<T> {
+    type Output = T;
+
+    fn index(&self, bank: Bank) -> &T {
+        match bank {
+            Bank::First => &self.0[0],
+            Bank::Second => &self.0[1],
+        }
+    }
+}
+
+impl<T> IndexMut<Bank> for PerBank<T> {
+    fn index_mut(&mut self, bank: Bank) -> &mut T {
+        match bank {
+            Bank::First => &mut self.0[0],
+            Bank::Second => &mut self.0[1],
+        }
+    }
+}

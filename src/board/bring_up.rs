@@ -1,0 +1,98 @@
+//! This file brings a board up in stages: opening goes through them at once, the self-test one by
+//! one.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+
+use crate::axi_dma::{Channel, ChannelName, Direction, DmaError, detect_length_width, reset_core};
+use crate::control_block::Capabilities;
+use crate::error::OpenError;
+use crate::platform::{AccessCounts, Platform, PlatformError, RegisterMap, Window};
+
+/// The two channels of a DMA core.
+#[derive(Debug)]
+pub(crate) struct Core {
+    pub(crate) sender: Channel,
+    pub(crate) receiver: Channel,
+}
+
+impl Core {
+    /// Resets both channels.
+    pub(crate) fn reset(&mut self, platform: &dyn Platform) -> Result<(), DmaError> {
+        reset_core(platform, &mut self.sender, &mut self.receiver)
+    }
+
+    /// Checks that both channels, just reset, answer and have scatter-gather.
+    pub(crate) fn check_mode(&self) -> Result<(), DmaError> {
+        [&self.sender, &self.receiver].into_iter().try_for_each(check_mode)
+    }
+
+    /// The widths of both length registers of a core that was just reset.
+    pub(crate) fn length_widths(&mut self) -> Result<[(ChannelName, u32); 2], DmaError> {
+        let Self { sender, receiver } = self;
+        let width = |channel: &mut Channel| {
+            detect_length_width(channel).map(|width| (channel.name(), width))
+        };
+        Ok([width(sender)?, width(receiver)?])
+    }
+
+    /// Checks that both length registers of a core that was just reset have so many bits.
+    pub(crate) fn check_length_width(&mut self, expected: u32) -> Result<(), DmaError> {
+        for (channel, found) in self.length_widths()? {
+            if found != expected {
+                let channel = channel.to_string();
+                return Err(DmaError::LengthWidth { channel, expected, found });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a length width that no core can have.
+pub(crate) fn check_given_width(given: Option<u32>) -> Result<(), OpenError> {
+    let (low, high) = (LENGTH_WIDTH_MIN, LENGTH_WIDTH_MAX);
+    match given {
+        Some(found) if !(low..=high).contains(&found) => {
+            Err(OpenError::LengthWidth { found, low, high })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Maps the DMA cores of a bitstream. Nothing is read or written.
+pub(crate) fn connect(
+    platform: &dyn Platform,
+    capabilities: &Capabilities,
+    counts: &Arc<AccessCounts>,
+) -> Result<Vec<Core>, PlatformError> {
+    let width = capabilities.address_width;
+    let core = |core| {
+        let registers = platform.dma_window(core)?;
+        let window = Arc::new(Window::new(registers, RegisterMap::Dma(core), Arc::clone(counts))?);
+        Ok(Core {
+            sender: Channel::new(Arc::clone(&window), core, Direction::Mm2s, width),
+            receiver: Channel::new(window, core, Direction::S2mm, width),
+        })
+    };
+    (0..capabilities.mm2s_channels).map(core).collect()
+}
+
+fn check_mode(channel: &Channel) -> Result<(), DmaError> {
+    let status = channel.status();
+    let name = channel.name().to_string();
+    if status.gone() {
+        return Err(DmaError::Gone { channel: name });
+    }
+    if !status.scatter_gather() {
+        return Err(DmaError::NoScatterGather { channel: name, found: status.to_string() });
+    }
+    Ok(())
+}
+
+/// Takes an event from before, and lets the next one through.
+pub(crate) fn drain_interrupt(platform: &dyn Platform) -> Result<(), PlatformError> {
+    platform.wait_interrupt(Duration::ZERO)?;
+    platform.unmask_interrupt()
+}

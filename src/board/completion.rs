@@ -1,0 +1,284 @@
+//! This file waits for a step's results: on the interrupt, on the clock, and never without end.
+//!
+//! An interrupt is a hint, the descriptors in memory are the truth. Per wake-up: read all status
+//! registers, acknowledge what they show, let the next interrupt through, look once more.
+
+use std::time::Duration;
+
+use super::anomalies::Oddity;
+use super::cancellation::Cancellation;
+use super::device::{Device, Statuses};
+use super::plan::{Plan, bytes};
+use super::symptom::Symptom;
+use crate::axi_dma::Progress;
+use crate::control_block::Counters;
+use crate::fault::{Awaited, Fault};
+use crate::platform::{Deadline, acquire_from_device, poll_until};
+use crate::step::report::time_of;
+
+/// How long the status of descriptors is polled for after the interrupt, before registers are looked
+/// at again.
+const GRACE: Duration = Duration::from_millis(1);
+/// Longer than a status ever takes to reach memory after the interrupt.
+const NOTICEABLE: Duration = Duration::from_micros(10);
+/// Shortest time to wait for an interrupt before looking by oneself.
+const SHORTEST_SLICE: Duration = Duration::from_millis(10);
+/// How long a step that may be cancelled waits between two looks whether it was.
+const CANCEL_LOOK: Duration = Duration::from_millis(10);
+/// After so many missing interrupts in a row the driver no longer relies on them.
+const MISSED_LIMIT: u32 = 2;
+/// After so many interrupts in one step that did not end it nobody waits for another: the line stays
+/// masked until its end, and the driver looks by itself.
+const STORM: u64 = 16;
+
+/// How all chains of a step were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Chains {
+    /// Complete, at the first look.
+    Complete,
+    /// Complete, after a look at which they were not.
+    BecameComplete,
+    /// Not complete.
+    Running,
+}
+
+impl Device {
+    /// Waits until every chain of the step is complete; the number of interrupts that woke.
+    pub(crate) fn wait(&mut self, plan: &Plan, deadline: &Deadline) -> Result<u64, Symptom> {
+        let completion = self.s2mm.len() - 1;
+        // Up to the last they ended nothing. A clock that stands still must not make them endless.
+        let mut interrupts = 0;
+        let mut spurious = 0;
+        let mut slice = self.first_slice(deadline.limit());
+        loop {
+            // Asked before looking, so that there is one look after the deadline.
+            let remaining = deadline.remaining(&*self.platform);
+            let time = slice.min(remaining);
+            let woke = if interrupts < STORM {
+                self.wait_interrupt(time)?.is_some()
+            } else {
+                self.check_cancelled()?;
+                self.platform.pause(time);
+                false
+            };
+            let statuses = self.statuses();
+            self.check(&statuses)?;
+            let mut pending = false;
+            for (lane, status) in self.lanes_mut().zip(statuses) {
+                if lane.channel.pending(status) != 0 {
+                    pending = true;
+                    lane.channel.acknowledge(status);
+                }
+            }
+            let mut packet = statuses[completion].complete();
+            if woke {
+                interrupts += 1;
+                spurious += u64::from(!pending);
+                if interrupts < STORM {
+                    self.platform.unmask_interrupt()?;
+                }
+                // What came between reading and unmasking raised no interrupt.
+                let channel = &mut self.s2mm[completion].channel;
+                let again = channel.status();
+                if channel.pending(again) != 0 {
+                    channel.acknowledge(again);
+                }
+                packet |= again.complete();
+            }
+            let looked = self.platform.now();
+            // Of the time that is left now: the wait has taken some.
+            let left = deadline.remaining(&*self.platform);
+            let grace = if packet { GRACE.min(left) } else { Duration::ZERO };
+            let chains = self.complete_within(plan, grace)?;
+            // A look at many descriptors takes its time, too.
+            let waited = chains != Chains::Complete;
+            if packet && waited && self.platform.now().saturating_sub(looked) > NOTICEABLE {
+                self.oddities.tell(Oddity::LateStatus);
+            }
+            let odd = woke && !pending;
+            if chains != Chains::Running {
+                if odd {
+                    self.oddities.tell(Oddity::SpuriousInterrupt);
+                }
+                if !packet && self.acknowledge_completion()? {
+                    interrupts += 1;
+                }
+                self.note_interrupt(interrupts > spurious);
+                if interrupts >= STORM {
+                    // The storm may be over, and the next step relies on interrupts.
+                    self.platform.unmask_interrupt()?;
+                }
+                acquire_from_device();
+                return Ok(interrupts);
+            }
+            if let Some(error) = self.control.sticky_error() {
+                return Err(Symptom::Sticky(error));
+            }
+            if odd {
+                // Neither a channel nor the accelerator.
+                self.oddities.tell(Oddity::SpuriousInterrupt);
+            }
+            if interrupts >= STORM {
+                self.oddities.tell(Oddity::InterruptStorm);
+            }
+            if remaining.is_zero() {
+                return Err(Symptom::Late { awaited: Awaited::Results, limit: deadline.limit() });
+            }
+            slice = match packet || interrupts >= STORM {
+                true => GRACE,
+                // An interrupt that was none says nothing of how long it still takes.
+                false if odd => slice,
+                false => (slice * 2).min(self.longest_slice(deadline)),
+            };
+        }
+    }
+
+    /// Waits for the interrupt, at most that long, unless the caller cancels.
+    fn wait_interrupt(&self, time: Duration) -> Result<Option<u32>, Fault> {
+        if self.cancellation.is_none() {
+            return Ok(self.platform.wait_interrupt(time)?);
+        }
+        let mut left = time;
+        loop {
+            self.check_cancelled()?;
+            let piece = left.min(CANCEL_LOOK);
+            let before = self.platform.now();
+            let came = self.platform.wait_interrupt(piece)?;
+            left -= piece;
+            // A platform without an interrupt comes back early, to let the caller look.
+            let early = self.platform.now().saturating_sub(before) < piece;
+            if came.is_some() || early || left.is_zero() {
+                return Ok(came);
+            }
+        }
+    }
+
+    /// Acknowledges the completion of a step that was found complete before its interrupt was seen,
+    /// which would else be the next step's; whether it had reached the driver.
+    fn acknowledge_completion(&mut self) -> Result<bool, Fault> {
+        let Some(lane) = self.s2mm.last_mut() else { return Ok(false) };
+        let status = lane.channel.status();
+        if status.gone() || lane.channel.pending(status) == 0 {
+            return Ok(false);
+        }
+        lane.channel.acknowledge(status);
+        let came = self.platform.wait_interrupt(Duration::ZERO)?.is_some();
+        if came {
+            self.platform.unmask_interrupt()?;
+        }
+        Ok(came)
+    }
+
+    /// Waits for the accelerator to say that it is done, then reads its counters.
+    pub(crate) fn collect(&mut self, deadline: &Deadline) -> Result<Counters, Symptom> {
+        let gone = || Symptom::Known(Fault::Gone { region: "the control block".to_owned() });
+        let Self { control, cancellation, platform, .. } = self;
+        let cancelled = || cancellation.as_ref().is_some_and(Cancellation::is_cancelled);
+        let done = poll_until(&**platform, deadline, || match control.take_done() {
+            Some(false) => cancelled().then_some(Err(Fault::Cancelled.into())),
+            Some(true) => Some(Ok(())),
+            None => Some(Err(gone())),
+        });
+        match done {
+            Some(done) => done?,
+            None => {
+                return Err(Symptom::Late { awaited: Awaited::Done, limit: deadline.limit() });
+            }
+        }
+        if let Some(error) = self.control.sticky_error() {
+            return Err(Symptom::Sticky(error));
+        }
+        let counters = self.control.counters(&self.capabilities);
+        // No step takes two thousand years.
+        if counters.cycles == u64::MAX {
+            return Err(gone());
+        }
+        let clock_khz = self.capabilities.clock_khz;
+        self.took = (clock_khz > 0).then(|| time_of(counters.cycles, clock_khz));
+        Ok(counters)
+    }
+
+    /// How long to wait for the first interrupt before looking: twice what the step before took, so
+    /// that an interrupt that is lost costs a step, and no more.
+    ///
+    /// Looking earlier costs register accesses and finds nothing, unless interrupts do not come at
+    /// all. Of the first step all that is known is that a quarter of the default deadline is what it
+    /// takes at worst.
+    fn first_slice(&self, limit: Duration) -> Duration {
+        if self.missed_interrupts >= MISSED_LIMIT {
+            return GRACE;
+        }
+        let worst = limit / 4;
+        self.took.map_or(worst, |took| worst.min(took.saturating_mul(2))).max(SHORTEST_SLICE)
+    }
+
+    fn longest_slice(&self, deadline: &Deadline) -> Duration {
+        let share = if self.missed_interrupts >= MISSED_LIMIT { 16 } else { 4 };
+        (deadline.limit() / share).max(SHORTEST_SLICE)
+    }
+
+    fn note_interrupt(&mut self, came: bool) {
+        if came {
+            self.missed_interrupts = 0;
+            return;
+        }
+        self.missed_interrupts = self.missed_interrupts.saturating_add(1);
+        if self.missed_interrupts == 1 {
+            self.oddities.tell(Oddity::MissedInterrupt);
+        } else if self.missed_interrupts == MISSED_LIMIT {
+            self.oddities.tell(Oddity::NoInterrupts);
+        }
+    }
+
+    /// Errors that the status registers show.
+    fn check(&self, statuses: &Statuses) -> Result<(), Symptom> {
+        let statuses = statuses.iter().take(self.lanes().count()).enumerate();
+        for (place, status) in statuses {
+            if status.gone() || status.errors() != 0 {
+                return Err(Symptom::Status { place, status: *status });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether all chains are complete, or become so within `grace`.
+    fn complete_within(&mut self, plan: &Plan, grace: Duration) -> Result<Chains, Symptom> {
+        let Self { s2mm, mm2s, platform, .. } = self;
+        let grace = Deadline::after(&**platform, grace);
+        let mut next = 0;
+        let mut found = Chains::Complete;
+        let ended = poll_until(&**platform, &grace, || {
+            // Lanes that were complete are not looked at again.
+            while next < s2mm.len() + mm2s.len() {
+                let place = next;
+                let (lane, expected) = match s2mm.get_mut(place) {
+                    Some(lane) => (lane, Some(bytes(plan.results(place)))),
+                    None => (&mut mm2s[place - s2mm.len()], None),
+                };
+                let ended = match (lane.ring_mut().progress(), expected) {
+                    (Progress::Running, _) => {
+                        found = Chains::BecameComplete;
+                        return None;
+                    }
+                    (Progress::Complete { .. }, None) => None,
+                    (Progress::Complete { bytes, packet_ended }, Some(expected))
+                        if bytes == expected && (packet_ended || expected == 0) =>
+                    {
+                        None
+                    }
+                    _ => Some(place),
+                };
+                if ended.is_some() {
+                    return Some(ended);
+                }
+                next += 1;
+            }
+            Some(None)
+        });
+        match ended {
+            None => Ok(Chains::Running),
+            Some(None) => Ok(found),
+            Some(Some(place)) => Err(Symptom::Chain { place }),
+        }
+    }
+}

@@ -1,0 +1,390 @@
+//! This file holds an open board: its lanes and its control block, from opening to closing.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use pgs_interface::address_map::DMA_COUNT_MAX;
+
+use super::anomalies::Oddities;
+use super::bank::{Bank, PerBank};
+use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
+use super::cancellation::Cancellation;
+use super::plan::{Plan, bytes};
+use super::port::Lane;
+use super::symptom::Symptom;
+use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
+use crate::beat::pack::pool::Packers;
+use crate::control_block::{Capabilities, Control, Fingerprint, identify};
+use crate::error::OpenError;
+use crate::fault::Fault;
+use crate::fault::phase::Outline;
+use crate::platform::{
+    Access, AccessCounts, Platform, PlatformError, RegisterMap, Window, release_to_device,
+};
+use crate::record::body_table::Table;
+use crate::scene::StepParameters;
+
+/// Status registers of all channels: S2MM first, then MM2S.
+pub(crate) type Statuses = [Dmasr; 2 * DMA_COUNT_MAX];
+
+/// The step that was started last.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Started {
+    pub(crate) outline: Outline,
+    /// When, on the board's clock.
+    pub(crate) at: Duration,
+}
+
+/// What the engines are at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Activity {
+    /// No engine has a buffer in work.
+    Idle,
+    /// A step was begun, and neither taken back nor cleared away.
+    Step,
+}
+
+/// An open board.
+pub(crate) struct Device {
+    pub(crate) mm2s: Vec<Lane>,
+    pub(crate) s2mm: Vec<Lane>,
+    pub(crate) control: Control,
+    pub(crate) capabilities: Capabilities,
+    pub(crate) counts: Arc<AccessCounts>,
+    pub(crate) platform: Arc<dyn Platform>,
+    /// What the bitstream said of itself when it was opened.
+    pub(crate) fingerprint: Fingerprint,
+    /// The step that was started last.
+    pub(crate) started: Option<Started>,
+    /// What the last step took on the board, from its start to done, as it counted itself.
+    pub(crate) took: Option<Duration>,
+    /// Interrupts that did not come although the work was done, in a row.
+    pub(crate) missed_interrupts: u32,
+    /// What was told already.
+    pub(crate) oddities: Oddities,
+    /// Whether a reset failed: nothing may be touched any more.
+    pub(crate) dead: bool,
+    activity: Activity,
+    /// What ends a step early, if the caller gave it.
+    pub(crate) cancellation: Option<Cancellation>,
+    /// The longest piece that a descriptor carries, bytes.
+    pub(crate) largest: u32,
+    /// Who writes the records and reads the results.
+    pub(crate) packers: Packers,
+    /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
+    pub(crate) ends: Table,
+    /// Those of the step in each bank that never move, by their indices, upwards.
+    pub(crate) statics: PerBank<Vec<u32>>,
+}
+
+impl Device {
+    /// Identifies the bitstream, resets everything and checks the DMA cores.
+    pub(crate) fn open(
+        platform: Arc<dyn Platform>,
+        length_width: Option<u32>,
+    ) -> Result<Self, OpenError> {
+        let opened = Self::identify(Arc::clone(&platform), length_width);
+        opened.map_err(|error| platform.lost().map_or(error, OpenError::from))
+    }
+
+    fn identify(platform: Arc<dyn Platform>, length_width: Option<u32>) -> Result<Self, OpenError> {
+        let counts = Arc::<AccessCounts>::default();
+        let window =
+            Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;
+        let mut capabilities = identify(&window)?;
+        check_given_width(length_width)?;
+        capabilities.length_width = length_width.unwrap_or(capabilities.length_width);
+        let mut control = Control::new(window);
+        let mut cores = connect(&*platform, &capabilities, &counts)?;
+        for core in &mut cores {
+            core.reset(&*platform)?;
+            core.check_mode()?;
+            core.check_length_width(capabilities.length_width)?;
+        }
+        control.reset(&*platform)?;
+        drain_interrupt(&*platform)?;
+        Ok(Self::assemble(platform, control, capabilities, counts, cores))
+    }
+
+    /// A board of parts that were reset and checked.
+    pub(crate) fn assemble(
+        platform: Arc<dyn Platform>,
+        control: Control,
+        capabilities: Capabilities,
+        counts: Arc<AccessCounts>,
+        cores: Vec<Core>,
+    ) -> Self {
+        let fingerprint = control.fingerprint();
+        let (mut mm2s, mut s2mm) = (Vec::new(), Vec::new());
+        let last = cores.len().saturating_sub(1);
+        for (place, Core { sender, receiver }) in cores.into_iter().enumerate() {
+            mm2s.push(Lane::new(sender, Access::Read, Dmacr::RUNNING));
+            // Every step has results on the last channel, and they end within a beat of the others'
+            // (three channels: 4 B beats): its completion is taken for the step's.
+            let completion = place == last;
+            let running = if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
+            s2mm.push(Lane::new(receiver, Access::Write, running));
+        }
+        Self {
+            mm2s,
+            s2mm,
+            control,
+            capabilities,
+            counts,
+            platform,
+            fingerprint,
+            started: None,
+            took: None,
+            missed_interrupts: 0,
+            oddities: Oddities::default(),
+            dead: false,
+            activity: Activity::Idle,
+            cancellation: None,
+            largest: largest_piece(capabilities.length_width),
+            packers: Packers::new(None),
+            ends: Table::default(),
+            statics: PerBank::default(),
+        }
+    }
+
+    /// Makes the buffers of a bank, which no engine has in work, large enough for a step.
+    pub(crate) fn reserve_buffers(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
+        self.take_back_unused(bank);
+        let width = self.capabilities.address_width;
+        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
+            let beats = plan.segments(channel).end();
+            lane.reserve_beats(&self.platform, bank, beats, width)?;
+        }
+        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
+            lane.reserve_beats(&self.platform, bank, plan.results(channel), width)?;
+        }
+        Ok(())
+    }
+
+    /// Takes back the buffers of a bank that no engine has in work: what was prepared is not
+    /// started any more.
+    pub(crate) fn take_back_unused(&mut self, bank: Bank) {
+        for lane in self.lanes_mut() {
+            // It is made anew.
+            if let Err(error) = lane.take_back(bank) {
+                log::error!("a buffer was lost: {error}");
+            }
+        }
+    }
+
+    /// Frees the buffers of a bank that no engine has in work; whether there were any.
+    pub(crate) fn release_buffers(&mut self, bank: Bank) -> bool {
+        self.take_back_unused(bank);
+        // All of them.
+        self.lanes_mut().map(|lane| lane.drop_buffer(bank)).fold(false, std::ops::BitOr::bitor)
+    }
+
+    /// Whether every lane has a buffer in that bank, whoever holds it.
+    pub(crate) fn holds(&self, bank: Bank) -> bool {
+        self.lanes().all(|lane| lane.has_buffer(bank))
+    }
+
+    /// Makes the rings large enough for a step. Nothing is in flight.
+    pub(crate) fn reserve_rings(&mut self, plan: &Plan) -> Result<(), Symptom> {
+        self.started = None;
+        let width = self.capabilities.address_width;
+        for core in 0..self.mm2s.len() {
+            let [sent, received] = self.descriptors_of(plan, core);
+            for (lane, descriptors) in
+                [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
+            {
+                if !lane.ring_takes(descriptors) {
+                    lane.stop(&*self.platform)?;
+                    lane.replace_ring(&self.platform, descriptors, width)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the buffers of a bank, and the rings, are large enough for a step as they are.
+    pub(crate) fn has_room(&self, plan: &Plan, bank: Bank) -> bool {
+        (0..self.mm2s.len()).all(|core| {
+            let (mm2s, s2mm) = (&self.mm2s[core], &self.s2mm[core]);
+            let [sent, received] = self.descriptors_of(plan, core);
+            mm2s.beats(bank).len() >= plan.segments(core).end()
+                && s2mm.beats(bank).len() >= plan.results(core)
+                && mm2s.ring_takes(sent)
+                && s2mm.ring_takes(received)
+        })
+    }
+
+    /// Descriptors that a step takes of both channels of a core.
+    fn descriptors_of(&self, plan: &Plan, core: usize) -> [usize; 2] {
+        let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
+        let received = usize::try_from(received).unwrap_or(usize::MAX);
+        [plan.descriptors(core, self.largest), received]
+    }
+
+    /// Hands the buffers of a packed step over to the device, those that it does not have.
+    pub(crate) fn hand_over(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
+        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
+            lane.hand_over(bank, plan.results(channel))?;
+        }
+        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
+            lane.hand_over(bank, plan.segments(channel).end())?;
+        }
+        Ok(())
+    }
+
+    /// Hands the buffers over, queues all descriptors and writes the arguments: everything but the
+    /// doorbells.
+    pub(crate) fn arm(
+        &mut self,
+        plan: &Plan,
+        bank: Bank,
+        parameters: &StepParameters,
+    ) -> Result<(), Symptom> {
+        let largest = self.largest;
+        let outline = Outline::new(plan, parameters, largest);
+        self.started = Some(Started { outline, at: self.platform.now() });
+        self.activity = Activity::Step;
+        self.hand_over(plan, bank)?;
+        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
+            lane.begin();
+            lane.queue(bank, 0, bytes(plan.results(channel)), largest)?;
+            lane.ensure_running(&*self.platform)?;
+        }
+        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
+            let segments = plan.segments(channel);
+            lane.begin();
+            let mut queue = |beats: &std::ops::Range<usize>| {
+                lane.queue(bank, bytes(beats.start), bytes(beats.len()), largest)
+            };
+            queue(&segments.velocities)?;
+            if !segments.collisions.is_empty() {
+                for _ in 0..plan.rounds() {
+                    queue(&segments.collisions)?;
+                }
+            }
+            queue(&segments.poses)?;
+            lane.ensure_running(&*self.platform)?;
+        }
+        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        self.control.set_arguments(count(plan.bodies), count(plan.collisions), parameters);
+        // Buffers and descriptors must be visible before the first doorbell.
+        release_to_device();
+        Ok(())
+    }
+
+    /// Starts what is armed; the number of doorbells.
+    pub(crate) fn start(&mut self) -> Result<u64, Symptom> {
+        // Receivers first: otherwise the accelerator's output stalls, and with it the input.
+        let mut doorbells = 1;
+        for lane in &mut self.s2mm {
+            doorbells += u64::from(lane.ring_doorbell()?);
+        }
+        self.control.start();
+        for lane in &mut self.mm2s {
+            doorbells += u64::from(lane.ring_doorbell()?);
+        }
+        Ok(doorbells)
+    }
+
+    /// Takes the buffers of a step back whose chains are complete.
+    pub(crate) fn take_back(&mut self, bank: Bank) -> Result<(), Symptom> {
+        for lane in self.lanes_mut() {
+            lane.take_back(bank)?;
+        }
+        self.activity = Activity::Idle;
+        Ok(())
+    }
+
+    /// Fails if the caller has cancelled.
+    pub(crate) fn check_cancelled(&self) -> Result<(), Fault> {
+        match &self.cancellation {
+            Some(cancellation) if cancellation.is_cancelled() => Err(Fault::Cancelled),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a step was begun, and neither taken back nor cleared away.
+    pub(crate) fn in_flight(&self) -> bool {
+        self.activity == Activity::Step
+    }
+
+    /// Takes note that everything was reset and the buffers are back.
+    pub(crate) fn was_cleared(&mut self) {
+        self.activity = Activity::Idle;
+    }
+
+    /// Descriptors in the chains of the step.
+    pub(crate) fn descriptors(&mut self) -> u64 {
+        self.lanes_mut().map(|lane| lane.ring_mut().used() as u64).sum()
+    }
+
+    /// All lanes, in the order of [`Statuses`].
+    pub(crate) fn lanes_mut(&mut self) -> impl Iterator<Item = &mut Lane> {
+        self.s2mm.iter_mut().chain(&mut self.mm2s)
+    }
+
+    /// All lanes, in the order of [`Statuses`].
+    pub(crate) fn lanes(&self) -> impl Iterator<Item = &Lane> {
+        self.s2mm.iter().chain(&self.mm2s)
+    }
+
+    /// Reads every status register once.
+    pub(crate) fn statuses(&self) -> Statuses {
+        let mut statuses = [Dmasr(0); 2 * DMA_COUNT_MAX];
+        for (status, lane) in statuses.iter_mut().zip(self.lanes()) {
+            *status = lane.channel.status();
+        }
+        statuses
+    }
+
+    /// Resets all DMA cores, then the accelerator: a core that still runs would fill the streams of
+    /// an accelerator that was reset before it with the rest of a packet.
+    pub(crate) fn reset(&mut self) -> Result<(), Fault> {
+        // Everything is tried, even if one part does not come back: the others stop moving data.
+        let mut result = Ok(());
+        for (sender, receiver) in self.mm2s.iter_mut().zip(&mut self.s2mm) {
+            let reset = reset_core(&*self.platform, &mut sender.channel, &mut receiver.channel);
+            result = result.and(reset.map_err(Fault::from));
+        }
+        result = result.and(self.control.reset(&*self.platform).map_err(Fault::from));
+        result?;
+        drain_interrupt(&*self.platform)?;
+        Ok(())
+    }
+}
+
+impl Drop for Device {
+    /// Stops the engines before their memory goes; what cannot be stopped keeps its memory.
+    fn drop(&mut self) {
+        if self.dead {
+            return;
+        }
+        if self.in_flight() {
+            // A step that was forgotten: the accelerator runs, too. What a reset does not reach
+            // is tried channel by channel.
+            if let Err(error) = self.reset() {
+                log::error!("the board could not be reset: {error}");
+            } else {
+                for lane in self.lanes_mut() {
+                    if let Err(error) = lane.was_reset() {
+                        log::error!("a buffer was lost: {error}");
+                    }
+                }
+            }
+        }
+        let Self { mm2s, s2mm, platform, .. } = self;
+        for (sender, receiver) in mm2s.iter_mut().zip(s2mm) {
+            let stopped = sender.stop(&**platform).and_then(|()| receiver.stop(&**platform));
+            let stopped = stopped
+                .or_else(|_| reset_core(&**platform, &mut sender.channel, &mut receiver.channel));
+            for lane in [sender, receiver] {
+                if let Err(error) = &stopped {
+                    log::error!("a channel could not be stopped: {error}");
+                    lane.leave_to_device();
+                } else if let Err(error) = lane.take_all_back() {
+                    log::error!("cannot take a buffer back: {error}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! An open board: opening, bring-up, its channels and control block, completion, recovery.
+
+pub(crate) mod anomalies;
+pub(crate) mod bank;
+pub(crate) mod bring_up;
+pub(crate) mod cancellation;
+pub(crate) mod completion;
+pub(crate) mod device;
+pub(crate) mod open;
+pub(crate) mod plan;
+pub(crate) mod port;
+pub(crate) mod recovery;
+pub(crate) mod root_cause;
+pub(crate) mod symptom;
+#[cfg(test)]
+pub(crate) mod tests;
+
+pub(crate) use bring_up::{Core, check_given_width, connect, drain_interrupt};
+pub use cancellation::Cancellation;
+pub(crate) use device::Device;
+pub(crate) use open::Found;
+pub use open::{BoardChoice, BoardDescription, BoardKind, OpenOptions};

@@ -1,0 +1,204 @@
+//! Opens a board: the one place that knows every kind.
+
+use std::fmt;
+use std::sync::Arc;
+
+use pgs_interface::address_map::UIO_NODE;
+
+use crate::error::OpenError;
+use crate::platform::linux::uio_listing::uio_listing;
+use crate::platform::{
+    DevMemWindows, HardwarePlatform, ManagerChoice, MemoryChoice, Platform, RegisterChoice, System,
+};
+
+/// How to open the accelerator. The default takes whatever board is there.
+#[derive(Debug, Clone, Default)]
+pub struct OpenOptions {
+    /// Which board.
+    pub board: BoardChoice,
+    /// Where a real board's memory for DMA comes from.
+    pub memory: MemoryChoice,
+    /// Which FPGA manager is asked whether a real board's logic is programmed, before it is touched.
+    pub manager: ManagerChoice,
+    /// Width of the DMA cores' length registers, bits; `None` believes the bitstream. Either is
+    /// checked against the cores themselves.
+    pub length_width: Option<u32>,
+    /// Threads that write the records of a step and read its results, the caller's among them: 1 to 64,
+    /// what is beyond is taken for the nearest. `None` takes as many as the machine has processors, at
+    /// most four. What is written and read does not depend on it. Up to about 2,000 bodies or collisions
+    /// are the caller's alone, and so are results where only live bodies are kept; the others are started
+    /// when there is more, and end with the accelerator.
+    ///
+    /// [`Bodies`](crate::Bodies) and [`Collisions`](crate::Collisions) are asked from these threads
+    /// while the caller's waits for them. A container that needs the caller's own thread (what it
+    /// keeps per thread, a lock that the caller holds) wants `Some(1)`. How the caller's thread rounds
+    /// or flushes is of no account: all threads compute in the standard [floating-point
+    /// environment](crate#the-floating-point-environment).
+    pub pack_threads: Option<usize>,
+}
+
+/// Which board to open.
+#[derive(Debug, Clone, Default)]
+#[non_exhaustive]
+pub enum BoardChoice {
+    /// The UIO node `pgs`, or the nodes `pgs-control` and `pgs-dma0` to `pgs-dma3`, if there are
+    /// any; else an emulated board, which is said at warn level.
+    #[default]
+    Automatic,
+    /// The UIO node of that name (`linux,uio-name`), or a node for each region: `<node>-control`, and
+    /// `<node>-dma0` to `<node>-dma3` as far as there are such cores.
+    Uio {
+        /// The name, as in `/sys/class/uio/uio*/name`.
+        node: String,
+    },
+    /// Registers through `/dev/mem`, inside these windows only. There is no interrupt this way.
+    DevMem(DevMemWindows),
+    /// An emulated board.
+    #[cfg(feature = "emulation")]
+    Emulated(bitstream_model::CpuPort),
+    /// An emulated board in another process, served at this Unix socket
+    /// ([`bitstream_model::remote`]). Its memory is [`MemoryChoice::File`], or the file beside the
+    /// socket that `pgs serve` makes.
+    #[cfg(feature = "emulation")]
+    Served {
+        /// The socket.
+        socket: std::path::PathBuf,
+    },
+}
+
+/// What kind of board was opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BoardKind {
+    /// A software-emulated board.
+    Emulated,
+    /// A board behind UIO nodes.
+    Uio,
+    /// A board behind `/dev/mem`.
+    DevMem,
+    /// A software-emulated board in another process.
+    Served,
+}
+
+/// Which board was opened, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct BoardDescription {
+    /// What kind.
+    pub kind: BoardKind,
+    /// Its name: the UIO node, "/dev/mem", "emulated", or the socket.
+    pub name: String,
+    /// Why this board and no other.
+    pub reason: String,
+}
+
+impl fmt::Display for BoardDescription {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({})", self.name, self.reason)
+    }
+}
+
+/// A board that was found.
+#[derive(Debug)]
+pub(crate) struct Found {
+    pub(crate) platform: Arc<dyn Platform>,
+    pub(crate) description: BoardDescription,
+}
+
+/// Finds the board of choice.
+pub(crate) fn find(
+    choice: &BoardChoice,
+    memory: &MemoryChoice,
+    manager: &ManagerChoice,
+    system: &System,
+) -> Result<Found, OpenError> {
+    let real = |registers, kind, name: &str, reason: &str| -> Result<Found, OpenError> {
+        Ok(Found {
+            platform: Arc::new(HardwarePlatform::open(system, registers, memory, manager)?),
+            description: BoardDescription {
+                kind,
+                name: name.to_owned(),
+                reason: reason.to_owned(),
+            },
+        })
+    };
+    let uio = |node: &str, reason| {
+        real(RegisterChoice::Uio(node.to_owned()), BoardKind::Uio, node, reason)
+    };
+    #[cfg(feature = "emulation")]
+    if matches!(memory, MemoryChoice::File { .. }) && !matches!(choice, BoardChoice::Served { .. })
+    {
+        return Err(OpenError::ServedMemory);
+    }
+    match choice {
+        BoardChoice::Automatic => {
+            let mut listing = uio_listing(&system.uio)?;
+            if listing.has_board(UIO_NODE)? {
+                return uio(UIO_NODE, "its UIO node is there");
+            }
+            let found = fall_back(&listing.without_board(UIO_NODE))?;
+            own_memory(memory).map(|()| found)
+        }
+        BoardChoice::Uio { node } => uio(node, "asked for"),
+        BoardChoice::DevMem(windows) => {
+            let registers = RegisterChoice::DevMem(windows.clone());
+            real(registers, BoardKind::DevMem, "/dev/mem", "asked for")
+        }
+        #[cfg(feature = "emulation")]
+        BoardChoice::Emulated(port) => {
+            own_memory(memory).map(|()| emulated(port.clone(), "asked for"))
+        }
+        #[cfg(feature = "emulation")]
+        BoardChoice::Served { socket } => served(socket, memory),
+    }
+}
+
+/// Refuses a choice of memory for a board that has its own.
+fn own_memory(memory: &MemoryChoice) -> Result<(), OpenError> {
+    match memory {
+        MemoryChoice::Automatic => Ok(()),
+        _ => Err(OpenError::EmulatedMemory),
+    }
+}
+
+#[cfg(feature = "emulation")]
+fn fall_back(reason: &str) -> Result<Found, OpenError> {
+    log::warn!("{reason}: using the software-emulated board");
+    let board = bitstream_model::EmulatedBoard::new(bitstream_model::BoardConfig::default())?;
+    Ok(emulated(board.cpu_port(), reason))
+}
+
+#[cfg(not(feature = "emulation"))]
+fn fall_back(reason: &str) -> Result<Found, OpenError> {
+    Err(OpenError::NoEmulation { reason: reason.to_owned() })
+}
+
+#[cfg(feature = "emulation")]
+fn emulated(port: bitstream_model::CpuPort, reason: &str) -> Found {
+    Found {
+        platform: Arc::new(crate::platform::EmulatedPlatform::new(port)),
+        description: BoardDescription {
+            kind: BoardKind::Emulated,
+            name: "emulated".to_owned(),
+            reason: reason.to_owned(),
+        },
+    }
+}
+
+/// The board of another process.
+#[cfg(feature = "emulation")]
+fn served(socket: &std::path::Path, memory: &MemoryChoice) -> Result<Found, OpenError> {
+    let memory = match memory {
+        MemoryChoice::Automatic => crate::platform::memory_beside(socket),
+        MemoryChoice::File { path } => path.clone(),
+        _ => return Err(OpenError::ServedMemory),
+    };
+    Ok(Found {
+        platform: Arc::new(crate::platform::RemotePlatform::open(socket, &memory)?),
+        description: BoardDescription {
+            kind: BoardKind::Served,
+            name: socket.display().to_string(),
+            reason: "asked for".to_owned(),
+        },
+    })
+}

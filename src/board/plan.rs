@@ -1,0 +1,240 @@
+//! This file lays out one step: where the segments lie in each channel's buffer, how many
+//! descriptors they take, and how long the step may last.
+//!
+//! ```text
+//! MM2S buffer of a channel: | velocities | poses | collisions |    each from a multiple of 64 bytes
+//! ```
+//!
+//! Collisions come last, so that there may be fewer of them than room was made for.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use pgs_interface::profile::{Flow, Variant};
+use pgs_interface::record::BEAT_BYTES;
+
+use crate::axi_dma::pieces;
+use crate::beat::stripe::Segment;
+use crate::control_block::Capabilities;
+use crate::scene::StepParameters;
+use crate::step::report::time_of;
+
+/// A memory slower than 100 MB/s is taken for one that does not answer.
+const SLOWEST_BYTES_PER_MICROSECOND: u64 = 100;
+/// Beats to which segments are aligned: 64 bytes.
+const ALIGNMENT: usize = 64 / BEAT_BYTES;
+
+/// What a step streams.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Plan {
+    /// Bodies of which there are records: where only live bodies are kept, those that move.
+    pub(crate) bodies: usize,
+    /// Records of collisions, padding included.
+    pub(crate) collisions: usize,
+    pub(crate) passes: u64,
+    /// How records lie on the channels.
+    pub(crate) variant: Variant,
+}
+
+/// Where the segments lie in the buffer of one MM2S channel, beats.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Segments {
+    pub(crate) velocities: Range<usize>,
+    pub(crate) poses: Range<usize>,
+    pub(crate) collisions: Range<usize>,
+}
+
+impl Segments {
+    /// Beats up to the end of the last.
+    pub(crate) const fn end(&self) -> usize {
+        if self.collisions.start == self.collisions.end {
+            self.poses.end
+        } else {
+            self.collisions.end
+        }
+    }
+}
+
+/// Bytes of a number of beats.
+pub(crate) const fn bytes(beats: usize) -> u64 {
+    (beats as u64) * BEAT_BYTES as u64
+}
+
+impl Plan {
+    /// Channels each way.
+    pub(crate) const fn channels(&self) -> usize {
+        self.variant.profile.mm2s_widths.len()
+    }
+
+    /// How often the collisions are streamed.
+    pub(crate) fn rounds(&self) -> u64 {
+        match self.variant.profile.flow {
+            Flow::Passes => self.passes,
+            Flow::Window(_) => self.passes.min(1),
+        }
+    }
+
+    /// The segments of one MM2S channel.
+    pub(crate) fn segments(&self, channel: usize) -> Segments {
+        let place = |segment: Segment, records, start: usize| {
+            let start = start.next_multiple_of(ALIGNMENT);
+            start..start + segment.layout(&self.variant).beats_on_channel(records, channel)
+        };
+        let velocities = place(Segment::Velocities, self.bodies, 0);
+        let poses = place(Segment::Poses, self.bodies, velocities.end);
+        let collisions = place(Segment::Collisions, self.collisions, poses.end);
+        Segments { velocities, poses, collisions }
+    }
+
+    /// Beats of results on one S2MM channel.
+    pub(crate) fn results(&self, channel: usize) -> usize {
+        Segment::Results.layout(&self.variant).beats_on_channel(self.bodies, channel)
+    }
+
+    /// Descriptors of one MM2S channel, whose descriptors carry at most `largest` bytes.
+    pub(crate) fn descriptors(&self, channel: usize, largest: u32) -> usize {
+        let count = |range: Range<usize>| pieces(bytes(range.len()), largest).count();
+        let Segments { velocities, poses, collisions } = self.segments(channel);
+        let rounds = usize::try_from(self.rounds()).unwrap_or(usize::MAX);
+        (count(velocities) + count(poses)).saturating_add(count(collisions).saturating_mul(rounds))
+    }
+
+    /// Bytes streamed to the accelerator, all channels.
+    pub(crate) fn bytes_to_device(&self) -> u64 {
+        (0..self.channels())
+            .map(|channel| {
+                let Segments { velocities, poses, collisions } = self.segments(channel);
+                bytes(velocities.len() + poses.len())
+                    .saturating_add(bytes(collisions.len()).saturating_mul(self.rounds()))
+            })
+            .fold(0, u64::saturating_add)
+    }
+
+    /// Bytes streamed from the accelerator, all channels.
+    pub(crate) fn bytes_from_device(&self) -> u64 {
+        (0..self.channels()).map(|channel| bytes(self.results(channel))).sum()
+    }
+
+    /// How long the step may last: four times what it takes if every collision waits for the one
+    /// before it, what its bytes take over the slowest memory, and 10 ms.
+    pub(crate) fn deadline(
+        &self,
+        parameters: &StepParameters,
+        capabilities: &Capabilities,
+    ) -> Duration {
+        parameters.deadline.unwrap_or_else(|| {
+            let window = capabilities.contact.window.max(capabilities.friction.window);
+            let cycles = 4u64
+                .saturating_mul(self.passes)
+                .saturating_mul(self.collisions as u64)
+                .saturating_mul(u64::from(capabilities.initiation_interval) + u64::from(window));
+            let bytes = self.bytes_to_device().saturating_add(self.bytes_from_device());
+            let moving = Duration::from_micros(bytes / SLOWEST_BYTES_PER_MICROSECOND);
+            time_of(cycles, capabilities.clock_khz)
+                .saturating_add(moving)
+                .saturating_add(Duration::from_millis(10))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control_block::{fake, identify};
+    use crate::platform::RegisterMap;
+    use crate::platform::fake::FakeRegisters;
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
+
+    const FOUR: Plan =
+        Plan { bodies: 38_881, collisions: 127_746, passes: 8, variant: FLOAT.default_variant() };
+
+    #[test]
+    fn a_wide_length_register_takes_ten_descriptors_a_channel() {
+        // Velocities, eight passes, poses (interface specification, packets).
+        assert!((0..4).all(|channel| FOUR.descriptors(channel, 67_108_800) == 10));
+    }
+
+    #[test]
+    fn segments_begin_on_64_bytes_and_hold_every_beat() {
+        let all: Vec<_> = (0..4).map(|channel| FOUR.segments(channel)).collect();
+        assert!(all.iter().all(|s| s.collisions.start % 4 == 0 && s.poses.start % 4 == 0));
+        let beats = |of: fn(&Segments) -> &Range<usize>| -> usize {
+            all.iter().map(|segments| of(segments).len()).sum()
+        };
+        assert_eq!(beats(|s| &s.velocities), 2 * 38_881);
+        assert_eq!(beats(|s| &s.collisions), 7 * 127_746);
+        assert_eq!(beats(|s| &s.poses), 2 * 38_881);
+        assert_eq!(FOUR.bytes_to_device(), 16 * (4 * 38_881 + 8 * 7 * 127_746));
+        assert_eq!(FOUR.bytes_from_device(), 16 * 4 * 38_881);
+    }
+
+    #[test]
+    fn a_channel_without_beats_has_no_descriptors() {
+        let one = Plan { bodies: 1, collisions: 0, ..FOUR };
+        let counts: Vec<_> = (0..4).map(|channel| one.descriptors(channel, 192)).collect();
+        assert_eq!(counts, [2, 2, 0, 0]);
+    }
+
+    /// B = 38,881 and C = 127,746 by hand from the record table and the stripes.
+    #[test]
+    fn bytes_of_every_profile_include_its_padding() {
+        let bytes = |variant| {
+            let plan = Plan { variant, ..FOUR };
+            (plan.bytes_to_device() / 16, plan.bytes_from_device() / 16)
+        };
+        let (bodies, collisions) = (38_881, 127_746);
+        assert_eq!(bytes(NAIVE.default_variant()), (4 * bodies + 8 * 7 * collisions, 4 * bodies));
+        // A beat a record, filled up to five: 38,885. Two collisions in seven beats. 77,762 beats of
+        // results, filled up to five: 77,765.
+        assert_eq!(bytes(HALF.default_variant()), (2 * 38_885 + 8 * 7 * (collisions / 2), 77_765));
+        assert_eq!(bytes(MIXED.default_variant()), (4 * bodies + 8 * 3 * collisions, 4 * bodies));
+        // Twice the velocities: four beats a body in f32; in half two, 77,762 filled up to five.
+        let world = |variant| Variant { inertia: Inertia::World, ..variant };
+        assert_eq!(
+            bytes(world(FLOAT.default_variant())),
+            (6 * bodies + 8 * 7 * collisions, 4 * bodies)
+        );
+        assert_eq!(
+            bytes(world(HALF.default_variant())),
+            (77_765 + 38_885 + 8 * 7 * (collisions / 2), 77_765)
+        );
+    }
+
+    /// Once, however many passes there are: velocities on channel 2, poses on channel 3.
+    #[test]
+    fn a_design_that_streams_the_collisions_once_does() {
+        let variant = WINDOWED.default_variant();
+        let plan = Plan { bodies: 38_880, variant, ..FOUR };
+        assert_eq!(plan.bytes_to_device(), 16 * (4 * 38_880 + 6 * 127_746));
+        assert_eq!(plan.bytes_from_device(), 16 * 4 * 38_880);
+        let counts: Vec<_> = (0..4).map(|channel| plan.descriptors(channel, 67_108_800)).collect();
+        assert_eq!(counts, [1, 1, 1, 1]);
+        let none = Plan { passes: 0, ..plan };
+        assert_eq!(none.bytes_to_device(), 16 * 4 * 38_880);
+    }
+
+    #[test]
+    fn an_odd_collision_of_half_is_paid_for_as_a_pair() {
+        let bytes = |collisions| {
+            let variant = HALF.default_variant();
+            let plan = Plan { bodies: 5, collisions, passes: 1, variant };
+            plan.bytes_to_device()
+        };
+        assert_eq!(bytes(3), bytes(4));
+        assert_eq!(bytes(1), 16 * (5 + 7 + 5));
+    }
+
+    #[test]
+    fn the_deadline_follows_from_the_work_unless_it_is_given() {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
+        let mut parameters = StepParameters::default();
+        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.727066 s; 119,437,184 bytes in and out
+        // are 1.194371 s at 100 MB/s.
+        let limit = FOUR.deadline(&parameters, &capabilities);
+        assert_eq!(limit.as_micros(), 4_727_066 + 1_194_371 + 10_000);
+        parameters.deadline = Some(Duration::from_millis(3));
+        assert_eq!(FOUR.deadline(&parameters, &capabilities), Duration::from_millis(3));
+    }
+}

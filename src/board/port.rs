@@ -1,0 +1,228 @@
+//! This file joins what one DMA channel needs for a step: its buffers, its ring, its registers.
+
+use std::sync::Arc;
+
+use super::bank::{Bank, PerBank};
+use crate::axi_dma::{ChainState, Channel, Descriptor, DmaError, Dmacr, Ring, pieces};
+use crate::platform::{Access, CpuBuffer, DeviceBuffer, Platform, PlatformError};
+
+use pgs_interface::record::Beat;
+
+/// Who holds a buffer.
+#[derive(Debug, Default)]
+enum Held {
+    /// There is none, or it was lost to a fault.
+    #[default]
+    Nobody,
+    Cpu(CpuBuffer),
+    Device(DeviceBuffer),
+}
+
+/// One channel with its memory.
+#[derive(Debug)]
+pub(crate) struct Lane {
+    pub(crate) channel: Channel,
+    control: Dmacr,
+    access: Access,
+    ring: Option<Ring>,
+    held: PerBank<Held>,
+    running: bool,
+}
+
+impl Lane {
+    /// A lane of a channel that was reset; `control` is what it will run with.
+    pub(crate) fn new(channel: Channel, access: Access, control: Dmacr) -> Self {
+        Self { channel, control, access, ring: None, held: PerBank::default(), running: false }
+    }
+
+    /// Makes a buffer hold `beats`. Grows with slack, never shrinks.
+    pub(crate) fn reserve_beats(
+        &mut self,
+        platform: &Arc<dyn Platform>,
+        bank: Bank,
+        beats: usize,
+        address_width: u32,
+    ) -> Result<(), PlatformError> {
+        let held = &mut self.held[bank];
+        match held {
+            Held::Cpu(buffer) if buffer.beats().len() >= beats.max(1) => return Ok(()),
+            _ => {}
+        }
+        // The old buffer goes first: memory for DMA is scarce.
+        *held = Held::Nobody;
+        let slack = (beats + beats / 4).max(1).next_multiple_of(4);
+        *held = Held::Cpu(CpuBuffer::allocate(platform, slack, address_width)?);
+        Ok(())
+    }
+
+    /// Whether there is a buffer, whoever holds it.
+    pub(crate) fn has_buffer(&self, bank: Bank) -> bool {
+        !matches!(self.held[bank], Held::Nobody)
+    }
+
+    /// Frees a buffer, if the CPU holds it; whether it did.
+    pub(crate) fn drop_buffer(&mut self, bank: Bank) -> bool {
+        let held = &mut self.held[bank];
+        let was_held = matches!(held, Held::Cpu(_));
+        if was_held {
+            *held = Held::Nobody;
+        }
+        was_held
+    }
+
+    /// Whether the ring takes a chain of so many descriptors.
+    pub(crate) fn ring_takes(&self, descriptors: usize) -> bool {
+        self.ring.as_ref().is_some_and(|ring| ring.capacity() >= descriptors)
+    }
+
+    /// Replaces the ring of a channel that is stopped.
+    pub(crate) fn replace_ring(
+        &mut self,
+        platform: &Arc<dyn Platform>,
+        descriptors: usize,
+        address_width: u32,
+    ) -> Result<(), PlatformError> {
+        self.ring = None;
+        let slack = descriptors.saturating_add(descriptors / 4);
+        self.ring = Some(Ring::new(platform, self.channel.name().direction, slack, address_width)?);
+        Ok(())
+    }
+
+    /// Stops the channel if it runs.
+    pub(crate) fn stop(&mut self, platform: &dyn Platform) -> Result<(), DmaError> {
+        if self.running {
+            self.channel.stop(platform)?;
+            self.running = false;
+        }
+        Ok(())
+    }
+
+    /// The beats of a buffer that the CPU holds; none while the device does.
+    pub(crate) fn beats(&self, bank: Bank) -> &[Beat] {
+        match &self.held[bank] {
+            Held::Cpu(buffer) => buffer.beats(),
+            Held::Nobody | Held::Device(_) => &[],
+        }
+    }
+
+    /// The beats of a buffer that the CPU holds, to write; none while the device does.
+    pub(crate) fn beats_mut(&mut self, bank: Bank) -> &mut [Beat] {
+        match &mut self.held[bank] {
+            Held::Cpu(buffer) => buffer.beats_mut(),
+            Held::Nobody | Held::Device(_) => &mut [],
+        }
+    }
+
+    /// Gives a buffer to the device, which will touch its first `used` beats; nothing, if it has it.
+    pub(crate) fn hand_over(&mut self, bank: Bank, used: usize) -> Result<(), PlatformError> {
+        let held = &mut self.held[bank];
+        match std::mem::take(held) {
+            Held::Cpu(buffer) => *held = Held::Device(buffer.into_device(used, self.access)?),
+            other => *held = other,
+        }
+        Ok(())
+    }
+
+    /// Takes a buffer back, if the device has it. Only when its chain is complete or was never
+    /// begun, or after a reset.
+    pub(crate) fn take_back(&mut self, bank: Bank) -> Result<(), PlatformError> {
+        let held = &mut self.held[bank];
+        match std::mem::take(held) {
+            Held::Device(buffer) => *held = Held::Cpu(buffer.into_cpu()?),
+            other => *held = other,
+        }
+        Ok(())
+    }
+
+    /// Takes back what the device has of both banks.
+    pub(crate) fn take_all_back(&mut self) -> Result<(), PlatformError> {
+        let [first, second] = Bank::BOTH.map(|bank| self.take_back(bank));
+        first.and(second)
+    }
+
+    /// Starts the chain of a step.
+    pub(crate) fn begin(&mut self) {
+        self.ring_mut().begin();
+    }
+
+    /// Appends one packet, or a place for one, to the chain. A packet of no bytes is none.
+    pub(crate) fn queue(
+        &mut self,
+        bank: Bank,
+        offset: u64,
+        bytes: u64,
+        largest: u32,
+    ) -> Result<(), PlatformError> {
+        let Self { ring: Some(ring), held, access, .. } = self else {
+            unreachable!("a chain begins after reserving");
+        };
+        let Held::Device(buffer) = &held[bank] else {
+            unreachable!("a chain begins after handing over");
+        };
+        // S2MM: the device marks where the packet starts and ends.
+        let marks = *access == Access::Read;
+        for (piece, length) in pieces(bytes, largest) {
+            ring.push(&Descriptor {
+                address: buffer.range(offset + piece, u64::from(length))?,
+                bytes: length,
+                starts_packet: marks && piece == 0,
+                ends_packet: marks && piece + u64::from(length) == bytes,
+            });
+        }
+        Ok(())
+    }
+
+    /// Starts the channel at this step's chain, if it does not run yet.
+    pub(crate) fn ensure_running(&mut self, platform: &dyn Platform) -> Result<(), DmaError> {
+        if !self.running && self.ring_mut().used() > 0 {
+            let first = self.ring_mut().start()?;
+            self.channel.start(platform, first, self.control)?;
+            self.running = true;
+        }
+        Ok(())
+    }
+
+    /// Lets the engine run to the end of the chain; whether there was anything to run.
+    pub(crate) fn ring_doorbell(&mut self) -> Result<bool, PlatformError> {
+        let tail = self.ring_mut().tail()?;
+        if let Some(tail) = tail {
+            self.channel.ring_doorbell(tail);
+        }
+        Ok(tail.is_some())
+    }
+
+    /// The ring.
+    pub(crate) fn ring_mut(&mut self) -> &mut Ring {
+        self.ring.as_mut().expect("every step reserves the rings first")
+    }
+
+    /// How the chain of the step stands, and which of its descriptors lies at `address`.
+    pub(crate) fn survey(&self, address: u64) -> ChainState {
+        self.ring.as_ref().map(|ring| ring.survey(address)).unwrap_or_default()
+    }
+
+    /// Takes note that the core was reset, and takes the buffers back.
+    pub(crate) fn was_reset(&mut self) -> Result<(), PlatformError> {
+        self.running = false;
+        self.channel.was_reset();
+        if let Some(ring) = &mut self.ring {
+            ring.rewind();
+        }
+        self.take_all_back()
+    }
+
+    /// Gives up: an engine that could not be stopped may still reach ring and buffers. None is used
+    /// or freed any more, whoever holds it.
+    pub(crate) fn leave_to_device(&mut self) {
+        if let Some(ring) = &mut self.ring {
+            ring.leave_to_device();
+        }
+        for bank in Bank::BOTH {
+            match std::mem::take(&mut self.held[bank]) {
+                Held::Cpu(buffer) => buffer.leave_to_device(),
+                // Not freed when dropped.
+                held @ (Held::Device(_) | Held::Nobody) => self.held[bank] = held,
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! This file says why a step was given up. The [diagnosis](crate::fault::diagnosis) finds out the cause.
+
+use std::time::Duration;
+
+use crate::axi_dma::{DmaError, Dmasr};
+use crate::control_block::{ControlError, StickyError};
+use crate::fault::{Awaited, Fault};
+use crate::platform::PlatformError;
+
+/// Why a step was given up.
+#[derive(Debug)]
+pub(crate) enum Symptom {
+    /// The status of a channel shows an error, or nothing at all.
+    Status {
+        /// Place of the channel among all lanes.
+        place: usize,
+        status: Dmasr,
+    },
+    /// A chain ended in another way than it should.
+    Chain {
+        /// Place of the channel among all lanes.
+        place: usize,
+    },
+    /// The accelerator's sticky error is set.
+    Sticky(StickyError),
+    /// A deadline has passed.
+    Late { awaited: Awaited, limit: Duration },
+    /// The cause is known, unless something worse stands behind it.
+    Known(Fault),
+}
+
+impl From<Fault> for Symptom {
+    fn from(fault: Fault) -> Self {
+        Self::Known(fault)
+    }
+}
+
+impl From<DmaError> for Symptom {
+    fn from(error: DmaError) -> Self {
+        Self::Known(error.into())
+    }
+}
+
+impl From<ControlError> for Symptom {
+    fn from(error: ControlError) -> Self {
+        Self::Known(error.into())
+    }
+}
+
+impl From<PlatformError> for Symptom {
+    fn from(error: PlatformError) -> Self {
+        Self::Known(error.into())
+    }
+}

@@ -1,0 +1,168 @@
+//! This file writes the accelerator's arguments, starts it and resets it.
+
+use std::time::Duration;
+
+use pgs_interface::control::{
+    ANGULAR_DAMPING, AP_CTRL, BODIES, COLLISIONS, CONTACT_ITERATIONS, FLAGS, FRICTION,
+    FRICTION_ITERATIONS, GIE, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, IER, POSITION_COEFFICIENT,
+    POSITION_DRIFT, RESET, TIME_STEP, ap_ctrl, flags, irq, reset,
+};
+use pgs_interface::register::Register;
+
+use super::ControlError;
+use crate::platform::{Deadline, Platform, Window, poll_until};
+use crate::scene::StepParameters;
+
+/// How long the accelerator may take to reset.
+const RESET_LIMIT: Duration = Duration::from_millis(10);
+
+/// Number of arguments.
+const ARGUMENTS: usize = 13;
+
+/// The arguments of a step: register and value.
+fn arguments(
+    bodies: u32,
+    collisions: u32,
+    parameters: &StepParameters,
+) -> [(Register, u32); ARGUMENTS] {
+    [
+        (BODIES, bodies),
+        (COLLISIONS, collisions),
+        (CONTACT_ITERATIONS, parameters.contact_iterations),
+        (FRICTION_ITERATIONS, parameters.friction_iterations),
+        (FLAGS, flags::INTEGRATE.put(0, u32::from(parameters.integrate))),
+        (TIME_STEP, parameters.time_step.to_bits()),
+        (POSITION_DRIFT, parameters.position_drift.to_bits()),
+        (POSITION_COEFFICIENT, parameters.position_coefficient.to_bits()),
+        (FRICTION, parameters.friction.to_bits()),
+        (ANGULAR_DAMPING, parameters.angular_damping.to_bits()),
+        (GRAVITY_X, parameters.gravity[0].to_bits()),
+        (GRAVITY_Y, parameters.gravity[1].to_bits()),
+        (GRAVITY_Z, parameters.gravity[2].to_bits()),
+    ]
+}
+
+/// The accelerator's control block.
+#[derive(Debug)]
+pub(crate) struct Control {
+    window: Window,
+    /// What the argument registers hold; `None` if that is not known.
+    written: [Option<u32>; ARGUMENTS],
+}
+
+impl Control {
+    /// The control block behind a window.
+    pub(crate) fn new(window: Window) -> Self {
+        Self { window, written: [None; ARGUMENTS] }
+    }
+
+    /// One register.
+    pub(crate) fn read(&self, register: &Register) -> u32 {
+        self.window.read32(register.offset)
+    }
+
+    /// One write, at an offset that may lie in the shape table.
+    pub(crate) fn write(&mut self, offset: u32, value: u32) {
+        self.window.write32(offset, value);
+    }
+
+    /// Writes the arguments that differ from what the accelerator holds.
+    pub(crate) fn set_arguments(
+        &mut self,
+        bodies: u32,
+        collisions: u32,
+        parameters: &StepParameters,
+    ) {
+        for (place, (register, value)) in
+            arguments(bodies, collisions, parameters).into_iter().enumerate()
+        {
+            if self.written[place] != Some(value) {
+                self.write(register.offset, value);
+                self.written[place] = Some(value);
+            }
+        }
+    }
+
+    /// Starts a step.
+    pub(crate) fn start(&mut self) {
+        self.write(AP_CTRL.offset, ap_ctrl::START.mask());
+    }
+
+    /// Whether the step has ended; `None` if the board is gone. Reading clears the flag.
+    pub(crate) fn take_done(&mut self) -> Option<bool> {
+        let value = self.read(&AP_CTRL);
+        (value != u32::MAX).then(|| ap_ctrl::DONE.is_set(value))
+    }
+
+    /// Resets the accelerator, and lets its sticky error through to the interrupt line.
+    pub(crate) fn reset(&mut self, platform: &dyn Platform) -> Result<(), ControlError> {
+        self.written = [None; ARGUMENTS];
+        self.write(RESET.offset, reset::RESET.mask());
+        let deadline = Deadline::after(platform, RESET_LIMIT);
+        let mut found = 0;
+        let done = poll_until(platform, &deadline, || {
+            found = self.read(&RESET);
+            (found == u32::MAX || !reset::RESET.is_set(found)).then_some(())
+        });
+        if found == u32::MAX {
+            return Err(ControlError::Gone);
+        }
+        done.ok_or(ControlError::Reset { limit: deadline.limit(), found })?;
+        self.write(GIE.offset, 1);
+        self.write(IER.offset, irq::ERROR.mask());
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::platform::RegisterMap;
+    use crate::platform::fake::{FakePlatform, FakeRegisters};
+
+    #[test]
+    fn only_arguments_that_changed_are_written() {
+        let registers = FakeRegisters::default();
+        let mut control = Control::new(registers.window(RegisterMap::Control));
+        let parameters = StepParameters::default();
+        control.set_arguments(2, 1, &parameters);
+        assert_eq!(registers.with(|state| state.writes.len()), ARGUMENTS);
+        assert_eq!(registers.with(|state| state.values[&0x38]), (1.0f32 / 60.0).to_bits());
+        assert_eq!(registers.with(|state| state.values[&0x30]), 1);
+        control.set_arguments(2, 7, &parameters);
+        assert_eq!(registers.with(|state| state.writes[ARGUMENTS..].to_vec()), [(0x18, 7)]);
+    }
+
+    #[test]
+    fn after_a_reset_every_argument_is_written_again() {
+        let registers = FakeRegisters::default();
+        registers.with(|state| state.kept_bits.insert(0x1C0, 0));
+        let mut control = Control::new(registers.window(RegisterMap::Control));
+        control.set_arguments(2, 1, &StepParameters::default());
+        control.reset(&FakePlatform::default()).expect("out of reset");
+        assert_eq!(
+            registers.with(|state| state.writes[ARGUMENTS..].to_vec()),
+            [(0x1C0, 1), (0x04, 1), (0x08, 4)]
+        );
+        control.set_arguments(2, 1, &StepParameters::default());
+        assert_eq!(registers.with(|state| state.writes.len()), 2 * ARGUMENTS + 3);
+    }
+
+    #[test]
+    fn a_reset_that_never_ends_is_an_error() {
+        let registers = FakeRegisters::default();
+        let mut control = Control::new(registers.window(RegisterMap::Control));
+        let error = control.reset(&FakePlatform::default());
+        assert!(matches!(error, Err(ControlError::Reset { found: 1, .. })));
+    }
+
+    #[test]
+    fn all_ones_are_not_taken_for_done() {
+        let registers = FakeRegisters::default();
+        registers.with(|state| state.scripted.insert(0, vec![u32::MAX, 0b1110, 0b0100]));
+        let mut control = Control::new(registers.window(RegisterMap::Control));
+        assert_eq!(control.take_done(), None);
+        assert_eq!(control.take_done(), Some(true));
+        assert_eq!(control.take_done(), Some(false));
+    }
+}

@@ -1,0 +1,147 @@
+//! This file reads what the accelerator counted in a step, and its sticky error.
+
+use pgs_interface::control::{
+    COUNTER_MAX, CYCLES_HI, CYCLES_LO, ERROR, ERROR_DETAIL, HAZARDS, IMPULSE_SUM_FRACTION_BITS,
+    IMPULSE_SUM_HI, IMPULSE_SUM_LO, IMPULSE_SUM_MAX, SUM_RECEIVED, SUM_SENT, WAIT_CYCLES,
+    WORK_CYCLES,
+};
+
+use super::{Capabilities, Control};
+
+/// The accelerator's sticky error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct StickyError {
+    /// The register.
+    pub(crate) raw: u32,
+    /// What it is about.
+    pub(crate) detail: u32,
+}
+
+/// What was counted in the last step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Counters {
+    /// From start to done.
+    pub(crate) cycles: u64,
+    /// Of it, neither waiting for velocities nor for streams.
+    pub(crate) work: u32,
+    /// Of it, waiting for streams.
+    pub(crate) waits: u32,
+    /// Collisions that met a hazard.
+    pub(crate) hazards: u32,
+    /// Sums of the words received and sent, if the bitstream has them.
+    pub(crate) sums: Option<(u32, u32)>,
+    /// Sum of the accumulated normal impulses, N s, if the bitstream has it and it is known.
+    pub(crate) impulse_sum: Option<f64>,
+    /// Which of them stand at their maximum.
+    pub(crate) saturated: Saturated,
+}
+
+/// Counters of a step that stopped at their maximum: what they count is that or more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct Saturated {
+    /// Cycles by the formula.
+    pub work: bool,
+    /// Cycles in which the accelerator waited for a stream.
+    pub waits: bool,
+    /// Collisions that met a hazard.
+    pub hazards: bool,
+    /// The sum of the impulses.
+    pub impulse_sum: bool,
+}
+
+impl Saturated {
+    /// Whether the stalls are not known: they are what work and waits leave of all cycles.
+    #[must_use]
+    pub const fn stalls(&self) -> bool {
+        self.work || self.waits
+    }
+}
+
+impl Control {
+    /// The sticky error, if one is set.
+    pub(crate) fn sticky_error(&self) -> Option<StickyError> {
+        let raw = self.read(&ERROR);
+        // The detail is read only where there is one: a good step costs one access.
+        (raw != 0).then(|| StickyError { raw, detail: self.read(&ERROR_DETAIL) })
+    }
+
+    /// What was counted in the step that has ended.
+    pub(crate) fn counters(&self, capabilities: &Capabilities) -> Counters {
+        let wide = |high: u32, low: u32| (u64::from(high) << 32) | u64::from(low);
+        let hazards = self.read(&HAZARDS);
+        let low = self.read(&CYCLES_LO);
+        let cycles = wide(self.read(&CYCLES_HI), low);
+        let work = self.read(&WORK_CYCLES);
+        let waits = self.read(&WAIT_CYCLES);
+        let sums = capabilities.checksums.then(|| (self.read(&SUM_RECEIVED), self.read(&SUM_SENT)));
+        let impulses = capabilities.impulse_sum.then(|| {
+            let low = self.read(&IMPULSE_SUM_LO);
+            wide(self.read(&IMPULSE_SUM_HI), low)
+        });
+        let saturated = Saturated {
+            work: work == COUNTER_MAX,
+            waits: waits == COUNTER_MAX,
+            hazards: hazards == COUNTER_MAX,
+            impulse_sum: impulses == Some(IMPULSE_SUM_MAX),
+        };
+        let impulse_sum = impulses.filter(|_| !saturated.impulse_sum).map(impulse);
+        Counters { cycles, work, waits, hazards, sums, impulse_sum, saturated }
+    }
+}
+
+/// Fixed point to N s. Sums above 2^53 units (8.6e9 N s) are rounded.
+#[allow(clippy::cast_precision_loss, reason = "rounding of sums above 2^53 is documented")]
+pub(crate) const fn impulse(units: u64) -> f64 {
+    units as f64 / (1_u64 << IMPULSE_SUM_FRACTION_BITS) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control_block::{fake, identify};
+    use crate::platform::RegisterMap;
+    use crate::platform::fake::FakeRegisters;
+
+    #[test]
+    fn the_detail_of_an_error_is_read_with_it() {
+        let registers = FakeRegisters::default();
+        let control = Control::new(registers.window(RegisterMap::Control));
+        assert_eq!(control.sticky_error(), None);
+        registers.with(|state| {
+            state.values.insert(0x180, 0x0203);
+            state.values.insert(0x184, 17);
+        });
+        assert_eq!(control.sticky_error(), Some(StickyError { raw: 0x0203, detail: 17 }));
+    }
+
+    #[test]
+    #[allow(clippy::float_cmp, reason = "both are exact in binary")]
+    fn impulses_are_counted_in_units_of_two_to_the_minus_twenty() {
+        assert_eq!(impulse(1 << 20), 1.0);
+        assert_eq!(impulse((1 << 32) + (1 << 19)), 4096.5);
+        assert_eq!(impulse(u64::MAX), 17_592_186_044_416.0);
+    }
+
+    #[test]
+    fn a_counter_at_its_maximum_is_no_number() {
+        let registers = FakeRegisters::default();
+        fake::describe(&registers);
+        let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
+        let control = Control::new(registers.window(RegisterMap::Control));
+        let counted = |low: u32, others: u32| {
+            registers.with(|state| {
+                state.values.extend([(0x1A4, low), (0x1A8, u32::MAX)]);
+                state.values.extend([(0x190, others), (0x194, others), (0x198, others)]);
+            });
+            control.counters(&capabilities)
+        };
+        let most = counted(u32::MAX - 1, u32::MAX - 1);
+        assert_eq!(most.saturated, Saturated::default());
+        assert_eq!(most.impulse_sum, Some(impulse(u64::MAX - 1)));
+        let stopped = counted(u32::MAX, u32::MAX);
+        let all = Saturated { work: true, waits: true, hazards: true, impulse_sum: true };
+        assert_eq!((stopped.saturated, stopped.impulse_sum), (all, None));
+        assert!(all.stalls() && !Saturated { impulse_sum: true, ..most.saturated }.stalls());
+    }
+}

@@ -1,0 +1,378 @@
+//! This file says how a step can fail once it has begun: one fault a cause, each with a name.
+pub(crate) mod diagnosis;
+pub(crate) mod phase;
+
+pub use diagnosis::{ChannelState, ControlState, Diagnosis};
+pub use phase::Phase;
+
+use std::fmt;
+use std::time::Duration;
+
+use pgs_interface::control::ErrorCode;
+use thiserror::Error;
+
+use crate::axi_dma::{ChannelName, Direction, DmaError};
+use crate::control_block::ControlError;
+use crate::platform::PlatformError;
+
+/// What went wrong in a step.
+///
+/// Where several things stand at once, this is the one that the others follow from: an error of a
+/// channel before one of a descriptor, that before the accelerator's own, that before a packet of a
+/// wrong length, and all of them before a deadline.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// A channel stopped with `DMAIntErr`.
+    #[error(
+        "DMAIntErr on {0}: a descriptor of no bytes, or an error inside the core; is the memory of \
+         the descriptors what the core sees? see `pgs check`"
+    )]
+    DmaInternal(Box<ChannelState>),
+    /// A channel stopped with `DMASlvErr`.
+    #[error(
+        "DMASlvErr on {0}: the memory refused a buffer; is it protected, or behind an \
+         SMMU that has no mapping for this port?"
+    )]
+    DmaSlave(Box<ChannelState>),
+    /// A channel stopped with `DMADecErr`.
+    #[error(
+        "DMADecErr on {0}: nothing answers at the address of a buffer; is this \
+         memory assigned to the port in the block design, and are its addresses wide enough?"
+    )]
+    DmaDecode(Box<ChannelState>),
+    /// A channel stopped with `SGIntErr`.
+    #[error(
+        "SGIntErr on {0}: it fetched a descriptor that it had completed before; the \
+         memory of the descriptors must not be cached: see `pgs check`"
+    )]
+    SgInternal(Box<ChannelState>),
+    /// A channel stopped with `SGSlvErr`.
+    #[error(
+        "SGSlvErr on {0}: the memory refused a descriptor; is it protected, or behind \
+         an SMMU that has no mapping for the descriptor port?"
+    )]
+    SgSlave(Box<ChannelState>),
+    /// A channel stopped with `SGDecErr`.
+    #[error(
+        "SGDecErr on {0}: nothing answers at the address of a descriptor; the \
+         descriptor port is a master of its own: is it in the address map of the block design?"
+    )]
+    SgDecode(Box<ChannelState>),
+    /// A descriptor ended with `DMAIntErr`, while its channel shows no error.
+    #[error(
+        "DMAIntErr in a descriptor of {0}, and none in the channel's status: is the memory of the \
+         descriptors written by somebody else?"
+    )]
+    DescriptorInternal(Box<ChannelState>),
+    /// A descriptor ended with `DMASlvErr`, while its channel shows no error.
+    #[error(
+        "DMASlvErr in a descriptor of {0}, and none in the channel's status: is the memory of the \
+         descriptors written by somebody else?"
+    )]
+    DescriptorSlave(Box<ChannelState>),
+    /// A descriptor ended with `DMADecErr`, while its channel shows no error.
+    #[error(
+        "DMADecErr in a descriptor of {0}, and none in the channel's status: is the memory of the \
+         descriptors written by somebody else?"
+    )]
+    DescriptorDecode(Box<ChannelState>),
+    /// A channel is done, and its descriptors do not say so.
+    #[error(
+        "no status in the descriptors of {0}, though the channel is idle: it did not reach memory in \
+         time; the memory of the descriptors must not be cached: see `pgs check`"
+    )]
+    StatusMissing(Box<ChannelState>),
+    /// A packet of results ended too early.
+    #[error(
+        "a packet that ended early on {0}: the accelerator's TLAST comes too soon, or beats were lost"
+    )]
+    ShortPacket(Box<ChannelState>),
+    /// A packet of results went on behind its last beat.
+    #[error(
+        "more than the results on {0}: the accelerator's TLAST comes too late, or beats were doubled"
+    )]
+    LongPacket(Box<ChannelState>),
+    /// A packet of results is complete and did not end.
+    #[error("no TLAST on {0}: is it connected between the accelerator and this channel?")]
+    NoPacketEnd(Box<ChannelState>),
+    /// The accelerator gave up.
+    #[error("{0}")]
+    Accelerator(Box<AcceleratorError>),
+    /// Nothing happened in time.
+    #[error(
+        "{awaited} did not come within {limit:?}, in {phase}{}: give the step a longer deadline, or \
+         look at what the streams wait for", behind_text(*behind)
+    )]
+    Deadline {
+        /// What was awaited.
+        awaited: Awaited,
+        /// How long.
+        limit: Duration,
+        /// How far the step was.
+        phase: Phase,
+        /// The one channel that is behind all others of its direction, if there is one.
+        behind: Option<ChannelName>,
+    },
+    /// The caller ended the step.
+    #[error("the step was cancelled")]
+    Cancelled,
+    /// Words were changed on the way.
+    #[error(
+        "the words {} add up to {found:#010x}, expected {expected:#010x}: memory or a stream is \
+         corrupt; see `pgs check`", way(*direction)
+    )]
+    Checksum {
+        /// [`Direction::Mm2s`] is the way to the accelerator.
+        direction: Direction,
+        /// The sum of what was sent.
+        expected: u32,
+        /// The sum of what arrived.
+        found: u32,
+    },
+    /// A result is not a number.
+    #[error(
+        "the result of body {body} is not finite: the scene diverges (shorten the time step), or the \
+         accelerator computes wrongly"
+    )]
+    NotFinite {
+        /// The first such body.
+        body: usize,
+    },
+    /// Registers read all ones.
+    #[error(
+        "{region} reads all ones: is the bitstream still loaded, its power on and its clock running?"
+    )]
+    Gone {
+        /// Which register region.
+        region: String,
+    },
+    /// Another bitstream was loaded.
+    #[error(
+        "{register} reads {found:#010x}, {expected:#010x} when the board was opened: another \
+         bitstream was loaded; open the board again, with nobody loading one meanwhile"
+    )]
+    OtherBitstream {
+        /// The first register that differs.
+        register: &'static str,
+        /// What it read when the board was opened.
+        expected: u32,
+        /// What it reads now.
+        found: u32,
+    },
+    /// A DMA core did not follow.
+    #[error(transparent)]
+    Core(#[from] DmaError),
+    /// The control block did not follow.
+    #[error(transparent)]
+    Control(#[from] ControlError),
+    /// There is no DMA memory for a step of this size.
+    #[error("no DMA memory for this step: give a smaller one, or reserve more")]
+    NoMemory(#[source] PlatformError),
+    /// Memory or the interrupt failed.
+    #[error(transparent)]
+    Platform(#[from] PlatformError),
+}
+
+fn behind_text(behind: Option<ChannelName>) -> String {
+    behind.map(|channel| format!(", where {channel} is behind the others")).unwrap_or_default()
+}
+
+fn way(direction: Direction) -> &'static str {
+    match direction {
+        Direction::Mm2s => "to the accelerator",
+        Direction::S2mm => "from the accelerator",
+    }
+}
+
+impl Fault {
+    /// A name that stays the same from version to version: `dma-decode-error`.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::DmaInternal(_) => "dma-internal-error",
+            Self::DmaSlave(_) => "dma-slave-error",
+            Self::DmaDecode(_) => "dma-decode-error",
+            Self::SgInternal(_) => "sg-internal-error",
+            Self::SgSlave(_) => "sg-slave-error",
+            Self::SgDecode(_) => "sg-decode-error",
+            Self::DescriptorInternal(_) => "descriptor-internal-error",
+            Self::DescriptorSlave(_) => "descriptor-slave-error",
+            Self::DescriptorDecode(_) => "descriptor-decode-error",
+            Self::StatusMissing(_) => "descriptor-status-missing",
+            Self::ShortPacket(_) => "short-packet",
+            Self::LongPacket(_) => "long-packet",
+            Self::NoPacketEnd(_) => "no-tlast",
+            Self::Accelerator(error) => error.name(),
+            Self::Deadline { awaited: Awaited::Results, .. } => "deadline",
+            Self::Deadline { awaited: Awaited::Done, .. } => "no-done",
+            Self::Cancelled => "cancelled",
+            Self::Checksum { .. } => "checksum",
+            Self::NotFinite { .. } => "not-finite",
+            Self::Gone { .. }
+            | Self::Core(DmaError::Gone { .. })
+            | Self::Control(ControlError::Gone) => "gone",
+            Self::OtherBitstream { .. } => "other-bitstream",
+            Self::Core(_) => "dma-state",
+            Self::Control(_) => "accelerator-state",
+            Self::NoMemory(_) => "no-memory",
+            Self::Platform(_) => "platform",
+        }
+    }
+
+    /// The channel that it is about, if it is about one.
+    #[must_use]
+    pub fn channel(&self) -> Option<ChannelName> {
+        match self {
+            Self::DmaInternal(at)
+            | Self::DmaSlave(at)
+            | Self::DmaDecode(at)
+            | Self::SgInternal(at)
+            | Self::SgSlave(at)
+            | Self::SgDecode(at)
+            | Self::DescriptorInternal(at)
+            | Self::DescriptorSlave(at)
+            | Self::DescriptorDecode(at)
+            | Self::StatusMissing(at)
+            | Self::ShortPacket(at)
+            | Self::LongPacket(at)
+            | Self::NoPacketEnd(at) => Some(at.channel),
+            Self::Accelerator(error) => error.channel,
+            Self::Deadline { behind, .. } => *behind,
+            _ => None,
+        }
+    }
+}
+
+/// What a deadline was for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Awaited {
+    /// The end of all chains of descriptors.
+    Results,
+    /// The accelerator's `ap_done`, after all results had come.
+    Done,
+}
+
+impl fmt::Display for Awaited {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Results => "the end of the results",
+            Self::Done => "ap_done",
+        })
+    }
+}
+
+/// The accelerator's sticky error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct AcceleratorError {
+    /// Its code; `None` for one that this driver does not know.
+    pub code: Option<ErrorCode>,
+    /// The register ERROR.
+    pub raw: u32,
+    /// The register `ERROR_DETAIL`.
+    pub detail: u32,
+    /// The channel on which it was seen, for the codes that concern one.
+    pub channel: Option<ChannelName>,
+    /// What the detail means.
+    pub subject: Subject,
+    /// How far the step was, by what had left memory.
+    pub phase: Phase,
+}
+
+/// What an error of the accelerator is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Subject {
+    /// A collision.
+    Collision {
+        /// Its entry in the order in which they were sent.
+        sent: u32,
+        /// The caller's index; `None` for an entry that was left empty.
+        given: Option<usize>,
+    },
+    /// A body.
+    Body {
+        /// Its place in the order in which they were sent.
+        sent: u32,
+        /// The caller's index; `None` for one that was not sent.
+        given: Option<usize>,
+    },
+    /// A beat of a packet, from 0.
+    Beat(u32),
+    /// Bytes of on-chip memory that the step needs.
+    Bytes(u32),
+    /// The offset of an argument register.
+    Argument(u32),
+    /// Nothing that this driver knows.
+    Unknown,
+}
+
+impl AcceleratorError {
+    fn name(&self) -> &'static str {
+        match self.code {
+            Some(ErrorCode::BodyIndex) => "accelerator-body-index",
+            Some(ErrorCode::ContactCount) => "accelerator-contact-count",
+            Some(ErrorCode::TlastEarly) => "accelerator-tlast-early",
+            Some(ErrorCode::TlastMissing) => "accelerator-tlast-missing",
+            Some(ErrorCode::ShapeIndex) => "accelerator-shape-index",
+            Some(ErrorCode::Capacity) => "accelerator-capacity",
+            Some(ErrorCode::StaticPair) => "accelerator-static-pair",
+            Some(ErrorCode::SelfCollision) => "accelerator-self-collision",
+            Some(ErrorCode::Argument) => "accelerator-argument",
+            Some(ErrorCode::PartialBeat) => "accelerator-partial-beat",
+            Some(ErrorCode::EmptyPlace) => "accelerator-empty-place",
+            Some(ErrorCode::Deadlock) => "accelerator-deadlock",
+            _ => "accelerator-unknown",
+        }
+    }
+
+    /// What to look at.
+    fn advice(&self) -> &'static str {
+        match self.code {
+            Some(ErrorCode::TlastEarly | ErrorCode::TlastMissing | ErrorCode::PartialBeat) => {
+                "beats were lost or doubled on this stream; is it connected to the channel of that \
+                 number, and TLAST with it?"
+            }
+            Some(ErrorCode::Capacity | ErrorCode::Argument) => {
+                "the bitstream takes less than its capability registers say"
+            }
+            // The driver checks the input of every step before it sends it.
+            Some(_) => {
+                "it was not so when it was sent: memory or a stream is corrupt; see `pgs check`"
+            }
+            None => "the bitstream is newer than this driver: take a newer one",
+        }
+    }
+}
+
+impl fmt::Display for AcceleratorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { code, raw, detail, channel, subject, phase } = self;
+        let what = code.map_or("a code that this driver does not know", ErrorCode::describe);
+        write!(f, "the accelerator stopped in {phase}: {what}")?;
+        if let Some(channel) = channel {
+            write!(f, ", on the stream of {channel}")?;
+        }
+        match subject {
+            Subject::Collision { sent, given: Some(given) } => {
+                write!(f, ", collision {given} (sent as entry {sent})")?;
+            }
+            Subject::Collision { sent, given: None } => {
+                write!(f, ", entry {sent}, which was left empty")?;
+            }
+            Subject::Body { sent, given: Some(given) } => {
+                write!(f, ", body {given} (sent as record {sent})")?;
+            }
+            Subject::Body { sent, given: None } => {
+                write!(f, ", record {sent}, which is no body's")?;
+            }
+            Subject::Beat(beat) => write!(f, ", beat {beat} of the packet")?,
+            Subject::Bytes(bytes) => write!(f, ", {bytes} bytes needed")?,
+            Subject::Argument(offset) => write!(f, ", argument at {offset:#x}")?,
+            Subject::Unknown => {}
+        }
+        write!(f, " (ERROR {raw:#010x}, detail {detail}): {}", self.advice())
+    }
+}

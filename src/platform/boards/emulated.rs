@@ -1,0 +1,127 @@
+//! This file is the platform over the emulated board.
+
+use std::time::Duration;
+
+use bitstream_model::{CpuPort, DeviceAccess};
+use pgs_interface::address_map;
+use pgs_interface::record::BEAT_BYTES;
+
+use crate::platform::{Access, DmaMemory, Platform, PlatformError, RegisterWindow, SharedMemory};
+
+/// The emulated board, as its processor sees it.
+#[derive(Debug)]
+pub(crate) struct EmulatedPlatform {
+    port: CpuPort,
+}
+
+impl EmulatedPlatform {
+    /// The platform of that board.
+    pub(crate) fn new(port: CpuPort) -> Self {
+        Self { port }
+    }
+
+    fn window(&self, base: u64, bytes: u32) -> Box<dyn RegisterWindow> {
+        Box::new(EmulatedWindow { port: self.port.clone(), base, bytes })
+    }
+}
+
+/// A register region of the emulated board.
+#[derive(Debug)]
+struct EmulatedWindow {
+    port: CpuPort,
+    base: u64,
+    bytes: u32,
+}
+
+impl RegisterWindow for EmulatedWindow {
+    fn bytes(&self) -> u64 {
+        u64::from(self.bytes)
+    }
+
+    fn read32(&self, at: u32) -> u32 {
+        self.port.read32(self.base + u64::from(at))
+    }
+
+    fn write32(&self, at: u32, value: u32) {
+        self.port.write32(self.base + u64::from(at), value);
+    }
+}
+
+fn refused<E: std::error::Error + Send + Sync + 'static>(
+    act: &'static str,
+    what: &'static str,
+    value: u64,
+) -> impl FnOnce(E) -> PlatformError {
+    move |source| PlatformError::Memory { act, what, value, source: Box::new(source) }
+}
+
+impl Platform for EmulatedPlatform {
+    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        Ok(self.window(address_map::dma_base(core), address_map::DMA_BYTES))
+    }
+
+    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        Ok(self.window(address_map::CONTROL_BASE, address_map::CONTROL_BYTES))
+    }
+
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+        let bytes = beats.saturating_mul(BEAT_BYTES) as u64;
+        let allocated = self.port.allocate(beats);
+        let (address, beats) = allocated.map_err(refused("allocate", "bytes", bytes))?;
+        Ok((address, DmaMemory::Heap(beats)))
+    }
+
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+        let bytes = words.saturating_mul(4) as u64;
+        let allocated = self.port.allocate_shared(words);
+        let (address, words) = allocated.map_err(refused("allocate", "bytes", bytes))?;
+        Ok((address, SharedMemory::Heap(words)))
+    }
+
+    fn hand_over(
+        &self,
+        address: u64,
+        memory: DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        let DmaMemory::Heap(beats) = memory else {
+            unreachable!("a buffer goes back to the platform that it came from");
+        };
+        let access = match access {
+            Access::Read => DeviceAccess::Read,
+            Access::Write => DeviceAccess::Write,
+        };
+        self.port.hand_over_first(address, beats, used, access).map_err(refused(
+            "hand over",
+            "address",
+            address,
+        ))
+    }
+
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+        let taken = self.port.take_back(address);
+        Ok(DmaMemory::Heap(taken.map_err(refused("take back", "address", address))?))
+    }
+
+    fn release(&self, address: u64) -> Result<(), PlatformError> {
+        self.port.release(address).map_err(refused("free", "address", address))
+    }
+
+    fn now(&self) -> Duration {
+        self.port.now()
+    }
+
+    fn pause(&self, duration: Duration) {
+        self.port.pause(duration);
+    }
+
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+        Ok(self.port.wait_interrupt(timeout))
+    }
+
+    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+        self.port.unmask_interrupt();
+        Ok(())
+    }
+}

@@ -1,0 +1,286 @@
+//! This file is the platform of a real board: its registers, its memory, its interrupt.
+
+use std::ops::Range;
+#[cfg(feature = "emulation")]
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use pgs_interface::address_map::{U_DMA_BUF, UIO_CONTROL_MAP, UIO_DMA_MAPS, UIO_MEMORY_NODE};
+
+use crate::platform::linux::dev_mem::{DevMem, DevMemWindows};
+use crate::platform::linux::uio_listing::part_name;
+use crate::platform::linux::uio_listing::uio_listing;
+use crate::platform::memory::pool::{Pool, Region};
+use crate::platform::memory::u_dma_buf::{Caching, UDmaBuf};
+use crate::platform::{
+    Access, DmaMemory, ManagerChoice, Platform, PlatformError, RegisterWindow, ReservedMemory,
+    SharedMemory, System, UioDevice, require_bitstream,
+};
+
+/// Where a real board's memory for DMA comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum MemoryChoice {
+    /// The u-dma-buf `pgs` if there is one, else the UIO node `pgs-memory`. A board opened through
+    /// `/dev/mem` has its memory there too.
+    #[default]
+    Automatic,
+    /// A buffer of the kernel module u-dma-buf.
+    UDmaBuf {
+        /// Its name, as in `/sys/class/u-dma-buf`.
+        name: String,
+        /// How the CPU sees it.
+        caching: Caching,
+    },
+    /// Reserved memory behind a UIO node.
+    Uio {
+        /// The node's name (`linux,uio-name`).
+        node: String,
+    },
+    /// Reserved memory through `/dev/mem`.
+    DevMem {
+        /// Its physical addresses.
+        window: Range<u64>,
+    },
+    /// A file: the memory of a board in another process, if it is not the file beside its socket.
+    #[cfg(feature = "emulation")]
+    File {
+        /// Which.
+        path: PathBuf,
+    },
+}
+
+/// How long to sleep in place of an interrupt that there is not.
+const WITHOUT_INTERRUPT: Duration = Duration::from_millis(1);
+/// Pauses up to this are spent spinning: the kernel cannot sleep that short.
+const SPIN: Duration = Duration::from_micros(20);
+
+/// How the registers are reached.
+#[derive(Debug)]
+enum Registers {
+    /// One UIO node carries all regions.
+    OneNode(UioDevice),
+    /// Each region has a node of its own; absent DMAs have none.
+    Nodes { board: String, control: UioDevice, dma: Vec<(usize, UioDevice)> },
+    /// Through `/dev/mem`, at these places.
+    DevMem(DevMem, DevMemWindows),
+}
+
+/// A real board.
+#[derive(Debug)]
+pub(crate) struct HardwarePlatform {
+    registers: Registers,
+    pool: Pool,
+    started: Instant,
+    /// Whether the node turned out to carry no interrupt.
+    no_interrupt: AtomicBool,
+}
+
+/// How to reach a real board's registers.
+#[derive(Debug, Clone)]
+pub(crate) enum RegisterChoice {
+    /// One node of that name, or a node for each region if there is no such one.
+    Uio(String),
+    /// These windows of `/dev/mem`.
+    DevMem(DevMemWindows),
+}
+
+impl HardwarePlatform {
+    /// Opens registers and memory. No register is touched; the programmable logic is programmed.
+    pub(crate) fn open(
+        system: &System,
+        registers: RegisterChoice,
+        memory: &MemoryChoice,
+        manager: &ManagerChoice,
+    ) -> Result<Self, PlatformError> {
+        let window = match (memory, &registers) {
+            (MemoryChoice::DevMem { window }, _) => Some(window.clone()),
+            (MemoryChoice::Automatic, RegisterChoice::DevMem(windows)) => {
+                Some(windows.memory.clone())
+            }
+            _ => None,
+        };
+        let registers = match registers {
+            RegisterChoice::Uio(node) => open_uio(system, &node)?,
+            RegisterChoice::DevMem(windows) => {
+                // Opened once for both: it has one user at a time.
+                let wanted = windows.registers().into_iter().chain(window.clone()).collect();
+                Registers::DevMem(DevMem::open(system, wanted)?, windows)
+            }
+        };
+        require_bitstream(system, manager)?;
+        let region: Box<dyn Region> = match (&registers, window) {
+            (Registers::DevMem(mem, _), Some(window)) => Box::new(mem.memory(&window)?),
+            (_, Some(window)) => {
+                Box::new(DevMem::open(system, vec![window.clone()])?.memory(&window)?)
+            }
+            (_, None) => open_memory(system, memory)?,
+        };
+        log::info!("memory for DMA: {} bytes at {:#x}", region.bytes(), region.address());
+        Ok(Self {
+            registers,
+            pool: Pool::new(region),
+            started: Instant::now(),
+            no_interrupt: AtomicBool::new(false),
+        })
+    }
+
+    /// The node with the interrupt.
+    fn interrupt(&self) -> Option<&UioDevice> {
+        match &self.registers {
+            Registers::OneNode(device) | Registers::Nodes { control: device, .. } => Some(device),
+            Registers::DevMem(..) => None,
+        }
+        .filter(|_| !self.no_interrupt.load(Ordering::Relaxed))
+    }
+
+    /// Goes on without the interrupt if the node has none.
+    fn with_interrupt<T>(
+        &self,
+        act: impl FnOnce(&UioDevice) -> Result<T, PlatformError>,
+    ) -> Result<Option<T>, PlatformError> {
+        let Some(device) = self.interrupt() else { return Ok(None) };
+        match act(device) {
+            Err(error @ PlatformError::NoInterrupt { .. }) => {
+                if !self.no_interrupt.swap(true, Ordering::Relaxed) {
+                    log::warn!("polling: {error}");
+                }
+                Ok(None)
+            }
+            result => result.map(Some),
+        }
+    }
+}
+
+/// Opens the node of that name, or the nodes `<name>-control`, `<name>-dma0` and so on.
+fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
+    let mut listing = uio_listing(&system.uio)?;
+    let control = part_name(name, UIO_CONTROL_MAP);
+    if listing.has(name) || !listing.has(&control) {
+        let node = listing.node(name)?;
+        // What lacks a control block is another device.
+        node.map(UIO_CONTROL_MAP)?;
+        return Ok(Registers::OneNode(UioDevice::of_node(system, node)?));
+    }
+    let control = UioDevice::of_node(system, listing.node(&control)?)?;
+    let mut dma = Vec::new();
+    for (core, region) in UIO_DMA_MAPS.into_iter().enumerate() {
+        let name = part_name(name, region);
+        if listing.has(&name) {
+            dma.push((core, UioDevice::of_node(system, listing.node(&name)?)?));
+        }
+    }
+    Ok(Registers::Nodes { board: name.to_owned(), control, dma })
+}
+
+/// Opens memory that does not come from `/dev/mem`. Whichever it is, its device file is locked as
+/// long as the region, or a piece of it, exists.
+fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>, PlatformError> {
+    let u_dma_buf = |name: &str, caching| -> Result<Box<dyn Region>, PlatformError> {
+        Ok(Box::new(UDmaBuf::open(system, name, caching)?))
+    };
+    let uio = |node: &str| -> Result<Box<dyn Region>, PlatformError> {
+        Ok(Box::new(ReservedMemory::open_in(system, node)?))
+    };
+    match choice {
+        MemoryChoice::UDmaBuf { name, caching } => u_dma_buf(name, *caching),
+        MemoryChoice::Uio { node } => uio(node),
+        _ if UDmaBuf::exists(system, U_DMA_BUF) => u_dma_buf(U_DMA_BUF, Caching::default()),
+        _ if uio_listing(&system.uio)?.has(UIO_MEMORY_NODE) => uio(UIO_MEMORY_NODE),
+        _ => Err(PlatformError::NoMemory { u_dma_buf: U_DMA_BUF, node: UIO_MEMORY_NODE }),
+    }
+}
+
+impl Platform for HardwarePlatform {
+    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let map = UIO_DMA_MAPS.get(core).copied().unwrap_or_default();
+        match &self.registers {
+            Registers::OneNode(device) => Ok(device.window(map)?.into()),
+            Registers::Nodes { board, control, dma } => {
+                let present = dma.iter().find(|(number, _)| *number == core);
+                let (_, device) = present.ok_or_else(|| {
+                    let devices = dma.iter().map(|(_, device)| device).chain([control]);
+                    let names: Vec<_> = devices.map(|device| device.node().name.as_str()).collect();
+                    PlatformError::NoNode {
+                        wanted: part_name(board, &format!("dma{core}")),
+                        found: names.join(", "),
+                    }
+                })?;
+                Ok(device.map(device.node().map_or_only(map)?)?.into())
+            }
+            Registers::DevMem(mem, windows) => map_registers(mem, windows.dma(core)),
+        }
+    }
+
+    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        match &self.registers {
+            Registers::OneNode(device) => Ok(device.window(UIO_CONTROL_MAP)?.into()),
+            Registers::Nodes { control, .. } => {
+                Ok(control.map(control.node().map_or_only(UIO_CONTROL_MAP)?)?.into())
+            }
+            Registers::DevMem(mem, windows) => map_registers(mem, windows.control()),
+        }
+    }
+
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+        self.pool.allocate(beats)
+    }
+
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+        self.pool.allocate_shared(words)
+    }
+
+    fn hand_over(
+        &self,
+        address: u64,
+        memory: DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        self.pool.hand_over(address, memory, used, access)
+    }
+
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+        self.pool.take_back(address)
+    }
+
+    fn release(&self, address: u64) -> Result<(), PlatformError> {
+        self.pool.release(address)
+    }
+
+    fn now(&self) -> Duration {
+        self.started.elapsed()
+    }
+
+    fn pause(&self, duration: Duration) {
+        if duration > SPIN {
+            return thread::sleep(duration);
+        }
+        let started = Instant::now();
+        while started.elapsed() < duration {
+            std::hint::spin_loop();
+        }
+    }
+
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+        if let Some(came) = self.with_interrupt(|device| device.wait_interrupt(timeout))? {
+            return Ok(came);
+        }
+        self.pause(timeout.min(WITHOUT_INTERRUPT));
+        Ok(None)
+    }
+
+    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+        self.with_interrupt(UioDevice::unmask).map(|_| ())
+    }
+}
+
+fn map_registers(
+    mem: &DevMem,
+    window: Option<Range<u64>>,
+) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+    let window = window.ok_or(PlatformError::OutOfWindows { address: u64::MAX, bytes: 0 })?;
+    Ok(Box::new(mem.map(&window)?))
+}

@@ -1,0 +1,327 @@
+//! This file is the platform over a board in another process: registers, interrupt and time through
+//! its socket, memory for DMA in the file that both processes have open.
+//!
+//! The file is locked like every device file: the board has one driver at a time. Time is the
+//! board's, which is virtual; it passes with what is asked of the board, and each answer says how
+//! far it has come.
+
+use std::ffi::OsString;
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Read as _, Write as _};
+use std::os::unix::fs::MetadataExt as _;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use pgs_interface::address_map;
+use pgs_interface::message::{
+    ANSWER_BYTES, Answer, LONGEST_WAIT, MEMORY_SUFFIX, Request, Status, VERSION,
+};
+
+use crate::platform::linux::lock::LockedFile;
+use crate::platform::linux::mapped::Mapping;
+use crate::platform::memory::pool::Pool;
+use crate::platform::{
+    Access, DmaMemory, Platform, PlatformError, RegisterWindow, ReservedMemory, SharedMemory,
+};
+
+/// How long an answer may take. The board's process computes what the board does meanwhile, at most
+/// [`LONGEST_WAIT`] of its time.
+const ANSWER_LIMIT: Duration = Duration::from_secs(60);
+
+/// The file that is a served board's memory, if nobody says otherwise.
+pub(crate) fn memory_beside(socket: &Path) -> PathBuf {
+    let mut path = OsString::from(socket);
+    path.push(MEMORY_SUFFIX);
+    path.into()
+}
+
+/// A board in another process.
+#[derive(Debug)]
+pub(crate) struct RemotePlatform {
+    line: Arc<Line>,
+    pool: Pool,
+}
+
+impl RemotePlatform {
+    /// Connects to the board served at `socket`, whose memory is the file `memory`. No register is
+    /// touched.
+    pub(crate) fn open(socket: &Path, memory: &Path) -> Result<Self, PlatformError> {
+        let line = Line::connect(socket, ANSWER_LIMIT)?;
+        let error =
+            |act| move |source| PlatformError::File { act, path: memory.to_owned(), source };
+        let file = File::options().read(true).write(true).open(memory).map_err(error("open"))?;
+        let lock = Arc::new(LockedFile::of_file(file, memory)?);
+        let metadata = lock.file().metadata().map_err(error("measure"))?;
+
+        let hello = line.ask(Request::Hello { version: VERSION })?;
+        if hello.status != Status::Done || hello.value != VERSION {
+            return Err(PlatformError::OtherServer {
+                socket: socket.to_owned(),
+                expected: VERSION,
+                found: hello.value,
+            });
+        }
+        let placed = line.ask(Request::Memory { inode: metadata.ino() })?;
+        if placed.status != Status::Done {
+            let (socket, memory) = (socket.to_owned(), memory.to_owned());
+            return Err(PlatformError::OtherMemory { socket, memory });
+        }
+        let name = memory.display().to_string();
+        let (address, bytes) = (placed.number, metadata.len());
+        let length = usize::try_from(bytes).map_err(|_| PlatformError::UnusableMemory {
+            region: name.clone(),
+            address,
+            bytes,
+            reason: "make it smaller",
+        })?;
+        let mapping = Mapping::new(&lock, 0, 0, length)?;
+        let memory = ReservedMemory::new(mapping, address, name)?;
+        log::info!("memory for DMA: {} bytes at {:#x}", memory.bytes(), memory.address());
+        Ok(Self { line: Arc::new(line), pool: Pool::new(Box::new(memory)) })
+    }
+
+    fn window(&self, base: u64, bytes: u32) -> Box<dyn RegisterWindow> {
+        Box::new(RemoteWindow { line: Arc::clone(&self.line), base, bytes })
+    }
+}
+
+/// The socket to a board.
+struct Line {
+    socket: PathBuf,
+    state: Mutex<State>,
+}
+
+/// What is known of the other side.
+struct State {
+    stream: UnixStream,
+    /// The board's time at its last answer. A board that is lost has no time: there it is that of
+    /// our waits, so that these end.
+    now: Duration,
+    lost: Option<Arc<io::Error>>,
+}
+
+impl fmt::Debug for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Line").field("socket", &self.socket).finish_non_exhaustive()
+    }
+}
+
+impl Line {
+    fn connect(socket: &Path, limit: Duration) -> Result<Self, PlatformError> {
+        let connected = UnixStream::connect(socket).and_then(|stream| {
+            stream.set_read_timeout(Some(limit))?;
+            stream.set_write_timeout(Some(limit))?;
+            Ok(stream)
+        });
+        let stream = connected
+            .map_err(|source| PlatformError::NoServer { socket: socket.to_owned(), source })?;
+        let state = State { stream, now: Duration::ZERO, lost: None };
+        Ok(Self { socket: socket.to_owned(), state: Mutex::new(state) })
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Nothing in here panics between two changes that belong together.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// One request and its answer. Once that has failed the board is lost for good.
+    fn ask(&self, request: Request) -> Result<Answer, PlatformError> {
+        let mut state = self.state();
+        if state.lost.is_none() {
+            match exchange(&mut state.stream, request) {
+                Ok(answer) => {
+                    // A clock that stands still or runs backwards would make waits endless.
+                    let waited = match (request, answer.status) {
+                        (Request::Pause { time }, _)
+                        | (Request::WaitInterrupt { time }, Status::Nothing) => time,
+                        _ => Duration::ZERO,
+                    };
+                    state.now = answer.now.max(state.now.saturating_add(waited));
+                    return Ok(answer);
+                }
+                Err(error) => {
+                    log::error!("the board served at {} is lost: {error}", self.socket.display());
+                    state.lost = Some(Arc::new(error));
+                }
+            }
+        }
+        let source = state.lost.clone().unwrap_or_else(|| Arc::new(closed()));
+        Err(self.lost_to(source))
+    }
+
+    fn lost_to(&self, source: Arc<io::Error>) -> PlatformError {
+        PlatformError::ServerLost { socket: self.socket.clone(), source }
+    }
+
+    /// What a register reads: all ones from a board that is lost, as from one without power.
+    fn read(&self, address: u64) -> u32 {
+        self.ask(Request::Read { address }).map_or(u32::MAX, |answer| answer.value)
+    }
+}
+
+/// Sends a request and reads its answer, in bounded time.
+fn exchange(stream: &mut UnixStream, request: Request) -> io::Result<Answer> {
+    stream.write_all(&request.encode())?;
+    let mut bytes = [0; ANSWER_BYTES];
+    stream.read_exact(&mut bytes).map_err(|error| match error.kind() {
+        io::ErrorKind::UnexpectedEof => closed(),
+        // What the kernel calls a read that has timed out.
+        io::ErrorKind::WouldBlock => {
+            let limit = stream.read_timeout().ok().flatten().unwrap_or_default();
+            io::Error::new(io::ErrorKind::TimedOut, format!("no answer within {limit:?}"))
+        }
+        _ => error,
+    })?;
+    let answer = Answer::decode(&bytes)
+        .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
+    if answer.status == Status::Refused {
+        let text = format!("it does not understand {request:?}");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, text));
+    }
+    Ok(answer)
+}
+
+fn closed() -> io::Error {
+    io::Error::new(io::ErrorKind::UnexpectedEof, "its process has closed the socket")
+}
+
+/// A register region of the board.
+#[derive(Debug)]
+struct RemoteWindow {
+    line: Arc<Line>,
+    base: u64,
+    bytes: u32,
+}
+
+impl RegisterWindow for RemoteWindow {
+    fn bytes(&self) -> u64 {
+        u64::from(self.bytes)
+    }
+
+    fn read32(&self, at: u32) -> u32 {
+        self.line.read(self.base + u64::from(at))
+    }
+
+    fn write32(&self, at: u32, value: u32) {
+        // A write to a board that is lost goes nowhere; the next wait says so.
+        let _ = self.line.ask(Request::Write { address: self.base + u64::from(at), value });
+    }
+}
+
+impl Platform for RemotePlatform {
+    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        Ok(self.window(address_map::dma_base(core), address_map::DMA_BYTES))
+    }
+
+    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        Ok(self.window(address_map::CONTROL_BASE, address_map::CONTROL_BYTES))
+    }
+
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+        self.pool.allocate(beats)
+    }
+
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+        self.pool.allocate_shared(words)
+    }
+
+    fn hand_over(
+        &self,
+        address: u64,
+        memory: DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        self.pool.hand_over(address, memory, used, access)
+    }
+
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+        self.pool.take_back(address)
+    }
+
+    fn release(&self, address: u64) -> Result<(), PlatformError> {
+        self.pool.release(address)
+    }
+
+    fn now(&self) -> Duration {
+        self.line.state().now
+    }
+
+    fn pause(&self, duration: Duration) {
+        let mut left = duration;
+        while !left.is_zero() {
+            let time = left.min(LONGEST_WAIT);
+            if self.line.ask(Request::Pause { time }).is_err() {
+                let mut state = self.line.state();
+                state.now = state.now.saturating_add(left);
+                return;
+            }
+            left -= time;
+        }
+    }
+
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+        let mut left = timeout;
+        loop {
+            let time = left.min(LONGEST_WAIT);
+            let answer = self.line.ask(Request::WaitInterrupt { time })?;
+            left -= time;
+            match answer.status {
+                Status::Nothing if left.is_zero() => return Ok(None),
+                Status::Nothing => {}
+                _ => return Ok(Some(answer.value)),
+            }
+        }
+    }
+
+    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+        self.line.ask(Request::Unmask).map(|_| ())
+    }
+
+    fn lost(&self) -> Option<PlatformError> {
+        let source = self.line.state().lost.clone()?;
+        Some(self.line.lost_to(source))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::net::UnixListener;
+
+    use super::*;
+    use crate::platform::memory::reserved::fake::reserved;
+    use crate::platform::{Deadline, poll_until};
+
+    #[test]
+    fn a_server_that_is_silent_is_lost_and_every_wait_ends() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let socket = folder.path().join("silent");
+        let listener = UnixListener::bind(&socket).expect("bound");
+        let line = Line::connect(&socket, Duration::from_millis(20)).expect("somebody listens");
+        let error = line.ask(Request::Unmask).expect_err("no answer");
+        let PlatformError::ServerLost { source, .. } = &error else { panic!("{error}") };
+        assert_eq!(source.kind(), io::ErrorKind::TimedOut);
+        assert!(source.to_string().contains("no answer within 20ms"), "{source}");
+
+        // From here on nothing is sent, and no time of ours passes.
+        let (_root, memory) = reserved(0x6000_0000, 1 << 16);
+        let platform = RemotePlatform { line: Arc::new(line), pool: Pool::new(Box::new(memory)) };
+        let window = platform.control_window().expect("a window");
+        assert_eq!(window.read32(0), u32::MAX);
+        assert!(matches!(platform.lost(), Some(PlatformError::ServerLost { .. })));
+        window.write32(0, 1);
+        platform.wait_interrupt(Duration::from_secs(3600)).expect_err("lost");
+        platform.unmask_interrupt().expect_err("lost");
+        let deadline = Deadline::after(&platform, Duration::from_secs(3600));
+        assert!(poll_until(&platform, &deadline, || None::<()>).is_none());
+        assert!(platform.now() >= Duration::from_secs(3600));
+        let (mut stream, _) = listener.accept().expect("the driver");
+        let mut sent = Vec::new();
+        drop((window, platform));
+        stream.read_to_end(&mut sent).expect("closed");
+        assert_eq!(sent, Request::Unmask.encode());
+    }
+}

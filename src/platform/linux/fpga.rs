@@ -1,0 +1,223 @@
+//! Asks the kernel whether the programmable logic carries a bitstream, and which FPGA manager knows.
+//!
+//! An access to a register that is not there hangs the CPU: so the question comes before every
+//! first access. A board may have managers of other chips; the logic's own is known by its name.
+//!
+//! Source: Linux `Documentation/ABI/testing/sysfs-class-fpga-manager`, `drivers/fpga/zynqmp-fpga.c`.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use super::sysfs::{numbered, read, read_if_present};
+use crate::platform::{PlatformError, System};
+
+/// The state of a programmable logic that is ready.
+const OPERATING: &str = "operating";
+/// How the kernel names the manager of the chip's own logic.
+pub const ZYNQMP_MANAGER: &str = "Xilinx ZynqMP FPGA Manager";
+
+/// Which FPGA manager knows whether the logic of a real board is programmed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum ManagerChoice {
+    /// The one with the name of the chip's own, [`ZYNQMP_MANAGER`]. A kernel that has no managers
+    /// cannot say, which is logged.
+    #[default]
+    Automatic,
+    /// This one, whatever its name.
+    Device(String),
+    /// None: the caller knows that the logic is programmed, by JTAG for example, which the kernel
+    /// does not see.
+    ///
+    /// An access to logic that is not programmed, or has no clock, hangs the processor.
+    Unasked,
+}
+
+/// An FPGA manager.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct FpgaManager {
+    /// The kernel's name, `fpga0`.
+    pub device: String,
+    /// What its driver calls itself; empty if that cannot be read.
+    pub name: String,
+    /// Its attributes.
+    pub directory: PathBuf,
+}
+
+impl fmt::Display for FpgaManager {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {:?}", self.device, self.name)
+    }
+}
+
+impl FpgaManager {
+    /// The state of its logic.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn state(&self) -> Result<String, PlatformError> {
+        read(&self.directory.join("state"))
+    }
+}
+
+/// The FPGA managers under `class` (normally `/sys/class/fpga_manager`), by number.
+///
+/// # Errors
+/// The directory cannot be listed.
+pub fn fpga_managers(class: &Path) -> Result<Vec<FpgaManager>, PlatformError> {
+    let manager = |(number, directory): (u32, PathBuf)| FpgaManager {
+        device: format!("fpga{number}"),
+        name: read(&directory.join("name")).unwrap_or_default(),
+        directory,
+    };
+    Ok(numbered(class, "fpga")?.into_iter().map(manager).collect())
+}
+
+/// The manager of choice; `None` if the kernel has none, or none is to be asked.
+///
+/// # Errors
+/// The one asked for is not there, several have the name of the chip's own, or none of those there has.
+pub fn find_manager(
+    class: &Path,
+    choice: &ManagerChoice,
+) -> Result<Option<FpgaManager>, PlatformError> {
+    let wanted = match choice {
+        ManagerChoice::Unasked => return Ok(None),
+        ManagerChoice::Automatic => None,
+        ManagerChoice::Device(device) => Some(device),
+    };
+    let managers = fpga_managers(class)?;
+    let found: Vec<_> = managers.iter().map(FpgaManager::to_string).collect();
+    let found = found.join(", ");
+    if let Some(wanted) = wanted {
+        let named = managers.into_iter().find(|manager| manager.device == *wanted);
+        let missing = || PlatformError::NoManager { wanted: wanted.clone(), found };
+        return named.ok_or_else(missing).map(Some);
+    }
+    if managers.is_empty() {
+        return Ok(None);
+    }
+    let mut own = managers.into_iter().filter(|manager| manager.name == ZYNQMP_MANAGER);
+    match (own.next(), own.next()) {
+        (Some(only), None) => Ok(Some(only)),
+        (Some(_), Some(_)) => Err(PlatformError::SeveralManagers { found }),
+        (None, _) => Err(PlatformError::OtherManagers { found }),
+    }
+}
+
+/// Refuses a programmable logic that the kernel says is not programmed, or that a manager knows of
+/// which is not known to be the logic's own. A kernel that has no managers cannot say, which is
+/// logged.
+///
+/// # Errors
+/// [`PlatformError::NoBitstream`], as [`find_manager`], or the state cannot be read.
+pub fn require_bitstream(system: &System, choice: &ManagerChoice) -> Result<(), PlatformError> {
+    let class = &system.fpga_manager;
+    let Some(manager) = find_manager(class, choice)? else {
+        if *choice == ManagerChoice::Unasked {
+            log::info!("whether a bitstream is loaded is not asked for, as wished");
+        } else {
+            log::info!("no FPGA manager in {}: is a bitstream loaded?", class.display());
+        }
+        return Ok(());
+    };
+    let path = manager.directory.join("state");
+    // Some kernels' managers have no state to ask for.
+    match read_if_present(&path)? {
+        Some(state) if state == OPERATING => Ok(()),
+        Some(found) => Err(PlatformError::NoBitstream { path, found }),
+        None => {
+            log::info!("there is no {}: is a bitstream loaded?", path.display());
+            Ok(())
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod fake {
+    //! FPGA managers made of files.
+
+    use crate::platform::System;
+    use crate::platform::uio_fake::write;
+
+    /// Adds the manager `fpga<number>`.
+    pub(crate) fn add_manager(system: &System, number: u32, name: &str, state: &str) {
+        let manager = system.fpga_manager.join(format!("fpga{number}"));
+        write(manager.join("name"), name);
+        write(manager.join("state"), state);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fake::add_manager;
+    use super::*;
+
+    const SELECT_MAP: &str = "Xilinx Slave SelectMap FPGA Manager";
+
+    fn system() -> (tempfile::TempDir, System) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        (root, system)
+    }
+
+    fn ask(system: &System) -> Result<(), PlatformError> {
+        require_bitstream(system, &ManagerChoice::Automatic)
+    }
+
+    #[test]
+    fn only_an_operating_logic_or_one_nobody_knows_of_is_touched() {
+        let (_root, system) = system();
+        ask(&system).expect("cannot be asked for");
+        add_manager(&system, 0, ZYNQMP_MANAGER, "operating");
+        ask(&system).expect("operating");
+        for other in ["unknown", "power off", "write error", "operating soon", ""] {
+            add_manager(&system, 0, ZYNQMP_MANAGER, other);
+            let error = ask(&system).expect_err(other);
+            assert!(
+                matches!(&error, PlatformError::NoBitstream { found, .. } if found == other),
+                "{error}"
+            );
+            require_bitstream(&system, &ManagerChoice::Unasked).expect("the caller knows");
+        }
+    }
+
+    #[test]
+    fn the_manager_of_another_chip_does_not_answer_for_this_one() {
+        let (_root, system) = system();
+        add_manager(&system, 0, SELECT_MAP, "unknown");
+        add_manager(&system, 1, ZYNQMP_MANAGER, "operating");
+        ask(&system).expect("fpga1 runs");
+        add_manager(&system, 0, SELECT_MAP, "operating");
+        add_manager(&system, 1, ZYNQMP_MANAGER, "unknown");
+        let error = ask(&system).expect_err("fpga0 runs");
+        assert!(error.to_string().contains("fpga1/state"), "{error}");
+    }
+
+    #[test]
+    fn where_several_fit_or_none_the_caller_is_asked() {
+        let (_root, system) = system();
+        add_manager(&system, 0, ZYNQMP_MANAGER, "operating");
+        add_manager(&system, 2, ZYNQMP_MANAGER, "unknown");
+        let error = ask(&system).expect_err("which?");
+        assert!(matches!(error, PlatformError::SeveralManagers { .. }), "{error}");
+        let both = "fpga0 \"Xilinx ZynqMP FPGA Manager\", fpga2 \"Xilinx ZynqMP FPGA Manager\"";
+        assert!(error.to_string().contains(both), "{error}");
+        let named =
+            |device: &str| require_bitstream(&system, &ManagerChoice::Device(device.to_owned()));
+        named("fpga0").expect("it runs");
+        named("fpga2").expect_err("it does not");
+        let error = named("fpga1").expect_err("there is none");
+        assert!(error.to_string().contains("\"fpga1\" (found: fpga0"), "{error}");
+
+        // Another chip's, one without a name.
+        for name in [SELECT_MAP, "Xilinx Versal FPGA Manager", ""] {
+            add_manager(&system, 0, name, "operating");
+            add_manager(&system, 2, name, "operating");
+            let error = ask(&system).expect_err(name);
+            assert!(matches!(error, PlatformError::OtherManagers { .. }), "{error}");
+        }
+        named("fpga2").expect("it runs");
+    }
+}

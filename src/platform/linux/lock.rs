@@ -1,0 +1,146 @@
+//! This file opens a device file for one user alone.
+//!
+//! The lock is that of `flock(2)`: it belongs to one opening of the file, so that a second opening
+//! is refused whether it is made by another program or by another part of this one. Every device
+//! file that this folder maps is opened here, and a [`Mapping`](super::mapped::Mapping) keeps the
+//! lock as long as it exists. That is what makes a mapping the only one of its memory. It binds
+//! those who ask for the lock; a second device file of the same device (`mknod`) has another one.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use nix::errno::Errno;
+use nix::fcntl::{Flock, FlockArg};
+
+use super::system::open_device;
+use crate::platform::PlatformError;
+
+/// A device file that nobody else who asks can open; until this is dropped.
+#[derive(Debug)]
+pub(crate) struct LockedFile {
+    file: Flock<File>,
+    path: PathBuf,
+    /// Other device files that show the same, held for the same time.
+    others: Vec<LockedFile>,
+}
+
+impl LockedFile {
+    /// Opens and locks a device file to read and write; `flags` as for `open`.
+    ///
+    /// [`PlatformError::Busy`] if somebody else has it.
+    pub(crate) fn open(path: &Path, flags: i32) -> Result<Self, PlatformError> {
+        Self::of_file(open_device(path, flags)?, path)
+    }
+
+    /// Locks a file that is open.
+    pub(crate) fn of_file(file: File, path: &Path) -> Result<Self, PlatformError> {
+        let path = path.to_owned();
+        match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
+            Ok(file) => Ok(Self { file, path, others: Vec::new() }),
+            Err((_, Errno::EWOULDBLOCK)) => Err(PlatformError::Busy { path }),
+            Err((_, errno)) => Err(PlatformError::File { act: "lock", path, source: errno.into() }),
+        }
+    }
+
+    /// Holds other files for the same time.
+    pub(crate) fn with(mut self, others: Vec<LockedFile>) -> Self {
+        self.others.extend(others);
+        self
+    }
+
+    /// The open file.
+    pub(crate) fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Where it lies.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufRead as _, BufReader, Write as _};
+    use std::process::{Command, Stdio};
+    use std::thread;
+    use std::time::{Duration, Instant};
+
+    use super::*;
+
+    fn device() -> (tempfile::TempDir, PathBuf) {
+        let root = tempfile::tempdir().expect("a directory");
+        let path = root.path().join("uio0");
+        File::create(&path).expect("made");
+        (root, path)
+    }
+
+    fn assert_busy(path: &Path) {
+        let error = LockedFile::open(path, 0).expect_err("somebody has it");
+        assert!(matches!(&error, PlatformError::Busy { path: busy } if busy == path), "{error}");
+    }
+
+    /// Free within ten seconds: a program that another test starts has copies of all open files, and so of
+    /// the lock, from its fork to its first instruction.
+    fn assert_free(path: &Path) {
+        let until = Instant::now() + Duration::from_secs(10);
+        while let Err(error) = LockedFile::open(path, 0) {
+            assert!(Instant::now() < until, "{error}");
+            thread::yield_now();
+        }
+    }
+
+    #[test]
+    fn a_second_opening_in_this_process_is_refused_until_the_first_is_closed() {
+        let (_root, path) = device();
+        let first = LockedFile::open(&path, 0).expect("free");
+        assert_busy(&path);
+        assert_busy(&path);
+        drop(first);
+        assert_free(&path);
+    }
+
+    #[test]
+    fn what_is_held_along_is_free_at_the_same_time() {
+        let (_root, path) = device();
+        let (_other_root, other) = device();
+        let held = LockedFile::open(&other, 0).expect("free");
+        let both = LockedFile::open(&path, 0).expect("free").with(vec![held]);
+        assert_busy(&other);
+        drop(both);
+        assert_free(&other);
+    }
+
+    /// `flock(1)` is another program that asks for the same lock.
+    #[test]
+    fn another_process_is_refused_and_refuses() {
+        let version = Command::new("flock").arg("--version").output();
+        if !version.is_ok_and(|version| version.status.success()) {
+            let _ = writeln!(std::io::stderr(), "skipped: two processes (no flock program)");
+            return;
+        }
+        let (_root, path) = device();
+        let ours = LockedFile::open(&path, 0).expect("free");
+        let try_lock = || Command::new("flock").arg("-n").arg(&path).arg("true").status();
+        assert_eq!(try_lock().expect("it runs").code(), Some(1), "we have it");
+        drop(ours);
+        assert!(try_lock().expect("it runs").success(), "free");
+
+        // It holds the lock until its standard input ends.
+        let mut other = Command::new("flock")
+            .arg("-n")
+            .arg(&path)
+            .args(["sh", "-c", "echo held; cat"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("it runs");
+        let mut line = String::new();
+        BufReader::new(other.stdout.as_mut().expect("piped")).read_line(&mut line).expect("read");
+        assert_eq!(line, "held\n");
+        assert_busy(&path);
+        drop(other.stdin.take());
+        assert!(other.wait().expect("it ends").success());
+        assert_free(&path);
+    }
+}

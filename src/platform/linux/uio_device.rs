@@ -1,0 +1,287 @@
+//! This file opens a UIO node, for one user alone, and waits for its interrupt.
+//!
+//! The kernel's handler masks the interrupt and counts it; reading four bytes gives the count since
+//! the device was registered, writing a 1 lets the next one through. A count that jumps is no
+//! error: only that it changed matters.
+//!
+//! Source: Linux `Documentation/driver-api/uio-howto.rst`, `drivers/uio/uio_pdrv_genirq.c`.
+
+use std::fs::File;
+use std::io::{self, Read as _, Write as _};
+use std::os::fd::AsFd as _;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+
+use super::lock::LockedFile;
+use super::uio_listing::uio_listing;
+use super::uio_window::Claims;
+use crate::platform::{PlatformError, System, UioMap, UioNode, UioWindow};
+
+/// An open UIO node.
+///
+/// The interrupt protocol of a level-triggered device: acknowledge it in the device, then
+/// [`unmask`](Self::unmask), then look at the device once more (what came in between raised no
+/// interrupt), then [`wait_interrupt`](Self::wait_interrupt).
+#[derive(Debug)]
+pub struct UioDevice {
+    node: UioNode,
+    /// The node's folder in the device tree, if it comes from one.
+    tree: PathBuf,
+    file: Arc<LockedFile>,
+    claims: Claims,
+}
+
+impl UioDevice {
+    /// Opens the node of that name (`linux,uio-name`) on this system. No register is touched.
+    ///
+    /// It is locked (`flock`) until this and all that it mapped is dropped: who opens it meanwhile
+    /// by this library, in this program or another, is refused.
+    ///
+    /// A node whose registers lie in the programmable logic must be opened only once that is
+    /// programmed: see [`require_bitstream`](crate::platform::require_bitstream).
+    ///
+    /// # Errors
+    /// No such node, no device file, no right to open it, no right to list the nodes, somebody else
+    /// has it ([`PlatformError::Busy`]): each its own variant of [`PlatformError`].
+    pub fn open(name: &str) -> Result<Self, PlatformError> {
+        Self::open_in(&System::default(), name)
+    }
+
+    /// The same on a system whose files lie elsewhere.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_in(system: &System, name: &str) -> Result<Self, PlatformError> {
+        Self::of_node(system, uio_listing(&system.uio)?.node(name)?)
+    }
+
+    /// Opens a node that was found.
+    pub(crate) fn of_node(system: &System, node: UioNode) -> Result<Self, PlatformError> {
+        // Without O_NONBLOCK a wake-up that somebody else took would block for ever.
+        let file = LockedFile::open(&system.dev.join(&node.device), nix::libc::O_NONBLOCK)?;
+        let tree = system.uio.join(&node.device).join("device/of_node");
+        Ok(Self { node, tree, file: Arc::new(file), claims: Claims::default() })
+    }
+
+    /// What the kernel says of it.
+    #[must_use]
+    pub fn node(&self) -> &UioNode {
+        &self.node
+    }
+
+    /// Maps the registers of that name.
+    ///
+    /// # Errors
+    /// [`PlatformError::NoMap`], which lists the names that there are;
+    /// [`PlatformError::MappedAlready`] while there is another window of the map; or the kernel
+    /// refuses.
+    pub fn window(&self, map: &str) -> Result<UioWindow, PlatformError> {
+        self.map(self.node.map(map)?)
+    }
+
+    /// Maps a region.
+    pub(crate) fn map(&self, map: &UioMap) -> Result<UioWindow, PlatformError> {
+        UioWindow::new(&self.file, &self.node, map, &self.tree, &self.claims)
+    }
+
+    /// Waits until the interrupt comes: its count since the device was registered. `None` if
+    /// `timeout` passes first. Afterwards it is masked.
+    ///
+    /// # Errors
+    /// [`PlatformError::NoInterrupt`] if the node has none.
+    pub fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+        let started = Instant::now();
+        loop {
+            let remaining = timeout.saturating_sub(started.elapsed());
+            let readable = wait_readable(self.file.file(), remaining)
+                .map_err(|errno| self.error("wait for", errno.into()))?;
+            let mut count = [0; 4];
+            match self.file.file().read(&mut count) {
+                Ok(4) => return Ok(Some(u32::from_ne_bytes(count))),
+                Ok(found) => {
+                    let text = format!("expected 4 bytes, found {found}");
+                    let source = io::Error::new(io::ErrorKind::UnexpectedEof, text);
+                    return Err(self.error("read", source));
+                }
+                // Somebody else took it, or a signal came.
+                Err(error)
+                    if matches!(
+                        error.kind(),
+                        io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
+                    ) =>
+                {
+                    if !readable || remaining.is_zero() {
+                        return Ok(None);
+                    }
+                }
+                Err(error) => return Err(self.error("read", error)),
+            }
+        }
+    }
+
+    /// Lets the next interrupt through.
+    ///
+    /// # Errors
+    /// [`PlatformError::NoInterrupt`] if the node has none.
+    pub fn unmask(&self) -> Result<(), PlatformError> {
+        self.control(1)
+    }
+
+    /// Keeps the interrupt from coming.
+    ///
+    /// # Errors
+    /// [`PlatformError::NoInterrupt`] if the node has none.
+    pub fn mask(&self) -> Result<(), PlatformError> {
+        self.control(0)
+    }
+
+    fn control(&self, enable: u32) -> Result<(), PlatformError> {
+        match self.file.file().write(&enable.to_ne_bytes()) {
+            Ok(4) => Ok(()),
+            Ok(written) => {
+                let text = format!("expected to write 4 bytes, wrote {written}");
+                Err(self.error("write", io::Error::new(io::ErrorKind::WriteZero, text)))
+            }
+            Err(error) => Err(self.error("write", error)),
+        }
+    }
+
+    fn error(&self, act: &'static str, source: io::Error) -> PlatformError {
+        // EIO: no interrupt in the device tree; ENOSYS: a driver that cannot mask.
+        match source.raw_os_error().map(Errno::from_raw) {
+            Some(Errno::EIO | Errno::ENOSYS) => PlatformError::NoInterrupt {
+                node: self.node.name.clone(),
+                device: self.node.device.clone(),
+            },
+            _ => PlatformError::File { act, path: self.file.path().to_owned(), source },
+        }
+    }
+}
+
+/// Waits until the file is readable, or in error; false if `timeout` passes first.
+fn wait_readable(file: &File, timeout: Duration) -> Result<bool, Errno> {
+    let started = Instant::now();
+    loop {
+        let remaining = timeout.saturating_sub(started.elapsed());
+        // Rounded up: less than a millisecond would be no wait at all, over and over.
+        let milliseconds = remaining.as_micros().div_ceil(1000);
+        let slice = u16::try_from(milliseconds).unwrap_or(u16::MAX);
+        let mut files = [PollFd::new(file.as_fd(), PollFlags::POLLIN)];
+        match poll(&mut files, PollTimeout::from(slice)) {
+            Ok(0) | Err(Errno::EINTR) if started.elapsed() >= timeout => return Ok(false),
+            Ok(0) | Err(Errno::EINTR) => {}
+            Ok(_) => return Ok(true),
+            Err(errno) => return Err(errno),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::os::fd::OwnedFd;
+    use std::os::unix::net::UnixStream;
+
+    use super::*;
+    use crate::platform::uio_fake::{add_node, regions};
+
+    const SHORT: Duration = Duration::from_millis(5);
+    const LONG: Duration = Duration::from_secs(30);
+
+    /// A device whose file is one end of a pair of sockets; the other end plays the kernel.
+    fn with_interrupt() -> (UioDevice, UnixStream) {
+        let (ours, kernel) = UnixStream::pair().expect("a pair");
+        ours.set_nonblocking(true).expect("set");
+        let node = UioNode { device: "uio0".to_owned(), name: "pgs".to_owned(), maps: Vec::new() };
+        let file = File::from(OwnedFd::from(ours));
+        let file = Arc::new(LockedFile::of_file(file, "/dev/uio0".as_ref()).expect("locked"));
+        (UioDevice { node, tree: PathBuf::new(), file, claims: Claims::default() }, kernel)
+    }
+
+    #[test]
+    fn an_interrupt_is_its_count_and_the_next_one_waits() {
+        let (device, mut kernel) = with_interrupt();
+        assert_eq!(device.wait_interrupt(Duration::ZERO).expect("none yet"), None);
+        assert_eq!(device.wait_interrupt(SHORT).expect("none yet"), None);
+        // The count jumps: others came while nobody looked.
+        for count in [7_u32, 9, u32::MAX] {
+            kernel.write_all(&count.to_ne_bytes()).expect("written");
+            assert_eq!(device.wait_interrupt(LONG).expect("there is one"), Some(count));
+        }
+        kernel.write_all(&1_u32.to_ne_bytes()).expect("written");
+        assert_eq!(device.wait_interrupt(Duration::ZERO).expect("there is one"), Some(1));
+    }
+
+    #[test]
+    fn an_interrupt_wakes_a_wait_that_has_begun() {
+        let (device, mut kernel) = with_interrupt();
+        std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| device.wait_interrupt(LONG).expect("it comes"));
+            kernel.write_all(&3_u32.to_ne_bytes()).expect("written");
+            assert_eq!(waiting.join().expect("no panic"), Some(3));
+        });
+    }
+
+    #[test]
+    fn a_wait_without_an_interrupt_ends_in_time() {
+        let (device, _kernel) = with_interrupt();
+        let started = Instant::now();
+        assert_eq!(device.wait_interrupt(Duration::from_millis(20)).expect("none"), None);
+        assert!(started.elapsed() >= Duration::from_millis(20));
+    }
+
+    #[test]
+    fn one_lets_the_interrupt_through_and_zero_keeps_it() {
+        let (device, mut kernel) = with_interrupt();
+        device.unmask().expect("written");
+        device.mask().expect("written");
+        let mut words = [0; 8];
+        kernel.read_exact(&mut words).expect("two words");
+        assert_eq!(words[..4], 1_u32.to_ne_bytes());
+        assert_eq!(words[4..], 0_u32.to_ne_bytes());
+    }
+
+    #[test]
+    fn a_file_that_gives_no_whole_count_is_an_error() {
+        let (device, kernel) = with_interrupt();
+        drop(kernel);
+        let error = device.wait_interrupt(LONG).expect_err("end of file");
+        assert!(matches!(error, PlatformError::File { act: "read", .. }), "{error}");
+        device.unmask().expect_err("nobody reads");
+    }
+
+    #[test]
+    fn what_the_kernel_says_without_an_interrupt_is_named() {
+        let (device, _kernel) = with_interrupt();
+        for errno in [Errno::EIO, Errno::ENOSYS] {
+            let error = device.error("read", errno.into());
+            assert!(matches!(error, PlatformError::NoInterrupt { .. }), "{error}");
+        }
+        let other = device.error("read", Errno::EINVAL.into());
+        assert!(matches!(other, PlatformError::File { .. }), "{other}");
+    }
+
+    fn system() -> (tempfile::TempDir, System) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        add_node(&system, 3, "pgs", &regions());
+        (root, system)
+    }
+
+    #[test]
+    fn each_obstacle_is_an_error_of_its_own() {
+        let (_root, system) = system();
+        let error = UioDevice::open_in(&system, "pgs2").expect_err("no such node");
+        assert!(matches!(error, PlatformError::NoNode { .. }), "{error}");
+        let device = UioDevice::open_in(&system, "pgs").expect("opened");
+        let error = device.window("dma4").expect_err("no such map");
+        assert!(matches!(error, PlatformError::NoMap { .. }), "{error}");
+        fs::remove_file(system.dev.join("uio3")).expect("removed");
+        let error = UioDevice::open_in(&system, "pgs").expect_err("no file");
+        assert!(matches!(error, PlatformError::NoDevice { .. }), "{error}");
+    }
+}

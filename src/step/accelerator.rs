@@ -1,0 +1,237 @@
+//! This file is the accelerator as a caller sees it, and the first half of a step.
+//!
+//! Validate, order, reserve, pack (`load.rs`); hand over, start; then, in [`InFlight`], wait, take
+//! back, check, unpack, commit: nothing of the caller's changes before the last.
+
+use std::fmt;
+use std::sync::Arc;
+
+use pgs_support::float_env::standard;
+
+use super::in_flight::{Flight, InFlight, Started, Stopwatch};
+use super::ordering::Ordering;
+use super::pack::{Engines, Load};
+use super::report::StepReport;
+use super::retry::with_retries;
+use crate::beat::pack::pool::Packers;
+use crate::board::bank::{Bank, PerBank};
+use crate::board::cancellation::Cancellation;
+use crate::board::device::Device;
+use crate::board::open::{self, BoardDescription, Found, OpenOptions};
+use crate::control_block::Capabilities;
+use crate::error::{Error, OpenError};
+use crate::platform::{Deadline, System};
+use crate::record::result::Record;
+use crate::scene::{Bodies, Collisions, Shape, StepParameters};
+use crate::validate::{Limits, validate_shapes};
+
+/// Finds the board that the options ask for.
+pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
+    open::find(&options.board, &options.memory, &options.manager, &System::default())
+}
+
+/// An open accelerator.
+///
+/// Dropping it stops the DMA channels and frees their memory.
+pub struct Accelerator {
+    board: BoardDescription,
+    pub(super) device: Device,
+    pub(super) limits: Limits,
+    pub(super) shapes: Vec<Shape>,
+    /// How often shapes were loaded.
+    pub(super) shapes_loaded: u64,
+    /// The bank of the step that was started last, into which the next one that is not prepared goes.
+    pub(super) bank: Bank,
+    /// What lies in the banks.
+    pub(super) loads: PerBank<Option<Load>>,
+    /// How it was ordered.
+    pub(super) orderings: PerBank<Ordering>,
+    /// Results of a step until all are checked. Kept, so that a step allocates nothing.
+    pub(super) spare: Vec<Record>,
+}
+
+/// What it is, and a summary of the step in each bank: not the records, results and tables, which grow with it.
+impl fmt::Debug for Accelerator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Accelerator")
+            .field("board", &self.board)
+            .field("capabilities", &self.device.capabilities)
+            .field("shapes", &self.shapes.len())
+            .field("loads", &self.loads)
+            .field("dead", &self.device.dead)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Accelerator {
+    /// Opens a board, identifies its bitstream and resets it.
+    ///
+    /// # Errors
+    /// [`Error::Open`]: no such board, not a bitstream that this driver knows, or DMA cores that
+    /// do not behave as they should.
+    pub fn open(options: OpenOptions) -> Result<Self, Error> {
+        standard(|| {
+            let mut accelerator = Self::on(find(&options)?, options.length_width)?;
+            accelerator.device.packers = Packers::new(options.pack_threads);
+            Ok(accelerator)
+        })
+    }
+
+    /// Opens the accelerator of a board that was found.
+    pub(crate) fn on(found: Found, length_width: Option<u32>) -> Result<Self, Error> {
+        let device = Device::open(found.platform, length_width)?;
+        Ok(Self::assemble(found.description, device))
+    }
+
+    /// The accelerator of a board that was brought up.
+    pub(crate) fn assemble(board: BoardDescription, device: Device) -> Self {
+        let Capabilities { variant, version, clock_khz, .. } = device.capabilities;
+        log::info!(
+            "opened {board}: profile {}, interface {}.{}, {clock_khz} kHz",
+            variant.profile.name,
+            version.0,
+            version.1
+        );
+        let limits = Limits {
+            variant,
+            flush_subnormals: device.capabilities.flush_subnormals,
+            // An index has to name every body, whatever the bitstream says.
+            body_capacity: device.capabilities.body_capacity.min(variant.body_capacity()),
+            collision_capacity: device.capabilities.collision_capacity,
+            shape_capacity: device.capabilities.shape_capacity,
+            memory_bytes: device.capabilities.memory_bytes,
+            bytes_per_body: device.capabilities.bytes_per_body,
+            bytes_per_collision: device.capabilities.bytes_per_collision,
+        };
+        Self {
+            board,
+            device,
+            limits,
+            shapes: Vec::new(),
+            shapes_loaded: 0,
+            bank: Bank::First,
+            loads: PerBank::default(),
+            orderings: PerBank::default(),
+            spare: Vec::new(),
+        }
+    }
+
+    /// Which board was opened, and why.
+    #[must_use]
+    pub fn board(&self) -> &BoardDescription {
+        &self.board
+    }
+
+    /// What the bitstream says of itself.
+    #[must_use]
+    pub fn capabilities(&self) -> &Capabilities {
+        &self.device.capabilities
+    }
+
+    /// Loads the shapes that bodies refer to by index, in place of all earlier ones. A step that was
+    /// [prepared](InFlight::prepare) with those is not started any more.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
+    /// stay. [`Error::MustReopen`] after a fault that could not be cleared.
+    pub fn set_shapes(&mut self, shapes: &[Shape]) -> Result<(), Error> {
+        standard(|| {
+            self.device.settle(&self.shapes)?;
+            validate_shapes(shapes, &self.limits)?;
+            self.device.control.load_shapes(shapes, self.limits.variant.inertia);
+            self.shapes_loaded += 1;
+            self.shapes.clear();
+            self.shapes.extend_from_slice(shapes);
+            Ok(())
+        })
+    }
+
+    /// From now on this ends steps early, in place of an earlier one.
+    pub fn set_cancellation(&mut self, cancellation: Cancellation) {
+        self.device.cancellation = Some(cancellation);
+    }
+
+    /// Solves the contacts of one time step and integrates it.
+    ///
+    /// Collisions are taken in the [order](StepParameters::order) that the parameters ask for.
+    /// Static bodies are left as they are. The bodies change only if the step succeeds, and then all
+    /// at once.
+    ///
+    /// Units: metres, kilograms, seconds, radians, world frame.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: the input was refused and nothing was sent. [`Error::Step`]: a fault of
+    /// the board; [`Error::may_retry`] and [`Error::must_reopen`] say what to do.
+    /// [`Error::MustReopen`] after a fault that could not be cleared.
+    pub fn step<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &mut B,
+        collisions: &C,
+        parameters: &StepParameters,
+    ) -> Result<StepReport, Error> {
+        let counts = Arc::clone(&self.device.counts);
+        let (reads, writes) = (counts.reads(), counts.writes());
+        let (mut report, retries) = with_retries(parameters.retries, || {
+            self.submit(bodies, collisions, parameters)?.wait(bodies)
+        })?;
+        report.retries = retries;
+        report.register_reads = counts.reads() - reads;
+        report.register_writes = counts.writes() - writes;
+        Ok(report)
+    }
+
+    /// Starts a [step](Self::step) and returns at once: the caller may do other work until it asks
+    /// for the results with [`InFlight::wait`].
+    ///
+    /// The bodies are copied here, and looked at again only there.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn submit<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+        &mut self,
+        bodies: &B,
+        collisions: &C,
+        parameters: &StepParameters,
+    ) -> Result<InFlight<'_>, Error> {
+        standard(move || {
+            self.device.settle(&self.shapes)?;
+            let mut watch = Stopwatch::start();
+            let into = (self.bank, Engines::Idle);
+            let accesses = self.accesses();
+            let load = self.load(into, bodies, collisions, parameters, &mut watch)?;
+            let flight = self.begin(load, watch, accesses)?;
+            Ok(InFlight::new(self, flight))
+        })
+    }
+
+    /// Register reads and writes so far.
+    pub(super) fn accesses(&self) -> (u64, u64) {
+        (self.device.counts.reads(), self.device.counts.writes())
+    }
+
+    /// Starts a step that lies in its bank. Nothing is in flight.
+    pub(super) fn begin(
+        &mut self,
+        load: Load,
+        watch: Stopwatch,
+        accesses: (u64, u64),
+    ) -> Result<Flight, Error> {
+        let Load { plan, parameters, bank, .. } = &load;
+        let mut flight = Flight { load, started: None, watch, accesses };
+        self.bank = *bank;
+        if load.sent.is_some() {
+            let device = &mut self.device;
+            let limit = plan.deadline(parameters, &device.capabilities);
+            let deadline = Deadline::after(&*device.platform, limit);
+            let armed = device.arm(plan, *bank, parameters);
+            flight.load.host.start += flight.watch.lap();
+            let doorbells = armed
+                .and_then(|()| device.start())
+                .map_err(|symptom| device.fail(symptom, &self.shapes))?;
+            // From here on the board is at work.
+            flight.load.host.wait = flight.watch.lap();
+            flight.started = Some(Started { deadline, doorbells });
+        }
+        Ok(flight)
+    }
+}

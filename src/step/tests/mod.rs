@@ -1,0 +1,633 @@
+//! Whole steps on the emulated board, which goes dead at the first thing that the driver does wrong.
+mod fault;
+mod life;
+mod memory;
+mod mistakes;
+mod planned;
+mod prepared;
+mod prepared_fault;
+mod tampered;
+mod wait;
+mod written;
+
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, FaultKind};
+use pgs_interface::control::ErrorCode;
+use pgs_interface::profile::PROFILES;
+
+use crate::Direction as Way;
+use crate::board::open::{BoardDescription, BoardKind, Found};
+use crate::platform::{
+    Access, DmaMemory, EmulatedPlatform, Platform, PlatformError, RegisterWindow, SharedMemory,
+};
+use crate::{
+    Accelerator, Aftermath, Awaited, BoardChoice, Body, Cancellation, Collision, Contact, Error,
+    Fault, OpenError, OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
+};
+
+pub(super) fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
+    let board = EmulatedBoard::new(config).expect("a board that can be built");
+    let mut accelerator = Accelerator::open(options(&board)).expect("a board that opens");
+    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
+    (board, accelerator)
+}
+
+pub(super) fn options(board: &EmulatedBoard) -> OpenOptions {
+    OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() }
+}
+
+/// A row of cubes that fall on the ground, each with its own speed, each in contact.
+pub(super) fn scene(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
+    let body = |position, shape, velocity| Body {
+        pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity,
+        shape,
+    };
+    let mut bodies = vec![body([0.0, -400.0, 0.0], 0, Velocity::default())];
+    let mut collisions = Vec::new();
+    for cube in 1..=cubes {
+        let x = 2.2 * f32::from(u16::try_from(cube).expect("a small scene"));
+        let velocity = Velocity { linear: [0.1 * x, -1.0 - x, 0.3], angular: [0.2, 0.0, -0.1 * x] };
+        bodies.push(body([x, 0.99, 0.0], 1, velocity));
+        let corner = |dx, dz| Contact { point: [x + dx, -0.01, dz], distance: -0.01 };
+        collisions.push(Collision {
+            body_a: 0,
+            body_b: cube,
+            normal: [0.0, -1.0, 0.0],
+            count: 4,
+            contacts: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)],
+        });
+    }
+    (bodies, collisions)
+}
+
+pub(super) fn bits(bodies: &[Body]) -> Vec<u32> {
+    let numbers = |body: &Body| {
+        let Pose { position, orientation } = body.pose;
+        let Velocity { linear, angular } = body.velocity;
+        [position.to_vec(), orientation.to_vec(), linear.to_vec(), angular.to_vec()].concat()
+    };
+    bodies.iter().flat_map(numbers).map(f32::to_bits).collect()
+}
+
+/// One step of a fresh scene.
+pub(super) fn step(
+    accelerator: &mut Accelerator,
+    cubes: u32,
+) -> (Result<StepReport, Error>, Vec<Body>) {
+    let (mut bodies, collisions) = scene(cubes);
+    let result = accelerator.step(&mut bodies, &collisions, &StepParameters::default());
+    (result, bodies)
+}
+
+pub(super) fn undisturbed(cubes: u32) -> Vec<u32> {
+    let (result, bodies) = step(&mut open(BoardConfig::default()).1, cubes);
+    result.expect("nothing disturbs it");
+    bits(&bodies)
+}
+
+#[test]
+fn a_step_stops_the_cubes_and_leaves_the_ground() {
+    let (board, mut accelerator) = open(BoardConfig::default());
+    let (result, bodies) = step(&mut accelerator, 5);
+    let report = result.expect("a good step");
+    assert_eq!(bits(&bodies[..1]), bits(&scene(5).0[..1]));
+    assert!(bodies[1..].iter().all(|body| body.velocity.linear[1] > -1.0));
+    assert!(report.impulse_sum.expect("counted") > 0.0);
+    assert_eq!(
+        report.cycles.total,
+        report.cycles.work + report.cycles.stalls + report.cycles.waits
+    );
+    drop(accelerator);
+    assert_eq!(board.violations(), []);
+}
+
+/// A step has megabytes, for which a line of a log has no use.
+#[test]
+fn what_an_accelerator_prints_for_debugging_is_no_longer_after_a_longer_step() {
+    let printed = |cubes| {
+        let (_, mut accelerator) = open(BoardConfig::default());
+        step(&mut accelerator, cubes).0.expect("a good step");
+        format!("{accelerator:?}")
+    };
+    let (short, long) = (printed(5), printed(500));
+    assert!(short.contains("emulated") && short.contains("collisions: 5,"), "{short}");
+    assert!(long.contains("collisions: 500,"), "{long}");
+    // Numbers have more digits there.
+    assert!(long.len() < short.len() + 100, "{} and {} characters", short.len(), long.len());
+}
+
+#[test]
+fn a_steady_step_costs_39_accesses_with_wide_addresses_and_31_with_narrow_ones() {
+    for (address_width, accesses) in [(40, 39), (32, 31)] {
+        let (board, mut accelerator) =
+            open(BoardConfig { address_width, ..BoardConfig::default() });
+        step(&mut accelerator, 9).0.expect("the first step");
+        for cubes in [8, 7, 9] {
+            let before = board.counts();
+            let report = step(&mut accelerator, cubes).0.expect("a later step");
+            let after = board.counts();
+            assert_eq!(report.register_reads, after.register_reads - before.register_reads);
+            assert_eq!(report.register_writes, after.register_writes - before.register_writes);
+            // B changes here beside C.
+            assert_eq!(report.register_reads + report.register_writes, accesses + 1);
+            assert_eq!((report.doorbells, report.interrupts), (9, 1));
+            assert_eq!(after.doorbells - before.doorbells, 9);
+            assert_eq!(after.interrupts - before.interrupts, 1);
+            assert_eq!(after.descriptors - before.descriptors, report.descriptors);
+            assert_eq!(report.descriptors, 4 * 10 + 4);
+            assert_eq!((after.beats_read - before.beats_read) * 16, report.bytes_to_device);
+            assert_eq!((after.beats_written - before.beats_written) * 16, report.bytes_from_device);
+        }
+    }
+}
+
+#[test]
+fn every_length_and_address_width_gives_the_same_bits() {
+    let expected = undisturbed(30);
+    for (length_width, address_width) in [(8, 32), (8, 64), (10, 40), (14, 36), (26, 32)] {
+        let (board, mut accelerator) =
+            open(BoardConfig { length_width, address_width, ..BoardConfig::default() });
+        for _ in 0..3 {
+            let (result, bodies) = step(&mut accelerator, 30);
+            result.unwrap_or_else(|error| panic!("{error}: {:?}", board.violations()));
+            assert_eq!(bits(&bodies), expected, "{length_width} {address_width}");
+        }
+    }
+}
+
+#[test]
+fn steps_of_any_size_follow_each_other() {
+    let (board, mut accelerator) = open(BoardConfig { length_width: 8, ..BoardConfig::default() });
+    for cubes in [1, 40, 3, 2, 90, 1, 91] {
+        let (result, bodies) = step(&mut accelerator, cubes);
+        result.unwrap_or_else(|error| panic!("{error}: {:?}", board.violations()));
+        assert_eq!(bits(&bodies), undisturbed(cubes), "{cubes} cubes");
+    }
+}
+
+#[test]
+fn bodies_without_collisions_and_collisions_without_passes_are_steps_too() {
+    let (_, mut accelerator) = open(BoardConfig::default());
+    let (mut bodies, collisions) = scene(1);
+    let none: [Collision; 0] = [];
+    let parameters = StepParameters::default();
+    // One body: two channels have no packet to send.
+    let mut one = vec![bodies[1]];
+    let report = accelerator.step(&mut one, &none[..], &parameters).expect("one body falls");
+    assert_eq!((report.doorbells, report.descriptors), (1 + 4 + 2, 4 + 4));
+    assert!(one[0].velocity.linear[1] < bodies[1].velocity.linear[1]);
+    let parameters = StepParameters {
+        contact_iterations: 0,
+        friction_iterations: 0,
+        integrate: false,
+        ..StepParameters::default()
+    };
+    let before = bits(&bodies);
+    accelerator.step(&mut bodies, &collisions, &parameters).expect("no passes");
+    assert_eq!(bits(&bodies), before, "nothing solved, nothing integrated");
+}
+
+/// Sixteen bits round the pose of a cube at 2.2 m; that of the caller is not theirs to change.
+#[test]
+fn without_integration_every_profile_leaves_the_poses_as_they_are() {
+    let parameters = StepParameters { integrate: false, ..StepParameters::default() };
+    for profile in PROFILES {
+        let (_, mut accelerator) = open(BoardConfig { profile, ..BoardConfig::default() });
+        let (mut bodies, collisions) = scene(3);
+        let before = bodies.clone();
+        accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
+        for (found, given) in bodies.iter().zip(&before) {
+            let bits =
+                |pose: Pose| (pose.position.map(f32::to_bits), pose.orientation.map(f32::to_bits));
+            assert_eq!(bits(found.pose), bits(given.pose), "{}", profile.name);
+        }
+        assert_ne!(bodies[1].velocity, before[1].velocity, "{}", profile.name);
+    }
+}
+
+/// The velocity in y with which a ball leaves a step that it enters with `speed`, where the distance of its
+/// contact with the ground stands for a velocity.
+fn after_contact(speed: f32, distance: f32) -> f32 {
+    let (_, mut accelerator) = open(BoardConfig::default());
+    let (mut bodies, mut collisions) = scene(1);
+    bodies[1].velocity = Velocity { linear: [0.0, speed, 0.0], angular: [0.0; 3] };
+    collisions[0].count = 1;
+    collisions[0].contacts[0] = Contact { point: [2.2, -0.01, 0.0], distance };
+    let mut parameters = StepParameters { integrate: false, ..StepParameters::default() };
+    parameters.position_drift = 0.0;
+    parameters.position_coefficient = parameters.time_step;
+    accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
+    bodies[1].velocity.linear[1]
+}
+
+#[test]
+fn a_distance_is_a_velocity_where_the_coefficient_is_the_time_step() {
+    for (speed, distance, expected) in [
+        // Pushed apart at least so fast.
+        (0.0, -2.0, 2.0),
+        (-7.0, -2.0, 2.0),
+        (5.0, -2.0, 5.0),
+        // It may approach so fast, and no faster.
+        (-7.0, 3.0, -3.0),
+        (-2.5, 3.0, -2.5),
+        (-7.0, 0.0, 0.0),
+    ] {
+        let found: f32 = after_contact(speed, distance);
+        assert!((found - expected).abs() < 1e-5, "{speed} {distance}: {found}");
+    }
+}
+
+#[test]
+fn refused_input_reaches_no_register() {
+    let (board, mut accelerator) = open(BoardConfig::default());
+    let before = board.counts();
+    let (mut bodies, mut collisions) = scene(3);
+    collisions[1].body_b = 4;
+    let as_before = bits(&bodies);
+    let error = accelerator
+        .step(&mut bodies, &collisions, &StepParameters::default())
+        .expect_err("there is no body 4");
+    assert!(error.is_input() && !error.may_retry() && !error.must_reopen());
+    assert!(accelerator.set_shapes(&[]).expect_err("no shapes").is_input());
+    let after = board.counts();
+    assert_eq!(after.register_reads, before.register_reads);
+    assert_eq!(after.register_writes, before.register_writes);
+    assert_eq!(bits(&bodies), as_before);
+}
+
+/// Provokes a fault in a step, and checks that it changes nothing and that the next step is as if
+/// it had not been.
+fn survives(injected: Injected, seen: impl Fn(&Fault) -> bool) {
+    let (board, mut accelerator) = open(BoardConfig::default());
+    step(&mut accelerator, 20).0.expect("before the fault");
+    board.inject(injected);
+    let (result, bodies) = step(&mut accelerator, 20);
+    let error = result.expect_err("a fault");
+    let Error::Step { fault, aftermath, .. } = &error else { panic!("{error}") };
+    assert!(seen(fault), "{fault}");
+    assert_eq!(*aftermath, Aftermath::Ready, "{fault}");
+    assert!(error.may_retry());
+    assert_eq!(bits(&bodies), bits(&scene(20).0), "the bodies are as they were");
+    for _ in 0..2 {
+        let (result, bodies) = step(&mut accelerator, 20);
+        result.unwrap_or_else(|error| panic!("{error}: {:?}", board.violations()));
+        assert_eq!(bits(&bodies), undisturbed(20), "after {injected:?}");
+    }
+    drop(accelerator);
+    assert_eq!(board.violations(), [], "after {injected:?}");
+}
+
+/// The driver's word for a direction.
+fn way_of(direction: Direction) -> Way {
+    match direction {
+        Direction::Mm2s => Way::Mm2s,
+        Direction::S2mm => Way::S2mm,
+    }
+}
+
+const BOTH: [Direction; 2] = [Direction::Mm2s, Direction::S2mm];
+
+#[test]
+fn a_decode_error_on_any_channel_is_told_by_name_and_survived() {
+    for core in 0..4 {
+        for direction in BOTH {
+            survives(Injected::new(FaultKind::DmaDecErr).on(core, direction), |fault| {
+                let Fault::DmaDecode(at) = fault else { return false };
+                (at.channel.core, at.channel.direction) == (core, way_of(direction))
+                    && at.descriptor.is_some_and(|descriptor| descriptor.status.failed())
+            });
+        }
+    }
+}
+
+#[test]
+fn a_channel_that_stalls_for_ever_ends_at_the_deadline() {
+    for core in 0..4 {
+        for direction in BOTH {
+            survives(Injected::new(FaultKind::Stall).on(core, direction), |fault| {
+                matches!(fault, Fault::Deadline { awaited: Awaited::Results, .. })
+            });
+        }
+    }
+}
+
+#[test]
+fn every_sticky_error_of_the_accelerator_is_decoded_and_survived() {
+    for code in ErrorCode::ALL {
+        survives(
+            Injected::new(FaultKind::AcceleratorError { code }),
+            |fault| matches!(fault, Fault::Accelerator(error) if error.code == Some(code)),
+        );
+    }
+}
+
+/// The emulated board behind bad wiring.
+#[derive(Debug)]
+pub(super) struct BadlyWired {
+    inner: EmulatedPlatform,
+    /// Interrupts never arrive.
+    deaf: AtomicBool,
+    /// Waits for the interrupt until the caller cancels in the middle of one; 0 for never.
+    pub(super) cancel_at: AtomicU32,
+    pub(super) cancellation: Cancellation,
+    /// Flips this bit of the first word of the next buffer that goes to, or comes from, the device.
+    flip_going: AtomicU32,
+    flip_coming: AtomicU32,
+    /// Every register write: region (the control block is 4), offset. Memory that is allocated or
+    /// handed over is region 5.
+    pub(super) writes: Writes,
+}
+
+/// The region that stands for memory.
+pub(super) const MEMORY: usize = 5;
+
+type Writes = Arc<Mutex<Vec<(usize, u32)>>>;
+
+/// A register region that notes what is written.
+#[derive(Debug)]
+struct Noted {
+    inner: Box<dyn RegisterWindow>,
+    region: usize,
+    writes: Writes,
+}
+
+impl RegisterWindow for Noted {
+    fn bytes(&self) -> u64 {
+        self.inner.bytes()
+    }
+
+    fn read32(&self, at: u32) -> u32 {
+        self.inner.read32(at)
+    }
+
+    fn write32(&self, at: u32, value: u32) {
+        self.writes.lock().expect("no test panics with the lock").push((self.region, at));
+        self.inner.write32(at, value);
+    }
+}
+
+impl BadlyWired {
+    fn note_memory(&self) {
+        self.writes.lock().expect("no test panics with the lock").push((MEMORY, 0));
+    }
+
+    pub(super) fn new(board: &EmulatedBoard) -> Arc<Self> {
+        Arc::new(Self {
+            inner: EmulatedPlatform::new(board.cpu_port()),
+            deaf: AtomicBool::default(),
+            cancel_at: AtomicU32::default(),
+            cancellation: Cancellation::new(),
+            flip_going: AtomicU32::default(),
+            flip_coming: AtomicU32::default(),
+            writes: Writes::default(),
+        })
+    }
+
+    pub(super) fn open(self: &Arc<Self>) -> Accelerator {
+        let description = BoardDescription {
+            kind: BoardKind::Emulated,
+            name: "badly wired".to_owned(),
+            reason: "a test".to_owned(),
+        };
+        let platform: Arc<dyn Platform> = Arc::clone(self) as _;
+        let mut accelerator =
+            Accelerator::on(Found { platform, description }, None).expect("a board that opens");
+        accelerator
+            .set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)])
+            .expect("shapes that fit");
+        accelerator
+    }
+}
+
+impl Platform for BadlyWired {
+    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let (inner, writes) = (self.inner.dma_window(core)?, Arc::clone(&self.writes));
+        Ok(Box::new(Noted { inner, region: core, writes }))
+    }
+
+    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let (inner, writes) = (self.inner.control_window()?, Arc::clone(&self.writes));
+        Ok(Box::new(Noted { inner, region: 4, writes }))
+    }
+
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+        self.note_memory();
+        self.inner.allocate(beats)
+    }
+
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+        self.note_memory();
+        self.inner.allocate_shared(words)
+    }
+
+    fn hand_over(
+        &self,
+        address: u64,
+        mut memory: DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        if access == Access::Read {
+            memory.beats_mut()[0].0[0] ^= self.flip_going.swap(0, Ordering::Relaxed);
+        }
+        self.note_memory();
+        self.inner.hand_over(address, memory, used, access)
+    }
+
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+        let mut memory = self.inner.take_back(address)?;
+        memory.beats_mut()[0].0[0] ^= self.flip_coming.swap(0, Ordering::Relaxed);
+        Ok(memory)
+    }
+
+    fn release(&self, address: u64) -> Result<(), PlatformError> {
+        self.inner.release(address)
+    }
+
+    fn now(&self) -> Duration {
+        self.inner.now()
+    }
+
+    fn pause(&self, duration: Duration) {
+        self.inner.pause(duration);
+    }
+
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+        let waits = self.cancel_at.load(Ordering::Relaxed);
+        if waits > 0 {
+            self.cancel_at.store(waits - 1, Ordering::Relaxed);
+            if waits == 1 {
+                self.cancellation.cancel();
+            }
+        }
+        if !self.deaf.load(Ordering::Relaxed) {
+            return self.inner.wait_interrupt(timeout);
+        }
+        self.inner.pause(timeout);
+        Ok(None)
+    }
+
+    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+        self.inner.unmask_interrupt()
+    }
+}
+
+#[test]
+fn without_interrupts_steps_are_found_by_looking_and_soon_more_often() {
+    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+    let wired = BadlyWired::new(&board);
+    let mut accelerator = wired.open();
+    wired.deaf.store(true, Ordering::Relaxed);
+    let mut times = Vec::new();
+    for _ in 0..4 {
+        let before = wired.now();
+        let (result, bodies) = step(&mut accelerator, 20);
+        assert_eq!(result.expect("found by looking").interrupts, 0);
+        assert_eq!(bits(&bodies), undisturbed(20));
+        times.push(wired.now() - before);
+    }
+    // At first one polling interval, then no longer relying on the interrupt.
+    assert!(times[0] >= Duration::from_millis(10) && times[0] < Duration::from_millis(12));
+    assert!(times[3] < Duration::from_millis(2), "{times:?}");
+    // The interrupt comes back: relied on again.
+    wired.deaf.store(false, Ordering::Relaxed);
+    step(&mut accelerator, 20).0.expect("a step");
+    let report = step(&mut accelerator, 20).0.expect("a step");
+    assert_eq!((report.interrupts, report.register_reads + report.register_writes), (1, 38));
+    assert_eq!(board.violations(), []);
+}
+
+#[test]
+fn receivers_start_before_the_accelerator_and_it_before_the_senders() {
+    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+    let wired = BadlyWired::new(&board);
+    let mut accelerator = wired.open();
+    step(&mut accelerator, 20).0.expect("the first step");
+    wired.writes.lock().expect("unpoisoned").clear();
+    step(&mut accelerator, 20).0.expect("a step");
+    // Low word, then the upper word, which starts; last the acknowledgement of the completion.
+    let tails = |low, high| (0..4).flat_map(move |core| [(core, low), (core, high)]);
+    let expected: Vec<_> =
+        tails(0x40, 0x44).chain([(4, 0x00)]).chain(tails(0x10, 0x14)).chain([(3, 0x34)]).collect();
+    let mut writes = wired.writes.lock().expect("unpoisoned").clone();
+    writes.retain(|(region, _)| *region != MEMORY);
+    assert_eq!(writes, expected);
+}
+
+#[test]
+fn a_bit_that_flips_on_the_way_is_found_by_the_sums() {
+    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+    let wired = BadlyWired::new(&board);
+    let mut accelerator = wired.open();
+    for (flip, way) in [(&wired.flip_going, Way::Mm2s), (&wired.flip_coming, Way::S2mm)] {
+        flip.store(1 << 4, Ordering::Relaxed);
+        let (result, bodies) = step(&mut accelerator, 20);
+        let error = result.expect_err("a flipped bit");
+        let Error::Step { fault, .. } = &error else { panic!("{error}") };
+        assert!(
+            matches!(**fault, Fault::Checksum { direction, .. } if direction == way),
+            "{fault}"
+        );
+        assert!(error.may_retry());
+        assert_eq!(bits(&bodies), bits(&scene(20).0));
+        let (result, bodies) = step(&mut accelerator, 20);
+        result.expect("the next step is undisturbed");
+        assert_eq!(bits(&bodies), undisturbed(20));
+    }
+}
+
+#[test]
+fn a_scene_that_diverges_is_refused_with_the_body_and_needs_no_reset() {
+    let (board, mut accelerator) = open(BoardConfig::default());
+    let (mut bodies, collisions) = scene(4);
+    bodies[3].velocity.angular = [3.0e38, 3.0e38, -3.0e38];
+    bodies[3].velocity.linear = [3.0e38, -3.0e38, 3.0e38];
+    let before = bits(&bodies);
+    let error = accelerator
+        .step(&mut bodies, &collisions, &StepParameters::default())
+        .expect_err("beyond f32");
+    let Error::Step { fault, aftermath: Aftermath::Untouched, .. } = &error else {
+        panic!("{error}")
+    };
+    assert!(matches!(**fault, Fault::NotFinite { body: 3 }), "{fault}");
+    assert!(!error.may_retry() && !error.must_reopen());
+    assert_eq!(bits(&bodies), before);
+    let (result, bodies) = step(&mut accelerator, 4);
+    result.expect("the next step");
+    assert_eq!(bits(&bodies), undisturbed(4));
+    assert_eq!(board.violations(), []);
+}
+
+#[test]
+fn a_board_that_is_no_board_any_more_must_be_opened_again() {
+    let (board, mut accelerator) = open(BoardConfig::default());
+    // The strict board goes dead after an access that no register answers.
+    let port = board.cpu_port();
+    port.write32(0xA004_0FF0, 1);
+    assert_eq!(board.violations().len(), 1);
+    let (result, bodies) = step(&mut accelerator, 3);
+    let error = result.expect_err("all ones");
+    assert!(error.must_reopen() && !error.may_retry(), "{error}");
+    assert_eq!(bits(&bodies), bits(&scene(3).0));
+    assert!(matches!(step(&mut accelerator, 3).0, Err(Error::MustReopen)));
+    assert!(matches!(accelerator.set_shapes(&[Shape::STATIC]), Err(Error::MustReopen)));
+    let again = Accelerator::open(options(&board)).expect_err("still dead");
+    assert!(matches!(again, Error::Open(OpenError::Identity(_))), "{again}");
+}
+
+#[test]
+fn a_deadline_that_is_too_short_says_what_was_awaited() {
+    let (_, mut accelerator) = open(BoardConfig::default());
+    let (mut bodies, collisions) = scene(20);
+    let deadline = Some(Duration::from_nanos(1));
+    let parameters = StepParameters { deadline, ..StepParameters::default() };
+    let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("no time");
+    let Error::Step { fault, .. } = &error else { panic!("{error}") };
+    let text = fault.to_string();
+    assert!(matches!(**fault, Fault::Deadline { .. }), "{text}");
+    let diagnosis = error.diagnosis().expect("the board has a part in it");
+    assert_eq!(diagnosis.channels.len(), 8);
+    assert!(diagnosis.elapsed >= Duration::from_nanos(1), "{:?}", diagnosis.elapsed);
+    assert_eq!(bits(&bodies), bits(&scene(20).0));
+    let (result, bodies) = step(&mut accelerator, 20);
+    result.expect("the next step has time");
+    assert_eq!(bits(&bodies), undisturbed(20));
+}
+
+#[test]
+fn a_length_width_that_the_cores_do_not_have_is_refused() {
+    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+    let open =
+        |length_width| Accelerator::open(OpenOptions { length_width, ..options(&board) }).map(drop);
+    let error = open(Some(14)).expect_err("the cores have 26 bits");
+    assert!(
+        matches!(
+            error,
+            Error::Open(OpenError::Core(crate::DmaError::LengthWidth {
+                expected: 14,
+                found: 26,
+                ..
+            }))
+        ),
+        "{error}"
+    );
+    assert!(matches!(open(Some(7)), Err(Error::Open(OpenError::LengthWidth { found: 7, .. }))));
+    open(Some(26)).expect("the right width");
+    open(None).expect("the width that the bitstream says");
+    assert_eq!(board.violations(), []);
+}
+
+#[test]
+fn cores_without_scatter_gather_are_refused() {
+    let config = BoardConfig { scatter_gather: false, ..BoardConfig::default() };
+    let board = EmulatedBoard::new(config).expect("a board that can be built");
+    let error = Accelerator::open(options(&board)).expect_err("direct mode only");
+    assert!(
+        matches!(error, Error::Open(OpenError::Core(crate::DmaError::NoScatterGather { .. }))),
+        "{error}"
+    );
+}

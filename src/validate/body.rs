@@ -1,0 +1,229 @@
+//! This file refuses bodies that cannot be solved.
+
+use pgs_interface::number::StreamFormat;
+use pgs_interface::profile::Variant;
+
+use super::InputError;
+use super::range::Held;
+use super::{Scene, all_within, first};
+use crate::scene::Body;
+
+const LINEAR: &str = "linear velocity";
+const ANGULAR: &str = "angular velocity";
+
+/// What of one body a step refuses.
+#[inline]
+pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result<(), InputError> {
+    for (field, values, format) in fields(body, &scene.held) {
+        if !all_within(values, format.largest()) {
+            return Err(number_refused(index, body, (field, values, format), scene));
+        }
+    }
+    let [x, y, z, w] = body.pose.orientation;
+    let length = (x * x + y * y + z * z + w * w).sqrt();
+    if !(InputError::SHORTEST_ORIENTATION..=f32::MAX).contains(&length) {
+        return Err(InputError::Orientation { body: index, length });
+    }
+    let Some(shape) = scene.shapes.get(shape_of(body)) else {
+        let shapes = scene.shapes.len();
+        return Err(InputError::ShapeIndex { body: index, found: body.shape, shapes });
+    };
+    if shape.is_static() {
+        for (field, values) in [(LINEAR, body.velocity.linear), (ANGULAR, body.velocity.angular)] {
+            if values.iter().any(|value| *value != 0.0) {
+                let (component, found) = first(&values, |value| value != 0.0);
+                return Err(InputError::StaticBodyMoves { body: index, field, component, found });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Numbers of a body: name, values, format.
+type Field<'a> = (&'static str, &'a [f32], StreamFormat);
+
+/// The numbers of a body that are streamed.
+#[inline]
+fn fields<'a>(body: &'a Body, held: &Held) -> [Field<'a>; 4] {
+    [
+        ("position", &body.pose.position, held.poses),
+        ("orientation", &body.pose.orientation, held.poses),
+        (LINEAR, &body.velocity.linear, held.velocities),
+        (ANGULAR, &body.velocity.angular, held.velocities),
+    ]
+}
+
+/// Names the number of a field that is known not to be finite or to be out of range.
+#[cold]
+fn number_refused(
+    index: usize,
+    body: &Body,
+    (field, values, format): Field<'_>,
+    scene: &Scene<'_>,
+) -> InputError {
+    if !all_within(values, f32::MAX) {
+        let (component, found) = first(values, |value| !value.is_finite());
+        return InputError::BodyNotFinite { body: index, field, component, found };
+    }
+    let limit = format.largest();
+    let (component, found) = first(values, |value| value.abs() > limit);
+    let carriers = scene.demand.carriers(|variant: &Variant| {
+        let fields = fields(body, &Held::by(&variant.numbers));
+        fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
+    });
+    InputError::BodyOutOfRange { body: index, field, component, found, format, limit, carriers }
+}
+
+/// A body's shape as an index; an index that this machine cannot address is in no table.
+pub(crate) fn shape_of(body: &Body) -> usize {
+    usize::try_from(body.shape).unwrap_or(usize::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Pose, Shape, Velocity};
+    use crate::validate::Demand;
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
+
+    const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+    const MOVING: Body = Body {
+        pose: Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] },
+        velocity: Velocity { linear: [4.0, 5.0, 6.0], angular: [7.0, 8.0, 9.0] },
+        shape: 1,
+    };
+
+    fn check_on(profile: &'static Profile, body: &Body) -> Result<(), InputError> {
+        let demand = Demand { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
+        let variant = &profile.default_variant();
+        let held = Held::by(&variant.numbers);
+        let scene = Scene { shapes: &SHAPES, demand, variant, held, flush_subnormals: false };
+        check_body(7, body, &scene)
+    }
+
+    fn check(body: &Body) -> Result<(), InputError> {
+        check_on(&FLOAT, body)
+    }
+
+    fn refused(body: &Body) -> InputError {
+        check(body).expect_err("a body to be refused")
+    }
+
+    #[test]
+    fn numbers_beyond_the_format_are_refused_on_streams_of_sixteen_bits_alone() {
+        let edge = [65_504.0, -65_504.0, 0.0];
+        let mut body = Body { velocity: Velocity { linear: edge, angular: edge }, ..MOVING };
+        body.pose.position = edge;
+        assert_eq!(check_on(&HALF, &body), Ok(()));
+        body.velocity.angular[1] = -65_504.0_f32.next_up();
+        assert_eq!(check_on(&MIXED, &body), Ok(()), "bodies are f32 there");
+        let refused = check_on(&HALF, &body).expect_err("beyond binary16");
+        assert!(
+            matches!(
+                refused,
+                InputError::BodyOutOfRange {
+                    body: 7,
+                    field: "angular velocity",
+                    component: 1,
+                    format: StreamFormat::Binary16,
+                    ..
+                }
+            ),
+            "{refused}"
+        );
+        assert_eq!(
+            refused.to_string(),
+            "body 7: angular velocity[1] is -65504.004, but this bitstream holds bodies in \
+             binary16, which ends at 65504: bring it into range, or load another (profiles that \
+             could: naive, float, mixed, windowed)"
+        );
+        body.velocity.angular[1] = f32::NAN;
+        let refused = check_on(&HALF, &body).expect_err("no number");
+        assert!(matches!(refused, InputError::BodyNotFinite { component: 1, .. }), "{refused}");
+    }
+
+    #[test]
+    fn moving_and_resting_bodies_are_accepted() {
+        assert_eq!(check(&MOVING), Ok(()));
+        let zero = Velocity { linear: [0.0, -0.0, 0.0], angular: [-0.0; 3] };
+        assert_eq!(check(&Body { velocity: zero, shape: 0, ..MOVING }), Ok(()));
+    }
+
+    #[test]
+    fn every_number_that_is_not_finite_is_refused() {
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let names = |body: Body, name: &str, index: usize| {
+                assert!(
+                    matches!(
+                        refused(&body),
+                        InputError::BodyNotFinite { body: 7, field, component, found }
+                            if (field, component) == (name, index)
+                                && found.to_bits() == value.to_bits()
+                    ),
+                    "{name}[{index}] {value}"
+                );
+            };
+            for component in 0..3 {
+                let mut body = MOVING;
+                body.pose.position[component] = value;
+                names(body, "position", component);
+                let mut body = MOVING;
+                body.velocity.linear[component] = value;
+                names(body, "linear velocity", component);
+                let mut body = MOVING;
+                body.velocity.angular[component] = value;
+                names(body, "angular velocity", component);
+            }
+            for component in 0..4 {
+                let mut body = MOVING;
+                body.pose.orientation[component] = value;
+                names(body, "orientation", component);
+            }
+        }
+    }
+
+    #[test]
+    fn an_orientation_that_cannot_be_normalised_is_refused() {
+        for (value, expected) in [(0.0, 0.0), (9e-7, 9e-7), (3e38, f32::INFINITY)] {
+            let mut body = MOVING;
+            body.pose.orientation = [0.0, 0.0, value, 0.0];
+            assert!(
+                matches!(
+                    refused(&body),
+                    InputError::Orientation { body: 7, length }
+                        if (length - expected).abs() <= 1e-9 || length.is_infinite()
+                            && expected.is_infinite()
+                ),
+                "{value}"
+            );
+        }
+        let mut body = MOVING;
+        body.pose.orientation = [0.0, 0.0, 0.0, -2e-6];
+        assert_eq!(check(&body), Ok(()));
+    }
+
+    #[test]
+    fn a_static_body_that_moves_is_refused() {
+        let moves = |field, component, found| InputError::StaticBodyMoves {
+            body: 7,
+            field,
+            component,
+            found,
+        };
+        let mut body = Body { velocity: Velocity::default(), shape: 0, ..MOVING };
+        body.velocity.angular[0] = 1e-40;
+        assert_eq!(refused(&body), moves("angular velocity", 0, 1e-40));
+        body.velocity.linear[2] = -1.0;
+        assert_eq!(refused(&body), moves("linear velocity", 2, -1.0));
+    }
+
+    #[test]
+    fn a_shape_outside_the_table_is_refused() {
+        for found in [2, u32::MAX] {
+            assert_eq!(
+                refused(&Body { shape: found, ..MOVING }),
+                InputError::ShapeIndex { body: 7, found, shapes: 2 }
+            );
+        }
+    }
+}

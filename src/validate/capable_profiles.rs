@@ -1,0 +1,126 @@
+//! This file finds the profiles that could carry what a bitstream has to refuse.
+
+use std::fmt;
+
+use pgs_interface::profile::{Inertia, PROFILES, Profile, Variant};
+
+/// The profiles, as they are built unless other formats are chosen, that could carry what was
+/// refused, in a scene of as many bodies and collisions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Carriers {
+    /// Bit k is profile k of the table.
+    profiles: u32,
+    inertia: Inertia,
+}
+
+const _: () = assert!(PROFILES.len() <= u32::BITS as usize);
+
+impl Carriers {
+    /// These profiles, in the order of the table.
+    pub fn profiles(&self) -> impl Iterator<Item = &'static Profile> {
+        let bits = self.profiles;
+        (0..).zip(PROFILES).filter(move |(at, _)| bits >> at & 1 != 0).map(|(_, profile)| *profile)
+    }
+
+    /// How they must be built to know the inertia of the scene's bodies.
+    #[must_use]
+    pub const fn inertia(&self) -> Inertia {
+        self.inertia
+    }
+}
+
+impl fmt::Display for Carriers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let built = match self.inertia {
+            Inertia::Isotropic => "",
+            Inertia::World => ", built with world inertia",
+        };
+        if self.profiles == 0 {
+            return write!(f, "no profile could{built}");
+        }
+        write!(f, "profiles that could{built}")?;
+        for (place, profile) in self.profiles().enumerate() {
+            let separator = if place == 0 { ": " } else { ", " };
+            write!(f, "{separator}{}", profile.name)?;
+        }
+        Ok(())
+    }
+}
+
+/// What a scene asks of any bitstream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Demand {
+    /// Number of bodies.
+    pub(crate) bodies: usize,
+    /// Number of collisions.
+    pub(crate) collisions: usize,
+    /// The least that its shapes need.
+    pub(crate) inertia: Inertia,
+}
+
+impl Demand {
+    /// The profiles that have room for the scene and fulfil a condition.
+    #[cold]
+    pub(crate) fn carriers(&self, can: impl Fn(&Variant) -> bool) -> Carriers {
+        let mut profiles = 0;
+        for (at, profile) in PROFILES.iter().enumerate() {
+            let variant = Variant { inertia: self.inertia, ..profile.default_variant() };
+            profiles |= u32::from(self.has_room(&variant) && can(&variant)) << at;
+        }
+        Carriers { profiles, inertia: self.inertia }
+    }
+
+    /// Whether the on-chip memory of a bitstream takes the scene.
+    pub(crate) fn has_room(&self, variant: &Variant) -> bool {
+        let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
+        let needed = bytes(self.bodies, variant.bytes_per_body())
+            .saturating_add(bytes(self.collisions, variant.bytes_per_collision()));
+        self.bodies as u64 <= u64::from(variant.body_capacity())
+            && needed <= u64::from(variant.profile.memory.bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(demand: Demand, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
+        demand.carriers(can).profiles().map(|profile| profile.name).collect()
+    }
+
+    const SMALL: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+
+    #[test]
+    fn profiles_are_named_in_the_order_of_the_table() {
+        let all = ["naive", "float", "half", "mixed", "windowed", "windowed16"];
+        assert_eq!(names(SMALL, |_| true), all);
+        let text = SMALL.carriers(|variant| variant.profile.name != "half").to_string();
+        assert_eq!(text, "profiles that could: naive, float, mixed, windowed, windowed16");
+        assert_eq!(SMALL.carriers(|_| false).to_string(), "no profile could");
+        let world = Demand { inertia: Inertia::World, ..SMALL };
+        let text = world.carriers(|variant| variant.profile.id == 1).to_string();
+        assert_eq!(text, "profiles that could, built with world inertia: float");
+        assert_eq!(
+            world.carriers(|_| false).to_string(),
+            "no profile could, built with world inertia"
+        );
+    }
+
+    #[test]
+    fn a_profile_without_room_for_the_scene_is_left_out() {
+        // 16-bit indices end at 65,535. What keeps no more than is alive has room for any number.
+        let bodies = |bodies| Demand { bodies, ..SMALL };
+        assert_eq!(names(bodies(65_536), |_| true).len(), 6);
+        let windowed = ["windowed", "windowed16"];
+        assert_eq!(names(bodies(65_537), |_| true), [["naive", "float"], windowed].concat());
+        assert_eq!(names(bodies(131_073), |_| true), windowed);
+        assert_eq!(names(bodies(1_048_577), |_| true), [""; 0]);
+        // 4 MiB: 16 bytes a collision in f32, 8 in half.
+        let collisions = |collisions| Demand { collisions, ..SMALL };
+        let and_half = ["half", "windowed", "windowed16"];
+        assert_eq!(names(collisions(300_000), |_| true), and_half);
+        // 48 bytes a body with world inertia in f32, 36 in half.
+        let world = Demand { bodies: 60_000, collisions: 100_000, inertia: Inertia::World };
+        assert_eq!(names(world, |_| true), and_half);
+    }
+}

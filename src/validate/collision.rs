@@ -1,0 +1,212 @@
+//! This file refuses collisions that cannot be solved.
+
+use super::InputError;
+use super::{all_within, first};
+use crate::scene::{CONTACT_POINTS, Collision, Contact};
+
+/// Checks what a collision says by itself; returns the indices of its two bodies.
+#[inline]
+pub(crate) fn check_collision(
+    index: usize,
+    collision: &Collision,
+    bodies: usize,
+) -> Result<(usize, usize), InputError> {
+    let body = |side: char, found: u32| match usize::try_from(found) {
+        Ok(body) if body < bodies => Ok(body),
+        _ => Err(InputError::BodyIndex { collision: index, side, found, bodies }),
+    };
+    let pair = (body('A', collision.body_a)?, body('B', collision.body_b)?);
+    if pair.0 == pair.1 {
+        return Err(InputError::SelfCollision { collision: index, body: collision.body_a });
+    }
+    let count = match usize::try_from(collision.count) {
+        Ok(count @ 1..=CONTACT_POINTS) => count,
+        _ => {
+            return Err(InputError::ContactCount { collision: index, found: collision.count });
+        }
+    };
+    if !all_within(&collision.normal, f32::MAX) {
+        let (component, found) = first(&collision.normal, |value| !value.is_finite());
+        return Err(InputError::NormalNotFinite { collision: index, component, found });
+    }
+    let [x, y, z] = collision.normal;
+    let length = (x * x + y * y + z * z).sqrt();
+    if (length - 1.0).abs() > InputError::NORMAL_TOLERANCE {
+        return Err(normal_length(index, collision.normal));
+    }
+    // All four points without a branch: counts follow no pattern that could be predicted.
+    let mut finite = true;
+    for (ordinal, Contact { point, distance }) in collision.contacts.iter().enumerate() {
+        finite &= (all_within(point, f32::MAX) & distance.is_finite()) | (ordinal >= count);
+    }
+    if !finite {
+        return Err(contact_not_finite(index, &collision.contacts[..count]));
+    }
+    Ok(pair)
+}
+
+/// Says what is wrong with the length of a normal.
+#[cold]
+fn normal_length(collision: usize, normal: [f32; 3]) -> InputError {
+    // The squares of small numbers are 0 in f32, and those of large ones infinite.
+    let [x, y, z] = normal.map(f64::from);
+    let length = (x * x + y * y + z * z).sqrt();
+    if length == 0.0 {
+        return InputError::NormalZero { collision };
+    }
+    #[allow(clippy::cast_possible_truncation, reason = "it is rounded, to infinity if need be")]
+    let length = length as f32;
+    InputError::NormalLength { collision, length }
+}
+
+/// Names the number of these contact points that is known not to be finite. A refusal stands even if
+/// none is found.
+#[cold]
+fn contact_not_finite(collision: usize, contacts: &[Contact]) -> InputError {
+    let mut values =
+        contacts.iter().enumerate().flat_map(|(contact, Contact { point, distance })| {
+            let [x, y, z] = *point;
+            [("point", 0, x), ("point", 1, y), ("point", 2, z), ("distance", 0, *distance)]
+                .map(|(field, component, found)| (contact, field, component, found))
+        });
+    let (contact, field, component, found) =
+        values.find(|(.., found)| !found.is_finite()).unwrap_or((0, "point", 0, f32::NAN));
+    InputError::ContactNotFinite { collision, contact, field, component, found }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
+    const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
+    const COLLISION: Collision = Collision {
+        body_a: 2,
+        body_b: 0,
+        normal: [0.0, -1.0, 0.0],
+        count: 3,
+        contacts: [USED, USED, USED, UNUSED],
+    };
+
+    fn refused(collision: &Collision) -> InputError {
+        check_collision(5, collision, 3).expect_err("a collision to be refused")
+    }
+
+    #[test]
+    fn a_refusal_that_finds_no_culprit_is_a_refusal_still() {
+        let InputError::ContactNotFinite { collision: 5, contact: 0, field, .. } =
+            contact_not_finite(5, &[USED])
+        else {
+            panic!("the contact points were refused")
+        };
+        assert_eq!(field, "point");
+        let (index, found) = first(&[1.0, 2.0], |value| value > 2.0);
+        assert!(index == 0 && found.is_nan());
+    }
+
+    #[test]
+    fn what_an_unused_contact_point_holds_does_not_matter() {
+        assert_eq!(check_collision(0, &COLLISION, 3), Ok((2, 0)));
+    }
+
+    #[test]
+    fn a_body_that_does_not_exist_is_refused() {
+        for found in [3, u32::MAX] {
+            assert_eq!(
+                refused(&Collision { body_a: found, ..COLLISION }),
+                InputError::BodyIndex { collision: 5, side: 'A', found, bodies: 3 }
+            );
+            assert_eq!(
+                refused(&Collision { body_b: found, ..COLLISION }),
+                InputError::BodyIndex { collision: 5, side: 'B', found, bodies: 3 }
+            );
+        }
+    }
+
+    #[test]
+    fn a_body_against_itself_is_refused() {
+        assert_eq!(
+            refused(&Collision { body_b: 2, ..COLLISION }),
+            InputError::SelfCollision { collision: 5, body: 2 }
+        );
+    }
+
+    #[test]
+    fn counts_other_than_one_to_four_are_refused() {
+        let contacts = [USED; 4];
+        for count in 1..=4 {
+            let collision = Collision { count, contacts, ..COLLISION };
+            assert_eq!(check_collision(5, &collision, 3), Ok((2, 0)));
+        }
+        for found in [0, 5, u32::MAX] {
+            assert_eq!(
+                refused(&Collision { count: found, contacts, ..COLLISION }),
+                InputError::ContactCount { collision: 5, found }
+            );
+        }
+    }
+
+    #[test]
+    fn a_normal_that_is_not_finite_is_refused() {
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for axis in 0..3 {
+                let mut collision = COLLISION;
+                collision.normal[axis] = value;
+                assert!(matches!(
+                    refused(&collision),
+                    InputError::NormalNotFinite { collision: 5, component, found }
+                        if component == axis && found.to_bits() == value.to_bits()
+                ));
+            }
+        }
+    }
+
+    #[test]
+    fn a_normal_off_unit_length_is_refused() {
+        for length in [1e-30, 0.998_9, 1.001_1, 2.0, 2e20] {
+            assert_eq!(
+                refused(&Collision { normal: [0.0, -length, 0.0], ..COLLISION }),
+                InputError::NormalLength { collision: 5, length }
+            );
+        }
+        let zero = Collision { normal: [0.0, -0.0, 0.0], ..COLLISION };
+        assert_eq!(refused(&zero), InputError::NormalZero { collision: 5 });
+        let overflows = Collision { normal: [3e38; 3], ..COLLISION };
+        assert_eq!(
+            refused(&overflows),
+            InputError::NormalLength { collision: 5, length: f32::INFINITY }
+        );
+        for length in [0.999_1, 1.000_9] {
+            let collision = Collision { normal: [0.0, 0.0, length], ..COLLISION };
+            assert_eq!(check_collision(5, &collision, 3), Ok((2, 0)));
+        }
+    }
+
+    #[test]
+    fn every_number_of_a_used_contact_point_that_is_not_finite_is_refused() {
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for slot in 0..3 {
+                let check = |collision: Collision, name: &str, index: usize| {
+                    assert!(
+                        matches!(
+                            refused(&collision),
+                            InputError::ContactNotFinite {
+                                collision: 5, contact, field, component, found,
+                            } if (contact, field, component) == (slot, name, index)
+                                && found.to_bits() == value.to_bits()
+                        ),
+                        "{slot} {name}[{index}] {value}"
+                    );
+                };
+                for axis in 0..3 {
+                    let mut collision = COLLISION;
+                    collision.contacts[slot].point[axis] = value;
+                    check(collision, "point", axis);
+                }
+                let mut collision = COLLISION;
+                collision.contacts[slot].distance = value;
+                check(collision, "distance", 0);
+            }
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! This file looks at the collisions of a block, one after the other, while their records are made.
+
+use pgs_interface::number::StreamFormat;
+
+use super::quick::{Block, OFF_UNIT, Quick};
+use super::reach::{Furthest, Locations, Reach};
+use crate::beat::pack::source::Lying;
+use crate::record::body_table::{End, Lookup};
+use crate::record::{Counted, FULL, alone, body_words, normal_and_count};
+use crate::simd::Lanes;
+
+/// Bits that a count less one has none of.
+const BEYOND_COUNTS: u32 = !(FULL - 1);
+const _: () = assert!(FULL.is_power_of_two());
+
+/// Bounds on the square of a normal's length, as bits.
+const SHORTEST: u32 = (1.0 - OFF_UNIT).to_bits();
+const LONGEST: u32 = (1.0 + OFF_UNIT).to_bits();
+
+// What is no longer than that is no number beyond what a stream holds, either.
+const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Binary16.largest());
+const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Thesis16.largest());
+
+/// A word in the last lane.
+#[inline(always)]
+fn in_last(word: u32) -> Lanes {
+    Lanes::new([0, 0, 0, word])
+}
+
+/// What has been seen of the collisions of a block.
+///
+/// Nothing is decided of any before the end: bits gather. `REACHES` says whether it matters how far they reach.
+#[derive(Clone, Copy)]
+pub(crate) struct Look<const REACHES: bool> {
+    /// The top bit where both bodies are the same.
+    alike: u32,
+    /// Of the indices of bodies A and B, in the first two words.
+    named: Lanes,
+    /// Of counts less one, in the last word.
+    counts: Lanes,
+    /// Of the tags of all ends.
+    tags: Lanes,
+    /// The top bit of the last word where both bodies are static or the length of a normal is wrong.
+    wrong: Lanes,
+    /// The top bits where a number may be beyond what the stream holds.
+    beyond: Lanes,
+    /// What it holds.
+    limit: Lanes,
+    furthest: Furthest,
+}
+
+impl<const REACHES: bool> Look<REACHES> {
+    /// At none yet.
+    #[inline(always)]
+    pub(crate) fn new(quick: &Quick<'_>) -> Self {
+        let none = Lanes::all(0);
+        Self {
+            alike: 0,
+            named: none,
+            counts: none,
+            tags: none,
+            wrong: none,
+            beyond: none,
+            limit: Lanes::all(quick.limit_of_collisions().to_bits()),
+            furthest: Furthest::new(),
+        }
+    }
+
+    /// Looks at the next, whose bodies were looked up and have these ends. Those that its record is made from
+    /// may be others; the `locations` are the record's.
+    #[inline(always)]
+    pub(crate) fn take(&mut self, of: Counted<'_>, ends: [&End; 2], locations: &Locations) {
+        let collision = of.collision;
+        // Not below zero, unless they are alike or much is wrong with them.
+        self.alike |= (collision.body_a ^ collision.body_b).wrapping_sub(1);
+        self.named = self.named.or(body_words(collision));
+        let normal = normal_and_count(collision);
+        self.counts = self.counts.or(normal.plus(in_last(u32::MAX)));
+        let [a, b] = ends.map(End::with_tag);
+        self.tags = self.tags.or(a).or(b);
+        // All four are multiplied, none of which is the count: it would be subnormal, which is slow.
+        let normal = alone(normal);
+        let square = normal.times_f32(normal).sum_f32();
+        // As bits, which are in the order of the numbers: below zero where one is larger.
+        let off = square.minus(in_last(SHORTEST)).or(in_last(LONGEST).minus(square));
+        self.wrong = self.wrong.or(off).or(a.and(b));
+        // The sign of NaN is not said.
+        self.beyond = self.beyond.or(self.limit.minus(locations.sum)).or(locations.sum);
+        if const { REACHES } {
+            let [a, b] = ends;
+            let reach = Reach::new(locations, of.count());
+            self.furthest.take(&reach, [a.still(), b.still()]);
+        }
+    }
+
+    /// Whether validation refuses nothing of the block, whose collisions all these were, at these
+    /// `locations`, with their bodies looked up in `ends`; and how many of it look like padding.
+    #[inline(always)]
+    pub(crate) fn good<'b, L: Lying<'b>, E: Lookup<'b>>(
+        self,
+        quick: &Quick<'_>,
+        block: &Block<'b, L>,
+        ends: E,
+        locations: impl Iterator<Item = Locations>,
+    ) -> (bool, usize) {
+        let [a, b, ..] = self.named.words();
+        let [[.., counts], [.., wrong]] = [self.counts, self.wrong].map(Lanes::words);
+        let mut good = ends.by_all_bits([a, b])
+            & (self.alike >> 31 == 0)
+            & (counts & BEYOND_COUNTS == 0)
+            & !End::any_shapeless(self.tags)
+            & (wrong >> 31 == 0);
+        let mut paddings = 0;
+        if !good && block.scheduled {
+            // Padding counts as wrong above.
+            (good, paddings) = quick.heads(block);
+        }
+        good = good && self.beyond.words().iter().all(|word| word >> 31 == 0);
+        if let Some(bounds) = quick.bounds_of_rows() {
+            // Where one shape of the table forbids it, nothing is found of all at once.
+            good = good
+                && (REACHES && self.furthest.all_surely_fit(bounds)
+                    || quick.rows_fit(block, locations));
+        }
+        (good || quick.exactly(block), paddings)
+    }
+}

@@ -1,0 +1,487 @@
+//! This folder refuses bad input before anything is sent.
+//!
+//! One pass over the bodies, one over the collisions ([`validate`]). What passes here, a board of
+//! the same capacities accepts. A step looks at its input while it packs it ([`Quick`]), and comes
+//! here for the words of what it has found.
+
+mod body;
+pub(crate) mod capable_profiles;
+mod collision;
+pub(crate) mod error;
+mod look;
+mod parameters;
+mod quick;
+mod range;
+mod reach;
+mod rows;
+mod shape;
+
+pub use capable_profiles::Carriers;
+pub(crate) use capable_profiles::Demand;
+pub use error::InputError;
+pub(crate) use look::Look;
+pub(crate) use quick::{Block, Quick};
+pub(crate) use reach::Locations;
+pub(crate) use shape::{needed, validate_shapes};
+
+use self::body::{check_body, shape_of};
+use self::collision::check_collision;
+use self::parameters::check_parameters;
+use self::range::{Held, check_range};
+use self::rows::Rows;
+use self::shape::check_shapes;
+use crate::record::relative::anchors;
+use crate::scene::{Bodies, Collision, Collisions, Shape, StepParameters};
+use pgs_interface::number::{Precision, StreamFormat};
+use pgs_interface::profile::{Geometry, Variant};
+
+/// What a bitstream carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Limits {
+    /// Its profile, formats and inertia.
+    pub(crate) variant: Variant,
+    /// Whether subnormal numbers count as zero.
+    pub(crate) flush_subnormals: bool,
+    /// Largest number of bodies, whatever the memory.
+    pub(crate) body_capacity: u32,
+    /// Largest number of collisions, whatever the memory.
+    pub(crate) collision_capacity: u32,
+    /// Entries of the shape table.
+    pub(crate) shape_capacity: u32,
+    /// On-chip memory that bodies and collisions share, bytes.
+    pub(crate) memory_bytes: u32,
+    /// What a body takes of it, bytes.
+    pub(crate) bytes_per_body: u32,
+    /// What a collision takes of it, bytes.
+    pub(crate) bytes_per_collision: u32,
+}
+
+impl Limits {
+    /// Collisions that fit beside so many bodies.
+    pub(crate) fn room_for_collisions(&self, bodies: usize) -> u32 {
+        let for_bodies = (bodies as u64).saturating_mul(u64::from(self.bytes_per_body));
+        let Some(free) = u64::from(self.memory_bytes).checked_sub(for_bodies) else { return 0 };
+        // Where they take nothing there is room for all that can be counted.
+        let fitting = free.checked_div(u64::from(self.bytes_per_collision)).unwrap_or(u64::MAX);
+        u32::try_from(fitting).unwrap_or(u32::MAX).min(self.collision_capacity)
+    }
+}
+
+/// Everything a step refuses before anything is sent.
+///
+/// `shapes` is the table as [`validate_shapes`] has accepted it; a shape of inverse mass 0 is
+/// static. Of several mistakes of one kind the one with the lowest index is reported.
+pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+    bodies: &B,
+    collisions: &C,
+    shapes: &[Shape],
+    parameters: &StepParameters,
+    limits: &Limits,
+) -> Result<(), InputError> {
+    let scene = preflight(bodies, collisions, shapes, parameters, limits)?;
+    for index in 0..scene.demand.bodies {
+        check_body(index, &bodies.body(index), &scene)?;
+    }
+    // A body without a shape was refused above.
+    let end = |index: usize| {
+        let body = bodies.body(index);
+        (body.pose.position, shapes.get(shape_of(&body)).unwrap_or(&Shape::STATIC))
+    };
+    for index in 0..scene.demand.collisions {
+        check_whole(index, &collisions.collision(index), end, &scene)?;
+    }
+    Ok(())
+}
+
+/// What a step refuses whatever its bodies and collisions hold: the first part of [`validate`].
+/// Returns what the rest looks at.
+pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
+    bodies: &B,
+    collisions: &C,
+    shapes: &'a [Shape],
+    parameters: &StepParameters,
+    limits: &'a Limits,
+) -> Result<Scene<'a>, InputError> {
+    for (what, agree) in
+        [("bodies", bodies.lengths_agree()), ("collisions", collisions.lengths_agree())]
+    {
+        if !agree {
+            return Err(InputError::UnequalLengths { what });
+        }
+    }
+    let demand =
+        Demand { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
+    check_parameters(parameters, &demand, limits)?;
+    check_room(&demand, limits)?;
+    check_shapes(shapes, &demand, limits)?;
+    let held = Held::by(&limits.variant.numbers);
+    let flush_subnormals = limits.flush_subnormals;
+    Ok(Scene { shapes, demand, variant: &limits.variant, held, flush_subnormals })
+}
+
+/// What of one collision a step refuses; `end` is the position and the shape of a body.
+#[inline]
+fn check_whole<'a>(
+    index: usize,
+    collision: &Collision,
+    end: impl Fn(usize) -> ([f32; 3], &'a Shape),
+    scene: &Scene<'_>,
+) -> Result<(), InputError> {
+    let (body_a, body_b) = check_collision(index, collision, scene.demand.bodies)?;
+    let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
+    let (mut positions, shapes) = ([a, b], [shape_a, shape_b]);
+    let moves = shapes.map(|shape| !shape.is_static());
+    if moves == [false, false] {
+        let Collision { body_a, body_b, .. } = *collision;
+        return Err(InputError::BothStatic { collision: index, body_a, body_b });
+    }
+    // What is finite in world coordinates is in the range of f32 as it is.
+    let geometry = scene.variant.profile.geometry;
+    if scene.held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute {
+        return Ok(());
+    }
+    if geometry == Geometry::Relative {
+        positions = anchors(positions, moves);
+    }
+    check_range(index, collision, positions, scene)?;
+    if scene.variant.numbers.rows == Precision::Binary16 {
+        Rows { index, collision, positions, shapes }.check(scene)?;
+    }
+    Ok(())
+}
+
+/// What the checks of single bodies and collisions look at beside them.
+#[derive(Debug)]
+pub(crate) struct Scene<'a> {
+    shapes: &'a [Shape],
+    demand: Demand,
+    variant: &'a Variant,
+    held: Held,
+    flush_subnormals: bool,
+}
+
+fn check_room(demand: &Demand, limits: &Limits) -> Result<(), InputError> {
+    let Demand { bodies, collisions, .. } = *demand;
+    if bodies == 0 {
+        return Err(InputError::NoBodies);
+    }
+    let carriers = || demand.carriers(|_| true);
+    if exceeds(bodies, limits.body_capacity) {
+        let (limit, carriers) = (limits.body_capacity, carriers());
+        return Err(InputError::TooManyBodies { found: bodies, limit, carriers });
+    }
+    if exceeds(collisions, limits.collision_capacity) {
+        let (limit, carriers) = (limits.collision_capacity, carriers());
+        return Err(InputError::TooManyCollisions { found: collisions, limit, carriers });
+    }
+    // Neither product leaves 64 bits: both factors are below 2^32 by now.
+    let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
+    let for_bodies = bytes(bodies, limits.bytes_per_body);
+    let needed = for_bodies.saturating_add(bytes(collisions, limits.bytes_per_collision));
+    let available = limits.memory_bytes;
+    if needed > u64::from(available) {
+        let fitting = limits.room_for_collisions(bodies);
+        let carriers = carriers();
+        return Err(InputError::MemoryExceeded {
+            bodies,
+            collisions,
+            needed,
+            available,
+            fitting,
+            carriers,
+        });
+    }
+    Ok(())
+}
+
+/// Whether a number of things is above a limit of the hardware.
+fn exceeds(found: usize, limit: u32) -> bool {
+    !u32::try_from(found).is_ok_and(|found| found <= limit)
+}
+
+/// Whether all are numbers of at most that magnitude. Without a branch per number: these loops see
+/// every number of a step.
+fn all_within(values: &[f32], limit: f32) -> bool {
+    values.iter().fold(true, |within, value| within & (value.abs() <= limit))
+}
+
+/// The first value that is wrong, and where it stands. The caller has found one to exist; should
+/// that not be so, the refusal stands, and blames the first.
+#[cold]
+fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
+    let mut values = values.iter().copied().enumerate();
+    values.find(|(_, value)| wrong(*value)).unwrap_or((0, f32::NAN))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::scene::{Body, BodyArrays, CollisionArrays, Contact, Pose, Velocity};
+    use pgs_interface::profile::{self, Inertia, Profile};
+
+    /// What a bitstream of that profile reports.
+    pub(crate) const fn on(profile: &'static Profile, inertia: Inertia) -> Limits {
+        Limits { variant: Variant { profile, numbers: profile.numbers, inertia }, ..FLOAT }
+    }
+
+    pub(crate) const HALF: Limits = Limits {
+        body_capacity: 65_536,
+        collision_capacity: 524_288,
+        bytes_per_collision: 8,
+        ..on(&profile::HALF, Inertia::Isotropic)
+    };
+    pub(crate) const FLOAT: Limits = Limits {
+        variant: profile::FLOAT.default_variant(),
+        flush_subnormals: false,
+        body_capacity: 131_072,
+        collision_capacity: 262_144,
+        shape_capacity: 64,
+        memory_bytes: 4 << 20,
+        bytes_per_body: 24,
+        bytes_per_collision: 16,
+    };
+    const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+
+    fn body(shape: u32) -> Body {
+        Body {
+            pose: Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] },
+            velocity: Velocity::default(),
+            shape,
+        }
+    }
+
+    fn collision(body_a: u32, body_b: u32) -> Collision {
+        Collision {
+            body_a,
+            body_b,
+            normal: [0.0, -1.0, 0.0],
+            count: 1,
+            contacts: [Contact::default(); 4],
+        }
+    }
+
+    fn validated(bodies: &[Body], collisions: &[Collision]) -> Result<(), InputError> {
+        validate(bodies, collisions, &SHAPES, &StepParameters::default(), &FLOAT)
+    }
+
+    fn room(bodies: usize, collisions: usize, limits: &Limits) -> Result<(), InputError> {
+        check_room(&Demand { bodies, collisions, inertia: Inertia::Isotropic }, limits)
+    }
+
+    #[test]
+    fn static_against_moving_is_accepted_either_way_round() {
+        let bodies = [body(0), body(1), body(1)];
+        let collisions = [collision(0, 1), collision(2, 0), collision(2, 1)];
+        assert_eq!(validated(&bodies, &collisions), Ok(()));
+        assert_eq!(validated(&bodies, &[]), Ok(()));
+    }
+
+    #[test]
+    fn two_static_bodies_are_refused() {
+        assert_eq!(
+            validated(&[body(0), body(1), body(0)], &[collision(0, 1), collision(2, 0)]),
+            Err(InputError::BothStatic { collision: 1, body_a: 2, body_b: 0 })
+        );
+    }
+
+    #[test]
+    fn each_check_is_reached_and_names_its_index() {
+        let bodies = [body(0), body(1), body(2)];
+        assert_eq!(
+            validated(&bodies, &[]),
+            Err(InputError::ShapeIndex { body: 2, found: 2, shapes: 2 })
+        );
+        assert_eq!(
+            validated(&bodies[..2], &[collision(0, 1), collision(1, 1)]),
+            Err(InputError::SelfCollision { collision: 1, body: 1 })
+        );
+        let parameters = StepParameters { contact_iterations: 256, ..StepParameters::default() };
+        assert_eq!(
+            validate(&bodies[..2], &[][..], &SHAPES, &parameters, &FLOAT),
+            Err(InputError::TooManyIterations { solver: "contact", found: 256 })
+        );
+        assert_eq!(
+            validate(&bodies[..2], &[][..], &[], &StepParameters::default(), &FLOAT),
+            Err(InputError::NoShapes)
+        );
+    }
+
+    #[test]
+    fn a_step_without_bodies_is_refused() {
+        assert_eq!(validated(&[], &[]), Err(InputError::NoBodies));
+    }
+
+    #[test]
+    fn more_bodies_than_the_capacity_are_refused() {
+        assert_eq!(room(131_072, 0, &FLOAT), Ok(()));
+        let text = room(131_073, 0, &FLOAT).expect_err("one too many").to_string();
+        assert_eq!(
+            text,
+            "found 131073 bodies, the bitstream takes at most 131072: give fewer, or load another \
+             (profiles that could: windowed, windowed16)"
+        );
+        // Indices of sixteen bits name fewer.
+        assert_eq!(room(65_536, 0, &HALF), Ok(()));
+        let text = room(65_537, 0, &HALF).expect_err("one too many").to_string();
+        assert!(text.contains("found 65537 bodies") && text.contains("at most 65536"), "{text}");
+        assert!(
+            text.ends_with("(profiles that could: naive, float, windowed, windowed16)"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn memory_of_four_mebibytes_carries_203_822_collisions_of_the_big_pile() {
+        // (4,194,304 - 38,881 * 24) / 16 = 203,822.5
+        assert_eq!(room(38_881, 203_822, &FLOAT), Ok(()));
+        let refused = room(38_881, 203_823, &FLOAT).expect_err("one too many");
+        assert!(
+            matches!(
+                refused,
+                InputError::MemoryExceeded {
+                    bodies: 38_881,
+                    collisions: 203_823,
+                    needed: 4_194_312,
+                    available: 4_194_304,
+                    fitting: 203_822,
+                    ..
+                }
+            ),
+            "{refused}"
+        );
+        let text = refused.to_string();
+        for number in ["38881", "203823", "4194312", "4194304", "203822"] {
+            assert!(text.contains(number), "{text}");
+        }
+        assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
+    }
+
+    #[test]
+    fn bodies_that_fill_the_memory_alone_leave_room_for_no_collision() {
+        let small = Limits { memory_bytes: 47, ..FLOAT };
+        assert!(matches!(
+            room(2, 0, &small),
+            Err(InputError::MemoryExceeded { needed: 48, available: 47, fitting: 0, .. })
+        ));
+        let free = Limits { bytes_per_collision: 0, ..small };
+        assert!(matches!(
+            room(2, 9, &free),
+            Err(InputError::MemoryExceeded { needed: 48, fitting: 0, .. })
+        ));
+    }
+
+    #[test]
+    fn more_collisions_than_the_capacity_are_refused_whatever_the_memory() {
+        let free = Limits { bytes_per_collision: 0, collision_capacity: 9, ..FLOAT };
+        assert_eq!(room(1, 9, &free), Ok(()));
+        let refused = room(1, 10, &free).expect_err("one too many");
+        assert!(
+            matches!(refused, InputError::TooManyCollisions { found: 10, limit: 9, .. }),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn separate_arrays_of_unequal_lengths_are_refused() {
+        let parameters = StepParameters::default();
+        let mut positions = [[0.0; 3]; 2];
+        let mut linear_velocities = [[0.0; 3]; 2];
+        let mut angular_velocities = [[0.0; 3]; 2];
+        let mut orientations = [[0.0, 0.0, 0.0, 1.0]; 2];
+        let mut check = |shapes: &[u32], counts: &[u32]| {
+            let bodies = BodyArrays {
+                positions: &mut positions,
+                orientations: &mut orientations,
+                linear_velocities: &mut linear_velocities,
+                angular_velocities: &mut angular_velocities,
+                shapes,
+            };
+            let collisions = CollisionArrays {
+                bodies: &[[0, 1]],
+                normals: &[[0.0, 1.0, 0.0]],
+                counts,
+                contacts: &[[[0.0; 4]; 4]],
+            };
+            validate(&bodies, &collisions, &SHAPES, &parameters, &FLOAT)
+        };
+        assert_eq!(check(&[0, 1], &[1]), Ok(()));
+        let unequal = |what| Err(InputError::UnequalLengths { what });
+        assert_eq!(check(&[0], &[1]), unequal("bodies"));
+        assert_eq!(check(&[0, 1, 1], &[1]), unequal("bodies"));
+        assert_eq!(check(&[0, 1], &[]), unequal("collisions"));
+    }
+
+    /// A number that is right by itself, in a scene that a stream of sixteen bits does not carry.
+    #[test]
+    fn ranges_are_checked_where_the_streams_are_narrow() {
+        let mut bodies = [body(0), body(1)];
+        let parameters = StepParameters::default();
+        let check = |bodies: &[Body], limits| {
+            validate(bodies, [collision(0, 1)].as_slice(), &SHAPES, &parameters, limits)
+        };
+        assert_eq!(check(&bodies, &HALF), Ok(()));
+        bodies[1].pose.position[2] = 7e4;
+        assert_eq!(check(&bodies, &FLOAT), Ok(()));
+        let refused = check(&bodies, &HALF).expect_err("beyond binary16");
+        assert!(matches!(refused, InputError::BodyOutOfRange { body: 1, .. }), "{refused}");
+        let refused = check(&bodies, &on(&profile::MIXED, Inertia::Isotropic));
+        let refused = refused.expect_err("body B is far from A");
+        assert!(
+            matches!(refused, InputError::CollisionOutOfRange { collision: 0, component: 2, .. }),
+            "{refused}"
+        );
+    }
+
+    /// 300,000 collisions and shapes with axes: `half` alone has room for the first.
+    #[test]
+    fn shapes_are_refused_with_the_profiles_that_have_room_for_the_scene() {
+        let shapes = [Shape::STATIC, Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 2.0, 3.0] }];
+        let collisions = vec![collision(0, 1); 300_000];
+        let limits = Limits { memory_bytes: 8 << 20, collision_capacity: 524_288, ..FLOAT };
+        let parameters = StepParameters::default();
+        let bodies = [body(0), body(1)];
+        let refused = validate(&bodies[..], &collisions[..], &shapes, &parameters, &limits);
+        let text = refused.expect_err("world inertia is needed").to_string();
+        assert!(
+            text.ends_with(
+                "(profiles that could, built with world inertia: half, \
+             windowed, windowed16)"
+            ),
+            "{text}"
+        );
+    }
+
+    /// Each number of it has its place in binary16, and what is made of them has none.
+    #[test]
+    fn rows_are_checked_where_they_are_computed_in_sixteen_bits() {
+        let mut bodies = [body(0), body(1)];
+        bodies[1].pose.position[2] = 300.0;
+        let check = |limits| {
+            let parameters = StepParameters::default();
+            validate(&bodies[..], [collision(1, 0)].as_slice(), &SHAPES, &parameters, limits)
+        };
+        assert_eq!(check(&FLOAT), Ok(()));
+        let refused = check(&HALF).expect_err("1 + 1.5 x 300^2");
+        assert!(
+            matches!(
+                refused,
+                InputError::RowOutOfRange { collision: 0, field: "inverse effective mass", .. }
+            ),
+            "{refused}"
+        );
+        assert_eq!(check(&on(&profile::MIXED, Inertia::Isotropic)), Ok(()));
+    }
+
+    #[test]
+    fn messages_name_index_value_and_limit() {
+        let text = |error: InputError| error.to_string();
+        let length = text(InputError::NormalLength { collision: 12, length: 1.25 });
+        assert!(length.contains("12") && length.contains("1.25") && length.contains("0.001"));
+        let count = text(InputError::ContactCount { collision: 12, found: 7 });
+        assert!(count.contains("12") && count.contains('7') && count.contains("1 to 4"));
+        let passes = text(InputError::TooManyIterations { solver: "friction", found: 300 });
+        assert!(passes.contains("300") && passes.contains("friction") && passes.contains("255"));
+        let orientation = text(InputError::Orientation { body: 3, length: 0.0 });
+        assert!(orientation.contains("body 3") && orientation.contains("1e-6"));
+    }
+}

@@ -1,0 +1,226 @@
+//! This file refuses step parameters outside their range.
+
+use pgs_interface::number::StreamFormat;
+
+use super::Limits;
+use super::range::{computes_short, smallest_short};
+use super::{Demand, InputError};
+use crate::scene::StepParameters;
+
+const TIME_STEP: &str = "time step";
+
+/// What of the parameters themselves a step refuses.
+pub(crate) fn check_parameters(
+    parameters: &StepParameters,
+    demand: &Demand,
+    limits: &Limits,
+) -> Result<(), InputError> {
+    let finite = |value: f32| value.is_finite();
+    let not_negative = |value: f32| value.is_finite() && value >= 0.0;
+    // Its reciprocal is computed, and that of a subnormal is infinite.
+    let positive = |value: f32| value.is_normal() && value > 0.0;
+    let [x, y, z] = parameters.gravity;
+    let StepParameters { time_step, position_drift, position_coefficient, .. } = *parameters;
+    let StepParameters { friction, angular_damping, .. } = *parameters;
+    let share = (0.0..=1.0).contains(&angular_damping);
+    let checks = [
+        (TIME_STEP, time_step, positive(time_step), "a finite number of seconds above 0"),
+        ("position drift", position_drift, finite(position_drift), "a finite number of metres"),
+        (
+            "position coefficient",
+            position_coefficient,
+            finite(position_coefficient),
+            "a finite number",
+        ),
+        ("friction", friction, not_negative(friction), "a finite number of at least 0"),
+        ("angular damping", angular_damping, share, "a number from 0 to 1"),
+        ("gravity in x", x, finite(x), "a finite number of m/s²"),
+        ("gravity in y", y, finite(y), "a finite number of m/s²"),
+        ("gravity in z", z, finite(z), "a finite number of m/s²"),
+    ];
+    for (parameter, found, fits, expected) in checks {
+        if !fits {
+            return Err(InputError::Parameter { parameter, found, expected });
+        }
+    }
+    if computes_short(&limits.variant.numbers) {
+        let largest = StreamFormat::Binary16.largest();
+        for (parameter, found, ..) in checks {
+            let nonzero = smallest_short(limits.flush_subnormals);
+            let (zero, smallest) = match parameter {
+                // Its reciprocal is computed.
+                TIME_STEP => (false, nonzero.max(1.0 / largest)),
+                _ => (true, nonzero),
+            };
+            let fits = (smallest..=largest).contains(&found.abs()) || (zero && found == 0.0);
+            if !fits {
+                let carriers = demand.carriers(|variant| !computes_short(&variant.numbers));
+                return Err(InputError::ParameterOutOfRange {
+                    parameter,
+                    found,
+                    zero,
+                    smallest,
+                    largest,
+                    carriers,
+                });
+            }
+        }
+    }
+    for (solver, found) in
+        [("contact", parameters.contact_iterations), ("friction", parameters.friction_iterations)]
+    {
+        if found > InputError::MAX_ITERATIONS {
+            return Err(InputError::TooManyIterations { solver, found });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{FLOAT, HALF};
+    use super::*;
+    use pgs_interface::profile::Inertia;
+
+    const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+
+    fn checked(parameters: &StepParameters) -> Result<(), InputError> {
+        check_parameters(parameters, &DEMAND, &FLOAT)
+    }
+
+    const NOT_FINITE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+
+    fn refuses(name: &str, values: &[f32], set: impl Fn(&mut StepParameters, f32)) {
+        for value in values {
+            let mut parameters = StepParameters::default();
+            set(&mut parameters, *value);
+            assert!(
+                matches!(
+                    checked(&parameters),
+                    Err(InputError::Parameter { parameter, found, .. })
+                        if parameter == name && found.to_bits() == value.to_bits()
+                ),
+                "{name} {value}"
+            );
+        }
+    }
+
+    fn accepts(values: &[f32], set: impl Fn(&mut StepParameters, f32)) {
+        for value in values {
+            let mut parameters = StepParameters::default();
+            set(&mut parameters, *value);
+            assert_eq!(checked(&parameters), Ok(()), "{value}");
+        }
+    }
+
+    #[test]
+    fn the_defaults_are_accepted() {
+        assert_eq!(checked(&StepParameters::default()), Ok(()));
+    }
+
+    #[test]
+    fn parameters_that_are_not_finite_are_refused() {
+        refuses("time step", &NOT_FINITE, |parameters, value| parameters.time_step = value);
+        refuses("position drift", &NOT_FINITE, |parameters, value| {
+            parameters.position_drift = value;
+        });
+        refuses("position coefficient", &NOT_FINITE, |parameters, value| {
+            parameters.position_coefficient = value;
+        });
+        refuses("friction", &NOT_FINITE, |parameters, value| parameters.friction = value);
+        refuses("angular damping", &NOT_FINITE, |parameters, value| {
+            parameters.angular_damping = value;
+        });
+        refuses("gravity in x", &NOT_FINITE, |parameters, value| parameters.gravity[0] = value);
+        refuses("gravity in y", &NOT_FINITE, |parameters, value| parameters.gravity[1] = value);
+        refuses("gravity in z", &NOT_FINITE, |parameters, value| parameters.gravity[2] = value);
+    }
+
+    #[test]
+    fn parameters_outside_their_range_are_refused() {
+        let subnormal = 1e-40;
+        refuses("time step", &[0.0, -0.0, -1.0, subnormal], |parameters, value| {
+            parameters.time_step = value;
+        });
+        refuses("friction", &[-0.5], |parameters, value| parameters.friction = value);
+        refuses("angular damping", &[-0.1, 1.000_000_1], |parameters, value| {
+            parameters.angular_damping = value;
+        });
+    }
+
+    #[test]
+    fn the_ends_of_the_ranges_are_accepted() {
+        accepts(&[f32::MIN_POSITIVE, 1.0], |parameters, value| parameters.time_step = value);
+        accepts(&[0.0, 5.0], |parameters, value| parameters.friction = value);
+        accepts(&[0.0, 1.0], |parameters, value| parameters.angular_damping = value);
+        accepts(&[-1.0, 0.0], |parameters, value| parameters.position_drift = value);
+        accepts(&[-1.0, 2.0], |parameters, value| parameters.position_coefficient = value);
+    }
+
+    #[test]
+    fn more_than_255_iterations_are_refused() {
+        let mut parameters = StepParameters::default();
+        (parameters.contact_iterations, parameters.friction_iterations) = (0, 255);
+        assert_eq!(checked(&parameters), Ok(()));
+        parameters.friction_iterations = 256;
+        let too_many = |solver, found| Err(InputError::TooManyIterations { solver, found });
+        assert_eq!(checked(&parameters), too_many("friction", 256));
+        parameters.contact_iterations = u32::MAX;
+        assert_eq!(checked(&parameters), too_many("contact", u32::MAX));
+    }
+    #[test]
+    fn what_binary16_does_not_hold_is_refused_where_it_computes() {
+        let mut parameters = StepParameters::default();
+        let check = |parameters: &StepParameters, limits: &Limits| {
+            check_parameters(parameters, &DEMAND, limits).map_err(|error| error.to_string())
+        };
+        assert_eq!(check(&parameters, &HALF), Ok(()));
+        parameters.gravity[2] = -7e4;
+        assert_eq!(check(&parameters, &FLOAT), Ok(()));
+        assert_eq!(
+            check(&parameters, &HALF),
+            Err("the gravity in z is -7e4, but this bitstream computes in binary16, which takes 0, or \
+                 5.9604645e-8 to 65504: correct the step parameters, or load another (profiles that \
+                 could: naive, float, mixed, windowed)"
+                .to_owned())
+        );
+        // The reciprocal of 10 us is 100,000.
+        let time = |time_step| StepParameters { time_step, ..StepParameters::default() };
+        let text = check(&time(1e-5), &HALF).expect_err("its reciprocal overflows");
+        assert!(text.contains("time step is 1e-5") && text.contains("takes 1.5266"), "{text}");
+        let flush = Limits { flush_subnormals: true, ..HALF };
+        assert_eq!(check(&time(5e-5), &HALF), Ok(()));
+        assert!(check(&time(5e-5), &flush).is_err(), "subnormal in binary16");
+        assert_eq!(check(&time(1e-5), &Limits { flush_subnormals: true, ..FLOAT }), Ok(()));
+    }
+
+    #[test]
+    fn what_binary16_would_take_for_zero_is_refused_where_it_computes() {
+        type Set = fn(&mut StepParameters, f32);
+        let sets: [(&str, Set); 5] = [
+            ("position drift", |parameters, value| parameters.position_drift = -value),
+            ("position coefficient", |parameters, value| parameters.position_coefficient = value),
+            ("friction", |parameters, value| parameters.friction = value),
+            ("angular damping", |parameters, value| parameters.angular_damping = value),
+            ("gravity in y", |parameters, value| parameters.gravity[1] = -value),
+        ];
+        let flush = Limits { flush_subnormals: true, ..HALF };
+        let (normal, subnormal) = (2.0_f32.powi(-14), 2.0_f32.powi(-24));
+        for (name, set) in sets {
+            let check = |value, limits| {
+                let mut parameters = StepParameters::default();
+                set(&mut parameters, value);
+                check_parameters(&parameters, &DEMAND, limits).map_err(|error| error.to_string())
+            };
+            for (limits, smallest) in [(&HALF, subnormal), (&flush, normal)] {
+                assert_eq!(check(0.0, limits), Ok(()), "{name}");
+                assert_eq!(check(smallest, limits), Ok(()), "{name}");
+                let text = check(smallest.next_down(), limits).expect_err(name);
+                assert!(text.contains(name), "{text}");
+                assert!(text.contains(&format!("takes 0, or {smallest:e} to 65504")), "{text}");
+            }
+            let f32 = Limits { flush_subnormals: true, ..FLOAT };
+            assert_eq!(check(1e-30, &f32), Ok(()), "{name}");
+        }
+    }
+}

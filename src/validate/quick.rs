@@ -1,0 +1,213 @@
+//! This file looks at the input of a step while it is packed: a block at a time.
+//!
+//! Without a branch per number it is found out whether everything of a block is surely right. One
+//! of which that cannot be said is checked as [`validate`](super::validate) does; what that refuses
+//! is refused there, by its own words and in its own order.
+
+#[cfg(test)]
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use pgs_interface::number::{Precision, StreamFormat};
+use pgs_interface::profile::Geometry;
+use pgs_interface::record::LANES;
+
+use super::InputError;
+use super::body::check_body;
+use super::reach::{Extremes, Locations, Reach, surely_fit};
+use super::{Scene, check_whole};
+use crate::beat::pack::source::Lying;
+use crate::record::body_table::{End, Ends, Lookup};
+use crate::record::largest::{Largest, MAGNITUDE};
+use crate::record::{self, FULL};
+use crate::scene::{Body, Collision};
+use crate::simd::Lanes;
+
+/// How far from 1 the square of a normal's length surely may be: the length itself is half as far.
+pub(crate) const OFF_UNIT: f32 = InputError::NORMAL_TOLERANCE;
+/// Square of twice the length that an orientation must have.
+const ORIENTATION: f32 = 4.0 * InputError::SHORTEST_ORIENTATION * InputError::SHORTEST_ORIENTATION;
+
+/// Looks at the bodies and collisions of one step.
+#[derive(Debug)]
+pub(crate) struct Quick<'a> {
+    scene: Scene<'a>,
+    /// What bounds the rows, where they are computed in sixteen bits.
+    short_rows: Option<Extremes>,
+    bodies: Largest<4>,
+    /// Blocks that were not found good at once.
+    #[cfg(test)]
+    pub(crate) doubted: AtomicUsize,
+}
+
+impl<'a> Quick<'a> {
+    /// For what passed [`preflight`](super::preflight).
+    pub(crate) fn new(scene: Scene<'a>) -> Self {
+        let held = scene.held;
+        let any = MAGNITUDE;
+        let [velocities, poses] = [held.velocities, held.poses].map(StreamFormat::largest);
+        let Largest([linear, angular]) = Largest::new(velocities, [any; 2]);
+        let Largest([position, orientation]) = Largest::new(poses, [any, poses.to_bits()]);
+        let geometry = scene.variant.profile.geometry;
+        let short_rows = scene.variant.numbers.rows == Precision::Binary16
+            && !(held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute);
+        Self {
+            short_rows: short_rows.then(|| Extremes::new(scene.shapes, scene.flush_subnormals)),
+            bodies: Largest([linear, angular, position, orientation]),
+            #[cfg(test)]
+            doubted: AtomicUsize::new(0),
+            scene,
+        }
+    }
+
+    /// Whether validation refuses nothing of these bodies, the first of which has the index `first`;
+    /// `ends` are theirs, and `any_still` says whether any of these is static.
+    #[inline(always)]
+    pub(crate) fn bodies(
+        &self,
+        first: usize,
+        bodies: &[Body],
+        ends: &[End],
+        any_still: bool,
+    ) -> bool {
+        let (mut beyond, mut length) = (Lanes::all(0), Lanes::all(0));
+        for body in bodies {
+            // What is beside the vectors, whatever it is, is not bounded.
+            let [linear, angular] = record::velocity::encode(body).rows;
+            let [position, orientation] = record::pose::encode(body);
+            beyond = beyond.or(self.bodies.beyond(&[linear, angular, position, orientation]));
+            let square = orientation.times_f32(orientation).sum_f32();
+            // As bits, as a normal's.
+            let [least, most] =
+                [ORIENTATION, f32::MAX / 2.0].map(|bound| Lanes::all(bound.to_bits()));
+            length = length.or(square.minus(least)).or(most.minus(square));
+        }
+        let [length, ..] = length.words();
+        let mut good = (beyond.words() == [0; LANES]) & (length >> 31 == 0);
+        if any_still {
+            // One without a shape is among them.
+            good &= bodies.iter().zip(ends).all(|(body, end)| {
+                let speeds = [body.velocity.linear, body.velocity.angular];
+                let moves = speeds.as_flattened().iter().fold(0, |bits, v| bits | v.to_bits());
+                !end.is_static() | (end.has_shape() & (moves & MAGNITUDE == 0))
+            });
+        }
+        good || self.bodies_exactly(first, bodies)
+    }
+
+    /// Looks at bodies as validation does.
+    #[cold]
+    fn bodies_exactly(&self, first: usize, bodies: &[Body]) -> bool {
+        self.doubt();
+        (first..).zip(bodies).all(|(at, body)| check_body(at, body, &self.scene).is_ok())
+    }
+
+    /// Counts a block that was not found good at once.
+    fn doubt(&self) {
+        #[cfg(test)]
+        self.doubted.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// What bounds the rows, where they are computed in sixteen bits.
+    #[inline(always)]
+    pub(crate) const fn bounds_of_rows(&self) -> Option<&Extremes> {
+        self.short_rows.as_ref()
+    }
+
+    /// Whether it matters how far collisions reach, and may be found of many at once.
+    #[inline(always)]
+    pub(crate) fn asks_how_far(&self) -> bool {
+        self.short_rows.as_ref().is_some_and(Extremes::allow)
+    }
+
+    /// The largest number that the stream of collisions holds.
+    #[inline(always)]
+    pub(crate) const fn limit_of_collisions(&self) -> f32 {
+        self.scene.held.collisions.largest()
+    }
+
+    /// Whether a bitstream that computes rows in sixteen bits surely computes those of each collision of
+    /// a block, which are at these `locations`.
+    pub(crate) fn rows_fit<'b, L: Lying<'b>>(
+        &self,
+        block: &Block<'b, L>,
+        locations: impl Iterator<Item = Locations>,
+    ) -> bool {
+        block.collisions.iter().zip(locations).all(|(collision, locations)| {
+            let reach = Reach::new(&locations, collision.count);
+            let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
+            let shapes = ends.map(|end| end.shape(self.scene.shapes));
+            surely_fit(&reach, shapes, self.scene.flush_subnormals)
+                | (block.scheduled & is_padding(collision))
+        })
+    }
+
+    /// Whether normals, counts and bodies of all of a block but padding are surely right, and how many look
+    /// like padding.
+    // Out of the way of blocks without padding, which most are.
+    #[inline(never)]
+    pub(crate) fn heads<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> (bool, usize) {
+        let (mut good, mut paddings) = (true, 0);
+        for collision in block.collisions.iter() {
+            let padding = is_padding(collision);
+            let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
+            good &= padding | head(collision, ends);
+            paddings += usize::from(padding);
+        }
+        (good, paddings)
+    }
+
+    /// Looks at a block as validation does.
+    #[cold]
+    pub(crate) fn exactly<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> bool {
+        self.doubt();
+        self.refusal(block).is_ok()
+    }
+
+    /// What validation refuses of a block.
+    ///
+    /// # Errors
+    /// That of the first collision that it refuses.
+    pub(crate) fn refusal<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> Result<(), InputError> {
+        let end = |body: usize| {
+            let end = u32::try_from(body).map_or(&End::MISSING, |body| block.ends.get(body));
+            (end.position, end.shape(self.scene.shapes))
+        };
+        (block.first..).zip(block.collisions.iter()).try_for_each(|(index, collision)| {
+            if block.scheduled & is_padding(collision) {
+                return Ok(());
+            }
+            check_whole(index, collision, end, &self.scene)
+        })
+    }
+}
+
+/// Collisions that are looked at together.
+pub(crate) struct Block<'a, L> {
+    /// Index of the first.
+    pub(crate) first: usize,
+    pub(crate) collisions: L,
+    /// Of all bodies.
+    pub(crate) ends: Ends<'a>,
+    /// Whether they are in an order that was made for them. What looks like padding may be of the
+    /// order's making then: whoever looks at all of them counts it.
+    pub(crate) scheduled: bool,
+}
+
+/// Whether normal, count and bodies of a collision are surely right.
+#[inline(always)]
+fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
+    let [x, y, z] = collision.normal;
+    let square = x * x + y * y + z * z;
+    ((square - 1.0).abs() <= OFF_UNIT)
+        & (collision.count.wrapping_sub(1) < FULL)
+        & (collision.body_a != collision.body_b)
+        & a.has_shape()
+        & b.has_shape()
+        & !(a.is_static() & b.is_static())
+}
+
+/// Whether an order may have made it.
+#[inline(always)]
+fn is_padding(collision: &Collision) -> bool {
+    (collision.count == 0) & (collision.body_a == collision.body_b)
+}

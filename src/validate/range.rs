@@ -1,0 +1,296 @@
+//! This file says which numbers a bitstream holds on their whole way, and refuses collisions with
+//! others.
+
+use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::profile::{Geometry, Variant};
+
+use super::InputError;
+use super::Scene;
+use crate::record::relative::difference;
+use crate::scene::{CONTACT_POINTS, Collision, Contact};
+
+/// Formats of what a step is given, each the narrowest on its way: stream, arithmetic, array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Held {
+    /// Positions and orientations.
+    pub(crate) poses: StreamFormat,
+    /// Linear and angular velocities.
+    pub(crate) velocities: StreamFormat,
+    /// Everything of a collision.
+    pub(crate) collisions: StreamFormat,
+}
+
+impl Held {
+    /// What a bitstream of these formats holds.
+    pub(crate) const fn by(numbers: &Numbers) -> Self {
+        Self {
+            // Streamed in f32 they are integrated in f32.
+            poses: numbers.poses,
+            velocities: narrower(narrower(numbers.bodies, numbers.updates), numbers.velocities),
+            collisions: narrower(numbers.collisions, numbers.rows),
+        }
+    }
+}
+
+/// The format in which a number survives a stream and what lies behind it.
+const fn narrower(stream: StreamFormat, behind: Precision) -> StreamFormat {
+    match (stream, behind) {
+        (StreamFormat::F32, Precision::Binary16) => StreamFormat::Binary16,
+        (stream, _) => stream,
+    }
+}
+
+/// Whether constants of the arithmetic, masses and step parameters, meet sixteen bits.
+pub(crate) const fn computes_short(numbers: &Numbers) -> bool {
+    !matches!((numbers.rows, numbers.updates), (Precision::F32, Precision::F32))
+}
+
+/// The smallest magnitude that binary16 does not take for 0.
+pub(crate) const fn smallest_short(flush_subnormals: bool) -> f32 {
+    // 2^-14, or the subnormal 2^-24.
+    if flush_subnormals { 1.0 / 16_384.0 } else { 1.0 / 16_777_216.0 }
+}
+
+/// What of a collision a bitstream streams, by geometry: name and value.
+const VECTORS: usize = 3;
+
+/// Checks every number of a collision that is otherwise right, as it would be streamed.
+///
+/// `positions` are those of bodies A and B.
+// Out of the loop, which most streams leave without it.
+#[inline(never)]
+pub(crate) fn check_range(
+    index: usize,
+    collision: &Collision,
+    positions: [[f32; 3]; 2],
+    scene: &Scene<'_>,
+) -> Result<(), InputError> {
+    if fits(scene.variant, collision, positions) {
+        return Ok(());
+    }
+    Err(refused(index, collision, positions, scene))
+}
+
+/// Whether a bitstream carries every number of a collision.
+pub(crate) fn fits(variant: &Variant, collision: &Collision, positions: [[f32; 3]; 2]) -> bool {
+    let limit = Held::by(&variant.numbers).collisions.largest();
+    let within = |vector: [f32; 3]| {
+        (vector[0].abs() <= limit) & (vector[1].abs() <= limit) & (vector[2].abs() <= limit)
+    };
+    let vectors = vectors(variant.profile.geometry, collision, positions);
+    let mut fit = vectors.iter().fold(true, |fit, (_, vector)| fit & within(*vector));
+    let origin = origin(variant.profile.geometry, positions);
+    for (ordinal, contact) in (0..).zip(&collision.contacts) {
+        let used = within(difference(contact.point, origin)) & (contact.distance.abs() <= limit);
+        fit &= used | (ordinal >= collision.count);
+    }
+    fit
+}
+
+/// The vectors of a collision as they are streamed, its contact points aside.
+fn vectors(
+    geometry: Geometry,
+    collision: &Collision,
+    [a, b]: [[f32; 3]; 2],
+) -> [(&'static str, [f32; 3]); VECTORS] {
+    let normal = ("normal", collision.normal);
+    match geometry {
+        Geometry::Absolute => [normal, ("position of body A", a), ("position of body B", b)],
+        Geometry::Relative => {
+            [normal, ("offset of body B from body A", difference(b, a)), ("", [0.0; 3])]
+        }
+    }
+}
+
+/// What contact points are streamed relative to.
+pub(crate) fn origin(geometry: Geometry, [a, _]: [[f32; 3]; 2]) -> [f32; 3] {
+    match geometry {
+        Geometry::Absolute => [0.0; 3],
+        Geometry::Relative => a,
+    }
+}
+
+/// The contact points in use.
+pub(crate) fn used(collision: &Collision) -> &[Contact] {
+    let used = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS).min(CONTACT_POINTS);
+    &collision.contacts[..used]
+}
+
+/// Names the number that is known to be out of range.
+#[cold]
+fn refused(
+    index: usize,
+    collision: &Collision,
+    positions: [[f32; 3]; 2],
+    scene: &Scene<'_>,
+) -> InputError {
+    let geometry = scene.variant.profile.geometry;
+    let format = scene.held.collisions;
+    let limit = format.largest();
+    let point = match geometry {
+        Geometry::Absolute => "point",
+        Geometry::Relative => "lever arm of the point",
+    };
+    let of_contacts = used(collision).iter().enumerate().flat_map(|(at, contact)| {
+        let [x, y, z] = difference(contact.point, origin(geometry, positions));
+        [(point, 0, x), (point, 1, y), (point, 2, z), ("distance", 0, contact.distance)]
+            .map(|(field, component, found)| (Some(at), field, component, found))
+    });
+    let (contact, field, component, found) = vectors(geometry, collision, positions)
+        .into_iter()
+        .flat_map(|(field, [x, y, z])| {
+            [(0, x), (1, y), (2, z)].map(|(component, found)| (None, field, component, found))
+        })
+        .chain(of_contacts)
+        .find(|(.., found)| found.is_nan() || found.abs() > limit)
+        .unwrap_or((None, "normal", 0, collision.normal[0]));
+    let carriers = scene.demand.carriers(|variant| fits(variant, collision, positions));
+    InputError::CollisionOutOfRange {
+        collision: index,
+        contact,
+        field,
+        component,
+        found,
+        format,
+        limit,
+        carriers,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::validate::Demand;
+    use pgs_interface::number::StreamFormat;
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile, WINDOWED16};
+
+    const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
+    const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
+    const COLLISION: Collision = Collision {
+        body_a: 0,
+        body_b: 1,
+        normal: [0.0, -1.0, 0.0],
+        count: 2,
+        contacts: [USED, USED, UNUSED, UNUSED],
+    };
+
+    fn check(
+        profile: &'static Profile,
+        collision: &Collision,
+        positions: [[f32; 3]; 2],
+    ) -> Result<(), InputError> {
+        let variant = profile.default_variant();
+        let held = Held::by(&variant.numbers);
+        let scene =
+            Scene { shapes: &[], demand: DEMAND, variant: &variant, held, flush_subnormals: false };
+        check_range(7, collision, positions, &scene)
+    }
+
+    fn far(contact: Contact) -> Collision {
+        Collision { contacts: [USED, contact, UNUSED, UNUSED], ..COLLISION }
+    }
+
+    #[test]
+    fn what_the_format_still_carries_is_accepted_and_unused_points_do_not_matter() {
+        for profile in [&FLOAT, &HALF, &MIXED] {
+            assert_eq!(check(profile, &COLLISION, [[0.0; 3]; 2]), Ok(()));
+        }
+        let edge = far(Contact { point: [65_504.0, 0.0, -65_504.0], distance: 65_504.0 });
+        assert_eq!(check(&HALF, &edge, [[65_504.0; 3], [-65_504.0; 3]]), Ok(()));
+    }
+
+    #[test]
+    fn absolute_coordinates_are_held_against_the_limit_as_they_are() {
+        let beyond = 65_504.0_f32.next_up();
+        let cases = [
+            (COLLISION, [[0.0, beyond, 0.0], [0.0; 3]], None, "position of body A", 1, beyond),
+            (COLLISION, [[0.0; 3], [0.0, 0.0, -beyond]], None, "position of body B", 2, -beyond),
+            (
+                far(Contact { point: [-7e4, 0.0, 0.0], distance: 0.0 }),
+                [[0.0; 3]; 2],
+                Some(1),
+                "point",
+                0,
+                -7e4,
+            ),
+            (
+                far(Contact { point: [0.0; 3], distance: -1e9 }),
+                [[0.0; 3]; 2],
+                Some(1),
+                "distance",
+                0,
+                -1e9,
+            ),
+        ];
+        for (collision, positions, contact, field, component, found) in cases {
+            let refused = check(&HALF, &collision, positions).expect_err(field);
+            let InputError::CollisionOutOfRange { carriers, .. } = refused else {
+                panic!("{refused}")
+            };
+            let (format, limit) = (StreamFormat::Binary16, 65_504.0);
+            let expected = InputError::CollisionOutOfRange {
+                collision: 7,
+                contact,
+                field,
+                component,
+                found,
+                format,
+                limit,
+                carriers,
+            };
+            assert_eq!(refused, expected);
+            assert_eq!(check(&FLOAT, &collision, positions), Ok(()));
+        }
+    }
+
+    #[test]
+    fn relative_coordinates_are_held_against_it_from_body_a() {
+        // Far from the origin, close to each other.
+        let there = [1e6, 0.0, 0.0];
+        let near = Contact { point: [1e6 + 1.0, 2.0, 0.0], distance: -0.5 };
+        let collision = Collision { contacts: [near; 4], ..COLLISION };
+        assert_eq!(check(&MIXED, &collision, [there, there]), Ok(()));
+        let text = check(&HALF, &collision, [there, there]).expect_err("absolute").to_string();
+        assert_eq!(
+            text,
+            "collision 7: position of body A[0] is 1000000, but this bitstream holds collisions \
+             in binary16, which ends at 65504: bring it into range, or load another (profiles that \
+             could: naive, float, mixed, windowed, windowed16)"
+        );
+        // Body B is far from A.
+        let text = check(&MIXED, &collision, [there, [0.0; 3]]).expect_err("apart").to_string();
+        assert!(
+            text.starts_with("collision 7: offset of body B from body A[0] is -1000000"),
+            "{text}"
+        );
+        assert!(text.ends_with("(profiles that could: naive, float, windowed)"), "{text}");
+        let text = check(&MIXED, &collision, [[0.0; 3]; 2]).expect_err("a far point").to_string();
+        assert!(
+            text.starts_with("collision 7, contact point 0: lever arm of the point[0] is 1000001"),
+            "{text}"
+        );
+    }
+    #[test]
+    fn the_narrowest_place_on_the_way_decides() {
+        use StreamFormat::{Binary16, F32, Thesis16};
+        let held = |numbers: &Numbers| {
+            let Held { poses, velocities, collisions } = Held::by(numbers);
+            (poses, velocities, collisions)
+        };
+        assert_eq!(held(&FLOAT.numbers), (F32, F32, F32));
+        assert_eq!(held(&HALF.numbers), (Binary16, Binary16, Binary16));
+        assert_eq!(held(&MIXED.numbers), (F32, F32, Binary16));
+        let short = Precision::Binary16;
+        let with = |numbers| held(&numbers);
+        let velocities = short;
+        assert_eq!(with(Numbers { velocities, ..Numbers::F32 }), (F32, Binary16, F32));
+        assert_eq!(with(Numbers { updates: short, ..Numbers::F32 }), (F32, Binary16, F32));
+        assert_eq!(with(Numbers { rows: short, ..Numbers::F32 }), (F32, F32, Binary16));
+        assert_eq!(with(Numbers { impulses: short, ..Numbers::F32 }), (F32, F32, F32));
+        let thesis =
+            Numbers { collisions: Thesis16, bodies: Thesis16, poses: Thesis16, ..HALF.numbers };
+        assert_eq!(held(&thesis), (Thesis16, Thesis16, Thesis16));
+        assert_eq!(held(&WINDOWED16.numbers), (F32, Binary16, Binary16));
+    }
+}

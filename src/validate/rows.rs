@@ -1,0 +1,300 @@
+//! This file refuses collisions whose constraint rows leave binary16, where a bitstream computes
+//! them in it.
+//!
+//! An effective mass that overflows there is 0, and the accelerator leaves the contact out without
+//! a word; a lever arm that overflows makes NaN of the row, even that of a static body.
+
+use pgs_interface::number::{Precision, StreamFormat};
+use pgs_interface::profile::Variant;
+
+use super::InputError;
+use super::Scene;
+use super::range::{fits, origin, used};
+use crate::record::relative::difference;
+use crate::scene::{Collision, Contact, Shape};
+
+/// A component of a moment is two products of the lever arm with a unit normal: at most sqrt(2)
+/// times its longest component. 65504 less that, and less what the roundings add.
+pub(crate) const LONGEST_ARM: f32 = 43_000.0;
+/// 65504 less what the roundings on the way add, 2 %: for effective inverse masses, their
+/// reciprocals, and the sum of the contact points.
+pub(crate) const LARGEST: f32 = 64_000.0;
+/// The same of 2^14, whose reciprocal is the smallest that is not flushed.
+const LARGEST_FLUSHED: f32 = 16_000.0;
+/// The most that a coordinate loses on its way, as a share of it: cut off, or rounded twice.
+pub(crate) const LOSS: f32 = 1.0 / 1024.0;
+
+/// What the rows of a collision are made of.
+pub(crate) struct Rows<'a> {
+    pub(crate) index: usize,
+    pub(crate) collision: &'a Collision,
+    /// Of bodies A and B, as they are streamed.
+    pub(crate) positions: [[f32; 3]; 2],
+    pub(crate) shapes: [&'a Shape; 2],
+}
+
+/// A number that the rows come upon: contact point, name, component, value, and its range.
+type Found = (Option<usize>, &'static str, usize, f32, f32, f32);
+
+impl Rows<'_> {
+    /// Refuses what leaves the range.
+    // Out of the loop, which most streams leave without it.
+    #[inline(never)]
+    pub(crate) fn check(&self, scene: &Scene<'_>) -> Result<(), InputError> {
+        if self.fit(scene.variant, scene.flush_subnormals) {
+            return Ok(());
+        }
+        Err(self.refused(scene))
+    }
+
+    /// Whether a bitstream computes every row.
+    pub(crate) fn fit(&self, variant: &Variant, flush: bool) -> bool {
+        if variant.numbers.rows == Precision::F32 {
+            return true;
+        }
+        let origin = origin(variant.profile.geometry, self.positions);
+        let positions = self.positions.map(|position| difference(position, origin));
+        let mut fit = self.inverse_mass() >= 1.0 / LARGEST;
+        let mut sum = [0.0; 3];
+        for contact in used(self.collision) {
+            let point = difference(contact.point, origin);
+            sum = add(sum, point);
+            let arms = positions.map(|position| arm(point, position));
+            let [a, b] = arms;
+            let short = a.iter().chain(&b).fold(true, |fit, arm| fit & (*arm <= LONGEST_ARM));
+            fit &= short & (self.inverse_effective_mass(arms) <= largest(flush));
+        }
+        sum.into_iter().fold(fit, |fit, sum| fit & (sum <= LARGEST))
+    }
+
+    fn inverse_mass(&self) -> f32 {
+        self.shapes[0].inverse_mass + self.shapes[1].inverse_mass
+    }
+
+    /// The most that it can be for these lever arms, whatever the direction of the row, 1/kg.
+    fn inverse_effective_mass(&self, arms: [[f32; 3]; 2]) -> f32 {
+        let turning = |side: usize| {
+            let [x, y, z] = self.shapes[side].inverse_inertia;
+            let [rx, ry, rz] = arms[side];
+            x.max(y).max(z) * (rx * rx + ry * ry + rz * rz)
+        };
+        self.inverse_mass() + turning(0) + turning(1)
+    }
+
+    /// Everything that is held against a limit, in the order of the record.
+    fn numbers(&self, variant: &Variant, flush: bool) -> Vec<Found> {
+        let origin = origin(variant.profile.geometry, self.positions);
+        let positions = self.positions.map(|position| difference(position, origin));
+        let points: Vec<_> = used(self.collision)
+            .iter()
+            .map(|Contact { point, .. }| difference(*point, origin))
+            .collect();
+        let smallest = 1.0 / LARGEST;
+        let mass = self.inverse_mass();
+        let mut numbers =
+            vec![(None, "sum of the inverse masses", 0, mass, smallest, f32::INFINITY)];
+        for (contact, point) in points.iter().enumerate() {
+            let arms = positions.map(|position| arm(*point, position));
+            let names = ["lever arm about body A", "lever arm about body B"];
+            for (name, arm) in names.into_iter().zip(arms) {
+                for (component, found) in arm.into_iter().enumerate() {
+                    numbers.push((Some(contact), name, component, found, 0.0, LONGEST_ARM));
+                }
+            }
+            let found = self.inverse_effective_mass(arms);
+            let name = "inverse effective mass";
+            numbers.push((Some(contact), name, 0, found, smallest, largest(flush)));
+        }
+        for (component, found) in points.into_iter().fold([0.0; 3], add).into_iter().enumerate() {
+            numbers.push((None, "sum of the contact points", component, found, 0.0, LARGEST));
+        }
+        numbers
+    }
+
+    /// Names the number that is known to be out of range.
+    #[cold]
+    fn refused(&self, scene: &Scene<'_>) -> InputError {
+        let flush = scene.flush_subnormals;
+        let (smallest, largest) = (1.0 / LARGEST, f32::INFINITY);
+        let (contact, field, component, found, smallest, largest) = self
+            .numbers(scene.variant, flush)
+            .into_iter()
+            .find(|(.., found, smallest, largest)| !(smallest..=largest).contains(&found))
+            .unwrap_or((
+                None,
+                "sum of the inverse masses",
+                0,
+                self.inverse_mass(),
+                smallest,
+                largest,
+            ));
+        let carriers = scene.demand.carriers(|variant| {
+            fits(variant, self.collision, self.positions) && self.fit(variant, flush)
+        });
+        // What bounds a sum of masses from above is the effective mass.
+        let largest = largest.min(StreamFormat::Binary16.largest());
+        InputError::RowOutOfRange {
+            collision: self.index,
+            contact,
+            field,
+            component,
+            found,
+            smallest,
+            largest,
+            carriers,
+        }
+    }
+}
+
+/// The largest inverse effective mass whose reciprocal is not 0, 1/kg.
+pub(crate) const fn largest(flush: bool) -> f32 {
+    if flush { LARGEST_FLUSHED } else { LARGEST }
+}
+
+/// The most that each component of a lever arm can be, whatever rounding does to its two ends.
+fn arm(point: [f32; 3], position: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|k| {
+        let (x, p) = (point[k], position[k]);
+        (x - p).abs() + (x.abs() + p.abs()) * LOSS
+    })
+}
+
+/// Adds magnitudes.
+fn add(sum: [f32; 3], point: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|k| sum[k] + point[k].abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::range::Held;
+    use super::*;
+    use crate::validate::Demand;
+    use pgs_interface::number::Numbers;
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED};
+
+    const CUBE: Shape = Shape::isotropic(1.0, 1.5);
+    const GROUND: Shape = Shape::STATIC;
+    const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+
+    /// Two contact points, at `point` and at the origin; those that are not used do not matter.
+    fn collision(point: [f32; 3]) -> Collision {
+        let unused = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
+        let at = |point| Contact { point, distance: 0.0 };
+        Collision {
+            body_a: 0,
+            body_b: 1,
+            normal: [0.0, -1.0, 0.0],
+            count: 2,
+            contacts: [at([0.0; 3]), at(point), unused, unused],
+        }
+    }
+
+    fn check_on(
+        variant: Variant,
+        flush_subnormals: bool,
+        shapes: [&Shape; 2],
+        collision: &Collision,
+        positions: [[f32; 3]; 2],
+    ) -> Result<(), String> {
+        let held = Held::by(&variant.numbers);
+        let variant = &variant;
+        let scene = Scene { shapes: &[], demand: DEMAND, variant, held, flush_subnormals };
+        let rows = Rows { index: 7, collision, positions, shapes };
+        rows.check(&scene).map_err(|error| error.to_string())
+    }
+
+    const HALF_BUILT: Variant = HALF.default_variant();
+
+    fn check(shapes: [&Shape; 2], point: [f32; 3]) -> Result<(), String> {
+        check_on(HALF_BUILT, false, shapes, &collision(point), [[0.0; 3]; 2])
+    }
+
+    #[test]
+    fn an_effective_mass_beyond_binary16_is_refused_and_named() {
+        // 1 + 1.5 x 200^2 = 60,001 and a little for the roundings; 210 m make 66,151.
+        assert_eq!(check([&GROUND, &CUBE], [200.0, 0.0, 0.0]), Ok(()));
+        let text = check([&GROUND, &CUBE], [0.0, 210.0, 0.0]).expect_err("it overflows");
+        let expected = "collision 7, contact point 1: inverse effective mass[0] is 66280.";
+        assert!(text.starts_with(expected), "{text}");
+        assert!(text.contains("in binary16, which takes 1.5625e-5 to 64000"), "{text}");
+        assert!(text.ends_with("(profiles that could: naive, float, mixed, windowed)"), "{text}");
+        // Of both bodies together, by the largest of their inertias.
+        assert_eq!(check([&GROUND, &CUBE], [150.0, 0.0, 0.0]), Ok(()));
+        assert!(check([&CUBE, &CUBE], [150.0, 0.0, 0.0]).is_err());
+        let flat = Shape { inverse_mass: 1.0, inverse_inertia: [0.1, 0.1, 1.5] };
+        assert!(check([&GROUND, &flat], [0.0, 210.0, 0.0]).is_err());
+        for variant in [FLOAT.default_variant(), MIXED.default_variant()] {
+            let far = collision([0.0, 210.0, 0.0]);
+            let checked = check_on(variant, true, [&GROUND, &CUBE], &far, [[0.0; 3]; 2]);
+            assert_eq!(checked, Ok(()));
+        }
+    }
+
+    /// Rounding its ends may make an arm of 1 m one of 32 m at 16 km.
+    #[test]
+    fn what_is_lost_of_the_coordinates_counts() {
+        let light = Shape::isotropic(1.0, 100.0);
+        let check = |variant| {
+            let contact = Contact { point: [16_001.0, 0.0, 0.0], distance: 0.0 };
+            let near = Collision { contacts: [contact; 4], count: 1, ..collision([0.0; 3]) };
+            check_on(variant, false, [&light; 2], &near, [[16_000.0, 0.0, 0.0]; 2])
+        };
+        assert!(check(HALF_BUILT).is_err());
+        let numbers = Numbers { rows: Precision::Binary16, ..MIXED.numbers };
+        assert_eq!(check(Variant { numbers, ..MIXED.default_variant() }), Ok(()));
+    }
+
+    #[test]
+    fn flushed_subnormals_bound_the_reciprocal() {
+        let check = |flush, point| {
+            let shapes = [&GROUND, &CUBE];
+            check_on(HALF_BUILT, flush, shapes, &collision(point), [[0.0; 3]; 2])
+        };
+        let far = [105.0, 0.0, 0.0];
+        assert_eq!(check(false, far), Ok(()));
+        let text = check(true, far).expect_err("1 / 16538 is subnormal");
+        assert!(text.contains("to 16000"), "{text}");
+        assert_eq!(check(true, [100.0, 0.0, 0.0]), Ok(()));
+    }
+
+    #[test]
+    fn two_bodies_that_are_too_heavy_together_are_refused() {
+        let heavy = |inverse_mass| Shape::isotropic(inverse_mass, 0.0);
+        let light = heavy(1.6e-5);
+        assert_eq!(check([&GROUND, &light], [1.0, 0.0, 0.0]), Ok(()));
+        let text = check([&GROUND, &heavy(1.5e-5)], [1.0, 0.0, 0.0]).expect_err("66 t");
+        let expected = "collision 7: sum of the inverse masses[0] is 0.000015";
+        assert!(text.starts_with(expected), "{text}");
+        assert_eq!(check([&heavy(8e-6), &heavy(8e-6)], [1.0, 0.0, 0.0]), Ok(()));
+    }
+
+    #[test]
+    fn long_lever_arms_are_refused_even_those_of_a_static_body() {
+        let point_mass = Shape::isotropic(1.0, 0.0);
+        let check = |positions| {
+            let near = collision([1.0, 0.0, 0.0]);
+            check_on(HALF_BUILT, false, [&GROUND, &point_mass], &near, positions)
+        };
+        assert_eq!(check([[0.0, 0.0, 42_000.0], [0.0; 3]]), Ok(()));
+        let text = check([[0.0, 0.0, -43_000.0], [0.0; 3]]).expect_err("too long");
+        let expected = "collision 7, contact point 0: lever arm about body A[2] is 4304";
+        assert!(text.starts_with(expected), "{text}");
+        let text = check([[0.0; 3], [50_000.0, 0.0, 0.0]]).expect_err("too long");
+        assert!(text.contains("lever arm about body B[0]"), "{text}");
+    }
+
+    /// The friction passes need their centre.
+    #[test]
+    fn the_sum_of_the_contact_points_is_held_against_the_limit() {
+        let point_mass = Shape::isotropic(1.0, 0.0);
+        let check = |x| {
+            let there = [x, 0.0, 0.0];
+            let contact = Contact { point: there, distance: 0.0 };
+            let collision = Collision { count: 4, contacts: [contact; 4], ..collision(there) };
+            check_on(HALF_BUILT, false, [&GROUND, &point_mass], &collision, [there; 2])
+        };
+        assert_eq!(check(16_000.0), Ok(()));
+        let text = check(-16_100.0).expect_err("64,400");
+        assert!(text.contains("sum of the contact points[0] is 64400"), "{text}");
+    }
+}
