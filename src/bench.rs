@@ -7,7 +7,7 @@ use pgs_interface::record::{BEAT_BYTES, Beat};
 use crate::beat::bare;
 use crate::beat::pack::bodies::{pack_bodies, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
-use crate::beat::pack::pool::Packers;
+use crate::beat::pack::pool::PackPool;
 use crate::beat::pack::target::Target;
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Survey, Table};
@@ -52,9 +52,9 @@ impl CollisionPacker {
         let channels = &mut channels[..streams];
         let target = Target { variant: &self.variant, shapes, quick: None };
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
-        survey(target, bodies, bodies.len(), into, &mut Packers::alone());
+        survey(target, bodies, bodies.len(), into, &mut PackPool::alone());
         let entries = Entries { collisions, count, added: None, words: None };
-        let packers = &mut Packers::alone();
+        let packers = &mut PackPool::alone();
         let (sum, good) = pack_collisions(target, self.ends.ends(), &entries, channels, packers);
         good.then_some(sum)
     }
@@ -69,7 +69,7 @@ pub struct StepPacker {
     poses: [Vec<Beat>; DMA_COUNT_MAX],
     ends: Table,
     statics: Vec<u32>,
-    packers: Packers,
+    packers: PackPool,
 }
 
 impl StepPacker {
@@ -93,7 +93,7 @@ impl StepPacker {
             poses: Default::default(),
             ends: Table::default(),
             statics: Vec::new(),
-            packers: Packers::new(threads),
+            packers: PackPool::new(threads),
         }
     }
 
@@ -204,7 +204,7 @@ pub struct Unpacker {
     channels: [Vec<Beat>; DMA_COUNT_MAX],
     statics: Vec<u32>,
     spare: Vec<Record>,
-    packers: Packers,
+    packers: PackPool,
 }
 
 impl Unpacker {
@@ -227,8 +227,8 @@ impl Unpacker {
         let (mut ends, mut statics) = (Table::default(), Vec::new());
         let target = Target { variant: &variant, shapes, quick: None };
         let into = Survey { ends: &mut ends, statics: &mut statics };
-        survey(target, bodies, bodies.len(), into, &mut Packers::alone());
-        Self { variant, channels, statics, spare: Vec::new(), packers: Packers::new(threads) }
+        survey(target, bodies, bodies.len(), into, &mut PackPool::alone());
+        Self { variant, channels, statics, spare: Vec::new(), packers: PackPool::new(threads) }
     }
 
     /// Bytes of so many results, once they are read: f32, whatever the format of the stream.

@@ -6,6 +6,7 @@ use crate::axi_dma::DmaError;
 use crate::control_block::{ControlError, IdentityError};
 use crate::fault::{Diagnosis, Fault};
 use crate::platform::PlatformError;
+use crate::scene::ShapeError;
 use crate::validate::InputError;
 
 /// Why a call failed. The cause is the [`source`](std::error::Error::source).
@@ -49,6 +50,12 @@ pub enum Aftermath {
     Untouched,
     /// It could not be reset.
     MustReopen,
+}
+
+impl From<ShapeError> for Error {
+    fn from(error: ShapeError) -> Self {
+        Self::Input(error.into())
+    }
 }
 
 impl Error {

@@ -188,12 +188,12 @@ pub use platform::{
 };
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
-    Pose, Shape, StepParameters, Structures, Velocity,
+    Pose, Shape, ShapeError, StepParameters, Structures, Velocity,
 };
 pub use step::{
     Accelerator, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles, StepReport,
 };
-pub use validate::{Carriers, InputError};
+pub use validate::{CapableProfiles, InputError};
 
 /// The README's library example is a test.
 #[cfg(all(doctest, feature = "emulation"))]

@@ -26,7 +26,7 @@ struct World {
     port: CpuPort,
 }
 
-/// Pieces in which time passes.
+/// Parts in which time passes.
 const PIECES: u32 = 100;
 
 /// The collisions of a world while they are packed, which takes its time.

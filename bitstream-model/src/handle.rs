@@ -11,12 +11,12 @@ use std::time::Duration;
 use pgs_support::float_env::standard;
 
 use crate::axi_dma::PacketCount;
-use crate::board::violation::{RegisterAccess, Violation};
 use crate::board::{Board, Counts};
 use crate::config::{BoardConfig, ConfigError};
 use crate::fault::FaultPlan;
 use crate::memory::external::DeviceMemory;
 use crate::memory::{DeviceAccess, Memory, MemoryError};
+use crate::violation::{RegisterAccess, Violation};
 use pgs_interface::record::Beat;
 
 /// Does something with a board: the one door to it.

@@ -15,16 +15,17 @@ mod memory;
 #[cfg(unix)]
 pub mod remote;
 mod shortcut;
+mod stream;
+mod violation;
 
+pub use crate::violation::{RegisterAccess, Violation, ViolationKind};
+pub use axi_dma::PacketCount;
+pub use board::Counts;
+pub use config::quirks::{Coherency, InterruptWiring, Quirks, Resettable};
+pub use config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, Subnormals, THREADS_MAX};
+pub use fault::{Consequence, Fault, FaultError, FaultKind, FaultPlan, Place, StepPhase, When};
+pub use handle::{CpuPort, EmulatedBoard};
+pub use memory::external::DeviceMemory;
+pub use memory::{Denied, DeviceAccess, MemoryError};
 pub use pgs_interface as interface;
-pub use {
-    axi_dma::{Direction, PacketCount},
-    board::Counts,
-    board::violation::{RegisterAccess, Violation, ViolationKind},
-    config::quirks::{Coherency, InterruptWiring, Quirks, Resettable},
-    config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, Subnormals, THREADS_MAX},
-    fault::{Consequence, Fault, FaultError, FaultKind, FaultPlan, Place, StepPhase, When},
-    handle::{CpuPort, EmulatedBoard},
-    memory::external::DeviceMemory,
-    memory::{Denied, DeviceAccess, MemoryError},
-};
+pub use pgs_interface::axi_dma::Direction;

@@ -1,42 +1,14 @@
 //! This file drives one direction of a DMA core; both directions are this one piece of code.
 
-use std::fmt;
 use std::sync::Arc;
 
 use pgs_interface::axi_dma::{
-    CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, S2MM_OFFSET, TAILDESC, TAILDESC_MSB,
+    CURDESC, CURDESC_MSB, DMACR, DMASR, Direction, LENGTH, TAILDESC, TAILDESC_MSB,
 };
 use pgs_interface::register::Register;
 
 use super::{ChannelName, DmaError, Dmacr, Dmasr, STATE_CHANGE};
 use crate::platform::{BusAddress, Deadline, Platform, Window, poll_until};
-
-/// Which way data goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
-    /// Memory to stream.
-    Mm2s,
-    /// Stream to memory.
-    S2mm,
-}
-
-impl Direction {
-    const fn offset(self) -> u32 {
-        match self {
-            Self::Mm2s => 0,
-            Self::S2mm => S2MM_OFFSET,
-        }
-    }
-}
-
-impl fmt::Display for Direction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Mm2s => "MM2S",
-            Self::S2mm => "S2MM",
-        })
-    }
-}
 
 /// One direction of one DMA core, in scatter-gather mode.
 #[derive(Debug)]

@@ -14,10 +14,10 @@ use std::time::Duration;
 
 use thiserror::Error;
 
-pub use channel::Direction;
 pub(crate) use channel::{Channel, detect_length_width};
 pub use descriptor::DescriptorStatus;
 pub(crate) use descriptor::{Descriptor, largest_piece, pieces};
+pub use pgs_interface::axi_dma::Direction;
 pub use registers::{Dmacr, Dmasr};
 pub(crate) use reset::reset_core;
 pub use ring::DescriptorState;

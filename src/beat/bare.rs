@@ -10,9 +10,9 @@ use pgs_interface::record::{Beat, LANES, collision, relative};
 use super::format::{Join, Records};
 use super::pack::encode::each;
 use super::pack::pattern::Pattern;
-use super::pack::source::{InArray, InOrder, Lying, Next};
 use super::pack::unrolled;
 use super::stripe::Segment;
+use crate::record::source::{CollisionSource, Contiguous, Indexed, Next};
 use crate::record::{Record, Row, Rows};
 use crate::scene::{Collision, Collisions, Structures};
 use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
@@ -29,9 +29,9 @@ pub(crate) fn deal<C: Collisions + ?Sized>(
 ) -> usize {
     // Others are not as many as there is room for.
     match collisions.structures().filter(|all| all.len() == collisions.len()) {
-        Some(Structures::Array(all)) => dealt(variant, InArray(all), channels),
+        Some(Structures::Array(all)) => dealt(variant, Contiguous(all), channels),
         Some(Structures::Ordered { all, order }) => {
-            let order = InOrder::new(all, order);
+            let order = Indexed::new(all, order);
             match order.nearby(0) {
                 Some(order) => dealt(variant, order, channels),
                 None => dealt(variant, order, channels),
@@ -41,7 +41,7 @@ pub(crate) fn deal<C: Collisions + ?Sized>(
     }
 }
 
-fn dealt<'p, L: Lying<'p>>(
+fn dealt<'p, L: CollisionSource<'p>>(
     variant: &Variant,
     collisions: L,
     channels: &mut [&mut [Beat]],
@@ -68,7 +68,7 @@ struct Dealing<'c, 'b, L> {
     rest: &'c mut [&'b mut [Beat]],
 }
 
-impl<'p, L: Lying<'p>> Work for Dealing<'_, '_, L> {
+impl<'p, L: CollisionSource<'p>> Work for Dealing<'_, '_, L> {
     type Output = usize;
 
     #[inline(always)]
@@ -117,7 +117,7 @@ impl Join for Folded {
 #[derive(Clone, Copy)]
 struct AsTheyLie<L>(L);
 
-impl<'p, L: Lying<'p>, const ROWS: usize> Records<ROWS> for AsTheyLie<L> {
+impl<'p, L: CollisionSource<'p>, const ROWS: usize> Records<ROWS> for AsTheyLie<L> {
     #[inline(always)]
     fn len(&self) -> usize {
         self.0.len()

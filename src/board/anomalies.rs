@@ -2,7 +2,7 @@
 
 /// Something odd that costs no step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Oddity {
+pub(crate) enum Anomaly {
     /// A step ended and no interrupt said so.
     MissedInterrupt,
     /// Interrupts have not come for some steps.
@@ -17,7 +17,7 @@ pub(crate) enum Oddity {
     LateStatus,
 }
 
-impl Oddity {
+impl Anomaly {
     const fn text(self) -> &'static str {
         match self {
             Self::MissedInterrupt => "a step ended without an interrupt; found by looking",
@@ -40,11 +40,11 @@ impl Oddity {
 
 /// Which oddities were told.
 #[derive(Debug, Default)]
-pub(crate) struct Oddities(u32);
+pub(crate) struct Anomalies(u32);
 
-impl Oddities {
+impl Anomalies {
     /// Tells of an oddity unless it was told before; whether it was told.
-    pub(crate) fn tell(&mut self, oddity: Oddity) -> bool {
+    pub(crate) fn tell(&mut self, oddity: Anomaly) -> bool {
         let bit = 1 << oddity as u32;
         let first = self.0 & bit == 0;
         if first {
@@ -56,7 +56,7 @@ impl Oddities {
 
     /// Whether an oddity was told.
     #[cfg(test)]
-    pub(crate) fn told(&self, oddity: Oddity) -> bool {
+    pub(crate) fn told(&self, oddity: Anomaly) -> bool {
         self.0 & (1 << oddity as u32) != 0
     }
 }
@@ -67,9 +67,9 @@ mod tests {
 
     #[test]
     fn an_oddity_is_told_once() {
-        let mut oddities = Oddities::default();
-        assert!(oddities.tell(Oddity::LateStatus) && !oddities.tell(Oddity::LateStatus));
-        assert!(oddities.tell(Oddity::MissedInterrupt));
-        assert!(oddities.told(Oddity::LateStatus) && !oddities.told(Oddity::InterruptStorm));
+        let mut oddities = Anomalies::default();
+        assert!(oddities.tell(Anomaly::LateStatus) && !oddities.tell(Anomaly::LateStatus));
+        assert!(oddities.tell(Anomaly::MissedInterrupt));
+        assert!(oddities.told(Anomaly::LateStatus) && !oddities.told(Anomaly::InterruptStorm));
     }
 }

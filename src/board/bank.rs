@@ -1,6 +1,6 @@
 //! This file tells the two banks of buffers apart.
 //!
-//! Every lane has a buffer in each. A step is packed into one bank and stays there; the next one may
+//! Every port has a buffer in each. A step is packed into one bank and stays there; the next one may
 //! be packed into the other meanwhile. The second has no memory before a step is first prepared.
 
 use std::ops::{Index, IndexMut};

@@ -5,16 +5,16 @@
 
 use std::time::Duration;
 
-use super::anomalies::Oddity;
+use super::anomalies::Anomaly;
 use super::cancellation::Cancellation;
 use super::device::{Device, Statuses};
 use super::plan::{Plan, bytes};
 use super::symptom::Symptom;
 use crate::axi_dma::Progress;
 use crate::control_block::Counters;
+use crate::control_block::time_of;
 use crate::fault::{Awaited, Fault};
 use crate::platform::{Deadline, acquire_from_device, poll_until};
-use crate::step::report::time_of;
 
 /// How long the status of descriptors is polled for after the interrupt, before registers are looked
 /// at again.
@@ -64,10 +64,10 @@ impl Device {
             let statuses = self.statuses();
             self.check(&statuses)?;
             let mut pending = false;
-            for (lane, status) in self.lanes_mut().zip(statuses) {
-                if lane.channel.pending(status) != 0 {
+            for (port, status) in self.ports_mut().zip(statuses) {
+                if port.channel.pending(status) != 0 {
                     pending = true;
-                    lane.channel.acknowledge(status);
+                    port.channel.acknowledge(status);
                 }
             }
             let mut packet = statuses[completion].complete();
@@ -93,12 +93,12 @@ impl Device {
             // A look at many descriptors takes its time, too.
             let waited = chains != Chains::Complete;
             if packet && waited && self.platform.now().saturating_sub(looked) > NOTICEABLE {
-                self.oddities.tell(Oddity::LateStatus);
+                self.oddities.tell(Anomaly::LateStatus);
             }
             let odd = woke && !pending;
             if chains != Chains::Running {
                 if odd {
-                    self.oddities.tell(Oddity::SpuriousInterrupt);
+                    self.oddities.tell(Anomaly::SpuriousInterrupt);
                 }
                 if !packet && self.acknowledge_completion()? {
                     interrupts += 1;
@@ -116,10 +116,10 @@ impl Device {
             }
             if odd {
                 // Neither a channel nor the accelerator.
-                self.oddities.tell(Oddity::SpuriousInterrupt);
+                self.oddities.tell(Anomaly::SpuriousInterrupt);
             }
             if interrupts >= STORM {
-                self.oddities.tell(Oddity::InterruptStorm);
+                self.oddities.tell(Anomaly::InterruptStorm);
             }
             if remaining.is_zero() {
                 return Err(Symptom::Late { awaited: Awaited::Results, limit: deadline.limit() });
@@ -156,12 +156,12 @@ impl Device {
     /// Acknowledges the completion of a step that was found complete before its interrupt was seen,
     /// which would else be the next step's; whether it had reached the driver.
     fn acknowledge_completion(&mut self) -> Result<bool, Fault> {
-        let Some(lane) = self.s2mm.last_mut() else { return Ok(false) };
-        let status = lane.channel.status();
-        if status.gone() || lane.channel.pending(status) == 0 {
+        let Some(port) = self.s2mm.last_mut() else { return Ok(false) };
+        let status = port.channel.status();
+        if status.gone() || port.channel.pending(status) == 0 {
             return Ok(false);
         }
-        lane.channel.acknowledge(status);
+        port.channel.acknowledge(status);
         let came = self.platform.wait_interrupt(Duration::ZERO)?.is_some();
         if came {
             self.platform.unmask_interrupt()?;
@@ -224,15 +224,15 @@ impl Device {
         }
         self.missed_interrupts = self.missed_interrupts.saturating_add(1);
         if self.missed_interrupts == 1 {
-            self.oddities.tell(Oddity::MissedInterrupt);
+            self.oddities.tell(Anomaly::MissedInterrupt);
         } else if self.missed_interrupts == MISSED_LIMIT {
-            self.oddities.tell(Oddity::NoInterrupts);
+            self.oddities.tell(Anomaly::NoInterrupts);
         }
     }
 
     /// Errors that the status registers show.
     fn check(&self, statuses: &Statuses) -> Result<(), Symptom> {
-        let statuses = statuses.iter().take(self.lanes().count()).enumerate();
+        let statuses = statuses.iter().take(self.ports().count()).enumerate();
         for (place, status) in statuses {
             if status.gone() || status.errors() != 0 {
                 return Err(Symptom::Status { place, status: *status });
@@ -248,14 +248,14 @@ impl Device {
         let mut next = 0;
         let mut found = Chains::Complete;
         let ended = poll_until(&**platform, &grace, || {
-            // Lanes that were complete are not looked at again.
+            // Ports that were complete are not looked at again.
             while next < s2mm.len() + mm2s.len() {
                 let place = next;
-                let (lane, expected) = match s2mm.get_mut(place) {
-                    Some(lane) => (lane, Some(bytes(plan.results(place)))),
+                let (port, expected) = match s2mm.get_mut(place) {
+                    Some(port) => (port, Some(bytes(plan.results(place)))),
                     None => (&mut mm2s[place - s2mm.len()], None),
                 };
-                let ended = match (lane.ring_mut().progress(), expected) {
+                let ended = match (port.ring_mut().progress(), expected) {
                     (Progress::Running, _) => {
                         found = Chains::BecameComplete;
                         return None;

@@ -1,23 +1,23 @@
-//! This file holds an open board: its lanes and its control block, from opening to closing.
+//! This file holds an open board: its ports and its control block, from opening to closing.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
 
-use super::anomalies::Oddities;
+use super::anomalies::Anomalies;
 use super::bank::{Bank, PerBank};
 use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
 use super::cancellation::Cancellation;
+use super::outline::Outline;
 use super::plan::{Plan, bytes};
-use super::port::Lane;
+use super::port::Port;
 use super::symptom::Symptom;
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
-use crate::beat::pack::pool::Packers;
+use crate::beat::pack::pool::PackPool;
 use crate::control_block::{Capabilities, Control, Fingerprint, identify};
 use crate::error::OpenError;
 use crate::fault::Fault;
-use crate::fault::phase::Outline;
 use crate::platform::{
     Access, AccessCounts, Platform, PlatformError, RegisterMap, Window, release_to_device,
 };
@@ -46,8 +46,8 @@ enum Activity {
 
 /// An open board.
 pub(crate) struct Device {
-    pub(crate) mm2s: Vec<Lane>,
-    pub(crate) s2mm: Vec<Lane>,
+    pub(crate) mm2s: Vec<Port>,
+    pub(crate) s2mm: Vec<Port>,
     pub(crate) control: Control,
     pub(crate) capabilities: Capabilities,
     pub(crate) counts: Arc<AccessCounts>,
@@ -61,7 +61,7 @@ pub(crate) struct Device {
     /// Interrupts that did not come although the work was done, in a row.
     pub(crate) missed_interrupts: u32,
     /// What was told already.
-    pub(crate) oddities: Oddities,
+    pub(crate) oddities: Anomalies,
     /// Whether a reset failed: nothing may be touched any more.
     pub(crate) dead: bool,
     activity: Activity,
@@ -70,7 +70,7 @@ pub(crate) struct Device {
     /// The longest piece that a descriptor carries, bytes.
     pub(crate) largest: u32,
     /// Who writes the records and reads the results.
-    pub(crate) packers: Packers,
+    pub(crate) packers: PackPool,
     /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
     pub(crate) ends: Table,
     /// Those of the step in each bank that never move, by their indices, upwards.
@@ -118,12 +118,12 @@ impl Device {
         let (mut mm2s, mut s2mm) = (Vec::new(), Vec::new());
         let last = cores.len().saturating_sub(1);
         for (place, Core { sender, receiver }) in cores.into_iter().enumerate() {
-            mm2s.push(Lane::new(sender, Access::Read, Dmacr::RUNNING));
+            mm2s.push(Port::new(sender, Access::Read, Dmacr::RUNNING));
             // Every step has results on the last channel, and they end within a beat of the others'
             // (three channels: 4 B beats): its completion is taken for the step's.
             let completion = place == last;
             let running = if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
-            s2mm.push(Lane::new(receiver, Access::Write, running));
+            s2mm.push(Port::new(receiver, Access::Write, running));
         }
         Self {
             mm2s,
@@ -136,12 +136,12 @@ impl Device {
             started: None,
             took: None,
             missed_interrupts: 0,
-            oddities: Oddities::default(),
+            oddities: Anomalies::default(),
             dead: false,
             activity: Activity::Idle,
             cancellation: None,
             largest: largest_piece(capabilities.length_width),
-            packers: Packers::new(None),
+            packers: PackPool::new(None),
             ends: Table::default(),
             statics: PerBank::default(),
         }
@@ -151,12 +151,12 @@ impl Device {
     pub(crate) fn reserve_buffers(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
         self.take_back_unused(bank);
         let width = self.capabilities.address_width;
-        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
+        for (channel, port) in self.mm2s.iter_mut().enumerate() {
             let beats = plan.segments(channel).end();
-            lane.reserve_beats(&self.platform, bank, beats, width)?;
+            port.reserve_beats(&self.platform, bank, beats, width)?;
         }
-        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
-            lane.reserve_beats(&self.platform, bank, plan.results(channel), width)?;
+        for (channel, port) in self.s2mm.iter_mut().enumerate() {
+            port.reserve_beats(&self.platform, bank, plan.results(channel), width)?;
         }
         Ok(())
     }
@@ -164,9 +164,9 @@ impl Device {
     /// Takes back the buffers of a bank that no engine has in work: what was prepared is not
     /// started any more.
     pub(crate) fn take_back_unused(&mut self, bank: Bank) {
-        for lane in self.lanes_mut() {
+        for port in self.ports_mut() {
             // It is made anew.
-            if let Err(error) = lane.take_back(bank) {
+            if let Err(error) = port.take_back(bank) {
                 log::error!("a buffer was lost: {error}");
             }
         }
@@ -176,12 +176,12 @@ impl Device {
     pub(crate) fn release_buffers(&mut self, bank: Bank) -> bool {
         self.take_back_unused(bank);
         // All of them.
-        self.lanes_mut().map(|lane| lane.drop_buffer(bank)).fold(false, std::ops::BitOr::bitor)
+        self.ports_mut().map(|port| port.drop_buffer(bank)).fold(false, std::ops::BitOr::bitor)
     }
 
-    /// Whether every lane has a buffer in that bank, whoever holds it.
+    /// Whether every port has a buffer in that bank, whoever holds it.
     pub(crate) fn holds(&self, bank: Bank) -> bool {
-        self.lanes().all(|lane| lane.has_buffer(bank))
+        self.ports().all(|port| port.has_buffer(bank))
     }
 
     /// Makes the rings large enough for a step. Nothing is in flight.
@@ -190,12 +190,12 @@ impl Device {
         let width = self.capabilities.address_width;
         for core in 0..self.mm2s.len() {
             let [sent, received] = self.descriptors_of(plan, core);
-            for (lane, descriptors) in
+            for (port, descriptors) in
                 [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
             {
-                if !lane.ring_takes(descriptors) {
-                    lane.stop(&*self.platform)?;
-                    lane.replace_ring(&self.platform, descriptors, width)?;
+                if !port.ring_takes(descriptors) {
+                    port.stop(&*self.platform)?;
+                    port.replace_ring(&self.platform, descriptors, width)?;
                 }
             }
         }
@@ -223,11 +223,11 @@ impl Device {
 
     /// Hands the buffers of a packed step over to the device, those that it does not have.
     pub(crate) fn hand_over(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
-        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
-            lane.hand_over(bank, plan.results(channel))?;
+        for (channel, port) in self.s2mm.iter_mut().enumerate() {
+            port.hand_over(bank, plan.results(channel))?;
         }
-        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
-            lane.hand_over(bank, plan.segments(channel).end())?;
+        for (channel, port) in self.mm2s.iter_mut().enumerate() {
+            port.hand_over(bank, plan.segments(channel).end())?;
         }
         Ok(())
     }
@@ -245,16 +245,16 @@ impl Device {
         self.started = Some(Started { outline, at: self.platform.now() });
         self.activity = Activity::Step;
         self.hand_over(plan, bank)?;
-        for (channel, lane) in self.s2mm.iter_mut().enumerate() {
-            lane.begin();
-            lane.queue(bank, 0, bytes(plan.results(channel)), largest)?;
-            lane.ensure_running(&*self.platform)?;
+        for (channel, port) in self.s2mm.iter_mut().enumerate() {
+            port.begin();
+            port.queue(bank, 0, bytes(plan.results(channel)), largest)?;
+            port.ensure_running(&*self.platform)?;
         }
-        for (channel, lane) in self.mm2s.iter_mut().enumerate() {
+        for (channel, port) in self.mm2s.iter_mut().enumerate() {
             let segments = plan.segments(channel);
-            lane.begin();
+            port.begin();
             let mut queue = |beats: &std::ops::Range<usize>| {
-                lane.queue(bank, bytes(beats.start), bytes(beats.len()), largest)
+                port.queue(bank, bytes(beats.start), bytes(beats.len()), largest)
             };
             queue(&segments.velocities)?;
             if !segments.collisions.is_empty() {
@@ -263,7 +263,7 @@ impl Device {
                 }
             }
             queue(&segments.poses)?;
-            lane.ensure_running(&*self.platform)?;
+            port.ensure_running(&*self.platform)?;
         }
         let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         self.control.set_arguments(count(plan.bodies), count(plan.collisions), parameters);
@@ -276,20 +276,20 @@ impl Device {
     pub(crate) fn start(&mut self) -> Result<u64, Symptom> {
         // Receivers first: otherwise the accelerator's output stalls, and with it the input.
         let mut doorbells = 1;
-        for lane in &mut self.s2mm {
-            doorbells += u64::from(lane.ring_doorbell()?);
+        for port in &mut self.s2mm {
+            doorbells += u64::from(port.ring_doorbell()?);
         }
         self.control.start();
-        for lane in &mut self.mm2s {
-            doorbells += u64::from(lane.ring_doorbell()?);
+        for port in &mut self.mm2s {
+            doorbells += u64::from(port.ring_doorbell()?);
         }
         Ok(doorbells)
     }
 
     /// Takes the buffers of a step back whose chains are complete.
     pub(crate) fn take_back(&mut self, bank: Bank) -> Result<(), Symptom> {
-        for lane in self.lanes_mut() {
-            lane.take_back(bank)?;
+        for port in self.ports_mut() {
+            port.take_back(bank)?;
         }
         self.activity = Activity::Idle;
         Ok(())
@@ -315,24 +315,24 @@ impl Device {
 
     /// Descriptors in the chains of the step.
     pub(crate) fn descriptors(&mut self) -> u64 {
-        self.lanes_mut().map(|lane| lane.ring_mut().used() as u64).sum()
+        self.ports_mut().map(|port| port.ring_mut().used() as u64).sum()
     }
 
-    /// All lanes, in the order of [`Statuses`].
-    pub(crate) fn lanes_mut(&mut self) -> impl Iterator<Item = &mut Lane> {
+    /// All ports, in the order of [`Statuses`].
+    pub(crate) fn ports_mut(&mut self) -> impl Iterator<Item = &mut Port> {
         self.s2mm.iter_mut().chain(&mut self.mm2s)
     }
 
-    /// All lanes, in the order of [`Statuses`].
-    pub(crate) fn lanes(&self) -> impl Iterator<Item = &Lane> {
+    /// All ports, in the order of [`Statuses`].
+    pub(crate) fn ports(&self) -> impl Iterator<Item = &Port> {
         self.s2mm.iter().chain(&self.mm2s)
     }
 
     /// Reads every status register once.
     pub(crate) fn statuses(&self) -> Statuses {
         let mut statuses = [Dmasr(0); 2 * DMA_COUNT_MAX];
-        for (status, lane) in statuses.iter_mut().zip(self.lanes()) {
-            *status = lane.channel.status();
+        for (status, port) in statuses.iter_mut().zip(self.ports()) {
+            *status = port.channel.status();
         }
         statuses
     }
@@ -365,8 +365,8 @@ impl Drop for Device {
             if let Err(error) = self.reset() {
                 log::error!("the board could not be reset: {error}");
             } else {
-                for lane in self.lanes_mut() {
-                    if let Err(error) = lane.was_reset() {
+                for port in self.ports_mut() {
+                    if let Err(error) = port.was_reset() {
                         log::error!("a buffer was lost: {error}");
                     }
                 }
@@ -377,11 +377,11 @@ impl Drop for Device {
             let stopped = sender.stop(&**platform).and_then(|()| receiver.stop(&**platform));
             let stopped = stopped
                 .or_else(|_| reset_core(&**platform, &mut sender.channel, &mut receiver.channel));
-            for lane in [sender, receiver] {
+            for port in [sender, receiver] {
                 if let Err(error) = &stopped {
                     log::error!("a channel could not be stopped: {error}");
-                    lane.leave_to_device();
-                } else if let Err(error) = lane.take_all_back() {
+                    port.leave_to_device();
+                } else if let Err(error) = port.take_all_back() {
                     log::error!("cannot take a buffer back: {error}");
                 }
             }

@@ -7,10 +7,12 @@ pub(crate) mod cancellation;
 pub(crate) mod completion;
 pub(crate) mod device;
 pub(crate) mod open;
+pub(crate) mod outline;
 pub(crate) mod plan;
 pub(crate) mod port;
 pub(crate) mod recovery;
 pub(crate) mod root_cause;
+pub(crate) mod snapshot;
 pub(crate) mod symptom;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -16,8 +16,8 @@ use pgs_interface::record::BEAT_BYTES;
 use crate::axi_dma::pieces;
 use crate::beat::stripe::Segment;
 use crate::control_block::Capabilities;
+use crate::control_block::time_of;
 use crate::scene::StepParameters;
-use crate::step::report::time_of;
 
 /// A memory slower than 100 MB/s is taken for one that does not answer.
 const SLOWEST_BYTES_PER_MICROSECOND: u64 = 100;

@@ -20,7 +20,7 @@ enum Held {
 
 /// One channel with its memory.
 #[derive(Debug)]
-pub(crate) struct Lane {
+pub(crate) struct Port {
     pub(crate) channel: Channel,
     control: Dmacr,
     access: Access,
@@ -29,8 +29,8 @@ pub(crate) struct Lane {
     running: bool,
 }
 
-impl Lane {
-    /// A lane of a channel that was reset; `control` is what it will run with.
+impl Port {
+    /// A port of a channel that was reset; `control` is what it will run with.
     pub(crate) fn new(channel: Channel, access: Access, control: Dmacr) -> Self {
         Self { channel, control, access, ring: None, held: PerBank::default(), running: false }
     }

@@ -1,6 +1,6 @@
 //! This file leads from any fault to "the next step works" or "open again".
 
-use super::anomalies::Oddity;
+use super::anomalies::Anomaly;
 use super::bank::Bank;
 use super::device::Device;
 use super::plan::Plan;
@@ -85,7 +85,7 @@ impl Device {
         if let Err(Symptom::Known(Fault::Core(error @ DmaError::State { .. }))) = &reserved {
             log::debug!("resetting the board: {error}");
             self.recover(shapes)?;
-            self.oddities.tell(Oddity::NoHalt);
+            self.oddities.tell(Anomaly::NoHalt);
             reserved = self.reserve_rings(plan);
         }
         reserved.map_err(|symptom| match symptom {
@@ -109,9 +109,9 @@ impl Device {
         if let Some(changed) = self.fingerprint.difference(&found) {
             return Err(other_bitstream(changed));
         }
-        for lane in self.lanes_mut() {
+        for port in self.ports_mut() {
             // A buffer that does not come back is replaced by the next step.
-            if let Err(error) = lane.was_reset() {
+            if let Err(error) = port.was_reset() {
                 log::error!("a buffer was lost: {error}");
             }
         }
@@ -125,8 +125,8 @@ impl Device {
     fn give_up(&mut self, error: &Fault) -> Aftermath {
         log::error!("the board is given up: {error}");
         self.dead = true;
-        for lane in self.lanes_mut() {
-            lane.leave_to_device();
+        for port in self.ports_mut() {
+            port.leave_to_device();
         }
         Aftermath::MustReopen
     }

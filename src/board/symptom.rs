@@ -12,13 +12,13 @@ use crate::platform::PlatformError;
 pub(crate) enum Symptom {
     /// The status of a channel shows an error, or nothing at all.
     Status {
-        /// Place of the channel among all lanes.
+        /// Place of the channel among all ports.
         place: usize,
         status: Dmasr,
     },
     /// A chain ended in another way than it should.
     Chain {
-        /// Place of the channel among all lanes.
+        /// Place of the channel among all ports.
         place: usize,
     },
     /// The accelerator's sticky error is set.

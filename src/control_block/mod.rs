@@ -12,7 +12,7 @@ use crate::platform::PlatformError;
 
 pub(crate) use control::Control;
 pub use counters::Saturated;
-pub(crate) use counters::{Counters, StickyError, impulse};
+pub(crate) use counters::{Counters, StickyError, impulse, time_of};
 pub(crate) use fingerprint::{Changed, Fingerprint};
 #[cfg(test)]
 pub(crate) use identity::fake;

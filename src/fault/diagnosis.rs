@@ -3,16 +3,12 @@
 use std::fmt;
 use std::time::Duration;
 
-use pgs_interface::axi_dma::{
-    CURDESC, CURDESC_MSB, DMACR, DMASR, S2MM_OFFSET, TAILDESC, TAILDESC_MSB,
-};
+use pgs_interface::axi_dma::{CURDESC, CURDESC_MSB, DMACR, DMASR, TAILDESC, TAILDESC_MSB};
 use pgs_interface::control::{AP_CTRL, ERROR, ERROR_DETAIL, IDENTIFICATION};
 
 use super::Fault;
-use super::phase::{Outline, Phase};
-use crate::axi_dma::{ChainState, ChannelName, DescriptorState, Direction, Dmacr, Dmasr};
-use crate::board::device::Device;
-use crate::board::port::Lane;
+use super::phase::Phase;
+use crate::axi_dma::{ChannelName, DescriptorState, Dmacr, Dmasr};
 use crate::control_block::Changed;
 use crate::platform::{Decoded, RegisterAccess, RegisterMap};
 
@@ -99,40 +95,6 @@ impl fmt::Display for ChannelState {
 }
 
 impl ChannelState {
-    /// A channel whose chain stands like that.
-    pub(crate) fn new(
-        (channel, address_width): (ChannelName, u32),
-        (control, status): (Dmacr, Dmasr),
-        (current, tail): (u64, u64),
-        chain: &ChainState,
-        outline: Option<&Outline>,
-    ) -> Self {
-        let failed = chain.failed.or(chain.at_address.filter(|_| status.errors() != 0));
-        let descriptor = failed.or(chain.in_work);
-        let at = descriptor.map_or(chain.descriptors, |state| state.index);
-        let phase = match channel.direction {
-            Direction::S2mm => Phase::Results,
-            Direction::Mm2s => {
-                outline.map_or(Phase::Load, |outline| outline.phase_of(channel.core, at))
-            }
-        };
-        Self {
-            channel,
-            control,
-            status,
-            current,
-            tail,
-            phase,
-            descriptors: chain.descriptors,
-            complete: chain.complete,
-            packet_end: chain.packet_end,
-            bytes_moved: chain.bytes_moved,
-            bytes_expected: chain.bytes_expected,
-            descriptor,
-            address_width,
-        }
-    }
-
     /// Whether the step is through with it.
     pub(crate) fn done(&self) -> bool {
         self.complete == self.descriptors
@@ -140,10 +102,7 @@ impl ChannelState {
 
     /// Those that were read.
     fn registers(&self) -> impl Iterator<Item = (u32, u32)> {
-        let base = match self.channel.direction {
-            Direction::Mm2s => 0,
-            Direction::S2mm => S2MM_OFFSET,
-        };
+        let base = self.channel.direction.offset();
         #[allow(clippy::cast_possible_truncation, reason = "the other half is high()")]
         let low = |address: u64| address as u32;
         let high = |address: u64| low(address >> 32);
@@ -181,75 +140,4 @@ impl Diagnosis {
         });
         channels.chain(control).collect()
     }
-}
-
-impl Device {
-    /// Reads everything that tells why a step failed. The lane at `seen` had that status before,
-    /// should it read another now.
-    pub(crate) fn snapshot(&mut self, seen: Option<(usize, Dmasr)>) -> Diagnosis {
-        // Before the reads that follow push them out.
-        let accesses = self.counts.recent();
-        let mut channels = Vec::new();
-        let outline = self.started.as_ref().map(|started| &started.outline);
-        let mut gone = false;
-        for (place, lane) in self.lanes().enumerate() {
-            let before = seen.filter(|(seen, _)| *seen == place).map(|(_, status)| status);
-            let state = channel_state(lane, before, outline);
-            gone = state.status.gone();
-            channels.push(state);
-            if gone {
-                // Whatever else is read may hold the bus up.
-                break;
-            }
-        }
-        // What answers may be another design, which has nothing where the channels were.
-        let answers = !gone || self.control.read(&IDENTIFICATION) != u32::MAX;
-        let control = answers.then(|| self.control_state());
-        let senders = channels.iter().filter(|state| state.channel.direction == Direction::Mm2s);
-        let unfinished = senders.filter(|state| !state.done()).map(|state| state.phase);
-        let elapsed = self
-            .started
-            .as_ref()
-            .map_or(Duration::ZERO, |started| self.platform.now().saturating_sub(started.at));
-        let phase = match self.started {
-            Some(_) => unfinished.min().unwrap_or(Phase::Results),
-            None => Phase::Load,
-        };
-        Diagnosis { phase, elapsed, channels, control, accesses, reset: None }
-    }
-
-    fn control_state(&mut self) -> ControlState {
-        let control = &self.control;
-        let found = control.fingerprint();
-        ControlState {
-            control: control.read(&AP_CTRL),
-            error: control.read(&ERROR),
-            error_detail: control.read(&ERROR_DETAIL),
-            identification: found.identification(),
-            changed: self.fingerprint.difference(&found),
-        }
-    }
-}
-
-fn channel_state(lane: &Lane, before: Option<Dmasr>, outline: Option<&Outline>) -> ChannelState {
-    let channel = &lane.channel;
-    let name = (channel.name(), channel.address_width());
-    let now = channel.status();
-    // A status that was seen and is no longer shown is what the step failed of.
-    let status = before.filter(|_| now.errors() == 0).unwrap_or(now);
-    if status.gone() {
-        let chain = lane.survey(u64::MAX);
-        return ChannelState::new(
-            name,
-            (Dmacr(u32::MAX), status),
-            (u64::MAX, u64::MAX),
-            &chain,
-            outline,
-        );
-    }
-    let current = channel.current_descriptor();
-    // Behind the status: a chain that became complete in between is not one that hangs.
-    let chain = lane.survey(current);
-    let registers = (channel.control(), status);
-    ChannelState::new(name, registers, (current, channel.tail_descriptor()), &chain, outline)
 }

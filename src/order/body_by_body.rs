@@ -10,18 +10,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{OrderInput, Schedule};
-
-/// Which of the active bodies with the fewest collisions left comes first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ties {
-    /// That of the lowest index.
-    LowestIndex,
-    /// That which became active first.
-    Oldest,
-    /// That which became active last.
-    Newest,
-}
+use super::{OrderInput, Schedule, Ties};
 
 impl Ties {
     fn rank(self, age: u32) -> u32 {

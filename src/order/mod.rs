@@ -53,14 +53,14 @@ mod sweep;
 mod tail;
 mod window;
 
-pub use body_by_body::Ties;
+pub use crate::scene::{Order, Ties};
 pub use check::Checker;
 pub use error::OrderError;
 pub use input::{InputBuffers, OrderInput};
 pub(crate) use interlock::Interlock;
 pub use live::LiveReport;
 pub(crate) use live::{Crowded, Lives, Room};
-pub use orderer::{Order, OrderCosts, Orderer, colour_count};
+pub use orderer::{OrderCosts, Orderer, colour_count};
 pub use report::{OrderReport, live_curve};
 pub use schedule::{Ordered, Schedule};
 pub use window::IssueWindow;

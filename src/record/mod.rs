@@ -14,6 +14,7 @@ pub(crate) mod pose;
 pub(crate) mod relative;
 pub(crate) mod result;
 pub(crate) mod sixteen;
+pub(crate) mod source;
 mod thesis16;
 pub(crate) mod velocity;
 

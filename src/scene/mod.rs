@@ -2,11 +2,14 @@
 
 mod body;
 mod collision;
+mod order;
 mod parameters;
 mod shape;
+mod structures;
 
-pub use crate::beat::pack::source::Structures;
 pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
 pub use collision::{CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact};
+pub use order::{Order, Ties};
 pub use parameters::StepParameters;
-pub use shape::Shape;
+pub use shape::{Shape, ShapeError};
+pub use structures::Structures;

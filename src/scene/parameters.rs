@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::order::Order;
+use super::Order;
 
 /// Parameters of a step. The default is Bullet's.
 ///

@@ -1,8 +1,21 @@
 //! This file says what a shape is: the mass properties that bodies refer to by index.
 
 use pgs_support::float_env::standard;
+use thiserror::Error;
 
-use crate::validate::InputError;
+/// A shape that has no mass properties.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error(
+    "the {parameter} of a shape is {found:e}, expected a number above 0 with which mass and inertia \
+     stay in the range of f32: correct it"
+)]
+#[non_exhaustive]
+pub struct ShapeError {
+    /// Mass, half extent, half height or radius.
+    pub parameter: &'static str,
+    /// Its value, kg or m.
+    pub found: f32,
+}
 
 /// Mass properties shared by bodies.
 ///
@@ -11,7 +24,7 @@ use crate::validate::InputError;
 /// ```
 /// use zynq_pgs::Shape;
 ///
-/// # fn main() -> Result<(), zynq_pgs::InputError> {
+/// # fn main() -> Result<(), zynq_pgs::ShapeError> {
 /// // A cube of 1 kg with edges of 2 m: inertia 2/3 kg m².
 /// assert_eq!(Shape::cuboid(1.0, [1.0; 3])?, Shape::isotropic(1.0, 1.5));
 /// assert!(!Shape::cuboid(1.0, [2.0, 1.0, 0.5])?.is_isotropic());
@@ -42,9 +55,9 @@ impl Shape {
     /// Units: kg; half lengths of the edges along the body's x, y and z, m.
     ///
     /// # Errors
-    /// [`InputError::ShapeParameter`]: one of them is not above 0, or so large or small that the
+    /// [`ShapeError`]: one of them is not above 0, or so large or small that the
     /// inertia leaves f32.
-    pub fn cuboid(mass: f32, half_extents: [f32; 3]) -> Result<Self, InputError> {
+    pub fn cuboid(mass: f32, half_extents: [f32; 3]) -> Result<Self, ShapeError> {
         let [hx, hy, hz] = half_extents;
         Self::solid(
             mass,
@@ -62,7 +75,7 @@ impl Shape {
     ///
     /// # Errors
     /// As for [`cuboid`](Self::cuboid).
-    pub fn sphere(mass: f32, radius: f32) -> Result<Self, InputError> {
+    pub fn sphere(mass: f32, radius: f32) -> Result<Self, ShapeError> {
         Self::solid(mass, &[("radius", radius)], |[r]| [0.4 * r * r; 3])
     }
 
@@ -80,7 +93,7 @@ impl Shape {
     ///
     /// # Errors
     /// As for [`cuboid`](Self::cuboid).
-    pub fn capsule(mass: f32, half_height: f32, radius: f32) -> Result<Self, InputError> {
+    pub fn capsule(mass: f32, half_height: f32, radius: f32) -> Result<Self, ShapeError> {
         Self::solid(mass, &[("half height", half_height), ("radius", radius)], |[h, r]| {
             let cylinder = 2.0 * h / (2.0 * h + 4.0 / 3.0 * r);
             let caps = 1.0 - cylinder;
@@ -97,7 +110,7 @@ impl Shape {
         mass: f32,
         sizes: &[(&'static str, f32); N],
         inertia: impl Fn([f64; N]) -> [f64; 3],
-    ) -> Result<Self, InputError> {
+    ) -> Result<Self, ShapeError> {
         standard(|| Self::computed(mass, sizes, inertia))
     }
 
@@ -105,10 +118,10 @@ impl Shape {
         mass: f32,
         sizes: &[(&'static str, f32); N],
         inertia: impl Fn([f64; N]) -> [f64; 3],
-    ) -> Result<Self, InputError> {
+    ) -> Result<Self, ShapeError> {
         for (parameter, found) in [("mass", mass)].into_iter().chain(*sizes) {
             if !(found > 0.0 && found.is_finite()) {
-                return Err(InputError::ShapeParameter { parameter, found });
+                return Err(ShapeError { parameter, found });
             }
         }
         // In f64 nothing here leaves the range of numbers, and f32 rounds once.
@@ -118,11 +131,11 @@ impl Shape {
         let inverse_inertia = inertia(sizes.map(|(_, size)| size.into()))
             .map(|per_mass| inverse(f64::from(mass) * per_mass));
         if !inverse_mass.is_normal() {
-            return Err(InputError::ShapeParameter { parameter: "mass", found: mass });
+            return Err(ShapeError { parameter: "mass", found: mass });
         }
         if !inverse_inertia.iter().all(|value| value.is_normal()) {
             let (parameter, found) = sizes[0];
-            return Err(InputError::ShapeParameter { parameter, found });
+            return Err(ShapeError { parameter, found });
         }
         Ok(Self { inverse_mass, inverse_inertia })
     }
@@ -192,11 +205,11 @@ mod tests {
     #[test]
     fn parameters_that_are_not_above_zero_are_refused_by_name() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            let refused = |shape: Result<Shape, InputError>, name: &str| {
+            let refused = |shape: Result<Shape, ShapeError>, name: &str| {
                 assert!(
                     matches!(
                         shape,
-                        Err(InputError::ShapeParameter { parameter, found })
+                        Err(ShapeError { parameter, found })
                             if parameter == name && found.to_bits() == bad.to_bits()
                     ),
                     "{name} {bad}: {shape:?}"

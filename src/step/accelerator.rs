@@ -10,10 +10,10 @@ use pgs_support::float_env::standard;
 
 use super::in_flight::{Flight, InFlight, Started, Stopwatch};
 use super::ordering::Ordering;
-use super::pack::{Engines, Load};
+use super::pack::{Engines, PackedStep};
 use super::report::StepReport;
 use super::retry::with_retries;
-use crate::beat::pack::pool::Packers;
+use crate::beat::pack::pool::PackPool;
 use crate::board::bank::{Bank, PerBank};
 use crate::board::cancellation::Cancellation;
 use crate::board::device::Device;
@@ -43,7 +43,7 @@ pub struct Accelerator {
     /// The bank of the step that was started last, into which the next one that is not prepared goes.
     pub(super) bank: Bank,
     /// What lies in the banks.
-    pub(super) loads: PerBank<Option<Load>>,
+    pub(super) loads: PerBank<Option<PackedStep>>,
     /// How it was ordered.
     pub(super) orderings: PerBank<Ordering>,
     /// Results of a step until all are checked. Kept, so that a step allocates nothing.
@@ -72,7 +72,7 @@ impl Accelerator {
     pub fn open(options: OpenOptions) -> Result<Self, Error> {
         standard(|| {
             let mut accelerator = Self::on(find(&options)?, options.length_width)?;
-            accelerator.device.packers = Packers::new(options.pack_threads);
+            accelerator.device.packers = PackPool::new(options.pack_threads);
             Ok(accelerator)
         })
     }
@@ -212,11 +212,11 @@ impl Accelerator {
     /// Starts a step that lies in its bank. Nothing is in flight.
     pub(super) fn begin(
         &mut self,
-        load: Load,
+        load: PackedStep,
         watch: Stopwatch,
         accesses: (u64, u64),
     ) -> Result<Flight, Error> {
-        let Load { plan, parameters, bank, .. } = &load;
+        let PackedStep { plan, parameters, bank, .. } = &load;
         let mut flight = Flight { load, started: None, watch, accesses };
         self.bank = *bank;
         if load.sent.is_some() {

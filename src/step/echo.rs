@@ -79,9 +79,9 @@ impl Accelerator {
                 (Direction::Mm2s, &mut self.device.mm2s),
                 (Direction::S2mm, &mut self.device.s2mm),
             ];
-            for (direction, lanes) in sides {
-                for (channel, lane) in lanes.iter_mut().enumerate() {
-                    for (slot, beat) in lane.beats_mut(bank).iter_mut().enumerate() {
+            for (direction, ports) in sides {
+                for (channel, port) in ports.iter_mut().enumerate() {
+                    for (slot, beat) in port.beats_mut(bank).iter_mut().enumerate() {
                         *beat = dirt(direction, channel, slot);
                     }
                 }

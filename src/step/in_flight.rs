@@ -6,7 +6,7 @@ use pgs_support::float_env::standard;
 
 use super::accelerator::Accelerator;
 use super::locate::locate;
-use super::pack::Load;
+use super::pack::PackedStep;
 use super::report::{HostTimes, StepCycles, StepReport};
 use super::results::{commit, commit_velocities};
 use crate::board::symptom::Symptom;
@@ -33,7 +33,7 @@ pub struct InFlight<'a> {
 /// What is known of a step between its start and its end.
 #[derive(Debug)]
 pub(super) struct Flight {
-    pub(super) load: Load,
+    pub(super) load: PackedStep,
     /// Nothing, where nothing moves and nothing is streamed.
     pub(super) started: Option<Started>,
     pub(super) watch: Stopwatch,
@@ -101,7 +101,7 @@ impl<'a> InFlight<'a> {
 
     fn take_results(&mut self) -> Result<Ended, Symptom> {
         let Self { accelerator, flight } = self;
-        let Load { plan, bank, sent, .. } = flight.load;
+        let PackedStep { plan, bank, sent, .. } = flight.load;
         // What the caller did meanwhile.
         flight.watch.lap();
         let device = &mut accelerator.device;
@@ -129,7 +129,7 @@ impl<'a> InFlight<'a> {
         bodies: &B,
     ) -> Result<(), Fault> {
         let Self { accelerator, flight } = self;
-        let Load { plan, bank, arranged, .. } = &flight.load;
+        let PackedStep { plan, bank, arranged, .. } = &flight.load;
         // Of a step that was not started there are no sums.
         let answered = ended.counters.sums.map(|(_, answered)| answered);
         accelerator.unpack(plan, *bank, bodies, arranged.live, answered)?;
@@ -177,7 +177,7 @@ impl<'a> InFlight<'a> {
 
     /// Says of which of the caller's collisions an error speaks.
     pub(super) fn located(&self, mut error: Error) -> Error {
-        let Load { arranged, bank, .. } = &self.flight.load;
+        let PackedStep { arranged, bank, .. } = &self.flight.load;
         if arranged.scheduled {
             let ordering = &self.accelerator.orderings[*bank];
             let lives = arranged.live.map(|_| ordering.lives());
@@ -188,7 +188,7 @@ impl<'a> InFlight<'a> {
 
     /// What the step streamed and counted, so far.
     fn report(&self, counters: &Counters) -> StepReport {
-        let Load { plan, arranged, bodies, collisions, empty, .. } = &self.flight.load;
+        let PackedStep { plan, arranged, bodies, collisions, empty, .. } = &self.flight.load;
         let (work, waits) = (u64::from(counters.work), u64::from(counters.waits));
         let stalls = counters.cycles.saturating_sub(work).saturating_sub(waits);
         let (reads, writes) = self.accelerator.accesses();

@@ -13,7 +13,7 @@ use crate::order::{
     OrderInput, OrderReport, Orderer, Room, Schedule,
 };
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
-use crate::validate::{Demand, InputError};
+use crate::validate::{InputError, SceneNeeds};
 use crate::validate::{Limits, needed};
 
 /// Orders the collisions of steps, keeping its memory from one to the next.
@@ -214,7 +214,7 @@ fn too_long(
     // Of several the first.
     let most = uses.iter().copied().enumerate().rev().max_by_key(|(_, uses)| *uses);
     let (body, uses) = most.unwrap_or_default();
-    let demand = Demand { bodies, collisions, inertia: needed(shapes) };
+    let demand = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
     let carriers = demand.carriers(|variant| {
         let Ok(window) = IssueWindow::of_profile(variant.profile, parameters) else { return false };
         let apart = window.depth() as usize * window.per_issue() as usize;
@@ -226,7 +226,7 @@ fn too_long(
         // What took more than the limit here takes no less at a greater depth.
         let as_here = if window.depth() >= depth { limit.saturating_add(1) } else { 0 };
         let entries = collisions.max(of_body).max(as_here);
-        Demand { collisions: entries, ..demand }.has_room(variant)
+        SceneNeeds { collisions: entries, ..demand }.has_room(variant)
     });
     InputError::OrderTooLong { collisions, bodies, limit, depth, body, uses, carriers }
 }
@@ -241,7 +241,7 @@ fn refused(
     shapes: &[Shape],
 ) -> InputError {
     let (bodies, collisions) = (input.moving.len(), input.pairs.len());
-    let demand = Demand { bodies, collisions, inertia: needed(shapes) };
+    let demand = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
     let held = match crowded {
         Crowded::Span { .. } => 0,
         Crowded::Places { held } => held,

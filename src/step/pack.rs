@@ -19,9 +19,9 @@ use crate::validate::{Quick, preflight, validate};
 
 /// What tells one packing from all others of this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Ticket(u64);
+pub(super) struct PackId(u64);
 
-impl Ticket {
+impl PackId {
     /// One that nobody has.
     pub(super) fn new() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
@@ -31,8 +31,8 @@ impl Ticket {
 
 /// A step whose records lie in a bank.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Load {
-    pub(super) ticket: Ticket,
+pub(super) struct PackedStep {
+    pub(super) ticket: PackId,
     pub(super) bank: Bank,
     pub(super) plan: Plan,
     /// Nothing, where nothing moves and nothing is streamed.
@@ -67,7 +67,7 @@ impl Accelerator {
         collisions: &C,
         parameters: &StepParameters,
         watch: &mut Stopwatch,
-    ) -> Result<Load, Error> {
+    ) -> Result<PackedStep, Error> {
         self.forget(bank);
         let mut host = HostTimes::default();
         preflight(bodies, collisions, &self.shapes, parameters, &self.limits)?;
@@ -124,8 +124,8 @@ impl Accelerator {
             sent = Some(packed);
         }
         host.pack = watch.lap();
-        let load = Load {
-            ticket: Ticket::new(),
+        let load = PackedStep {
+            ticket: PackId::new(),
             bank,
             plan,
             sent,

@@ -1,4 +1,4 @@
-//! This file writes the records of a step into the buffers of its lanes.
+//! This file writes the records of a step into the buffers of its ports.
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
@@ -10,7 +10,7 @@ use crate::beat::pack::writer::Writer;
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
-use crate::board::port::Lane;
+use crate::board::port::Port;
 use crate::order::Lives;
 use crate::record::body_table::Survey;
 use crate::scene::{Bodies, Collisions, Shape};
@@ -103,7 +103,7 @@ impl Device {
     }
 }
 
-/// The buffers of the MM2S lanes, each cut into its three segments.
+/// The buffers of the MM2S ports, each cut into its three segments.
 struct Cut<'a> {
     velocities: [&'a mut [Beat]; DMA_COUNT_MAX],
     poses: [&'a mut [Beat]; DMA_COUNT_MAX],
@@ -112,13 +112,13 @@ struct Cut<'a> {
 
 impl<'a> Cut<'a> {
     /// One borrow of each buffer, for what it was made large enough for.
-    fn of(lanes: &'a mut [Lane], plan: &Plan, bank: Bank) -> Self {
+    fn of(ports: &'a mut [Port], plan: &Plan, bank: Bank) -> Self {
         type Channels<'a> = [&'a mut [Beat]; DMA_COUNT_MAX];
         let (mut velocities, mut poses, mut entries) =
             <(Channels<'_>, Channels<'_>, Channels<'_>)>::default();
-        for (place, lane) in lanes.iter_mut().enumerate() {
+        for (place, port) in ports.iter_mut().enumerate() {
             let segments = plan.segments(place);
-            let beats = &mut lane.beats_mut(bank)[..segments.end()];
+            let beats = &mut port.beats_mut(bank)[..segments.end()];
             let (first, beats) = beats.split_at_mut(segments.poses.start);
             let (second, third) = beats.split_at_mut(segments.poses.len());
             velocities[place] = &mut first[segments.velocities];

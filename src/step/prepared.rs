@@ -9,7 +9,7 @@ use pgs_support::float_env::standard;
 
 use super::accelerator::Accelerator;
 use super::in_flight::{Flight, InFlight, Stopwatch};
-use super::pack::{Engines, Load, Ticket};
+use super::pack::{Engines, PackId, PackedStep};
 use super::report::StepReport;
 use crate::board::bank::Bank;
 use crate::error::{Aftermath, Error};
@@ -28,7 +28,7 @@ use crate::validate::InputError;
 #[must_use = "a step that was prepared is not started by itself"]
 pub struct Prepared {
     pub(super) bank: Bank,
-    pub(super) ticket: Ticket,
+    pub(super) ticket: PackId,
 }
 
 impl InFlight<'_> {
@@ -87,7 +87,7 @@ impl InFlight<'_> {
     }
 
     /// Hands what was packed while this step is on the board over to the device.
-    pub(super) fn hand_over(&mut self, mut load: Load) -> Result<Prepared, Error> {
+    pub(super) fn hand_over(&mut self, mut load: PackedStep) -> Result<Prepared, Error> {
         let (accelerator, bank) = (&mut *self.accelerator, load.bank);
         let mut watch = Stopwatch::start();
         if load.sent.is_some() {
@@ -198,7 +198,7 @@ impl Accelerator {
         let watch = Stopwatch::start();
         let accesses = self.accesses();
         let load = self.loads[prepared.bank].filter(|load| load.ticket == prepared.ticket);
-        let Some(load @ Load { plan, bank, shapes_loaded, .. }) = load else {
+        let Some(load @ PackedStep { plan, bank, shapes_loaded, .. }) = load else {
             return Err(InputError::NotPrepared.into());
         };
         if load.sent.is_some() && !self.device.holds(bank) {

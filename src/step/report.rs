@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use pgs_interface::control::IMPULSE_SUM_MAX;
 
+use crate::control_block::time_of;
 use crate::control_block::{Saturated, impulse};
 use crate::order::{LiveReport, Order, OrderCosts, OrderReport};
 
@@ -165,13 +166,6 @@ impl StepReport {
     }
 }
 
-/// `cycles` of a clock of `clock_khz`, rounded down to nanoseconds; zero for a clock of 0.
-pub(crate) fn time_of(cycles: u64, clock_khz: u32) -> Duration {
-    let nanoseconds =
-        (u128::from(cycles) * 1_000_000).checked_div(u128::from(clock_khz)).unwrap_or(0);
-    Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -224,14 +218,5 @@ mod tests {
         assert_eq!(limit(1000, 20, 21, work), Limit::Unknown);
         let others = Saturated { hazards: true, impulse_sum: true, ..Saturated::default() };
         assert_eq!(limit(1000, 20, 20, others), Limit::Pipeline);
-    }
-
-    #[test]
-    fn time_is_cycles_over_the_clock() {
-        // 2,062,697 cycles at 275 MHz are 7.5007 ms; the thesis prints 7.49 ms beside them (T6.4).
-        let time = time_of(2_062_697, 275_000);
-        assert_eq!(time.as_micros(), 7500);
-        assert_eq!(time_of(1, 0), Duration::ZERO);
-        assert_eq!(time_of(u64::MAX, 1), Duration::from_nanos(u64::MAX));
     }
 }

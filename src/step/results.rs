@@ -8,13 +8,13 @@ use pgs_interface::record::Beat;
 use super::accelerator::Accelerator;
 use super::packing::Sent;
 use crate::axi_dma::Direction;
-use crate::beat::pack::pool::Packers;
+use crate::beat::pack::pool::PackPool;
 use crate::beat::stripe::{Layout, Segment};
 use crate::beat::unpack::results::{BLOCK, Reader, read_all};
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
-use crate::board::port::Lane;
+use crate::board::port::Port;
 use crate::control_block::Counters;
 use crate::fault::Fault;
 use crate::order::LiveReport;
@@ -78,13 +78,13 @@ impl Accelerator {
 
 /// The result beats of each channel, in a bank.
 pub(super) fn received<'a>(
-    lanes: &'a [Lane],
+    ports: &'a [Port],
     plan: &Plan,
     bank: Bank,
 ) -> [&'a [Beat]; DMA_COUNT_MAX] {
     let mut channels = <[&[Beat]; DMA_COUNT_MAX]>::default();
-    for (place, lane) in lanes.iter().enumerate() {
-        channels[place] = &lane.beats(bank)[..plan.results(place)];
+    for (place, port) in ports.iter().enumerate() {
+        channels[place] = &port.beats(bank)[..plan.results(place)];
     }
     channels
 }
@@ -108,7 +108,7 @@ impl Results<'_> {
         bodies: &B,
         statics: &[u32],
         spare: &mut Vec<Record>,
-        packers: &mut Packers,
+        packers: &mut PackPool,
     ) -> (u32, Option<usize>) {
         // What is there from the last step is overwritten.
         spare.resize(count, Record::default());
@@ -126,7 +126,7 @@ impl Results<'_> {
         self,
         statics: &[u32],
         into: &mut [Record],
-        packers: &mut Packers,
+        packers: &mut PackPool,
     ) -> (u32, Option<usize>) {
         let (sum, all_finite) = read_all(self.layout, self.channels, into, packers);
         if all_finite {
@@ -224,7 +224,7 @@ mod tests {
         {
             let mut spare = Vec::new();
             let (_, found) = of_broken(broken, |results, bodies| {
-                results.in_turn(COUNT, bodies, &statics, &mut spare, &mut Packers::alone())
+                results.in_turn(COUNT, bodies, &statics, &mut spare, &mut PackPool::alone())
             });
             assert_eq!(found, told, "{broken:?}");
             for (index, record) in spare.iter().enumerate() {

@@ -5,7 +5,7 @@ use pgs_support::float_env::standard_around;
 use super::accelerator::Accelerator;
 use super::in_flight::{InFlight, Stopwatch};
 use super::ordering::{Arranged, in_order_of_writing};
-use super::pack::{Engines, Load, Ticket};
+use super::pack::{Engines, PackId, PackedStep};
 use super::prepared::Prepared;
 use super::report::{HostTimes, OrderChoice};
 use crate::beat::pack::target::Target;
@@ -90,7 +90,7 @@ impl Accelerator {
         announced: usize,
         parameters: &StepParameters,
         narrow_phase: impl FnOnce(&mut Writer<'_>),
-    ) -> Result<Load, Error> {
+    ) -> Result<PackedStep, Error> {
         self.forget(bank);
         let mut watch = Stopwatch::start();
         let mut host = HostTimes::default();
@@ -117,8 +117,8 @@ impl Accelerator {
             device.pack_written(&plan, bank, target, bodies, refuse, narrow_phase)?;
         plan.collisions = written;
         host.pack = watch.lap();
-        let load = Load {
-            ticket: Ticket::new(),
+        let load = PackedStep {
+            ticket: PackId::new(),
             bank,
             plan,
             sent: Some(sent),

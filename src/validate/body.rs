@@ -83,7 +83,7 @@ pub(crate) fn shape_of(body: &Body) -> usize {
 mod tests {
     use super::*;
     use crate::scene::{Pose, Shape, Velocity};
-    use crate::validate::Demand;
+    use crate::validate::SceneNeeds;
     use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
 
     const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
@@ -94,7 +94,7 @@ mod tests {
     };
 
     fn check_on(profile: &'static Profile, body: &Body) -> Result<(), InputError> {
-        let demand = Demand { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
+        let demand = SceneNeeds { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
         let variant = &profile.default_variant();
         let held = Held::by(&variant.numbers);
         let scene = Scene { shapes: &SHAPES, demand, variant, held, flush_subnormals: false };

@@ -7,7 +7,7 @@ use pgs_interface::profile::{Inertia, PROFILES, Profile, Variant};
 /// The profiles, as they are built unless other formats are chosen, that could carry what was
 /// refused, in a scene of as many bodies and collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Carriers {
+pub struct CapableProfiles {
     /// Bit k is profile k of the table.
     profiles: u32,
     inertia: Inertia,
@@ -15,7 +15,7 @@ pub struct Carriers {
 
 const _: () = assert!(PROFILES.len() <= u32::BITS as usize);
 
-impl Carriers {
+impl CapableProfiles {
     /// These profiles, in the order of the table.
     pub fn profiles(&self) -> impl Iterator<Item = &'static Profile> {
         let bits = self.profiles;
@@ -29,7 +29,7 @@ impl Carriers {
     }
 }
 
-impl fmt::Display for Carriers {
+impl fmt::Display for CapableProfiles {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let built = match self.inertia {
             Inertia::Isotropic => "",
@@ -49,7 +49,7 @@ impl fmt::Display for Carriers {
 
 /// What a scene asks of any bitstream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Demand {
+pub(crate) struct SceneNeeds {
     /// Number of bodies.
     pub(crate) bodies: usize,
     /// Number of collisions.
@@ -58,16 +58,16 @@ pub(crate) struct Demand {
     pub(crate) inertia: Inertia,
 }
 
-impl Demand {
+impl SceneNeeds {
     /// The profiles that have room for the scene and fulfil a condition.
     #[cold]
-    pub(crate) fn carriers(&self, can: impl Fn(&Variant) -> bool) -> Carriers {
+    pub(crate) fn carriers(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
         let mut profiles = 0;
         for (at, profile) in PROFILES.iter().enumerate() {
             let variant = Variant { inertia: self.inertia, ..profile.default_variant() };
             profiles |= u32::from(self.has_room(&variant) && can(&variant)) << at;
         }
-        Carriers { profiles, inertia: self.inertia }
+        CapableProfiles { profiles, inertia: self.inertia }
     }
 
     /// Whether the on-chip memory of a bitstream takes the scene.
@@ -84,11 +84,11 @@ impl Demand {
 mod tests {
     use super::*;
 
-    fn names(demand: Demand, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
+    fn names(demand: SceneNeeds, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
         demand.carriers(can).profiles().map(|profile| profile.name).collect()
     }
 
-    const SMALL: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    const SMALL: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     #[test]
     fn profiles_are_named_in_the_order_of_the_table() {
@@ -97,7 +97,7 @@ mod tests {
         let text = SMALL.carriers(|variant| variant.profile.name != "half").to_string();
         assert_eq!(text, "profiles that could: naive, float, mixed, windowed, windowed16");
         assert_eq!(SMALL.carriers(|_| false).to_string(), "no profile could");
-        let world = Demand { inertia: Inertia::World, ..SMALL };
+        let world = SceneNeeds { inertia: Inertia::World, ..SMALL };
         let text = world.carriers(|variant| variant.profile.id == 1).to_string();
         assert_eq!(text, "profiles that could, built with world inertia: float");
         assert_eq!(
@@ -109,18 +109,18 @@ mod tests {
     #[test]
     fn a_profile_without_room_for_the_scene_is_left_out() {
         // 16-bit indices end at 65,535. What keeps no more than is alive has room for any number.
-        let bodies = |bodies| Demand { bodies, ..SMALL };
+        let bodies = |bodies| SceneNeeds { bodies, ..SMALL };
         assert_eq!(names(bodies(65_536), |_| true).len(), 6);
         let windowed = ["windowed", "windowed16"];
         assert_eq!(names(bodies(65_537), |_| true), [["naive", "float"], windowed].concat());
         assert_eq!(names(bodies(131_073), |_| true), windowed);
         assert_eq!(names(bodies(1_048_577), |_| true), [""; 0]);
         // 4 MiB: 16 bytes a collision in f32, 8 in half.
-        let collisions = |collisions| Demand { collisions, ..SMALL };
+        let collisions = |collisions| SceneNeeds { collisions, ..SMALL };
         let and_half = ["half", "windowed", "windowed16"];
         assert_eq!(names(collisions(300_000), |_| true), and_half);
         // 48 bytes a body with world inertia in f32, 36 in half.
-        let world = Demand { bodies: 60_000, collisions: 100_000, inertia: Inertia::World };
+        let world = SceneNeeds { bodies: 60_000, collisions: 100_000, inertia: Inertia::World };
         assert_eq!(names(world, |_| true), and_half);
     }
 }

@@ -1,7 +1,8 @@
 //! This file lists everything that a step refuses before anything is sent.
 
-use super::Carriers;
+use super::CapableProfiles;
 use crate::order::OrderError;
+use crate::scene::ShapeError;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::CONTACT_POINTS;
 
@@ -26,7 +27,7 @@ pub enum InputError {
         /// Bodies that the bitstream takes.
         limit: u32,
         /// Who takes them.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// More collisions than the bitstream has room for, whatever the memory.
@@ -40,7 +41,7 @@ pub enum InputError {
         /// Collisions that the bitstream takes.
         limit: u32,
         /// Who takes them.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// Other bodies than those that the step was started with.
@@ -113,7 +114,7 @@ pub enum InputError {
         /// Collisions that fit beside the bodies; 0 if the bodies alone are too many.
         fitting: u32,
         /// Who has room for both.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// A number of a body is NaN or infinite.
@@ -148,7 +149,7 @@ pub enum InputError {
         /// Its largest number.
         limit: f32,
         /// Who carries the body.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// A quaternion that stands for no rotation.
@@ -323,7 +324,7 @@ pub enum InputError {
         /// Its largest number.
         limit: f32,
         /// Who carries the collision.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// The collisions cannot be ordered, or have hazards although the order was to be verified.
@@ -352,7 +353,7 @@ pub enum InputError {
         /// Its collisions.
         uses: usize,
         /// Who could have room for it.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// A body lives longer than the bitstream lets it.
@@ -372,7 +373,7 @@ pub enum InputError {
         /// Length of the delay lines.
         lag: u32,
         /// Who could take it.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// More bodies are alive than the bitstream has places for.
@@ -389,7 +390,7 @@ pub enum InputError {
         /// Places that there are.
         places: u32,
         /// Who could take them.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// The constraint rows of a collision leave what the bitstream's arithmetic holds.
@@ -416,7 +417,7 @@ pub enum InputError {
         /// The largest magnitude that leaves room for the roundings.
         largest: f32,
         /// Who computes the rows.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// A parameter is outside its range.
@@ -448,7 +449,7 @@ pub enum InputError {
         /// The largest magnitude.
         largest: f32,
         /// Who computes with it.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// More passes than a step takes.
@@ -511,7 +512,7 @@ pub enum InputError {
         /// Its inverse inertia, 1/(kg m²).
         found: [f32; 3],
         /// Who takes it.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
     /// An inverse mass or inertia is beyond what the bitstream's arithmetic or streams hold.
@@ -536,20 +537,12 @@ pub enum InputError {
         /// The largest number.
         largest: f32,
         /// Who carries it.
-        carriers: Carriers,
+        carriers: CapableProfiles,
     },
 
-    /// A size or the mass of a shape to be made.
-    #[error(
-        "the {parameter} of a shape is {found:e}, expected a number above 0 with which mass and \
-         inertia stay in the range of f32: correct it"
-    )]
-    ShapeParameter {
-        /// Mass, half extent, half height or radius.
-        parameter: &'static str,
-        /// Its value, kg or m.
-        found: f32,
-    },
+    /// A shape was asked for that has no mass properties.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
 
     /// A static shape that could rotate.
     #[error(

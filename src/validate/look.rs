@@ -4,8 +4,8 @@ use pgs_interface::number::StreamFormat;
 
 use super::quick::{Block, OFF_UNIT, Quick};
 use super::reach::{Furthest, Locations, Reach};
-use crate::beat::pack::source::Lying;
 use crate::record::body_table::{End, Lookup};
+use crate::record::source::CollisionSource;
 use crate::record::{Counted, FULL, alone, body_words, normal_and_count};
 use crate::simd::Lanes;
 
@@ -96,7 +96,7 @@ impl<const REACHES: bool> Look<REACHES> {
     /// Whether validation refuses nothing of the block, whose collisions all these were, at these
     /// `locations`, with their bodies looked up in `ends`; and how many of it look like padding.
     #[inline(always)]
-    pub(crate) fn good<'b, L: Lying<'b>, E: Lookup<'b>>(
+    pub(crate) fn good<'b, L: CollisionSource<'b>, E: Lookup<'b>>(
         self,
         quick: &Quick<'_>,
         block: &Block<'b, L>,

@@ -16,8 +16,8 @@ mod reach;
 mod rows;
 mod shape;
 
-pub use capable_profiles::Carriers;
-pub(crate) use capable_profiles::Demand;
+pub use capable_profiles::CapableProfiles;
+pub(crate) use capable_profiles::SceneNeeds;
 pub use error::InputError;
 pub(crate) use look::Look;
 pub(crate) use quick::{Block, Quick};
@@ -110,7 +110,7 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
         }
     }
     let demand =
-        Demand { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
+        SceneNeeds { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
     check_parameters(parameters, &demand, limits)?;
     check_room(&demand, limits)?;
     check_shapes(shapes, &demand, limits)?;
@@ -154,14 +154,14 @@ fn check_whole<'a>(
 #[derive(Debug)]
 pub(crate) struct Scene<'a> {
     shapes: &'a [Shape],
-    demand: Demand,
+    demand: SceneNeeds,
     variant: &'a Variant,
     held: Held,
     flush_subnormals: bool,
 }
 
-fn check_room(demand: &Demand, limits: &Limits) -> Result<(), InputError> {
-    let Demand { bodies, collisions, .. } = *demand;
+fn check_room(demand: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
+    let SceneNeeds { bodies, collisions, .. } = *demand;
     if bodies == 0 {
         return Err(InputError::NoBodies);
     }
@@ -265,7 +265,7 @@ pub(crate) mod tests {
     }
 
     fn room(bodies: usize, collisions: usize, limits: &Limits) -> Result<(), InputError> {
-        check_room(&Demand { bodies, collisions, inertia: Inertia::Isotropic }, limits)
+        check_room(&SceneNeeds { bodies, collisions, inertia: Inertia::Isotropic }, limits)
     }
 
     #[test]

@@ -4,7 +4,7 @@ use pgs_interface::number::StreamFormat;
 
 use super::Limits;
 use super::range::{computes_short, smallest_short};
-use super::{Demand, InputError};
+use super::{InputError, SceneNeeds};
 use crate::scene::StepParameters;
 
 const TIME_STEP: &str = "time step";
@@ -12,7 +12,7 @@ const TIME_STEP: &str = "time step";
 /// What of the parameters themselves a step refuses.
 pub(crate) fn check_parameters(
     parameters: &StepParameters,
-    demand: &Demand,
+    demand: &SceneNeeds,
     limits: &Limits,
 ) -> Result<(), InputError> {
     let finite = |value: f32| value.is_finite();
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use pgs_interface::profile::Inertia;
 
-    const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     fn checked(parameters: &StepParameters) -> Result<(), InputError> {
         check_parameters(parameters, &DEMAND, &FLOAT)

@@ -15,9 +15,9 @@ use super::InputError;
 use super::body::check_body;
 use super::reach::{Extremes, Locations, Reach, surely_fit};
 use super::{Scene, check_whole};
-use crate::beat::pack::source::Lying;
 use crate::record::body_table::{End, Ends, Lookup};
 use crate::record::largest::{Largest, MAGNITUDE};
+use crate::record::source::CollisionSource;
 use crate::record::{self, FULL};
 use crate::scene::{Body, Collision};
 use crate::simd::Lanes;
@@ -127,7 +127,7 @@ impl<'a> Quick<'a> {
 
     /// Whether a bitstream that computes rows in sixteen bits surely computes those of each collision of
     /// a block, which are at these `locations`.
-    pub(crate) fn rows_fit<'b, L: Lying<'b>>(
+    pub(crate) fn rows_fit<'b, L: CollisionSource<'b>>(
         &self,
         block: &Block<'b, L>,
         locations: impl Iterator<Item = Locations>,
@@ -145,7 +145,7 @@ impl<'a> Quick<'a> {
     /// like padding.
     // Out of the way of blocks without padding, which most are.
     #[inline(never)]
-    pub(crate) fn heads<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> (bool, usize) {
+    pub(crate) fn heads<'b, L: CollisionSource<'b>>(&self, block: &Block<'b, L>) -> (bool, usize) {
         let (mut good, mut paddings) = (true, 0);
         for collision in block.collisions.iter() {
             let padding = is_padding(collision);
@@ -158,7 +158,7 @@ impl<'a> Quick<'a> {
 
     /// Looks at a block as validation does.
     #[cold]
-    pub(crate) fn exactly<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> bool {
+    pub(crate) fn exactly<'b, L: CollisionSource<'b>>(&self, block: &Block<'b, L>) -> bool {
         self.doubt();
         self.refusal(block).is_ok()
     }
@@ -167,7 +167,10 @@ impl<'a> Quick<'a> {
     ///
     /// # Errors
     /// That of the first collision that it refuses.
-    pub(crate) fn refusal<'b, L: Lying<'b>>(&self, block: &Block<'b, L>) -> Result<(), InputError> {
+    pub(crate) fn refusal<'b, L: CollisionSource<'b>>(
+        &self,
+        block: &Block<'b, L>,
+    ) -> Result<(), InputError> {
         let end = |body: usize| {
             let end = u32::try_from(body).map_or(&End::MISSING, |body| block.ends.get(body));
             (end.position, end.shape(self.scene.shapes))

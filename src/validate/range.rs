@@ -160,11 +160,11 @@ fn refused(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::Demand;
+    use crate::validate::SceneNeeds;
     use pgs_interface::number::StreamFormat;
     use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile, WINDOWED16};
 
-    const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
     const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
     const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
     const COLLISION: Collision = Collision {

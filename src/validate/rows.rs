@@ -168,13 +168,13 @@ fn add(sum: [f32; 3], point: [f32; 3]) -> [f32; 3] {
 mod tests {
     use super::super::range::Held;
     use super::*;
-    use crate::validate::Demand;
+    use crate::validate::SceneNeeds;
     use pgs_interface::number::Numbers;
     use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED};
 
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
     const GROUND: Shape = Shape::STATIC;
-    const DEMAND: Demand = Demand { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     /// Two contact points, at `point` and at the origin; those that are not used do not matter.
     fn collision(point: [f32; 3]) -> Collision {

@@ -4,7 +4,7 @@ use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Inertia, Variant};
 
 use super::range::{computes_short, smallest_short};
-use super::{Demand, InputError};
+use super::{InputError, SceneNeeds};
 use super::{Limits, exceeds};
 use crate::scene::Shape;
 
@@ -13,7 +13,7 @@ const INERTIA: &str = "inverse inertia";
 
 /// What the shape table refuses, whatever scene it is for.
 pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), InputError> {
-    let demand = Demand { bodies: 0, collisions: 0, inertia: needed(shapes) };
+    let demand = SceneNeeds { bodies: 0, collisions: 0, inertia: needed(shapes) };
     check_shapes(shapes, &demand, limits)
 }
 
@@ -22,7 +22,7 @@ pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), I
 /// A moving shape of inverse inertia 0 is legal: it does not rotate.
 pub(crate) fn check_shapes(
     shapes: &[Shape],
-    demand: &Demand,
+    demand: &SceneNeeds,
     limits: &Limits,
 ) -> Result<(), InputError> {
     if shapes.is_empty() {

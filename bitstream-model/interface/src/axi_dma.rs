@@ -5,7 +5,38 @@
 //!
 //! Source: PG021 (v7.1).
 
+use std::fmt;
+
 use super::register::{Access, Field, Register};
+
+/// One of the two channels of a core.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// Memory-mapped to stream: the device reads memory.
+    Mm2s,
+    /// Stream to memory-mapped: the device writes memory.
+    S2mm,
+}
+
+impl Direction {
+    /// Distance of this channel's registers above the core's base.
+    #[must_use]
+    pub const fn offset(self) -> u32 {
+        match self {
+            Self::Mm2s => 0,
+            Self::S2mm => S2MM_OFFSET,
+        }
+    }
+}
+
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Mm2s => "MM2S",
+            Self::S2mm => "S2MM",
+        })
+    }
+}
 
 /// Distance of the S2MM registers above the MM2S registers.
 pub const S2MM_OFFSET: u32 = 0x30;

@@ -24,13 +24,13 @@ pub(crate) mod records;
 pub(crate) mod solver;
 pub(crate) mod window;
 
-use crate::board::stream::Stream;
-use crate::board::violation::{Log, ViolationKind};
 use crate::cast::register;
 use crate::config::BoardConfig;
 use crate::config::quirks::Resettable;
-use crate::fault::{FaultKind, Faults, Place, StepPhase, StepShape, Streamed};
+use crate::fault::{FaultKind, Faults, Place, StepPhase, StepShape, Streamed, end_of_reset};
 use crate::memory::Memory;
+use crate::stream::Stream;
+use crate::violation::{Log, ViolationKind};
 use pgs_interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
@@ -175,7 +175,7 @@ impl Accelerator {
             }
             Request::Reset => {
                 let fault = faults.at_reset(Place::Accelerator);
-                self.reset_until = Some(self.config.end_of_reset(now, fault));
+                self.reset_until = Some(end_of_reset(&self.config, now, fault));
                 self.registers.reset();
                 self.phase = Phase::Idle;
                 self.start_due = false;

@@ -1,9 +1,10 @@
 //! This file holds the registers of one DMA channel and what reading and writing them does.
 
+use super::Build;
 use super::faults::Faulty;
-use super::{Build, Direction};
-use crate::board::violation::{Log, ViolationKind};
 use crate::cast::{high, low, register};
+use crate::violation::{Log, ViolationKind};
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::axi_dma::{
     ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, TAILDESC,
     TAILDESC_MSB, dmacr, dmasr,

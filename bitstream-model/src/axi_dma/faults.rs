@@ -1,9 +1,10 @@
 //! This file lets a channel's faults happen, and ends what they began.
 
 use super::channel::{Channel, Work};
-use super::{Build, Direction, Surroundings};
-use crate::board::stream::Stream;
+use super::{Build, Surroundings};
 use crate::fault::{Due, FaultKind, Turn};
+use crate::stream::Stream;
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::axi_dma::dmasr;
 use pgs_interface::descriptor::status;
 use pgs_interface::record::Beat;

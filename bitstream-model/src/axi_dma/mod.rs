@@ -10,36 +10,16 @@ pub(crate) mod channel;
 mod faults;
 pub(crate) mod mover;
 
-use std::fmt;
-
-use crate::accelerator::records::striping::beat_cycles;
-use crate::board::stream::Stream;
-use crate::board::violation::Log;
+use crate::config::beat_cycles;
 use crate::config::quirks::Resettable;
 use crate::config::{BoardConfig, Delays, cycles_of};
-use crate::fault::{FaultKind, Faults, Place, StepPhase};
+use crate::fault::{FaultKind, Faults, Place, StepPhase, end_of_reset};
 use crate::memory::Memory;
-use pgs_interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
+use crate::stream::Stream;
+use crate::violation::Log;
+use pgs_interface::axi_dma::{DMACR, Direction, S2MM_OFFSET, dmacr};
 
 use channel::{Channel, Work};
-
-/// One of the two channels of a core.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Direction {
-    /// Memory-mapped to stream: the device reads memory.
-    Mm2s,
-    /// Stream to memory-mapped: the device writes memory.
-    S2mm,
-}
-
-impl fmt::Display for Direction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Mm2s => "MM2S",
-            Self::S2mm => "S2MM",
-        })
-    }
-}
 
 /// How a core was built.
 #[derive(Debug, Clone, Copy)]
@@ -175,7 +155,7 @@ impl Core {
         if at == DMACR.offset && dmacr::RESET.is_set(value) {
             let core = self.build.core;
             let fault = faults.at_reset(Place::Core(core));
-            self.reset_until = Some(self.config.end_of_reset(now, fault));
+            self.reset_until = Some(end_of_reset(&self.config, now, fault));
             self.mm2s.stop();
             self.s2mm.stop();
             log.withdraw_pardon();

@@ -6,12 +6,13 @@
 
 use super::channel::{Channel, Descriptor, Work};
 use super::faults::Next;
-use super::{Build, Direction, PacketCount, Surroundings};
-use crate::board::stream::Stream;
-use crate::board::violation::ViolationKind;
+use super::{Build, PacketCount, Surroundings};
 use crate::cast::register;
 use crate::fault::FaultKind;
 use crate::memory::Denied;
+use crate::stream::Stream;
+use crate::violation::ViolationKind;
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::axi_dma::{dmacr, dmasr};
 use pgs_interface::descriptor::{
     self, BUFFER, BUFFER_MSB, BYTES, CONTROL, FETCHED_WORDS, NXTDESC, NXTDESC_MSB, STATUS, status,

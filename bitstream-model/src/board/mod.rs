@@ -4,22 +4,20 @@
 //! inside a register write. The clock is the accelerator's; the DMAs run on it too.
 pub(crate) mod bus;
 pub(crate) mod interrupt;
-pub(crate) mod span;
-pub(crate) mod stream;
-pub(crate) mod violation;
 
 use self::bus::Target;
 use self::interrupt::InterruptLine;
-use self::stream::Stream;
-use self::violation::{Log, RegisterAccess, ViolationKind};
 use crate::accelerator::Accelerator;
-use crate::axi_dma::{Core, Direction, Moved, PacketCount, Surroundings};
+use crate::axi_dma::{Core, Moved, PacketCount, Surroundings};
 use crate::cast::index;
 use crate::config::quirks::InterruptWiring;
 use crate::config::{Bandwidth, BoardConfig};
 use crate::fault::{Fault, FaultKind, Faults};
 use crate::memory::{Memory, MemoryError};
 use crate::shortcut::flow::periods::Recurrence;
+use crate::stream::Stream;
+use crate::violation::{Log, RegisterAccess, ViolationKind};
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::control::IDENTIFICATION;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 

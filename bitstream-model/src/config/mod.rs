@@ -7,14 +7,22 @@ use std::num::NonZero;
 use std::sync::OnceLock;
 
 use self::quirks::Quirks;
-use crate::accelerator::records::striping::{GROUP_MAX, STREAMS_MAX};
-use crate::fault::FaultKind;
 use pgs_interface::address_map::CONTROL_BYTES;
+use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
+use pgs_interface::record::BEAT_BYTES;
 use pgs_interface::stripe::Stripe;
+
+/// The most beats of a group of a stripe.
+pub(crate) const GROUP_MAX: usize = 8;
+
+/// Clock cycles that a beat takes on a stream of `width` bits.
+pub(crate) const fn beat_cycles(width: u32) -> u64 {
+    8 * BEAT_BYTES as u64 / width as u64
+}
 
 /// What the pipeline does when a collision needs a velocity that is still being computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -263,16 +271,6 @@ impl BoardConfig {
         cycles_of(ns, self.profile.clock_khz)
     }
 
-    /// When a reset ends that is asked for now.
-    pub(crate) fn end_of_reset(&self, now: u64, fault: Option<FaultKind>) -> u64 {
-        let end = now + self.delays.reset;
-        match fault {
-            Some(FaultKind::ResetNever) => u64::MAX,
-            Some(FaultKind::ResetSlow { ns }) => end.saturating_add(self.cycles(ns)),
-            _ => end,
-        }
-    }
-
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         let range = |what, found: u64, low: u64, high: u64| {
             if (low..=high).contains(&found) {
@@ -378,7 +376,7 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
     let stripes = &profile.stripes;
     let wrong = [
         (
-            streams.iter().any(|widths| !(1..=STREAMS_MAX).contains(&widths.len())),
+            streams.iter().any(|widths| !(1..=DMA_COUNT_MAX).contains(&widths.len())),
             "1 to 4 streams each way are expected",
         ),
         (

@@ -3,7 +3,7 @@
 //!
 //! Unlike a [`Fault`](crate::Fault), which happens once, they last as long as the board.
 
-use crate::axi_dma::Direction;
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::axi_dma::LENGTH_WIDTH_MAX;
 use pgs_interface::control::{IDENTIFICATION, VERSION};
 use pgs_interface::record::{BEAT_BYTES, Beat};

@@ -2,8 +2,8 @@
 //! one's turn.
 
 use super::{Fault, FaultKind, Place, Site, StepPhase, StepShape, When};
-use crate::axi_dma::Direction;
 use pgs_interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::axi_dma::Direction;
 
 /// Where a channel stands in its packet.
 #[derive(Debug, Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use super::text::FaultError;
 use super::{Fault, FaultKind, Place, Site, StepPhase, When};
-use crate::axi_dma::Direction;
+use pgs_interface::axi_dma::Direction;
 
 impl Fault {
     /// Whether it can happen at all where and when it says.

@@ -18,12 +18,24 @@ mod random;
 mod shape;
 mod text;
 
-use crate::axi_dma::Direction;
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::control::ErrorCode;
+
+use crate::config::BoardConfig;
 
 pub(crate) use armed::{Due, Faults, Turn};
 pub(crate) use shape::{StepShape, Streamed};
 pub use text::FaultError;
+
+/// When a reset ends that begins `now`, in clocks.
+pub(crate) fn end_of_reset(config: &BoardConfig, now: u64, fault: Option<FaultKind>) -> u64 {
+    let end = now + config.delays.reset;
+    match fault {
+        Some(FaultKind::ResetNever) => u64::MAX,
+        Some(FaultKind::ResetSlow { ns }) => end.saturating_add(config.cycles(ns)),
+        _ => end,
+    }
+}
 
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

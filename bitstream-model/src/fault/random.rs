@@ -1,9 +1,9 @@
 //! This file makes a fault from a seed.
 
 use super::{Fault, FaultKind, FaultPlan, Place, Site, StepPhase, When};
-use crate::axi_dma::Direction;
 use crate::cast::{index, register};
 use crate::config::BoardConfig;
+use pgs_interface::axi_dma::Direction;
 
 /// Numbers from a seed (Steele, Lea and Flood: splitmix64).
 #[derive(Debug)]

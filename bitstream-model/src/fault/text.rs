@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{Fault, FaultKind, FaultPlan, Place, StepPhase, When};
-use crate::axi_dma::Direction;
 use pgs_interface::address_map::DMA_COUNT_MAX;
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::control::ErrorCode;
 
 /// A line that is no fault plan.

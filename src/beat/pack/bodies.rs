@@ -6,7 +6,7 @@
 //!
 //! A range goes by blocks of bodies that lie in the cache, for each is read more than once: what the
 //! caller has is looked at and made rows of ([`record`](crate::record)), which are dealt out to the
-//! channels in the format of the stream ([`Dealer`](super::stripe_writer::Dealer)). What is wrong with the input is
+//! channels in the format of the stream ([`StripeWriter`](super::stripe_writer::StripeWriter)). What is wrong with the input is
 //! not said here, only that something is.
 
 use std::mem;
@@ -15,7 +15,7 @@ use std::ops::Range;
 use pgs_interface::record::Beat;
 
 use super::body_records::{Poses, Velocities};
-use super::pool::{Packers, Piece, Pieces, ranges, whole};
+use super::pool::{ChannelChunks, PackPool, Piece, ranges, whole};
 use super::stripe_writer::BODIES;
 use super::target::Target;
 use crate::beat::stripe::Segment;
@@ -30,7 +30,7 @@ pub(crate) fn survey<B: Bodies + ?Sized>(
     bodies: &B,
     count: usize,
     into: Survey<'_>,
-    packers: &mut Packers,
+    packers: &mut PackPool,
 ) -> bool {
     let wanted = Wanted { into: Some(into), velocities: None, poses: None };
     let (.., good) = pack(target, bodies, count, wanted, packers);
@@ -48,7 +48,7 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     count: usize,
     into: Survey<'_>,
     (velocities, poses): (&mut [&mut [Beat]], &mut [&mut [Beat]]),
-    packers: &mut Packers,
+    packers: &mut PackPool,
 ) -> (u32, u32, bool) {
     let wanted =
         Wanted { into: Some(into), velocities: Some(whole(velocities)), poses: Some(whole(poses)) };
@@ -64,7 +64,7 @@ pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
     bodies: &B,
     count: usize,
     channels: &mut [&mut [Beat]],
-    packers: &mut Packers,
+    packers: &mut PackPool,
 ) -> (u32, bool) {
     let wanted = Wanted { into: None, velocities: Some(whole(channels)), poses: None };
     let (sum, _, good) = pack(target, bodies, count, wanted, packers);
@@ -77,7 +77,7 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
     bodies: &B,
     count: usize,
     channels: &mut [&mut [Beat]],
-    packers: &mut Packers,
+    packers: &mut PackPool,
 ) -> (u32, bool) {
     let wanted = Wanted { into: None, velocities: None, poses: Some(whole(channels)) };
     let (_, sum, good) = pack(target, bodies, count, wanted, packers);
@@ -98,7 +98,7 @@ fn pack<B: Bodies + ?Sized>(
     bodies: &B,
     count: usize,
     wanted: Wanted<'_>,
-    packers: &mut Packers,
+    packers: &mut PackPool,
 ) -> (u32, u32, bool) {
     let Wanted { mut into, velocities, poses } = wanted;
     let ends = into.as_mut().map(|into| into.ends(count));
@@ -132,13 +132,14 @@ fn parts<'a>(
     let [of_velocities, of_poses] =
         [Segment::Velocities, Segment::Poses].map(|segment| segment.layout(target.variant));
     let mut ends = ends.map(|ends| ends.chunks_mut(size));
-    let mut velocities = velocities.map(|channels| Pieces::new(&of_velocities, size, channels));
-    let mut poses = poses.map(|channels| Pieces::new(&of_poses, size, channels));
+    let mut velocities =
+        velocities.map(|channels| ChannelChunks::new(&of_velocities, size, channels));
+    let mut poses = poses.map(|channels| ChannelChunks::new(&of_poses, size, channels));
     ranges(count, size).map(move |range| Part {
         range,
         ends: ends.as_mut().map(|ends| ends.next().unwrap_or_default()),
-        velocities: velocities.as_mut().map(Pieces::cut),
-        poses: poses.as_mut().map(Pieces::cut),
+        velocities: velocities.as_mut().map(ChannelChunks::cut),
+        poses: poses.as_mut().map(ChannelChunks::cut),
     })
 }
 

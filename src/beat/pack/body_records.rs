@@ -4,7 +4,7 @@ use pgs_interface::profile::Inertia;
 use pgs_interface::record::{Beat, pose, velocity};
 use pgs_support::chunks::Chunks;
 
-use super::stripe_writer::Dealer;
+use super::stripe_writer::StripeWriter;
 use super::target::Target;
 use crate::beat::format::Records;
 use crate::beat::stripe::Segment;
@@ -15,7 +15,7 @@ use crate::simd::Vectors;
 /// Writes velocity records.
 pub(crate) struct Velocities<'a, 'b> {
     shapes: &'a [Shape],
-    dealer: Dealer<'a, 'b>,
+    dealer: StripeWriter<'a, 'b>,
     inertia: Inertia,
 }
 
@@ -24,7 +24,7 @@ impl<'a, 'b> Velocities<'a, 'b> {
     pub(crate) fn new(target: Target<'a>, channels: &'a mut [&'b mut [Beat]]) -> Self {
         let layout = Segment::Velocities.layout(target.variant);
         let inertia = target.variant.inertia;
-        Self { shapes: target.shapes, dealer: Dealer::new(&layout, channels), inertia }
+        Self { shapes: target.shapes, dealer: StripeWriter::new(&layout, channels), inertia }
     }
 
     /// Writes those of the next bodies, at most [`BODIES`](super::stripe_writer::BODIES); only the last may be fewer.
@@ -49,14 +49,14 @@ impl<'a, 'b> Velocities<'a, 'b> {
 
 /// Writes pose records.
 pub(crate) struct Poses<'a, 'b> {
-    dealer: Dealer<'a, 'b>,
+    dealer: StripeWriter<'a, 'b>,
 }
 
 impl<'a, 'b> Poses<'a, 'b> {
     /// From the first record of a group on.
     pub(crate) fn new(target: Target<'_>, channels: &'a mut [&'b mut [Beat]]) -> Self {
         let layout = Segment::Poses.layout(target.variant);
-        Self { dealer: Dealer::new(&layout, channels) }
+        Self { dealer: StripeWriter::new(&layout, channels) }
     }
 
     /// Writes those of the next bodies, at most [`BODIES`](super::stripe_writer::BODIES); only the last may be fewer.

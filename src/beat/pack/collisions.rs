@@ -10,14 +10,14 @@ use pgs_interface::profile::Geometry;
 use pgs_interface::record::Beat;
 
 use super::encode::{Absolute, Encoding, Kind, Relative, Worded, most_are_full};
-use super::pool::{Packers, Piece, Pieces, ranges, whole};
-use super::source::{InArray, InNearbyOrder, InOrder, Lying};
-use super::stripe_writer::{BLOCK, CHECKED, Dealer, MANY};
+use super::pool::{ChannelChunks, PackPool, Piece, ranges, whole};
+use super::stripe_writer::{BLOCK, CHECKED, MANY, StripeWriter};
 use super::target::Target;
 use crate::beat::format::{Format, in_format};
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Ends, Lookup};
 use crate::record::sixteen::Sixteen;
+use crate::record::source::{CollisionSource, Contiguous, InNearbyOrder, Indexed};
 use crate::scene::{Collision, Collisions, Structures};
 use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
 use crate::validate::{Block, Look, Quick};
@@ -48,13 +48,13 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     ends: Ends<'_>,
     entries: &Entries<'_, C>,
     channels: &mut [&mut [Beat]],
-    packers: &mut Packers,
+    packers: &mut PackPool,
 ) -> (u32, bool) {
     let layout = Segment::Collisions.layout(target.variant);
     let (mut sum, mut good, mut paddings) = (0_u32, true, 0);
     let channels = whole(channels);
     let cut = |size| {
-        let mut pieces = Pieces::new(&layout, size, channels);
+        let mut pieces = ChannelChunks::new(&layout, size, channels);
         ranges(entries.count, size).map(move |range| (range, pieces.cut()))
     };
     let work = |part: (Range<usize>, Piece<'_>)| pack_range(target, ends, entries, part);
@@ -102,9 +102,9 @@ fn pack_range<C: Collisions + ?Sized>(
     let marks = Marks { scheduled: added.is_some(), words };
     let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
     let seen = match collisions.structures().filter(|all| all.len() == count) {
-        Some(Structures::Array(all)) => packer.write(InArray(all).part(range)),
+        Some(Structures::Array(all)) => packer.write(Contiguous(all).part(range)),
         Some(Structures::Ordered { all, order }) => {
-            let order = InOrder::new(all, order).part(range.clone());
+            let order = Indexed::new(all, order).part(range.clone());
             match order.nearby(range.start) {
                 Some(order) => packer.write_nearby(order),
                 None => packer.write_ordered(order),
@@ -122,7 +122,7 @@ fn pack_range<C: Collisions + ?Sized>(
                     *to = collisions.collision(index);
                     ends.soon([to.body_a, to.body_b]);
                 }
-                seen.and(packer.write(InArray(copies)))
+                seen.and(packer.write(Contiguous(copies)))
             })
         }
     };
@@ -145,7 +145,7 @@ pub(crate) struct CollisionPacker<'a, 'b> {
     quick: Option<&'a Quick<'a>>,
     ends: Ends<'a>,
     marks: Marks<'a>,
-    dealer: Dealer<'a, 'b>,
+    dealer: StripeWriter<'a, 'b>,
     geometry: Geometry,
     /// The index of the next.
     next: usize,
@@ -168,7 +168,7 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
     ) -> Self {
         let layout = Segment::Collisions.layout(target.variant);
         let geometry = target.variant.profile.geometry;
-        let dealer = Dealer::new(&layout, channels);
+        let dealer = StripeWriter::new(&layout, channels);
         Self { quick: target.quick, ends, marks, dealer, geometry, next: first, most_full: true }
     }
 
@@ -180,12 +180,12 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
     }
 
     /// Writes the next collisions. Their number is divisible by [`BLOCK`], unless they are the last.
-    pub(crate) fn write(&mut self, collisions: InArray<'_>) -> Seen {
+    pub(crate) fn write(&mut self, collisions: Contiguous<'_>) -> Seen {
         self.write_lying(collisions)
     }
 
     /// The same.
-    fn write_ordered(&mut self, collisions: InOrder<'_>) -> Seen {
+    fn write_ordered(&mut self, collisions: Indexed<'_>) -> Seen {
         self.write_lying(collisions)
     }
 
@@ -195,7 +195,7 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
     }
 
     #[inline(always)]
-    fn write_lying<'p, L: Lying<'p>>(&'p mut self, collisions: L) -> Seen {
+    fn write_lying<'p, L: CollisionSource<'p>>(&'p mut self, collisions: L) -> Seen {
         let Self { quick, ends, marks, dealer, geometry, next, most_full } = self;
         let Marks { scheduled, words } = *marks;
         let (quick, first) = (*quick, *next);
@@ -230,11 +230,13 @@ struct Writing<'p, 'a, 'b, K, L, const ROWS: usize> {
     rows: PhantomData<[Lanes; ROWS]>,
     quick: Option<&'p Quick<'p>>,
     all: Block<'p, L>,
-    dealer: &'p mut Dealer<'a, 'b>,
+    dealer: &'p mut StripeWriter<'a, 'b>,
     most_full: &'p mut bool,
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_, '_, K, L, ROWS> {
+impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Work
+    for Writing<'p, '_, '_, K, L, ROWS>
+{
     type Output = Seen;
 
     #[inline(always)]
@@ -243,7 +245,7 @@ impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Work for Writing<'p, '_
     }
 }
 
-impl<'p, K: Kind<ROWS>, L: Lying<'p>, const ROWS: usize> Writing<'p, '_, '_, K, L, ROWS> {
+impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Writing<'p, '_, '_, K, L, ROWS> {
     /// Whether a loop that looks jumps where all contact points are used: in loops of f32, and in those that do not
     /// look, that costs what the masks do; what is cut to the thesis' format takes far longer than either.
     const fn jumps<F: Format>() -> bool {

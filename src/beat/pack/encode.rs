@@ -2,10 +2,10 @@
 
 use pgs_interface::record::{CONTACT_POINTS, collision, relative};
 
-use super::source::{Lying, Next};
 use crate::beat::format::{Format, Records};
 use crate::record::body_table::{End, Ends, Lookup};
 use crate::record::largest::MAGNITUDE;
+use crate::record::source::{CollisionSource, Next};
 use crate::record::{self, Counted, FULL, Record, Rows};
 use crate::scene::Collision;
 use crate::simd::{Integer, Lanes};
@@ -18,7 +18,7 @@ const SAMPLED: usize = 15;
 /// Whether most of these have all contact points, a few of which tell: of eight one may be another, as a jump
 /// that is not foreseen costs about as much as eight times the masks.
 #[inline(always)]
-pub(crate) fn most_are_full<'p>(collisions: impl Lying<'p>) -> bool {
+pub(crate) fn most_are_full<'p>(collisions: impl CollisionSource<'p>) -> bool {
     let sampled = (0..collisions.len()).step_by(SAMPLED);
     let full =
         |nth: &usize| collisions.some::<1>(*nth).is_some_and(|[collision]| collision.count == FULL);
@@ -177,7 +177,9 @@ pub(crate) struct Encoding<K, L, E, W, const MOST_FULL: bool> {
     witness: W,
 }
 
-impl<'p, K, L: Lying<'p>, E: Lookup<'p>, W, const MOST_FULL: bool> Encoding<K, L, E, W, MOST_FULL> {
+impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, W, const MOST_FULL: bool>
+    Encoding<K, L, E, W, MOST_FULL>
+{
     /// Those of a block, whose bodies are looked up here.
     #[inline(always)]
     pub(crate) fn new(kind: K, block: &Block<'p, L>, ends: E, witness: W) -> Self {
@@ -223,7 +225,7 @@ impl<const REACHES: bool> Witness for Look<REACHES> {
     }
 }
 
-impl<'p, K, L: Lying<'p>, E: Lookup<'p>, const REACHES: bool, const MOST_FULL: bool>
+impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, const REACHES: bool, const MOST_FULL: bool>
     Encoding<K, L, E, Look<REACHES>, MOST_FULL>
 {
     /// Whether validation refuses none of the block, all of whose records were taken; and how many of it look
@@ -284,7 +286,7 @@ impl<'p, K, L, E, W, const ROWS: usize, const MOST_FULL: bool> Records<ROWS>
     for Encoding<K, L, E, W, MOST_FULL>
 where
     K: Kind<ROWS>,
-    L: Lying<'p>,
+    L: CollisionSource<'p>,
     E: Lookup<'p>,
     W: Witness,
 {
@@ -313,13 +315,13 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::beat::pack::source::InArray;
+    use crate::record::source::Contiguous;
 
     #[test]
     fn most_are_full_where_few_of_those_looked_at_are_not() {
         let full = Collision { count: FULL, ..Collision::NOTHING };
         let mut collisions = vec![full; 16 * SAMPLED];
-        let most = |collisions: &[Collision]| most_are_full(InArray(collisions));
+        let most = |collisions: &[Collision]| most_are_full(Contiguous(collisions));
         assert!(most(&collisions) && most(&[]) && most(&[full]));
         assert!(!most(&[Collision::NOTHING]));
         for (nth, count) in [(0, 3), (15, 5)] {

@@ -6,7 +6,6 @@ pub(crate) mod collisions;
 pub(crate) mod encode;
 pub(crate) mod pattern;
 pub(crate) mod pool;
-pub(crate) mod source;
 pub(crate) mod stripe_writer;
 pub(crate) mod target;
 pub(crate) mod unrolled;

@@ -27,14 +27,14 @@ const MOST: usize = 64;
 
 /// The threads that write records and read results.
 #[derive(Debug)]
-pub(crate) struct Packers {
+pub(crate) struct PackPool {
     /// How many there may be, the caller's among them; as many as are worth it, if nobody said it.
     threads: Option<usize>,
     /// They are started when there is something for them.
     crew: Option<Crew>,
 }
 
-impl Packers {
+impl PackPool {
     /// At most so many threads, of which one is the caller's; as many as are worth it for `None`.
     pub(crate) const fn new(threads: Option<usize>) -> Self {
         Self { threads, crew: None }
@@ -146,13 +146,13 @@ impl Stretch for &[Beat] {
 
 /// The channels of a segment, cut into ranges.
 #[derive(Debug)]
-pub(crate) struct Pieces<S> {
+pub(crate) struct ChannelChunks<S> {
     /// Beats of a range.
     beats: [usize; DMA_COUNT_MAX],
     rest: PieceOf<S>,
 }
 
-impl<S: Stretch> Pieces<S> {
+impl<S: Stretch> ChannelChunks<S> {
     /// For ranges of `size` records, whole blocks.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says of all records.

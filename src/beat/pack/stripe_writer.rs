@@ -35,7 +35,7 @@ pub(crate) const BODIES: usize = 120;
 const _: () = assert!(BODIES.is_multiple_of(BLOCK), "so that each begins with a group");
 
 /// Writes the records of one segment.
-pub(crate) struct Dealer<'a, 'b> {
+pub(crate) struct StripeWriter<'a, 'b> {
     /// What is not written yet.
     channels: &'a mut [&'b mut [Beat]],
     format: Option<Sixteen>,
@@ -46,7 +46,7 @@ pub(crate) struct Dealer<'a, 'b> {
     sum: Lanes,
 }
 
-impl<'a, 'b> Dealer<'a, 'b> {
+impl<'a, 'b> StripeWriter<'a, 'b> {
     /// From the first record on.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
@@ -129,7 +129,7 @@ impl<'a, 'b> Dealer<'a, 'b> {
 
 /// Where rows go whose beats are written one by one.
 struct Rest<'d, 'a, 'b, V, F> {
-    dealer: &'d mut Dealer<'a, 'b>,
+    dealer: &'d mut StripeWriter<'a, 'b>,
     beats: Beats<V, F>,
 }
 
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    struct Dealing<'p, 'a, 'b>(&'p mut Dealer<'a, 'b>, Made<'p>);
+    struct Dealing<'p, 'a, 'b>(&'p mut StripeWriter<'a, 'b>, Made<'p>);
 
     impl Work for Dealing<'_, '_, '_> {
         type Output = ();
@@ -208,7 +208,7 @@ mod tests {
                 .map(|channel| vec![Beat([u32::MAX; LANES]); layout.beats_on_channel(records.len(), channel)])
                 .collect();
             let mut channels: Vec<&mut [Beat]> = segments.iter_mut().map(Vec::as_mut_slice).collect();
-            let mut dealer = Dealer::new(&layout, &mut channels);
+            let mut dealer = StripeWriter::new(&layout, &mut channels);
             for block in records.chunks(BLOCK) {
                 in_wide_vectors(Dealing(&mut dealer, Made(block)));
             }

@@ -7,10 +7,10 @@ use pgs_interface::record::Beat;
 use pgs_support::float_env::standard;
 
 use super::collisions::{CollisionPacker, Marks};
-use super::source::InArray;
 use super::stripe_writer::BLOCK;
 use super::target::Target;
 use crate::record::body_table::Ends;
+use crate::record::source::Contiguous;
 use crate::scene::Collision;
 use crate::validate::InputError;
 use crate::validate::{Block, Quick};
@@ -119,7 +119,7 @@ impl<'a> Writer<'a> {
         if count == 0 {
             return;
         }
-        let (first, collisions) = (self.packer.next(), InArray(&self.block[..count]));
+        let (first, collisions) = (self.packer.next(), Contiguous(&self.block[..count]));
         if !self.packer.write(collisions).good {
             let ends = self.ends;
             let block = Block { first, collisions, ends, scheduled: false };
@@ -153,7 +153,7 @@ mod tests {
 
     use super::super::bodies::survey;
     use super::*;
-    use crate::beat::pack::pool::Packers;
+    use crate::beat::pack::pool::PackPool;
     use crate::beat::stripe::Segment;
     use crate::record::body_table::{Survey, Table};
     use crate::scene::{Body, Contact, Shape, StepParameters};
@@ -194,7 +194,7 @@ mod tests {
                 let target = Target { variant: &variant, shapes: &shapes, quick };
                 let (mut ends, mut statics) = (Table::default(), Vec::new());
                 let into = Survey { ends: &mut ends, statics: &mut statics };
-                assert!(survey(target, &bodies, count, into, &mut Packers::alone()));
+                assert!(survey(target, &bodies, count, into, &mut PackPool::alone()));
                 let layout = Segment::Collisions.layout(&variant);
                 let mut buffers: [Vec<Beat>; 3] = std::array::from_fn(|channel| {
                     vec![Beat::default(); layout.beats_on_channel(BLOCK, channel)]

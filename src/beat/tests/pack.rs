@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use crate::beat::pack::bodies::{Chosen, pack_poses, pack_velocities, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
-use crate::beat::pack::pool::Packers;
+use crate::beat::pack::pool::PackPool;
 use crate::beat::pack::stripe_writer::{BLOCK, BODIES};
 use crate::beat::pack::target::Target;
 use crate::beat::stripe::Segment;
@@ -266,14 +266,14 @@ const SHAPES: [Shape; 3] = [
 fn velocities(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     let count = bodies.len();
     packed(spec, Segment::Velocities, count, |views| {
-        pack_velocities(target(spec), bodies, count, views, &mut Packers::alone()).0
+        pack_velocities(target(spec), bodies, count, views, &mut PackPool::alone()).0
     })
 }
 
 fn poses(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     let count = bodies.len();
     packed(spec, Segment::Poses, count, |views| {
-        pack_poses(target(spec), bodies, count, views, &mut Packers::alone()).0
+        pack_poses(target(spec), bodies, count, views, &mut PackPool::alone()).0
     })
 }
 
@@ -291,10 +291,10 @@ fn entries(
     let count = collisions.len();
     let (mut ends, mut statics) = (Table::default(), Vec::new());
     let into = Survey { ends: &mut ends, statics: &mut statics };
-    survey(target(spec), bodies, bodies.len(), into, &mut Packers::alone());
+    survey(target(spec), bodies, bodies.len(), into, &mut PackPool::alone());
     let entries = Entries { collisions, count, added: None, words };
     packed(spec, Segment::Collisions, count, |views| {
-        pack_collisions(target(spec), ends.ends(), &entries, views, &mut Packers::alone()).0
+        pack_collisions(target(spec), ends.ends(), &entries, views, &mut PackPool::alone()).0
     })
 }
 
@@ -613,13 +613,13 @@ fn more_bodies_than_a_stream_has_indices_for_are_refused() {
         let bodies = vec![Body { shape: 1, ..Body::zeroed() }; count];
         let (mut ends, mut statics) = (Table::default(), Vec::new());
         let into = Survey { ends: &mut ends, statics: &mut statics };
-        survey(target(&HALF_SPEC), &bodies, count, into, &mut Packers::alone());
+        survey(target(&HALF_SPEC), &bodies, count, into, &mut PackPool::alone());
         let layout = Segment::Collisions.layout(&HALF_SPEC.variant);
         let ones = Beat([u32::MAX; 4]);
         let mut buffers: [Vec<Beat>; 3] =
             std::array::from_fn(|channel| vec![ones; layout.beats_on_channel(BLOCK, channel)]);
         let mut views = buffers.each_mut().map(Vec::as_mut_slice);
-        let packers = &mut Packers::alone();
+        let packers = &mut PackPool::alone();
         let (_, good) =
             pack_collisions(target(&HALF_SPEC), ends.ends(), &entries, &mut views, packers);
         assert_eq!(good, fits, "{count}");

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use crate::beat::pack::bodies::{Chosen, pack_bodies, pack_poses, pack_velocities, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
-use crate::beat::pack::pool::{Packers, Pieces, RANGE, ranges, whole};
+use crate::beat::pack::pool::{ChannelChunks, PackPool, RANGE, ranges, whole};
 use crate::beat::pack::stripe_writer::BLOCK;
 use crate::beat::pack::target::Target;
 use crate::beat::stripe::Segment;
@@ -134,7 +134,7 @@ struct Packed {
 
 impl Input {
     /// Packs all of it.
-    fn pack(&self, packers: &mut Packers) -> Packed {
+    fn pack(&self, packers: &mut PackPool) -> Packed {
         let Self { limits, bodies, collisions, order, places, .. } = self;
         let parameters = StepParameters::default();
         let quick = preflight(bodies, collisions, &SHAPES, &parameters, limits).map(Quick::new);
@@ -191,7 +191,7 @@ impl Input {
         target: Target<'_>,
         ends: Ends<'_>,
         collisions: &C,
-        packers: &mut Packers,
+        packers: &mut PackPool,
     ) -> (Vec<Vec<Beat>>, (u32, bool)) {
         let count = collisions.len();
         let entries = Entries { collisions, count, added: None, words: self.words.as_deref() };
@@ -280,9 +280,9 @@ proptest! {
 
     #[test]
     fn several_threads_write_what_one_does(inputs in prop::collection::vec(any_input(), 1..4)) {
-        let mut crews = [1, 2, 3].map(|threads| Packers::new(Some(threads)));
+        let mut crews = [1, 2, 3].map(|threads| PackPool::new(Some(threads)));
         for input in inputs {
-            let expected = input.pack(&mut Packers::alone());
+            let expected = input.pack(&mut PackPool::alone());
             let still = (0_u32..).zip(&input.bodies).filter(|(_, body)| body.shape == 0);
             let still: Vec<u32> = still.map(|(at, _)| at).collect();
             prop_assert_eq!(&expected.statics, &[still.clone(), still]);
@@ -300,7 +300,7 @@ proptest! {
 /// Or the property above would hold of nothing.
 #[test]
 fn one_wrong_record_is_noticed_in_whichever_range() {
-    let mut packers = Packers::new(Some(3));
+    let mut packers = PackPool::new(Some(3));
     let mut numbers = Numbers(1);
     let bodies: Vec<Body> = (0..2 * RANGE + 5).map(|_| numbers.body(0)).collect();
     let collisions = (0..2 * RANGE + 7).map(|_| numbers.collision(4000, 2)).collect();
@@ -331,7 +331,7 @@ fn one_wrong_record_is_noticed_in_whichever_range() {
 #[test]
 fn ranges_are_for_all_threads_and_few_records_for_the_caller() {
     let caller = thread::current().id();
-    let mut packers = Packers::new(Some(3));
+    let mut packers = PackPool::new(Some(3));
     for few in [0, 1, BLOCK, RANGE] {
         let mut joined = vec![];
         let work = |range| (range, thread::current().id());
@@ -361,7 +361,7 @@ fn ranges_are_for_all_threads_and_few_records_for_the_caller() {
 /// One that is not finite is found in whichever range it is, and padding is counted once.
 #[test]
 fn results_are_read_the_same_by_any_number_of_threads() {
-    let crews = &mut [Some(1), Some(2), Some(3), None].map(Packers::new);
+    let crews = &mut [Some(1), Some(2), Some(3), None].map(PackPool::new);
     for profile in PROFILES {
         let layout = Segment::Results.layout(&profile.default_variant());
         for count in [0, 1, RANGE, RANGE + 1, 3 * RANGE + BLOCK + 1] {
@@ -415,7 +415,7 @@ fn the_pieces_of_a_segment_are_those_of_its_ranges() {
                 buffers[place.channel][place.slot] = Beat([number; 4]);
             }
             let mut views = views(&mut buffers);
-            let mut pieces = Pieces::new(&layout, RANGE, whole(&mut views));
+            let mut pieces = ChannelChunks::new(&layout, RANGE, whole(&mut views));
             for range in ranges(count, RANGE) {
                 let last = range.end == count;
                 let end = if last { beats } else { layout.beats(range.end) };

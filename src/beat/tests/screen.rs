@@ -4,13 +4,13 @@ use std::sync::atomic::Ordering;
 
 use crate::beat::pack::bodies::{pack_bodies, survey};
 use crate::beat::pack::collisions::{CollisionPacker, Entries, Marks, pack_collisions};
-use crate::beat::pack::pool::Packers;
-use crate::beat::pack::source::InArray;
+use crate::beat::pack::pool::PackPool;
 use crate::beat::pack::stripe_writer::CHECKED;
 use crate::beat::pack::target::Target;
 use crate::beat::stripe::Segment;
 use crate::order::{Ordered, Schedule};
 use crate::record::body_table::{Ends, Survey, Table};
+use crate::record::source::Contiguous;
 use crate::scene::{Body, Collision, Collisions, Contact, Pose, Shape, StepParameters, Velocity};
 use crate::validate::InputError;
 use crate::validate::{Limits, Quick, preflight, validate};
@@ -84,7 +84,7 @@ fn looked_at<C: Collisions + ?Sized>(
     let packed = |target: Target<'_>| {
         let mut channels = buffers(target.variant, Segment::Collisions, entries.count);
         let views = &mut views(&mut channels);
-        let (sum, good) = pack_collisions(target, ends, entries, views, &mut Packers::alone());
+        let (sum, good) = pack_collisions(target, ends, entries, views, &mut PackPool::alone());
         ((channels, sum), good)
     };
     let (beats, good) = packed(target);
@@ -95,7 +95,7 @@ fn looked_at<C: Collisions + ?Sized>(
     let marks = Marks { scheduled: entries.added.is_some(), words: entries.words };
     let packer = CollisionPacker::new(target, ends, marks, 0, &mut views);
     let mut packer = packer.expecting_few_full();
-    let seen = packer.write(InArray(&list));
+    let seen = packer.write(Contiguous(&list));
     // What looks like padding is counted of all of them, elsewhere.
     assert!(marks.scheduled || seen.good == good, "found good as in the other loop: {}", seen.good);
     let sum = packer.finish();
@@ -140,7 +140,7 @@ fn said_and_doubted(
         count,
         Survey { ends: &mut ends, statics: &mut statics },
         (&mut views(&mut velocities), &mut views(&mut poses)),
-        &mut Packers::alone(),
+        &mut PackPool::alone(),
     );
     let moves =
         |body: &Body| shapes.get(body.shape as usize).is_some_and(|shape| !shape.is_static());
@@ -148,7 +148,7 @@ fn said_and_doubted(
     assert_eq!(statics, still.collect::<Vec<u32>>());
     let (mut other_ends, mut other_statics) = (Table::default(), vec![7]);
     let into = Survey { ends: &mut other_ends, statics: &mut other_statics };
-    assert_eq!(survey(target, bodies, count, into, &mut Packers::alone()), bodies_good);
+    assert_eq!(survey(target, bodies, count, into, &mut PackPool::alone()), bodies_good);
     // As bytes: a position may be no number.
     let bytes = |ends: &Table| bytemuck::cast_slice::<_, u8>(ends.of_bodies()).to_vec();
     assert_eq!((bytes(&other_ends), other_statics), (bytes(&ends), statics));

@@ -9,7 +9,7 @@ use pgs_interface::record::{Beat, result};
 use super::stripe_reader::{self, Tally};
 use crate::beat::format::{Format, in_format};
 use crate::beat::pack::pattern::Pattern;
-use crate::beat::pack::pool::{Packers, PieceRead, Pieces, whole_read};
+use crate::beat::pack::pool::{ChannelChunks, PackPool, PieceRead, whole_read};
 pub(crate) use crate::beat::pack::stripe_writer::BLOCK;
 use crate::beat::stripe::{Deal, Layout};
 use crate::record::finite::Finite;
@@ -25,12 +25,12 @@ pub(crate) fn read_all(
     layout: &Layout,
     channels: &[&[Beat]],
     records: &mut [Record],
-    packers: &mut Packers,
+    packers: &mut PackPool,
 ) -> (u32, bool) {
     let (mut sum, mut all_finite) = (0_u32, true);
     let count = records.len();
     let cut = |size| {
-        let (mut pieces, all) = (Pieces::new(layout, size, whole_read(channels)), records);
+        let (mut pieces, all) = (ChannelChunks::new(layout, size, whole_read(channels)), records);
         all.chunks_mut(size).map(move |records| (records, pieces.cut()))
     };
     let work = |(records, piece): (&mut [Record], PieceRead<'_>)| {

@@ -10,7 +10,7 @@ use pgs_interface::control::ErrorCode;
 
 use super::tampered::{CONTROL, Tamper, Tampered};
 use super::{bits, open, scene, step, undisturbed};
-use crate::board::anomalies::Oddity;
+use crate::board::anomalies::Anomaly;
 use crate::{
     Accelerator, Aftermath, Direction, Error, Fault, Phase, Shape, StepParameters, StepReport,
 };
@@ -134,7 +134,7 @@ fn a_status_that_never_reaches_memory_is_not_taken_for_a_channel_that_hangs() {
 fn a_status_that_is_late_costs_no_step_and_is_told_once() {
     let (board, tampered, mut accelerator) = Tampered::open();
     step(&mut accelerator, CUBES).0.expect("a good step");
-    assert!(!accelerator.device.oddities.told(Oddity::LateStatus));
+    assert!(!accelerator.device.oddities.told(Anomaly::LateStatus));
     let mut looks = 0;
     let mut seen = 0;
     // Hidden at the first look, back at the third.
@@ -160,7 +160,7 @@ fn a_status_that_is_late_costs_no_step_and_is_told_once() {
     let (result, bodies) = step(&mut accelerator, CUBES);
     result.expect("only late");
     assert_eq!(bits(&bodies), undisturbed(CUBES));
-    assert!(accelerator.device.oddities.told(Oddity::LateStatus));
+    assert!(accelerator.device.oddities.told(Anomaly::LateStatus));
     assert_eq!(board.violations(), []);
 }
 
@@ -345,15 +345,15 @@ fn interrupts_without_a_reason_cost_no_step_and_are_told_once() {
     let (result, accelerator, _) = odd(CUBES, 1);
     assert_eq!(result.expect("one is odd").interrupts, 2);
     let told = |accelerator: &Accelerator, oddity| accelerator.device.oddities.told(oddity);
-    assert!(told(&accelerator, Oddity::SpuriousInterrupt));
-    assert!(!told(&accelerator, Oddity::InterruptStorm));
+    assert!(told(&accelerator, Anomaly::SpuriousInterrupt));
+    assert!(!told(&accelerator, Anomaly::InterruptStorm));
 
     // A step that takes longer than the storm is endured.
     let (result, mut accelerator, tampered) = odd(2_000, 10_000);
     let accesses = |report: StepReport| report.register_reads + report.register_writes;
     let during = accesses(result.expect("a storm is odd"));
-    assert!(told(&accelerator, Oddity::InterruptStorm));
-    assert!(!told(&accelerator, Oddity::LateStatus));
+    assert!(told(&accelerator, Anomaly::InterruptStorm));
+    assert!(!told(&accelerator, Anomaly::LateStatus));
     // Eight status registers and a few more at each interrupt, and no thousand of them.
     assert!(during < 1_000, "{during}");
     tampered.wires().storm = 0;

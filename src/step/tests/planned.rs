@@ -6,7 +6,7 @@ use bitstream_model::{Bandwidth, BoardConfig, FaultPlan};
 
 use super::fault::{CUBES, fault_of, recovered};
 use super::{bits, open, scene, step, undisturbed};
-use crate::board::anomalies::Oddity;
+use crate::board::anomalies::Anomaly;
 use crate::{ChannelState, Error, StepParameters};
 
 /// Each line with the name, the channel and the phase that are told.
@@ -78,9 +78,9 @@ fn planned_faults_are_named_with_channel_and_phase() {
 #[test]
 fn planned_oddities_cost_no_step_and_are_told() {
     let cases = [
-        ("irq-drop", Some(Oddity::MissedInterrupt)),
-        ("irq-spurious,access=10", Some(Oddity::SpuriousInterrupt)),
-        ("late-cmplted=400000@dma3.s2mm", Some(Oddity::LateStatus)),
+        ("irq-drop", Some(Anomaly::MissedInterrupt)),
+        ("irq-spurious,access=10", Some(Anomaly::SpuriousInterrupt)),
+        ("late-cmplted=400000@dma3.s2mm", Some(Anomaly::LateStatus)),
         ("slow=50@dma1.mm2s", None),
     ];
     for (line, oddity) in cases {
@@ -90,7 +90,7 @@ fn planned_oddities_cost_no_step_and_are_told() {
         let (result, bodies) = step(&mut accelerator, CUBES);
         result.expect(line);
         assert_eq!((bits(&bodies), board.faults()), (undisturbed(CUBES), 1), "{line}");
-        for other in [Oddity::MissedInterrupt, Oddity::SpuriousInterrupt, Oddity::LateStatus] {
+        for other in [Anomaly::MissedInterrupt, Anomaly::SpuriousInterrupt, Anomaly::LateStatus] {
             let told = accelerator.device.oddities.told(other);
             assert_eq!(told, Some(other) == oddity, "{line}: {other:?}");
         }
@@ -133,7 +133,7 @@ fn a_channel_that_does_not_stop_for_its_new_ring_is_reset() {
     let (result, bodies) = step(&mut accelerator, 60);
     result.expect("reset, and no step lost");
     assert_eq!((bits(&bodies), board.faults()), (undisturbed(60), 1));
-    assert!(accelerator.device.oddities.told(Oddity::NoHalt));
+    assert!(accelerator.device.oddities.told(Anomaly::NoHalt));
     drop(accelerator);
     assert_eq!(board.violations(), []);
 }

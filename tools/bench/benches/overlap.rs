@@ -65,7 +65,7 @@ fn time(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(ms / 1e3).map_err(|error| error.to_string())
 }
 
-/// Pieces in which the host's time passes.
+/// Parts in which the host's time passes.
 const PIECES: u32 = 100;
 
 /// Bodies or collisions that are read and stored in so much of the board's time.

@@ -126,7 +126,7 @@ impl Options {
 enum Thing {
     Bodies,
     AsGiven,
-    InOrder,
+    Indexed,
     BareAsGiven,
     BareInOrder,
     StepAsGiven,
@@ -147,7 +147,7 @@ impl Thing {
         match self {
             Self::Bodies => "bodies",
             Self::AsGiven => "as given",
-            Self::InOrder => "in order",
+            Self::Indexed => "in order",
             Self::BareAsGiven => "bare, as given",
             Self::BareInOrder => "bare, in order",
             Self::StepAsGiven => "step, as given",
@@ -308,7 +308,7 @@ fn measure(
         let added = Some(schedule.empty());
         match thing {
             Thing::AsGiven | Thing::StepAsGiven => packer.pack_collisions(collisions, shapes, None),
-            Thing::InOrder | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
+            Thing::Indexed | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
             Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, None)?,
             Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, added)?,
             Thing::BareAsGiven => (packer.deal_bare(collisions) > 0).then_some(0),
@@ -322,7 +322,7 @@ fn measure(
     let bytes = match thing {
         Thing::Bodies => of_bodies,
         Thing::AsGiven | Thing::BareAsGiven => of_collisions,
-        Thing::InOrder | Thing::BareInOrder => of_entries,
+        Thing::Indexed | Thing::BareInOrder => of_entries,
         Thing::StepAsGiven | Thing::CheckedAsGiven => of_bodies + of_collisions,
         Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
         Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
@@ -375,7 +375,7 @@ fn packing<'a>(
             Thing::AsGiven | Thing::StepAsGiven => {
                 black_box(packer.pack_collisions(black_box(collisions), shapes, None));
             }
-            Thing::InOrder | Thing::StepInOrder => {
+            Thing::Indexed | Thing::StepInOrder => {
                 black_box(packer.pack_collisions(black_box(ordered), shapes, added));
             }
             Thing::CheckedAsGiven => {

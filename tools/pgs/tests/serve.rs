@@ -10,8 +10,8 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 
 use bitstream_model::interface::address_map::dma_base;
-use common::{Ran, Tied, pgs, run, signal};
 use bitstream_model::interface::message::{ANSWER_BYTES, Answer, REQUEST_BYTES, Request, Status};
+use common::{Ran, Tied, pgs, run, signal};
 
 /// `pgs serve` in a process of its own.
 struct Served {

@@ -1,6 +1,6 @@
 //! This file holds what can be wrong with a request for a scene.
 
-use zynq_pgs::InputError;
+use zynq_pgs::ShapeError;
 
 /// Why a scene could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -44,5 +44,5 @@ pub enum SceneError {
     },
     /// A body has sizes or a mass that no shape has.
     #[error(transparent)]
-    Shape(#[from] InputError),
+    Shape(#[from] ShapeError),
 }

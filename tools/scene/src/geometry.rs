@@ -1,6 +1,6 @@
 //! This file says what a body looks like, and what mass properties follow from it.
 
-use zynq_pgs::{InputError, Shape};
+use zynq_pgs::{Shape, ShapeError};
 
 use crate::CUBE_HALF_EXTENT;
 
@@ -58,9 +58,9 @@ impl Geometry {
     /// The mass properties of a solid body of `mass` kg, the same everywhere inside.
     ///
     /// # Errors
-    /// [`InputError::ShapeParameter`]: a size or the mass is not above 0, or so large or small that
+    /// [`ShapeError`]: a size or the mass is not above 0, or so large or small that
     /// the inertia leaves f32.
-    pub fn shape(&self, mass: f32) -> Result<Shape, InputError> {
+    pub fn shape(&self, mass: f32) -> Result<Shape, ShapeError> {
         match *self {
             Self::Box { half_extents } => Shape::cuboid(mass, half_extents),
             Self::Sphere { radius } => Shape::sphere(mass, radius),
@@ -100,7 +100,7 @@ mod tests {
             (Geometry::Capsule { half_height: -1.0, radius: 1.0 }, 1.0),
         ] {
             let refused = geometry.shape(mass);
-            assert!(matches!(refused, Err(InputError::ShapeParameter { .. })), "{refused:?}");
+            assert!(matches!(refused, Err(ShapeError { .. })), "{refused:?}");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::array::{Array, Row, beat_of};
 use super::striping::{PerStream, STREAMS_MAX};
-use crate::board::stream::Stream;
+use crate::stream::Stream;
 use pgs_interface::record::{Beat, result};
 
 /// A result fills whole beats, two rows each at least.

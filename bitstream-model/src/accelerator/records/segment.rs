@@ -3,9 +3,9 @@
 
 use super::array::{Array, Row, half_of};
 use super::striping::{PerStream, Places, STREAMS_MAX};
-use crate::board::stream::Stream;
 use crate::cast::register;
 use crate::memory::Memory;
+use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::record::{Beat, LANES};
 

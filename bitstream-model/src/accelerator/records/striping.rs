@@ -2,19 +2,13 @@
 //! each, how long they take.
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
-use pgs_interface::record::{BEAT_BYTES, pose, result, velocity};
+use pgs_interface::record::{pose, result, velocity};
 use pgs_interface::stripe::Stripe;
+
+use crate::config::{GROUP_MAX, beat_cycles};
 
 /// The most streams that a profile has.
 pub(crate) const STREAMS_MAX: usize = DMA_COUNT_MAX;
-/// The most beats of a group.
-pub(crate) const GROUP_MAX: usize = 8;
-
-/// Clock cycles that a beat takes on a stream of that width.
-pub(crate) const fn beat_cycles(width: u32) -> u64 {
-    8 * BEAT_BYTES as u64 / width as u64
-}
-
 /// A count for each stream.
 pub(crate) type PerStream = [usize; STREAMS_MAX];
 

@@ -11,9 +11,9 @@ use crate::accelerator::arithmetic::number::{Format, Half, HalfFlushed, Single, 
 use crate::accelerator::records::decode;
 use crate::accelerator::records::results::Results;
 use crate::accelerator::records::segment::{PacketError, Segment};
-use crate::board::stream::Stream;
 use crate::cast::register;
 use crate::config::Subnormals;
+use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::Precision;
 use pgs_interface::profile::Inertia;

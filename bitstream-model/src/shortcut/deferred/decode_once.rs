@@ -12,11 +12,11 @@ use crate::accelerator::hazards::{Entry, Pipeline};
 use crate::accelerator::records::segment::{PacketError, Segment};
 use crate::accelerator::records::striping::{PerStream, STREAMS_MAX, Turns};
 use crate::accelerator::solver::Mass;
-use crate::board::span::Spans;
-use crate::board::stream::Stream;
 use crate::config::BoardConfig;
 use crate::memory::{Memory, Source};
 use crate::shortcut::batch::{Batch, Translation};
+use crate::stream::Stream;
+use crate::stream::span::Spans;
 use pgs_interface::record::Beat;
 
 /// Issue slots of a hazard window that are kept in mind.

@@ -1,7 +1,7 @@
 //! This file says which designs can be replayed, and how their collisions and bodies lie on the streams.
 
-use crate::accelerator::records::striping::{PerStream, Striping, Turns, beat_cycles};
-use crate::config::{BoardConfig, Hazards, Subnormals};
+use crate::accelerator::records::striping::{PerStream, Striping, Turns};
+use crate::config::{BoardConfig, Hazards, Subnormals, beat_cycles};
 use crate::shortcut::batch;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Flow, Geometry, Inertia};

@@ -5,10 +5,10 @@ use super::decode_once::Coming;
 use crate::accelerator::records::segment::{PacketError, Segment};
 use crate::accelerator::records::striping::PerStream;
 use crate::accelerator::{Accelerator, Phase};
-use crate::board::stream::Stream;
 use crate::memory::Memory;
 use crate::shortcut::flow::collisions::{Pace, Slice};
 use crate::shortcut::flow::periods::Recurrence;
+use crate::stream::Stream;
 use pgs_interface::record::CONTACT_POINTS;
 
 impl Accelerator {

@@ -1,11 +1,12 @@
 //! This file is for a channel that does nothing out of the ordinary: it waits, or moves beats in the
 //! middle of a descriptor, which are counted elsewhere.
 
+use crate::axi_dma::Core;
 use crate::axi_dma::channel::{Channel, Work};
 use crate::axi_dma::mover::BEAT;
-use crate::axi_dma::{Core, Direction};
-use crate::board::stream::Stream;
 use crate::cast::register;
+use crate::stream::Stream;
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::axi_dma::dmacr;
 use pgs_interface::record::BEAT_BYTES;
 

@@ -5,10 +5,10 @@ use super::bodies::{BodyFlowed, BodyLimits, BodyPace, BodyPhase, BodyStanding};
 use super::collisions::{Flowed, Limits, Pace, PerEngine, Rules, Standing, Supply};
 use crate::accelerator::Coming;
 use crate::accelerator::records::striping::{ROWS_IN, STREAMS_MAX, Turns};
-use crate::axi_dma::Direction;
 use crate::board::{BURST_BEATS, Board};
 use crate::config::Bandwidth;
 use crate::memory::Source;
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::record::BEAT_BYTES;
 
 /// Where the beats are that are next on each stream, those in its FIFO before those that are about to

@@ -114,24 +114,24 @@ fn mistake_19_slices_of_a_buffer_that_the_device_writes() {
         implements!(Vec<Beat>: std::ops::Deref),
     ];
     assert_eq!(ways, [true; 4]);
-    // The lanes, which hold either, give no beat away while the device has them.
+    // The ports, which hold either, give no beat away while the device has them.
     let mut bench = Bench::open(BoardConfig::default(), None, None).expect("a board that opens");
     bench.step(20).expect("a step");
     let device = &mut bench.accelerator.device;
     const FIRST: Bank = Bank::First;
     let reachable = |device: &mut crate::board::Device| {
         device
-            .lanes_mut()
-            .map(|lane| lane.beats(FIRST).len() + lane.beats_mut(FIRST).len())
+            .ports_mut()
+            .map(|port| port.beats(FIRST).len() + port.beats_mut(FIRST).len())
             .sum::<usize>()
     };
     assert!(reachable(device) > 0, "the CPU holds them between steps");
-    for lane in device.lanes_mut() {
-        lane.hand_over(FIRST, 1).expect("handed over");
+    for port in device.ports_mut() {
+        port.hand_over(FIRST, 1).expect("handed over");
     }
     assert_eq!(reachable(device), 0);
-    for lane in device.lanes_mut() {
-        lane.take_back(FIRST).expect("nothing runs");
+    for port in device.ports_mut() {
+        port.take_back(FIRST).expect("nothing runs");
     }
     assert!(reachable(device) > 0);
     bench.close().expect("nothing went wrong");

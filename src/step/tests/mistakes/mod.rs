@@ -25,7 +25,7 @@
 //! | 16 | receivers started after senders | [`addresses`]`::mistake_16_receivers_started_after_senders` | the order of the doorbells |
 //! | 17 | buffer used again after a time-out | [`buffers`]`::mistake_17_buffer_used_again_after_a_time_out` | the board: an access to a buffer of the CPU |
 //! | 18 | idle senders taken for the end | [`waits`]`::mistake_18_idle_senders_taken_for_the_end` | buffers taken back while engines run |
-//! | 19 | slices of a buffer that the device writes | [`buffers`]`::mistake_19_slices_of_a_buffer_that_the_device_writes` | the compiler, and the lanes |
+//! | 19 | slices of a buffer that the device writes | [`buffers`]`::mistake_19_slices_of_a_buffer_that_the_device_writes` | the compiler, and the ports |
 //!
 //! Beside them [`confinement`] plants lengths and addresses that are off by one beat, buffers that
 //! were freed and buffers of the CPU.

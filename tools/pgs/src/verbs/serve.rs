@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
+use bitstream_model::interface::message::MEMORY_SUFFIX;
 use bitstream_model::remote::{Ended, MemoryFile, ServeError, Server, Visit};
 use clap::Args;
-use bitstream_model::interface::message::MEMORY_SUFFIX;
 use serde_json::json;
 use zynq_pgs::{MemoryChoice, StepParameters};
 

@@ -8,42 +8,10 @@ use crate::scene::Collision;
 use crate::simd::{later_with_those_behind, soon_alone, soon_with_those_behind};
 use pgs_support::chunks::Chunks;
 
-/// Where collisions lie ([`Collisions::structures`](crate::scene::Collisions::structures)).
-#[derive(Debug, Clone, Copy)]
-pub enum Structures<'a> {
-    /// One behind the other, in their order.
-    Array(&'a [Collision]),
-    /// In an order of their own.
-    Ordered {
-        /// One behind the other.
-        all: &'a [Collision],
-        /// Where each of them lies in `all`. Beyond its end is one without contact points, which has no
-        /// effect, and which a step refuses if it is a caller's.
-        order: &'a [u32],
-    },
-}
-
-impl Structures<'_> {
-    /// Number of collisions.
-    #[must_use]
-    pub const fn len(&self) -> usize {
-        match self {
-            Self::Array(all) => all.len(),
-            Self::Ordered { order, .. } => order.len(),
-        }
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}
-
 /// Collisions that lie somewhere, to look up.
 ///
 /// All of it is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
-pub(crate) trait Lying<'a>: Copy {
+pub(crate) trait CollisionSource<'a>: Copy {
     /// How many there are.
     fn len(self) -> usize;
 
@@ -111,9 +79,9 @@ fn part<T>(all: &[T], range: Range<usize>) -> &[T] {
 
 /// [`Structures::Array`].
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct InArray<'a>(pub(crate) &'a [Collision]);
+pub(crate) struct Contiguous<'a>(pub(crate) &'a [Collision]);
 
-impl<'a> Lying<'a> for InArray<'a> {
+impl<'a> CollisionSource<'a> for Contiguous<'a> {
     #[inline(always)]
     fn len(self) -> usize {
         self.0.len()
@@ -140,7 +108,7 @@ impl<'a> Lying<'a> for InArray<'a> {
 
 /// [`Structures::Ordered`].
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct InOrder<'a> {
+pub(crate) struct Indexed<'a> {
     all: &'a [Collision],
     /// Places of these, and of what is behind them.
     order: &'a [u32],
@@ -148,7 +116,7 @@ pub(crate) struct InOrder<'a> {
     count: usize,
 }
 
-impl<'a> InOrder<'a> {
+impl<'a> Indexed<'a> {
     /// Those at all places of an order.
     pub(crate) fn new(all: &'a [Collision], order: &'a [u32]) -> Self {
         Self { all, order, count: order.len() }
@@ -195,7 +163,7 @@ impl<'a> InOrder<'a> {
     }
 }
 
-impl<'a> Lying<'a> for InOrder<'a> {
+impl<'a> CollisionSource<'a> for Indexed<'a> {
     #[inline(always)]
     fn len(self) -> usize {
         self.count
@@ -227,12 +195,12 @@ impl<'a> Lying<'a> for InOrder<'a> {
 /// [`Structures::Ordered`], where each lies about where it would in an array.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InNearbyOrder<'a> {
-    order: InOrder<'a>,
+    order: Indexed<'a>,
     /// The index of the first of these.
     first: usize,
 }
 
-impl<'a> InOrder<'a> {
+impl<'a> Indexed<'a> {
     /// The same, if nearly all of these lie about where they would in an array; entry `first` is the first
     /// of them. Those that are not there lie nowhere.
     pub(crate) fn nearby(self, first: usize) -> Option<InNearbyOrder<'a>> {
@@ -250,7 +218,7 @@ impl<'a> InOrder<'a> {
     }
 }
 
-impl<'a> Lying<'a> for InNearbyOrder<'a> {
+impl<'a> CollisionSource<'a> for InNearbyOrder<'a> {
     #[inline(always)]
     fn len(self) -> usize {
         self.order.len()
@@ -292,7 +260,7 @@ mod tests {
     }
 
     /// A part ends where it says, also if there is more behind it.
-    fn parts_are_as_long_as_they_say<'a>(all: impl Lying<'a>, expected: &[u32]) {
+    fn parts_are_as_long_as_they_say<'a>(all: impl CollisionSource<'a>, expected: &[u32]) {
         let whole = all.part(10..90).part(15..200);
         assert_eq!(names(whole.iter()), expected[25..90]);
         for range in [0..0, 0..7, 30..60, 60..100, 95..130, 100..101, 200..230] {
@@ -311,14 +279,14 @@ mod tests {
     fn a_part_is_as_long_as_it_says() {
         let all = collisions(100);
         let in_turn: Vec<u32> = (0..100).collect();
-        parts_are_as_long_as_they_say(InArray(&all), &in_turn);
+        parts_are_as_long_as_they_say(Contiguous(&all), &in_turn);
         // Backwards, with one that is not there.
         let mut order: Vec<u32> = in_turn.into_iter().rev().collect();
         order[40] = u32::MAX;
         let mut expected = order.clone();
         expected[40] = Collision::NOTHING.body_a;
-        parts_are_as_long_as_they_say(InOrder::new(&all, &order), &expected);
-        let near = InOrder::new(&all, &order).nearby(0).expect("a hundred lie near each other");
+        parts_are_as_long_as_they_say(Indexed::new(&all, &order), &expected);
+        let near = Indexed::new(&all, &order).nearby(0).expect("a hundred lie near each other");
         parts_are_as_long_as_they_say(near, &expected);
         // What is fetched goes by the entry.
         let part = near.part(10..90).part(15..200);
@@ -332,7 +300,7 @@ mod tests {
         let in_turn: Vec<u32> = (0..100_000).collect();
         let nearby = |order: &[u32], range: Range<usize>| {
             let first = range.start;
-            InOrder::new(&all, order).part(range).nearby(first).is_some()
+            Indexed::new(&all, order).part(range).nearby(first).is_some()
         };
         assert!(nearby(&in_turn, 0..100_000) && nearby(&in_turn, 90_000..100_000));
         // Swapped in pairs, and with some that are not there.
@@ -353,14 +321,14 @@ mod tests {
     fn those_whose_bodies_are_fetched_are_a_little_behind() {
         let all = collisions(100);
         let order: Vec<u32> = (0..100).rev().collect();
-        let part = InOrder::new(&all, &order).part(30..60);
+        let part = Indexed::new(&all, &order).part(30..60);
         let soon = |nth| part.next::<2>(nth).expect("as many").soon.map(names);
         // Entries 30 + 15 and the next; beyond the part, too.
         assert_eq!(soon(0), Some(vec![54, 53]));
         assert_eq!(soon(14), Some(vec![26, 25]));
         // Of the last none are.
-        let last = InOrder::new(&all, &order).part(90..100);
+        let last = Indexed::new(&all, &order).part(90..100);
         assert!(last.next::<2>(0).expect("as many").soon.is_none());
-        assert!(InArray(&all).next::<2>(0).expect("as many").soon.is_none());
+        assert!(Contiguous(&all).next::<2>(0).expect("as many").soon.is_none());
     }
 }

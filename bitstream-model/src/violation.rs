@@ -4,8 +4,8 @@
 use std::collections::VecDeque;
 use std::fmt;
 
-use crate::axi_dma::Direction;
 use crate::memory::Denied;
+use pgs_interface::axi_dma::Direction;
 
 /// What went wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

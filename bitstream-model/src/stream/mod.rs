@@ -3,11 +3,12 @@
 //! A narrower stream carries a beat in several cycles; that is the mover's and the accelerator's
 //! business, here a beat is a beat. A beat is in the FIFO itself, or what is there says from which
 //! buffer it comes: the bytes are then looked at where they are, if anybody wants them.
+pub(crate) mod span;
 
 use std::collections::VecDeque;
 use std::fmt;
 
-use super::span::Spans;
+use self::span::Spans;
 use crate::cast::index;
 use crate::memory::{Memory, Source};
 use pgs_interface::record::Beat;

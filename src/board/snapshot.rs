@@ -1,0 +1,110 @@
+//! Takes down how everything stands when a step has failed, before anything is reset.
+
+use std::time::Duration;
+
+use pgs_interface::control::{AP_CTRL, ERROR, ERROR_DETAIL, IDENTIFICATION};
+
+use super::device::Device;
+use super::outline::Outline;
+use super::port::Port;
+use crate::axi_dma::{ChainState, ChannelName, Direction, Dmacr, Dmasr};
+use crate::fault::{ChannelState, ControlState, Diagnosis, Phase};
+
+impl Device {
+    /// Reads everything that tells why a step failed. The port at `seen` had that status before,
+    /// should it read another now.
+    pub(crate) fn snapshot(&mut self, seen: Option<(usize, Dmasr)>) -> Diagnosis {
+        // Before the reads that follow push them out.
+        let accesses = self.counts.recent();
+        let mut channels = Vec::new();
+        let outline = self.started.as_ref().map(|started| &started.outline);
+        let mut gone = false;
+        for (place, port) in self.ports().enumerate() {
+            let before = seen.filter(|(seen, _)| *seen == place).map(|(_, status)| status);
+            let state = channel_state(port, before, outline);
+            gone = state.status.gone();
+            channels.push(state);
+            if gone {
+                // Whatever else is read may hold the bus up.
+                break;
+            }
+        }
+        // What answers may be another design, which has nothing where the channels were.
+        let answers = !gone || self.control.read(&IDENTIFICATION) != u32::MAX;
+        let control = answers.then(|| self.control_state());
+        let senders = channels.iter().filter(|state| state.channel.direction == Direction::Mm2s);
+        let unfinished = senders.filter(|state| !state.done()).map(|state| state.phase);
+        let elapsed = self
+            .started
+            .as_ref()
+            .map_or(Duration::ZERO, |started| self.platform.now().saturating_sub(started.at));
+        let phase = match self.started {
+            Some(_) => unfinished.min().unwrap_or(Phase::Results),
+            None => Phase::Load,
+        };
+        Diagnosis { phase, elapsed, channels, control, accesses, reset: None }
+    }
+
+    fn control_state(&mut self) -> ControlState {
+        let control = &self.control;
+        let found = control.fingerprint();
+        ControlState {
+            control: control.read(&AP_CTRL),
+            error: control.read(&ERROR),
+            error_detail: control.read(&ERROR_DETAIL),
+            identification: found.identification(),
+            changed: self.fingerprint.difference(&found),
+        }
+    }
+}
+
+fn channel_state(port: &Port, before: Option<Dmasr>, outline: Option<&Outline>) -> ChannelState {
+    let channel = &port.channel;
+    let name = (channel.name(), channel.address_width());
+    let now = channel.status();
+    // A status that was seen and is no longer shown is what the step failed of.
+    let status = before.filter(|_| now.errors() == 0).unwrap_or(now);
+    if status.gone() {
+        let chain = port.survey(u64::MAX);
+        return state_of(name, (Dmacr(u32::MAX), status), (u64::MAX, u64::MAX), &chain, outline);
+    }
+    let current = channel.current_descriptor();
+    // Behind the status: a chain that became complete in between is not one that hangs.
+    let chain = port.survey(current);
+    let registers = (channel.control(), status);
+    state_of(name, registers, (current, channel.tail_descriptor()), &chain, outline)
+}
+
+/// A channel whose chain stands as `chain` says.
+fn state_of(
+    (channel, address_width): (ChannelName, u32),
+    (control, status): (Dmacr, Dmasr),
+    (current, tail): (u64, u64),
+    chain: &ChainState,
+    outline: Option<&Outline>,
+) -> ChannelState {
+    let failed = chain.failed.or(chain.at_address.filter(|_| status.errors() != 0));
+    let descriptor = failed.or(chain.in_work);
+    let at = descriptor.map_or(chain.descriptors, |state| state.index);
+    let phase = match channel.direction {
+        Direction::S2mm => Phase::Results,
+        Direction::Mm2s => {
+            outline.map_or(Phase::Load, |outline| outline.phase_of(channel.core, at))
+        }
+    };
+    ChannelState {
+        channel,
+        control,
+        status,
+        current,
+        tail,
+        phase,
+        descriptors: chain.descriptors,
+        complete: chain.complete,
+        packet_end: chain.packet_end,
+        bytes_moved: chain.bytes_moved,
+        bytes_expected: chain.bytes_expected,
+        descriptor,
+        address_width,
+    }
+}
