@@ -16,6 +16,7 @@ use crate::config::{BoardConfig, ConfigError};
 use crate::fault::FaultPlan;
 use crate::memory::external::DeviceMemory;
 use crate::memory::{DeviceAccess, Memory, MemoryError};
+use crate::shortcut;
 use crate::violation::{RegisterAccess, Violation};
 use pgs_interface::record::Beat;
 
@@ -54,7 +55,7 @@ impl EmulatedBoard {
     }
 
     fn of(config: BoardConfig, memory: Memory) -> Self {
-        Self(Arc::new(Mutex::new(standard(|| Board::new(config, memory)))))
+        Self(Arc::new(Mutex::new(standard(|| Board::new(config, memory, shortcut::of(&config))))))
     }
 
     /// What a driver of this board may touch.

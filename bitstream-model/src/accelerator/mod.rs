@@ -1,21 +1,25 @@
 //! The emulated accelerator: beats in, beats out.
 //!
 //! ```text
-//! streams -> segment.rs -> decode.rs -> pipeline.rs (hazards) -> solver.rs -> velocities
-//!                                              integrate.rs -> results.rs -> streams
+//! streams -> records/segment.rs -> records/decode.rs -> hazards.rs -> solver.rs -> velocities
+//!                                       integrate.rs -> records/results.rs -> streams
 //! ```
 //!
-//! `array.rs` and `striping.rs` say where rows lie in beats and beats on streams, `sixteen.rs` what
-//! their words mean; `number.rs`, `vector.rs` and `inertia.rs` are the arithmetic.
+//! `phases.rs` goes through load, passes and integration, `per_record.rs` is what happens to one
+//! record, `window` is the design that streams the collisions once. `records` says where rows lie in
+//! beats and beats on streams, `arithmetic` is that of the words; `control.rs` is the register file.
+//! The accelerator takes what has arrived on the streams, keeps account of the clock cycles that
+//! this costs, and knows nothing of who sent it.
 //!
-//! `turn.rs` is what happens to one record. `window` is the design that streams the collisions once.
-//!
-//! `control.rs` is its register file, `phases.rs` goes through load, passes and integration. It takes
-//! what has arrived on the streams, keeps account of the clock cycles that this costs, and knows
-//! nothing of who sent it.
+//! **Which code runs.** This folder is the reference: it computes a record when it takes it. By
+//! default a board of `float`, `half` or `mixed` is built with the short cuts of
+//! [`shortcut`](crate::shortcut), which take the records through the seam in `defer.rs` instead: a
+//! breakpoint in `solver.rs` is then hardly ever met. To see the reference run, switch them off:
+//! [`BoardConfig::shortcuts`]. Every bit, counter and cycle stays the same.
 
 pub(crate) mod arithmetic;
 pub(crate) mod control;
+pub(crate) mod defer;
 pub(crate) mod hazards;
 pub(crate) mod integrate;
 pub(crate) mod per_record;
@@ -35,16 +39,14 @@ use pgs_interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
 use pgs_interface::profile::{Flow, Inertia, Variant};
-use pgs_interface::record::{Beat, CONTACT_POINTS};
+use pgs_interface::record::CONTACT_POINTS;
 
-use crate::shortcut::deferred::decode_once::Replay;
 use control::{Arguments, Counters, Registers, Request};
+use defer::Deferral;
 use hazards::Pipeline;
 use records::results::Results;
 use records::segment::Segment;
 use solver::{Impulses, Velocity};
-
-pub(crate) use crate::shortcut::deferred::decode_once::Coming;
 
 /// Where a step stands.
 #[derive(Debug, Clone, Copy)]
@@ -83,15 +85,15 @@ pub(crate) struct Accelerator {
     pub(crate) variant: Variant,
     registers: Registers,
     pub(crate) arguments: Arguments,
-    pub(crate) phase: Phase,
+    phase: Phase,
     start_due: bool,
     reset_until: Option<u64>,
     /// Takes and sends nothing until it is reset.
-    pub(crate) hung: bool,
+    hung: bool,
     /// Cycles since the start of the step.
     pub(crate) clock: u64,
     /// Cycles that the last action still takes.
-    pub(crate) debt: u64,
+    debt: u64,
     pub(crate) counters: Counters,
     pub(crate) pipeline: Pipeline,
     pub(crate) velocities: Vec<Velocity>,
@@ -99,9 +101,6 @@ pub(crate) struct Accelerator {
     /// With world inertia, that of each body.
     inertias: Vec<arithmetic::inertia::Stored>,
     pub(crate) impulses: Vec<Impulses>,
-    pub(crate) replay: Replay,
-    /// Rows of results on their way to each stream.
-    pub(crate) rows: [Vec<Beat>; records::striping::STREAMS_MAX],
     window: Option<Box<window::Windowed>>,
 }
 
@@ -130,8 +129,6 @@ impl Accelerator {
             shape_of: Vec::new(),
             inertias: Vec::new(),
             impulses: Vec::new(),
-            replay: Replay::new(config),
-            rows: Default::default(),
             window: None,
         }
     }
@@ -219,6 +216,19 @@ impl Accelerator {
         self.counters.waits += cycles;
     }
 
+    /// The phase under way, if nothing can happen in it but that records arrive.
+    pub(crate) fn undisturbed(&self) -> Option<&Phase> {
+        (self.debt == 0 && !self.hung).then_some(&self.phase)
+    }
+
+    /// Cycles have passed, of which it waited for some, and have brought it to that place of the
+    /// phase under way.
+    pub(crate) fn pass_over(&mut self, cycles: u64, waits: u64, phase: Phase) {
+        self.clock += cycles;
+        self.counters.waits += waits;
+        self.phase = phase;
+    }
+
     /// Works for up to `limit` cycles on what has arrived, then returns; it returns early when
     /// there is nothing to do.
     pub(crate) fn run(
@@ -228,6 +238,7 @@ impl Accelerator {
         outputs: &mut [Stream],
         faults: &mut Faults,
         memory: &Memory,
+        mut deferral: Deferral<'_>,
     ) -> Ran {
         let mut ran = Ran::default();
         if !self.running() {
@@ -235,7 +246,7 @@ impl Accelerator {
         }
         if std::mem::take(&mut self.start_due) {
             ran.progressed = true;
-            self.start();
+            self.start(deferral.as_deref_mut());
             faults.step_begins(self.step_shape());
         }
         loop {
@@ -247,9 +258,9 @@ impl Accelerator {
             if self.debt > 0 {
                 break;
             }
-            // What hangs meets nothing more.
+            // After it hangs no other fault can happen.
             if !self.hung && !faults.none() {
-                ran.progressed |= self.meet(faults, inputs);
+                ran.progressed |= self.apply_due_fault(faults, inputs, deferral.as_deref_mut());
             }
             if self.hung {
                 break;
@@ -257,13 +268,13 @@ impl Accelerator {
             let left = limit - ran.cycles;
             let progress = match self.phase {
                 Phase::Idle | Phase::Failed => break,
-                Phase::Load(segment) => self.load(segment, inputs, memory),
-                Phase::Pass { number, segment } if self.replay.on => {
-                    self.replayed(number, segment, left, inputs, memory)
+                Phase::Load(segment) => self.load(segment, inputs, memory, deferral.as_deref_mut()),
+                Phase::Pass { number, segment } => {
+                    self.pass(number, segment, left, inputs, memory, deferral.as_deref_mut())
                 }
-                Phase::Pass { number, segment } => self.pass(number, segment, left, inputs),
                 Phase::Integrate { poses, results } => {
-                    self.integrate(poses, results, inputs, outputs, memory)
+                    let deferral = deferral.as_deref_mut();
+                    self.integrate(poses, results, inputs, outputs, memory, deferral)
                 }
                 // It has worked on what has arrived.
                 Phase::Window if ran.cycles > 0 => break,
@@ -279,6 +290,7 @@ impl Accelerator {
                 Ok(false) => break,
                 Err(error) => {
                     ran.progressed = true;
+                    self.compute_deferred(deferral.as_deref_mut());
                     self.fail(error.code, error.channel, error.beat);
                 }
             }
@@ -300,8 +312,13 @@ impl Accelerator {
         }
     }
 
-    /// Lets a fault happen whose time has come; whether one did.
-    fn meet(&mut self, faults: &mut Faults, inputs: &[Stream]) -> bool {
+    /// Lets a fault happen whose time has come; returns whether one did.
+    fn apply_due_fault(
+        &mut self,
+        faults: &mut Faults,
+        inputs: &[Stream],
+        deferral: Deferral<'_>,
+    ) -> bool {
         let (phase, segment) = match &self.phase {
             Phase::Idle | Phase::Failed => return false,
             Phase::Ending => {
@@ -330,7 +347,10 @@ impl Accelerator {
         }
         let fault = faults.in_accelerator(phase, arrived as u64);
         match fault {
-            Some(FaultKind::AcceleratorError { code }) => self.fail(code, 0, register(done)),
+            Some(FaultKind::AcceleratorError { code }) => {
+                self.compute_deferred(deferral);
+                self.fail(code, 0, register(done));
+            }
             Some(_) => self.hung = true,
             None => {}
         }
@@ -340,12 +360,16 @@ impl Accelerator {
     pub(crate) fn fail(&mut self, code: ErrorCode, channel: usize, detail: u32) {
         log::debug!("accelerator: {} (stream {channel}, detail {detail})", code.describe());
         self.registers.fail(code, channel, detail);
-        if let Phase::Pass { number, segment } = self.phase {
-            self.compute_to(number, segment.done);
-        }
         self.phase = Phase::Failed;
         self.debt = 0;
         self.end_step();
+    }
+
+    /// Lets what was put off be computed before the pass under way ends for good.
+    fn compute_deferred(&mut self, deferral: Deferral<'_>) {
+        if let (Phase::Pass { number, segment }, Some(defer)) = (self.phase, deferral) {
+            defer.compute(self, number, segment.done);
+        }
     }
 
     fn end_step(&mut self) {
@@ -355,7 +379,7 @@ impl Accelerator {
     }
 
     /// Takes the arguments and starts with the load.
-    fn start(&mut self) {
+    fn start(&mut self, deferral: Deferral<'_>) {
         let arguments = self.registers.arguments();
         self.arguments = arguments;
         self.counters = Counters::default();
@@ -392,9 +416,9 @@ impl Accelerator {
             self.inertias.resize(bodies, arithmetic::inertia::Stored::default());
         }
         let collisions = arguments.collisions as usize;
-        self.replay.begin(collisions, self.registers.shapes());
+        let shapes = self.registers.shapes();
         self.impulses.clear();
-        if !self.replay.on {
+        if !deferral.is_some_and(|defer| defer.begin_step(collisions, shapes)) {
             self.impulses.resize(collisions, [0.0; CONTACT_POINTS]);
         }
         self.pipeline.start_step(bodies);

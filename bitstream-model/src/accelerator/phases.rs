@@ -1,8 +1,9 @@
-//! This file works through the phases of a step on what has arrived: load, passes, integration.
+//! Works through the phases of a step on what has arrived: load, passes, integration.
 
 use super::arithmetic::inertia::{self, Isotropic, World};
 use super::arithmetic::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
 use super::control::Arguments;
+use super::defer::{Arrived, Deferral};
 use super::hazards::Entry;
 use super::records::array::{Array, Records};
 use super::records::decode::{self, Collision};
@@ -19,6 +20,15 @@ use pgs_interface::control::ErrorCode;
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Geometry, Inertia, Variant};
 use pgs_interface::record::{CONTACT_POINTS, pose, result};
+
+/// Collisions that have arrived of a pass, and for how long they may enter.
+struct Solved<'a> {
+    number: u32,
+    segment: &'a mut Segment,
+    records: usize,
+    limit: u64,
+    inputs: &'a mut [Stream],
+}
 
 impl Accelerator {
     fn body_records(&self, format: StreamFormat, rows: usize) -> Records {
@@ -60,12 +70,17 @@ impl Accelerator {
         self.counters.sum_received = self.counters.sum_received.wrapping_add(sum);
     }
 
+    pub(crate) fn sent(&mut self, sum: u32) {
+        self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sum);
+    }
+
     /// Loads the velocities that have arrived, a beat a cycle from each stream of 128 bits.
     pub(super) fn load(
         &mut self,
         mut segment: Segment,
         inputs: &mut [Stream],
         memory: &Memory,
+        mut deferral: Deferral<'_>,
     ) -> Result<bool, PacketError> {
         let records = segment.available(inputs);
         if records == 0 {
@@ -73,20 +88,22 @@ impl Accelerator {
         }
         segment.check(records, inputs)?;
         let before = segment.cycles();
-        let sum = if let Some(rows) = self.views(&segment, records, inputs, memory) {
-            let sum = self.load_views(records, rows)?;
-            segment.skip(records, inputs);
-            sum
-        } else {
-            segment.fetch(records, inputs, memory);
-            self.load_records(&segment, records, inputs)?;
-            segment.advance(records, inputs)
+        let mut arrived = Arrived { records, inputs, memory };
+        let deferred =
+            deferral.as_deref_mut().and_then(|defer| defer.load(self, &mut segment, &mut arrived));
+        let sum = match deferred {
+            Some(sum) => sum?,
+            None => {
+                segment.fetch(records, inputs, memory);
+                self.load_records(&segment, records, inputs)?;
+                segment.advance(records, inputs)
+            }
         };
         self.received(sum);
         self.debt += segment.cycles() - before;
         self.phase = Phase::Load(segment);
         if segment.finished() {
-            self.start_pass(0);
+            self.start_pass(0, deferral);
         }
         Ok(true)
     }
@@ -122,98 +139,123 @@ impl Accelerator {
         self.config.depth(if contact { profile.contact } else { profile.friction })
     }
 
-    pub(crate) fn start_pass(&mut self, number: u32) {
+    fn start_pass(&mut self, number: u32, deferral: Deferral<'_>) {
         if number == self.passes() {
-            self.compute_to(number, 0);
+            if let Some(defer) = deferral {
+                defer.compute(self, number, 0);
+            }
             let (poses, results) = (self.poses_in(), self.results_out());
             self.phase = Phase::Integrate { poses, results };
             return;
         }
         self.pipeline.start_pass(self.depth(number).window.into());
-        self.replay.begin_pass(self.pipeline.depth());
+        if let Some(defer) = deferral {
+            defer.begin_pass(self.pipeline.depth());
+        }
         self.phase = Phase::Pass { number, segment: self.collisions_in() };
     }
 
-    /// Solves the collisions that have arrived, for up to `limit` cycles.
-    pub(crate) fn pass(
-        &mut self,
-        number: u32,
-        segment: Segment,
-        limit: u64,
-        inputs: &mut [Stream],
-    ) -> Result<bool, PacketError> {
-        match self.config.subnormals {
-            Subnormals::Keep => self.pass_of::<Single, Half>(number, segment, limit, inputs),
-            Subnormals::Flush => {
-                self.pass_of::<SingleFlushed, HalfFlushed>(number, segment, limit, inputs)
-            }
-        }
-    }
-
-    fn pass_of<S: Format, H: Format>(
-        &mut self,
-        number: u32,
-        segment: Segment,
-        limit: u64,
-        inputs: &mut [Stream],
-    ) -> Result<bool, PacketError> {
-        let numbers = self.variant.numbers;
-        match (numbers.updates, numbers.rows) {
-            // Rows that need more than the updates have: the configuration refuses them.
-            (Precision::Binary16, _) => self.pass_with::<H, H>(number, segment, limit, inputs),
-            (Precision::F32, Precision::Binary16) => {
-                self.pass_with::<H, S>(number, segment, limit, inputs)
-            }
-            (Precision::F32, Precision::F32) => {
-                self.pass_with::<S, S>(number, segment, limit, inputs)
-            }
-        }
-    }
-
-    fn pass_with<R: Format, U: Format>(
-        &mut self,
-        number: u32,
-        segment: Segment,
-        limit: u64,
-        inputs: &mut [Stream],
-    ) -> Result<bool, PacketError> {
-        match self.variant.inertia {
-            Inertia::Isotropic => {
-                self.collisions::<R, U, Isotropic>(number, segment, limit, inputs)
-            }
-            Inertia::World => self.collisions::<R, U, World>(number, segment, limit, inputs),
-        }
-    }
-
-    fn collisions<R: Format, U: Format, I: inertia::Inertia>(
+    /// Takes the collisions that have arrived, for up to `limit` cycles.
+    pub(super) fn pass(
         &mut self,
         number: u32,
         mut segment: Segment,
         limit: u64,
         inputs: &mut [Stream],
+        memory: &Memory,
+        mut deferral: Deferral<'_>,
     ) -> Result<bool, PacketError> {
+        let mut records = segment.available(inputs);
+        if records < segment.left() {
+            // The collisions of an issue enter together.
+            records -= records % self.variant.profile.collisions_per_issue as usize;
+        }
+        if records == 0 {
+            return segment.check_waiting(inputs).map(|()| false);
+        }
+        segment.check(records, inputs)?;
+        let deferred = match deferral.as_deref_mut().filter(|defer| defer.takes_collisions()) {
+            Some(defer) => {
+                let arrived = Arrived { records, inputs, memory };
+                defer.collisions(self, number, &mut segment, limit, arrived)?
+            }
+            None => None,
+        };
+        let cycles = match deferred {
+            Some(cycles) => cycles,
+            None => self.solve_arrived(number, &mut segment, records, limit, inputs)?,
+        };
+        self.debt += cycles;
+        self.phase = Phase::Pass { number, segment };
+        if segment.finished() {
+            if self.config.hazards == Hazards::Unchecked {
+                self.pipeline.finish_pass(&mut self.velocities);
+            }
+            self.debt += u64::from(self.depth(number).fill);
+            self.start_pass(number + 1, deferral);
+        }
+        Ok(true)
+    }
+
+    /// Solves collisions that have arrived, for up to `limit` cycles; returns the cycles that they
+    /// take to enter, stalls included.
+    fn solve_arrived(
+        &mut self,
+        number: u32,
+        segment: &mut Segment,
+        records: usize,
+        limit: u64,
+        inputs: &mut [Stream],
+    ) -> Result<u64, PacketError> {
+        let mut arrived = Solved { number, segment, records, limit, inputs };
+        let arrived = &mut arrived;
+        match self.config.subnormals {
+            Subnormals::Keep => self.solve_of::<Single, Half>(arrived),
+            Subnormals::Flush => self.solve_of::<SingleFlushed, HalfFlushed>(arrived),
+        }
+    }
+
+    fn solve_of<S: Format, H: Format>(
+        &mut self,
+        arrived: &mut Solved<'_>,
+    ) -> Result<u64, PacketError> {
+        let numbers = self.variant.numbers;
+        match (numbers.updates, numbers.rows) {
+            // Rows that need more than the updates have: the configuration refuses them.
+            (Precision::Binary16, _) => self.solve_with::<H, H>(arrived),
+            (Precision::F32, Precision::Binary16) => self.solve_with::<H, S>(arrived),
+            (Precision::F32, Precision::F32) => self.solve_with::<S, S>(arrived),
+        }
+    }
+
+    fn solve_with<R: Format, U: Format>(
+        &mut self,
+        arrived: &mut Solved<'_>,
+    ) -> Result<u64, PacketError> {
+        match self.variant.inertia {
+            Inertia::Isotropic => self.solve_all::<R, U, Isotropic>(arrived),
+            Inertia::World => self.solve_all::<R, U, World>(arrived),
+        }
+    }
+
+    fn solve_all<R: Format, U: Format, I: inertia::Inertia>(
+        &mut self,
+        arrived: &mut Solved<'_>,
+    ) -> Result<u64, PacketError> {
+        let Solved { number, segment, records: available, limit, inputs } = arrived;
         let profile = self.variant.profile;
         let interval = u64::from(profile.initiation_interval);
         let per_issue = profile.collisions_per_issue as usize;
-        let mut available = segment.available(inputs);
-        if available < segment.left() {
-            // The collisions of an issue enter together.
-            available -= available % per_issue;
-        }
-        if available == 0 {
-            return segment.check_waiting(inputs).map(|()| false);
-        }
-        segment.check(available, inputs)?;
         let mut cycles = 0;
         let mut records = 0;
         let mut reader = segment.reader(0, inputs);
-        while records < available && cycles <= limit {
-            let issue = (available - records).min(per_issue);
+        while records < *available && cycles <= *limit {
+            let issue = (*available - records).min(per_issue);
             let first = segment.done + records;
             for index in first..first + issue {
                 let collision = self.collision(&mut reader);
                 let now = self.clock + cycles;
-                let stall = self.solve::<R, U, I>(number, index, now, &collision)?;
+                let stall = self.solve::<R, U, I>(*number, index, now, &collision)?;
                 cycles += stall;
                 self.counters.stalls += stall;
             }
@@ -222,16 +264,7 @@ impl Accelerator {
         }
         let sum = segment.advance(records, inputs);
         self.received(sum);
-        self.debt += cycles;
-        self.phase = Phase::Pass { number, segment };
-        if segment.finished() {
-            if self.config.hazards == Hazards::Unchecked {
-                self.pipeline.finish_pass(&mut self.velocities);
-            }
-            self.debt += u64::from(self.depth(number).fill);
-            self.start_pass(number + 1);
-        }
-        Ok(true)
+        Ok(cycles)
     }
 
     /// The next collision.
@@ -330,6 +363,7 @@ impl Accelerator {
         inputs: &mut [Stream],
         outputs: &mut [Stream],
         memory: &Memory,
+        deferral: Deferral<'_>,
     ) -> Result<bool, PacketError> {
         let arrived = poses.available(inputs);
         let records = arrived.min(results.room(outputs));
@@ -342,17 +376,17 @@ impl Accelerator {
         poses.check(records, inputs)?;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
-        let [received, sent] = if let Some(rows) = self.views(&poses, records, inputs, memory) {
-            let sums = self.integrate_views(&mut results, records, rows, outputs);
-            poses.skip(records, inputs);
-            sums
-        } else {
+        let mut arrived = Arrived { records, inputs, memory };
+        let deferred = deferral.and_then(|defer| {
+            defer.integrate(self, &mut poses, &mut results, &mut arrived, outputs)
+        });
+        let [received, sent] = deferred.unwrap_or_else(|| {
             poses.fetch(records, inputs, memory);
             let sent = self.integrate_records(&poses, &mut results, records, inputs, outputs);
             [poses.advance(records, inputs), sent]
-        };
+        });
         self.received(received);
-        self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sent);
+        self.sent(sent);
         self.debt += cycles(&poses, &results) - before;
         let finished = poses.finished();
         self.phase = if finished { Phase::Ending } else { Phase::Integrate { poses, results } };

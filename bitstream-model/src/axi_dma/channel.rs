@@ -1,8 +1,9 @@
-//! This file holds the registers of one DMA channel and what reading and writing them does.
+//! The registers of one DMA channel and what reading and writing them does.
 
 use super::Build;
 use super::faults::Faulty;
 use crate::cast::{high, low, register};
+use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
 use pgs_interface::axi_dma::Direction;
 use pgs_interface::axi_dma::{
@@ -17,7 +18,7 @@ const DELAY_TICK: u64 = 125;
 
 /// What the engine is doing.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Work {
+pub(super) enum Work {
     /// Nothing: stopped, idle, or never started.
     None,
     /// Waiting for a descriptor.
@@ -30,15 +31,15 @@ pub(crate) enum Work {
 
 /// A fetched descriptor.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Descriptor {
+pub(super) struct Descriptor {
     pub(super) address: u64,
     pub(super) next: u64,
-    pub(crate) buffer: u64,
-    pub(crate) length: u32,
-    pub(crate) moved: u32,
+    pub(super) buffer: u64,
+    pub(super) length: u32,
+    pub(super) moved: u32,
     pub(super) eof: bool,
     /// S2MM: the packet's first beat went into this descriptor.
-    pub(crate) rxsof: bool,
+    pub(super) rxsof: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -49,10 +50,10 @@ enum Transition {
 
 /// One direction of a core.
 #[derive(Debug)]
-pub(crate) struct Channel {
-    pub(crate) direction: Direction,
+pub(super) struct Channel {
+    pub(super) direction: Direction,
     /// DMACR as last written, without Reset.
-    pub(crate) control: u32,
+    pub(super) control: u32,
     /// Error and interrupt bits of DMASR.
     latched: u32,
     packets_to_go: u32,
@@ -64,17 +65,17 @@ pub(crate) struct Channel {
     pub(super) tail: u64,
     pub(super) address: u64,
     pub(super) length: u32,
-    pub(crate) work: Work,
+    pub(super) work: Work,
     /// The descriptor after the last completed one.
     pub(super) resume: Option<u64>,
     /// A packet has begun and not ended.
-    pub(crate) in_packet: bool,
+    pub(super) in_packet: bool,
     /// The engine's clock; it may run a little behind the board's.
-    pub(crate) time: u64,
+    pub(super) time: u64,
     /// Beats of the packet that were moved, and descriptors that were completed.
-    pub(crate) beats: u64,
+    pub(super) beats: u64,
     pub(super) descriptors: u32,
-    pub(crate) faulty: Faulty,
+    pub(super) faulty: Faulty,
 }
 
 impl Channel {
@@ -110,6 +111,21 @@ impl Channel {
     /// Whether it has nothing to do.
     pub(super) fn rests(&self) -> bool {
         matches!(self.work, Work::None)
+    }
+
+    /// Whether it has to wait for beats, for space or for work, and nothing else can happen in it.
+    #[inline]
+    pub(super) fn cannot_move(&self, stream: &Stream) -> bool {
+        let waits = match self.direction {
+            Direction::Mm2s => stream.space() == 0,
+            Direction::S2mm => stream.len() == 0,
+        };
+        let works = match self.work {
+            Work::None => !waits && self.direction == Direction::S2mm,
+            Work::Fetch { .. } => true,
+            Work::Descriptor(_) | Work::Direct { .. } => !waits,
+        };
+        !works && self.faulty.late.is_empty() && !self.faulty.extra && !self.faulty.discards
     }
 
     /// Whether it was told to stop and has not halted yet.
@@ -324,7 +340,7 @@ impl Channel {
         }
     }
 
-    pub(crate) fn next_event(&self) -> Option<u64> {
+    pub(super) fn next_event(&self) -> Option<u64> {
         let fetch = match self.work {
             Work::Fetch { ready_at, .. } => Some(ready_at),
             _ => None,

@@ -1,4 +1,4 @@
-//! This file lets a channel's faults happen, and ends what they began.
+//! Lets a channel's faults happen, and ends what they began.
 
 use super::channel::{Channel, Work};
 use super::{Build, Surroundings};
@@ -12,7 +12,7 @@ use pgs_interface::register::Field;
 
 /// What faults have done to a channel, until its packet ends or its core is reset.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Faulty {
+pub(super) struct Faulty {
     /// It moves nothing.
     pub(super) stalled: bool,
     /// Clocks more for each beat.
@@ -20,16 +20,16 @@ pub(crate) struct Faulty {
     /// MM2S: the packet has ended on the stream, what is left of it is dropped.
     pub(super) cut: bool,
     /// S2MM: the packet has ended in memory, what is left of it is dropped.
-    pub(crate) discards: bool,
+    pub(super) discards: bool,
     /// A beat with TLAST is still to follow the packet.
-    pub(crate) extra: bool,
+    pub(super) extra: bool,
     /// Statuses that are still on their way to memory: when each arrives, where, and what.
-    pub(crate) late: Vec<(u64, u64, u32)>,
+    pub(super) late: Vec<(u64, u64, u32)>,
 }
 
 impl Faulty {
     /// Whether nothing is wrong.
-    pub(crate) fn none(&self) -> bool {
+    pub(super) fn none(&self) -> bool {
         let Self { stalled, slow, cut, discards, extra, late } = self;
         !(*stalled || *cut || *discards || *extra) && *slow == 0 && late.is_empty()
     }

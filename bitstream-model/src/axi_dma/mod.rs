@@ -1,14 +1,16 @@
 //! The emulated AXI DMA core: two channels, one reset.
 //!
 //! `channel.rs` holds the registers of one channel and their side effects, `mover.rs` the engine
-//! that fetches descriptors and moves beats, `faulty.rs` what faults do to both;
-//! `flow.rs` is the shortcut where nothing happens. Both directions are one piece of code.
+//! that fetches descriptors and moves beats, `faults.rs` what faults do to both. Both directions are
+//! one piece of code. `undisturbed.rs` is a seam: the core says when nothing but beats flows, and can
+//! be told that many of them have.
 //!
 //! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
 
-pub(crate) mod channel;
+mod channel;
 mod faults;
-pub(crate) mod mover;
+mod mover;
+mod undisturbed;
 
 use crate::config::beat_cycles;
 use crate::config::quirks::Resettable;
@@ -23,14 +25,14 @@ use channel::{Channel, Work};
 
 /// How a core was built.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Build {
+struct Build {
     core: usize,
     length_width: u32,
     address_width: u32,
     scatter_gather: bool,
     /// Binary logarithm of the clocks that a beat takes on the streams.
-    pub(crate) mm2s_beat_shift: u32,
-    pub(crate) s2mm_beat_shift: u32,
+    mm2s_beat_shift: u32,
+    s2mm_beat_shift: u32,
     delays: Delays,
     clock_khz: u32,
 }
@@ -73,18 +75,18 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) log: &'a mut Log,
     pub(crate) moved: &'a mut Moved,
     pub(crate) faults: &'a mut Faults,
-    /// Whether the receiver takes beats that stay in their buffer.
+    /// Whether the receiver takes beats by reference: they stay in their buffer.
     pub(crate) by_reference: bool,
 }
 
 /// One AXI DMA.
 #[derive(Debug)]
 pub(crate) struct Core {
-    pub(crate) build: Build,
+    build: Build,
     config: BoardConfig,
-    pub(crate) mm2s: Channel,
-    pub(crate) s2mm: Channel,
-    pub(crate) reset_until: Option<u64>,
+    mm2s: Channel,
+    s2mm: Channel,
+    reset_until: Option<u64>,
 }
 
 impl Core {
@@ -113,7 +115,7 @@ impl Core {
         }
     }
 
-    pub(crate) fn channel(&mut self, direction: Direction) -> &mut Channel {
+    fn channel(&mut self, direction: Direction) -> &mut Channel {
         match direction {
             Direction::Mm2s => &mut self.mm2s,
             Direction::S2mm => &mut self.s2mm,

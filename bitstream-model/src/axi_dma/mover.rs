@@ -1,4 +1,4 @@
-//! This file moves beats: it fetches descriptors, reads or writes memory and writes status back.
+//! The engine of a channel: it fetches descriptors, moves beats and writes status back.
 //!
 //! An engine moves at most one beat a clock, what its port can carry; on a stream of less than 128
 //! bits a beat takes several. It keeps a clock of its own that follows the board's, so that a stretch
@@ -21,7 +21,7 @@ use pgs_interface::record::{BEAT_BYTES, Beat};
 use pgs_interface::register::Field;
 
 #[expect(clippy::cast_possible_truncation, reason = "it is 16")]
-pub(crate) const BEAT: u32 = BEAT_BYTES as u32;
+pub(super) const BEAT: u32 = BEAT_BYTES as u32;
 const KEYHOLE_BEATS: usize = 1;
 
 /// What a descriptor or transfer still has.

@@ -1,4 +1,4 @@
-//! This file decodes physical register addresses: which region, which offset.
+//! Decodes physical register addresses: which region, which offset.
 
 use pgs_interface::address_map::{CONTROL_BASE, CONTROL_BYTES, DMA_BYTES, DMA_COUNT_MAX, dma_base};
 

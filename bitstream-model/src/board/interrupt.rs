@@ -1,4 +1,4 @@
-//! This file is the one level interrupt: all sources OR-ed, and the UIO driver that waits for it.
+//! The one level interrupt: all sources OR-ed, and the UIO driver that waits for it.
 
 /// The interrupt line and the kernel's view of it.
 #[derive(Debug, Default)]

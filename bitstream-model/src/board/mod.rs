@@ -1,28 +1,30 @@
-//! This file puts the parts together: DMAs, streams, accelerator, memory, one clock.
+//! The emulated board: DMAs, streams, accelerator, memory, one clock.
 //!
 //! Time is virtual. It passes with each register access, and when the CPU waits; nothing happens
 //! inside a register write. The clock is the accelerator's; the DMAs run on it too.
-pub(crate) mod bus;
-pub(crate) mod interrupt;
 
+pub(crate) mod arbiter;
+mod bus;
+mod interrupt;
+pub(crate) mod short_cut;
+
+use self::arbiter::{Arbiter, Turn};
 use self::bus::Target;
 use self::interrupt::InterruptLine;
+use self::short_cut::{ShortCut, Stretch};
 use crate::accelerator::Accelerator;
+use crate::accelerator::defer::Defer;
 use crate::axi_dma::{Core, Moved, PacketCount, Surroundings};
-use crate::cast::index;
+use crate::config::BoardConfig;
 use crate::config::quirks::InterruptWiring;
-use crate::config::{Bandwidth, BoardConfig};
 use crate::fault::{Fault, FaultKind, Faults};
 use crate::memory::{Memory, MemoryError};
-use crate::shortcut::flow::periods::Recurrence;
 use crate::stream::Stream;
 use crate::violation::{Log, RegisterAccess, ViolationKind};
 use pgs_interface::axi_dma::Direction;
 use pgs_interface::control::IDENTIFICATION;
-use pgs_interface::record::{BEAT_BYTES, Beat};
+use pgs_interface::record::Beat;
 
-/// Beats that an engine moves before the next one has its turn at the memory: an AXI burst.
-pub(crate) const BURST_BEATS: u64 = 16;
 /// Cycles after which an accelerator that waits looks at its streams again.
 pub(crate) const STARVED_CYCLES: u64 = 64;
 
@@ -58,27 +60,30 @@ pub(crate) struct Board {
     pub(crate) memory: Memory,
     pub(crate) interrupt: InterruptLine,
     pub(crate) log: Log,
-    pub(crate) cores: Vec<Core>,
-    pub(crate) accelerator: Accelerator,
-    pub(crate) inputs: Vec<Stream>,
-    pub(crate) outputs: Vec<Stream>,
-    pub(crate) moved: Moved,
-    pub(crate) faults: Faults,
+    cores: Vec<Core>,
+    accelerator: Accelerator,
+    inputs: Vec<Stream>,
+    outputs: Vec<Stream>,
+    moved: Moved,
+    faults: Faults,
     /// The programmable logic has lost its power.
     powerless: bool,
     /// Another design was loaded; what its IDENTIFICATION reads.
     other_design: Option<u32>,
     counts: Counts,
-    /// What the memory can still deliver at once, in bytes times the clock in kHz.
-    pub(crate) credit: u64,
-    /// The engine that has the first turn at the memory.
-    pub(crate) turn: usize,
-    /// What is known of how collisions flow.
-    pub(crate) recurrence: Recurrence,
+    arbiter: Arbiter,
+    turn: Turn,
+    /// `None`: everything is moved and computed slice by slice.
+    short_cut: Option<Box<dyn ShortCut>>,
 }
 
 impl Board {
-    pub(crate) fn new(config: BoardConfig, memory: Memory) -> Self {
+    /// Builds a board, with a short cut or without.
+    pub(crate) fn new(
+        config: BoardConfig,
+        memory: Memory,
+        short_cut: Option<Box<dyn ShortCut>>,
+    ) -> Self {
         let profile = config.profile;
         let streams = |widths: &[u32]| {
             widths.iter().map(|_| Stream::new(config.delays.fifo_beats)).collect::<Vec<_>>()
@@ -101,9 +106,9 @@ impl Board {
             powerless: false,
             other_design: None,
             counts: Counts::default(),
-            credit: 0,
-            turn: 0,
-            recurrence: Recurrence::default(),
+            arbiter: Arbiter::new(&config, cores),
+            turn: Turn::default(),
+            short_cut,
         }
     }
 
@@ -137,8 +142,9 @@ impl Board {
         &self.moved.packets
     }
 
-    /// Lets what concerns the whole board happen, at a register access if there is one now.
-    fn meet(&mut self, access: bool) {
+    /// Applies the faults of the board as a whole that are due, also those of a register access if
+    /// there is one now.
+    fn apply_due_faults(&mut self, access: bool) {
         match self.faults.of_board(access) {
             Some(FaultKind::PowerLost) => self.powerless = true,
             Some(FaultKind::OtherBitstream { identification }) => {
@@ -179,7 +185,7 @@ impl Board {
     pub(crate) fn read32(&mut self, address: u64) -> u32 {
         self.counts.register_reads += 1;
         self.advance(self.now + self.access_cycles(), false);
-        self.meet(true);
+        self.apply_due_faults(true);
         if self.dead() {
             self.record(address, false, u32::MAX);
             return u32::MAX;
@@ -210,7 +216,7 @@ impl Board {
     pub(crate) fn write32(&mut self, address: u64, value: u32) {
         self.counts.register_writes += 1;
         self.advance(self.now + self.access_cycles(), false);
-        self.meet(true);
+        self.apply_due_faults(true);
         self.record(address, true, value);
         if self.dead() {
             return;
@@ -265,14 +271,17 @@ impl Board {
                 break;
             }
             self.tick();
-            self.stretch(until);
+            self.fast_forward(until);
             let event = self.next_event().map_or(until, |event| event.min(until));
             let limit = event - self.now;
             if self.accelerator.starts() {
                 self.moved.packets.clear();
             }
             let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
-            let ran = self.accelerator.run(limit, inputs, outputs, &mut self.faults, &self.memory);
+            let deferral =
+                self.short_cut.as_deref_mut().map(|short_cut| short_cut as &mut dyn Defer);
+            let (faults, memory) = (&mut self.faults, &self.memory);
+            let ran = self.accelerator.run(limit, inputs, outputs, faults, memory, deferral);
             let waits = ran.cycles == 0;
             let mut slice = if waits { limit.min(STARVED_CYCLES) } else { ran.cycles };
             if waits && ran.progressed {
@@ -287,11 +296,40 @@ impl Board {
                 self.accelerator.starve(slice);
             }
             self.now += slice;
-            self.meet(false);
+            self.apply_due_faults(false);
             self.tick();
             self.update_interrupt();
         }
         self.log.at(self.now);
+    }
+
+    /// Takes the short cut until shortly before `until`, if there is one and nothing else can happen.
+    fn fast_forward(&mut self, until: u64) {
+        let Some(short_cut) = &mut self.short_cut else { return };
+        let undisturbed = self.faults.none()
+            && self.config.quirks.unconnected.is_none()
+            && self.inputs.iter().chain(&self.outputs).all(|stream| !stream.marked())
+            && self.interrupt.next_event().is_none()
+            && self.cores.len() == self.inputs.len();
+        if !undisturbed {
+            return;
+        }
+        let cycles = short_cut.fast_forward(Stretch {
+            now: self.now,
+            until,
+            accelerator: &mut self.accelerator,
+            cores: &mut self.cores,
+            inputs: &mut self.inputs,
+            outputs: &mut self.outputs,
+            memory: &mut self.memory,
+            moved: &mut self.moved,
+            arbiter: self.arbiter,
+            turn: &mut self.turn,
+        });
+        if cycles > 0 {
+            self.now += cycles;
+            self.log.at(self.now);
+        }
     }
 
     /// Moves a buffer back to the CPU; beats of it that are on the way are there already.
@@ -335,40 +373,16 @@ impl Board {
 
     /// Lets every DMA engine work between two clocks; returns whether any did something.
     fn move_beats(&mut self, start: u64, end: u64) -> bool {
-        match self.config.bandwidth {
-            Bandwidth::Unlimited => {
-                let mut any = false;
-                for engine in 0..2 * self.cores.len() {
-                    any |= self.run_engine(engine, start, end, usize::MAX).1;
-                }
-                any
-            }
-            Bandwidth::BytesPerSecond(bytes) => self.share_memory(start, end, bytes),
-        }
-    }
-
-    /// Gives every engine a burst in turn until the memory's bandwidth is used up.
-    fn share_memory(&mut self, start: u64, end: u64, bytes_per_second: u64) -> bool {
-        let engines = 2 * self.cores.len();
-        let beat_cost = BEAT_BYTES as u64 * u64::from(self.config.profile.clock_khz);
-        let income = (end - start).saturating_mul(bytes_per_second / 1000);
-        let reserve = BURST_BEATS * engines as u64 * beat_cost;
-        self.credit = self.credit.min(reserve).saturating_add(income);
+        let (arbiter, mut turn) = (self.arbiter, self.turn);
         let mut any = false;
-        let mut without_beats = 0;
-        while without_beats < engines {
-            let beats = (self.credit / beat_cost).min(BURST_BEATS);
-            if beats == 0 {
-                // The bandwidth is what holds the engines up: time alone brings progress.
-                return true;
-            }
-            let (moved, changed) = self.run_engine(self.turn, start, end, index(beats));
+        let held_up = arbiter.share(&mut turn, end - start, |engine, limit| {
+            let (moved, changed) = self.run_engine(engine, start, end, limit);
             any |= changed;
-            self.credit -= moved as u64 * beat_cost;
-            self.turn = (self.turn + 1) % engines;
-            without_beats = if moved == 0 { without_beats + 1 } else { 0 };
-        }
-        any
+            moved
+        });
+        self.turn = turn;
+        // Where the bandwidth holds the engines up, time alone brings progress.
+        any || held_up
     }
 
     fn run_engine(&mut self, engine: usize, start: u64, end: u64, limit: usize) -> (usize, bool) {
@@ -387,7 +401,7 @@ impl Board {
             log: &mut self.log,
             moved: &mut self.moved,
             faults: &mut self.faults,
-            by_reference: self.accelerator.by_reference(),
+            by_reference: self.short_cut.as_ref().is_some_and(|of| of.takes_collisions()),
         };
         self.cores[number].run(direction, start, end, limit, stream, &mut with)
     }

@@ -1,5 +1,6 @@
-//! This file says how an emulated board can be built: the choices that a bitstream, a block design
-//! and a device tree fix on a real one.
+//! How an emulated board can be built: the choices that a bitstream, a block design and a device tree
+//! fix on a real one.
+
 pub(crate) mod contradiction;
 pub(crate) mod quirks;
 
@@ -136,15 +137,15 @@ pub struct BoardConfig {
     pub delays: Delays,
     /// What is built wrongly.
     pub quirks: Quirks,
-    /// Threads of the host that the arithmetic may take, the caller's among them. Like the next two
-    /// without any influence on results, counters and cycles.
+    /// Threads of the host that the short cuts' arithmetic may take, the caller's among them. Like the
+    /// next two options without any influence on results, counters and cycles.
     pub threads: usize,
     /// Whether collisions that have no body in common, and bodies, are computed side by side, where the
     /// host can.
     pub lanes: bool,
-    /// Whether collisions are decoded once and replayed in the other passes, where the design allows
-    /// for it and the bytes are the same.
-    pub replay: bool,
+    /// Whether the board takes its short cuts where the design has them: collisions are decoded once a
+    /// step, passes are computed many collisions at a time, and undisturbed time passes at once.
+    pub shortcuts: bool,
 }
 
 impl Default for BoardConfig {
@@ -167,7 +168,7 @@ impl Default for BoardConfig {
             quirks: Quirks::default(),
             threads: threads_of_host(),
             lanes: true,
-            replay: true,
+            shortcuts: true,
         }
     }
 }

@@ -1,5 +1,16 @@
-//! Everything that only saves time: switch it off, and every result bit, the work cycles and the stalls stay the same.
+#![doc = include_str!("README.md")]
 
 pub(crate) mod batch;
-pub(crate) mod deferred;
-pub(crate) mod flow;
+mod deferred;
+mod flow;
+
+use crate::board::short_cut::ShortCut;
+use crate::config::BoardConfig;
+use deferred::Deferred;
+use deferred::eligible::Layout;
+
+/// The short cut of a board, if it is to have one and its design is known to it.
+pub(crate) fn of(config: &BoardConfig) -> Option<Box<dyn ShortCut>> {
+    let layout = Layout::of(config).filter(|_| config.shortcuts)?;
+    Some(Box::new(Deferred::new(config, layout)))
+}

@@ -64,6 +64,11 @@ impl Stream {
         self.spans.clear();
     }
 
+    /// Beats that the FIFO holds.
+    pub(crate) fn depth(&self) -> usize {
+        self.depth
+    }
+
     /// Beats in the FIFO.
     pub(crate) fn len(&self) -> usize {
         index(self.put - self.taken)

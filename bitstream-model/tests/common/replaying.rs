@@ -133,7 +133,7 @@ pub(crate) fn same(
     steps: usize,
     mut take: impl FnMut(&mut Machine) -> Result<Outcome, Failure>,
 ) -> Seen {
-    let long = see(BoardConfig { replay: false, ..config }, plan, steps, &mut take);
+    let long = see(BoardConfig { shortcuts: false, ..config }, plan, steps, &mut take);
     for (threads, lanes) in [(1, false), (2, true)] {
         let short = see(BoardConfig { threads, lanes, ..config }, plan, steps, &mut take);
         assert_eq!(short, long);

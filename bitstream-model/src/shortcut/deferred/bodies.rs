@@ -1,30 +1,29 @@
-//! This file loads and integrates bodies whose beats are still in their buffers, on streams that take
-//! turns.
+//! Loads and integrates bodies whose beats are still in their buffers, on streams that take turns.
 //!
 //! ```text
 //! four streams    0 1 | 2 3 |              two rows of a body, of the next one...
 //! three           0 1 | 2 0 | 1 2 |
 //! ```
 //!
-//! After a period of two bodies, or three, it begins again with stream 0.
+//! After two bodies, or three, the next one begins with stream 0 again: that is a period.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
-use super::decode_once::Replay;
+use super::Deferred;
+use crate::accelerator::Accelerator;
 use crate::accelerator::control::Arguments;
+use crate::accelerator::defer::Arrived;
 use crate::accelerator::records::array::Row;
 use crate::accelerator::records::decode;
 use crate::accelerator::records::results::Results;
 use crate::accelerator::records::segment::{PacketError, Segment};
 use crate::accelerator::records::striping::{PerStream, ROWS_IN, ROWS_OUT, STREAMS_MAX, Turns};
 use crate::accelerator::solver::{Mass, Velocity};
-use crate::accelerator::{Accelerator, Phase};
 use crate::cast::register;
 use crate::config::SHAPES_MAX;
 use crate::memory::{Memory, Source};
 use crate::shortcut::batch::ResultPlaces;
-use crate::shortcut::flow::bodies::{BodyPace, BodyPhase};
 use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::StreamFormat;
@@ -144,19 +143,22 @@ impl BodyRows<'_> {
     }
 }
 
-impl Accelerator {
-    /// Where the beats of the next bodies are, if they are all in their buffers.
-    pub(crate) fn views<'a>(
+impl Deferred {
+    /// How bodies lie on the streams, if they can be taken from their buffers and put into them.
+    pub(crate) fn bodies(&self) -> Option<Turns> {
+        self.decoded.layout.bodies.filter(|_| self.on)
+    }
+
+    /// The rows of the bodies that have arrived, if they are all in their buffers.
+    pub(super) fn rows_of_next<'a>(
         &self,
         segment: &Segment,
-        records: usize,
-        inputs: &[Stream],
-        memory: &'a Memory,
+        Arrived { records, inputs, memory }: &Arrived<'a>,
     ) -> Option<BodyRows<'a>> {
-        let turns = self.replay.bodies()?;
-        let counts = segment.beats_of_next(records);
+        let turns = self.bodies()?;
+        let counts = segment.beats_of_next(*records);
         let mut views: Views<'a> = [&[]; STREAMS_MAX];
-        for ((view, stream), count) in views.iter_mut().zip(inputs).zip(counts) {
+        for ((view, stream), count) in views.iter_mut().zip(inputs.iter()).zip(counts) {
             if count > 0 {
                 let (_, source) =
                     Some(stream.piece(0, count)).filter(|(there, _)| *there == count)?;
@@ -166,16 +168,17 @@ impl Accelerator {
         Some(BodyRows { views, turns, first: segment.done })
     }
 
-    /// Loads the next bodies.
-    pub(crate) fn load_views(
+    /// Loads the next bodies; returns the sum of their words.
+    pub(super) fn load_rows(
         &mut self,
+        accelerator: &mut Accelerator,
         records: usize,
         rows: BodyRows<'_>,
     ) -> Result<u32, PacketError> {
         let bodies = rows.first..rows.first + records;
-        let Replay { batch, masses, .. } = &mut self.replay;
-        let velocities = self.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
-        let shapes = self.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
+        let (batch, masses) = (&mut self.decoded.batch, &self.decoded.masses);
+        let velocities = accelerator.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
+        let shapes = accelerator.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
         let (sum, wrong) = (AtomicU32::new(0), AtomicUsize::new(usize::MAX));
         let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes));
         batch.share(parts, |(first, (velocities, shapes))| {
@@ -192,9 +195,11 @@ impl Accelerator {
         }
     }
 
-    /// Integrates the next bodies and sends their results; the sums of what has come and gone.
-    pub(crate) fn integrate_views(
+    /// Integrates the next bodies and sends their results; returns the sums of the words received
+    /// and sent.
+    pub(super) fn integrate_rows(
         &mut self,
+        accelerator: &Accelerator,
         results: &mut Results,
         records: usize,
         poses: BodyRows<'_>,
@@ -203,7 +208,7 @@ impl Accelerator {
         let first = poses.first;
         let mut rows = self.room(poses.turns, first..first + records);
         let places = rows.each_mut().map(Vec::as_mut_slice);
-        let sums = self.results(first..first + records, poses, places);
+        let sums = self.results(accelerator, first..first + records, poses, places);
         results.send_rows(records, &rows, outputs);
         self.rows = rows;
         sums
@@ -218,137 +223,99 @@ impl Accelerator {
         rows
     }
 
-    /// Makes the results of bodies, for which the places have room. Returns the sums of what has come
-    /// and gone.
+    /// Computes the results of bodies into the places that have room for them. Returns the sums of
+    /// the words received and sent.
     fn results(
         &mut self,
+        accelerator: &Accelerator,
         bodies: Range<usize>,
         poses: BodyRows<'_>,
         places: ResultPlaces<'_>,
     ) -> [u32; 2] {
-        let Replay { batch, masses, .. } = &mut self.replay;
-        batch.enter(&self.velocities, &self.shape_of, masses);
-        let Arguments { integrate, integration, .. } = &self.arguments;
+        let (batch, masses) = (&mut self.decoded.batch, &self.decoded.masses);
+        batch.enter(&accelerator.velocities, &accelerator.shape_of, masses);
+        let Arguments { integrate, integration, .. } = &accelerator.arguments;
         batch.integrate(integrate.then_some(integration), bodies, poses, places)
     }
 
-    /// What happens to the bodies, if nothing else can be next for it, and how they lie on the streams.
-    pub(crate) fn flowing_bodies(&self) -> Option<(BodyPhase, Turns)> {
-        let turns = self.replay.bodies().filter(|_| self.debt == 0 && !self.hung)?;
-        match self.phase {
-            Phase::Load(_) => Some((BodyPhase::Load, turns)),
-            Phase::Integrate { .. } => Some((BodyPhase::Integrate, turns)),
-            _ => None,
-        }
-    }
-
-    /// Which body is next, and from how many on something may happen that is not for here; as far as
-    /// is to be known for so many cycles. `sources` say where the beats are.
-    pub(crate) fn bodies_known(
+    /// Of the next bodies to load, the ones within `cycles` that have a shape. `sources` say where
+    /// their beats are.
+    pub(crate) fn bodies_with_shape(
         &self,
+        segment: &Segment,
         sources: &[(Source, usize); STREAMS_MAX],
         cycles: u64,
         memory: &Memory,
-    ) -> Option<(usize, usize)> {
-        let (segment, load) = match &self.phase {
-            Phase::Load(segment) => (segment, true),
-            Phase::Integrate { poses, .. } => (poses, false),
-            _ => return None,
-        };
-        let (first, turns) = (segment.done, self.replay.bodies()?);
-        // The last ones end packets.
-        let ending = turns.streams.div_ceil(ROWS_IN);
-        let mut records = (segment.left() + 1).saturating_sub(ending);
-        if load {
-            // So many a cycle, if there are that many.
-            let most = usize::try_from(cycles).unwrap_or(usize::MAX).saturating_mul(turns.streams);
-            records = records.min((most / ROWS_IN).saturating_add(1));
-            let mut views: Views<'_> = [&[]; STREAMS_MAX];
-            for (view, (source, count)) in views.iter_mut().zip(sources).take(turns.streams) {
-                *view = memory.view(*source, *count)?;
-            }
-            let rows = BodyRows { views, turns, first };
-            let shapes = self.replay.masses.len();
-            let bad = rows.without_shape(records, shapes);
-            records = bad.map_or(records, |body| body - first);
+    ) -> Option<usize> {
+        let turns = self.bodies()?;
+        // A row a cycle from each stream.
+        let most = usize::try_from(cycles).unwrap_or(usize::MAX).saturating_mul(turns.streams);
+        let records = segment.left().min((most / ROWS_IN).saturating_add(1));
+        let mut views: Views<'_> = [&[]; STREAMS_MAX];
+        for (view, (source, count)) in views.iter_mut().zip(sources).take(turns.streams) {
+            *view = memory.view(*source, *count)?;
         }
-        Some((first, records))
+        let rows = BodyRows { views, turns, first: segment.done };
+        let bad = rows.without_shape(records, self.decoded.masses.len());
+        Some(bad.map_or(records, |body| body - segment.done))
     }
 
-    /// Bodies have flowed, and the beats with them that are on the streams now. `views` are theirs;
-    /// `places` is where the results go that have left their FIFOs.
-    pub(crate) fn flowed_bodies(
+    /// Bodies have been loaded that flowed undisturbed, whose beats are on the streams now.
+    pub(crate) fn pass_over_loaded(
         &mut self,
-        pace: &BodyPace,
-        views: Views<'_>,
-        places: ResultPlaces<'_>,
-        inputs: &mut [Stream],
-        outputs: &mut [Stream],
-    ) {
-        let (records, turns) = (pace.flowed.records, pace.turns);
-        self.clock += pace.flowed.cycles;
-        self.counters.waits += pace.flowed.waits;
-        self.phase = match self.phase {
-            Phase::Load(mut segment) => {
-                let rows = BodyRows { views, turns, first: segment.done };
-                match self.load_views(records, rows) {
-                    Ok(sum) => self.received(sum),
-                    // They were looked at before.
-                    Err(error) => return self.fail(error.code, error.channel, error.beat),
-                }
-                segment.skip(records, inputs);
-                Phase::Load(segment)
-            }
-            Phase::Integrate { mut poses, mut results } => {
-                let poses_there = BodyRows { views, turns, first: poses.done };
-                let [received, sent] = self.flowed_results(poses_there, records, places, outputs);
-                self.received(received);
-                self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sent);
-                poses.skip(records, inputs);
-                results.pass(records);
-                Phase::Integrate { poses, results }
-            }
-            other => other,
-        };
-    }
-
-    /// Integrates bodies. The results go where there is place for them, behind those that wait on the
-    /// streams, and the last ones onto the streams. Returns the sums of what has come and gone.
-    fn flowed_results(
-        &mut self,
-        poses: BodyRows<'_>,
+        accelerator: &mut Accelerator,
+        segment: &mut Segment,
         records: usize,
+        rows: BodyRows<'_>,
+        inputs: &mut [Stream],
+    ) {
+        let loaded = self.load_rows(accelerator, records, rows);
+        debug_assert!(loaded.is_ok(), "all of them have a shape: {loaded:?}");
+        accelerator.received(loaded.unwrap_or_default());
+        segment.skip(records, inputs);
+    }
+
+    /// Bodies have been integrated that flowed undisturbed, whose beats are on the streams now. The
+    /// results go to `places` as far as these have room, behind the results that wait on the streams;
+    /// the last ones go onto the streams.
+    pub(crate) fn pass_over_integrated(
+        &mut self,
+        accelerator: &mut Accelerator,
+        poses: &mut Segment,
+        records: usize,
+        rows: BodyRows<'_>,
+        (inputs, outputs): (&mut [Stream], &mut [Stream]),
         mut places: ResultPlaces<'_>,
-        outputs: &mut [Stream],
-    ) -> [u32; 2] {
+    ) {
         for (place, stream) in places.iter_mut().zip(&mut *outputs) {
             let waiting = stream.len().min(place.len());
             let (from_stream, behind) = std::mem::take(place).split_at_mut(waiting);
             stream.pop_into(from_stream);
             *place = behind;
         }
-        let (turns, bodies) = (poses.turns, poses.first..poses.first + records);
+        let (turns, bodies) = (rows.turns, rows.first..rows.first + records);
         let went = turns.counts(ROWS_OUT * bodies.start);
         let whole = turns.contiguous(|k| went[k] + places[k].len()) / ROWS_OUT;
         let whole = whole.min(bodies.end);
-        let beats = beats_of_results(turns, bodies.start..whole);
-        let mut of = beats.into_iter();
+        let mut beats = beats_of_results(turns, bodies.start..whole).into_iter();
         let now = places.each_mut().map(|place| {
-            let beats = of.next().unwrap_or(0);
+            let beats = beats.next().unwrap_or(0);
             let (now, behind) = std::mem::take(place).split_at_mut(beats);
             *place = behind;
             now
         });
-        let before = self.results(bodies.start..whole, poses, now);
-        let mut rows = self.room(turns, whole..bodies.end);
-        let places_of_rows = rows.each_mut().map(Vec::as_mut_slice);
-        let behind = self.results(whole..bodies.end, poses, places_of_rows);
-        for ((rows, place), stream) in rows.iter().zip(places).zip(outputs) {
+        let before = self.results(accelerator, bodies.start..whole, rows, now);
+        let mut staying = self.room(turns, whole..bodies.end);
+        let places_of_rows = staying.each_mut().map(Vec::as_mut_slice);
+        let behind = self.results(accelerator, whole..bodies.end, rows, places_of_rows);
+        for ((rows, place), stream) in staying.iter().zip(places).zip(outputs) {
             let (leaving, staying) = rows.split_at(place.len());
             place.copy_from_slice(leaving);
             stream.push(staying);
         }
-        self.rows = rows;
-        [before[0].wrapping_add(behind[0]), before[1].wrapping_add(behind[1])]
+        self.rows = staying;
+        accelerator.received(before[0].wrapping_add(behind[0]));
+        accelerator.sent(before[1].wrapping_add(behind[1]));
+        poses.skip(records, inputs);
     }
 }

@@ -1,16 +1,13 @@
-//! This file takes the collisions of a step from their buffers once, and replays them in the other
-//! passes, as long as these bring the same bytes.
+//! Takes the collisions of a step from their buffers once, and tells whether other passes bring the
+//! same ones.
 //!
-//! What a pass takes and how long is accounted for beat by beat as ever; what it computes is left for
-//! later, until somebody can see it, and then done for many passes at once. The bytes are the same
-//! where they come from the same place of the same hand-over of a buffer: the device owns it, and
-//! nobody writes to it. Where a stream brings anything else, the rest of the step goes the long way.
+//! Two passes bring the same bytes if the beats come from the same place of the same hand-over of a
+//! buffer: the device owns it, and nobody writes to it.
 
 use super::eligible::{BEATS_MAX, Layout};
 use crate::accelerator::control::Shape;
-use crate::accelerator::hazards::{Entry, Pipeline};
 use crate::accelerator::records::segment::{PacketError, Segment};
-use crate::accelerator::records::striping::{PerStream, STREAMS_MAX, Turns};
+use crate::accelerator::records::striping::{PerStream, STREAMS_MAX};
 use crate::accelerator::solver::Mass;
 use crate::config::BoardConfig;
 use crate::memory::{Memory, Source};
@@ -19,83 +16,43 @@ use crate::stream::Stream;
 use crate::stream::span::Spans;
 use pgs_interface::record::Beat;
 
-/// Issue slots of a hazard window that are kept in mind.
-const SLOTS_MAX: usize = 512;
-
 /// Beats that are about to come to a stream: where from, and how many.
 pub(crate) type Coming = [Option<(Source, usize)>; STREAMS_MAX];
 
-/// Collisions that entered, an issue an interval.
-#[derive(Debug, Clone, Copy, Default)]
-struct Entered {
-    clock: u64,
-    first: usize,
-    records: usize,
-}
-
-/// The collisions of a step.
+/// The collisions of a step, decoded as far as they are known.
 #[derive(Debug)]
-pub(crate) struct Replay {
-    /// How collisions lie on the streams, if the design is one of those that it knows.
-    layout: Option<Layout>,
-    /// What makes of them what the batch takes in, unless it takes them as they are.
+pub(super) struct Decoded {
+    pub(super) layout: Layout,
+    /// Translates collisions into those that the batch takes in, unless it takes them as they are.
     translation: Option<Translation>,
-    /// Whether the step has brought nothing so far that it cannot replay.
-    pub(crate) on: bool,
-    pub(crate) batch: Batch,
-    /// Passes that were computed.
-    pub(crate) computed: u32,
+    pub(super) batch: Batch,
     /// Mass properties of each shape.
-    pub(crate) masses: Vec<Mass>,
+    pub(super) masses: Vec<Mass>,
     /// Where the beats of the decoded collisions are, stream by stream.
     origin: [Spans; STREAMS_MAX],
-    /// The sum of all words of none of them, of the first one, of the first two...
+    /// Element `n` is the sum of all words of the first `n` collisions.
     sums: Vec<u32>,
-    /// What the decoder said to the collision behind the last one decoded.
-    pub(crate) refused: Option<PacketError>,
-    /// Issue slots from a collision to the first that sees its write-back.
-    slots: usize,
-    /// Whether each collision entered as soon as it had come, up to now in this pass.
-    pub(crate) even: bool,
-    /// The last collisions that entered so.
-    entered: Box<[Entered]>,
-    next_entered: usize,
+    /// Why the decoder refused the collision after the last decoded one.
+    refused: Option<PacketError>,
 }
 
-impl Replay {
-    pub(crate) fn new(config: &BoardConfig) -> Self {
-        let layout = if config.replay { Layout::of(config) } else { None };
-        let translated = layout.filter(|layout| !layout.in_place);
-        let threads = if layout.is_some() { config.threads } else { 1 };
-        let mut batch = Batch::new(threads, config.lanes);
-        if let Some(Layout { precision, together, .. }) = layout {
-            batch = batch.of(precision, together);
-        }
+impl Decoded {
+    pub(super) fn new(config: &BoardConfig, layout: Layout) -> Self {
+        let batch = Batch::new(config.threads, config.lanes);
         Self {
             layout,
-            translation: translated.map(Translation::new),
-            on: layout.is_some(),
-            batch,
-            computed: 0,
+            translation: (!layout.in_place).then(|| Translation::new(layout)),
+            batch: batch.of(layout.precision, layout.together),
             masses: Vec::new(),
             origin: std::array::from_fn(|_| Spans::with_capacity(64)),
             sums: vec![0],
             refused: None,
-            slots: 0,
-            even: true,
-            entered: vec![Entered::default(); SLOTS_MAX].into(),
-            next_entered: 0,
         }
     }
 
     /// A step begins.
-    pub(crate) fn begin(&mut self, collisions: usize, shapes: &[Shape]) {
-        self.on = self.layout.is_some();
-        if !self.on {
-            return;
-        }
+    pub(super) fn begin_step(&mut self, collisions: usize, shapes: &[Shape]) {
         self.batch.begin(collisions);
-        self.computed = 0;
         self.masses.clear();
         self.masses.extend(shapes.iter().map(|shape| Mass {
             inverse_mass: shape.inverse_mass,
@@ -108,23 +65,18 @@ impl Replay {
         self.refused = None;
     }
 
-    /// How bodies lie on the streams, if they can be taken from their buffers and put into them.
-    pub(crate) fn bodies(&self) -> Option<Turns> {
-        self.layout.filter(|_| self.on)?.bodies
-    }
-
-    /// Beats of an issue on each stream; none if the design cannot be replayed.
-    pub(crate) fn share(&self) -> PerStream {
-        self.layout.map_or([0; STREAMS_MAX], |layout| layout.share)
+    /// Beats of an issue on each stream.
+    pub(super) fn share(&self) -> PerStream {
+        self.layout.share
     }
 
     /// Collisions that enter together.
-    pub(crate) fn together(&self) -> usize {
-        self.layout.map_or(1, |layout| layout.together)
+    pub(super) fn together(&self) -> usize {
+        self.layout.together
     }
 
     /// Issues of so many collisions, the last one with padding.
-    pub(crate) fn issues(&self, collisions: usize) -> usize {
+    pub(super) fn issues(&self, collisions: usize) -> usize {
         collisions.div_ceil(self.together())
     }
 
@@ -133,32 +85,24 @@ impl Replay {
         self.share().into_iter().enumerate().filter(|(_, share)| *share > 0)
     }
 
-    /// A pass begins, with a hazard window of so many issue slots.
-    pub(crate) fn begin_pass(&mut self, slots: u64) {
-        self.slots = usize::try_from(slots).unwrap_or(usize::MAX);
-        self.entered.fill(Entered::default());
-        self.next_entered = 0;
-        self.even = self.slots <= SLOTS_MAX && self.far_enough();
+    /// The least number of issues between two decoded collisions that share a body that moves.
+    pub(super) fn distance(&self) -> usize {
+        self.batch.distance() as usize
     }
 
-    /// Whether no decoded collision is so close behind another that it may have to wait for it.
-    fn far_enough(&self) -> bool {
-        self.batch.distance() as usize >= self.slots
-    }
-
-    /// Collisions of which everything is known.
-    pub(crate) fn known(&self) -> usize {
+    /// Collisions that are decoded.
+    pub(super) fn known(&self) -> usize {
         self.batch.len()
     }
 
-    /// Issue slots that collisions have to be apart.
-    pub(crate) fn slots(&self) -> usize {
-        self.slots
+    /// Why the decoder refused the collision after the last decoded one, if it did.
+    pub(super) fn refused(&self) -> Option<PacketError> {
+        self.refused
     }
 
-    /// Decodes what is on the streams and what is about to come behind that. The segment says which
-    /// collisions of the first pass are next.
-    pub(crate) fn look_ahead(
+    /// Decodes the collisions on the streams and those about to come behind them. The segment says
+    /// which collisions of the first pass are next.
+    pub(super) fn decode_ahead(
         &mut self,
         segment: &Segment,
         inputs: &[Stream],
@@ -167,7 +111,7 @@ impl Replay {
         memory: &Memory,
     ) {
         let total = segment.done + segment.left();
-        // Where beats are, by their number behind the front of their stream.
+        // Where the beats `ahead` places behind the front of a stream are, and how many together.
         let piece = |k: usize, ahead: usize, most: usize| {
             let there = inputs[k].len();
             match coming[k] {
@@ -180,7 +124,7 @@ impl Replay {
             }
         };
         while self.refused.is_none() && self.known() < total {
-            // All issues that are known are whole ones.
+            // All decoded issues are whole ones.
             let known = self.known();
             let first = self.issues(known);
             let share_of = self.share();
@@ -189,7 +133,7 @@ impl Replay {
             for (k, share) in self.shares() {
                 issues = issues.min(piece(k, ahead(k), issues * share).0 / share);
             }
-            // Where the beats of an issue are not together it is gathered.
+            // An issue whose beats are not together is gathered.
             let apart = issues == 0;
             let issues = issues.max(1);
             let mut gathered = [[Beat::default(); BEATS_MAX]; STREAMS_MAX];
@@ -237,13 +181,13 @@ impl Replay {
     }
 
     /// The sum of all words of some collisions, of which the first begins an issue.
-    pub(crate) fn sum(&self, first: usize, records: usize) -> u32 {
+    pub(super) fn sum(&self, first: usize, records: usize) -> u32 {
         self.sums[first + records].wrapping_sub(self.sums[first])
     }
 
-    /// Whether the next `records` collisions on the streams are the decoded ones, as far as they have
-    /// come: on some streams there may be more of them than on others.
-    pub(crate) fn same(&self, segment: &Segment, records: usize, inputs: &[Stream]) -> bool {
+    /// Whether the next `records` collisions on the streams are the decoded ones, as far as their
+    /// beats have come: more may have come on one stream than on another.
+    pub(super) fn same(&self, segment: &Segment, records: usize, inputs: &[Stream]) -> bool {
         self.shares().all(|(k, share)| {
             let first = (self.issues(segment.done) * share) as u64;
             let most = (self.issues(records) * share).min(inputs[k].len());
@@ -260,9 +204,9 @@ impl Replay {
         })
     }
 
-    /// Whether what is about to come to the streams goes on with the decoded collisions, as far as it
-    /// belongs to the segment.
-    pub(crate) fn goes_on(&self, segment: &Segment, inputs: &[Stream], coming: &Coming) -> bool {
+    /// Whether the beats about to come to the streams go on with the decoded collisions, as far as
+    /// they belong to the segment.
+    pub(super) fn goes_on(&self, segment: &Segment, inputs: &[Stream], coming: &Coming) -> bool {
         self.shares().all(|(k, share)| {
             let Some((source, count)) = coming[k] else { return false };
             let next = self.issues(segment.done) * share + inputs[k].len();
@@ -270,38 +214,5 @@ impl Replay {
             let left = (all * share).saturating_sub(next);
             self.origin[k].holds(next as u64, count.min(left), source)
         })
-    }
-
-    /// Collisions enter, an issue an interval from that clock on; the first one begins an issue.
-    pub(crate) fn enter(&mut self, clock: u64, first: usize, records: usize) {
-        self.entered[self.next_entered] = Entered { clock, first, records };
-        self.next_entered = (self.next_entered + 1) % SLOTS_MAX;
-    }
-
-    /// From now on collisions may have to wait for those that have entered.
-    pub(crate) fn end_even(&mut self, interval: u64, pipeline: &mut Pipeline) {
-        if !std::mem::replace(&mut self.even, false) {
-            return;
-        }
-        let together = self.together();
-        let (newer, older) = self.entered.split_at(self.next_entered);
-        for Entered { clock, first, records } in older.iter().chain(newer) {
-            for (at, index) in (*first..first + records).enumerate() {
-                if let Some(entry) = self.batch.entry(index) {
-                    pipeline.entered(clock + (at / together) as u64 * interval, &entry);
-                }
-            }
-        }
-    }
-
-    /// Looks again whether a collision may have to wait.
-    pub(crate) fn look_at_distances(&mut self, interval: u64, pipeline: &mut Pipeline) {
-        if self.even && !self.far_enough() {
-            self.end_even(interval, pipeline);
-        }
-    }
-
-    pub(crate) fn entry(&self, index: usize) -> Option<Entry> {
-        self.batch.entry(index)
     }
 }

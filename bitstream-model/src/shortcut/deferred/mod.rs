@@ -1,6 +1,113 @@
 //! Decodes the collisions of a step once, and computes its passes when somebody can see them.
+//!
+//! `eligible.rs` says which designs these are, `decode_once.rs` decodes collisions and tells whether
+//! a later pass brings the same ones, `entered.rs` keeps in mind when they entered. `passes.rs` takes
+//! and computes passes, `bodies.rs` loads and integrates.
 
-pub(crate) mod bodies;
-pub(crate) mod decode_once;
-pub(crate) mod eligible;
-pub(crate) mod passes;
+pub(super) mod bodies;
+mod decode_once;
+pub(super) mod eligible;
+mod entered;
+mod passes;
+
+use crate::accelerator::Accelerator;
+use crate::accelerator::control::Shape;
+use crate::accelerator::defer::{Arrived, Defer};
+use crate::accelerator::records::results::Results;
+use crate::accelerator::records::segment::{PacketError, Segment};
+use crate::accelerator::records::striping::STREAMS_MAX;
+use crate::config::BoardConfig;
+use crate::stream::Stream;
+use decode_once::Decoded;
+use eligible::Layout;
+use entered::Entered;
+use pgs_interface::record::Beat;
+
+pub(super) use bodies::BodyRows;
+pub(super) use decode_once::Coming;
+pub(super) use passes::Ahead;
+
+/// A step whose collisions are decoded once and whose passes are computed later.
+#[derive(Debug)]
+pub(super) struct Deferred {
+    /// Whether the step has brought nothing so far but what was decoded.
+    on: bool,
+    decoded: Decoded,
+    entered: Entered,
+    /// Passes that were computed.
+    computed: u32,
+    /// Rows of results on their way to each stream.
+    rows: [Vec<Beat>; STREAMS_MAX],
+}
+
+impl Deferred {
+    pub(super) fn new(config: &BoardConfig, layout: Layout) -> Self {
+        Self {
+            on: true,
+            decoded: Decoded::new(config, layout),
+            entered: Entered::new(layout.together, config.profile.initiation_interval.into()),
+            computed: 0,
+            rows: Default::default(),
+        }
+    }
+}
+
+impl Defer for Deferred {
+    fn begin_step(&mut self, collisions: usize, shapes: &[Shape]) -> bool {
+        self.on = true;
+        self.computed = 0;
+        self.decoded.begin_step(collisions, shapes);
+        true
+    }
+
+    fn takes_collisions(&self) -> bool {
+        self.on
+    }
+
+    fn begin_pass(&mut self, slots: u64) {
+        self.entered.begin_pass(slots, self.decoded.distance());
+    }
+
+    fn collisions(
+        &mut self,
+        accelerator: &mut Accelerator,
+        pass: u32,
+        segment: &mut Segment,
+        limit: u64,
+        arrived: Arrived<'_>,
+    ) -> Result<Option<u64>, PacketError> {
+        self.take_collisions(accelerator, pass, segment, limit, arrived)
+    }
+
+    fn compute(&mut self, accelerator: &mut Accelerator, pass: u32, collisions: usize) {
+        self.compute_to(accelerator, pass, collisions);
+    }
+
+    fn load(
+        &mut self,
+        accelerator: &mut Accelerator,
+        velocities: &mut Segment,
+        arrived: &mut Arrived<'_>,
+    ) -> Option<Result<u32, PacketError>> {
+        let rows = self.rows_of_next(velocities, arrived)?;
+        let sum = self.load_rows(accelerator, arrived.records, rows);
+        if sum.is_ok() {
+            velocities.skip(arrived.records, arrived.inputs);
+        }
+        Some(sum)
+    }
+
+    fn integrate(
+        &mut self,
+        accelerator: &mut Accelerator,
+        poses: &mut Segment,
+        results: &mut Results,
+        arrived: &mut Arrived<'_>,
+        outputs: &mut [Stream],
+    ) -> Option<[u32; 2]> {
+        let rows = self.rows_of_next(poses, arrived)?;
+        let sums = self.integrate_rows(accelerator, results, arrived.records, rows, outputs);
+        poses.skip(arrived.records, arrived.inputs);
+        Some(sums)
+    }
+}

@@ -1,210 +1,222 @@
-//! This file lets a long stretch of time pass in which nothing but collisions flows, or bodies: it is
-//! counted in `pace.rs` or `body_pace.rs`, and then has happened.
+//! Lets a stretch of a board's time pass at once: counts what flows in it, then makes the board as it
+//! is afterwards.
 
-use super::bodies::{BodyFlowed, BodyLimits, BodyPace, BodyPhase, BodyStanding};
-use super::collisions::{Flowed, Limits, Pace, PerEngine, Rules, Standing, Supply};
-use crate::accelerator::Coming;
-use crate::accelerator::records::striping::{ROWS_IN, STREAMS_MAX, Turns};
-use crate::board::{BURST_BEATS, Board};
-use crate::config::Bandwidth;
+use super::records::{Bodies, Issues};
+use super::{Flow, FlowState, Flowed, Limits, PerEngine, Rules};
+use crate::accelerator::Phase;
+use crate::accelerator::defer::Defer;
+use crate::accelerator::records::results::Results;
+use crate::accelerator::records::segment::Segment;
+use crate::accelerator::records::striping::{ROWS_IN, STREAMS_MAX};
+use crate::board::short_cut::{ShortCut, Stretch};
 use crate::memory::Source;
+use crate::shortcut::deferred::{Ahead, BodyRows, Coming, Deferred};
+use crate::stream::Stream;
 use pgs_interface::axi_dma::Direction;
-use pgs_interface::record::BEAT_BYTES;
 
-/// Where the beats are that are next on each stream, those in its FIFO before those that are about to
-/// come, and how many.
+/// Where the next beats of each input are, the ones in its FIFO before the ones about to come, and
+/// how many.
 type Sources = [(Source, usize); STREAMS_MAX];
 
-impl Board {
-    /// Lets whole slices pass until shortly before `until`, as far as it is known that nothing
-    /// happens in them.
-    pub(crate) fn stretch(&mut self, until: u64) {
-        let plain = self.faults.none()
-            && self.config.quirks.unconnected.is_none()
-            && self.inputs.iter().chain(&self.outputs).all(|stream| !stream.marked())
-            && self.interrupt.next_event().is_none()
-            && self.cores.len() == self.inputs.len();
-        if !plain {
-            return;
-        }
-        match self.accelerator.flowing_bodies() {
-            Some((phase, turns)) => self.stretch_of_bodies(phase, turns, until),
-            None => self.stretch_of_collisions(until),
+impl ShortCut for Deferred {
+    fn fast_forward(&mut self, stretch: Stretch<'_>) -> u64 {
+        let Some(phase) = stretch.accelerator.undisturbed() else { return 0 };
+        let passed = match *phase {
+            Phase::Pass { number, segment } => collisions(self, stretch, number, segment),
+            Phase::Load(segment) => bodies(self, stretch, segment, None),
+            Phase::Integrate { poses, results } => bodies(self, stretch, poses, Some(results)),
+            _ => None,
+        };
+        passed.unwrap_or(0)
+    }
+}
+
+/// A flow that begins on a board. `limits` hold for it.
+fn begin(stretch: &Stretch<'_>, limits: Limits) -> Flow {
+    let mut state =
+        FlowState { held: PerEngine::default(), ahead: [0; STREAMS_MAX], turn: *stretch.turn };
+    let mut beat_shift = [0; STREAMS_MAX];
+    for (k, core) in stretch.cores.iter().enumerate() {
+        state.held[2 * k] = stretch.inputs[k].len();
+        state.held[2 * k + 1] = stretch.outputs.get(k).map_or(0, |output| output.len());
+        state.ahead[k] = core.ahead(stretch.now);
+        beat_shift[k] = core.beat_shift();
+    }
+    let (cores, depth) = (stretch.cores.len(), stretch.inputs[0].depth());
+    let rules = Rules { cores, beat_shift, depth, arbiter: stretch.arbiter };
+    Flow { rules, limits, state, flowed: Flowed::default() }
+}
+
+/// The inputs have got the beats of a flow, which stay where they are.
+fn pass_inputs(inputs: &mut [Stream], flow: &Flow, coming: &Coming) {
+    for (k, (stream, coming)) in inputs.iter_mut().zip(coming).enumerate() {
+        let read = flow.flowed.beats[2 * k];
+        if let Some((source, _)) = coming.filter(|_| read > 0) {
+            stream.push_span(source, read);
         }
     }
+}
 
-    fn stretch_of_collisions(&mut self, until: u64) {
-        let Some(mut pace) = self.pace(until) else { return };
-        self.accelerator.flow(&mut pace, &mut self.recurrence);
-        let Flowed { cycles, beats, .. } = pace.flowed;
-        if cycles == 0 {
-            return;
-        }
-        for ((core, stream), beats) in self.cores.iter_mut().zip(&mut self.inputs).zip(beats) {
-            let Some((at, _)) = core.flows(Direction::Mm2s, self.now) else { continue };
-            let Ok(Some(source)) = self.memory.source(at, beats) else { continue };
-            if beats > 0 {
-                stream.push_span(source, beats);
-                core.flowed(Direction::Mm2s, beats);
-                self.moved.beats_read += beats as u64;
-            }
-        }
-        for (core, ahead) in self.cores.iter_mut().zip(pace.standing.ahead) {
-            core.has_come_to(self.now + cycles, ahead);
-        }
-        self.accelerator.flowed(&pace, &mut self.inputs);
-        self.credit = pace.standing.credit;
-        self.turn = pace.standing.turn;
-        self.now += cycles;
-        self.log.at(self.now);
+/// The cores have moved the beats of a flow.
+fn pass_cores(stretch: &mut Stretch<'_>, flow: &Flow) {
+    let Flowed { cycles, beats, .. } = flow.flowed;
+    for (k, core) in stretch.cores.iter_mut().enumerate() {
+        let (read, written) = (beats[2 * k], beats[2 * k + 1]);
+        core.pass_over(Direction::Mm2s, read);
+        core.pass_over(Direction::S2mm, written);
+        core.set_ahead(stretch.now + cycles, flow.state.ahead[k]);
+        stretch.moved.beats_read += read as u64;
+        stretch.moved.beats_written += written as u64;
     }
+    *stretch.turn = flow.state.turn;
+}
 
-    /// What flows of the collisions, if nothing else can happen for some time.
-    fn pace(&mut self, until: u64) -> Option<Pace> {
-        let now = self.now;
-        if self.outputs.iter().any(|stream| stream.len() > 0) {
+/// The beats about to come to each input, if its MM2S does nothing but move them.
+fn coming(Stretch { now, cores, memory, .. }: &Stretch<'_>) -> Option<Coming> {
+    let mut coming = Coming::default();
+    for (coming, core) in coming.iter_mut().zip(&**cores) {
+        let (at, beats) = core.undisturbed(Direction::Mm2s, *now)?;
+        *coming = Some((memory.source(at, beats).ok()??, beats));
+    }
+    Some(coming)
+}
+
+/// Lets the collisions of a pass flow; returns the cycles that have passed.
+fn collisions(
+    deferred: &mut Deferred,
+    mut stretch: Stretch<'_>,
+    number: u32,
+    mut segment: Segment,
+) -> Option<u64> {
+    let now = stretch.now;
+    let results_rest = stretch.outputs.iter().all(|stream| stream.len() == 0)
+        && stretch.cores.iter().all(|core| core.rests_without_beats(now));
+    if !results_rest || !deferred.takes_collisions() {
+        return None;
+    }
+    let coming = coming(&stretch)?;
+    let Stretch { accelerator, inputs, memory, .. } = &mut stretch;
+    let ahead =
+        deferred.collisions_ahead(accelerator, number, &segment, inputs, &coming, memory)?;
+    let mut limits =
+        Limits { cycles: stretch.until - now, records: ahead.issues, beats: PerEngine::default() };
+    for (k, beats) in coming.iter().enumerate() {
+        limits.beats[2 * k] = beats.map_or(0, |(_, beats)| beats);
+    }
+    let mut flow = begin(&stretch, limits);
+    let Ahead { last, .. } = ahead;
+    let accelerator = &mut *stretch.accelerator;
+    let mut issues = Issues { accelerator, deferred, ahead, done: segment.done };
+    match last {
+        Some(last) => flow.run_evenly(&mut issues, last),
+        None => flow.run(&mut issues),
+    }
+    let Flowed { cycles, waits, records, .. } = flow.flowed;
+    if cycles == 0 {
+        return None;
+    }
+    pass_cores(&mut stretch, &flow);
+    let Stretch { accelerator, inputs, .. } = stretch;
+    pass_inputs(inputs, &flow, &coming);
+    deferred.pass_over_issues(accelerator, &mut segment, records, inputs);
+    accelerator.pass_over(cycles, waits, Phase::Pass { number, segment });
+    Some(cycles)
+}
+
+/// Lets bodies flow, which are loaded, or integrated with these results; returns the cycles that
+/// have passed.
+fn bodies(
+    deferred: &mut Deferred,
+    mut stretch: Stretch<'_>,
+    mut segment: Segment,
+    results: Option<Results>,
+) -> Option<u64> {
+    let turns = deferred.bodies()?;
+    let coming = coming(&stretch)?;
+    let sources = sources(&stretch, &coming)?;
+    let mut limits = Limits {
+        cycles: stretch.until - stretch.now,
+        // The last bodies end packets.
+        records: (segment.left() + 1).saturating_sub(turns.streams.div_ceil(ROWS_IN)),
+        beats: PerEngine::default(),
+    };
+    let mut writes = [(0, 0); STREAMS_MAX];
+    for (k, core) in stretch.cores.iter().enumerate() {
+        limits.beats[2 * k] = coming[k].map_or(0, |(_, beats)| beats);
+        if results.is_some() {
+            let (at, beats) = core.undisturbed(Direction::S2mm, stretch.now)?;
+            stretch.memory.may_write(at, beats).then_some(())?;
+            (writes[k].0, limits.beats[2 * k + 1]) = (at, beats);
+        } else if !core.rests_without_beats(stretch.now) {
             return None;
         }
-        let (cores, memory) = (&self.cores, &self.memory);
-        let mut left = [0; STREAMS_MAX];
-        let coming = || {
-            let mut coming = Coming::default();
-            for (k, core) in cores.iter().enumerate() {
-                let (at, beats) = core.flows(Direction::Mm2s, now)?;
-                left[k] = beats;
-                coming[k] = Some((memory.source(at, beats).ok()??, beats));
-                if !core.rests_without_beats(now) {
-                    return None;
-                }
-            }
-            Some(coming)
+    }
+    if results.is_none() {
+        let memory = &*stretch.memory;
+        let good = deferred.bodies_with_shape(&segment, &sources, limits.cycles, memory)?;
+        limits.records = limits.records.min(good);
+    }
+    let mut flow = begin(&stretch, limits);
+    let (done, given) = (segment.done, results.is_some());
+    match turns.streams {
+        4 => flow.run(&mut Bodies::<4> { done, results: given }),
+        3 => flow.run(&mut Bodies::<3> { done, results: given }),
+        2 => flow.run(&mut Bodies::<2> { done, results: given }),
+        _ => flow.run(&mut Bodies::<1> { done, results: given }),
+    }
+    let Flowed { cycles, waits, records, beats } = flow.flowed;
+    if cycles == 0 {
+        return None;
+    }
+    let mut reads = sources;
+    let [before, after] = [done, done + records].map(|bodies| turns.counts(ROWS_IN * bodies));
+    for k in 0..stretch.cores.len() {
+        reads[k].1 = after[k] - before[k];
+        writes[k].1 = beats[2 * k + 1];
+    }
+    let Stretch { accelerator, inputs, outputs, memory, .. } = &mut stretch;
+    let (views, places) = memory.lend(reads, writes)?;
+    let rows = BodyRows { views, turns, first: done };
+    pass_inputs(inputs, &flow, &coming);
+    let phase = match results {
+        None => {
+            deferred.pass_over_loaded(accelerator, &mut segment, records, rows, inputs);
+            Phase::Load(segment)
+        }
+        Some(mut results) => {
+            let streams = (&mut **inputs, &mut **outputs);
+            deferred.pass_over_integrated(
+                accelerator,
+                &mut segment,
+                records,
+                rows,
+                streams,
+                places,
+            );
+            results.pass(records);
+            Phase::Integrate { poses: segment, results }
+        }
+    };
+    accelerator.pass_over(cycles, waits, phase);
+    pass_cores(&mut stretch, &flow);
+    Some(cycles)
+}
+
+/// The next beats of each input, if the ones in its FIFO lie before the ones about to come, in the
+/// same buffer.
+fn sources(stretch: &Stretch<'_>, coming: &Coming) -> Option<Sources> {
+    let mut sources = Sources::default();
+    for (source, (stream, coming)) in sources.iter_mut().zip(stretch.inputs.iter().zip(coming)) {
+        let ((next, beats), held) = ((*coming)?, stream.len());
+        let first = match stream.piece(0, held) {
+            (0, _) => next,
+            (count, Some(first)) if count == held => first,
+            _ => return None,
         };
-        let (issues, interval_max) = self.accelerator.flows(&self.inputs, coming, memory)?;
-        let (mut held, mut ahead) = ([0; STREAMS_MAX], [0; STREAMS_MAX]);
-        for (k, (core, stream)) in self.cores.iter().zip(&self.inputs).enumerate() {
-            held[k] = stream.len();
-            ahead[k] = core.ahead(now);
+        if first.further(held as u64) != next {
+            return None;
         }
-        Some(Pace {
-            rules: self.rules(interval_max),
-            limits: Limits { cycles: until - now, issues, beats: left },
-            standing: Standing { held, ahead, credit: self.credit, turn: self.turn },
-            flowed: Flowed::default(),
-        })
+        *source = (first, held + beats);
     }
-
-    /// MM2S and S2MM of each core.
-    fn engines(&self) -> usize {
-        2 * self.cores.len()
-    }
-
-    fn supply(&self) -> Option<Supply> {
-        let beat_cost = BEAT_BYTES as u64 * u64::from(self.config.profile.clock_khz);
-        match self.config.bandwidth {
-            Bandwidth::Unlimited => None,
-            Bandwidth::BytesPerSecond(bytes) => {
-                let reserve = BURST_BEATS * self.engines() as u64 * beat_cost;
-                Some(Supply { income: bytes / 1000, beat_cost, reserve })
-            }
-        }
-    }
-
-    fn rules(&self, interval_max: u64) -> Rules {
-        let mut beat_shift = [0; STREAMS_MAX];
-        for (shift, core) in beat_shift.iter_mut().zip(&self.cores) {
-            *shift = core.beat_shift();
-        }
-        Rules {
-            share: self.accelerator.share(),
-            beat_shift,
-            depth: self.config.delays.fifo_beats,
-            engines: self.engines(),
-            interval: self.config.profile.initiation_interval.into(),
-            interval_max,
-            supply: self.supply(),
-        }
-    }
-
-    fn stretch_of_bodies(&mut self, phase: BodyPhase, turns: Turns, until: u64) {
-        let Some((mut pace, sources)) = self.body_pace(phase, turns, until) else { return };
-        pace.run();
-        let BodyFlowed { cycles, records, beats, .. } = pace.flowed;
-        if cycles == 0 {
-            return;
-        }
-        let first = pace.standing.body - records;
-        let [before, after] = [first, first + records].map(|bodies| turns.counts(ROWS_IN * bodies));
-        let mut reads = sources;
-        let mut writes = [(0, 0); STREAMS_MAX];
-        for (k, core) in self.cores.iter().enumerate() {
-            reads[k].1 = after[k] - before[k];
-            if let Some((at, _)) = core.flows(Direction::S2mm, self.now) {
-                writes[k] = (at, beats[2 * k + 1]);
-            }
-        }
-        let Some((views, places)) = self.memory.lend(reads, writes) else { return };
-        for (k, (core, stream)) in self.cores.iter_mut().zip(&mut self.inputs).enumerate() {
-            let (came, went) = (beats[2 * k], beats[2 * k + 1]);
-            stream.push_span(sources[k].0.further(stream.len() as u64), came);
-            core.flowed(Direction::Mm2s, came);
-            core.flowed(Direction::S2mm, went);
-            self.moved.beats_read += came as u64;
-            self.moved.beats_written += went as u64;
-        }
-        let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
-        self.accelerator.flowed_bodies(&pace, views, places, inputs, outputs);
-        self.credit = pace.standing.credit;
-        self.turn = pace.standing.turn;
-        self.now += cycles;
-        self.log.at(self.now);
-    }
-
-    /// What flows of the bodies, if nothing else can happen for some time, and where their beats are.
-    fn body_pace(&self, phase: BodyPhase, turns: Turns, until: u64) -> Option<(BodyPace, Sources)> {
-        let (now, memory) = (self.now, &self.memory);
-        let mut left = PerEngine::default();
-        let mut sources = Sources::default();
-        for (k, (core, stream)) in self.cores.iter().zip(&self.inputs).enumerate() {
-            let (at, beats) = core.flows(Direction::Mm2s, now)?;
-            let (coming, there) = (memory.source(at, beats).ok()??, stream.len());
-            // Together with those in the FIFO.
-            let source = match stream.piece(0, there) {
-                (0, _) => coming,
-                (count, Some(source)) if count == there => source,
-                _ => return None,
-            };
-            if source.further(there as u64) != coming {
-                return None;
-            }
-            sources[k] = (source, there + beats);
-            left[2 * k] = beats;
-            match phase {
-                BodyPhase::Load if core.rests_without_beats(now) => {}
-                BodyPhase::Load => return None,
-                BodyPhase::Integrate => {
-                    let (at, beats) = core.flows(Direction::S2mm, now)?;
-                    memory.may_write(at, beats).then_some(())?;
-                    left[2 * k + 1] = beats;
-                }
-            }
-        }
-        let cycles = until - now;
-        let (body, records) = self.accelerator.bodies_known(&sources, cycles, memory)?;
-        let mut standing =
-            BodyStanding { body, held: PerEngine::default(), credit: self.credit, turn: self.turn };
-        for (k, (input, output)) in self.inputs.iter().zip(&self.outputs).enumerate() {
-            (standing.held[2 * k], standing.held[2 * k + 1]) = (input.len(), output.len());
-        }
-        let pace = BodyPace {
-            phase,
-            turns,
-            depth: self.config.delays.fifo_beats,
-            engines: self.engines(),
-            supply: self.supply(),
-            limits: BodyLimits { cycles, records, beats: left },
-            standing,
-            flowed: BodyFlowed::default(),
-        };
-        Some((pace, sources))
-    }
+    Some(sources)
 }

@@ -1,7 +1,173 @@
 //! Counts beats that flow undisturbed instead of moving them one by one.
+//!
+//! A [`Flow`] does what `Board::advance` does, with everything left out that can happen in between:
+//! slice by slice the accelerator takes the records that are there, then the engines go on for as
+//! long as that took. It comes to the same numbers to the beat. `records.rs` says what taking
+//! records means in each phase, `periods.rs` passes over what recurs, `fast_forward.rs` begins a flow
+//! on a board and makes the board as it is after it.
 
-pub(crate) mod bodies;
-pub(crate) mod collisions;
-pub(crate) mod dma;
-pub(crate) mod fast_forward;
-pub(crate) mod periods;
+mod fast_forward;
+mod periods;
+mod records;
+#[cfg(test)]
+mod tests;
+
+use crate::accelerator::records::striping::STREAMS_MAX;
+use crate::board::STARVED_CYCLES;
+use crate::board::arbiter::{Arbiter, Turn};
+use periods::Periods;
+use records::Records;
+
+/// A count for each engine, in their order: MM2S and S2MM of each core.
+type PerEngine = [usize; 2 * STREAMS_MAX];
+
+/// What stays the same.
+#[derive(Debug, Clone, Copy)]
+struct Rules {
+    /// Cores, of which each has an input and an output.
+    cores: usize,
+    /// Binary logarithm of the cycles that a beat takes on each input; on an output it takes one.
+    beat_shift: [u32; STREAMS_MAX],
+    /// Beats that a FIFO holds.
+    depth: usize,
+    arbiter: Arbiter,
+}
+
+/// Where the flow must end: none of these is reached.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    cycles: u64,
+    records: usize,
+    beats: PerEngine,
+}
+
+/// What has flowed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Flowed {
+    cycles: u64,
+    /// Cycles of them in which no record was there.
+    waits: u64,
+    records: usize,
+    beats: PerEngine,
+}
+
+/// What decides how the flow goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct FlowState {
+    /// Beats in the FIFO of each engine, to or from the accelerator.
+    held: PerEngine,
+    /// Cycles by which the clock of each MM2S is ahead: a beat is on its way.
+    ahead: [u64; STREAMS_MAX],
+    turn: Turn,
+}
+
+/// Beats and records that flow.
+#[derive(Debug, Clone)]
+struct Flow {
+    rules: Rules,
+    limits: Limits,
+    state: FlowState,
+    flowed: Flowed,
+}
+
+impl Flow {
+    /// Goes on for whole slices, as far as no limit can be reached.
+    fn run(&mut self, records: &mut impl Records) {
+        while self.slice(records).is_some() {}
+    }
+
+    /// The same for records that always take equally long. Whole periods are passed over, but not
+    /// the last `last` records.
+    fn run_evenly(&mut self, records: &mut impl Records, last: usize) {
+        let mut periods = Periods::default();
+        while !periods.pass_over(self, records, last) {
+            if self.slice(records).is_none() {
+                return;
+            }
+        }
+        self.run(records);
+    }
+
+    /// One slice: the accelerator takes the records that are there, then the engines go on for as
+    /// long as that took. Nothing, and no change, if a limit could be reached in it.
+    #[inline(always)]
+    fn slice(&mut self, records: &mut impl Records) -> Option<()> {
+        let Self { rules, limits, state, flowed } = self;
+        let first = flowed.records;
+        let ready = records.ready(first, &state.held, rules.depth);
+        let longest = if ready == 0 { STARVED_CYCLES } else { records.cycles_max(first, ready) };
+        if flowed.cycles + longest >= limits.cycles || first + ready >= limits.records {
+            return None;
+        }
+        let mut held = state.held;
+        if ready > 0 {
+            let (taken, given) = records.beats(first, ready);
+            for k in 0..STREAMS_MAX {
+                held[2 * k] -= taken[k];
+                held[2 * k + 1] += given[k];
+            }
+        }
+        for k in 0..rules.cores {
+            for (engine, most) in [(2 * k, rules.depth - held[2 * k]), (2 * k + 1, held[2 * k + 1])]
+            {
+                if most > 0 && flowed.beats[engine] + most >= limits.beats[engine] {
+                    return None;
+                }
+            }
+        }
+        let cycles = if ready == 0 {
+            flowed.waits += STARVED_CYCLES;
+            STARVED_CYCLES
+        } else {
+            records.enter(first, ready, flowed.cycles)
+        };
+        state.held = held;
+        flowed.records += ready;
+        flowed.cycles += cycles;
+        if rules.beat_shift == [0; STREAMS_MAX] {
+            self.move_beats::<false>(cycles);
+        } else {
+            self.move_beats::<true>(cycles);
+        }
+        Some(())
+    }
+
+    /// Lets the engines move beats for that many cycles. Without `NARROW` streams every beat takes a
+    /// cycle.
+    #[inline(always)]
+    fn move_beats<const NARROW: bool>(&mut self, cycles: u64) {
+        let Rules { cores, beat_shift, depth, arbiter } = self.rules;
+        let FlowState { held, ahead, turn } = &mut self.state;
+        let mut room = PerEngine::default();
+        let most = usize::try_from(cycles).unwrap_or(usize::MAX);
+        for k in 0..cores {
+            let most_in = if NARROW {
+                // An engine begins a beat as soon as it is through with the last one.
+                let last = (1 << beat_shift[k]) - 1;
+                let beats = cycles.saturating_sub(ahead[k]).saturating_add(last) >> beat_shift[k];
+                usize::try_from(beats).unwrap_or(usize::MAX)
+            } else {
+                most
+            };
+            room[2 * k] = most_in.min(depth - held[2 * k]);
+            room[2 * k + 1] = most.min(held[2 * k + 1]);
+        }
+        let mut left = room;
+        arbiter.share(turn, cycles, |engine, limit| {
+            let moved = limit.min(left[engine]);
+            left[engine] -= moved;
+            moved
+        });
+        for k in 0..cores {
+            let moved = [room[2 * k] - left[2 * k], room[2 * k + 1] - left[2 * k + 1]];
+            held[2 * k] += moved[0];
+            held[2 * k + 1] -= moved[1];
+            if NARROW {
+                let busy = ahead[k] + ((moved[0] as u64) << beat_shift[k]);
+                ahead[k] = busy.saturating_sub(cycles);
+            }
+            self.flowed.beats[2 * k] += moved[0];
+            self.flowed.beats[2 * k + 1] += moved[1];
+        }
+    }
+}

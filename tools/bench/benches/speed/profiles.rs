@@ -12,7 +12,7 @@ use step_folder::digest;
 
 use crate::{Options, Outcome};
 
-/// Ways of taking a step, which give the same bits: threads, and whether collisions are replayed.
+/// Ways of taking a step, which give the same bits: threads, and short cuts or not.
 const WAYS: [(&str, usize, bool); 3] =
     [("the long way", 1, false), ("1 thread", 1, true), ("2 threads", 2, true)];
 
@@ -54,8 +54,8 @@ pub(crate) fn measure(options: &Options) -> Outcome {
 /// The ways of one design in turn.
 fn row(step: &Step, profile: &'static Profile, runs: usize) -> Result<Row, Box<dyn Error>> {
     let mut boards = Vec::new();
-    for (_, threads, replay) in WAYS {
-        let config = BoardConfig { profile, threads, replay, ..BoardConfig::default() };
+    for (_, threads, shortcuts) in WAYS {
+        let config = BoardConfig { profile, threads, shortcuts, ..BoardConfig::default() };
         boards.push(Emulated::new(step, config)?);
     }
     let mut times = [const { Vec::new() }; WAYS.len()];

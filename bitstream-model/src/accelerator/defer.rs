@@ -1,0 +1,73 @@
+//! The seam through which a step's arithmetic can be put off: somebody else takes the records that
+//! have arrived, and computes what they come to before anybody can see it.
+//!
+//! The accelerator goes on keeping account of phases, packets and cycles. Without a [`Defer`] it
+//! computes every record as it takes it; with one, nothing but the time of the host may differ.
+
+use std::fmt;
+
+use super::Accelerator;
+use super::control::Shape;
+use super::records::results::Results;
+use super::records::segment::{PacketError, Segment};
+use crate::memory::Memory;
+use crate::stream::Stream;
+
+/// Records of the phase under way that have arrived, and what they lie in.
+#[derive(Debug)]
+pub(crate) struct Arrived<'a> {
+    /// How many.
+    pub(crate) records: usize,
+    pub(crate) inputs: &'a mut [Stream],
+    pub(crate) memory: &'a Memory,
+}
+
+/// Takes records from their buffers, and computes passes later and many at once.
+pub(crate) trait Defer: fmt::Debug + Send {
+    /// A step begins. Returns whether its collisions are taken, at first.
+    fn begin_step(&mut self, collisions: usize, shapes: &[Shape]) -> bool;
+
+    /// Whether the collisions of the step under way are still taken.
+    fn takes_collisions(&self) -> bool;
+
+    /// A pass begins, with a hazard window of so many issue slots.
+    fn begin_pass(&mut self, slots: u64);
+
+    /// Takes collisions of a pass for up to `limit` cycles: the next ones of `segment`. Returns the
+    /// cycles that they take to enter, stalls included. `None` if it takes no more collisions of
+    /// this step: the accelerator computes them from the next one of `segment` on.
+    fn collisions(
+        &mut self,
+        accelerator: &mut Accelerator,
+        pass: u32,
+        segment: &mut Segment,
+        limit: u64,
+        arrived: Arrived<'_>,
+    ) -> Result<Option<u64>, PacketError>;
+
+    /// Computes what was put off: the passes before `pass`, and of `pass` the first `collisions`.
+    fn compute(&mut self, accelerator: &mut Accelerator, pass: u32, collisions: usize);
+
+    /// Loads the bodies that have arrived, and takes their beats. Returns the sum of the words, or
+    /// `None` if the accelerator has to load them.
+    fn load(
+        &mut self,
+        accelerator: &mut Accelerator,
+        velocities: &mut Segment,
+        arrived: &mut Arrived<'_>,
+    ) -> Option<Result<u32, PacketError>>;
+
+    /// Integrates the bodies that have arrived, takes their beats and sends their results. Returns
+    /// the sums of the words received and sent, or `None` if the accelerator has to do it.
+    fn integrate(
+        &mut self,
+        accelerator: &mut Accelerator,
+        poses: &mut Segment,
+        results: &mut Results,
+        arrived: &mut Arrived<'_>,
+        outputs: &mut [Stream],
+    ) -> Option<[u32; 2]>;
+}
+
+/// Who takes records, if anybody does.
+pub(crate) type Deferral<'a> = Option<&'a mut (dyn Defer + 'static)>;
