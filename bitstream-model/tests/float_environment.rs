@@ -9,9 +9,9 @@ use pgs_interface::number::{Numbers, StreamFormat};
 use pgs_interface::profile::{HALF, Inertia, PROFILES, Profile};
 use pgs_support::float_env::foreign::{Environment, environments, under};
 
-use common::replaying::{Visible, scene, visible};
 use common::scene::{AT_REST, Body, Step};
 use common::sg::Machine;
+use common::shortcuts::{Visible, scene, visible};
 
 /// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
 const THESIS16: Numbers = Numbers {

@@ -7,10 +7,10 @@
 
 pub(crate) mod clock;
 pub(crate) mod packing;
-pub(crate) mod replaying;
 pub(crate) mod ring;
 pub(crate) mod scene;
 pub(crate) mod sg;
+pub(crate) mod shortcuts;
 pub(crate) mod windowed;
 
 use std::time::Duration;

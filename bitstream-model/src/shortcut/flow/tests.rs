@@ -88,7 +88,6 @@ fn periods_passed_over_give_what_each_slice_would_have_given() {
                 slices.iter().filter(tells).copied().collect()
             };
             assert_eq!(last(&gone_through.slices), last(&issues.slices), "{case}");
-            println!("{case}: {} of {}", gone_through.slices.len(), issues.slices.len());
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Steps that are seen with and without replaying, and what they are made of.
+//! Steps that are seen with the board's short cuts and without them, and the scenes of these steps.
 
 use bitstream_model::{BoardConfig, Counts, FaultPlan, PacketCount, RegisterAccess, ViolationKind};
 use pgs_interface::control;
@@ -12,11 +12,12 @@ use super::ring::WHOLE;
 use super::scene::{AT_REST, Body, Collision, Lane, STATIC, Step, bits};
 use super::sg::{Failure, Flight, Machine, Outcome};
 
-/// The designs that are replayed.
+/// The designs that have short cuts.
 pub(crate) const PROFILES: [&Profile; 3] = [&FLOAT, &HALF, &MIXED];
 
-/// And nobody's: two, three and six beats of a collision on each of three, two and one streams, one of
-/// which the bodies take the long way, one with narrow streams, and pairs of collisions otherwise.
+/// Designs of nobody that have short cuts too: two, three and six beats of a collision on each of
+/// three, two and one streams; one whose bodies have none; one with narrow streams; and one of pairs
+/// of collisions on other streams than `half`'s.
 pub(crate) const OTHERS: [&Profile; 6] =
     [&ON_THREE, &ON_TWO, &ON_ONE, &BODIES_APART, &NARROW, &PAIRS];
 
@@ -80,7 +81,7 @@ pub(crate) fn visible(outcome: &Outcome) -> Visible {
     )
 }
 
-/// Takes steps as `take` says, and resets everything after one that fails.
+/// Takes steps on a board of its own until one fails, and looks at everything.
 pub(crate) fn see(
     config: BoardConfig,
     plan: Option<&FaultPlan>,
@@ -126,19 +127,21 @@ pub(crate) fn see(
     }
 }
 
-/// The same with and without replaying, and on as many threads and lanes as there are.
+/// Takes steps on boards without short cuts and with them, on one thread and on two with lanes, and
+/// asserts that everybody sees the same of them: results, registers, counters, cycles, packets,
+/// violations and faults.
 pub(crate) fn same(
     config: BoardConfig,
     plan: Option<&FaultPlan>,
     steps: usize,
     mut take: impl FnMut(&mut Machine) -> Result<Outcome, Failure>,
 ) -> Seen {
-    let long = see(BoardConfig { shortcuts: false, ..config }, plan, steps, &mut take);
+    let reference = see(BoardConfig { shortcuts: false, ..config }, plan, steps, &mut take);
     for (threads, lanes) in [(1, false), (2, true)] {
-        let short = see(BoardConfig { threads, lanes, ..config }, plan, steps, &mut take);
-        assert_eq!(short, long);
+        let seen = see(BoardConfig { threads, lanes, ..config }, plan, steps, &mut take);
+        assert_eq!(seen, reference);
     }
-    long
+    reference
 }
 
 /// A number that depends on another one in no simple way.
@@ -155,8 +158,8 @@ pub(crate) fn unit(seed: u64, number: u64) -> f32 {
     whole / (1 << 23) as f32 - 1.0
 }
 
-/// Bodies of which every eighth is static, and collisions of any two that have one that moves: as they
-/// come, or so that a body comes again only after all others have.
+/// Bodies, every eighth one static, and collisions between any two unless both are static. Body B is
+/// random, or with `apart` comes again only after all others have.
 pub(crate) fn scene(bodies: u32, collisions: u32, seed: u64, apart: bool) -> Step {
     let body = |k: u32| {
         let of = |n: u64| unit(seed, 16 * u64::from(k) + n);
@@ -198,7 +201,7 @@ pub(crate) fn scene(bodies: u32, collisions: u32, seed: u64, apart: bool) -> Ste
     }
 }
 
-/// The same with contact points missing anywhere, where a design has a word for that.
+/// The step with contact points missing anywhere, where the design has a word for that.
 pub(crate) fn with_gaps(mut step: Step, seed: u64, profile: &Profile) -> Step {
     if profile.geometry == Geometry::Relative {
         for (n, collision) in (0..).zip(&mut step.collisions) {
@@ -217,8 +220,8 @@ pub(crate) fn below(random: u64, end: u32) -> u32 {
     u32::try_from(random % u64::from(end)).expect("less than the end")
 }
 
-/// Begins a step with a buffer for every packet, of which `change` may change the beats; returns the
-/// addresses of each stream's too.
+/// Begins a step with a buffer for every packet, whose beats `change` may change; returns the buffers'
+/// addresses too, stream by stream.
 pub(crate) fn begin(
     machine: &mut Machine,
     step: &Step,
@@ -248,7 +251,7 @@ pub(crate) fn begin(
     (flight, addresses)
 }
 
-/// Begins a step of which every pass takes the same buffers, so that it is replayed to its end.
+/// Begins a step whose passes all take the same buffers, so that its collisions are decoded once.
 pub(crate) fn begin_once(machine: &mut Machine, step: &Step) -> Flight {
     let variant = machine.host.variant();
     step.write_arguments(&machine.host);

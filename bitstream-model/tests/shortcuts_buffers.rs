@@ -1,5 +1,5 @@
-//! A pass is replayed only as long as it brings the bytes that the first one brought: other buffers,
-//! other bytes, buffers that change hands, packets that end elsewhere.
+//! A pass takes the collisions decoded in the first one only as long as it brings the same bytes: other
+//! buffers, other bytes, buffers that change hands, packets that end elsewhere.
 
 mod common;
 
@@ -10,10 +10,10 @@ use pgs_interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
 use pgs_interface::record::Beat;
 
 use common::packing::result_beats;
-use common::replaying::{PROFILES, Seen, begin, begin_once, large, same, scene, whole_length};
 use common::ring::WHOLE;
 use common::scene::Lane;
 use common::sg::{Failure, Flight, LONG};
+use common::shortcuts::{PROFILES, Seen, begin, begin_once, large, same, scene, whole_length};
 
 /// Where the first contact point of each collision is on the streams of a design, or of each issue.
 #[derive(Debug, Clone, Copy)]
