@@ -13,9 +13,9 @@ use super::records::segment::{PacketError, Segment};
 use crate::memory::Memory;
 use crate::stream::Stream;
 
-/// Records of the phase under way that have arrived, and what they lie in.
+/// Records of the phase under way that have arrived, and where their beats are.
 #[derive(Debug)]
-pub(crate) struct Arrived<'a> {
+pub(crate) struct ArrivedRecords<'a> {
     /// How many.
     pub(crate) records: usize,
     pub(crate) inputs: &'a mut [Stream],
@@ -42,7 +42,7 @@ pub(crate) trait Defer: fmt::Debug + Send {
         pass: u32,
         segment: &mut Segment,
         limit: u64,
-        arrived: Arrived<'_>,
+        arrived: ArrivedRecords<'_>,
     ) -> Result<Option<u64>, PacketError>;
 
     /// Computes what was put off: the passes before `pass`, and of `pass` the first `collisions`.
@@ -54,7 +54,7 @@ pub(crate) trait Defer: fmt::Debug + Send {
         &mut self,
         accelerator: &mut Accelerator,
         velocities: &mut Segment,
-        arrived: &mut Arrived<'_>,
+        arrived: &mut ArrivedRecords<'_>,
     ) -> Option<Result<u32, PacketError>>;
 
     /// Integrates the bodies that have arrived, takes their beats and sends their results. Returns
@@ -64,7 +64,7 @@ pub(crate) trait Defer: fmt::Debug + Send {
         accelerator: &mut Accelerator,
         poses: &mut Segment,
         results: &mut Results,
-        arrived: &mut Arrived<'_>,
+        arrived: &mut ArrivedRecords<'_>,
         outputs: &mut [Stream],
     ) -> Option<[u32; 2]>;
 }

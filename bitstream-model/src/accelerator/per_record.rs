@@ -1,5 +1,5 @@
-//! This file is what both flows do to one record: a body as it comes in, a collision in one pass, a body
-//! as it leaves.
+//! The work on one record, the same in both flows: a body as it comes in, a collision in one pass, a
+//! body as it leaves.
 
 use super::Accelerator;
 use super::arithmetic::inertia;
@@ -15,13 +15,13 @@ use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Inertia;
 use pgs_interface::record::velocity;
 
-/// The integer part, toward zero and stopped at the ends, as the accumulator takes it.
+/// Rounds toward zero and saturates, as the accumulator does.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 fn to_fixed(value: f64) -> u64 {
     value as u64
 }
 
-/// The normal impulses of a collision after the last contact pass, as they are counted.
+/// The sum of a collision's normal impulses after the last contact pass, as the accumulator adds it.
 #[inline]
 pub(crate) fn fixed_impulse<U: Format>(impulses: &Impulses) -> u64 {
     let sum = f64::from(solver::normal_sum::<U>(impulses));
@@ -45,7 +45,7 @@ impl Accelerator {
             numbers.map(|number| Number::<F>::new(number).value())
         }
         match (precision, self.config.subnormals) {
-            // What the arithmetic left, as it is.
+            // The array holds the arithmetic's results unchanged.
             (Precision::F32, _) => numbers,
             (Precision::Binary16, Subnormals::Keep) => rounded::<Half, N>(numbers),
             (Precision::Binary16, Subnormals::Flush) => rounded::<HalfFlushed, N>(numbers),
@@ -61,7 +61,7 @@ impl Accelerator {
         }
     }
 
-    /// The next velocity record, that of body `body`, as the on-chip arrays hold it.
+    /// Reads the velocity record of body `body`, which is next, as the on-chip arrays hold it.
     pub(super) fn arrival(
         &self,
         body: usize,
@@ -89,13 +89,13 @@ impl Accelerator {
                 beat: register(body),
             });
         };
-        // A static body's words are not looked at: thesis16 has none for 0.
+        // The words of a static body are ignored: thesis16 has none for 0.
         let moves = self.registers.shapes()[usize::from(shape)].inverse_mass != 0.0;
         let velocity = if moves { velocity } else { Velocity::default() };
         Ok(Arrival { velocity: self.stored_velocity(velocity), shape, inertia })
     }
 
-    /// Mass properties of a body of that shape; with world inertia its own.
+    /// Mass properties of a body: its shape's, with world inertia its own inertia.
     #[inline]
     pub(super) fn mass(&self, shape: u8, inertia: inertia::Stored) -> Mass {
         let shape = self.registers.shapes()[usize::from(shape)];
@@ -106,7 +106,7 @@ impl Accelerator {
         Mass { inverse_mass: shape.inverse_mass, inverse_inertia }
     }
 
-    /// What a pass does to one collision: velocities and impulses as they are written back.
+    /// Computes a pass over one collision: velocities and impulses become the ones written back.
     #[inline]
     pub(super) fn compute<R: Format, U: Format, I: inertia::Inertia>(
         &mut self,
@@ -137,7 +137,7 @@ impl Accelerator {
         *velocities = velocities.map(|velocity| self.stored_velocity(velocity));
     }
 
-    /// The state that a body leaves with.
+    /// The pose and velocity that a body leaves with.
     pub(super) fn integrated(
         &self,
         moves: bool,

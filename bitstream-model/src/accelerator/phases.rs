@@ -3,7 +3,7 @@
 use super::arithmetic::inertia::{self, Isotropic, World};
 use super::arithmetic::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
 use super::control::Arguments;
-use super::defer::{Arrived, Deferral};
+use super::defer::{ArrivedRecords, Deferral};
 use super::hazards::Entry;
 use super::records::array::{Array, Records};
 use super::records::decode::{self, Collision};
@@ -21,8 +21,9 @@ use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Geometry, Inertia, Variant};
 use pgs_interface::record::{CONTACT_POINTS, pose, result};
 
-/// Collisions that have arrived of a pass, and for how long they may enter.
-struct Solved<'a> {
+/// Collisions of a pass that have arrived, and for how many cycles they may enter.
+#[derive(Debug)]
+struct PassInput<'a> {
     number: u32,
     segment: &'a mut Segment,
     records: usize,
@@ -88,7 +89,7 @@ impl Accelerator {
         }
         segment.check(records, inputs)?;
         let before = segment.cycles();
-        let mut arrived = Arrived { records, inputs, memory };
+        let mut arrived = ArrivedRecords { records, inputs, memory };
         let deferred =
             deferral.as_deref_mut().and_then(|defer| defer.load(self, &mut segment, &mut arrived));
         let sum = match deferred {
@@ -176,7 +177,7 @@ impl Accelerator {
         segment.check(records, inputs)?;
         let deferred = match deferral.as_deref_mut().filter(|defer| defer.takes_collisions()) {
             Some(defer) => {
-                let arrived = Arrived { records, inputs, memory };
+                let arrived = ArrivedRecords { records, inputs, memory };
                 defer.collisions(self, number, &mut segment, limit, arrived)?
             }
             None => None,
@@ -207,55 +208,51 @@ impl Accelerator {
         limit: u64,
         inputs: &mut [Stream],
     ) -> Result<u64, PacketError> {
-        let mut arrived = Solved { number, segment, records, limit, inputs };
-        let arrived = &mut arrived;
+        let input = PassInput { number, segment, records, limit, inputs };
         match self.config.subnormals {
-            Subnormals::Keep => self.solve_of::<Single, Half>(arrived),
-            Subnormals::Flush => self.solve_of::<SingleFlushed, HalfFlushed>(arrived),
+            Subnormals::Keep => self.solve_of::<Single, Half>(input),
+            Subnormals::Flush => self.solve_of::<SingleFlushed, HalfFlushed>(input),
         }
     }
 
-    fn solve_of<S: Format, H: Format>(
-        &mut self,
-        arrived: &mut Solved<'_>,
-    ) -> Result<u64, PacketError> {
+    fn solve_of<S: Format, H: Format>(&mut self, input: PassInput<'_>) -> Result<u64, PacketError> {
         let numbers = self.variant.numbers;
         match (numbers.updates, numbers.rows) {
             // Rows that need more than the updates have: the configuration refuses them.
-            (Precision::Binary16, _) => self.solve_with::<H, H>(arrived),
-            (Precision::F32, Precision::Binary16) => self.solve_with::<H, S>(arrived),
-            (Precision::F32, Precision::F32) => self.solve_with::<S, S>(arrived),
+            (Precision::Binary16, _) => self.solve_with::<H, H>(input),
+            (Precision::F32, Precision::Binary16) => self.solve_with::<H, S>(input),
+            (Precision::F32, Precision::F32) => self.solve_with::<S, S>(input),
         }
     }
 
     fn solve_with<R: Format, U: Format>(
         &mut self,
-        arrived: &mut Solved<'_>,
+        input: PassInput<'_>,
     ) -> Result<u64, PacketError> {
         match self.variant.inertia {
-            Inertia::Isotropic => self.solve_all::<R, U, Isotropic>(arrived),
-            Inertia::World => self.solve_all::<R, U, World>(arrived),
+            Inertia::Isotropic => self.solve_all::<R, U, Isotropic>(input),
+            Inertia::World => self.solve_all::<R, U, World>(input),
         }
     }
 
     fn solve_all<R: Format, U: Format, I: inertia::Inertia>(
         &mut self,
-        arrived: &mut Solved<'_>,
+        input: PassInput<'_>,
     ) -> Result<u64, PacketError> {
-        let Solved { number, segment, records: available, limit, inputs } = arrived;
+        let PassInput { number, segment, records: available, limit, inputs } = input;
         let profile = self.variant.profile;
         let interval = u64::from(profile.initiation_interval);
         let per_issue = profile.collisions_per_issue as usize;
         let mut cycles = 0;
         let mut records = 0;
         let mut reader = segment.reader(0, inputs);
-        while records < *available && cycles <= *limit {
-            let issue = (*available - records).min(per_issue);
+        while records < available && cycles <= limit {
+            let issue = (available - records).min(per_issue);
             let first = segment.done + records;
             for index in first..first + issue {
                 let collision = self.collision(&mut reader);
                 let now = self.clock + cycles;
-                let stall = self.solve::<R, U, I>(*number, index, now, &collision)?;
+                let stall = self.solve::<R, U, I>(number, index, now, &collision)?;
                 cycles += stall;
                 self.counters.stalls += stall;
             }
@@ -376,7 +373,7 @@ impl Accelerator {
         poses.check(records, inputs)?;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
-        let mut arrived = Arrived { records, inputs, memory };
+        let mut arrived = ArrivedRecords { records, inputs, memory };
         let deferred = deferral.and_then(|defer| {
             defer.integrate(self, &mut poses, &mut results, &mut arrived, outputs)
         });

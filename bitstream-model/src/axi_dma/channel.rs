@@ -103,12 +103,12 @@ impl Channel {
         }
     }
 
-    /// Drops what it is doing.
+    /// Drops its work.
     pub(super) fn stop(&mut self) {
         self.work = Work::None;
     }
 
-    /// Whether it has nothing to do.
+    /// Whether it has no work.
     pub(super) fn rests(&self) -> bool {
         matches!(self.work, Work::None)
     }
@@ -133,7 +133,7 @@ impl Channel {
         matches!(self.transition, Some((_, Transition::Halt)))
     }
 
-    /// Puts off what it is about to show.
+    /// Puts off the transition under way.
     pub(super) fn halt_later(&mut self, cycles: u64) {
         if let Some((at, _)) = &mut self.transition {
             *at = at.saturating_add(cycles);
@@ -278,7 +278,7 @@ impl Channel {
         let (core, direction) = (build.core, self.direction);
         let mask = u32::MAX >> (32 - build.length_width);
         if self.halted {
-            // All ones, and the 0 that undoes it, are how a driver learns the register's width.
+            // A driver writes all ones, then 0, to learn the register's width.
             self.length = value & mask;
             if value != u32::MAX && value != 0 {
                 log.violation(ViolationKind::DoorbellWhileHalted { core, direction });

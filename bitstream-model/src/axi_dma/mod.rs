@@ -59,7 +59,7 @@ pub struct PacketCount {
     pub descriptors: u32,
 }
 
-/// What the cores' engines have done, for the observer.
+/// What the engines of all cores have done, for the observer.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Moved {
     /// The packets of this step.
@@ -69,7 +69,7 @@ pub(crate) struct Moved {
     pub(crate) descriptors: u64,
 }
 
-/// What the engines move beats with.
+/// Everything outside a core that its engines need to move beats.
 pub(crate) struct Surroundings<'a> {
     pub(crate) memory: &'a mut Memory,
     pub(crate) log: &'a mut Log,
@@ -92,7 +92,7 @@ pub(crate) struct Core {
 impl Core {
     pub(crate) fn new(core: usize, config: &BoardConfig) -> Self {
         let profile = config.profile;
-        // A core whose other direction has no stream: any number will do.
+        // A direction without a stream never moves a beat: any number will do.
         let shift =
             |widths: &[u32]| widths.get(core).map_or(0, |width| beat_cycles(*width).ilog2());
         let build = Build {
@@ -180,7 +180,7 @@ impl Core {
         Some(doorbell)
     }
 
-    /// Lets the states change that change by time alone.
+    /// Changes the states that change by time alone.
     pub(crate) fn tick(&mut self, now: u64) {
         if self.reset_until.is_some_and(|until| until <= now) {
             self.reset_until = None;

@@ -1,8 +1,8 @@
 //! The engine of a channel: it fetches descriptors, moves beats and writes status back.
 //!
-//! An engine moves at most one beat a clock, what its port can carry; on a stream of less than 128
-//! bits a beat takes several. It keeps a clock of its own that follows the board's, so that a stretch
-//! of many clocks is moved in a few block copies.
+//! An engine moves at most one beat a clock, as its port does; on a stream of less than 128 bits a beat
+//! takes several clocks. It keeps a clock of its own that follows the board's, so that it moves the
+//! beats of many clocks in a few block copies.
 
 use super::channel::{Channel, Descriptor, Work};
 use super::faults::Next;
@@ -24,10 +24,10 @@ use pgs_interface::register::Field;
 pub(super) const BEAT: u32 = BEAT_BYTES as u32;
 const KEYHOLE_BEATS: usize = 1;
 
-/// What a descriptor or transfer still has.
+/// The rest of a descriptor or transfer.
 #[derive(Debug, Clone, Copy)]
 struct Part {
-    /// Where it goes on.
+    /// The address of its next beat.
     at: u64,
     /// Bytes.
     left: u32,
@@ -35,13 +35,13 @@ struct Part {
     last: bool,
 }
 
-/// What became of beats that were to be moved.
+/// The outcome of an attempt to move beats.
 #[derive(Debug, Clone, Copy)]
 enum Transferred {
     Nothing,
-    /// None, and something has happened.
+    /// None were moved, but the state of the channel changed.
     Stopped,
-    /// So many were moved; whether the packet ended with them.
+    /// `n` were moved; whether the packet ended with them.
     Beats {
         n: usize,
         ended: bool,
@@ -177,7 +177,7 @@ impl Channel {
         (left.div_ceil(BEAT) as usize).min(clocks).min(stream_beats).min(limit).min(keyhole)
     }
 
-    /// Moves up to `n` beats of a descriptor or transfer, as far as no fault comes up.
+    /// Moves up to `n` beats of a descriptor or transfer, until a fault is due.
     fn beats(
         &mut self,
         build: &Build,
@@ -221,8 +221,8 @@ impl Channel {
         Transferred::Beats { n, ended }
     }
 
-    /// Moves `n` beats, of which the first word has the bits of `mask` inverted. Returns whether the
-    /// packet ended, or `None` on an error, which has been dealt with.
+    /// Moves `n` beats and inverts the bits of `mask` in their first word. Returns whether the packet
+    /// ended, or `None` after an error, on which the channel has failed.
     fn transfer(
         &mut self,
         build: &Build,
@@ -294,7 +294,7 @@ impl Channel {
         Some(whole && last)
     }
 
-    /// MM2S: puts beats on the stream that stay where they are, if they cannot change there.
+    /// MM2S: puts beats on the stream by reference, if nobody can change them in their buffer.
     fn refer(
         &self,
         at: u64,
@@ -318,7 +318,7 @@ impl Channel {
         }
     }
 
-    /// An access to data has failed: the descriptor says so, if it can, and the channel.
+    /// An access to data has failed: reports it in the descriptor, if that can be written, and fails.
     fn data_error(
         &mut self,
         build: &Build,
@@ -328,7 +328,7 @@ impl Channel {
     ) {
         if let Work::Descriptor(bd) = self.work {
             let word = status.put(bd.moved, 1);
-            // The channel fails anyway; whether the descriptor can tell is of no matter.
+            // The channel fails anyway, whether or not the status could be written.
             let _ = with.memory.write_word(bd.address + 4 * STATUS as u64, word);
         }
         self.fail(build, dmasr.mask());
@@ -403,8 +403,8 @@ impl Channel {
         });
     }
 
-    /// A packet may end before its buffer does. What the descriptor would have let the device write
-    /// beyond must be granted all the same: the next packet could be longer.
+    /// A packet may end before its buffer does. The device must be granted the rest of the buffer all
+    /// the same: the next packet could be longer.
     fn check_rest(&self, build: &Build, bd: &Descriptor, with: &mut Surroundings<'_>) {
         if self.direction == Direction::Mm2s || bd.moved == bd.length {
             return;
@@ -470,7 +470,7 @@ impl Channel {
         }
     }
 
-    /// Writes the status of a descriptor; whether it could.
+    /// Writes the status of a descriptor; returns whether it could.
     pub(super) fn put_status(
         &mut self,
         build: &Build,
@@ -486,7 +486,7 @@ impl Channel {
         false
     }
 
-    /// Takes account of a packet that has ended.
+    /// Counts a packet that has ended, and ends the faults that last as long as it.
     fn packet_ended(&mut self, build: &Build, with: &mut Surroundings<'_>) {
         let (core, direction) = (build.core, self.direction);
         let (beats, descriptors) = (self.beats, self.descriptors);

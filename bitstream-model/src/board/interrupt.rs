@@ -3,7 +3,7 @@
 /// The interrupt line and the kernel's view of it.
 #[derive(Debug, Default)]
 pub(crate) struct InterruptLine {
-    /// What the sources give, and what of it arrives.
+    /// The level of the sources, and the level that arrives at the processor.
     source: bool,
     level: bool,
     /// Until when a rising edge is withheld by a fault; forever means until the line falls.
@@ -18,12 +18,12 @@ pub(crate) struct InterruptLine {
 }
 
 impl InterruptLine {
-    /// Whether that level of the sources is a rising edge.
+    /// Whether the level `source` would be a rising edge of the sources.
     pub(crate) fn rises(&self, source: bool) -> bool {
         source && !self.source
     }
 
-    /// Keeps the edge that comes next back until then.
+    /// Withholds the next edge until then.
     pub(crate) fn withhold(&mut self, until: u64) {
         self.withheld = Some(until);
     }
@@ -33,7 +33,7 @@ impl InterruptLine {
         self.spurious = self.spurious.saturating_add(times);
     }
 
-    /// Sets the level that the sources give.
+    /// Sets the level of the sources.
     pub(crate) fn set(&mut self, source: bool, now: u64) {
         self.source = source;
         if !source || self.withheld.is_some_and(|until| until <= now) {
@@ -44,12 +44,12 @@ impl InterruptLine {
         self.level = level;
     }
 
-    /// When a level that is withheld arrives.
+    /// When a withheld level arrives.
     pub(crate) fn next_event(&self) -> Option<u64> {
         self.withheld
     }
 
-    /// The level that arrives.
+    /// The level that arrives at the processor.
     pub(crate) fn level(&self) -> bool {
         self.level
     }

@@ -1,8 +1,9 @@
-//! This file is an AXI4-Stream with a FIFO of 128-bit beats: beats, TLAST, back-pressure.
+//! An AXI4-Stream with a FIFO of 128-bit beats: beats, TLAST, back-pressure.
 //!
 //! A narrower stream carries a beat in several cycles; that is the mover's and the accelerator's
-//! business, here a beat is a beat. A beat is in the FIFO itself, or what is there says from which
-//! buffer it comes: the bytes are then looked at where they are, if anybody wants them.
+//! business, here a beat is a beat. The FIFO holds a beat itself, or a reference to the buffer that
+//! the beat comes from: a receiver that wants the bytes reads them there.
+
 pub(crate) mod span;
 
 use std::collections::VecDeque;
@@ -23,7 +24,7 @@ pub(crate) struct Stream {
     /// Beat numbers that carry TLAST, and those with invalid bytes (TKEEP).
     lasts: VecDeque<u64>,
     partials: VecDeque<u64>,
-    /// Beats that are not in the ring, in order.
+    /// References to beats that are not in the ring, in order.
     spans: Spans,
 }
 
@@ -82,7 +83,7 @@ impl Stream {
         index(number & (self.ring.len() as u64 - 1))
     }
 
-    /// Puts beats in; there must be space for them.
+    /// Puts beats in, for which there must be space.
     pub(crate) fn push(&mut self, beats: &[Beat]) {
         assert!(beats.len() <= self.space(), "the sender looks at the space first");
         self.copy_in(self.put, beats);
@@ -97,27 +98,30 @@ impl Stream {
         self.ring[..beats.len() - first].copy_from_slice(&beats[first..]);
     }
 
-    /// Puts beats in that stay where they are. Of those that are taken again at once there may be
-    /// more than the FIFO has space for.
+    /// Puts beats in by reference: they stay where they are. They may exceed the space if the excess
+    /// is taken again at once.
     pub(crate) fn push_span(&mut self, source: Source, count: usize) {
         self.spans.push(self.put, count as u64, source);
         self.put += count as u64;
     }
 
-    /// How many of the next beats, of at most `most` from `ahead` places behind the front on, are
-    /// together in a buffer, and where the first of them is; or how many are in the FIFO itself.
+    /// The first piece of the `most` beats from `ahead` places behind the front on: its length, and
+    /// where it lies if it lies in a buffer and not in the FIFO itself.
     pub(crate) fn piece(&self, ahead: usize, most: usize) -> (usize, Option<Source>) {
         let first = self.taken + ahead as u64;
         self.spans.piece(first, (first + most as u64).min(self.put))
     }
 
-    /// Copies the next `beats` beats into the FIFO, as far as they are elsewhere.
+    /// Copies the next `beats` beats into the FIFO, where it holds references to them.
     pub(crate) fn fetch(&mut self, beats: usize, memory: &Memory) {
         let end = self.taken + (beats as u64).min(self.put - self.taken);
         while let Some(span) = self.spans.front().filter(|span| span.first < end) {
             let end = span.end().min(end);
             let from = memory.view(span.source, index(end - span.first));
-            debug_assert!(from.is_some(), "whoever takes a buffer back fetches its beats first");
+            debug_assert!(
+                from.is_some(),
+                "the board fetches the beats of a buffer before it gives it back"
+            );
             if let Some(from) = from {
                 self.copy_in(span.first, from);
             }
@@ -125,7 +129,7 @@ impl Stream {
         }
     }
 
-    /// Whether beats are elsewhere.
+    /// Whether it holds references.
     pub(crate) fn refers(&self) -> bool {
         !self.spans.is_empty()
     }
@@ -145,7 +149,7 @@ impl Stream {
         self.partials.push_back(self.put - 1);
     }
 
-    /// The beat `ahead` places behind the front; it must be in the FIFO itself.
+    /// The beat `ahead` places behind the front; the FIFO must hold the beat itself.
     #[inline]
     pub(crate) fn peek(&self, ahead: usize) -> Beat {
         debug_assert!(ahead < self.len(), "the receiver looks at the length first");
@@ -162,8 +166,8 @@ impl Stream {
         self.partials.front().map(|number| index(number - self.taken))
     }
 
-    /// Takes `beats` beats out, with their marks; the sum of their words, which must be in the FIFO
-    /// itself.
+    /// Takes `beats` beats out, with their marks, and returns the sum of their words. The FIFO must
+    /// hold the beats themselves.
     pub(crate) fn take_sum(&mut self, beats: usize) -> u32 {
         assert!(beats <= self.len(), "the receiver looks at the length first");
         let at = self.slot(self.taken);

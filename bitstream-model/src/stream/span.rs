@@ -1,12 +1,12 @@
-//! This file keeps account of beats that are still in the buffers that they come from: which numbers
-//! they have on their stream, and where they are.
+//! References to beats that are still in their buffers: the beats' numbers on their stream, and where
+//! they lie.
 
 use std::collections::VecDeque;
 
 use crate::cast::index;
 use crate::memory::Source;
 
-/// Beats one after the other, on the stream as in their buffer.
+/// Consecutive beats, on the stream as in their buffer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Span {
     /// The number of the first one.
@@ -20,13 +20,13 @@ impl Span {
         self.first + self.count
     }
 
-    /// Where the beat of that number is, which is one of them.
+    /// Where the beat of that number lies; it must be one of the span.
     pub(crate) fn at(&self, number: u64) -> Source {
         self.source.further(number - self.first)
     }
 }
 
-/// Spans in the order of their numbers, with gaps where beats are elsewhere.
+/// Spans in the order of their numbers, with gaps where the stream holds the beats itself.
 #[derive(Debug, Default)]
 pub(crate) struct Spans(VecDeque<Span>);
 
@@ -51,8 +51,8 @@ impl Spans {
         }
     }
 
-    /// How many of the beats from number `first` to `end` are together in a buffer, and where the
-    /// first of them is; or how many are not in any.
+    /// The first piece of the beats from number `first` to `end`: its length, and where it lies if it
+    /// lies in a buffer.
     pub(crate) fn piece(&self, first: u64, end: u64) -> (usize, Option<Source>) {
         let place = self.0.partition_point(|span| span.end() <= first);
         let (end, source) = match self.0.get(place) {
@@ -63,7 +63,7 @@ impl Spans {
         (index(end.saturating_sub(first)), source)
     }
 
-    /// Whether all the beats from that number on are there, and come from there.
+    /// Whether `count` beats from number `first` on lie one after the other from `source` on.
     pub(crate) fn holds(&self, first: u64, count: usize, source: Source) -> bool {
         self.piece(first, first + count as u64) == (count, Some(source))
     }
@@ -82,7 +82,7 @@ impl Spans {
         }
     }
 
-    /// The first ones.
+    /// The first span.
     pub(crate) fn front(&self) -> Option<Span> {
         self.0.front().copied()
     }

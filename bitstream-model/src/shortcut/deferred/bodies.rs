@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use super::Deferred;
 use crate::accelerator::Accelerator;
 use crate::accelerator::control::Arguments;
-use crate::accelerator::defer::Arrived;
+use crate::accelerator::defer::ArrivedRecords;
 use crate::accelerator::records::array::Row;
 use crate::accelerator::records::decode;
 use crate::accelerator::records::results::Results;
@@ -29,27 +29,27 @@ use pgs_interface::control::ErrorCode;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{Beat, LANES, WORD_LANE, velocity};
 
-/// The beats of some bodies on each stream, where they are.
+/// Beats of bodies in their buffers, stream by stream.
 pub(crate) type Views<'a> = [&'a [Beat]; STREAMS_MAX];
 
 /// Bodies that a thread loads at once.
 const LOADED_TOGETHER: usize = 2048;
 
-// Whatever shape the table has fits, so that a body is refused only if `bodies_known` has found it.
+// Every shape of the table fits into a byte: a body is refused only where `bodies_with_shape` ends.
 const _: () = assert!(SHAPES_MAX <= 1 << u8::BITS);
 
-/// Beats of the results of bodies on each stream.
+/// Beats of the results of `bodies` on each stream.
 pub(crate) fn beats_of_results(turns: Turns, bodies: Range<usize>) -> PerStream {
     let [before, after] = [bodies.start, bodies.end].map(|body| turns.counts(ROWS_OUT * body));
     std::array::from_fn(|k| after[k] - before[k])
 }
 
-/// Bodies after which streams that take turns begin again.
+/// Bodies after which the next one begins with stream 0 again.
 pub(crate) const fn period(streams: usize) -> usize {
     if streams.is_multiple_of(ROWS_IN) { streams / ROWS_IN } else { streams }
 }
 
-/// Two rows of each of some bodies, of which the views begin with body `first`.
+/// Velocities or poses, two rows a body, in their buffers. The views begin with body `first`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyRows<'a> {
     pub(crate) views: Views<'a>,
@@ -58,7 +58,7 @@ pub(crate) struct BodyRows<'a> {
 }
 
 impl BodyRows<'_> {
-    /// Beats on each stream before those of the views.
+    /// Beats on each stream before the views.
     pub(crate) fn before(&self) -> PerStream {
         self.turns.counts(ROWS_IN * self.first)
     }
@@ -72,8 +72,8 @@ impl BodyRows<'_> {
         })
     }
 
-    /// Loads bodies from `first` on; the sum of the words of their rows, and the first body that has no
-    /// shape.
+    /// Loads the bodies from `first` on. Returns the sum of their words, and the first body whose shape
+    /// is not in the table.
     fn load(
         &self,
         first: usize,
@@ -89,7 +89,7 @@ impl BodyRows<'_> {
         }
     }
 
-    /// The same from so many streams.
+    /// [`load`](Self::load) with the number of streams known when this is compiled.
     fn load_from<const STREAMS: usize>(
         &self,
         first: usize,
@@ -119,7 +119,7 @@ impl BodyRows<'_> {
                     wrong = wrong.into_iter().chain([first + body]).min();
                     continue;
                 };
-                // A static body's words are not looked at.
+                // The words of a static body are ignored.
                 let moves = mass.inverse_mass != 0.0;
                 velocities[body] = if moves { loaded } else { Velocity::default() };
                 shape_of[body] = shape;
@@ -128,7 +128,7 @@ impl BodyRows<'_> {
         (sum.into_iter().fold(0, u32::wrapping_add), wrong)
     }
 
-    /// The first of so many bodies from the first one on that has a shape which is not there.
+    /// The first of the next `bodies` bodies whose shape is not among `shapes`.
     fn without_shape(&self, bodies: usize, shapes: usize) -> Option<usize> {
         let (period, before) = (period(self.turns.streams), self.before());
         let stride = period * ROWS_IN / self.turns.streams;
@@ -153,7 +153,7 @@ impl Deferred {
     pub(super) fn rows_of_next<'a>(
         &self,
         segment: &Segment,
-        Arrived { records, inputs, memory }: &Arrived<'a>,
+        ArrivedRecords { records, inputs, memory }: &ArrivedRecords<'a>,
     ) -> Option<BodyRows<'a>> {
         let turns = self.bodies()?;
         let counts = segment.beats_of_next(*records);

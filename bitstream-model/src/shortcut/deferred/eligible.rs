@@ -1,4 +1,4 @@
-//! This file says which designs can be replayed, and how their collisions and bodies lie on the streams.
+//! Which designs have short cuts, and how their collisions and bodies lie on the streams.
 
 use crate::accelerator::records::striping::{PerStream, Striping, Turns};
 use crate::config::{BoardConfig, Hazards, Subnormals, beat_cycles};
@@ -11,27 +11,27 @@ use pgs_interface::stripe::{Stripe, Stripes};
 /// Beats of an issue, at most.
 pub(crate) const BEATS_MAX: usize = collision::ROWS;
 
-/// Where the beats of each issue are, the same for all of them.
+/// How issues and bodies lie on the streams of a design that has short cuts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Layout {
     pub(crate) format: StreamFormat,
-    /// Of all arithmetic.
+    /// The precision of all arithmetic.
     pub(crate) precision: Precision,
-    /// Collisions that enter together: an issue, but for the last one, of which padding is a part. Of
-    /// two, records are in world coordinates and sixteen bits.
+    /// Collisions of an issue; padding completes the last issue. Where it is two, records are in
+    /// world coordinates and sixteen bits.
     pub(crate) together: usize,
-    /// Beats of an issue on each stream; every stream of the design has some.
+    /// Beats of an issue on each stream: some on every stream of the design.
     pub(crate) share: PerStream,
-    /// The stream of each beat, and its number among the issue's there.
+    /// The stream of each beat of an issue, and the beat's number among the issue's beats there.
     pub(crate) places: [(usize, usize); BEATS_MAX],
-    /// Whether a batch takes the beats as they are.
+    /// Whether a batch takes the beats as they are, without conversion.
     pub(crate) in_place: bool,
-    /// How velocities, poses and results lie on the streams, if all of them in turn.
+    /// How velocities, poses and results lie on the streams, if all three take turns on them.
     pub(crate) bodies: Option<Turns>,
 }
 
 impl Layout {
-    /// That of a design that can be replayed.
+    /// The layout of a design, if it has short cuts.
     pub(crate) fn of(config: &BoardConfig) -> Option<Self> {
         let variant = config.variant();
         let (profile, numbers) = (variant.profile, variant.numbers);
@@ -53,7 +53,7 @@ impl Layout {
         let rows_per_beat = (u32::BITS / format.bits()) as usize;
         let beats = rows / rows_per_beat;
         let group = profile.stripes.collisions.streams.len();
-        // Every issue begins with a beat and with a group.
+        // Every issue begins at a beat and at a group.
         let alike = rows.is_multiple_of(rows_per_beat) && beats.is_multiple_of(group);
         let as_it_is = (geometry, format) == (Geometry::Absolute, StreamFormat::F32);
         let known = match together {
@@ -98,11 +98,11 @@ mod tests {
 
     #[test]
     fn collisions_of_float_are_taken_as_they_are_and_those_of_mixed_are_translated() {
-        let float = layout(&FLOAT).expect("it can be replayed");
+        let float = layout(&FLOAT).expect("it has short cuts");
         assert!(float.in_place);
         assert_eq!(float.bodies, Some(Turns { streams: 4 }));
         assert_eq!(float.share, [2, 2, 2, 1]);
-        let mixed = layout(&MIXED).expect("it can be replayed");
+        let mixed = layout(&MIXED).expect("it has short cuts");
         assert!(!mixed.in_place);
         assert_eq!(mixed.bodies, Some(Turns { streams: 3 }));
         assert_eq!(mixed.share, [1, 1, 1, 0]);
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn issues_of_half_are_translated_and_its_bodies_go_the_long_way() {
-        let half = layout(&HALF).expect("it can be replayed");
+        let half = layout(&HALF).expect("it has short cuts");
         assert_eq!((half.in_place, half.together, half.precision), (false, 2, Precision::Binary16));
         assert_eq!((half.share, half.bodies), ([3, 3, 1, 0], None));
         let on = |stream| [(stream, 0), (stream, 1), (stream, 2)];
@@ -138,12 +138,12 @@ mod tests {
         };
         static FEWER_OUT: Profile = Profile { s2mm_widths: &[128; 2], ..MIXED };
         for profile in [&APART, &PADDED, &FEWER_OUT] {
-            let layout = layout(profile).expect("its collisions can be replayed");
+            let layout = layout(profile).expect("its collisions have short cuts");
             assert_eq!(layout.bodies, None, "{:?}", profile.stripes);
         }
     }
 
-    /// What a design must have, one by one.
+    /// Each condition on a design, one by one.
     #[test]
     fn others_go_the_long_way() {
         for profile in [&NAIVE, &WINDOWED, &WINDOWED16] {

@@ -12,7 +12,7 @@ mod passes;
 
 use crate::accelerator::Accelerator;
 use crate::accelerator::control::Shape;
-use crate::accelerator::defer::{Arrived, Defer};
+use crate::accelerator::defer::{ArrivedRecords, Defer};
 use crate::accelerator::records::results::Results;
 use crate::accelerator::records::segment::{PacketError, Segment};
 use crate::accelerator::records::striping::STREAMS_MAX;
@@ -74,7 +74,7 @@ impl Defer for Deferred {
         pass: u32,
         segment: &mut Segment,
         limit: u64,
-        arrived: Arrived<'_>,
+        arrived: ArrivedRecords<'_>,
     ) -> Result<Option<u64>, PacketError> {
         self.take_collisions(accelerator, pass, segment, limit, arrived)
     }
@@ -87,7 +87,7 @@ impl Defer for Deferred {
         &mut self,
         accelerator: &mut Accelerator,
         velocities: &mut Segment,
-        arrived: &mut Arrived<'_>,
+        arrived: &mut ArrivedRecords<'_>,
     ) -> Option<Result<u32, PacketError>> {
         let rows = self.rows_of_next(velocities, arrived)?;
         let sum = self.load_rows(accelerator, arrived.records, rows);
@@ -102,7 +102,7 @@ impl Defer for Deferred {
         accelerator: &mut Accelerator,
         poses: &mut Segment,
         results: &mut Results,
-        arrived: &mut Arrived<'_>,
+        arrived: &mut ArrivedRecords<'_>,
         outputs: &mut [Stream],
     ) -> Option<[u32; 2]> {
         let rows = self.rows_of_next(poses, arrived)?;

@@ -4,7 +4,7 @@
 use super::Deferred;
 use super::decode_once::Coming;
 use crate::accelerator::Accelerator;
-use crate::accelerator::defer::Arrived;
+use crate::accelerator::defer::ArrivedRecords;
 use crate::accelerator::records::segment::{PacketError, Segment};
 use crate::accelerator::records::striping::PerStream;
 use crate::memory::Memory;
@@ -32,7 +32,7 @@ impl Deferred {
         pass: u32,
         segment: &mut Segment,
         limit: u64,
-        Arrived { records: arrived, inputs, memory }: Arrived<'_>,
+        ArrivedRecords { records: arrived, inputs, memory }: ArrivedRecords<'_>,
     ) -> Result<Option<u64>, PacketError> {
         self.decode_ahead(accelerator, pass, segment, inputs, &Coming::default(), memory);
         let decoded = &self.decoded;

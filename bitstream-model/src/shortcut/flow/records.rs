@@ -33,7 +33,7 @@ pub(super) struct Issues<'a> {
     pub(super) done: usize,
 }
 
-/// Whole issues that the FIFOs hold, of which each has so many beats on each input.
+/// Whole issues that the FIFOs hold, of `share` beats on each input.
 pub(super) fn issues_held(share: &PerStream, held: &PerEngine) -> usize {
     let mut issues = usize::MAX;
     for k in 0..STREAMS_MAX {
@@ -67,8 +67,8 @@ impl Records for Issues<'_> {
     }
 }
 
-/// Bodies that come alive, or leave with their results, on streams that take turns. How many streams
-/// there are is known when this is compiled: it divides every count of beats.
+/// Bodies that are loaded, or leave with their results, on streams that take turns. The number of
+/// streams divides every count of beats: it is a constant.
 #[derive(Debug)]
 pub(super) struct Bodies<const STREAMS: usize> {
     /// Bodies of the phase before the flow.
@@ -80,8 +80,7 @@ pub(super) struct Bodies<const STREAMS: usize> {
 impl<const STREAMS: usize> Bodies<STREAMS> {
     const TURNS: Turns = Turns { streams: STREAMS };
 
-    /// What `count` comes to for some bodies: of the rows up to the last one without those before the
-    /// first one.
+    /// `count` of the rows before the first of some bodies, and of the rows up to the last one.
     fn rows<T>(
         &self,
         first: usize,
