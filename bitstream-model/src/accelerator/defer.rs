@@ -1,5 +1,5 @@
-//! The seam through which a step's arithmetic can be put off: somebody else takes the records that
-//! have arrived, and computes what they come to before anybody can see it.
+//! The seam through which a step's arithmetic can be deferred: a short cut takes the records that have
+//! arrived, and computes their results before anybody can see them.
 //!
 //! The accelerator goes on keeping account of phases, packets and cycles. Without a [`Defer`] it
 //! computes every record as it takes it; with one, nothing but the time of the host may differ.
@@ -30,7 +30,7 @@ pub(crate) trait Defer: fmt::Debug + Send {
     /// Whether the collisions of the step under way are still taken.
     fn takes_collisions(&self) -> bool;
 
-    /// A pass begins, with a hazard window of so many issue slots.
+    /// A pass begins, with a hazard window of `slots` issue slots.
     fn begin_pass(&mut self, slots: u64);
 
     /// Takes collisions of a pass for up to `limit` cycles: the next ones of `segment`. Returns the
@@ -45,7 +45,7 @@ pub(crate) trait Defer: fmt::Debug + Send {
         arrived: ArrivedRecords<'_>,
     ) -> Result<Option<u64>, PacketError>;
 
-    /// Computes what was put off: the passes before `pass`, and of `pass` the first `collisions`.
+    /// Computes everything deferred: the passes before `pass`, and the first `collisions` of `pass`.
     fn compute(&mut self, accelerator: &mut Accelerator, pass: u32, collisions: usize);
 
     /// Loads the bodies that have arrived, and takes their beats. Returns the sum of the words, or
@@ -69,5 +69,5 @@ pub(crate) trait Defer: fmt::Debug + Send {
     ) -> Option<[u32; 2]>;
 }
 
-/// Who takes records, if anybody does.
+/// The short cut that takes records, if the board has one.
 pub(crate) type Deferral<'a> = Option<&'a mut (dyn Defer + 'static)>;

@@ -221,8 +221,8 @@ impl Accelerator {
         (self.debt == 0 && !self.hung).then_some(&self.phase)
     }
 
-    /// Cycles have passed, of which it waited for some, and have brought it to that place of the
-    /// phase under way.
+    /// Lets cycles pass at once, `waits` of them for want of beats or space. `phase` is the phase under
+    /// way as it is afterwards.
     pub(crate) fn pass_over(&mut self, cycles: u64, waits: u64, phase: Phase) {
         self.clock += cycles;
         self.counters.waits += waits;
@@ -276,7 +276,7 @@ impl Accelerator {
                     let deferral = deferral.as_deref_mut();
                     self.integrate(poses, results, inputs, outputs, memory, deferral)
                 }
-                // It has worked on what has arrived.
+                // All that has arrived is worked on.
                 Phase::Window if ran.cycles > 0 => break,
                 Phase::Window => self.windowed(left, inputs, outputs),
                 Phase::Ending => {
@@ -365,7 +365,7 @@ impl Accelerator {
         self.end_step();
     }
 
-    /// Lets what was put off be computed before the pass under way ends for good.
+    /// Lets the deferred passes be computed before the pass under way fails.
     fn compute_deferred(&mut self, deferral: Deferral<'_>) {
         if let (Phase::Pass { number, segment }, Some(defer)) = (self.phase, deferral) {
             defer.compute(self, number, segment.done);

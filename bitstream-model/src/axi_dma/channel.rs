@@ -1,4 +1,4 @@
-//! The registers of one DMA channel and what reading and writing them does.
+//! The registers of one DMA channel and the side effects of reading and writing them.
 
 use super::Build;
 use super::faults::Faulty;

@@ -17,9 +17,9 @@ pub(super) struct Faulty {
     pub(super) stalled: bool,
     /// Clocks more for each beat.
     pub(super) slow: u32,
-    /// MM2S: the packet has ended on the stream, what is left of it is dropped.
+    /// MM2S: the packet has ended on the stream; the rest of it is dropped.
     pub(super) cut: bool,
-    /// S2MM: the packet has ended in memory, what is left of it is dropped.
+    /// S2MM: the packet has ended in memory; the rest of it is dropped.
     pub(super) discards: bool,
     /// A beat with TLAST is still to follow the packet.
     pub(super) extra: bool,
@@ -141,7 +141,7 @@ impl Channel {
         }
     }
 
-    /// Goes on with what faults have begun; whether anything changed.
+    /// Goes on with the effects of earlier faults; returns whether anything changed.
     pub(super) fn settle(
         &mut self,
         build: &Build,

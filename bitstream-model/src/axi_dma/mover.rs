@@ -158,7 +158,7 @@ impl Channel {
         }
     }
 
-    /// Beats that can be moved now: those that begin before `end`.
+    /// The number of beats that can be moved now and begin before `end`.
     fn portion(&self, build: &Build, left: u32, end: u64, limit: usize, stream: &Stream) -> usize {
         let shift = self.beat_shift(build);
         let last = (1 << shift) - 1;

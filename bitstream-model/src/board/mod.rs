@@ -46,7 +46,7 @@ pub struct Counts {
     pub beats_written: u64,
     /// Descriptors completed.
     pub descriptors: u64,
-    /// Violations, also those of which no record was kept.
+    /// Violations, recorded in the log or not.
     pub violations: u64,
     /// Clock cycles since the board was built.
     pub cycles: u64,
@@ -68,7 +68,7 @@ pub(crate) struct Board {
     faults: Faults,
     /// The programmable logic has lost its power.
     powerless: bool,
-    /// Another design was loaded; what its IDENTIFICATION reads.
+    /// The IDENTIFICATION of another design, if one was loaded.
     other_design: Option<u32>,
     counts: Counts,
     arbiter: Arbiter,
@@ -142,8 +142,7 @@ impl Board {
         &self.moved.packets
     }
 
-    /// Applies the faults of the board as a whole that are due, also those of a register access if
-    /// there is one now.
+    /// Applies the due faults of the board as a whole, with the ones of a register access if `access`.
     fn apply_due_faults(&mut self, access: bool) {
         match self.faults.of_board(access) {
             Some(FaultKind::PowerLost) => self.powerless = true,

@@ -10,7 +10,7 @@ use crate::axi_dma::{Core, Moved};
 use crate::memory::Memory;
 use crate::stream::Stream;
 
-/// Puts off the accelerator's arithmetic, and lets undisturbed time pass at once.
+/// Defers the accelerator's arithmetic, and lets undisturbed time pass at once.
 pub(crate) trait ShortCut: Defer {
     /// Lets whole slices of a stretch pass, as long as nothing but beats and records flows in them.
     /// Returns the cycles that have passed, and everything in the stretch is as it is after them.

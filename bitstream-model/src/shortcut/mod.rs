@@ -14,3 +14,20 @@ pub(crate) fn of(config: &BoardConfig) -> Option<Box<dyn ShortCut>> {
     let layout = Layout::of(config).filter(|_| config.shortcuts)?;
     Some(Box::new(Deferred::new(config, layout)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
+
+    #[test]
+    fn designs_that_are_known_have_short_cuts_unless_these_are_switched_off() {
+        for (profile, known) in
+            [(&FLOAT, true), (&HALF, true), (&MIXED, true), (&NAIVE, false), (&WINDOWED, false)]
+        {
+            let config = BoardConfig { profile, ..BoardConfig::default() };
+            assert_eq!(of(&config).is_some(), known, "{}", profile.name);
+            assert!(of(&BoardConfig { shortcuts: false, ..config }).is_none(), "{}", profile.name);
+        }
+    }
+}

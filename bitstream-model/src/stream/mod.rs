@@ -21,7 +21,7 @@ pub(crate) struct Stream {
     /// Beats taken out and put in since reset.
     taken: u64,
     put: u64,
-    /// Beat numbers that carry TLAST, and those with invalid bytes (TKEEP).
+    /// Numbers of the beats with TLAST, and of the beats with invalid bytes (TKEEP).
     lasts: VecDeque<u64>,
     partials: VecDeque<u64>,
     /// References to beats that are not in the ring, in order.

@@ -146,7 +146,7 @@ impl BodyRows<'_> {
 impl Deferred {
     /// How bodies lie on the streams, if they can be taken from their buffers and put into them.
     pub(crate) fn bodies(&self) -> Option<Turns> {
-        self.decoded.layout.bodies.filter(|_| self.on)
+        self.decoded.layout.bodies.filter(|_| self.active)
     }
 
     /// The rows of the bodies that have arrived, if they are all in their buffers.

@@ -23,7 +23,7 @@ pub(crate) type Coming = [Option<(Source, usize)>; STREAMS_MAX];
 #[derive(Debug)]
 pub(super) struct Decoded {
     pub(super) layout: Layout,
-    /// Translates collisions into those that the batch takes in, unless it takes them as they are.
+    /// Converts records into the format of the batch; `None` if they come in it.
     translation: Option<Translation>,
     pub(super) batch: Batch,
     /// Mass properties of each shape.
@@ -75,7 +75,7 @@ impl Decoded {
         self.layout.together
     }
 
-    /// Issues of so many collisions, the last one with padding.
+    /// The number of issues that `collisions` fill, the last one with padding.
     pub(super) fn issues(&self, collisions: usize) -> usize {
         collisions.div_ceil(self.together())
     }
@@ -100,8 +100,8 @@ impl Decoded {
         self.refused
     }
 
-    /// Decodes the collisions on the streams and those about to come behind them. The segment says
-    /// which collisions of the first pass are next.
+    /// Decodes the collisions on the streams and the ones about to come behind them. The segment
+    /// says which collisions of the first pass are next.
     pub(super) fn decode_ahead(
         &mut self,
         segment: &Segment,
@@ -180,7 +180,7 @@ impl Decoded {
         }
     }
 
-    /// The sum of all words of some collisions, of which the first begins an issue.
+    /// The sum of all words of `records` collisions. The first one begins an issue.
     pub(super) fn sum(&self, first: usize, records: usize) -> u32 {
         self.sums[first + records].wrapping_sub(self.sums[first])
     }

@@ -30,8 +30,8 @@ pub(super) use passes::Ahead;
 /// A step whose collisions are decoded once and whose passes are computed later.
 #[derive(Debug)]
 pub(super) struct Deferred {
-    /// Whether the step has brought nothing so far but what was decoded.
-    on: bool,
+    /// Whether the step under way has brought nothing but decoded collisions so far.
+    active: bool,
     decoded: Decoded,
     entered: Entered,
     /// Passes that were computed.
@@ -43,7 +43,7 @@ pub(super) struct Deferred {
 impl Deferred {
     pub(super) fn new(config: &BoardConfig, layout: Layout) -> Self {
         Self {
-            on: true,
+            active: true,
             decoded: Decoded::new(config, layout),
             entered: Entered::new(layout.together, config.profile.initiation_interval.into()),
             computed: 0,
@@ -54,14 +54,14 @@ impl Deferred {
 
 impl Defer for Deferred {
     fn begin_step(&mut self, collisions: usize, shapes: &[Shape]) -> bool {
-        self.on = true;
+        self.active = true;
         self.computed = 0;
         self.decoded.begin_step(collisions, shapes);
         true
     }
 
     fn takes_collisions(&self) -> bool {
-        self.on
+        self.active
     }
 
     fn begin_pass(&mut self, slots: u64) {

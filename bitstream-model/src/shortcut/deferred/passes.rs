@@ -25,7 +25,7 @@ pub(crate) struct Ahead {
 }
 
 impl Deferred {
-    /// Takes collisions that have arrived, for up to `limit` cycles, if they are those decoded.
+    /// Takes collisions that have arrived, for up to `limit` cycles, if they are the decoded ones.
     pub(super) fn take_collisions(
         &mut self,
         accelerator: &mut Accelerator,
@@ -61,7 +61,7 @@ impl Deferred {
         let enters = records % together != 0 || cycles <= limit;
         if let Some(error) = refused.filter(|_| records == known && enters) {
             self.compute_to(accelerator, pass, segment.done + records);
-            self.on = false;
+            self.active = false;
             return Err(error);
         }
         self.take_beats(accelerator, segment, records, inputs);
@@ -134,7 +134,7 @@ impl Deferred {
         pass: u32,
         collisions: usize,
     ) {
-        if !self.on {
+        if !self.active {
             return;
         }
         let contact = accelerator.arguments.contact_iterations;
@@ -170,7 +170,7 @@ impl Deferred {
         for (index, impulses) in impulses.iter_mut().enumerate().take(known) {
             *impulses = self.decoded.batch.impulses(index);
         }
-        self.on = false;
+        self.active = false;
         for stream in inputs {
             stream.fetch(stream.len(), memory);
         }
@@ -209,8 +209,8 @@ impl Deferred {
         })
     }
 
-    /// Whole issues enter from that clock on, of which the first is issue `first` behind the next
-    /// collision `done`. Returns the cycles that they take.
+    /// Whole issues enter from that clock on. The first one is number `first` behind collision `done`.
+    /// Returns the cycles that they take.
     pub(crate) fn issues_enter(
         &mut self,
         accelerator: &mut Accelerator,

@@ -1,10 +1,10 @@
 //! Counts beats that flow undisturbed instead of moving them one by one.
 //!
-//! A [`Flow`] does what `Board::advance` does, with everything left out that can happen in between:
-//! slice by slice the accelerator takes the records that are there, then the engines go on for as
-//! long as that took. It comes to the same numbers to the beat. `records.rs` says what taking
-//! records means in each phase, `periods.rs` passes over what recurs, `fast_forward.rs` begins a flow
-//! on a board and makes the board as it is after it.
+//! A [`Flow`] is `Board::advance` without everything that disturbs it: slice by slice the accelerator
+//! takes the records that are there, then the engines go on for as long as that took. It agrees with
+//! `Board::advance` to the beat. `records.rs` takes the records of each phase, `periods.rs` passes over
+//! periods that recur, `fast_forward.rs` begins a flow on a board and makes the board as it is
+//! afterwards.
 
 mod fast_forward;
 mod periods;
@@ -24,7 +24,7 @@ type PerEngine = [usize; 2 * STREAMS_MAX];
 /// What stays the same.
 #[derive(Debug, Clone, Copy)]
 struct Rules {
-    /// Cores, of which each has an input and an output.
+    /// The number of cores.
     cores: usize,
     /// Binary logarithm of the cycles that a beat takes on each input; on an output it takes one.
     beat_shift: [u32; STREAMS_MAX],

@@ -91,7 +91,7 @@ impl Periods {
 fn fitting(flow: &Flow, period: &Flowed, records: &impl Records, last: usize) -> u64 {
     let Flow { rules, limits: Limits { cycles, records: most, beats }, flowed, .. } = flow;
     let slice = STARVED_CYCLES.max(records.cycles_max(0, rules.depth));
-    // The slices of the periods are those of `Flow::slice`, which must not find a limit in them.
+    // `Flow::slice` must not meet a limit in any slice of these periods.
     let fits = |limit: u64, flowed: u64, slice: u64, period: u64| {
         limit.saturating_sub(flowed + slice + 1).checked_div(period)
     };

@@ -18,8 +18,7 @@ pub(super) trait Records {
     /// The beats that records take from each input, and give to each output.
     fn beats(&self, first: usize, records: usize) -> (PerStream, PerStream);
 
-    /// The accelerator takes records, so many cycles after the flow began; returns the cycles that
-    /// they take.
+    /// The accelerator takes records `cycles` after the flow began; returns the cycles that they take.
     fn enter(&mut self, first: usize, records: usize, cycles: u64) -> u64;
 }
 

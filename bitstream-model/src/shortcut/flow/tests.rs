@@ -10,7 +10,7 @@ const OF_FLOAT: Design = (&FLOAT, [2, 2, 2, 1], [0; STREAMS_MAX]);
 const OF_HALF: Design = (&HALF, [3, 3, 1, 0], [0, 0, 1, 0]);
 const OF_MIXED: Design = (&MIXED, [1, 1, 1, 0], [0; STREAMS_MAX]);
 
-/// Issues of a pass of which each takes the design's interval, and the slices that took some.
+/// Issues that each take the design's interval, and the slices in which they were taken.
 struct Even {
     share: PerStream,
     interval: u64,
