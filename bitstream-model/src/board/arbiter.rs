@@ -29,7 +29,7 @@ pub(crate) struct Arbiter {
 }
 
 /// What one stretch of cycles leaves to the next.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Turn {
     /// What the memory can still deliver at once.
     credit: u64,

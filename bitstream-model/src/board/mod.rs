@@ -13,7 +13,6 @@ use self::bus::Target;
 use self::interrupt::InterruptLine;
 use self::short_cut::{ShortCut, Stretch};
 use crate::accelerator::Accelerator;
-use crate::accelerator::defer::Defer;
 use crate::axi_dma::{Core, Moved, PacketCount, Surroundings};
 use crate::config::BoardConfig;
 use crate::config::quirks::InterruptWiring;
@@ -277,8 +276,7 @@ impl Board {
                 self.moved.packets.clear();
             }
             let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
-            let deferral =
-                self.short_cut.as_deref_mut().map(|short_cut| short_cut as &mut dyn Defer);
+            let deferral = self.short_cut.as_mut().map(|short_cut| short_cut.defer());
             let (faults, memory) = (&mut self.faults, &self.memory);
             let ran = self.accelerator.run(limit, inputs, outputs, faults, memory, deferral);
             let waits = ran.cycles == 0;
@@ -400,7 +398,7 @@ impl Board {
             log: &mut self.log,
             moved: &mut self.moved,
             faults: &mut self.faults,
-            by_reference: self.short_cut.as_ref().is_some_and(|of| of.takes_collisions()),
+            by_reference: self.short_cut.as_mut().is_some_and(|of| of.defer().takes_collisions()),
         };
         self.cores[number].run(direction, start, end, limit, stream, &mut with)
     }

@@ -3,6 +3,8 @@
 //! A board without a [`ShortCut`] is the reference: it moves beats and computes records slice by
 //! slice. One with a short cut must show the same to everybody who looks.
 
+use std::fmt;
+
 use super::arbiter::{Arbiter, Turn};
 use crate::accelerator::Accelerator;
 use crate::accelerator::defer::Defer;
@@ -11,7 +13,10 @@ use crate::memory::Memory;
 use crate::stream::Stream;
 
 /// Defers the accelerator's arithmetic, and lets undisturbed time pass at once.
-pub(crate) trait ShortCut: Defer {
+pub(crate) trait ShortCut: fmt::Debug + Send {
+    /// The accelerator's part of the short cut.
+    fn defer(&mut self) -> &mut (dyn Defer + 'static);
+
     /// Lets whole slices of a stretch pass, as long as nothing but beats and records flows in them.
     /// Returns the cycles that have passed, and everything in the stretch is as it is after them.
     fn fast_forward(&mut self, stretch: Stretch<'_>) -> u64;

@@ -8,11 +8,12 @@ use crate::board::short_cut::ShortCut;
 use crate::config::BoardConfig;
 use deferred::Deferred;
 use deferred::eligible::Layout;
+use flow::fast_forward::FastForward;
 
 /// The short cut of a board, if it is to have one and its design is known to it.
 pub(crate) fn of(config: &BoardConfig) -> Option<Box<dyn ShortCut>> {
     let layout = Layout::of(config).filter(|_| config.shortcuts)?;
-    Some(Box::new(Deferred::new(config, layout)))
+    Some(Box::new(FastForward::new(Deferred::new(config, layout))))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Lets a stretch of a board's time pass at once: counts what flows in it, then makes the board as it
 //! is afterwards.
 
+use super::periods::Periods;
 use super::records::{Bodies, Issues};
 use super::{Flow, FlowState, Flowed, Limits, PerEngine, Rules};
 use crate::accelerator::Phase;
@@ -18,13 +19,34 @@ use pgs_interface::axi_dma::Direction;
 /// how many.
 type Sources = [(Source, usize); STREAMS_MAX];
 
-impl ShortCut for Deferred {
+/// The short cut of a board: deferred arithmetic, and stretches of time that pass at once.
+#[derive(Debug)]
+pub(crate) struct FastForward {
+    deferred: Deferred,
+    /// What is known of how collisions flow.
+    periods: Periods,
+}
+
+impl FastForward {
+    pub(crate) fn new(deferred: Deferred) -> Self {
+        Self { deferred, periods: Periods::new() }
+    }
+}
+
+impl ShortCut for FastForward {
+    fn defer(&mut self) -> &mut (dyn Defer + 'static) {
+        &mut self.deferred
+    }
+
     fn fast_forward(&mut self, stretch: Stretch<'_>) -> u64 {
+        let Self { deferred, periods } = self;
         let Some(phase) = stretch.accelerator.undisturbed() else { return 0 };
         let passed = match *phase {
-            Phase::Pass { number, segment } => collisions(self, stretch, number, segment),
-            Phase::Load(segment) => bodies(self, stretch, segment, None),
-            Phase::Integrate { poses, results } => bodies(self, stretch, poses, Some(results)),
+            Phase::Pass { number, segment } => {
+                collisions(deferred, periods, stretch, number, segment)
+            }
+            Phase::Load(segment) => bodies(deferred, stretch, segment, None),
+            Phase::Integrate { poses, results } => bodies(deferred, stretch, poses, Some(results)),
             _ => None,
         };
         passed.unwrap_or(0)
@@ -71,6 +93,12 @@ fn pass_cores(stretch: &mut Stretch<'_>, flow: &Flow) {
     *stretch.turn = flow.state.turn;
 }
 
+/// Whether the outputs are empty, and no S2MM does anything as long as they are.
+fn outputs_rest(Stretch { now, cores, outputs, .. }: &Stretch<'_>) -> bool {
+    outputs.iter().all(|stream| stream.len() == 0)
+        && cores.iter().all(|core| core.rests_without_beats(*now))
+}
+
 /// The beats about to come to each input, if its MM2S does nothing but move them.
 fn coming(Stretch { now, cores, memory, .. }: &Stretch<'_>) -> Option<Coming> {
     let mut coming = Coming::default();
@@ -84,14 +112,13 @@ fn coming(Stretch { now, cores, memory, .. }: &Stretch<'_>) -> Option<Coming> {
 /// Lets the collisions of a pass flow; returns the cycles that have passed.
 fn collisions(
     deferred: &mut Deferred,
+    periods: &mut Periods,
     mut stretch: Stretch<'_>,
     number: u32,
     mut segment: Segment,
 ) -> Option<u64> {
     let now = stretch.now;
-    let results_rest = stretch.outputs.iter().all(|stream| stream.len() == 0)
-        && stretch.cores.iter().all(|core| core.rests_without_beats(now));
-    if !results_rest || !deferred.takes_collisions() {
+    if !outputs_rest(&stretch) || !deferred.takes_collisions() {
         return None;
     }
     let coming = coming(&stretch)?;
@@ -108,7 +135,7 @@ fn collisions(
     let accelerator = &mut *stretch.accelerator;
     let mut issues = Issues { accelerator, deferred, ahead, done: segment.done };
     match last {
-        Some(last) => flow.run_evenly(&mut issues, last),
+        Some(last) => flow.run_evenly(&mut issues, last, periods),
         None => flow.run(&mut issues),
     }
     let Flowed { cycles, waits, records, .. } = flow.flowed;
@@ -132,6 +159,9 @@ fn bodies(
     results: Option<Results>,
 ) -> Option<u64> {
     let turns = deferred.bodies()?;
+    if results.is_none() && !outputs_rest(&stretch) {
+        return None;
+    }
     let coming = coming(&stretch)?;
     let sources = sources(&stretch, &coming)?;
     let mut limits = Limits {
@@ -147,8 +177,6 @@ fn bodies(
             let (at, beats) = core.undisturbed(Direction::S2mm, stretch.now)?;
             stretch.memory.may_write(at, beats).then_some(())?;
             (writes[k].0, limits.beats[2 * k + 1]) = (at, beats);
-        } else if !core.rests_without_beats(stretch.now) {
-            return None;
         }
     }
     if results.is_none() {
@@ -157,12 +185,16 @@ fn bodies(
         limits.records = limits.records.min(good);
     }
     let mut flow = begin(&stretch, limits);
-    let (done, given) = (segment.done, results.is_some());
-    match turns.streams {
-        4 => flow.run(&mut Bodies::<4> { done, results: given }),
-        3 => flow.run(&mut Bodies::<3> { done, results: given }),
-        2 => flow.run(&mut Bodies::<2> { done, results: given }),
-        _ => flow.run(&mut Bodies::<1> { done, results: given }),
+    let done = segment.done;
+    match (turns.streams, results.is_some()) {
+        (4, false) => flow.run(&mut Bodies::<4, false> { done }),
+        (4, true) => flow.run(&mut Bodies::<4, true> { done }),
+        (3, false) => flow.run(&mut Bodies::<3, false> { done }),
+        (3, true) => flow.run(&mut Bodies::<3, true> { done }),
+        (2, false) => flow.run(&mut Bodies::<2, false> { done }),
+        (2, true) => flow.run(&mut Bodies::<2, true> { done }),
+        (_, false) => flow.run(&mut Bodies::<1, false> { done }),
+        (_, true) => flow.run(&mut Bodies::<1, true> { done }),
     }
     let Flowed { cycles, waits, records, beats } = flow.flowed;
     if cycles == 0 {

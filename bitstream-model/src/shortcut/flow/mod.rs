@@ -6,7 +6,7 @@
 //! periods that recur, `fast_forward.rs` begins a flow on a board and makes the board as it is
 //! afterwards.
 
-mod fast_forward;
+pub(super) mod fast_forward;
 mod periods;
 mod records;
 #[cfg(test)]
@@ -52,7 +52,7 @@ struct Flowed {
 }
 
 /// What decides how the flow goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct FlowState {
     /// Beats in the FIFO of each engine, to or from the accelerator.
     held: PerEngine,
@@ -78,8 +78,8 @@ impl Flow {
 
     /// The same for records that always take equally long. Whole periods are passed over, but not
     /// the last `last` records.
-    fn run_evenly(&mut self, records: &mut impl Records, last: usize) {
-        let mut periods = Periods::default();
+    fn run_evenly(&mut self, records: &mut impl Records, last: usize, periods: &mut Periods) {
+        periods.begin();
         while !periods.pass_over(self, records, last) {
             if self.slice(records).is_none() {
                 return;
@@ -91,7 +91,7 @@ impl Flow {
     /// One slice: the accelerator takes the records that are there, then the engines go on for as
     /// long as that took. Nothing, and no change, if a limit could be reached in it.
     #[inline(always)]
-    fn slice(&mut self, records: &mut impl Records) -> Option<()> {
+    fn slice<R: Records>(&mut self, records: &mut R) -> Option<()> {
         let Self { rules, limits, state, flowed } = self;
         let first = flowed.records;
         let ready = records.ready(first, &state.held, rules.depth);
@@ -104,15 +104,19 @@ impl Flow {
             let (taken, given) = records.beats(first, ready);
             for k in 0..STREAMS_MAX {
                 held[2 * k] -= taken[k];
-                held[2 * k + 1] += given[k];
+                if R::RESULTS {
+                    held[2 * k + 1] += given[k];
+                }
             }
         }
+        let reached =
+            |engine: usize, most| most > 0 && flowed.beats[engine] + most >= limits.beats[engine];
         for k in 0..rules.cores {
-            for (engine, most) in [(2 * k, rules.depth - held[2 * k]), (2 * k + 1, held[2 * k + 1])]
+            let (input, output) = (2 * k, 2 * k + 1);
+            if reached(input, rules.depth - held[input])
+                || R::RESULTS && reached(output, held[output])
             {
-                if most > 0 && flowed.beats[engine] + most >= limits.beats[engine] {
-                    return None;
-                }
+                return None;
             }
         }
         let cycles = if ready == 0 {
@@ -125,9 +129,9 @@ impl Flow {
         flowed.records += ready;
         flowed.cycles += cycles;
         if rules.beat_shift == [0; STREAMS_MAX] {
-            self.move_beats::<false>(cycles);
+            self.move_beats::<R, false>(cycles);
         } else {
-            self.move_beats::<true>(cycles);
+            self.move_beats::<R, true>(cycles);
         }
         Some(())
     }
@@ -135,7 +139,7 @@ impl Flow {
     /// Lets the engines move beats for that many cycles. Without `NARROW` streams every beat takes a
     /// cycle.
     #[inline(always)]
-    fn move_beats<const NARROW: bool>(&mut self, cycles: u64) {
+    fn move_beats<R: Records, const NARROW: bool>(&mut self, cycles: u64) {
         let Rules { cores, beat_shift, depth, arbiter } = self.rules;
         let FlowState { held, ahead, turn } = &mut self.state;
         let mut room = PerEngine::default();
@@ -150,7 +154,9 @@ impl Flow {
                 most
             };
             room[2 * k] = most_in.min(depth - held[2 * k]);
-            room[2 * k + 1] = most.min(held[2 * k + 1]);
+            if R::RESULTS {
+                room[2 * k + 1] = most.min(held[2 * k + 1]);
+            }
         }
         let mut left = room;
         arbiter.share(turn, cycles, |engine, limit| {
@@ -159,15 +165,19 @@ impl Flow {
             moved
         });
         for k in 0..cores {
-            let moved = [room[2 * k] - left[2 * k], room[2 * k + 1] - left[2 * k + 1]];
-            held[2 * k] += moved[0];
-            held[2 * k + 1] -= moved[1];
+            let (input, output) = (2 * k, 2 * k + 1);
+            let moved = room[input] - left[input];
+            held[input] += moved;
+            self.flowed.beats[input] += moved;
             if NARROW {
-                let busy = ahead[k] + ((moved[0] as u64) << beat_shift[k]);
+                let busy = ahead[k] + ((moved as u64) << beat_shift[k]);
                 ahead[k] = busy.saturating_sub(cycles);
             }
-            self.flowed.beats[2 * k] += moved[0];
-            self.flowed.beats[2 * k + 1] += moved[1];
+            if R::RESULTS {
+                let moved = room[output] - left[output];
+                held[output] -= moved;
+                self.flowed.beats[output] += moved;
+            }
         }
     }
 }

@@ -1,27 +1,28 @@
 //! Passes over whole periods of a flow whose state recurs.
 //!
 //! What flows settles soon: FIFOs, the memory's credit and its turns come to the same state again, and
-//! from then on the same slices follow.
+//! from then on the same slices follow. A period that is found serves the flows after it, which settle
+//! in the same way as a rule.
 
 use super::records::Records;
 use super::{Flow, FlowState, Flowed, Limits};
 use crate::board::STARVED_CYCLES;
 use crate::cast::index;
 
-/// A state that the flow may come to again (Brent's algorithm: it is looked out for twice as long
-/// each time).
+/// The most slices of a period.
+const SLICES_MAX: usize = 1 << 11;
+
+/// Finds periods (by Brent's algorithm) in flows of one kind of record on one board.
 #[derive(Debug)]
 pub(super) struct Periods {
+    /// The states of the last period found, sorted, and what flows in it.
+    known: Vec<FlowState>,
+    period: Flowed,
+    /// A state of this flow that may recur.
     seen: Option<(FlowState, Flowed)>,
-    /// Slices since then, and after how many of them a newer state is taken.
-    since: usize,
+    /// The states from it on, and after how many a newer one is looked out for.
+    since: Vec<FlowState>,
     patience: usize,
-}
-
-impl Default for Periods {
-    fn default() -> Self {
-        Self { seen: None, since: 0, patience: 1 }
-    }
 }
 
 impl Flowed {
@@ -35,54 +36,72 @@ impl Flowed {
         }
     }
 
-    /// The same `times` over.
-    fn times(&self, times: u64) -> Self {
+    /// This, and then `period` some `times` over.
+    fn with(&self, period: &Self, times: u64) -> Self {
         let n = index(times);
         Self {
-            cycles: times * self.cycles,
-            waits: times * self.waits,
-            records: n * self.records,
-            beats: self.beats.map(|beats| n * beats),
-        }
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        Self {
-            cycles: self.cycles + other.cycles,
-            waits: self.waits + other.waits,
-            records: self.records + other.records,
-            beats: std::array::from_fn(|k| self.beats[k] + other.beats[k]),
+            cycles: self.cycles + times * period.cycles,
+            waits: self.waits + times * period.waits,
+            records: self.records + n * period.records,
+            beats: std::array::from_fn(|k| self.beats[k] + n * period.beats[k]),
         }
     }
 }
 
 impl Periods {
+    /// Nothing is known. All memory is allocated here: a step allocates none.
+    pub(super) fn new() -> Self {
+        Self {
+            known: Vec::with_capacity(SLICES_MAX),
+            period: Flowed::default(),
+            seen: None,
+            since: Vec::with_capacity(SLICES_MAX),
+            patience: 1,
+        }
+    }
+
+    /// A flow begins.
+    pub(super) fn begin(&mut self) {
+        self.seen = None;
+        self.patience = 1;
+    }
+
     /// Passes over the periods that fit before the limits, but not over the last `last` records, as
-    /// soon as a period is known. Returns whether it is.
+    /// soon as the flow is in a period. Returns whether it is.
     pub(super) fn pass_over(
         &mut self,
         flow: &mut Flow,
         records: &impl Records,
         last: usize,
     ) -> bool {
-        let Some((state, flowed)) = &self.seen else {
-            self.seen = Some((flow.state, flow.flowed));
+        let met = self.known.binary_search(&flow.state).is_ok();
+        if !met && !self.recurs(flow) {
             return false;
-        };
-        if *state == flow.state {
-            let period = flow.flowed.since(flowed);
-            let times = fitting(flow, &period, records, last);
-            flow.flowed = flow.flowed.plus(&period.times(times));
-            return true;
         }
-        self.since += 1;
-        if self.since == self.patience {
-            *self = Self {
-                seen: Some((flow.state, flow.flowed)),
-                since: 0,
-                patience: 2 * self.patience,
-            };
+        let times = fitting(flow, &self.period, records, last);
+        flow.flowed = flow.flowed.with(&self.period, times);
+        true
+    }
+
+    /// Whether the state of a flow has recurred for the first time: then the period is known.
+    fn recurs(&mut self, flow: &Flow) -> bool {
+        match &self.seen {
+            Some((state, flowed)) if *state == flow.state => {
+                self.period = flow.flowed.since(flowed);
+                std::mem::swap(&mut self.known, &mut self.since);
+                self.known.sort_unstable();
+                return true;
+            }
+            Some(_) if self.since.len() < self.patience => {}
+            // Each time it waits twice as long for the same state.
+            _ if self.patience < SLICES_MAX => {
+                self.seen = Some((flow.state, flow.flowed));
+                self.since.clear();
+                self.patience *= 2;
+            }
+            _ => return false,
         }
+        self.since.push(flow.state);
         false
     }
 }

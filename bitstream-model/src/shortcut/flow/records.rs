@@ -8,6 +8,9 @@ use crate::shortcut::deferred::{Ahead, Deferred};
 /// Records that flow one after the other: the bodies of a phase, or the issues of a pass. They are
 /// numbered from the first one of the flow.
 pub(super) trait Records {
+    /// Whether records give beats to the outputs; if not, these are empty.
+    const RESULTS: bool;
+
     /// How many records can be taken, from record `first` on: the FIFOs hold all their beats, and
     /// have room for the beats that they give.
     fn ready(&self, first: usize, held: &PerEngine, depth: usize) -> usize;
@@ -44,6 +47,8 @@ pub(super) fn issues_held(share: &PerStream, held: &PerEngine) -> usize {
 }
 
 impl Records for Issues<'_> {
+    const RESULTS: bool = false;
+
     #[inline(always)]
     fn ready(&self, _first: usize, held: &PerEngine, _depth: usize) -> usize {
         issues_held(&self.ahead.share, held)
@@ -69,14 +74,12 @@ impl Records for Issues<'_> {
 /// Bodies that are loaded, or leave with their results, on streams that take turns. The number of
 /// streams divides every count of beats: it is a constant.
 #[derive(Debug)]
-pub(super) struct Bodies<const STREAMS: usize> {
+pub(super) struct Bodies<const STREAMS: usize, const RESULTS: bool> {
     /// Bodies of the phase before the flow.
     pub(super) done: usize,
-    /// Whether each gives a result.
-    pub(super) results: bool,
 }
 
-impl<const STREAMS: usize> Bodies<STREAMS> {
+impl<const STREAMS: usize, const RESULTS: bool> Bodies<STREAMS, RESULTS> {
     const TURNS: Turns = Turns { streams: STREAMS };
 
     /// `count` of the rows before the first of some bodies, and of the rows up to the last one.
@@ -96,13 +99,15 @@ impl<const STREAMS: usize> Bodies<STREAMS> {
     }
 }
 
-impl<const STREAMS: usize> Records for Bodies<STREAMS> {
+impl<const STREAMS: usize, const RESULTS: bool> Records for Bodies<STREAMS, RESULTS> {
+    const RESULTS: bool = RESULTS;
+
     #[inline(always)]
     fn ready(&self, first: usize, held: &PerEngine, depth: usize) -> usize {
         let body = self.done + first;
         let came = Self::TURNS.counts(ROWS_IN * body);
         let there = Self::TURNS.contiguous(|k| came[k] + held[2 * k]) / ROWS_IN - body;
-        if !self.results {
+        if !RESULTS {
             return there;
         }
         let went = Self::TURNS.counts(ROWS_OUT * body);
@@ -113,7 +118,7 @@ impl<const STREAMS: usize> Records for Bodies<STREAMS> {
     /// A row a cycle on each stream: a result takes longer than its pose.
     #[inline(always)]
     fn cycles_max(&self, first: usize, records: usize) -> u64 {
-        let rows = if self.results { ROWS_OUT } else { ROWS_IN };
+        let rows = if RESULTS { ROWS_OUT } else { ROWS_IN };
         let [before, after] = self.rows(first, records, rows, |rows| Self::TURNS.cycles(rows));
         after - before
     }
@@ -121,7 +126,7 @@ impl<const STREAMS: usize> Records for Bodies<STREAMS> {
     #[inline(always)]
     fn beats(&self, first: usize, records: usize) -> (PerStream, PerStream) {
         let given =
-            if self.results { self.beats_of(first, records, ROWS_OUT) } else { [0; STREAMS_MAX] };
+            if RESULTS { self.beats_of(first, records, ROWS_OUT) } else { [0; STREAMS_MAX] };
         (self.beats_of(first, records, ROWS_IN), given)
     }
 
