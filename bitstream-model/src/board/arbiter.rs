@@ -58,7 +58,7 @@ impl Arbiter {
     #[inline(always)]
     pub(crate) fn share(
         &self,
-        Turn { credit, engine }: &mut Turn,
+        turn: &mut Turn,
         cycles: u64,
         mut burst: impl FnMut(usize, usize) -> usize,
     ) -> bool {
@@ -68,21 +68,20 @@ impl Arbiter {
             }
             return false;
         };
-        *credit = (*credit).min(reserve).saturating_add(cycles.saturating_mul(income));
+        let mut credit = turn.credit.min(reserve).saturating_add(cycles.saturating_mul(income));
+        let mut engine = turn.engine;
         let mut without_beats = 0;
-        while without_beats < self.engines {
-            if *credit < beat_cost {
-                return true;
-            }
-            // The division is left out where it is not needed: this is called often.
-            let whole = *credit >= BURST_BEATS * beat_cost;
-            let beats = if whole { BURST_BEATS } else { *credit / beat_cost };
-            let moved = burst(*engine, index(beats));
-            *credit -= moved as u64 * beat_cost;
-            *engine = if *engine + 1 == self.engines { 0 } else { *engine + 1 };
+        while without_beats < self.engines && credit >= beat_cost {
+            // A division takes long, and is seldom needed.
+            let whole = credit >= BURST_BEATS * beat_cost;
+            let beats = if whole { BURST_BEATS } else { credit / beat_cost };
+            let moved = burst(engine, index(beats));
+            credit -= moved as u64 * beat_cost;
+            engine = if engine + 1 == self.engines { 0 } else { engine + 1 };
             without_beats = if moved == 0 { without_beats + 1 } else { 0 };
         }
-        false
+        *turn = Turn { credit, engine };
+        without_beats < self.engines
     }
 }
 

@@ -99,22 +99,13 @@ impl Flow {
         if flowed.cycles + longest >= limits.cycles || first + ready >= limits.records {
             return None;
         }
-        let mut held = state.held;
-        if ready > 0 {
-            let (taken, given) = records.beats(first, ready);
-            for k in 0..STREAMS_MAX {
-                held[2 * k] -= taken[k];
-                if R::RESULTS {
-                    held[2 * k + 1] += given[k];
-                }
-            }
-        }
+        let (taken, given) = records.beats(first, ready);
         let reached =
             |engine: usize, most| most > 0 && flowed.beats[engine] + most >= limits.beats[engine];
         for k in 0..rules.cores {
             let (input, output) = (2 * k, 2 * k + 1);
-            if reached(input, rules.depth - held[input])
-                || R::RESULTS && reached(output, held[output])
+            if reached(input, rules.depth - state.held[input] + taken[k])
+                || R::RESULTS && reached(output, state.held[output] + given[k])
             {
                 return None;
             }
@@ -123,9 +114,14 @@ impl Flow {
             flowed.waits += STARVED_CYCLES;
             STARVED_CYCLES
         } else {
+            for k in 0..rules.cores {
+                state.held[2 * k] -= taken[k];
+                if R::RESULTS {
+                    state.held[2 * k + 1] += given[k];
+                }
+            }
             records.enter(first, ready, flowed.cycles)
         };
-        state.held = held;
         flowed.records += ready;
         flowed.cycles += cycles;
         if rules.beat_shift == [0; STREAMS_MAX] {
