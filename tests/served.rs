@@ -744,7 +744,7 @@ fn what_keeps_a_driver_from_a_socket_is_said_with_the_next_step() {
 
     // The right to connect is that to write to the socket; root has it always.
     let served = Served::new(BoardConfig::default());
-    let forbid = std::fs::Permissions::from_mode(0);
+    let forbid = std::fs::Permissions::from_mode(0o000);
     std::fs::set_permissions(served.socket(), forbid).expect("ours");
     if UnixStream::connect(served.socket()).is_ok() {
         let _ = writeln!(std::io::stderr(), "skipped: a socket without rights (as root)");

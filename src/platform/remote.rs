@@ -410,15 +410,11 @@ mod tests {
         let dripping = std::thread::spawn(move || {
             let (mut stream, _) = listener.accept().expect("the driver");
             // Each byte is in time, and the whole would take twelve limits.
-            let mut answer = Vec::new();
-            for _ in 0..ANSWER_BYTES {
+            let taken = |_: &usize| {
                 std::thread::park_timeout(limit / 2);
-                answer.push(0);
-                if stream.write_all(&[0]).is_err() {
-                    break;
-                }
-            }
-            answer.len()
+                stream.write_all(&[0]).is_ok()
+            };
+            (0..ANSWER_BYTES).take_while(taken).count()
         });
         let error = line.ask(Request::Unmask).expect_err("late");
         let PlatformError::ServerLost { source, .. } = &error else { panic!("{error}") };
