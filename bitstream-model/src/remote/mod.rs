@@ -8,7 +8,7 @@
 //!   DMA buffers ---------------> the file <---------------------- DMA engines
 //! ```
 //!
-//! [`message`], [`mark`] and [`connect`] are what both sides share. Everything else here is the
+//! [`message`], [`mark`] and [`connect()`] are what both sides share. Everything else here is the
 //! board's side: it serves one driver after the other. One that vanishes leaves the board as it is,
 //! engines running, as a process that is killed leaves a real one.
 
