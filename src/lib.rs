@@ -102,7 +102,7 @@ pub use step::{
 
 /// The examples of the documents, which are tests.
 #[cfg(all(doctest, feature = "emulation"))]
-#[expect(unused, reason = "rustdoc alone reads them")]
+#[allow(dead_code, reason = "rustdoc alone reads them")]
 mod documents {
     #[doc = include_str!("../README.md")]
     struct Readme;
