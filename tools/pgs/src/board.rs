@@ -5,22 +5,23 @@ use std::io::{self, Write};
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
-use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, FaultPlan, Hazards, Subnormals};
+use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::platform::{System, uio_listing};
 use zynq_pgs::{
     Accelerator, BoardChoice, BoardKind, DevMemWindows, Fault, InputError, MemoryChoice,
-    OpenOptions,
+    OpenOptions, StepParameters,
 };
 
-use crate::args::{BoardName, CommonArgs};
-use crate::build::described;
+use crate::common::{BoardName, CommonArgs};
 use crate::diagnosis;
 use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure};
-use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
-use crate::planned;
-use crate::verbs::facts::fact;
+use crate::options::bandwidth::{bandwidth_number, bandwidth_text};
+use crate::options::build::BuildArgs;
+use crate::options::build_text::described;
+use crate::options::planned::{Injected, PlannedArgs};
+use crate::output::facts::fact;
 
 /// What to do about bodies that the board's inertia is too simple for.
 const WORLD_INERTIA: &str =
@@ -33,7 +34,7 @@ pub(crate) struct Opened {
     /// The emulated board, as its builder sees it; none for a real one.
     pub(crate) observer: Option<EmulatedBoard>,
     /// The faults that it was told to have.
-    pub(crate) plan: Option<FaultPlan>,
+    injected: Option<Injected>,
     /// Why this board and no other.
     pub(crate) reason: String,
 }
@@ -181,7 +182,7 @@ pub(crate) fn not_built(error: ConfigError) -> Failure {
 pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Failure> {
     let Chosen { options, observer, reason, .. } = find(common, build.config(), build.given())?;
     let accelerator = Accelerator::open(options).map_err(unusable)?;
-    Ok(Opened { accelerator, observer, plan: None, reason })
+    Ok(Opened { accelerator, observer, injected: None, reason })
 }
 
 /// There is no board, or none that can be opened.
@@ -230,10 +231,44 @@ impl Opened {
             false => format!("{next}; the emulated board saw this misuse:{seen}"),
         };
         let failure = diagnosis::hardware(error).next(next);
-        match planned::text(self) {
-            Some(line) => failure.planned(&line, planned::to_json(self)),
+        match &self.injected {
+            Some(injected) => failure.planned(&injected.text(), injected.to_json()),
             None => failure,
         }
+    }
+
+    /// Gives the board the faults of `planned`, which it has from its first step on.
+    pub(crate) fn inject(
+        &mut self,
+        planned: &PlannedArgs,
+        parameters: &StepParameters,
+    ) -> Result<(), Failure> {
+        if !planned.is_given() {
+            return Ok(());
+        }
+        let Some(board) = &self.observer else {
+            let next = match self.accelerator.board().kind {
+                BoardKind::Served => "leave out --fault, or give it to the board's `pgs serve`",
+                _ => "leave out --fault, or add --board emulated",
+            };
+            let error = "--fault is for an emulated board of this process";
+            return Err(Failure::input(error).next(next));
+        };
+        if let Some(plan) = planned.plan(&board.config(), parameters) {
+            board.inject(plan.clone());
+            self.injected = Some(Injected { plan, board: board.clone() });
+        }
+        Ok(())
+    }
+
+    /// The planned faults and how many have happened, for people.
+    pub(crate) fn faults_text(&self) -> Option<String> {
+        self.injected.as_ref().map(Injected::text)
+    }
+
+    /// The same for programs; null without a plan.
+    pub(crate) fn faults_json(&self) -> Value {
+        self.injected.as_ref().map_or(Value::Null, Injected::to_json)
     }
 
     fn kind(&self) -> &'static str {

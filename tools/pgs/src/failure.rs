@@ -16,7 +16,7 @@ use std::process::ExitCode;
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use crate::verbs::SCHEMA;
+use crate::output::SCHEMA;
 
 /// A command that ran.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -178,7 +178,7 @@ pub(crate) fn usage_code(message: &clap::Error) -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::npy::{NpyError, Problem};
+    use step_folder::npy::{NpyError, Problem};
 
     #[test]
     fn a_chain_names_every_cause_once() {

@@ -5,31 +5,27 @@
 
 #![forbid(unsafe_code)]
 
-mod args;
 mod board;
-mod build;
-mod compare;
+mod bug_report;
+mod cli;
+mod common;
 mod deviation;
 mod diagnosis;
+mod difference;
 mod environment;
 mod failure;
 mod footprint;
 mod interrupt;
 mod loading;
-mod memory;
+mod narrow;
+mod numbers;
 mod options;
-mod ordering;
-mod origin;
-mod planned;
-mod scenes;
-mod sixteen;
-mod solver;
+mod output;
+mod step_input;
 mod verbs;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
-
-use step_folder::{folder, npy};
 
 /// Has the log written to stderr: warnings, or what the environment asks for.
 fn log_to_stderr() {
@@ -45,7 +41,7 @@ fn log_to_stderr() {
 
 fn main() -> ExitCode {
     log_to_stderr();
-    let command = match args::parse(std::env::args_os(), |name| std::env::var_os(name)) {
+    let command = match cli::parse(std::env::args_os(), |name| std::env::var_os(name)) {
         Ok(command) => command,
         Err(message) => {
             // Help goes to stdout with code 0, a usage error to stderr with code 2. Nobody is left
@@ -55,7 +51,9 @@ fn main() -> ExitCode {
         }
     };
     let mut out = io::stdout().lock();
-    let done = verbs::run(&command, &mut out)
+    let done = command
+        .verb
+        .run(&command.common, &mut out)
         .and_then(|verdict| out.flush().map(|()| verdict).map_err(failure::Failure::from));
     match done {
         Ok(verdict) => verdict.code(),

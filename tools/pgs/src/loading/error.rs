@@ -7,7 +7,17 @@ use thiserror::Error;
 use zynq_pgs::PlatformError;
 
 use super::format::Advice;
-use crate::failure::Cause;
+
+/// The party that a failed load is to be blamed on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AtFault {
+    /// The command line, or a file named on it.
+    Caller,
+    /// The kernel: its configuration, other programs, rights.
+    System,
+    /// The programmable logic, which did not take the bitstream.
+    Logic,
+}
 
 /// Why loading was refused or failed.
 #[derive(Debug, Error)]
@@ -92,19 +102,19 @@ impl LoadError {
         Self::Attribute { path: path.to_owned(), source }
     }
 
-    /// Whose fault it is.
-    pub(crate) fn cause(&self) -> Cause {
+    /// The party at fault.
+    pub(crate) fn at_fault(&self) -> AtFault {
         match self {
             Self::Unreadable { .. }
             | Self::Bitstream { .. }
             | Self::Overlay { .. }
             | Self::Name { .. }
-            | Self::Unasked => Cause::Input,
+            | Self::Unasked => AtFault::Caller,
             Self::Refused { source, .. } if source.kind() == io::ErrorKind::NotFound => {
-                Cause::NoBoard
+                AtFault::System
             }
-            Self::Refused { .. } | Self::NotOperating { .. } => Cause::Hardware,
-            _ => Cause::NoBoard,
+            Self::Refused { .. } | Self::NotOperating { .. } => AtFault::Logic,
+            _ => AtFault::System,
         }
     }
 

@@ -32,7 +32,7 @@ use bitstream_model::interface::address_map::{
 use zynq_pgs::platform::{UioListing, uio_listing};
 use zynq_pgs::{ManagerChoice, UioNode};
 
-pub(crate) use error::LoadError;
+pub(crate) use error::{AtFault, LoadError};
 pub(crate) use system::{Linux, System};
 
 use firmware::Firmware;

@@ -7,11 +7,11 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
 
-use super::SCHEMA;
-use crate::args::CommonArgs;
 use crate::board::{self, Chosen};
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
-use crate::options::BuildArgs;
+use crate::options::build::BuildArgs;
+use crate::output::SCHEMA;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::SCHEMA;
-use super::milliseconds;
-use crate::args::CommonArgs;
-use crate::failure::{Failure, Verdict};
-use crate::loading::{self, Linux, LoadError, Request};
+use crate::common::CommonArgs;
+use crate::failure::{Cause, Failure, Verdict};
+use crate::loading::{self, AtFault, Linux, LoadError, Request};
+use crate::output::SCHEMA;
+use crate::output::milliseconds;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -48,7 +48,12 @@ pub(crate) struct LoadArgs {
 impl From<LoadError> for Failure {
     fn from(error: LoadError) -> Self {
         let next = error.next();
-        Self::new(error.cause(), error).next(next)
+        let cause = match error.at_fault() {
+            AtFault::Caller => Cause::Input,
+            AtFault::System => Cause::NoBoard,
+            AtFault::Logic => Cause::Hardware,
+        };
+        Self::new(cause, error).next(next)
     }
 }
 

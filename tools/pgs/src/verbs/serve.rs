@@ -12,15 +12,15 @@ use clap::Args;
 use serde_json::json;
 use zynq_pgs::{MemoryChoice, StepParameters};
 
-use super::SCHEMA;
-use super::table::grouped;
-use crate::args::{BoardName, CommonArgs};
 use crate::board::not_built;
-use crate::build::described;
+use crate::common::{BoardName, CommonArgs};
 use crate::failure::{Cause, Failure, Verdict};
 use crate::interrupt;
-use crate::options::BuildArgs;
-use crate::planned::PlannedArgs;
+use crate::numbers::grouped;
+use crate::options::build::BuildArgs;
+use crate::options::build_text::described;
+use crate::options::planned::PlannedArgs;
+use crate::output::SCHEMA;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -8,24 +8,25 @@ use scene::kinetic_energy;
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Capabilities, StepParameters, StepReport};
 
-use super::SCHEMA;
-use super::facts::fact;
-use super::table::{Bound, grouped};
-use super::{limit_text, milliseconds};
-use crate::args::CommonArgs;
 use crate::board;
-use crate::compare::{self, Difference};
-use crate::diagnosis::FaultArgs;
+use crate::bug_report::FaultArgs;
+use crate::common::CommonArgs;
+use crate::difference::{self, Difference};
 use crate::failure::{Failure, Verdict};
-use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use crate::interrupt::Interrupt;
-use crate::npy::{self, Dimensions};
-use crate::options::{BuildArgs, DeadlineArgs};
-use crate::ordering::{self, OrderingArgs};
-use crate::origin;
-use crate::planned::{self, PlannedArgs};
-use crate::solver::SolverArgs;
+use crate::numbers::{Bound, grouped};
+use crate::options::build::BuildArgs;
+use crate::options::ordering::OrderingArgs;
+use crate::options::planned::PlannedArgs;
+use crate::options::solver::{DeadlineArgs, SolverArgs};
+use crate::output::SCHEMA;
+use crate::output::facts::fact;
+use crate::output::order;
+use crate::output::{limit_text, milliseconds};
+use crate::step_input;
 use step_folder::digest;
+use step_folder::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
+use step_folder::npy::{self, Dimensions};
 
 const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
 const VELOCITIES_FRICTION: &str = "out_vel_friction.npy";
@@ -137,7 +138,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let mut folder = origin::load(&args.folder)?;
+    let mut folder = step_input::load(&args.folder)?;
     let parameters = args.parameters(&folder.parameters);
     let expected = match args.compare {
         true => expected(&folder, &parameters)?,
@@ -148,7 +149,7 @@ pub(crate) fn run(
         .check_shapes(opened.accelerator.capabilities().shape_capacity)
         .map_err(Failure::input)?;
     let parameters = args.ordered(parameters, opened.accelerator.capabilities());
-    args.planned.inject(&mut opened, &parameters)?;
+    opened.inject(&args.planned, &parameters)?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
@@ -162,7 +163,7 @@ pub(crate) fn run(
         Ok(report) => report,
         Err(error) if board::is_cancelled(&error) => return Ok(Verdict::Interrupted),
         Err(error) if error.is_input() => {
-            return Err(Failure::input(origin::locate(error, &folder)));
+            return Err(Failure::input(step_input::locate(error, &folder)));
         }
         Err(error) => return Err(args.faults.failure(&opened, &parameters, error)),
     };
@@ -176,7 +177,7 @@ pub(crate) fn run(
     }
 
     let beside_bullet = match args.compare {
-        true => ordering::beside_bullet(&report, opened.accelerator.capabilities()),
+        true => order::beside_bullet(&report, opened.accelerator.capabilities()),
         false => None,
     };
     let solved = Solved {
@@ -192,14 +193,14 @@ pub(crate) fn run(
         let mut document = solved.to_json();
         document["folder"] = args.folder.display().to_string().into();
         document["board"] = opened.to_json();
-        document["faults"] = planned::to_json(&opened);
+        document["faults"] = opened.faults_json();
         document["equal"] = args.compare.then_some(equal).into();
         writeln!(out, "{document:#}")?;
     } else if args.digest {
         writeln!(out, "{} {}", digest::ALGORITHM, solved.digest)?;
     } else {
         opened.print(out)?;
-        if let Some(faults) = planned::text(&opened) {
+        if let Some(faults) = opened.faults_text() {
             writeln!(out, "{faults}")?;
         }
         solved.print(out)?;
@@ -255,7 +256,7 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
     let size = |n: u32| usize::try_from(n).unwrap_or(usize::MAX);
     let shape = Dimensions(vec![Some(size(passes)), Some(n), Some(6)]);
     let values = npy::read_row::<f32>(&path, &shape, size(pass) - 1).map_err(Failure::input)?;
-    compare::check(&path, &values).map_err(Failure::input)?;
+    difference::check(&path, &values).map_err(Failure::input)?;
     let velocities =
         Expected { name: format!("{name}[{}]", pass - 1), values, kind: Kind::Velocities };
     Ok(vec![
@@ -270,7 +271,7 @@ fn state(folder: &Folder, file: &str, property: State) -> Result<Expected, Failu
     let path = &folder.path.join(file);
     let shape = Dimensions(vec![Some(folder.bodies.len()), Some(property.width())]);
     let (_, values) = npy::read::<f32>(path, &shape).map_err(Failure::input)?;
-    compare::check(path, &values).map_err(Failure::input)?;
+    difference::check(path, &values).map_err(Failure::input)?;
     Ok(Expected { name: file.to_owned(), values, kind: Kind::State(property) })
 }
 
@@ -278,8 +279,8 @@ fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
     expected
         .iter()
         .map(|Expected { name, values, kind }| match kind {
-            Kind::State(property) => compare::compare(name, property.of(bodies), values),
-            Kind::Velocities => compare::compare(name, folder::velocities(bodies), values),
+            Kind::State(property) => difference::compare(name, property.of(bodies), values),
+            Kind::Velocities => difference::compare(name, folder::velocities(bodies), values),
         })
         .collect()
 }
@@ -315,8 +316,8 @@ impl Solved {
             self.parameters.friction_iterations,
             if self.parameters.integrate { "integrated" } else { "not integrated" },
         )?;
-        let mut order = ordering::text(report);
-        if let Some(text) = self.beside_bullet.map(str::to_owned).or(ordering::reason(report)) {
+        let mut order = order::text(report);
+        if let Some(text) = self.beside_bullet.map(str::to_owned).or(order::reason(report)) {
             order += &format!(" ({text})");
         }
         fact(out, "order", &order)?;
@@ -393,7 +394,7 @@ impl Solved {
                 "friction_iterations": self.parameters.friction_iterations,
                 "integrate": self.parameters.integrate,
             },
-            "step": super::report_json(&self.report),
+            "step": crate::output::report_json(&self.report),
             "hazard_share": (!self.report.saturated.hazards).then(|| self.hazard_share()),
             "kinetic_energy_before_j": self.energy[0],
             "kinetic_energy_j": self.energy[1],

@@ -162,6 +162,6 @@ fn the_bitstream_goes_to_the_logics_own_manager_by_its_name() {
     let error = load(&kernel, &to(ManagerChoice::Device("fpga7".to_owned()))).expect_err("absent");
     assert_refused(&kernel, &error, "no FPGA manager \"fpga7\" (found: fpga0", "pgs list");
     let error = load(&kernel, &to(ManagerChoice::Unasked)).expect_err("none");
-    assert_eq!(error.cause(), Cause::Input);
+    assert_eq!(error.at_fault(), AtFault::Caller);
     assert_eq!(kernel.written(), []);
 }

@@ -74,7 +74,7 @@ fn a_state_that_is_not_operating_is_a_hardware_failure_and_ends_it() {
         kernel.state_after.set(state);
         kernel.file("sys/class/fpga_manager/fpga0/status", "reconfig CRC error");
         let error = kernel.load(&kernel.installed(), true).expect_err("failed");
-        assert_eq!(error.cause(), Cause::Hardware);
+        assert_eq!(error.at_fault(), AtFault::Logic);
         let text = error.to_string();
         assert!(text.contains(message) && text.contains("(reconfig CRC error)"), "{text}");
         assert_eq!(kernel.written().len(), 2, "no overlay on logic that does not run");
@@ -86,7 +86,7 @@ fn an_overlay_that_the_kernel_drops_is_removed_and_said() {
     let kernel = FakeKernel::vendor();
     kernel.status_after.set("unapplied");
     let error = kernel.load(&kernel.installed(), true).expect_err("not applied");
-    assert_eq!(error.cause(), Cause::NoBoard);
+    assert_eq!(error.at_fault(), AtFault::System);
     assert!(error.to_string().contains("found \"unapplied\""), "{error}");
     assert!(!kernel.path(&format!("{OVERLAYS}/pgs")).exists());
 

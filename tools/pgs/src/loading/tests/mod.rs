@@ -13,7 +13,6 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use super::*;
-use crate::failure::Cause;
 
 /// A bitstream as bootgen makes it, in short.
 const BITSTREAM: &[u8] = b"\xff\xff\xff\xff\x66\x55\x99\xaa a bitstream";
@@ -202,7 +201,7 @@ fn pair(path: &str, text: &str) -> (String, String) {
 /// Asserts that nothing was touched, and that cause, message and next step are as expected.
 fn assert_refused(kernel: &FakeKernel, error: &LoadError, message: &str, next: &str) {
     assert_eq!(kernel.written(), [], "{error}");
-    assert_eq!(error.cause(), Cause::NoBoard, "{error}");
+    assert_eq!(error.at_fault(), AtFault::System, "{error}");
     assert!(error.to_string().contains(message), "{error}");
     assert!(error.next().contains(next), "{}", error.next());
 }

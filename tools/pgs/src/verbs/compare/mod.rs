@@ -1,30 +1,28 @@
 //! The verb `compare`: two boards step the same start, each on its own way, and what becomes of it.
 
-mod lane;
 mod show;
+mod side;
+mod spec;
 
-use std::fmt;
 use std::io::Write;
 use std::path::PathBuf;
-use std::str::FromStr;
 use std::thread;
 
 use clap::Args;
 use serde_json::{Value, json};
 use zynq_pgs::StepParameters;
 
-use self::lane::{Lane, Measured, World};
-use super::SCHEMA;
-use super::progress::progress_bar;
-use crate::args::{BoardName, CommonArgs};
+use self::side::{Measured, Side, World};
+use self::spec::SideSpec;
+use crate::common::{BoardName, CommonArgs};
 use crate::deviation::StateDeviation;
 use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
-use crate::options::{BuildArgs, DeadlineArgs};
-use crate::ordering::{OrderName, OrderingArgs};
-use crate::origin;
-use crate::scenes::SceneArgs;
-use crate::solver::SolverArgs;
+use crate::options::scenes::SceneArgs;
+use crate::options::solver::{DeadlineArgs, SolverArgs};
+use crate::output::SCHEMA;
+use crate::output::progress::progress_bar;
+use crate::step_input;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -62,10 +60,10 @@ const ROWS: u32 = 10;
 pub(crate) struct CompareArgs {
     /// Build of the board that is the original.
     #[arg(value_name = "A")]
-    a: Side,
+    a: SideSpec,
     /// Build of the board that is compared with it.
     #[arg(value_name = "B")]
-    b: Side,
+    b: SideSpec,
     /// Take one step from this folder of .npy arrays instead of a scene.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "steps", "every"])]
     input: Option<PathBuf>,
@@ -85,45 +83,6 @@ pub(crate) struct CompareArgs {
     solver: SolverArgs,
     #[command(flatten)]
     deadline: DeadlineArgs,
-}
-
-/// What one side of a comparison is: how its board is built, and in which order it is sent the
-/// collisions.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Side {
-    pub(super) build: BuildArgs,
-    pub(super) ordering: OrderingArgs,
-}
-
-impl FromStr for Side {
-    type Err = String;
-
-    /// A word of the order may stand anywhere behind the profile.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut order = None;
-        let mut rest = Vec::new();
-        for (place, word) in text.split(',').enumerate() {
-            match OrderName::of_word(word) {
-                Some(_) if order.is_some() => return Err("order is given twice".to_owned()),
-                Some(name) if place > 0 => order = Some(name),
-                _ => rest.push(word),
-            }
-        }
-        let build = rest.join(",").parse().map_err(|error| {
-            format!("{error}; orders of the collisions are {}", OrderName::all())
-        })?;
-        Ok(Self { build, ordering: OrderingArgs { order, verify: false } })
-    }
-}
-
-impl fmt::Display for Side {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.build)?;
-        match self.ordering.order {
-            Some(order) => write!(f, ",{}", order.text()),
-            None => Ok(()),
-        }
-    }
 }
 
 /// A step on both boards.
@@ -185,14 +144,14 @@ pub(crate) fn run(
         let error = "`pgs compare` builds both boards itself, a real one is as its bitstream is";
         return Err(Failure::input(error).next("leave out --board (and PGS_BOARD)"));
     }
-    let folder = args.input.as_deref().map(origin::load).transpose()?;
+    let folder = args.input.as_deref().map(step_input::load).transpose()?;
     let parameters = match &folder {
         Some(folder) => folder.parameters,
         None => StepParameters::default(),
     };
     let mut parameters = args.deadline.apply(args.solver.apply(parameters));
     parameters.verify_order |= args.verify;
-    let open = |name, side: Side| {
+    let open = |name, spec: SideSpec| {
         let world = |opened: &_| match &folder {
             Some(folder) => {
                 let capacity = board_shapes(opened);
@@ -200,49 +159,49 @@ pub(crate) fn run(
                 Ok(World::Folder { folder, bodies: folder.bodies.clone() })
             }
             None => {
-                args.scene.check_size(opened)?;
-                args.scene.build(&side.build).map(Box::new).map(World::Scene)
+                args.scene.check_size(opened.accelerator.capabilities())?;
+                args.scene.build(&spec.build).map(Box::new).map(World::Scene)
             }
         };
-        Lane::open(name, side, common, world, parameters.gravity)
+        Side::open(name, spec, common, world, parameters.gravity)
     };
-    let mut lanes = (open("A", args.a)?, open("B", args.b)?);
+    let mut sides = (open("A", args.a)?, open("B", args.b)?);
 
     let steps = if folder.is_some() { 1 } else { args.steps };
     let every = args.every.unwrap_or(steps.div_ceil(ROWS));
-    let moving = lanes.0.world.moving();
+    let moving = sides.0.world.moving();
     let interrupt = Interrupt::install();
     let progress = progress_bar(steps);
-    let (a, b) = both(&mut lanes, |lane| Some(lane.start()));
+    let (a, b) = both(&mut sides, |side| Some(side.start()));
     let mut last = Row { step: 0, a, b, deviation: None };
     let mut documents = vec![last.to_json()];
     let mut done = 0;
     while done < steps && !interrupt.is_set() {
         done += 1;
-        let (a, b) = both(&mut lanes, |lane| lane.step(done, &parameters));
+        let (a, b) = both(&mut sides, |side| side.step(done, &parameters));
         if done == 1 && a.is_none() && b.is_none() {
             // Nothing to be compared, and nothing that one build does better than the other.
-            let Lane { name, side, failed, .. } = &mut lanes.0;
+            let Side { name, spec, failed, .. } = &mut sides.0;
             if let Some(failed) = failed.take() {
-                return Err(failed.failure.about(format!("board {name} ({side}), and B as well")));
+                return Err(failed.failure.about(format!("board {name} ({spec}), and B as well")));
             }
         }
         if done == 1 && !common.json {
             // Only now: what is refused prints nothing but the refusal.
-            progress.suspend(|| show::head(args, &lanes, steps, &last, out))?;
+            progress.suspend(|| show::head(args, &sides, steps, &last, out))?;
         }
         progress.inc(1);
-        let fails = [&lanes.0, &lanes.1].map(|lane| &lane.failed);
+        let fails = [&sides.0, &sides.1].map(|side| &side.failed);
         let fails_now = fails.iter().any(|f| f.as_ref().is_some_and(|f| f.step == done));
         let all_failed = fails.iter().all(|failed| failed.is_some());
         let deviation = (a.is_some() && b.is_some())
-            .then(|| StateDeviation::of(lanes.0.world.bodies(), lanes.1.world.bodies(), &moving));
+            .then(|| StateDeviation::of(sides.0.world.bodies(), sides.1.world.bodies(), &moving));
         let row = Row { step: done, a, b, deviation };
         if done == 1 || done % every == 0 || done == steps || fails_now {
             if common.json {
                 documents.push(row.to_json());
             } else {
-                progress.suspend(|| show::row(&row, &lanes, out))?;
+                progress.suspend(|| show::row(&row, &sides, out))?;
                 out.flush()?;
             }
         }
@@ -253,7 +212,7 @@ pub(crate) fn run(
     }
     progress.finish_and_clear();
 
-    let failed = lanes.0.failed.is_some() || lanes.1.failed.is_some();
+    let failed = sides.0.failed.is_some() || sides.1.failed.is_some();
     let complete = done == steps && !failed;
     if common.json {
         let mut config = match &args.input {
@@ -272,13 +231,13 @@ pub(crate) fn run(
             "verb": "compare",
             "config": config,
             "complete": complete,
-            "a": lanes.0.to_json(),
-            "b": lanes.1.to_json(),
+            "a": sides.0.to_json(),
+            "b": sides.1.to_json(),
             "rows": documents,
         });
         writeln!(out, "{document:#}")?;
     } else {
-        show::end(&last, &lanes, out)?;
+        show::end(&last, &sides, out)?;
         if !failed && !complete {
             writeln!(out, "interrupted after {done} of {steps} steps")?;
         }
@@ -298,10 +257,10 @@ fn board_shapes(opened: &crate::board::Opened) -> u32 {
 
 /// Does the same with both boards, side by side.
 fn both<'a, R: Send>(
-    lanes: &mut (Lane<'a>, Lane<'a>),
-    act: impl Fn(&mut Lane<'a>) -> R + Sync,
+    sides: &mut (Side<'a>, Side<'a>),
+    act: impl Fn(&mut Side<'a>) -> R + Sync,
 ) -> (R, R) {
-    let (a, b) = (&mut lanes.0, &mut lanes.1);
+    let (a, b) = (&mut sides.0, &mut sides.1);
     thread::scope(|scope| {
         let other = scope.spawn(|| act(b));
         let one = act(a);
@@ -311,29 +270,4 @@ fn both<'a, R: Send>(
             Err(panic) => std::panic::resume_unwind(panic),
         }
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_side_is_written_as_it_is_read() {
-        for text in [
-            "float",
-            "half,thesis16,f32,unchecked",
-            "float,unchecked,hazard-free",
-            "mixed,body-by-body-oldest",
-            "float,auto",
-        ] {
-            assert_eq!(text.parse::<Side>().expect(text).to_string(), text);
-        }
-        let side: Side = "float,order=as-given,unchecked".parse().expect("the same");
-        assert_eq!(side.to_string(), "float,unchecked,as-given");
-        let error = "float,sorted".parse::<Side>().expect_err("no such word");
-        assert!(error.contains("sorted") && error.contains("colours"), "{error}");
-        let error = "float,colours,as-given".parse::<Side>().expect_err("two orders");
-        assert_eq!(error, "order is given twice");
-        "hazard-free".parse::<Side>().expect_err("no profile");
-    }
 }

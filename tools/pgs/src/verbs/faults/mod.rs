@@ -18,11 +18,11 @@ use serde_json::{Value, json};
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
 use self::trial::{Bench, Verified};
-use super::SCHEMA;
-use super::progress::progress_bar;
-use crate::args::CommonArgs;
+use crate::common::CommonArgs;
 use crate::environment;
 use crate::failure::{Failure, Verdict};
+use crate::output::SCHEMA;
+use crate::output::progress::progress_bar;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -42,7 +42,7 @@ call says so.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FaultsArgs {
     /// One profile instead of all.
-    #[arg(long, value_name = "PROFILE", value_parser = crate::options::profile())]
+    #[arg(long, value_name = "PROFILE", value_parser = crate::options::build::profile())]
     profile: Option<&'static Profile>,
     /// Print what each cell injects, and try none.
     #[arg(long)]

@@ -8,7 +8,8 @@ use super::Tried;
 use super::cells::Cell;
 use super::expected::Expected;
 use super::trial::Verified;
-use crate::verbs::table::{Column, grouped, heading, line};
+use crate::numbers::grouped;
+use crate::output::table::{Column, heading, line};
 
 const COLUMNS: [Column; 9] = [
     Column { name: "fault", unit: "", width: 18 },

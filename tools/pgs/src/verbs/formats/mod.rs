@@ -12,18 +12,20 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use self::numbers::{AS_STREAMED, EACH_ONCE, Numbers, SUMS, numbers};
 use self::tally::{Loss, Sizes};
-use super::SCHEMA;
-use super::progress::progress_bar;
-use super::table::{Column, grouped, heading, line, number};
-use crate::args::CommonArgs;
 use crate::board;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
-use crate::folder::Folder;
 use crate::interrupt::Interrupt;
-use crate::options::{BuildArgs, DeadlineArgs};
-use crate::origin;
-use crate::scenes::SceneArgs;
-use crate::sixteen::Sixteen;
+use crate::narrow::NarrowFormat;
+use crate::numbers::{grouped, number};
+use crate::options::build::BuildArgs;
+use crate::options::scenes::SceneArgs;
+use crate::options::solver::DeadlineArgs;
+use crate::output::SCHEMA;
+use crate::output::progress::progress_bar;
+use crate::output::table::{Column, heading, line};
+use crate::step_input;
+use step_folder::folder::Folder;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -71,7 +73,7 @@ pub(crate) fn run(
 ) -> Result<Verdict, Failure> {
     let Step { bodies, shapes, collisions } = match &args.input {
         Some(path) => {
-            let Folder { bodies, shapes, collisions, .. } = origin::load(path)?;
+            let Folder { bodies, shapes, collisions, .. } = step_input::load(path)?;
             Step { bodies, shapes, collisions }
         }
         None => match stepped(args, common)? {
@@ -125,7 +127,7 @@ pub(crate) fn run(
 /// The scene's step; nothing if Ctrl-C came before it.
 fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Failure> {
     let mut opened = board::open(common, &args.build)?;
-    args.scene.check_size(&opened)?;
+    args.scene.check_size(opened.accelerator.capabilities())?;
     let mut scene = args.scene.build(&args.build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let parameters = args.deadline.apply(StepParameters::default());
@@ -159,7 +161,7 @@ fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Fail
 
 fn described<'a>(values: impl Iterator<Item = &'a f32> + Clone) -> Value {
     let mut value = Sizes::of(values.clone()).to_json();
-    for format in Sixteen::ALL {
+    for format in NarrowFormat::ALL {
         value["formats"][format.name()] = Loss::of(format, values.clone()).to_json();
     }
     value
@@ -209,7 +211,7 @@ fn print(
         let range = format!("1e{exponent} .. 1e{}", exponent + 1);
         writeln!(out, "  {range:<14} {:>11} {:>9.4} %", grouped(count), percent(count))?;
     }
-    for format in Sixteen::ALL {
+    for format in NarrowFormat::ALL {
         let refused = Loss::of(format, streamed()).refused;
         if refused > 0 {
             let name = format.name();
@@ -229,7 +231,7 @@ fn cells<'a>(name: &str, values: impl Iterator<Item = &'a f32> + Clone) -> Vec<S
         size(sizes.largest),
         number(sizes.small_share() * 100.0),
     ];
-    for format in Sixteen::ALL {
+    for format in NarrowFormat::ALL {
         let loss = Loss::of(format, values.clone());
         cells.push(number(loss.mean() * 100.0));
         cells.push(number(loss.under_share() * 100.0));

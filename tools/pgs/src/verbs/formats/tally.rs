@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::deviation::share;
-use crate::sixteen::Sixteen;
+use crate::narrow::NarrowFormat;
 
 /// What numbers below this are counted by: thesis16 has none, but for 2^-15 = 3.05e-5.
 const SMALL: f32 = 3e-5;
@@ -25,7 +25,7 @@ pub(super) struct Loss {
 }
 
 impl Loss {
-    pub(super) fn of<'a>(format: Sixteen, values: impl Iterator<Item = &'a f32>) -> Self {
+    pub(super) fn of<'a>(format: NarrowFormat, values: impl Iterator<Item = &'a f32>) -> Self {
         let mut loss = Self::default();
         for &value in values {
             loss.numbers += 1;
@@ -162,11 +162,11 @@ mod tests {
     fn losses_leave_zeros_out_of_what_is_relative() {
         // 100.03 is read back as 100.0, 0 as 2^-15, 1e5 not at all.
         let values = [0.0, 1.0, 100.03, 1e5];
-        let loss = Loss::of(Sixteen::Thesis16, values.iter());
+        let loss = Loss::of(NarrowFormat::Thesis16, values.iter());
         assert_eq!((loss.numbers, loss.zeros, loss.refused, loss.under), (4, 1, 1, 2));
         assert!((loss.mean() - 0.03 / 100.03 / 2.0).abs() < 1e-7, "{loss:?}");
         assert!((loss.largest_absolute - 0.03).abs() < 1e-5, "{loss:?}");
-        let zero = Loss::of(Sixteen::Thesis16, [0.0].iter());
+        let zero = Loss::of(NarrowFormat::Thesis16, [0.0].iter());
         assert!((zero.largest_absolute - 2.0_f64.powi(-15)).abs() < 1e-12);
         assert!((zero.under_share() - 1.0).abs() < 1e-12);
     }

@@ -8,7 +8,7 @@ use bitstream_model::timing::{
 use serde_json::{Value, json};
 
 use super::scene::Scene;
-use crate::options::bandwidth_number;
+use crate::options::bandwidth::bandwidth_number;
 
 pub(super) fn profiles(scene: &Scene) -> Vec<Value> {
     scene.variants.iter().map(|variant| profile(scene, variant)).collect()

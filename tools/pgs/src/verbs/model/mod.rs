@@ -23,10 +23,10 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::table::grouped;
-use crate::args::CommonArgs;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
-use crate::options::bandwidth;
+use crate::numbers::grouped;
+use crate::options::bandwidth::bandwidth;
 use report::Table;
 use scene::Scene;
 

@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
-use super::super::table::grouped;
 use super::report::{Cell, Table};
+use crate::numbers::grouped;
 
 /// Notes are broken before this column.
 const WIDTH: usize = 100;

@@ -8,7 +8,7 @@ use bitstream_model::timing::{MemoryUse, Records, StepCycles, StepTime};
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, difference, mib, yes_or_no};
 use super::window::has_window;
-use crate::options::bandwidth_text;
+use crate::options::bandwidth::bandwidth_text;
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     vec![cycles(scene), times(scene), world_inertia(scene)]

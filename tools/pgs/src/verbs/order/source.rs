@@ -7,13 +7,13 @@ use zynq_pgs::order::{InputBuffers, OrderInput};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use super::OrderArgs;
-use crate::args::CommonArgs;
 use crate::board;
+use crate::common::CommonArgs;
 use crate::failure::Failure;
-use crate::folder::Folder;
-use crate::npy::{self, Dimensions};
-use crate::options::BuildArgs;
-use crate::origin;
+use crate::options::build::BuildArgs;
+use crate::step_input;
+use step_folder::folder::Folder;
+use step_folder::npy::{self, Dimensions};
 
 /// The order in which Bullet's GPU takes the collisions, if the folder has it.
 const GPU_ORDER: &str = "gpu_order.npy";
@@ -59,7 +59,7 @@ impl Source {
     }
 
     fn folder(path: &Path) -> Result<Self, Failure> {
-        let folder = origin::load(path)?;
+        let folder = step_input::load(path)?;
         let gpu_order = gpu_order(&path.join(GPU_ORDER), folder.collisions.len())?;
         let Folder { bodies, collisions, shapes, .. } = folder;
         Ok(Self::new(path.display().to_string(), &bodies, &collisions, &shapes, gpu_order))

@@ -12,21 +12,24 @@ use zynq_pgs::{BoardKind, StepParameters, StepReport};
 
 use self::row::{ALL_COLUMNS, Row, columns, step};
 use self::summary::{Summary, Totals};
-use super::SCHEMA;
-use super::facts::fact;
-use super::progress::progress_bar;
-use super::table::{grouped, heading, line};
-use crate::args::CommonArgs;
 use crate::board::{self, Opened};
-use crate::diagnosis::FaultArgs;
+use crate::bug_report::FaultArgs;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::footprint::Footprint;
 use crate::interrupt::Interrupt;
-use crate::options::{BuildArgs, DeadlineArgs, bandwidth_text};
-use crate::ordering::{self, OrderingArgs};
-use crate::planned::{self, PlannedArgs};
-use crate::scenes::SceneArgs;
-use crate::solver::{SolverArgs, time_step_text};
+use crate::numbers::grouped;
+use crate::options::bandwidth::bandwidth_text;
+use crate::options::build::BuildArgs;
+use crate::options::ordering::OrderingArgs;
+use crate::options::planned::PlannedArgs;
+use crate::options::scenes::SceneArgs;
+use crate::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
+use crate::output::SCHEMA;
+use crate::output::facts::fact;
+use crate::output::order;
+use crate::output::progress::progress_bar;
+use crate::output::table::{heading, line};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -109,7 +112,7 @@ struct Course {
     retries: u64,
     totals: Totals,
     footprint: Footprint,
-    orders: ordering::OrdersSent,
+    orders: order::OrdersSent,
     /// With `--json`, the document of every step.
     documents: Vec<Value>,
     last: Option<Row>,
@@ -122,13 +125,13 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     let mut opened = board::open(common, &args.build)?;
-    args.scene.check_size(&opened)?;
+    args.scene.check_size(opened.accelerator.capabilities())?;
     let mut scene = args.scene.build(&args.build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let parameters = args.parameters();
-    args.planned.inject(&mut opened, &parameters)?;
+    opened.inject(&args.planned, &parameters)?;
 
     let course = take_steps(args, common, &parameters, &mut opened, &mut scene, &interrupt, out)?;
     let complete = course.done == args.steps;
@@ -197,7 +200,7 @@ fn print_heading(
 ) -> io::Result<()> {
     opened.print(out)?;
     fact(out, "scene", &args.scene.text())?;
-    fact(out, "order", &ordering::with_reason(first))?;
+    fact(out, "order", &order::with_reason(first))?;
     writeln!(out)?;
     match args.wide {
         true => heading(out, &ALL_COLUMNS)?,
@@ -237,7 +240,7 @@ fn print_end(
     if *done != args.steps {
         writeln!(out, "interrupted after {done} of {} steps", args.steps)?;
     }
-    if let Some(faults) = planned::text(opened) {
+    if let Some(faults) = opened.faults_text() {
         writeln!(out, "{faults}")?;
     }
     if *retries > 0 {
@@ -280,7 +283,7 @@ fn document(
         "complete": complete,
         "steps": steps,
         "summary": summary.map(|summary| summary.to_json()),
-        "faults": planned::to_json(opened),
+        "faults": opened.faults_json(),
         "memory": course.footprint.to_json(),
         "digest": { "algorithm": digest::ALGORITHM, "value": digest },
     })

@@ -7,8 +7,9 @@ use serde_json::Value;
 use zynq_pgs::{Accelerator, StepParameters, StepReport};
 
 use crate::board::is_cancelled;
-use crate::verbs::table::{Bound, Column, grouped};
-use crate::verbs::{limit_text, milliseconds, report_json};
+use crate::numbers::{Bound, grouped};
+use crate::output::table::Column;
+use crate::output::{limit_text, milliseconds, report_json};
 
 /// What one step did.
 pub(super) struct Row {

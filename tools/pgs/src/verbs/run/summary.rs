@@ -12,10 +12,10 @@ use zynq_pgs::interface::profile::Profile;
 use zynq_pgs::{Limit, StepParameters};
 
 use super::row::Row;
-use crate::solver::time_step_text;
-use crate::verbs::facts::fact;
-use crate::verbs::table::grouped;
-use crate::verbs::{limit_text, milliseconds};
+use crate::numbers::grouped;
+use crate::options::solver::time_step_text;
+use crate::output::facts::fact;
+use crate::output::{limit_text, milliseconds};
 
 /// A pile is at rest if its bodies move no faster than this on average (root of the mean of v²,
 /// weighted by mass, turning included), m/s.

@@ -5,10 +5,7 @@ use std::str::FromStr;
 use bitstream_model::{BoardConfig, EmulatedBoard, FaultPlan};
 use clap::Args;
 use serde_json::{Value, json};
-use zynq_pgs::{BoardKind, StepParameters};
-
-use crate::board::Opened;
-use crate::failure::Failure;
+use zynq_pgs::StepParameters;
 
 /// Faults of the emulated board.
 #[derive(Debug, Clone, Default, Args)]
@@ -55,49 +52,30 @@ impl PlannedArgs {
         })
     }
 
-    /// Tells the board what to do wrong from its first step on.
-    pub(crate) fn inject(
-        &self,
-        opened: &mut Opened,
-        parameters: &StepParameters,
-    ) -> Result<(), Failure> {
-        if self.fault.is_none() {
-            return Ok(());
-        }
-        let Some(board) = &opened.observer else {
-            let next = match opened.accelerator.board().kind {
-                BoardKind::Served => "leave out --fault, or give it to the board's `pgs serve`",
-                _ => "leave out --fault, or add --board emulated",
-            };
-            let error = "--fault is for an emulated board of this process";
-            return Err(Failure::input(error).next(next));
-        };
-        if let Some(plan) = self.plan(&board.config(), parameters) {
-            board.inject(plan.clone());
-            opened.plan = Some(plan);
-        }
-        Ok(())
+    /// Whether any fault is asked for.
+    pub(crate) fn is_given(&self) -> bool {
+        self.fault.is_some()
     }
 }
 
-/// How many of the planned faults have happened.
-fn happened(opened: &Opened) -> u64 {
-    opened.observer.as_ref().map_or(0, EmulatedBoard::faults)
+/// Faults that an emulated board has been given.
+#[derive(Debug, Clone)]
+pub(crate) struct Injected {
+    pub(crate) plan: FaultPlan,
+    pub(crate) board: EmulatedBoard,
 }
 
-/// What was planned and has happened, for people.
-pub(crate) fn text(opened: &Opened) -> Option<String> {
-    let plan = opened.plan.as_ref()?;
-    let planned: u64 = plan.faults.iter().map(|fault| u64::from(fault.times)).sum();
-    Some(format!("faults     {} of {planned} happened: {plan}", happened(opened)))
-}
+impl Injected {
+    /// The plan and how much of it has happened, for people.
+    pub(crate) fn text(&self) -> String {
+        let planned: u64 = self.plan.faults.iter().map(|fault| u64::from(fault.times)).sum();
+        format!("faults     {} of {planned} happened: {}", self.board.faults(), self.plan)
+    }
 
-/// What was planned and has happened, for programs.
-pub(crate) fn to_json(opened: &Opened) -> Value {
-    opened.plan.as_ref().map_or(
-        Value::Null,
-        |plan| json!({ "plan": plan.to_string(), "happened": happened(opened) }),
-    )
+    /// The same for programs.
+    pub(crate) fn to_json(&self) -> Value {
+        json!({ "plan": self.plan.to_string(), "happened": self.board.faults() })
+    }
 }
 
 #[cfg(test)]

@@ -3,11 +3,11 @@
 use clap::{Args, ValueEnum};
 use scene::{Grid, Inertia, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
+use zynq_pgs::Capabilities;
 
-use crate::board::Opened;
 use crate::failure::Failure;
-use crate::options::BuildArgs;
-use crate::verbs::table::grouped;
+use crate::numbers::grouped;
+use crate::options::build::BuildArgs;
 
 /// Drop if not said otherwise, m: the pile lands within half a second.
 const DROP: f32 = 1.0;
@@ -93,8 +93,8 @@ impl SceneArgs {
     }
 
     /// Refuses a grid that does not fit before memory is taken for it.
-    pub(crate) fn check_size(&self, opened: &Opened) -> Result<(), Failure> {
-        let capacity = opened.accelerator.capabilities().body_capacity;
+    pub(crate) fn check_size(&self, capabilities: &Capabilities) -> Result<(), Failure> {
+        let capacity = capabilities.body_capacity;
         if self.grid.cubes() < capacity {
             return Ok(());
         }

@@ -18,9 +18,10 @@ use bitstream_model::interface::profile::{FLOAT, PROFILES, Profile};
 use bitstream_model::{Bandwidth, BoardConfig};
 use thiserror::Error;
 
-use crate::options::{
+use super::bandwidth::{bandwidth, bandwidth_gigabytes};
+use super::build::{
     ArithmeticName, BuildArgs, Choice, FormatName, HazardsName, InertiaName, SubnormalsName,
-    address_width, bandwidth, bandwidth_gigabytes, length_width, window,
+    address_width, length_width, window,
 };
 
 /// One option of a build.
@@ -244,8 +245,8 @@ mod tests {
     use clap::ValueEnum;
     use proptest::prelude::*;
 
+    use super::super::build::LanesName;
     use super::*;
-    use crate::options::LanesName;
 
     fn build(text: &str) -> Result<BuildArgs, BuildError> {
         text.parse()

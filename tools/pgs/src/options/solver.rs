@@ -1,5 +1,7 @@
 //! Options of the solver: iterations and time step.
 
+use std::time::Duration;
+
 use bitstream_model::interface::control::ITERATIONS_MAX;
 use clap::Args;
 use zynq_pgs::StepParameters;
@@ -30,6 +32,25 @@ impl SolverArgs {
         }
         if let Some(time_step) = self.dt {
             parameters.time_step = time_step;
+        }
+        parameters
+    }
+}
+
+/// How long a step may take on the board.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(crate) struct DeadlineArgs {
+    /// How long a step may take on the board, ms [default: 10, and four times what its collisions
+    /// take one after the other]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    deadline: Option<u32>,
+}
+
+impl DeadlineArgs {
+    /// The same parameters with this deadline.
+    pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
+        if let Some(milliseconds) = self.deadline {
+            parameters.deadline = Some(Duration::from_millis(milliseconds.into()));
         }
         parameters
     }

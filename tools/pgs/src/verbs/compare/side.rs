@@ -7,15 +7,15 @@ use scene::{
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Collision, Error, Fault, InputError, Shape, StepParameters, StepReport};
 
-use super::Side;
-use crate::args::{BoardName, CommonArgs};
+use super::spec::SideSpec;
 use crate::board::{self, Opened};
+use crate::common::{BoardName, CommonArgs};
 use crate::deviation::unmoved_share;
 use crate::failure::Failure;
-use crate::folder::Folder;
-use crate::origin;
-use crate::sixteen::Sixteen;
+use crate::narrow::NarrowFormat;
+use crate::step_input;
 use step_folder::digest;
+use step_folder::folder::Folder;
 
 /// What a board steps.
 pub(super) enum World<'a> {
@@ -87,7 +87,7 @@ impl Measured {
                 "largest_m": penetration.largest,
             },
             "unmoved_share": self.unmoved,
-            "step": self.report.as_ref().map(crate::verbs::report_json),
+            "step": self.report.as_ref().map(crate::output::report_json),
         })
     }
 }
@@ -101,27 +101,27 @@ pub(super) struct Failed {
 }
 
 /// One board, and what it steps.
-pub(super) struct Lane<'a> {
+pub(super) struct Side<'a> {
     pub(super) name: &'static str,
-    pub(super) side: Side,
+    pub(super) spec: SideSpec,
     pub(super) opened: Opened,
     pub(super) world: World<'a>,
     pub(super) failed: Option<Failed>,
     gravity: [f32; 3],
 }
 
-impl<'a> Lane<'a> {
+impl<'a> Side<'a> {
     /// Builds the board, and has it take the shapes of what `world` makes.
     pub(super) fn open(
         name: &'static str,
-        side: Side,
+        spec: SideSpec,
         common: &CommonArgs,
         world: impl FnOnce(&Opened) -> Result<World<'a>, Failure>,
         gravity: [f32; 3],
     ) -> Result<Self, Failure> {
         let common = CommonArgs { board: BoardName::Emulated, ..common.clone() };
         let begin = || {
-            let mut opened = board::open(&common, &side.build)?;
+            let mut opened = board::open(&common, &spec.build)?;
             let world = world(&opened)?;
             if let Err(error) = opened.accelerator.set_shapes(world.shapes()) {
                 return Err(failure(&opened, &world, error));
@@ -129,8 +129,8 @@ impl<'a> Lane<'a> {
             Ok((opened, world))
         };
         let (opened, world) =
-            begin().map_err(|failure: Failure| failure.about(format!("board {name} ({side})")))?;
-        Ok(Self { name, side, opened, world, failed: None, gravity })
+            begin().map_err(|failure: Failure| failure.about(format!("board {name} ({spec})")))?;
+        Ok(Self { name, spec, opened, world, failed: None, gravity })
     }
 
     /// Finds the collisions of the first step and measures what there is before it.
@@ -153,7 +153,7 @@ impl<'a> Lane<'a> {
             return None;
         }
         let capabilities = self.opened.accelerator.capabilities();
-        let parameters = &self.side.ordering.apply_to_compare(*parameters, capabilities);
+        let parameters = &self.spec.ordering.apply_to_compare(*parameters, capabilities);
         let before = self.world.bodies().to_vec();
         let accelerator = &mut self.opened.accelerator;
         let stepped = match &mut self.world {
@@ -203,8 +203,8 @@ impl<'a> Lane<'a> {
 
     /// A number as the streams of the bodies carry it.
     fn carried(&self, value: f32) -> f32 {
-        let format = self.side.build.config().variant().numbers.poses;
-        Sixteen::of(format).and_then(|format| format.round_trip(value)).unwrap_or(value)
+        let format = self.spec.build.config().variant().numbers.poses;
+        NarrowFormat::of(format).and_then(|format| format.round_trip(value)).unwrap_or(value)
     }
 
     pub(super) fn digest(&self) -> String {
@@ -215,7 +215,7 @@ impl<'a> Lane<'a> {
     pub(super) fn to_json(&self) -> Value {
         let mut value = self.opened.to_json();
         value["name"] = self.name.into();
-        value["build"] = self.side.to_string().into();
+        value["build"] = self.spec.to_string().into();
         value["digest"] = json!({ "algorithm": digest::ALGORITHM, "value": self.digest() });
         value["failed"] = self.failed.as_ref().map_or(Value::Null, |failed| {
             json!({
@@ -232,7 +232,7 @@ impl<'a> Lane<'a> {
 fn failure(opened: &Opened, world: &World<'_>, error: Error) -> Failure {
     match world {
         World::Folder { folder, .. } if error.is_input() => {
-            Failure::input(origin::locate(error, folder))
+            Failure::input(step_input::locate(error, folder))
         }
         _ => opened.failure(error),
     }

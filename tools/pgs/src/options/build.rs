@@ -3,18 +3,18 @@
 
 use std::fmt::Display;
 use std::str::FromStr;
-use std::time::Duration;
 
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, Inertia, PROFILES, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals, THREADS_MAX};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use zynq_pgs::StepParameters;
+
+use super::bandwidth::bandwidth;
 
 /// How the emulated board is built; a real board is as its bitstream is.
 ///
-/// [`build`](crate::build) writes and reads all of it as one text.
+/// [`build_text`](super::build_text) writes and reads all of it as one text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 #[command(next_help_heading = "Emulated board")]
 pub(crate) struct BuildArgs {
@@ -235,89 +235,9 @@ impl BuildArgs {
     }
 }
 
-/// How long a step may take on the board.
-#[derive(Debug, Clone, Copy, Default, Args)]
-pub(crate) struct DeadlineArgs {
-    /// How long a step may take on the board, ms [default: 10, and four times what its collisions
-    /// take one after the other]
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
-    deadline: Option<u32>,
-}
-
-impl DeadlineArgs {
-    /// The same parameters with this deadline.
-    pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
-        if let Some(milliseconds) = self.deadline {
-            parameters.deadline = Some(Duration::from_millis(milliseconds.into()));
-        }
-        parameters
-    }
-}
-
-const BYTES_PER_GB: f64 = 1e9;
-/// Faster than any memory; beyond it a typing error is likelier.
-const BANDWIDTH_MAX: f64 = 1000.0;
-/// Slower than any memory.
-const BANDWIDTH_MIN: f64 = 0.1;
-
-/// A bandwidth, as it is written on the command line.
-pub(crate) fn bandwidth(text: &str) -> Result<Bandwidth, String> {
-    if text == "unlimited" {
-        return Ok(Bandwidth::Unlimited);
-    }
-    let wrong = || {
-        format!(
-            "expected a number of GB/s from {BANDWIDTH_MIN} to {BANDWIDTH_MAX}, or \"unlimited\""
-        )
-    };
-    let number: f64 = text.parse().map_err(|_| wrong())?;
-    if !(BANDWIDTH_MIN..=BANDWIDTH_MAX).contains(&number) {
-        return Err(wrong());
-    }
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a whole number between 1e6 and 1e12 after the check"
-    )]
-    let rate = (number * BYTES_PER_GB).round() as u64;
-    Ok(Bandwidth::BytesPerSecond(rate))
-}
-
-/// A bandwidth for people.
-pub(crate) fn bandwidth_text(bandwidth: Bandwidth) -> String {
-    match bandwidth_gigabytes(bandwidth) {
-        None => "unlimited".to_owned(),
-        Some(rate) => format!("{rate} GB/s"),
-    }
-}
-
-/// A bandwidth in GB/s, or nothing if it is unlimited.
-pub(crate) fn bandwidth_gigabytes(bandwidth: Bandwidth) -> Option<f64> {
-    bandwidth_number(bandwidth).map(|rate| rate as f64 / BYTES_PER_GB)
-}
-
-/// A bandwidth for programs: bytes a second, or null.
-pub(crate) fn bandwidth_number(bandwidth: Bandwidth) -> Option<u64> {
-    match bandwidth {
-        Bandwidth::Unlimited => None,
-        Bandwidth::BytesPerSecond(rate) => Some(rate),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bandwidths_are_read_as_they_are_shown() {
-        assert_eq!(bandwidth("12.8"), Ok(Bandwidth::ZCU102_SUSTAINED));
-        assert_eq!(bandwidth("17.07"), Ok(Bandwidth::ZCU102_PEAK));
-        assert_eq!(bandwidth("unlimited"), Ok(Bandwidth::Unlimited));
-        assert_eq!(bandwidth_text(Bandwidth::ZCU102_SUSTAINED), "12.8 GB/s");
-        for wrong in ["", "0", "-1", "nan", "inf", "1e9", "12.8GB", "Unlimited"] {
-            bandwidth(wrong).expect_err(wrong);
-        }
-    }
 
     #[test]
     fn no_option_is_the_default_board() {

@@ -13,10 +13,11 @@ use scene::Grid;
 use serde_json::{Value, json};
 use zynq_pgs::order::{IssueWindow, OrderError};
 
-use super::SCHEMA;
-use super::table::{Column, grouped, heading, line};
-use crate::args::CommonArgs;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
+use crate::numbers::grouped;
+use crate::output::SCHEMA;
+use crate::output::table::{Column, heading, line};
 use rows::{Measured, Row};
 use source::Source;
 

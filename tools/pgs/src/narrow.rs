@@ -5,7 +5,7 @@ use bitstream_model::interface::number::StreamFormat;
 
 /// A way to write a number in sixteen bits and to read it back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Sixteen {
+pub(crate) enum NarrowFormat {
     /// IEEE 754, to nearest even.
     Binary16,
     /// The thesis' own as this project writes it: small magnitudes become 2^-15.
@@ -15,7 +15,7 @@ pub(crate) enum Sixteen {
     Thesis16Literal,
 }
 
-impl Sixteen {
+impl NarrowFormat {
     pub(crate) const ALL: [Self; 3] = [Self::Binary16, Self::Thesis16, Self::Thesis16Literal];
 
     /// What a stream of that format makes of its numbers; nothing if it has more than sixteen bits.
@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    fn bits(format: Sixteen, value: f32) -> Option<u32> {
+    fn bits(format: NarrowFormat, value: f32) -> Option<u32> {
         format.round_trip(value).map(f32::to_bits)
     }
 
@@ -121,7 +121,11 @@ mod tests {
             // Up to the smallest normal number.
             (6.103_4e-5, 6.103_515_6e-5),
         ] {
-            assert_eq!(bits(Sixteen::Binary16, value), Some(f32::to_bits(expected)), "{value}");
+            assert_eq!(
+                bits(NarrowFormat::Binary16, value),
+                Some(f32::to_bits(expected)),
+                "{value}"
+            );
         }
     }
 
@@ -137,21 +141,25 @@ mod tests {
             (smallest * 1.5, smallest * 1.5),
             (65_504.0, 65_504.0),
         ] {
-            assert_eq!(bits(Sixteen::Thesis16, value), Some(f32::to_bits(expected)), "{value}");
+            assert_eq!(
+                bits(NarrowFormat::Thesis16, value),
+                Some(f32::to_bits(expected)),
+                "{value}"
+            );
         }
     }
 
     #[test]
     fn what_the_driver_refuses_is_no_number() {
         for value in [65_505.0, -1e9, f32::INFINITY, f32::NAN] {
-            assert_eq!(bits(Sixteen::Binary16, value), None, "{value}");
-            assert_eq!(bits(Sixteen::Thesis16, value), None, "{value}");
+            assert_eq!(bits(NarrowFormat::Binary16, value), None, "{value}");
+            assert_eq!(bits(NarrowFormat::Thesis16, value), None, "{value}");
         }
     }
 
     #[test]
     fn taken_literally_small_numbers_become_large() {
-        let of = |value| bits(Sixteen::Thesis16Literal, value).map(f32::from_bits);
+        let of = |value| bits(NarrowFormat::Thesis16Literal, value).map(f32::from_bits);
         assert_eq!(of(0.0), Some(2.0_f32.powi(-15)));
         // 2^-16 has the exponent bits of 1.0, but for the three.
         assert_eq!(of(2.0_f32.powi(-16)), Some(1.0));
@@ -163,7 +171,7 @@ mod tests {
         #[test]
         fn between_its_limits_the_literal_format_is_ours(value in 3.1e-5_f32..65_504.0, minus: bool) {
             let value = if minus { -value } else { value };
-            prop_assert_eq!(bits(Sixteen::Thesis16Literal, value), bits(Sixteen::Thesis16, value));
+            prop_assert_eq!(bits(NarrowFormat::Thesis16Literal, value), bits(NarrowFormat::Thesis16, value));
         }
 
         #[test]
@@ -174,12 +182,12 @@ mod tests {
                 0 => mantissa * 2.0_f32.powi(-24),
                 _ => (1024.0 + mantissa) * 2.0_f32.powi(field - 25),
             };
-            prop_assert_eq!(bits(Sixteen::Binary16, value), Some(value.to_bits()));
+            prop_assert_eq!(bits(NarrowFormat::Binary16, value), Some(value.to_bits()));
         }
 
         #[test]
         fn no_number_is_farther_than_half_a_step(value in 6.2e-5_f32..65_504.0) {
-            let back = Sixteen::Binary16.round_trip(value).expect("in range");
+            let back = NarrowFormat::Binary16.round_trip(value).expect("in range");
             prop_assert!(((back - value) / value).abs() <= 1.0 / 2048.0);
         }
     }

@@ -11,10 +11,10 @@ use zynq_pgs::platform::{
     System, UioListing, fpga_managers, require_bitstream, u_dma_buf_names, uio_listing,
 };
 
-use super::SCHEMA;
-use crate::args::CommonArgs;
 use crate::board;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
+use crate::output::SCHEMA;
 use inventory::{Buffer, Node, explained, state, unreadable_json};
 
 const EXAMPLES: &str = "\

@@ -6,7 +6,7 @@ use thiserror::Error;
 use zynq_pgs::InputError;
 
 use crate::failure::Failure;
-use crate::folder::{
+use step_folder::folder::{
     BODY_ANGULAR, BODY_INVERSE_INERTIA, BODY_INVERSE_MASS, BODY_LINEAR, BODY_ORIENTATION,
     BODY_POSITION, COLLISION_BODIES, COLLISION_COUNT, COLLISION_NORMAL, COLLISION_POINTS, Folder,
     ITERATIONS, PARAMS,

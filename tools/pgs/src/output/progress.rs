@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A bar over a number of steps: on stderr, and only if that is a terminal.
-pub(super) fn progress_bar(steps: u32) -> ProgressBar {
+pub(crate) fn progress_bar(steps: u32) -> ProgressBar {
     let bar = ProgressBar::new(steps.into());
     let style = "{bar:30} {pos}/{len} steps, {per_sec}, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(style) {
