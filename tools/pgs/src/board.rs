@@ -1,4 +1,4 @@
-//! Opens the board that the command line asks for, and says what it is.
+//! Opens the board of the command line, and describes it.
 
 use std::io::{self, Write};
 
@@ -23,7 +23,7 @@ use crate::options::build_text::described;
 use crate::options::planned::{Injected, PlannedArgs};
 use crate::output::facts::fact;
 
-/// What to do about bodies that the board's inertia is too simple for.
+/// Next step for bodies whose inertia is too general for the board.
 const WORLD_INERTIA: &str =
     "build the board with --inertia world (in a text for `pgs compare`: the word world)";
 
@@ -31,15 +31,15 @@ const WORLD_INERTIA: &str =
 #[derive(Debug)]
 pub(crate) struct Opened {
     pub(crate) accelerator: Accelerator,
-    /// The emulated board, as its builder sees it; none for a real one.
+    /// The builder's handle of an emulated board; none for a real one.
     pub(crate) observer: Option<EmulatedBoard>,
-    /// The faults that it was told to have.
+    /// The faults that the emulated board was given.
     injected: Option<Injected>,
-    /// Why this board and no other.
+    /// Why this board was chosen.
     pub(crate) reason: String,
 }
 
-/// A kind of board, as it is written on the command line and in results.
+/// The name of a kind of board, on the command line and in results.
 pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
     match kind {
         BoardKind::Emulated => "emulated",
@@ -49,7 +49,7 @@ pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
     }
 }
 
-/// Which kind of board a name on the command line means here, and why.
+/// The kind of board that a name on the command line means on this system, and why.
 pub(crate) fn choose(name: &BoardName, system: &System) -> (BoardKind, String) {
     let kind = match name {
         BoardName::Uio(_) => BoardKind::Uio,
@@ -61,9 +61,9 @@ pub(crate) fn choose(name: &BoardName, system: &System) -> (BoardKind, String) {
     (kind, "as asked for".to_owned())
 }
 
-/// Which kind of board there is, and why.
+/// The kind of board that this system has, and why.
 fn find_kind(system: &System) -> (BoardKind, String) {
-    // What cannot be read may be the board: the attempt to open it says what is wrong.
+    // A node that cannot be read may be the board: the attempt to open it names the obstacle.
     let unreadable = |error| (BoardKind::Uio, format!("UIO nodes cannot be listed: {error}"));
     let mut listing = match uio_listing(&system.uio) {
         Ok(listing) => listing,
@@ -81,7 +81,7 @@ fn find_kind(system: &System) -> (BoardKind, String) {
     }
 }
 
-/// Refuses a command that is about a board where there is none, and the emulated one would stand in.
+/// Refuses to stand an emulated board in for a missing real one, for commands that test a board.
 pub(crate) fn require(common: &CommonArgs) -> Result<(), Failure> {
     let (kind, reason) = choose(&common.board, &System::default());
     if kind != BoardKind::Emulated || common.board != BoardName::Auto {
@@ -93,18 +93,18 @@ pub(crate) fn require(common: &CommonArgs) -> Result<(), Failure> {
     ))
 }
 
-/// A board that was chosen and not opened yet.
+/// A board that is chosen and not yet open.
 #[derive(Debug)]
 pub(crate) struct Chosen {
     pub(crate) kind: BoardKind,
     pub(crate) options: OpenOptions,
-    /// The emulated board, as its builder sees it; none for a real one.
+    /// The builder's handle of an emulated board; none for a real one.
     pub(crate) observer: Option<EmulatedBoard>,
-    /// Why this board and no other.
+    /// Why this board was chosen.
     pub(crate) reason: String,
 }
 
-/// Chooses a board. `given` is an option of the command line that only an emulated one has.
+/// Chooses a board. `given` is an option of the command line that only an emulated board has.
 pub(crate) fn find(
     common: &CommonArgs,
     config: BoardConfig,
@@ -116,7 +116,8 @@ pub(crate) fn find(
         if *name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
         }
-        // One that is asked for by name has nothing to do with what the environment says of real ones.
+        // `PGS_MEMORY` describes real boards; it does not matter to an emulated board asked for by
+        // name.
         let ignored = *memory_of_environment && *name == BoardName::Emulated;
         if *memory != MemoryChoice::Automatic && !ignored {
             let (option, next) = match memory_of_environment {
@@ -158,7 +159,7 @@ pub(crate) fn find(
     Ok(Chosen { kind, options, observer, reason })
 }
 
-/// There is no such emulated board.
+/// The failure for a configuration that no emulated board has.
 pub(crate) fn not_built(error: ConfigError) -> Failure {
     let narrow = |numbers: &Numbers| {
         [numbers.collisions, numbers.bodies, numbers.poses]
@@ -185,7 +186,7 @@ pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Fai
     Ok(Opened { accelerator, observer, injected: None, reason })
 }
 
-/// There is no board, or none that can be opened.
+/// The failure for a board that is missing or cannot be opened.
 pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
     let general =
         || "see what there is with `pgs list`, or use the emulated board with --board emulated";
@@ -193,14 +194,14 @@ pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
     Failure::new(Cause::NoBoard, error).next(next)
 }
 
-/// Whether a step ended because Ctrl-C was pressed, and its channels are stopped.
+/// Whether Ctrl-C ended a step, with its channels stopped.
 pub(crate) fn is_cancelled(error: &zynq_pgs::Error) -> bool {
     matches!(error, zynq_pgs::Error::Step { fault, .. } if matches!(**fault, Fault::Cancelled))
         && !error.must_reopen()
 }
 
 impl Opened {
-    /// The failure that an error of the driver is.
+    /// Makes a failure of an error of the driver.
     pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {
         if let zynq_pgs::Error::Input(input) = &error {
             let anisotropic = matches!(input, InputError::Anisotropic { .. });
@@ -213,7 +214,7 @@ impl Opened {
         let diverged = matches!(&error, zynq_pgs::Error::Step { fault, .. }
             if matches!(**fault, Fault::NotFinite { .. }));
         if diverged && self.observer.is_some() {
-            // The emulated board does not miscalculate: the numbers given were too large.
+            // The emulated board does not miscalculate: the input numbers are too large.
             return Failure::input(error).next(
                 "start from smaller velocities (run: a lower --drop, or --hazards interlocked), or \
                  take a shorter time step (solve: params.npy)",
@@ -237,7 +238,7 @@ impl Opened {
         }
     }
 
-    /// Gives the board the faults of `planned`, which it has from its first step on.
+    /// Gives the board the faults of `planned`, effective from its first step.
     pub(crate) fn inject(
         &mut self,
         planned: &PlannedArgs,
@@ -261,7 +262,7 @@ impl Opened {
         Ok(())
     }
 
-    /// The planned faults and how many have happened, for people.
+    /// The planned faults and the number that have happened, for people.
     pub(crate) fn faults_text(&self) -> Option<String> {
         self.injected.as_ref().map(Injected::text)
     }
@@ -279,14 +280,14 @@ impl Opened {
         self.accelerator.capabilities().variant.profile.name
     }
 
-    /// The profile with its formats and inertia, as the bitstream says.
+    /// The profile with its formats and inertia, as the bitstream reports them.
     fn design(&self) -> String {
         let Variant { profile, numbers, inertia } = self.accelerator.capabilities().variant;
         let numbers = Some(numbers);
         described(&BoardConfig { profile, numbers, inertia, ..BoardConfig::default() })
     }
 
-    /// In lines of at most 100 columns: which board and why, which bitstream.
+    /// Prints in lines of at most 100 columns which board was opened, why, and its bitstream.
     pub(crate) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
         let can = self.accelerator.capabilities();
         fact(out, "board", &format!("{} ({})", self.kind(), self.reason))?;
@@ -347,7 +348,7 @@ impl Opened {
         })
     }
 
-    /// How the board is built, where it is emulated.
+    /// The configuration of an emulated board.
     pub(crate) fn config(&self) -> Option<BoardConfig> {
         self.observer.as_ref().map(EmulatedBoard::config)
     }

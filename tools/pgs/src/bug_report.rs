@@ -1,4 +1,4 @@
-//! Options for a step that fails: how often it is tried again, and the report for its bug.
+//! The options for a failed step: retries, and a report for a bug.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -19,23 +19,23 @@ use crate::output::SCHEMA;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "When a step fails")]
 pub(crate) struct FaultArgs {
-    /// Take a step again up to N times, if the board is ready for it after its reset
+    /// Repeat a failed step up to N times, if the board is ready for it after its reset
     #[arg(long, value_name = "N", default_value_t = 0)]
     retries: u32,
-    /// Write what a bug report needs to FILE: version, board, parameters, registers, last accesses.
-    /// Without a fault nothing is written
+    /// Write to FILE what a bug report needs: version, board, parameters, registers, last accesses.
+    /// Nothing is written without a fault
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }
 
 impl FaultArgs {
-    /// The same parameters with these retries.
+    /// Sets the number of retries.
     pub(crate) fn apply(&self, mut parameters: StepParameters) -> StepParameters {
         parameters.retries = self.retries;
         parameters
     }
 
-    /// The failure that an error of a step is; its report is written if one is asked for.
+    /// Makes a failure of a step's error, and writes the report if the command line names one.
     pub(crate) fn failure(
         &self,
         opened: &Opened,
@@ -53,7 +53,7 @@ impl FaultArgs {
     }
 }
 
-/// Everything that a bug report needs.
+/// The content of a bug report.
 fn bundle_json(opened: &Opened, parameters: &StepParameters, error: &Error) -> Value {
     let found = error.diagnosis();
     let accesses: Vec<Value> = found

@@ -31,7 +31,7 @@ no rights; 4 hardware fault or deadline; 130 interrupted.";
 
 /// Steps rigid bodies on the zynq-pgs accelerator, real or emulated.
 ///
-/// Without a verb, `run` is meant: its options are accepted here too.
+/// Without a verb, `pgs` runs `run` and takes its options.
 #[derive(Debug, Parser)]
 #[command(name = "pgs", version, after_help = EXAMPLES)]
 struct Cli {
@@ -43,15 +43,15 @@ struct Cli {
     run: RunArgs,
 }
 
-/// What to do, and how.
+/// A parsed command line.
 #[derive(Debug, Clone)]
 pub(crate) struct Command {
     pub(crate) verb: Verb,
     pub(crate) common: CommonArgs,
 }
 
-/// Reads the command line, and from `variable` what it leaves to the environment; the error is also how
-/// help is asked for.
+/// Parses the command line, and reads options that it leaves out from `variable`. A request for
+/// help is an error, too.
 pub(crate) fn parse(
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     variable: impl Fn(&str) -> Option<OsString>,
@@ -59,7 +59,7 @@ pub(crate) fn parse(
     let mut command = Cli::command();
     let matches = command.try_get_matches_from_mut(arguments)?;
     if let Some(verb) = matches.subcommand_name() {
-        // `run`'s options stand here as well, and would silently mean nothing before another verb.
+        // `run`'s options are accepted here as well; before another verb they would have no effect.
         let stray = matches.ids().find(|id| {
             let common = matches!(id.as_str(), "json" | "board" | "memory" | "manager");
             let is_argument = command.get_arguments().any(|argument| argument.get_id() == *id);
@@ -106,7 +106,7 @@ mod tests {
         parse(line.split_whitespace(), |_| None).map_err(|error| error.kind())
     }
 
-    /// The same where the environment has `PGS_BOARD` and `PGS_MEMORY`; or what is said.
+    /// Parses with `PGS_BOARD` and `PGS_MEMORY` set; or the error message.
     fn parsed_in(board: &str, memory: &str, line: &str) -> Result<CommonArgs, String> {
         let variable = |name: &str| match name {
             BOARD => Some(board.into()),

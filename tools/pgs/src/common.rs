@@ -10,7 +10,7 @@ use zynq_pgs::{ManagerChoice, MemoryChoice};
 use crate::environment::{BOARD, MANAGER, MEMORY, is_blank};
 use crate::options::memory::memory_choice;
 
-/// What holds for every verb, as the command line says it.
+/// The options of every verb, as parsed.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CommonOptions {
     /// Print one JSON document instead of text.
@@ -55,27 +55,27 @@ pub(crate) struct CommonOptions {
     manager: Option<ManagerChoice>,
 }
 
-/// What holds for every verb.
+/// The options of every verb, with the environment and the defaults filled in.
 #[derive(Debug, Clone)]
 pub(crate) struct CommonArgs {
     pub(crate) json: bool,
     pub(crate) board: BoardName,
     pub(crate) memory: MemoryChoice,
-    /// Whether the environment names the memory, and the command line does not.
+    /// Whether the memory was named by the environment and not by the command line.
     pub(crate) memory_of_environment: bool,
     pub(crate) manager: ManagerChoice,
 }
 
-/// A board, as it is named on the command line.
+/// A board named on the command line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum BoardName {
     Auto,
-    /// The UIO node of that name, or a node for each region.
+    /// A UIO node of this name, or one node for each region.
     Uio(String),
     /// Registers through /dev/mem.
     Devmem,
     Emulated,
-    /// In another process, at this socket.
+    /// A board in another process, served at this socket.
     Socket(PathBuf),
 }
 
@@ -105,18 +105,18 @@ fn manager_choice(text: &str) -> Result<ManagerChoice, String> {
     }
 }
 
-/// The common options that a verb reads. The environment is asked for these only, so a wrong
-/// variable breaks no command that does without it.
+/// The common options that a verb reads. The environment is read for these only: a wrong variable
+/// breaks no command that does not use it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reads {
     pub(crate) board: bool,
-    /// Whether the memory of an emulated board can be named: a served board is in a file.
+    /// Whether the memory of an emulated board can be named: a served board keeps it in a file.
     pub(crate) emulated_memory: bool,
     pub(crate) manager: bool,
 }
 
 impl CommonOptions {
-    /// Takes from the environment, through `variable`, what the command line leaves out.
+    /// Fills in options that the command line leaves out from the environment, through `variable`.
     pub(crate) fn complete(
         self,
         reads: Reads,
@@ -146,7 +146,7 @@ impl CommonOptions {
     }
 }
 
-/// What a variable of the environment says in place of an option.
+/// Reads an option from a variable of the environment.
 fn instead_of<T>(
     option: &str,
     name: &str,

@@ -7,7 +7,7 @@ use zynq_pgs::{Aftermath, ChannelState, Diagnosis, Error, Fault};
 
 use crate::failure::{Cause, Failure};
 
-/// The failure of the board that an error is, with all that is known about it.
+/// Makes a hardware failure of an error, with its diagnosis.
 pub(crate) fn hardware(error: Error) -> Failure {
     let text = error.fault().zip(error.diagnosis()).map(|(fault, found)| text(fault, found));
     let document = to_json(&error);
@@ -15,7 +15,7 @@ pub(crate) fn hardware(error: Error) -> Failure {
     failure.details(text.unwrap_or_default(), document)
 }
 
-/// A table of the channels, and the control block.
+/// A table of the channels, followed by the control block.
 fn text(fault: &Fault, diagnosis: &Diagnosis) -> String {
     let Diagnosis { phase, elapsed, channels, .. } = diagnosis;
     let mut text = format!(
@@ -60,7 +60,7 @@ fn hex(word: u32) -> String {
     format!("{word:#010x}")
 }
 
-/// The error for programs; null if it is not a step that failed.
+/// The error for programs; null unless a step failed.
 pub(crate) fn to_json(error: &Error) -> Value {
     let Error::Step { fault, aftermath, .. } = error else { return Value::Null };
     let mut causes = Vec::new();

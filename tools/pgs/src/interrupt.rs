@@ -1,9 +1,9 @@
-//! This file lets Ctrl-C end a command: between two steps, or in the middle of one, which the
-//! driver then stops and undoes.
+//! Ends a command at Ctrl-C: between two steps, or inside one, which the driver then stops and
+//! undoes.
 
 use zynq_pgs::Cancellation;
 
-/// Has `act` done, in a thread of its own, when Ctrl-C is pressed or the system asks to end.
+/// Calls `act`, in a thread of its own, at Ctrl-C or when the system asks the process to end.
 pub(crate) fn take_over(act: impl FnMut() + Send + 'static) {
     if let Err(error) = ctrlc::set_handler(act) {
         log::warn!("Ctrl-C will end the program at once: {error}");
@@ -15,7 +15,7 @@ pub(crate) fn take_over(act: impl FnMut() + Send + 'static) {
 pub(crate) struct Interrupt(Cancellation);
 
 impl Interrupt {
-    /// Takes Ctrl-C over from the system, which would leave the channels running.
+    /// Replaces the system's handling of Ctrl-C, which would leave the channels running.
     pub(crate) fn install() -> Self {
         let cancellation = Cancellation::new();
         let seen = cancellation.clone();
@@ -27,7 +27,7 @@ impl Interrupt {
         self.0.is_cancelled()
     }
 
-    /// What stops a step in the middle.
+    /// Cancels a running step.
     pub(crate) fn cancellation(&self) -> Cancellation {
         self.0.clone()
     }

@@ -27,7 +27,7 @@ mod verbs;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-/// Has the log written to stderr: warnings, or what the environment asks for.
+/// Sends the log to stderr: warnings, unless the environment sets another filter.
 fn log_to_stderr() {
     let text = |name: &str, default: &str| {
         let found = environment::variable(name).map(|text| text.to_string_lossy().into_owned());
@@ -44,8 +44,8 @@ fn main() -> ExitCode {
     let command = match cli::parse(std::env::args_os(), |name| std::env::var_os(name)) {
         Ok(command) => command,
         Err(message) => {
-            // Help goes to stdout with code 0, a usage error to stderr with code 2. Nobody is left
-            // to tell if either is closed.
+            // Help goes to stdout with code 0, a usage error to stderr with code 2. A closed stream
+            // cannot be reported anywhere.
             let _ = message.print();
             return failure::usage_code(&message);
         }

@@ -1,6 +1,6 @@
-//! Writes numbers for people: groups of digits, five digits, bounds.
+//! Formats numbers for people: groups of digits, five digits, bounds.
 
-/// A whole number with a comma between groups of three digits.
+/// Writes a whole number with a comma between groups of three digits.
 pub(crate) fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
@@ -13,7 +13,7 @@ pub(crate) fn grouped(number: u64) -> String {
     text
 }
 
-/// Five digits, with an exponent where they would not fit into seven places.
+/// Writes five digits, with an exponent where they would not fit into seven columns.
 pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
@@ -26,7 +26,7 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// On which side a number is known that a saturated counter has to do with.
+/// The direction of a bound that a saturated counter leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bound {
     AtLeast,
@@ -34,7 +34,7 @@ pub(crate) enum Bound {
 }
 
 impl Bound {
-    /// A count that is exact unless a counter is saturated, in words.
+    /// Writes a count in words; it is a bound if a counter is saturated.
     pub(crate) fn words(self, saturated: bool, count: u64) -> String {
         let count = grouped(count);
         match (saturated, self) {
@@ -44,12 +44,12 @@ impl Bound {
         }
     }
 
-    /// The same in few characters.
+    /// Writes the same in few characters.
     pub(crate) fn cell(self, saturated: bool, count: u64) -> String {
         if saturated { self.short(count as f64) } else { grouped(count) }
     }
 
-    /// A bound in three digits; rounded so that it is true.
+    /// Writes a bound in three digits, rounded so that it stays true.
     pub(crate) fn short(self, bound: f64) -> String {
         let unit = 10_f64.powf(bound.max(1.0).log10().floor() - 2.0);
         match self {
@@ -59,7 +59,7 @@ impl Bound {
     }
 }
 
-/// A number with its sign.
+/// Writes a number with its sign.
 pub(crate) fn signed(value: f64) -> String {
     if value > 0.0 { format!("+{}", number(value)) } else { number(value) }
 }

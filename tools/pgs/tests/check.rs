@@ -1,4 +1,4 @@
-//! `pgs check` names the cause of every board that is built wrongly, and its exit code says so.
+//! `pgs check` names the cause of every defect of a board, and its exit code tells success.
 
 mod common;
 
@@ -9,7 +9,7 @@ fn check(arguments: &[&str]) -> Ran {
     run(["check"].iter().chain(arguments))
 }
 
-/// The names of the lines with that outcome.
+/// The names of the lines with this outcome.
 fn lines_that(document: &Value, outcome: &str) -> Vec<String> {
     let lines = document["lines"].as_array().expect("the lines");
     lines
@@ -100,7 +100,7 @@ fn the_emulated_board_does_not_stand_in_for_one_that_is_missing() {
         assert!(ran.stderr.contains("there is no UIO node named \"pgs\""), "{}", ran.stderr);
         assert!(ran.stderr.contains("--board emulated"), "{}", ran.stderr);
     }
-    // Asked for, by option or by variable.
+    // The option or the variable asks for the emulated board.
     let mut command = pgs();
     let ran = command.env_remove("PGS_BOARD").args(["check", "--board", "emulated"]).output();
     assert_eq!(ran.expect("runs").status.code(), Some(0));

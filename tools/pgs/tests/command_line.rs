@@ -226,7 +226,7 @@ fn a_step_takes_as_long_as_the_deadline_says_and_no_longer() {
     assert_eq!(with(&["--deadline", "0"]).code, Some(2));
 }
 
-/// What a step that takes too long says: in lines, as a document, in a report.
+/// A step beyond its deadline is reported: in lines, as a document, in a report.
 #[test]
 fn a_step_that_fails_is_told_with_every_channel_for_people_programs_and_bug_reports() {
     let folder = tempfile::tempdir().expect("a directory");
@@ -263,13 +263,13 @@ fn a_step_that_fails_is_told_with_every_channel_for_people_programs_and_bug_repo
     assert_eq!(channels[6]["channel"], "dma2 MM2S");
     assert_eq!(channels[6]["descriptors_complete"], 2);
 
-    // Nothing failed: nothing is written.
+    // Without a failure nothing is written.
     std::fs::remove_file(&report).expect("it is there");
     let ran = run(["run"].iter().chain(&slow).chain(&["--report", path]));
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     assert!(!report.exists() && !ran.stdout.contains("retries"), "{}", ran.stdout);
 
-    // Where the report cannot be written the fault is told all the same.
+    // A report that cannot be written does not hide the fault.
     let nowhere = ["--deadline", "1", "--report", "/nonexistent/fault.json"];
     let ran = run(["run"].iter().chain(&slow).chain(&nowhere));
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
@@ -395,7 +395,7 @@ fn ctrl_c_ends_after_the_step_with_130_and_a_digest() {
         .spawn()
         .expect("it starts");
     let mut lines = BufReader::new(child.stdout.take().expect("a pipe")).lines();
-    // The row of the first step comes after Ctrl-C was taken over.
+    // Ctrl-C is handled before the row of the first step appears.
     let row =
         lines.find(|line| line.as_ref().is_ok_and(|line| line.trim_start().starts_with("1 ")));
     assert!(row.is_some(), "a row of the first step");

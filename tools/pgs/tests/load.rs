@@ -9,7 +9,7 @@ use common::{Ran, run};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A system whose logic is programmed and stays so: its files do not react.
+/// A system whose logic stays programmed: its files do not react to writes.
 fn system() -> TempDir {
     let root = tempfile::tempdir().expect("a directory");
     let manager = root.path().join("sys/class/fpga_manager/fpga0");

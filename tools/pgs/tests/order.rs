@@ -1,5 +1,5 @@
 //! `pgs order`: its table, on the scenes of the repository and, with `PGS_VECTORS`, on the thesis'
-//! scene, where the figures were measured outside this project.
+//! scene, whose figures were measured outside this project.
 mod common;
 
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use common::{golden, run, skipped, variable};
 use serde_json::Value;
 
-/// Runs `pgs order --json`; its document.
+/// Runs `pgs order --json`; returns its document.
 fn order(arguments: &[&str]) -> Value {
     let ran = run([&["order", "--json", "--runs", "1"], arguments].concat());
     assert_eq!(ran.code, Some(0), "{arguments:?}: {}{}", ran.stdout, ran.stderr);
@@ -29,7 +29,7 @@ fn number(row: &Value, key: &str) -> f64 {
     row[key].as_f64().unwrap_or_else(|| panic!("no number {key} in {row:#}"))
 }
 
-/// Those without hazards.
+/// The orders without hazards.
 const OURS: [&str; 2] = ["hazard-free", "hazard-free-nearby"];
 
 #[test]
@@ -44,7 +44,7 @@ fn every_order_is_shown_at_every_depth_and_ours_has_no_hazard() {
     for arguments in scenes {
         let document = order(arguments);
         let rows = document["rows"].as_array().expect("a list");
-        // As given, random, three times the thesis', colours, two of ours.
+        // As given, random, three of the thesis, colours, two of ours.
         assert_eq!(rows.len(), 4 * 8, "{arguments:?}");
         for depth in [1, 4, 16, 192] {
             for ours in OURS.map(|order| row(&document, order, depth)) {
@@ -114,7 +114,7 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
     }
 }
 
-/// One order gives way to another here and there: each step's report says which it was.
+/// One order falls back to another in some steps: each step's report names its order.
 #[test]
 fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
     let scene =
@@ -138,7 +138,7 @@ fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
     assert!(one.contains("order      hazard-free\n") && !one.contains("orders"), "{one}");
 }
 
-/// `full_step186`, if it is there; says once if it is not.
+/// `full_step186`, if it exists; reports once if it does not.
 fn full_step() -> Option<PathBuf> {
     let Some(root) = variable("PGS_VECTORS").map(PathBuf::from) else {
         skipped("the orders of full_step186 (PGS_VECTORS is not set)");

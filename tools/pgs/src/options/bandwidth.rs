@@ -1,14 +1,14 @@
-//! Reads and shows a memory bandwidth.
+//! Parses and formats a memory bandwidth.
 
 use bitstream_model::Bandwidth;
 
 const BYTES_PER_GB: f64 = 1e9;
-/// Faster than any memory; beyond it a typing error is likelier.
+/// Faster than any memory: a larger number is a typing error.
 const BANDWIDTH_MAX: f64 = 1000.0;
 /// Slower than any memory.
 const BANDWIDTH_MIN: f64 = 0.1;
 
-/// A bandwidth, as it is written on the command line.
+/// Parses a bandwidth on the command line.
 pub(crate) fn bandwidth(text: &str) -> Result<Bandwidth, String> {
     if text == "unlimited" {
         return Ok(Bandwidth::Unlimited);
@@ -31,7 +31,7 @@ pub(crate) fn bandwidth(text: &str) -> Result<Bandwidth, String> {
     Ok(Bandwidth::BytesPerSecond(rate))
 }
 
-/// A bandwidth for people.
+/// Formats a bandwidth for people.
 pub(crate) fn bandwidth_text(bandwidth: Bandwidth) -> String {
     match bandwidth_gigabytes(bandwidth) {
         None => "unlimited".to_owned(),
@@ -39,12 +39,12 @@ pub(crate) fn bandwidth_text(bandwidth: Bandwidth) -> String {
     }
 }
 
-/// A bandwidth in GB/s, or nothing if it is unlimited.
+/// A bandwidth in GB/s; `None` if it is unlimited.
 pub(crate) fn bandwidth_gigabytes(bandwidth: Bandwidth) -> Option<f64> {
     bandwidth_number(bandwidth).map(|rate| rate as f64 / BYTES_PER_GB)
 }
 
-/// A bandwidth for programs: bytes a second, or null.
+/// A bandwidth for programs: bytes per second, `None` if it is unlimited.
 pub(crate) fn bandwidth_number(bandwidth: Bandwidth) -> Option<u64> {
     match bandwidth {
         Bandwidth::Unlimited => None,

@@ -1,5 +1,4 @@
-//! This file holds the options of the emulated board and of a step, and how they are written on the
-//! command line.
+//! The options that describe an emulated board, and their names on the command line.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -12,9 +11,9 @@ use clap::{Args, ValueEnum};
 
 use super::bandwidth::bandwidth;
 
-/// How the emulated board is built; a real board is as its bitstream is.
+/// The build of the emulated board; a real board is built as its bitstream is.
 ///
-/// [`build_text`](super::build_text) writes and reads all of it as one text.
+/// [`build_text`](super::build_text) writes and reads a build as one text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 #[command(next_help_heading = "Emulated board")]
 pub(crate) struct BuildArgs {
@@ -24,12 +23,12 @@ pub(crate) struct BuildArgs {
     /// Numbers on streams of 16 bits [default: binary16]
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatName>,
-    /// Operators of the pipeline; what it stores stays as wide as the profile has it [default: that
+    /// Precision of the pipeline's operators; storage keeps the width of the profile [default: that
     /// of the profile]
     #[arg(long, value_enum)]
     pub(crate) arithmetic: Option<ArithmeticName>,
-    /// Inertia that is the same about every axis, or any (boxes, capsules), streamed with every body
-    /// [default: isotropic]
+    /// Inertia of a body: equal about every axis, or any (boxes, capsules), streamed with every
+    /// body [default: isotropic]
     #[arg(long, value_enum)]
     pub(crate) inertia: Option<InertiaName>,
     /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
@@ -50,37 +49,36 @@ pub(crate) struct BuildArgs {
     /// Width of DMA addresses in bits, 32 to 64 [default: 40]
     #[arg(long, value_name = "BITS", value_parser = address_width)]
     pub(crate) address_width: Option<u32>,
-    /// Threads of this machine that an emulated board's arithmetic may take, finding the collisions of a
-    /// scene, and writing the records of a step and reading its results; no result depends on it
-    /// [default: as many as there are, at most 4]
+    /// Threads of this machine for the emulated board's arithmetic, for collision detection, and
+    /// for packing and unpacking a step; no result depends on their number [default: one a
+    /// processor, at most 4]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub(crate) threads: Option<usize>,
-    /// Whether independent collisions are computed side by side; no result depends on it [default:
-    /// on]
+    /// Compute independent collisions side by side; no result depends on it [default: on]
     #[arg(long, value_enum)]
     pub(crate) lanes: Option<LanesName>,
 }
 
-/// A choice of a build whose names stand on the command line and in its text.
+/// A choice of a build, with the same names on the command line and in a build's text.
 pub(crate) trait Choice: ValueEnum + PartialEq + 'static {
-    /// What it means.
+    /// The value that a name stands for.
     type Meaning: PartialEq;
 
-    /// What this name means.
+    /// The value of this name.
     fn meaning(&self) -> Self::Meaning;
 
-    /// The name of a meaning, if it has one.
+    /// The name of a value, if it has one.
     fn of(meaning: &Self::Meaning) -> Option<Self> {
         Self::value_variants().iter().find(|name| name.meaning() == *meaning).cloned()
     }
 
-    /// As it is written.
+    /// The name as written.
     fn text(&self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 }
 
-/// Names of one choice, and what each means.
+/// Defines the names of a choice and their values.
 macro_rules! choice {
     ($name:ident means $meaning:ty: $($(#[$doc:meta])* $variant:ident is $value:expr),+ $(,)?) => {
         #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -127,28 +125,28 @@ choice!(SubnormalsName means Subnormals:
     Flush is Subnormals::Flush,
 );
 
-/// Reads the name of a profile.
+/// Parses the name of a profile.
 pub(crate) fn profile() -> impl TypedValueParser<Value = &'static Profile> {
     PossibleValuesParser::new(PROFILES.iter().map(|profile| profile.name))
         .try_map(|name| Profile::by_name(&name).ok_or("there is no such profile"))
 }
 
-/// Reads a number of slots.
+/// Parses a number of slots.
 pub(crate) fn window(text: &str) -> Result<u32, String> {
     whole(text, 1, u32::MAX)
 }
 
-/// Reads a number of threads.
+/// Parses a number of threads.
 pub(crate) fn threads(text: &str) -> Result<usize, String> {
     whole(text, 1, THREADS_MAX)
 }
 
-/// Reads the width of a length register.
+/// Parses the width of a length register.
 pub(crate) fn length_width(text: &str) -> Result<u32, String> {
     whole(text, 8, 26)
 }
 
-/// Reads the width of an address.
+/// Parses the width of an address.
 pub(crate) fn address_width(text: &str) -> Result<u32, String> {
     whole(text, 32, 64)
 }
@@ -165,7 +163,7 @@ fn whole<T: Copy + FromStr + PartialOrd + Display>(
 }
 
 impl BuildArgs {
-    /// The board that they describe.
+    /// The configuration of the described board.
     pub(crate) fn config(&self) -> BoardConfig {
         let default = BoardConfig::default();
         let profile = self.profile.unwrap_or(&FLOAT);
@@ -186,12 +184,12 @@ impl BuildArgs {
         }
     }
 
-    /// The profile's formats with what is asked for instead.
+    /// The profile's number formats, with the formats of the options in their place.
     fn numbers(&self, own: &Numbers) -> Numbers {
         let mut numbers = *own;
         if let Some(format) = self.format.map(|name| name.meaning()) {
             let narrow = |stream: StreamFormat| stream.bits() == format.bits();
-            // Where no stream has 16 bits the board says which widths do not fit.
+            // Where no stream has 16 bits, the board's error tells which widths do not fit.
             let none = ![own.collisions, own.bodies, own.poses].into_iter().any(narrow);
             for stream in [&mut numbers.collisions, &mut numbers.bodies, &mut numbers.poses] {
                 if none || narrow(*stream) {
@@ -205,7 +203,7 @@ impl BuildArgs {
         numbers
     }
 
-    /// What makes this board of the default board of its profile.
+    /// The options that turn the default board of a profile into this one.
     pub(crate) fn of(config: &BoardConfig) -> Self {
         fn unlike<T: PartialEq + Copy>(value: T, default: T) -> Option<T> {
             (value != default).then_some(value)
@@ -261,7 +259,7 @@ mod tests {
         assert_eq!(half.velocities, Precision::Binary16, "storage stays");
         let (_, mixed) = numbers("mixed", Some(FormatName::Thesis16), None);
         assert_eq!((mixed.collisions, mixed.bodies), (thesis, StreamFormat::F32));
-        // Refused by the board, which says why.
+        // The board refuses it, and names the reason.
         let (_, float) = numbers("float", Some(FormatName::Thesis16), None);
         assert_eq!((float.collisions, float.bodies), (thesis, thesis));
     }

@@ -1,4 +1,4 @@
-//! This file writes how an emulated board is built as one text, and reads it.
+//! Writes the build of an emulated board as one text, and parses it.
 //!
 //! ```text
 //! half,thesis16,f32,unchecked
@@ -26,13 +26,13 @@ use super::build::{
 
 /// One option of a build.
 struct Part {
-    /// On the command line; without the dashes, in a text.
+    /// Its name on the command line; a text has it without the dashes.
     option: &'static str,
-    /// Its values that need no name before them.
+    /// The values that need no name before them.
     words: &'static [&'static str],
-    /// How its other values are written; empty if there are none.
+    /// The form of its other values; empty if there are none.
     values: &'static str,
-    /// Its value, if it was given.
+    /// Its value, if it is given.
     get: fn(&BuildArgs) -> Option<String>,
     set: fn(&mut BuildArgs, &str) -> Result<(), String>,
 }
@@ -61,7 +61,7 @@ macro_rules! number {
 
 const NONE: Part = Part { option: "", words: &[], values: "", get: |_| None, set: |_, _| Ok(()) };
 
-/// Every option but the profile, in the order in which they are written.
+/// Every option but the profile, in the order of a text.
 const PARTS: [Part; 9] = [
     Part { option: "--format", words: &["binary16", "thesis16"], ..chosen!(format, FormatName) },
     Part {
@@ -127,13 +127,13 @@ pub(crate) enum BuildError {
     /// It does not begin with a profile.
     #[error("expected a build to begin with a profile ({}), found {found:?}", profiles())]
     Profile { found: String },
-    /// A word that no option has.
+    /// A word of no option.
     #[error("{found:?} is nothing that a board can be built with, known are {}", known())]
     Word { found: String },
-    /// An option twice.
+    /// An option is given twice.
     #[error("{key} is given twice")]
     Twice { key: &'static str },
-    /// A value that the option cannot have.
+    /// A value that the option cannot take.
     #[error("{key}={found}: {problem}")]
     Value { key: &'static str, found: String, problem: String },
 }
@@ -143,7 +143,7 @@ fn profiles() -> String {
     names.join(", ")
 }
 
-/// Everything that may follow the profile.
+/// Lists everything that may follow the profile.
 fn known() -> String {
     let mut words: Vec<String> = Vec::new();
     for part in &PARTS {
@@ -156,18 +156,18 @@ fn known() -> String {
 }
 
 impl BuildArgs {
-    /// The first option that was given of those that describe a board. `--threads` does not: it is for
-    /// finding collisions and packing too, whatever the board.
+    /// The first given option that describes a board. `--threads` does not: collision detection and
+    /// packing use it with every board.
     pub(crate) fn given(&self) -> Option<&'static str> {
         let part = || PARTS.iter().find(|part| (part.get)(self).is_some()).map(|part| part.option);
-        // How it is computed is no part of what it is, and of no text.
+        // How a board is computed does not describe it, and is in no text.
         let host = || self.lanes.map(|_| "--lanes");
         self.profile.map(|_| "--profile").or_else(part).or_else(host)
     }
 }
 
-/// A board as its text, and behind it every format in words where no text says them all, as of a
-/// bitstream that this command cannot build.
+/// A board as its text. Where no text tells all number formats, as for a bitstream that this
+/// command cannot build, the formats follow in words.
 pub(crate) fn described(config: &BoardConfig) -> String {
     let (build, variant) = (BuildArgs::of(config), config.variant());
     if build.config().variant() == variant {
@@ -230,7 +230,7 @@ impl FromStr for BuildArgs {
     }
 }
 
-/// The option that a word of a text is about, and the value in it.
+/// The option of a word in a text, and its value.
 fn part_of(word: &str) -> Option<(&'static Part, &str)> {
     match word.split_once('=') {
         Some((key, value)) => PARTS.iter().find(|part| part.key() == key).map(|part| (part, value)),
@@ -363,7 +363,7 @@ mod tests {
         assert_eq!(build("float").expect("a build").given(), Some("--profile"));
         let lanes = Some(LanesName::Off);
         assert_eq!(BuildArgs { lanes, ..BuildArgs::default() }.given(), Some("--lanes"));
-        // Detection and packing take them on a real board, too.
+        // Detection and packing use them on a real board, too.
         assert_eq!(BuildArgs { threads: Some(1), ..BuildArgs::default() }.given(), None);
     }
 
@@ -411,7 +411,7 @@ mod tests {
             let config = built.config();
             let again = BuildArgs::of(&config);
             prop_assert_eq!(again.config(), config);
-            // Nothing that is there anyway.
+            // A text holds no option that equals its default.
             prop_assert!(again.to_string().len() <= built.to_string().len());
         }
 

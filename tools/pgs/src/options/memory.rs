@@ -1,4 +1,4 @@
-//! This file is the choice of a real board's DMA memory, as it is written on the command line.
+//! Parses the DMA memory of a real board.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use zynq_pgs::{Caching, MemoryChoice};
 const EXPECTED: &str = "expected auto, u-dma-buf[:NAME[:write-combining]], uio[:NODE], \
                         devmem[:ADDRESS+BYTES] or file:PATH";
 
-/// Reads a choice of memory.
+/// Parses a choice of memory.
 pub(crate) fn memory_choice(text: &str) -> Result<MemoryChoice, String> {
     let expected = || EXPECTED.to_owned();
     let (kind, rest) = match text.split_once(':') {
@@ -28,7 +28,7 @@ pub(crate) fn memory_choice(text: &str) -> Result<MemoryChoice, String> {
                 Some((name, "cached")) => (name, Caching::Cached),
                 Some(_) => return Err(expected()),
             };
-            // The name becomes a part of paths.
+            // The name becomes part of a path.
             if name.is_empty() || name.contains('/') || name.starts_with('.') {
                 return Err(format!("{name:?} is no name of a buffer"));
             }

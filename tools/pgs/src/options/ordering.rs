@@ -1,11 +1,10 @@
-//! This file holds the order of the collisions of a step: how it is asked for on the command line
-//! and in the texts of `pgs compare`, and how a step's report tells it.
+//! The order of a step's collisions, on the command line and in the texts of `pgs compare`.
 
 use clap::{Args, ValueEnum};
 use zynq_pgs::order::{Order, Ties};
 use zynq_pgs::{Capabilities, StepParameters};
 
-/// How the collisions of a step are ordered.
+/// The order of a step's collisions.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub(crate) struct OrderingArgs {
     /// Order in which the collisions are sent [default: auto]
@@ -20,15 +19,16 @@ pub(crate) struct OrderingArgs {
 /// An order of the collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OrderName {
-    /// The cheapest on the board: hazard-free-nearby, without empty entries where the pipeline waits
-    /// on hazards, or as-given where that takes fewer cycles; hazard-free where only live bodies are
-    /// kept on chip
+    /// Fewest cycles on the board: hazard-free-nearby (without empty entries where the pipeline
+    /// waits on hazards), or as-given where that takes fewer cycles; hazard-free where the chip
+    /// keeps live bodies only
     Auto,
-    /// As detected, which is how Bullet sorts them: hazards abound
+    /// As detected, which is Bullet's order: many hazards
     AsGiven,
     /// No hazards, few bodies alive, few empty entries
     HazardFree,
-    /// No hazards, near to the order as given, few empty entries (hazard-free where they would be many)
+    /// No hazards, near the order as given, few empty entries (falls back to hazard-free where they
+    /// would be many)
     HazardFreeNearby,
     /// The thesis' Algorithm 3, ties by the lowest index: few bodies alive, nearly all hazardous
     BodyByBody,
@@ -36,12 +36,12 @@ pub(crate) enum OrderName {
     BodyByBodyOldest,
     /// The same, ties by the body that became active last
     BodyByBodyNewest,
-    /// By greedy colouring: no hazards if colours are large, nearly all bodies alive
+    /// Greedy colouring: no hazards if colours are large, nearly all bodies alive
     Colours,
 }
 
 impl OrderName {
-    /// What the driver is asked for.
+    /// The order that the driver is asked for.
     fn order(self) -> Option<Order> {
         match self {
             Self::Auto => None,
@@ -55,17 +55,17 @@ impl OrderName {
         }
     }
 
-    /// As it is written.
+    /// The name as written.
     pub(crate) fn text(self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 
-    /// The order that a word of a text names: its name, or its name behind `order=`.
+    /// Parses a word of a text: a name, or a name behind `order=`.
     pub(crate) fn of_word(word: &str) -> Option<Self> {
         Self::from_str(word.strip_prefix("order=").unwrap_or(word), false).ok()
     }
 
-    /// All names, for people.
+    /// Lists all names.
     pub(crate) fn all() -> String {
         let names: Vec<String> = Self::value_variants().iter().map(|name| name.text()).collect();
         names.join(", ")
@@ -73,7 +73,7 @@ impl OrderName {
 }
 
 impl OrderingArgs {
-    /// The same parameters with this order.
+    /// Sets the order.
     pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
         if let Some(name) = self.order {
             parameters.order = name.order();
@@ -82,9 +82,9 @@ impl OrderingArgs {
         parameters
     }
 
-    /// The same for a step that is to be compared with others: where the board solves one collision
-    /// after the other, and no order is asked for, the collisions stay as given. That is Bullet's
-    /// order, and the same on every such board.
+    /// Sets the order of a step whose results are compared. If no order is given, and the board
+    /// solves the collisions one after the other, they stay as given: in Bullet's order, which is
+    /// the same on every such board.
     pub(crate) fn apply_to_compare(
         self,
         parameters: StepParameters,
@@ -98,12 +98,12 @@ impl OrderingArgs {
     }
 }
 
-/// Whether a board gives what solving one collision after the other gives, in any order.
+/// Whether the board's results equal those of solving one collision after the other, in any order.
 pub(crate) fn is_sequential(capabilities: &Capabilities) -> bool {
     capabilities.interlocked && capabilities.window.is_none()
 }
 
-/// The name of an order that was sent.
+/// The name of an order.
 pub(crate) fn name(order: Order) -> String {
     let found = OrderName::value_variants().iter().find(|name| name.order() == Some(order));
     found.map_or_else(|| "another".to_owned(), |name| name.text())

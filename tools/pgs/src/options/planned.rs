@@ -1,4 +1,4 @@
-//! This file lets an emulated board fail as the command line says, and tells what came of it.
+//! Plans faults of an emulated board from the command line, and reports which of them happened.
 
 use std::str::FromStr;
 
@@ -11,13 +11,14 @@ use zynq_pgs::StepParameters;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Emulated board")]
 pub(crate) struct PlannedArgs {
-    /// Let the board fail: `KIND[=VALUE][@PLACE][,phase=,beat=,bd=,access=,n=,step=,times=]`, several
-    /// separated by `;`, or `seed:N` for some from a seed. `pgs faults --list` shows thousands
+    /// Make the board fail: `KIND[=VALUE][@PLACE][,phase=,beat=,bd=,access=,n=,step=,times=]`,
+    /// several faults separated by `;`, or `seed:N` for random ones. `pgs faults --list` shows
+    /// thousands
     #[arg(long, value_name = "PLAN")]
     fault: Option<Planned>,
 }
 
-/// What is planned.
+/// The faults that the option asks for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Planned {
     Plan(FaultPlan),
@@ -39,7 +40,7 @@ impl FromStr for Planned {
 }
 
 impl PlannedArgs {
-    /// The plan for a board, in steps of so many passes.
+    /// The plan for a board whose steps have the passes of `parameters`.
     pub(crate) fn plan(
         &self,
         config: &BoardConfig,
@@ -58,7 +59,7 @@ impl PlannedArgs {
     }
 }
 
-/// Faults that an emulated board has been given.
+/// Faults given to an emulated board.
 #[derive(Debug, Clone)]
 pub(crate) struct Injected {
     pub(crate) plan: FaultPlan,
@@ -66,7 +67,7 @@ pub(crate) struct Injected {
 }
 
 impl Injected {
-    /// The plan and how much of it has happened, for people.
+    /// The plan and the number of faults that have happened, for people.
     pub(crate) fn text(&self) -> String {
         let planned: u64 = self.plan.faults.iter().map(|fault| u64::from(fault.times)).sum();
         format!("faults     {} of {planned} happened: {}", self.board.faults(), self.plan)

@@ -10,7 +10,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use zynq_pgs::{Limit, StepReport};
 
-/// Number of the JSON documents' layout; it grows when a key changes its meaning or goes.
+/// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
 pub(crate) const SCHEMA: u32 = 1;
 
 /// A time in milliseconds.
@@ -32,7 +32,7 @@ pub(crate) fn limit_text(limit: Limit) -> &'static str {
 /// A step's report for programs.
 pub(crate) fn report_json(report: &StepReport) -> Value {
     let StepReport { cycles, host, saturated, .. } = report;
-    // What is not known is null; the key beside it says why.
+    // An unknown number is null; the key beside it tells why.
     let known = |saturated: bool, count: u64| (!saturated).then_some(count);
     json!({
         "bodies": report.bodies,

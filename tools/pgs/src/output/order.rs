@@ -1,4 +1,4 @@
-//! Tells from a step's report in which order the collisions were sent, and why.
+//! Reports the order in which a step's collisions were sent, and the reason for it.
 
 use serde_json::{Value, json};
 use zynq_pgs::order::Order;
@@ -7,7 +7,8 @@ use zynq_pgs::{Capabilities, OrderChoice, StepReport};
 use crate::numbers::grouped;
 use crate::options::ordering::{is_sequential, name};
 
-/// Whether the order of a step is Bullet's, in words; nothing where it is and that does not help.
+/// How the order of a step relates to Bullet's, in words; none if the order is Bullet's and the
+/// comparison fails all the same.
 pub(crate) fn beside_bullet(
     report: &StepReport,
     capabilities: &Capabilities,
@@ -19,13 +20,13 @@ pub(crate) fn beside_bullet(
     }
 }
 
-/// The orders that the steps of a run were sent in, and how many each: one may give way to another
+/// The orders of a run's steps, and the number of steps in each: one order may fall back to another
 /// ([`Order::HazardFreeNearby`]).
 #[derive(Debug, Default)]
 pub(crate) struct OrdersSent(Vec<(Order, u64)>);
 
 impl OrdersSent {
-    /// A step was sent.
+    /// Counts a step.
     pub(crate) fn see(&mut self, order: Order) {
         match self.0.iter_mut().find(|(taken, _)| *taken == order) {
             Some((_, steps)) => *steps += 1,
@@ -33,7 +34,7 @@ impl OrdersSent {
         }
     }
 
-    /// In words, the one met first before the others; nothing if all steps had one order.
+    /// In words, in the order of the first steps; none if all steps had one order.
     pub(crate) fn text(&self) -> Option<String> {
         let all: u64 = self.0.iter().map(|(_, steps)| steps).sum();
         let each = self.0.iter().map(|(order, steps)| (name(*order), grouped(*steps)));
@@ -42,7 +43,7 @@ impl OrdersSent {
     }
 }
 
-/// In which order a step was sent, and why.
+/// The order of a step, and the reason for it.
 pub(crate) fn with_reason(report: &StepReport) -> String {
     match reason(report) {
         Some(reason) => format!("{}: {reason}", name(report.order)),
@@ -50,7 +51,7 @@ pub(crate) fn with_reason(report: &StepReport) -> String {
     }
 }
 
-/// Why an order was taken; nothing where it was asked for.
+/// Why the driver took this order; none if the caller asked for it.
 pub(crate) fn reason(report: &StepReport) -> Option<String> {
     let OrderChoice::Cheapest(costs) = report.order_choice else {
         return match report.order_choice {
@@ -73,7 +74,7 @@ pub(crate) fn reason(report: &StepReport) -> Option<String> {
     })
 }
 
-/// In which order a step was sent, in words.
+/// The order of a step in words.
 pub(crate) fn text(report: &StepReport) -> String {
     let mut text = name(report.order);
     if report.empty > 0 {
@@ -120,7 +121,7 @@ pub(crate) fn to_json(report: &StepReport) -> Value {
     })
 }
 
-/// Why an order was taken, for programs.
+/// Why the driver took this order, for programs.
 fn choice_json(choice: &OrderChoice) -> Value {
     let name = match choice {
         OrderChoice::Asked => "asked",

@@ -1,8 +1,8 @@
-//! This file lays text out in columns.
+//! Lays text out in columns.
 
 use std::io::{self, Write};
 
-/// A column: two lines of heading, and its width in characters.
+/// A column: its name, its unit below it, and its width in characters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column {
     pub(crate) name: &'static str,
@@ -16,7 +16,7 @@ pub(crate) fn heading(out: &mut dyn Write, columns: &[Column]) -> io::Result<()>
     line(out, columns, columns.iter().map(|column| column.unit.to_owned()))
 }
 
-/// Writes one row, each cell at the right of its column.
+/// Writes one row, each cell flush right in its column.
 pub(crate) fn line(
     out: &mut dyn Write,
     columns: &[Column],

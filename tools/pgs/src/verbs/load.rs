@@ -1,4 +1,4 @@
-//! The verb `load`: a bitstream into the logic, and an overlay into the device tree.
+//! The verb `load`: loads a bitstream into the logic, and an overlay into the device tree.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -28,16 +28,16 @@ Remove the overlay by rmdir /sys/kernel/config/device-tree/overlays/pgs; see dev
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct LoadArgs {
-    /// Bitstream, as bootgen makes it (.bit.bin).
+    /// Bitstream in bootgen's format (.bit.bin).
     file: PathBuf,
-    /// Compiled overlay to apply once the bitstream is there.
+    /// Compiled overlay, applied after the bitstream is loaded.
     #[arg(long, value_name = "DTBO")]
     overlay: Option<PathBuf>,
     /// The bitstream is a partial one.
     #[arg(long)]
     partial: bool,
-    /// Load although other overlays, or drivers of the kernel, are bound to the logic: they stay, and
-    /// what they do next with the new logic is not known.
+    /// Load although other overlays or kernel drivers are bound to the logic. They stay bound, and
+    /// their behaviour with the new logic is unknown.
     #[arg(long)]
     replace_others: bool,
     /// Directory that holds the system's files, for tests.

@@ -30,7 +30,7 @@ use self::solve::SolveArgs;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 
-/// What to do.
+/// A verb and its options.
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum Verb {
     Run(RunArgs),

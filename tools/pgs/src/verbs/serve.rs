@@ -1,4 +1,4 @@
-//! The verb `serve`: an emulated board as a process of its own.
+//! The verb `serve`: runs an emulated board as a process of its own.
 
 use std::fs;
 use std::io::{self, Write};
@@ -37,11 +37,11 @@ one resets it. Ctrl-C ends it and removes the socket; the memory's file stays.";
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ServeArgs {
-    /// Unix socket to make. The memory is the file of that name and ".memory", unless --memory
-    /// names another.
+    /// Unix socket to create. The memory is the file with ".memory" appended to this name, unless
+    /// --memory names another.
     #[arg(long, value_name = "PATH")]
     pub(crate) socket: PathBuf,
-    /// Length of the memory, MiB [default: that of the file, 64 if there is none yet]
+    /// Length of the memory, MiB [default: that of the file; 64 for a new file]
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024))]
     memory_mib: Option<u64>,
     #[command(flatten)]
@@ -50,7 +50,7 @@ pub(crate) struct ServeArgs {
     planned: PlannedArgs,
 }
 
-/// What was served so far.
+/// Counts over all drivers.
 #[derive(Default)]
 struct Tally {
     drivers: u64,
@@ -81,7 +81,7 @@ pub(crate) fn run(
             return Err(Failure::input(error).next("write --memory file:PATH, or leave it out"));
         }
     };
-    // What a driver does wrong is told, and is not the end of the board for the next one.
+    // A driver's mistake is reported, and the board goes on to serve the next driver.
     let config = BoardConfig { strict: false, ..args.build.config() };
     let planned = args.planned.plan(&config, &StepParameters::default());
     let wanted = args.memory_mib.map(|mib| mib << 20);
@@ -119,7 +119,7 @@ pub(crate) fn run(
     let mut tally = Tally::default();
     let mut written = Ok(());
     let served = server.serve(|board, visit| {
-        // Somebody looked whether a board is served here.
+        // A visit without requests only tested whether a board is served here.
         if visit.requests == 0 && matches!(visit.ended, Ended::Left) {
             return;
         }
@@ -167,7 +167,7 @@ fn at(number: u64) -> usize {
     usize::try_from(number).unwrap_or(usize::MAX)
 }
 
-/// One driver that is gone.
+/// Reports a driver that has left.
 fn line(out: &mut dyn Write, number: u64, visit: &Visit) -> io::Result<()> {
     let Visit { requests, ended, left_running, .. } = visit;
     write!(out, "driver {number:<3} {} requests, ", grouped(*requests))?;

@@ -1,4 +1,4 @@
-//! The verb `solve`: one step from a folder of arrays, and its comparison with expected arrays.
+//! The verb `solve`: takes one step from a folder of arrays, and compares it with expected arrays.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -74,17 +74,18 @@ pub(crate) struct SolveArgs {
     /// Folder of .npy arrays.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Write the results as arrays to this folder: `out_pos`, `out_quat`, `out_linvel`, `out_angvel`.
+    /// Write the results as arrays to this folder: `out_pos`, `out_quat`, `out_linvel`,
+    /// `out_angvel`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Compare bit by bit with the folder's own results; exit code 1 on a difference. With
-    /// --no-integrate, with the velocities after that many iterations.
+    /// Compare bit by bit with the expected results in the folder; exit code 1 on a difference.
+    /// With --no-integrate, compare with the velocities after that many iterations.
     #[arg(long)]
     compare: bool,
     /// Print the digest of the final state alone.
     #[arg(long, conflicts_with = "json")]
     digest: bool,
-    /// Stop after the solver: poses stay, velocities are undamped and without gravity.
+    /// Stop after the solver: poses stay, velocities are without damping and gravity.
     #[arg(long)]
     no_integrate: bool,
     #[command(flatten)]
@@ -102,14 +103,14 @@ pub(crate) struct SolveArgs {
 }
 
 impl SolveArgs {
-    /// The folder's parameters, with what the command line says otherwise, but for the order.
+    /// The folder's parameters, overridden by the command line; the order is not set yet.
     fn parameters(&self, folder: &StepParameters) -> StepParameters {
         let mut parameters = *folder;
         parameters.integrate = !self.no_integrate;
         self.faults.apply(self.deadline.apply(self.solver.apply(parameters)))
     }
 
-    /// The same with the order that a board is to be sent.
+    /// Sets the order in which the board gets the collisions.
     fn ordered(&self, parameters: StepParameters, capabilities: &Capabilities) -> StepParameters {
         match self.compare {
             true => self.ordering.apply_to_compare(parameters, capabilities),
@@ -128,7 +129,7 @@ struct Expected {
 enum Kind {
     /// One property.
     State(State),
-    /// Linear and angular velocities in turn.
+    /// Linear and angular velocities alternate.
     Velocities,
 }
 
@@ -266,7 +267,7 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
     ])
 }
 
-/// The array in `file`, which that property must equal after the step.
+/// Reads the array in `file`, which the property must equal after the step.
 fn state(folder: &Folder, file: &str, property: State) -> Result<Expected, Failure> {
     let path = &folder.path.join(file);
     let shape = Dimensions(vec![Some(folder.bodies.len()), Some(property.width())]);
@@ -285,10 +286,10 @@ fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
         .collect()
 }
 
-/// What there is to tell.
+/// The result of the step.
 struct Solved {
     parameters: StepParameters,
-    /// How the order relates to Bullet's, where that is compared with.
+    /// How the order relates to Bullet's, if the results are compared.
     beside_bullet: Option<&'static str>,
     report: StepReport,
     /// Before and after the step, J.
@@ -298,7 +299,7 @@ struct Solved {
 }
 
 impl Solved {
-    /// Share of the collisions that met a hazard, over all passes.
+    /// Share of the collisions with a hazard, over all passes.
     fn hazard_share(&self) -> f64 {
         let issued = self.report.collisions * u64::from(self.report.passes);
         if issued == 0 { 0.0 } else { self.report.hazards as f64 / issued as f64 }
@@ -380,7 +381,7 @@ impl Solved {
                     "array": difference.array,
                     "values": difference.values,
                     "differing": difference.differing,
-                    // Infinite differences are null: JSON has no other word.
+                    // An infinite difference is null: JSON cannot express it.
                     "largest": difference.largest,
                     "first": difference.first,
                 })

@@ -1,4 +1,4 @@
-//! What is refused before anything is written.
+//! Refusals before anything is written.
 
 use super::*;
 
@@ -37,7 +37,7 @@ fn a_node_that_a_program_has_open_keeps_the_bitstream() {
 fn all_memory_that_a_program_has_open_keeps_the_bitstream() {
     let kernel = FakeKernel::vendor();
     let file = kernel.installed();
-    // Also where there is no node yet.
+    // Even where no node exists yet.
     kernel.add_process(4711, "peek", "/dev/mem");
     let error = kernel.load(&file, false).expect_err("in use");
     assert_refused(&kernel, &error, "/dev/mem is open in process 4711 (peek)", "stop");
@@ -169,7 +169,7 @@ fn what_the_kernel_would_misread_is_refused_before_anything_is_written() {
         ("x.bit.bin.gz", b"\x1f\x8b\x08", "gzip", "unpack"),
         ("zeros", &[0; 2000], "no sync word", "README"),
     ] {
-        // Where the kernel finds it, too.
+        // Also in the kernel's own folder.
         for folder in ["home", "lib/firmware"] {
             let file = kernel.bytes(&format!("{folder}/{name}"), bytes);
             let error = kernel.load(&file, true).expect_err("wrong");

@@ -1,4 +1,5 @@
-//! The verb `compare`: two boards step the same start, each on its own way, and what becomes of it.
+//! The verb `compare`: steps two boards from the same start, independently, and measures how far
+//! they diverge.
 
 mod show;
 mod side;
@@ -51,17 +52,17 @@ are not known, of the step's own contacts, carried along with their bodies.
 A board whose step fails stops there and the other goes on. Exit code 0 if every step was taken, 1
 if one failed.";
 
-/// Rows of the table, if not said otherwise.
+/// Default rows of the table.
 const ROWS: u32 = 10;
 
-/// Step the same start on two boards and show how far they come apart.
+/// Step two boards from the same start and show how far they diverge.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CompareArgs {
-    /// Build of the board that is the original.
+    /// Build of the original board.
     #[arg(value_name = "A")]
     a: SideSpec,
-    /// Build of the board that is compared with it.
+    /// Build of the board compared with it.
     #[arg(value_name = "B")]
     b: SideSpec,
     /// Take one step from this folder of .npy arrays instead of a scene.
@@ -87,11 +88,11 @@ pub(crate) struct CompareArgs {
 
 /// A step on both boards.
 struct Row {
-    /// 0 is the common start.
+    /// 0 is the start, before any step.
     step: u32,
     a: Option<Measured>,
     b: Option<Measured>,
-    /// If both took the step.
+    /// Present if both boards took the step.
     deviation: Option<StateDeviation>,
 }
 
@@ -106,7 +107,7 @@ impl Row {
         })
     }
 
-    /// B less A.
+    /// B minus A.
     fn difference(&self) -> Value {
         let (Some(a), Some(b), Some(state)) = (&self.a, &self.b, &self.deviation) else {
             return Value::Null;
@@ -180,14 +181,14 @@ pub(crate) fn run(
         done += 1;
         let (a, b) = both(&mut sides, |side| side.step(done, &parameters));
         if done == 1 && a.is_none() && b.is_none() {
-            // Nothing to be compared, and nothing that one build does better than the other.
+            // Both builds fail at once: nothing can be compared.
             let Side { name, spec, failed, .. } = &mut sides.0;
             if let Some(failed) = failed.take() {
                 return Err(failed.failure.about(format!("board {name} ({spec}), and B as well")));
             }
         }
         if done == 1 && !common.json {
-            // Only now: what is refused prints nothing but the refusal.
+            // The heading waits for the first step: a refused scene prints only the refusal.
             progress.suspend(|| show::head(args, &sides, steps, &last, out))?;
         }
         progress.inc(1);
@@ -255,7 +256,7 @@ fn board_shapes(opened: &crate::board::Opened) -> u32 {
     opened.accelerator.capabilities().shape_capacity
 }
 
-/// Does the same with both boards, side by side.
+/// Does the same with both boards, in parallel.
 fn both<'a, R: Send>(
     sides: &mut (Side<'a>, Side<'a>),
     act: impl Fn(&mut Side<'a>) -> R + Sync,
@@ -266,7 +267,7 @@ fn both<'a, R: Send>(
         let one = act(a);
         match other.join() {
             Ok(other) => (one, other),
-            // A panic goes on as it would have without a thread.
+            // A panic of the thread continues here.
             Err(panic) => std::panic::resume_unwind(panic),
         }
     })

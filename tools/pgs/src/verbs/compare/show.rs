@@ -1,4 +1,4 @@
-//! This file shows a comparison to people: a table while it goes, and the last step in words.
+//! Prints a comparison for people: a table row by row, then the last step in words.
 
 use std::io::{self, Write};
 
@@ -33,7 +33,7 @@ const COLUMNS: [Column; 17] = [
 
 const NOTHING: &str = "-";
 
-/// What is compared, and the names of the columns.
+/// The two builds, the scene, and the names of the columns.
 pub(super) fn head(
     args: &CompareArgs,
     sides: &(Side<'_>, Side<'_>),
@@ -56,7 +56,7 @@ pub(super) fn head(
     out.flush()
 }
 
-/// A, B, and B less A.
+/// Rows for A, for B, and for B minus A.
 pub(super) fn row(row: &Row, sides: &(Side<'_>, Side<'_>), out: &mut dyn Write) -> io::Result<()> {
     let step = row.step.to_string();
     let mut first = step.as_str();
@@ -116,7 +116,7 @@ fn cells(step: &str, name: &str, measured: &Measured) -> [String; 10] {
     ]
 }
 
-/// The last step in words, and how it ended.
+/// The last step in words, and the end of the comparison.
 pub(super) fn end(row: &Row, sides: &(Side<'_>, Side<'_>), out: &mut dyn Write) -> io::Result<()> {
     writeln!(out)?;
     if let Some(state) = &row.deviation {

@@ -1,4 +1,4 @@
-//! This file is one of the two boards on its way through the steps.
+//! Steps one of the two compared boards and measures its state.
 
 use scene::{
     KineticEnergy, Momentum, Penetration, Scene, carry_along, kinetic_energy_parts, momentum,
@@ -17,11 +17,11 @@ use crate::step_input;
 use step_folder::digest;
 use step_folder::folder::Folder;
 
-/// What a board steps.
+/// The bodies and collisions that a board steps.
 pub(super) enum World<'a> {
-    /// A scene, whose collisions are found anew after every step.
+    /// A scene, whose collisions are detected after every step.
     Scene(Box<Scene>),
-    /// One step from a folder of arrays, whose shapes are not known.
+    /// One step from a folder of arrays, without the shapes' geometry.
     Folder { folder: &'a Folder, bodies: Vec<Body> },
 }
 
@@ -40,7 +40,7 @@ impl World<'_> {
         }
     }
 
-    /// Whether each of the bodies can move.
+    /// Whether each body can move.
     pub(super) fn moving(&self) -> Vec<bool> {
         let shapes = self.shapes();
         let moves = |body: &Body| {
@@ -51,21 +51,21 @@ impl World<'_> {
     }
 }
 
-/// What there is to measure of a state.
+/// The measures of a state.
 pub(super) struct Measured {
-    /// Of the collisions that `penetration` is about.
+    /// The number of collisions that `penetration` measures.
     pub(super) collisions: u64,
     pub(super) kinetic: KineticEnergy,
     /// J.
     pub(super) potential: f64,
     pub(super) momentum: Momentum,
-    /// After the step: of the collisions that are found then, or of the step's own contacts,
-    /// carried along with their bodies.
+    /// Measured after the step: over the newly detected collisions, or over the step's own
+    /// contacts, carried along with their bodies.
     pub(super) penetration: Penetration,
-    /// Share of the position components that the step left as the board was sent them; none before
-    /// the first.
+    /// Share of the position components whose bits, as sent to the board, the step did not change;
+    /// none at the start.
     pub(super) unmoved: Option<f64>,
-    /// Of the step that led here; none before the first.
+    /// The report of the step that led here; none at the start.
     pub(super) report: Option<StepReport>,
 }
 
@@ -92,15 +92,15 @@ impl Measured {
     }
 }
 
-/// Why a board takes no more steps.
+/// The failure that ended a board's steps.
 pub(super) struct Failed {
     pub(super) step: u32,
-    /// The first body that it is about, where the error says which.
+    /// The first body that the error names, if it names one.
     pub(super) body: Option<usize>,
     pub(super) failure: Failure,
 }
 
-/// One board, and what it steps.
+/// One board and its world.
 pub(super) struct Side<'a> {
     pub(super) name: &'static str,
     pub(super) spec: SideSpec,
@@ -111,7 +111,7 @@ pub(super) struct Side<'a> {
 }
 
 impl<'a> Side<'a> {
-    /// Builds the board, and has it take the shapes of what `world` makes.
+    /// Builds the board, and gives it the shapes of the world that `world` makes.
     pub(super) fn open(
         name: &'static str,
         spec: SideSpec,
@@ -133,7 +133,7 @@ impl<'a> Side<'a> {
         Ok(Self { name, spec, opened, world, failed: None, gravity })
     }
 
-    /// Finds the collisions of the first step and measures what there is before it.
+    /// Detects the collisions of the first step and measures the start.
     pub(super) fn start(&mut self) -> Measured {
         match &mut self.world {
             World::Scene(scene) => {
@@ -147,7 +147,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// Takes a step and measures what comes of it; nothing if the board has failed.
+    /// Takes a step and measures the state after it; none if the board has failed.
     pub(super) fn step(&mut self, number: u32, parameters: &StepParameters) -> Option<Measured> {
         if self.failed.is_some() {
             return None;
@@ -201,7 +201,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// A number as the streams of the bodies carry it.
+    /// Rounds a number as the streams of the bodies do.
     fn carried(&self, value: f32) -> f32 {
         let format = self.spec.build.config().variant().numbers.poses;
         NarrowFormat::of(format).and_then(|format| format.round_trip(value)).unwrap_or(value)
@@ -228,7 +228,7 @@ impl<'a> Side<'a> {
     }
 }
 
-/// The failure that an error of the driver is; for a folder with the array that it is about.
+/// Makes a failure of the driver's error; for a folder, with the array at fault.
 fn failure(opened: &Opened, world: &World<'_>, error: Error) -> Failure {
     match world {
         World::Folder { folder, .. } if error.is_input() => {
@@ -238,7 +238,7 @@ fn failure(opened: &Opened, world: &World<'_>, error: Error) -> Failure {
     }
 }
 
-/// The body that an error is about.
+/// The body that an error names.
 fn body_of(error: &Error) -> Option<usize> {
     match error {
         Error::Step { fault, .. } => match **fault {

@@ -6,8 +6,7 @@ use std::str::FromStr;
 use crate::options::build::BuildArgs;
 use crate::options::ordering::{OrderName, OrderingArgs};
 
-/// What one side of a comparison is: how its board is built, and in which order it is sent the
-/// collisions.
+/// The specification of a side: the build of its board, and the order of its collisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SideSpec {
     pub(super) build: BuildArgs,
@@ -17,7 +16,7 @@ pub(super) struct SideSpec {
 impl FromStr for SideSpec {
     type Err = String;
 
-    /// A word of the order may stand anywhere behind the profile.
+    /// A word for the order may stand anywhere behind the profile.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut order = None;
         let mut rest = Vec::new();

@@ -1,4 +1,4 @@
-//! This file lists the cells: each kind of fault at each place where it can be.
+//! Lists the cells of the fault table: each kind of fault at each possible place.
 
 use bitstream_model::{
     Direction, Fault, FaultKind, FaultPlan, PacketCount, Place, StepPhase, When,
@@ -11,11 +11,12 @@ use super::trial::Bench;
 #[derive(Debug, Clone)]
 pub(super) struct Cell {
     pub(super) kind: FaultKind,
-    /// The phase that it happens in; none if it does not depend on one.
+    /// The phase of the fault; none if the kind does not depend on a phase.
     pub(super) phase: Option<StepPhase>,
     pub(super) plan: FaultPlan,
     pub(super) expected: Expected,
-    /// Whether the step with the fault is of the larger scene, for which channels must be stopped.
+    /// Whether the fault belongs to the step of the larger scene, in which channels must be
+    /// stopped.
     pub(super) larger: bool,
 }
 
@@ -24,7 +25,7 @@ impl Cell {
         self.phase.map_or_else(|| "any".to_owned(), |phase| phase.to_string())
     }
 
-    /// The channel that it is in.
+    /// The channel of the fault.
     pub(super) fn channel(&self) -> Option<(usize, Direction)> {
         match self.plan.faults.last()?.place {
             Some(Place::Channel(core, direction)) => Some((core, direction)),
@@ -47,14 +48,14 @@ impl Cell {
     }
 }
 
-/// Combinations that there are not, and how many cells they would be.
+/// Impossible combinations of a kind and a phase, and the number of cells that they would be.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Impossible {
     pub(super) what: &'static str,
     pub(super) cells: usize,
 }
 
-/// First, middle and last of so many, each once.
+/// The first, the middle and the last of `count` positions, each once.
 fn positions(count: u64) -> Vec<u64> {
     let last = count.saturating_sub(1);
     let mut all = vec![0, last / 2, last];
@@ -62,8 +63,8 @@ fn positions(count: u64) -> Vec<u64> {
     all
 }
 
-/// Phases that stand for all of their kind: of the passes the first, one in the middle and the last
-/// contact pass, the first and the last friction pass.
+/// Phases that represent all others of their kind: the first, the middle and the last contact pass,
+/// and the first and the last friction pass.
 fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
     match phase {
         StepPhase::Load | StepPhase::Poses | StepPhase::Results => true,
@@ -72,7 +73,7 @@ fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
     }
 }
 
-/// The same kind, where it costs time with so much that no step ends before it is felt.
+/// The kind, with a delay so long that the step cannot end before the delay shows.
 fn felt(kind: FaultKind) -> FaultKind {
     match kind {
         FaultKind::Slow { .. } => FaultKind::Slow { clocks: 10_000 },
@@ -81,7 +82,7 @@ fn felt(kind: FaultKind) -> FaultKind {
     }
 }
 
-/// Where a kind of fault can be.
+/// The places where a kind of fault can happen.
 enum Where {
     /// At each beat of a packet.
     Beats,
@@ -89,13 +90,13 @@ enum Where {
     Descriptors,
     /// At the end of a packet.
     Ends,
-    /// As each channel is stopped.
+    /// When a channel is stopped.
     Stops,
-    /// As each core, and the accelerator, is reset after a fault.
+    /// When a core, or the accelerator, is reset after a fault.
     Resets,
     /// In each phase of the accelerator.
     Accelerator,
-    /// Once.
+    /// Once a step.
     Once,
 }
 
@@ -129,7 +130,7 @@ fn place_of(kind: FaultKind) -> Where {
     }
 }
 
-/// All cells of a board, and what there cannot be.
+/// All cells of a board, and the impossible combinations.
 pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
     let packets: Vec<_> = bench
         .packets
@@ -208,7 +209,7 @@ fn at(kind: FaultKind, packet: &PacketCount, when: When) -> Cell {
     Cell::new(on(kind, packet).when(when), false)
 }
 
-/// Every channel that has packets, once.
+/// Every channel with packets, once.
 fn channels(packets: &[PacketCount]) -> impl Iterator<Item = (usize, Direction)> {
     let mut all: Vec<_> = packets.iter().map(|packet| (packet.core, packet.direction)).collect();
     all.sort_by_key(|(core, direction)| (*core, *direction == Direction::S2mm));
@@ -216,7 +217,7 @@ fn channels(packets: &[PacketCount]) -> impl Iterator<Item = (usize, Direction)>
     all.into_iter()
 }
 
-/// A reset follows a fault: a stall, here.
+/// A reset needs a fault before it: here a stall.
 fn resets(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
     let stall = Fault::new(FaultKind::Stall).on(0, Direction::S2mm);
     let cores = (0..bench.config.profile.mm2s_widths.len()).map(Place::Core);
@@ -239,7 +240,7 @@ fn in_accelerator(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
         }
     }
     if bench.streams_once() {
-        // It is in all of its phases at once.
+        // The fault acts in all phases at once.
         return vec![Cell::new(Fault::new(kind), false)];
     }
     phases

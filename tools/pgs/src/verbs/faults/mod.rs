@@ -1,5 +1,6 @@
-//! The verb `faults`: every fault that the emulated board can have, at every channel and in every phase
-//! of a step, and whether the driver names it, keeps the caller's data and works on.
+//! The verb `faults`: injects every fault of the emulated board, in every channel and in every
+//! phase of a step. Checks that the driver names the fault, keeps the caller's data and goes on
+//! working.
 
 mod cells;
 mod expected;
@@ -41,15 +42,15 @@ call says so.";
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FaultsArgs {
-    /// One profile instead of all.
+    /// Try this profile only.
     #[arg(long, value_name = "PROFILE", value_parser = crate::options::build::profile())]
     profile: Option<&'static Profile>,
-    /// Print what each cell injects, and try none.
+    /// Print the fault of each cell, and try none.
     #[arg(long)]
     list: bool,
 }
 
-/// What became of the cells of a profile.
+/// The results of a profile's cells.
 struct Tried {
     profile: &'static Profile,
     cells: Vec<(Cell, Verified)>,
@@ -63,7 +64,7 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     if environment::variable(environment::LOG).is_none() {
-        // Thousands of faults, and the driver warns of each.
+        // The driver would warn of each of thousands of faults.
         log::set_max_level(log::LevelFilter::Off);
     }
     let profiles: Vec<_> = match args.profile {
@@ -95,7 +96,7 @@ pub(crate) fn run(
     Ok(if failed { Verdict::Differs } else { Verdict::Done })
 }
 
-/// Tries cells on all processors; in their order, whoever was first.
+/// Tries the cells on all processors; the results are in the order of the cells.
 fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
     let bar: ProgressBar = progress_bar(u32::try_from(cells.len()).unwrap_or(u32::MAX));
     bar.set_message(bench.config.profile.name);
@@ -104,7 +105,7 @@ fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
     let work = || {
         let mut found = Vec::new();
         while let Some((place, cell)) = take(&next, &cells) {
-            // A panic is what fails everywhere, not what ends the table.
+            // A panic fails the cell and does not end the table.
             let tried = catch_unwind(AssertUnwindSafe(|| trial::run(bench, cell)));
             found.push((place, tried.unwrap_or_default()));
             bar.inc(1);
@@ -116,7 +117,7 @@ fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
         workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
     });
     bar.finish_and_clear();
-    // What is missing has passed nothing.
+    // A cell without a result has passed nothing.
     let mut all = vec![Verified::default(); cells.len()];
     for (place, verified) in found {
         all[place] = verified;
@@ -124,7 +125,7 @@ fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
     cells.into_iter().zip(all).collect()
 }
 
-/// The next cell that nobody has taken.
+/// The next cell that no thread has taken.
 fn take<'a>(next: &AtomicUsize, cells: &'a [Cell]) -> Option<(usize, &'a Cell)> {
     let place = next.fetch_add(1, Ordering::Relaxed);
     cells.get(place).map(|cell| (place, cell))

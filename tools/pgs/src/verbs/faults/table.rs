@@ -1,4 +1,4 @@
-//! This file prints what came of the cells: a row a kind of fault.
+//! Prints the results of the cells: one row for each kind of fault.
 
 use std::io::{self, Write};
 
@@ -23,7 +23,7 @@ const COLUMNS: [Column; 9] = [
     Column { name: "slowest", unit: "ms", width: 8 },
 ];
 
-/// How many cells came out right, by what was looked at.
+/// The number of cells that passed each check.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tally {
     tried: u64,
@@ -80,7 +80,8 @@ impl Tally {
     }
 }
 
-/// A row a kind, all profiles together; then profiles, phases, what there cannot be, and what failed.
+/// Prints a row for each kind over all profiles; then profiles, phases, impossible combinations,
+/// and failures.
 pub(super) fn print(all: &[Tried], out: &mut dyn Write) -> io::Result<()> {
     let cells = || all.iter().flat_map(|tried| &tried.cells);
     heading(out, &COLUMNS)?;

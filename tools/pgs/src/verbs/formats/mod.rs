@@ -1,4 +1,4 @@
-//! The verb `formats`: how large the numbers of a step are, and what sixteen bits leave of them.
+//! The verb `formats`: measures the sizes of a step's numbers, and their errors in 16-bit formats.
 
 mod numbers;
 mod tally;
@@ -40,14 +40,14 @@ the other one is, as the profile mixed streams it, and in neither sum.
 Relative errors are |read back - number| / |number|; zeros are left out of them, and of the share
 below 3e-5. The driver refuses a number that a format cannot carry.";
 
-/// Show how large the numbers of a step are, and the errors of 16-bit formats on them.
+/// Show the sizes of a step's numbers, and their errors in 16-bit formats.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FormatsArgs {
-    /// The step in this folder of .npy arrays instead of one of a scene.
+    /// Take the step from this folder of .npy arrays instead of a scene.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "BuildArgs", "step"])]
     input: Option<PathBuf>,
-    /// Which step of the scene; those before it are taken first.
+    /// Step of the scene whose numbers are measured; the steps before it are taken first.
     #[arg(long, value_name = "N", default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..))]
     step: u32,
     #[command(flatten)]
@@ -58,7 +58,7 @@ pub(crate) struct FormatsArgs {
     build: BuildArgs,
 }
 
-/// What a step is given.
+/// The input of a step.
 struct Step {
     bodies: Vec<Body>,
     shapes: Vec<Shape>,
@@ -124,7 +124,7 @@ pub(crate) fn run(
     Ok(Verdict::Done)
 }
 
-/// The scene's step; nothing if Ctrl-C came before it.
+/// The scene before its measured step; none if Ctrl-C ended the run before it.
 fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Failure> {
     let mut opened = board::open(common, &args.build)?;
     args.scene.check_size(opened.accelerator.capabilities())?;

@@ -1,4 +1,4 @@
-//! The verb `list`: which boards there are, and what keeps one from being used.
+//! The verb `list`: lists the boards of the system, and the obstacles to their use.
 
 mod inventory;
 
@@ -24,7 +24,8 @@ Examples:
 
 A UIO node is recognised by its regions, whatever its name; the line says how to use it.";
 
-/// List the boards: UIO nodes, DMA buffers, what is inaccessible and why, and the emulated board.
+/// List the boards: UIO nodes, DMA buffers, inaccessible devices with the reason, and the emulated
+/// board.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ListArgs {
@@ -33,7 +34,7 @@ pub(crate) struct ListArgs {
     system_root: PathBuf,
 }
 
-/// Lists what there is.
+/// Lists the boards.
 pub(crate) fn run(
     args: &ListArgs,
     common: &CommonArgs,

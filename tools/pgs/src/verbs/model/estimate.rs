@@ -1,4 +1,4 @@
-//! This file is each profile's estimate for programs.
+//! Each profile's estimate for programs.
 
 use bitstream_model::interface::profile::Variant;
 use bitstream_model::timing::thesis::recorded::Design;

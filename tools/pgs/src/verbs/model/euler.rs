@@ -1,4 +1,4 @@
-//! This file has Figure 2.6: a fall of ten seconds by explicit Euler.
+//! Figure 2.6: a fall of ten seconds by explicit Euler.
 
 use bitstream_model::timing::thesis::euler::{exact, explicit, explicit_single};
 

@@ -1,4 +1,4 @@
-//! This file has the tables of on-chip memory, logic and streams.
+//! The tables of on-chip memory, logic and streams.
 
 use bitstream_model::Bandwidth;
 use bitstream_model::timing::thesis::recorded::Design;
@@ -197,7 +197,7 @@ fn logic(scene: &Scene) -> Table {
     table
 }
 
-/// Stream widths against the ports, and the rate asked for against the memory.
+/// Stream widths against the ports, and required bandwidth against the memory's.
 pub(super) fn streams(scene: &Scene) -> Vec<Table> {
     let mut table = Table::new(
         "streams",

@@ -1,12 +1,12 @@
-//! This file has the tables of the block RAM ports: which initiation interval they allow, and who
-//! has which port when.
+//! The tables of the block RAM ports: the initiation interval that they allow, and the schedule of
+//! each port.
 
 use bitstream_model::timing::{Access, AccessKind, PortAccount, PortUse, Slot};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, yes_or_no};
 
-/// What a pump asks of the device, and what of it is known.
+/// The pump's demands on the device, and what is known of them.
 pub(super) const PUMP: &str = "The pump, block RAM at twice the accelerator's clock (500 or 550 MHz), is \
     a design assumption and was not synthesised. A global clock tree may run at 775 MHz (DS925 1.29, \
     clock buffers, speed grade -2, 0.85 V); the limit of the block RAM itself in DS925 was not \
@@ -85,12 +85,12 @@ fn intervals(scene: &Scene) -> Table {
     table
 }
 
-/// An access, as `read A`, with the number of its collision where several are issued together.
+/// An access, as `read A`, with the number of its collision if several are issued together.
 fn access(ports: &PortUse, access: &Access) -> String {
     let verb = match (access.kind, access.row) {
         (AccessKind::Read, _) => "read",
         (AccessKind::Write, 0 | 1) => "write",
-        // From the unit before.
+        // Forwarded from the unit before.
         (AccessKind::Write, _) => "take",
     };
     let body = match (ports.array, access.row % 2) {

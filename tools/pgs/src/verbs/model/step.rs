@@ -1,4 +1,4 @@
-//! This file has the tables of cycles and time of a step.
+//! The tables of a step's cycles and times.
 
 use bitstream_model::Bandwidth;
 use bitstream_model::interface::profile::{Inertia, Variant};
@@ -93,7 +93,7 @@ fn times(scene: &Scene) -> Table {
         for records in Records::ALL {
             for bandwidth in &scene.bandwidths {
                 let time = StepTime::new(variant, records, &scene.step, *bandwidth);
-                // The thesis' cycles contain no wait for memory, and it states a bandwidth.
+                // The thesis' cycles contain no memory waits, and it states a bandwidth.
                 let stated = [Bandwidth::Unlimited, MEMORY_BANDWIDTH];
                 let design = design.filter(|_| stated.contains(bandwidth));
                 table.row([

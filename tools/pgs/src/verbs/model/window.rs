@@ -1,4 +1,4 @@
-//! This file shows the designs that stream the collisions once: cycles, bytes, memory, logic.
+//! Shows the designs that stream the collisions once: cycles, bytes, memory, logic.
 
 use bitstream_model::Bandwidth;
 use bitstream_model::interface::profile::{FLOAT, Flow, Variant, Window};
@@ -9,12 +9,12 @@ use bitstream_model::timing::{
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, yes_or_no};
 
-/// Whether a profile is one of them.
+/// Whether a profile streams the collisions once.
 pub(super) fn has_window(flow: &Flow) -> bool {
     matches!(flow, Flow::Window(_))
 }
 
-/// The tables, if one of these designs was asked for.
+/// The tables, if one of these designs is among the profiles.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     let designs: Vec<(&Variant, &Window)> = scene
         .variants

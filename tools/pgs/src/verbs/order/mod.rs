@@ -1,4 +1,4 @@
-//! The verb `order`: what each order of a step's collisions costs, for every depth of the pipeline.
+//! The verb `order`: measures each order of a step's collisions, for every depth of the pipeline.
 
 mod cost;
 mod curve;
@@ -35,20 +35,20 @@ it. A body is alive from its first collision to its last; spans are counted in i
 The folder is that of `pgs solve`; if it also holds gpu_order.npy (M) <u4, the order in which Bullet's GPU takes the
 collisions, it is measured too.";
 
-/// Show what each order of the collisions costs: hazards, empty slots, bodies alive, host time.
+/// Show the cost of each order of the collisions: hazards, empty slots, live bodies, host time.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct OrderArgs {
     /// Collisions of a folder of .npy arrays.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["grid", "steps", "drop", "spheres", "seed"])]
     input: Option<PathBuf>,
-    /// Collisions of a pile of so many spheres of three sizes, which is no grid.
+    /// Collisions of an irregular pile with this many spheres of three sizes.
     #[arg(long, value_name = "N", conflicts_with_all = ["grid", "steps", "drop"])]
     spheres: Option<u32>,
-    /// Which pile of spheres.
+    /// Seed of the pile of spheres.
     #[arg(long, value_name = "SEED", default_value_t = 1, requires = "spheres")]
     seed: u64,
-    /// Collisions of cubes dropped on the ground; so many along each axis.
+    /// Collisions of a pile of cubes dropped on the ground; cubes along each axis.
     #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
     grid: Grid,
     /// Steps that the cubes take before their collisions are ordered.
@@ -66,13 +66,14 @@ pub(crate) struct OrderArgs {
         value_parser = clap::value_parser!(u32).range(1..=i64::from(IssueWindow::DEPTH_MAX))
     )]
     depth: Vec<u32>,
-    /// Collisions that enter in one issue slot.
+    /// Collisions that enter the pipeline in one issue slot.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(IssueWindow::PER_ISSUE_MAX)))]
     per_issue: u32,
-    /// Runs of which the host cost is the median.
+    /// Runs for the median host time.
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
-    /// Write the bodies alive in each slot, for every order at the last depth: .csv or .svg.
+    /// Write the number of live bodies in each slot, for every order at the last depth: .csv or
+    /// .svg.
     #[arg(long, value_name = "FILE", value_parser = curve::path)]
     curve: Option<PathBuf>,
 }
@@ -116,7 +117,7 @@ pub(crate) fn run(
     Ok(Verdict::Done)
 }
 
-/// The driver judges what a folder holds.
+/// The input of a folder is checked by the driver.
 fn refused(error: OrderError) -> Failure {
     Failure::input(error).next("`pgs solve` says more about input that cannot be taken")
 }

@@ -1,4 +1,4 @@
-//! This file measures every order of the collisions at every depth.
+//! Measures every order of the collisions at every depth.
 
 use zynq_pgs::order::{
     Checker, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer, Schedule, Ties,
@@ -8,7 +8,7 @@ use zynq_pgs::order::{
 use super::cost;
 use super::source::Source;
 
-/// Where the random order comes from; any number does.
+/// Seed of the random order; any number does.
 const SEED: u64 = 20_260_101;
 
 /// An order at a depth.
@@ -16,23 +16,23 @@ pub(super) struct Row {
     pub(super) order: String,
     pub(super) depth: u32,
     pub(super) report: OrderReport,
-    /// What making the order costs, ns a collision; not if it is not made here.
+    /// Host time of making the order, ns a collision; none if the order is given.
     pub(super) host_ns: Option<f64>,
 }
 
-/// Everything that was measured.
+/// All measurements.
 pub(super) struct Measured {
     pub(super) rows: Vec<Row>,
     /// Schedules at the last depth, by the name of their order.
     pub(super) last: Vec<(String, Schedule)>,
-    /// What verifying the hazard-free schedule of the last depth costs, ns a collision.
+    /// Host time of verifying the hazard-free schedule of the last depth, ns a collision.
     pub(super) verify_ns: f64,
 }
 
-/// Where an order comes from.
+/// The origin of an order.
 enum Kind {
     Made(Order),
-    /// The same at every depth, made elsewhere.
+    /// A given order, the same at every depth.
     Fixed(Schedule),
 }
 
@@ -54,7 +54,7 @@ pub(super) fn measure(
             match &kind {
                 Kind::Fixed(fixed) => schedule.clone_from(fixed),
                 Kind::Made(order) => {
-                    // Only the orders without hazards depend on the depth.
+                    // Only orders without hazards depend on the depth.
                     if place == 0 || order.is_hazard_free() {
                         let cost = || orderer.order(&input, *order, window).map(|_| ());
                         host_ns = Some(cost::per_collision(&input, runs, cost)?);
@@ -73,7 +73,7 @@ pub(super) fn measure(
     Ok(Measured { rows, last, verify_ns })
 }
 
-/// What verifying a schedule costs; it must be right.
+/// Measures the verification of a schedule, which must pass.
 fn verified(
     schedule: &Schedule,
     input: &OrderInput<'_>,
@@ -114,7 +114,7 @@ fn shuffled(count: usize) -> Vec<u32> {
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         let z = u128::from(z ^ (z >> 31));
-        // The upper half of the product is below `below`.
+        // The upper half of the product is below the bound.
         usize::try_from((z * below as u128) >> 64).unwrap_or(0)
     };
     let mut order: Vec<u32> = (0..).take(count).collect();

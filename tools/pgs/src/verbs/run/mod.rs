@@ -1,4 +1,4 @@
-//! The verb `run`: steps a scene, shows what every step cost, and sums it up.
+//! The verb `run`: steps a scene, shows the cost of every step, and sums up.
 
 mod row;
 mod summary;
@@ -55,9 +55,9 @@ Columns: step; pairs of bodies in contact; deepest penetration of the contacts t
 kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the step
 on the board, which is modelled where the board is emulated; time of this machine.";
 
-/// Rows of the table, if not said otherwise.
+/// Default rows of the table.
 const ROWS: u32 = 15;
-/// Contact and friction iterations of a step, if not said otherwise: enough to carry 30 layers.
+/// Default contact and friction iterations of a step: enough to carry 30 layers.
 const ITERATIONS: u32 = 10;
 
 /// Step a pile dropped on the ground.
@@ -72,7 +72,7 @@ pub(crate) struct RunArgs {
     /// Show every N-th step [default: a fifteenth of the steps]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     report_every: Option<u32>,
-    /// Show every column, 170 characters a line.
+    /// Show every column, in lines of 170 characters.
     #[arg(long)]
     wide: bool,
     #[command(flatten)]
@@ -98,14 +98,14 @@ impl RunArgs {
         self.faults.apply(self.ordering.apply(parameters))
     }
 
-    /// Whether a step has a row of its own.
+    /// Whether the table shows this step.
     fn is_shown(&self, step: u32) -> bool {
         let every = self.report_every.unwrap_or(self.steps.div_ceil(ROWS));
         step == 1 || step.is_multiple_of(every) || step == self.steps
     }
 }
 
-/// What a run has come to so far.
+/// The course of a run so far.
 #[derive(Default)]
 struct Course {
     done: u32,
@@ -167,7 +167,7 @@ fn take_steps(
         course.footprint.see(&variant, &row.report);
         course.orders.see(row.report.order);
         if course.done == 1 && !common.json {
-            // Only now: a scene that is refused prints nothing but the refusal.
+            // The heading waits for the first step: a refused scene prints only the refusal.
             progress.suspend(|| print_heading(args, opened, &row.report, out))?;
         }
         progress.inc(1);
@@ -191,7 +191,7 @@ fn is_emulated(opened: &Opened) -> bool {
     matches!(opened.accelerator.board().kind, BoardKind::Emulated | BoardKind::Served)
 }
 
-/// Which board, which scene, the first step's order, and the names of the columns.
+/// The board, the scene, the first step's order, and the names of the columns.
 fn print_heading(
     args: &RunArgs,
     opened: &Opened,
@@ -209,7 +209,7 @@ fn print_heading(
     out.flush()
 }
 
-/// What is known of the run as a whole; nothing before the first step.
+/// The summary of the run; none before the first step.
 fn summary<'a>(
     args: &RunArgs,
     parameters: &'a StepParameters,

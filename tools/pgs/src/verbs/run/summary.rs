@@ -1,5 +1,5 @@
-//! Sums up a run: what was simulated, how long the board takes beside the thesis' figures, what
-//! limits it, and whether the pile is at rest.
+//! Sums up a run: the simulated time, the board's time beside the thesis' figures, its limit, and
+//! whether the pile is at rest.
 
 use std::io::{self, Write};
 use std::time::Duration;
@@ -17,8 +17,8 @@ use crate::options::solver::time_step_text;
 use crate::output::facts::fact;
 use crate::output::{limit_text, milliseconds};
 
-/// A pile is at rest if its bodies move no faster than this on average (root of the mean of v²,
-/// weighted by mass, turning included), m/s.
+/// Average speed up to which a pile is at rest (root mean square, weighted by mass, rotation
+/// included), m/s.
 const REST: f64 = 0.05;
 
 /// Sums over the steps of a run.
@@ -34,12 +34,12 @@ pub(super) struct Totals {
     cycles: u64,
     stalls: u64,
     waits: u64,
-    /// How many steps each limit held back.
+    /// The number of steps that each limit held back.
     limits: Vec<(Limit, u32)>,
     host: HostSums,
 }
 
-/// Host time by what it was spent on.
+/// Host time by activity.
 #[derive(Debug, Default)]
 struct HostSums {
     all: Duration,
@@ -51,7 +51,7 @@ struct HostSums {
 }
 
 impl Totals {
-    /// Takes a step into account.
+    /// Adds a step.
     pub(super) fn see(&mut self, row: &Row) {
         let report = &row.report;
         self.steps += 1;
@@ -78,7 +78,7 @@ impl Totals {
         self.host.unpack += host.unpack + host.commit;
     }
 
-    /// The limit of most steps, and how many they are.
+    /// The limit of most steps, and their number.
     fn limit(&self) -> Option<(Limit, u32)> {
         self.limits.iter().copied().max_by_key(|(_, steps)| *steps)
     }
@@ -88,7 +88,7 @@ impl Totals {
         milliseconds(self.modelled) / f64::from(self.steps.max(1))
     }
 
-    /// Mean time of a pass over the collisions, what surrounds the passes included, ms.
+    /// Mean time of a pass over the collisions, with a share of the time around the passes, ms.
     fn per_pass(&self) -> Option<f64> {
         (self.passes > 0).then(|| self.mean() / f64::from(self.passes))
     }
@@ -99,13 +99,13 @@ impl Totals {
     }
 }
 
-/// What the thesis has beside a run.
+/// The thesis' figures beside a run.
 #[derive(Debug, Clone, Copy)]
 struct Thesis {
     design: &'static recorded::Design,
     /// Cycles of one of its passes.
     pass: u64,
-    /// Its time for as many passes, ms.
+    /// The thesis' time for the run's number of passes, ms.
     same_passes_ms: f64,
 }
 
@@ -144,14 +144,14 @@ impl Thesis {
     }
 }
 
-/// How the pile stands at the end.
+/// The state of the pile at the end.
 #[derive(Debug, Clone, Copy)]
 struct End {
-    /// Without what gravity added last, J.
+    /// Kinetic energy without gravity's last addition, J.
     kinetic_energy: f64,
-    /// Speed that all bodies together have this energy at, m/s.
+    /// The common speed of all bodies at this energy, m/s.
     speed: f64,
-    /// m.
+    /// Deepest penetration, m.
     deepest: f64,
 }
 
@@ -186,11 +186,11 @@ pub(super) struct Board {
     pub(super) profile: &'static Profile,
     /// Whether its times are modelled.
     pub(super) is_emulated: bool,
-    /// Its memory bandwidth, where that is known.
+    /// Its memory bandwidth, if known.
     pub(super) bandwidth: Option<String>,
 }
 
-/// What there is to tell of a run.
+/// The summary of a run.
 pub(super) struct Summary<'a> {
     totals: &'a Totals,
     parameters: &'a StepParameters,
@@ -201,7 +201,7 @@ pub(super) struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
-    /// Measures how the scene stands after its last step.
+    /// Measures the scene after its last step.
     pub(super) fn new(
         totals: &'a Totals,
         parameters: &'a StepParameters,
