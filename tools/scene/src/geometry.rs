@@ -1,4 +1,4 @@
-//! This file says what a body looks like, and what mass properties follow from it.
+//! The geometry of a body, and the mass properties that follow from it.
 
 use zynq_pgs::{InputError, Shape};
 
@@ -17,9 +17,9 @@ pub enum Geometry {
         /// Radius, m.
         radius: f32,
     },
-    /// All points up to a radius away from a piece of the y axis.
+    /// All points within a radius of a segment on the y axis.
     Capsule {
-        /// Half the length of that piece, m.
+        /// Half the length of that segment, m.
         half_height: f32,
         /// Radius, m.
         radius: f32,
@@ -55,11 +55,12 @@ impl Geometry {
         }
     }
 
-    /// The mass properties of a solid body of `mass` kg, the same everywhere inside.
+    /// The mass properties of a solid, homogeneous body of `mass` kg.
     ///
     /// # Errors
-    /// [`InputError::ShapeParameter`]: a size or the mass is not above 0, or so large or small that
-    /// the inertia leaves f32.
+    ///
+    /// [`InputError::ShapeParameter`]: a size or the mass is not above 0, or is so large or small
+    /// that the inertia leaves the range of f32.
     pub fn shape(&self, mass: f32) -> Result<Shape, InputError> {
         match *self {
             Self::Box { half_extents } => Shape::cuboid(mass, half_extents),

@@ -1,4 +1,4 @@
-//! This file draws numbers at random, the same for a seed on every machine.
+//! Generates random numbers, the same for a seed on every machine.
 
 /// Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
 #[derive(Debug)]
@@ -16,7 +16,7 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// One of eight.
+    /// From 0 to 7.
     pub(crate) fn below_eight(&mut self) -> u32 {
         #[allow(clippy::cast_possible_truncation, reason = "three bits")]
         let number = (self.next() >> 61) as u32;
