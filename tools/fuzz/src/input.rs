@@ -1,18 +1,18 @@
-//! This file reads choices out of the bytes of an execution, from the front; where they have ended
-//! it reads zeros, which is the tamest choice everywhere.
+//! Reads choices from the front of an execution's bytes; after their end it reads zeros, which are
+//! the tamest choice everywhere.
 
-/// What is left of the bytes.
+/// The bytes that are left.
 #[derive(Debug, Clone)]
 pub struct Input<'a>(&'a [u8]);
 
 impl<'a> Input<'a> {
-    /// All of the bytes.
+    /// Starts with all of the bytes.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
         Self(bytes)
     }
 
-    /// Whether there is nothing left.
+    /// Whether no byte is left.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
@@ -25,7 +25,7 @@ impl<'a> Input<'a> {
         array
     }
 
-    /// At most that many bytes as they are.
+    /// At most `most` bytes, unchanged.
     pub fn take(&mut self, most: usize) -> &'a [u8] {
         let (taken, left) = self.0.split_at(most.min(self.0.len()));
         self.0 = left;
@@ -53,7 +53,7 @@ impl<'a> Input<'a> {
         u64::from_le_bytes(self.array())
     }
 
-    /// A number below `end`, which is above 0; of one byte where that is enough.
+    /// A number below `end`, which is above 0; it uses one byte where that is enough.
     pub fn below(&mut self, end: u32) -> u32 {
         let raw = if end <= 256 { self.byte().into() } else { self.word() };
         raw.checked_rem(end).unwrap_or(0)
@@ -67,7 +67,7 @@ impl<'a> Input<'a> {
 
     /// True once in `rate` times.
     pub fn one_in(&mut self, rate: u32) -> bool {
-        // Never where the bytes have ended.
+        // Never after the end of the bytes.
         self.below(rate) == rate - 1
     }
 

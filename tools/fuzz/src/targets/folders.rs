@@ -1,4 +1,4 @@
-//! This file gives the loader folders of arrays that are nearly right.
+//! Gives the loader folders of nearly correct arrays.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -13,7 +13,7 @@ use step_folder::npy::{self, Problem};
 use crate::input::Input;
 use crate::tally::Tally;
 
-/// Shapes that a board's table holds.
+/// Size of a board's shape table.
 const SHAPES: u32 = 64;
 
 /// Name, type and row of each array; `true` for one row a body, or a collision, or none of both.
@@ -31,11 +31,12 @@ const FILES: [(&str, Kind, &[usize]); 12] = [
     (COLLISION_NORMAL, Kind::Numbers, &[3]),
     (COLLISION_POINTS, Kind::Numbers, &[4, 4]),
 ];
-/// The files before these have no row a body, and those before these no row a collision.
+/// Files before `FIRST_OF_BODIES` have no rows of bodies; files before the other have no rows of
+/// collisions.
 const FIRST_OF_BODIES: usize = 2;
 const FIRST_OF_COLLISIONS: usize = 8;
 
-/// Of which type an array is.
+/// The type of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// f32.
@@ -44,7 +45,7 @@ enum Kind {
     Counts,
 }
 
-/// A file as it should be, and as it is.
+/// A correct file, and its altered bytes.
 #[derive(Debug)]
 struct Array {
     name: &'static str,
@@ -86,7 +87,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
         Ok(folder) => {
             let _ = folder.check_shapes(SHAPES);
             if spoilt {
-                // Whatever it took, it took whole.
+                // A loaded step is complete.
                 assert!(
                     folder.bodies.iter().all(|b| folder.shapes.get(b.shape as usize).is_some())
                 );
@@ -98,7 +99,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
         }
         Err(error) => {
             assert!(spoilt, "{error}: {:?}", error.problem);
-            // Its text is for people.
+            // The error has a text for people.
             assert!(!error.to_string().is_empty() && !error.problem.to_string().is_empty());
             tally.refused += 1;
         }
@@ -118,7 +119,7 @@ fn array(input: &mut Input<'_>, name: &'static str, kind: Kind, shape: &[usize])
     Array { name, words, file }
 }
 
-/// What the loader took is what the files say, bit for bit.
+/// A loaded step equals the files bit for bit.
 fn check(folder: &Folder, files: &[Array]) {
     let bits = |numbers: &[f32]| numbers.iter().map(|number| number.to_bits()).collect::<Vec<_>>();
     let file = |name: &str| {
@@ -162,7 +163,7 @@ fn check(folder: &Folder, files: &[Array]) {
     assert_eq!(vec![of.contact_iterations, of.friction_iterations], file(ITERATIONS));
 }
 
-/// Words of a header, in the right and in the wrong place.
+/// Fragments of a header, in the right and in the wrong place.
 const WORDS: [&[u8]; 15] = [
     b"{",
     b"}",

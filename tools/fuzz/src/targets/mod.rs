@@ -17,13 +17,13 @@ use crate::tally::Tally;
 pub struct Target {
     /// Its name.
     pub name: &'static str,
-    /// What it drives, and what it holds against it.
+    /// The code under test, and the property to check.
     pub about: &'static str,
     /// One execution.
     pub run: fn(&[u8]) -> Tally,
     /// Bytes of an input, at most.
     pub longest: usize,
-    /// How many executions it gets beside the others.
+    /// Its share of executions, relative to the other targets.
     pub share: u32,
 }
 
@@ -79,7 +79,7 @@ pub const ALL: &[Target] = &[
     },
 ];
 
-/// The target of that name.
+/// The target with this name.
 #[must_use]
 pub fn by_name(name: &str) -> Option<&'static Target> {
     ALL.iter().find(|target| target.name == name)

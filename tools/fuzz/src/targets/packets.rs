@@ -1,4 +1,4 @@
-//! This file sends steps that are spoilt on their way to the accelerator.
+//! Sends steps with damaged packets and arguments to the accelerator.
 
 use bitstream_model::interface::control;
 use bitstream_model::interface::record::Beat;
@@ -19,7 +19,7 @@ const ENOUGH: u64 = 2_000;
 pub(super) fn run(bytes: &[u8]) -> Tally {
     let mut input = Input::new(bytes);
     let config = boards::any(&mut input);
-    // What has to be moved is not many beats, but with 8-bit lengths it is many descriptors.
+    // The steps have few beats; but with 8-bit lengths they would need many descriptors.
     let config = BoardConfig { length_width: config.length_width.max(11), ..config };
     let step = step(&mut input);
     let mut machine = Machine::with_slots(config, 24);
@@ -51,7 +51,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     tally
 }
 
-/// After a reset the step gives what it gives on a fresh board.
+/// After a reset a step gives the same result as on a fresh board.
 fn check_next(machine: &mut Machine, step: &Step) {
     let config = machine.host.board.config();
     let fresh = BoardConfig { delays: Delays::default(), ..config };
@@ -92,7 +92,7 @@ fn step(input: &mut Input<'_>) -> Step {
     Step { iterations: [input.below(3), input.below(3)], ..Step::new(bodies, collisions) }
 }
 
-/// Spoils arguments and packets; whether anything was.
+/// Damages arguments and packets; returns whether anything was damaged.
 fn spoil(input: &mut Input<'_>, host: &Host, lanes: &mut [Lane]) -> bool {
     let mut spoilt = false;
     if input.one_in(8) {

@@ -1,4 +1,4 @@
-//! This file lets a program of random accesses run against the registers and the memory of a board.
+//! Runs a program of random accesses against the registers and the memory of a board.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -17,16 +17,16 @@ use crate::host::{BOTH, Host, microseconds};
 use crate::input::Input;
 use crate::tally::Tally;
 
-/// Buffers that a program may have at once.
+/// Most buffers of a program at a time.
 const BUFFERS_MAX: usize = 16;
-/// Most of the time that passes at once, µs.
+/// Longest pause, µs.
 const PAUSE_MAX: u32 = 60;
 
-/// Who has a buffer.
+/// The owner of a buffer.
 #[derive(Debug)]
 enum Owner {
     Cpu(Box<[Beat]>),
-    /// With what it held, for those that the device may only read.
+    /// The device, with the content of a buffer that the device may only read.
     Device(DeviceAccess, Box<[Beat]>),
 }
 
@@ -59,7 +59,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
 }
 
 impl Program<'_> {
-    /// Something for the channels to read and to write from the start.
+    /// Prepares work for the channels, to read and to write from the start.
     fn furnish(&mut self) {
         self.allocate_ring();
         self.allocate_ring();
@@ -123,7 +123,7 @@ impl Program<'_> {
         (self.core(), self.input.pick(&BOTH))
     }
 
-    /// Any address, mostly of a register.
+    /// An address, mostly of a register.
     fn address(&mut self) -> u64 {
         match self.input.below(8) {
             0..=3 => {
@@ -139,7 +139,7 @@ impl Program<'_> {
         }
     }
 
-    /// Any value, often of an address in a buffer or a ring.
+    /// A value, often an address in a buffer or a ring.
     fn value(&mut self) -> u32 {
         if self.input.one_in(3) {
             let [low, high] = halves(self.place());
@@ -149,7 +149,7 @@ impl Program<'_> {
         }
     }
 
-    /// An address in or near what was allocated.
+    /// An address in or near an allocation.
     fn place(&mut self) -> u64 {
         let known: Vec<u64> = self
             .buffers
@@ -160,7 +160,7 @@ impl Program<'_> {
         let Some(last) = known.len().checked_sub(1) else { return self.input.long() };
         let base = known[self.input.index(last + 1)];
         let offset = u64::from(self.input.byte()) * self.input.pick(&[0, 0, 0, 16]);
-        // Now and then off the grid, and before the buffer.
+        // Sometimes unaligned, and before the buffer.
         match self.input.below(16) {
             0 => base.wrapping_sub(offset),
             1 => base.wrapping_add(offset / 16),
@@ -175,7 +175,7 @@ impl Program<'_> {
         self.host.write(core, direction, register, value);
     }
 
-    /// Lets a channel run on a ring, as far as the ring's descriptors let it.
+    /// Starts a channel on a ring, if the ring's descriptors allow it.
     fn start_channel(&mut self) {
         let (core, direction) = self.channel();
         let Some(last) = self.rings.len().checked_sub(1) else { return };
@@ -209,7 +209,7 @@ impl Program<'_> {
         self.host.write(core, direction, tail_high, high);
     }
 
-    /// A direct transfer.
+    /// Starts a direct transfer.
     fn transfer(&mut self) {
         let (core, direction) = self.channel();
         let [low, high] = halves(self.place());
@@ -291,7 +291,7 @@ impl Program<'_> {
         self.take(which);
     }
 
-    /// Takes a buffer back; whether the device may have written it is held against what it holds.
+    /// Takes a buffer back; if the device must not have written it, checks its content.
     fn take(&mut self, which: usize) {
         let buffer = &mut self.buffers[which];
         let taken = self.host.port.take_back(buffer.address);
@@ -316,7 +316,7 @@ impl Program<'_> {
         assert!(matches!(port.take_back(buffer.address), Err(MemoryError::Unknown { .. })));
     }
 
-    /// What must hold, whatever the program did.
+    /// Checks the invariants after any program.
     fn end(mut self) -> Tally {
         for which in 0..self.buffers.len() {
             self.take(which);

@@ -1,12 +1,11 @@
-//! This file makes small scenes and parameters for the driver: mostly what it takes, now and then
-//! what it must refuse.
+//! Makes small scenes and parameters for the driver: mostly valid, sometimes invalid ones.
 
 use zynq_pgs::order::{Order, Ties};
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 
 use crate::input::Input;
 
-/// What a step is given.
+/// The input of a step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scene {
     pub(super) shapes: Vec<Shape>,
@@ -14,22 +13,22 @@ pub(super) struct Scene {
     pub(super) collisions: Vec<Collision>,
 }
 
-/// Whether a scene may hold what is refused.
+/// Whether a scene may hold invalid values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Spoilt {
     Never,
-    /// Now and then.
+    /// Sometimes.
     Seldom,
 }
 
-/// Turns by nothing, and by a third and a quarter of a turn.
+/// No turn, a third of a turn, and a quarter.
 const ORIENTATIONS: [[f32; 4]; 3] =
     [[0.0, 0.0, 0.0, 1.0], [0.5, 0.5, 0.5, 0.5], [0.0, 0.6, 0.0, 0.8]];
 const NORMALS: [[f32; 3]; 4] =
     [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [0.0, 0.0, 1.0]];
 
 impl Scene {
-    /// At most `bodies` bodies and `collisions` collisions.
+    /// A scene of at most `bodies` bodies and `collisions` collisions.
     pub(super) fn any(input: &mut Input<'_>, bodies: u32, collisions: u32, spoilt: Spoilt) -> Self {
         let mut shapes = vec![Shape::STATIC];
         for _ in 0..=input.below(3) {
@@ -72,7 +71,7 @@ fn body(
     shapes: &[Shape],
     wild: impl Fn(&mut Input<'_>) -> bool,
 ) -> Body {
-    // The first one is mostly the ground.
+    // The first body is mostly the ground.
     let shape = match index {
         0 if !input.one_in(4) => 0,
         _ => 1 + input.below(u32::try_from(shapes.len()).expect("a few") - 1),

@@ -272,7 +272,7 @@ mod tests {
                 for body in &mut bounds {
                     body.centre = std::array::from_fn(|axis| body.centre[axis] + fall[axis]);
                 }
-                // Surplus events add bodies; with fewer events the number stays.
+                // An event past the last body can add one; bodies without an event stay.
                 for (index, event) in events.into_iter().enumerate() {
                     if index + 1 >= bounds.len() {
                         if let Event::Jump(centre) = event {
