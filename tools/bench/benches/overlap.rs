@@ -69,14 +69,14 @@ fn time(text: &str) -> Result<Duration, String> {
 const PIECES: u32 = 100;
 
 /// Bodies or collisions that take `time` on the board's clock to read or store.
-struct Timed<'a, T: ?Sized> {
+struct TimedReads<'a, T: ?Sized> {
     inner: &'a T,
     port: &'a CpuPort,
     time: Duration,
     left: AtomicU32,
 }
 
-impl<'a, T: ?Sized> Timed<'a, T> {
+impl<'a, T: ?Sized> TimedReads<'a, T> {
     fn new(inner: &'a T, port: &'a CpuPort, time: Duration) -> Self {
         Self { inner, port, time, left: AtomicU32::new(PIECES) }
     }
@@ -93,12 +93,12 @@ impl<'a, T: ?Sized> Timed<'a, T> {
 }
 
 /// Bodies that are stored separately from their source: every step starts from the first state.
-struct Elsewhere<'a> {
-    timed: Timed<'a, [Body]>,
+struct SeparateOutput<'a> {
+    timed: TimedReads<'a, [Body]>,
     stored: Vec<Body>,
 }
 
-impl Bodies for Elsewhere<'_> {
+impl Bodies for SeparateOutput<'_> {
     fn len(&self) -> usize {
         self.timed.inner.len()
     }
@@ -113,7 +113,7 @@ impl Bodies for Elsewhere<'_> {
     }
 }
 
-impl Collisions for Timed<'_, [Collision]> {
+impl Collisions for TimedReads<'_, [Collision]> {
     fn len(&self) -> usize {
         self.inner.len()
     }
@@ -135,13 +135,13 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn bodies(&self) -> Elsewhere<'_> {
-        let timed = Timed::new(self.bodies, &self.port, self.unpack);
-        Elsewhere { timed, stored: self.bodies.to_vec() }
+    fn bodies(&self) -> SeparateOutput<'_> {
+        let timed = TimedReads::new(self.bodies, &self.port, self.unpack);
+        SeparateOutput { timed, stored: self.bodies.to_vec() }
     }
 
-    fn collisions(&self) -> Timed<'_, [Collision]> {
-        Timed::new(self.collisions, &self.port, self.pack)
+    fn collisions(&self) -> TimedReads<'_, [Collision]> {
+        TimedReads::new(self.collisions, &self.port, self.pack)
     }
 
     fn submit<'a>(
@@ -190,7 +190,7 @@ impl Job<'_> {
 }
 
 /// Medians of host times, by phase.
-fn typical(reports: &[StepReport]) -> [(&'static str, Duration); 7] {
+fn median_phases(reports: &[StepReport]) -> [(&'static str, Duration); 7] {
     let of = |phase: fn(&HostTimes) -> Duration| {
         median(reports.iter().map(|report| phase(&report.host)).collect())
     };
@@ -254,7 +254,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let longer = host.max(on_board);
     let ratio = each.as_secs_f64() / longer.as_secs_f64();
     let ms = milliseconds;
-    let times = typical(&plain);
+    let times = median_phases(&plain);
     if options.common.json {
         let host_ms: serde_json::Map<_, _> =
             times.iter().map(|(name, time)| ((*name).to_owned(), ms(*time).into())).collect();

@@ -45,7 +45,7 @@ pub struct Summary {
 /// Executions that a thread takes at a time.
 const BLOCK: u64 = 16;
 /// Interval of the watchdog.
-const LOOK: Duration = Duration::from_millis(200);
+const WATCH_INTERVAL: Duration = Duration::from_millis(200);
 /// No execution.
 const NOTHING: u64 = u64::MAX;
 
@@ -155,7 +155,7 @@ pub fn run(target: &'static Target, plan: &Plan, mut progress: impl FnMut(u64)) 
     }
     drop(ended);
     // The channel closes when the last thread ends.
-    while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+    while end.recv_timeout(WATCH_INTERVAL) == Err(RecvTimeoutError::Timeout) {
         progress(shared.done.load(Ordering::Relaxed));
         if let Some(number) = shared.overdue() {
             let mut input = Vec::new();

@@ -20,13 +20,13 @@ impl<'a> Input<'a> {
 
     fn array<const N: usize>(&mut self) -> [u8; N] {
         let mut array = [0; N];
-        let taken = self.take(N);
+        let taken = self.bytes(N);
         array[..taken.len()].copy_from_slice(taken);
         array
     }
 
     /// At most `most` bytes, unchanged.
-    pub fn take(&mut self, most: usize) -> &'a [u8] {
+    pub fn bytes(&mut self, most: usize) -> &'a [u8] {
         let (taken, left) = self.0.split_at(most.min(self.0.len()));
         self.0 = left;
         taken
@@ -107,7 +107,7 @@ mod tests {
         assert!(input.is_empty());
         assert_eq!((input.long(), input.below(3), input.index(9)), (0, 0, 0));
         assert!(!input.one_in(2));
-        assert!(input.take(4).is_empty());
+        assert!(input.bytes(4).is_empty());
     }
 
     #[test]

@@ -29,7 +29,7 @@ const WORLD_INERTIA: &str =
 
 /// An open board.
 #[derive(Debug)]
-pub(crate) struct Opened {
+pub(crate) struct OpenBoard {
     pub(crate) accelerator: Accelerator,
     /// The builder's handle of an emulated board; none for a real one.
     pub(crate) observer: Option<EmulatedBoard>,
@@ -95,7 +95,7 @@ pub(crate) fn require(common: &CommonArgs) -> Result<(), Failure> {
 
 /// A board that is chosen and not yet open.
 #[derive(Debug)]
-pub(crate) struct Chosen {
+pub(crate) struct ChosenBoard {
     pub(crate) kind: BoardKind,
     pub(crate) options: OpenOptions,
     /// The builder's handle of an emulated board; none for a real one.
@@ -109,7 +109,7 @@ pub(crate) fn find(
     common: &CommonArgs,
     config: BoardConfig,
     given: Option<&'static str>,
-) -> Result<Chosen, Failure> {
+) -> Result<ChosenBoard, Failure> {
     let CommonArgs { board: name, memory, memory_of_environment, manager, .. } = common;
     let (kind, reason) = choose(name, &System::default());
     let (board, observer) = if kind == BoardKind::Emulated {
@@ -156,7 +156,7 @@ pub(crate) fn find(
     };
     let manager = manager.clone();
     let options = OpenOptions { board, memory, manager, pack_threads, ..OpenOptions::default() };
-    Ok(Chosen { kind, options, observer, reason })
+    Ok(ChosenBoard { kind, options, observer, reason })
 }
 
 /// The failure for a configuration that no emulated board has.
@@ -180,10 +180,11 @@ pub(crate) fn not_built(error: ConfigError) -> Failure {
 }
 
 /// Opens a board.
-pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Failure> {
-    let Chosen { options, observer, reason, .. } = find(common, build.config(), build.given())?;
+pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<OpenBoard, Failure> {
+    let ChosenBoard { options, observer, reason, .. } =
+        find(common, build.config(), build.board_option())?;
     let accelerator = Accelerator::open(options).map_err(unusable)?;
-    Ok(Opened { accelerator, observer, injected: None, reason })
+    Ok(OpenBoard { accelerator, observer, injected: None, reason })
 }
 
 /// The failure for a board that is missing or cannot be opened.
@@ -200,7 +201,7 @@ pub(crate) fn is_cancelled(error: &zynq_pgs::Error) -> bool {
         && !error.must_reopen()
 }
 
-impl Opened {
+impl OpenBoard {
     /// Makes a failure of an error of the driver.
     pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {
         if let zynq_pgs::Error::Input(input) = &error {

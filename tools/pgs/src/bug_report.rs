@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use step_folder::replace::replace;
 use zynq_pgs::{Diagnosis, Error, StepParameters};
 
-use crate::board::Opened;
+use crate::board::OpenBoard;
 use crate::diagnosis;
 use crate::failure::Failure;
 use crate::options::ordering;
@@ -38,7 +38,7 @@ impl FaultArgs {
     /// Makes a failure of a step's error, and writes the report if the command line names one.
     pub(crate) fn failure(
         &self,
-        opened: &Opened,
+        opened: &OpenBoard,
         parameters: &StepParameters,
         error: Error,
     ) -> Failure {
@@ -54,7 +54,7 @@ impl FaultArgs {
 }
 
 /// The content of a bug report.
-fn bundle_json(opened: &Opened, parameters: &StepParameters, error: &Error) -> Value {
+fn bundle_json(opened: &OpenBoard, parameters: &StepParameters, error: &Error) -> Value {
     let found = error.diagnosis();
     let accesses: Vec<Value> = found
         .iter()

@@ -45,7 +45,7 @@ impl Deviation {
             let difference = (f64::from(new) - original).abs();
             found.components += 1;
             absolute_sum += difference;
-            larger(&mut found.largest_absolute, difference);
+            raise_to(&mut found.largest_absolute, difference);
             if difference <= ONE_PERCENT * original.abs() {
                 found.within += 1;
             }
@@ -56,22 +56,22 @@ impl Deviation {
             }
             let relative = difference / original.abs();
             relative_sum += relative;
-            larger(&mut found.largest, relative);
+            raise_to(&mut found.largest, relative);
             found.under += u64::from(relative < ONE_PERCENT);
         }
-        found.mean = mean(relative_sum, found.others());
+        found.mean = mean(relative_sum, found.nonzero());
         found.mean_absolute = mean(absolute_sum, found.components);
         found
     }
 
     /// Components whose original is not 0.
-    fn others(&self) -> u64 {
+    fn nonzero(&self) -> u64 {
         self.components - self.zeros
     }
 
     /// Share of the components whose original is not 0 that deviate by less than 1 %.
     pub(crate) fn under_share(&self) -> f64 {
-        share(self.under, self.others())
+        share(self.under, self.nonzero())
     }
 
     /// Share of all components that are within 1 %.
@@ -146,7 +146,7 @@ fn pairs<'a>(
     a.iter().zip(b).zip(moving).filter_map(|(pair, moving)| moving.then_some(pair))
 }
 
-fn larger(most: &mut f64, value: f64) {
+fn raise_to(most: &mut f64, value: f64) {
     if value > *most {
         *most = value;
     }
@@ -237,7 +237,7 @@ mod tests {
         #[test]
         fn numbers_do_not_deviate_from_themselves(numbers in prop::collection::vec(-1e30_f32..1e30, 0..50)) {
             let d = Deviation::of(numbers.iter().map(|&number| (number, number)));
-            prop_assert_eq!((d.under, d.within, d.zeros_moved), (d.others(), d.components, 0));
+            prop_assert_eq!((d.under, d.within, d.zeros_moved), (d.nonzero(), d.components, 0));
             let sum = d.mean + d.largest + d.mean_absolute + d.largest_absolute;
             prop_assert_eq!(sum.to_bits(), 0.0_f64.to_bits());
         }

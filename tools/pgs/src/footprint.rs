@@ -16,7 +16,7 @@ pub(crate) struct Footprint {
 
 impl Footprint {
     /// Includes a step.
-    pub(crate) fn see(&mut self, variant: &Variant, report: &StepReport) {
+    pub(crate) fn include(&mut self, variant: &Variant, report: &StepReport) {
         let StepReport { bodies, collisions, empty, .. } = *report;
         let words = variant.words();
         let of_body = words.velocity + words.pose + words.result;

@@ -1,4 +1,4 @@
-//! The box-on-plane scene of the thesis, a scene of several shapes and a pile of spheres, with
+//! The box-on-plane scene of the thesis, a scene of shapes shapes and a pile of spheres, with
 //! collision detection.
 //!
 //! A grid of cubes above a plane, as Bullet's demo `box on plane` builds it. A [`Scene`] holds the
@@ -16,7 +16,7 @@
 //! # Ok::<(), scene::SceneError>(())
 //! ```
 //!
-//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes and capsules of several masses instead.
+//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes and capsules of shapes masses instead.
 //! [`Spheres`] is a pile that is no grid, for what depends on the order of collisions.
 //!
 //! The bits of every result are the same on every architecture and with every number of threads:
@@ -32,7 +32,7 @@ mod grid;
 mod measure;
 mod random;
 mod rotation;
-mod several;
+mod shapes;
 mod spheres;
 
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
@@ -45,7 +45,7 @@ pub use measure::{
     kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,
     potential_energy,
 };
-pub use several::ShapesOptions;
+pub use shapes::ShapesOptions;
 pub use spheres::{RADII, SPHERES_MAX, Spheres};
 
 /// Index of the static ground among the bodies.

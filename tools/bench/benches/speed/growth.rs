@@ -72,7 +72,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
             wait: median(times),
         })
         .collect();
-    let growth = [grown(&rows, FLOAT.name)?, grown(&rows, WINDOWED.name)?];
+    let growth = [growth_ratio(&rows, FLOAT.name)?, growth_ratio(&rows, WINDOWED.name)?];
     if !options.common.json {
         println!("Time of a step by the size of the scene, beats to results");
         println!("  profile       cubes  collisions         ms  ns a collision");
@@ -116,7 +116,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
 
 /// The ratio of the time per collision in a design's largest pile to that in its smallest, and the
 /// size of the largest.
-fn grown(rows: &[Row], profile: &'static str) -> Result<(&'static str, u32, f64), String> {
+fn growth_ratio(rows: &[Row], profile: &'static str) -> Result<(&'static str, u32, f64), String> {
     let missing = || format!("a pile of {FROM} cubes, and a larger one, for {profile}");
     let of = || rows.iter().filter(|row| row.profile == profile);
     let from = of().find(|row| row.cubes == FROM).ok_or_else(missing)?;

@@ -82,7 +82,7 @@ impl Scene<'_> {
     }
 
     /// An address, mostly in a grant and a multiple of `step`.
-    fn place(&mut self, step: u64) -> u64 {
+    fn address_in_grant(&mut self, step: u64) -> u64 {
         let base = self.input.pick(&BASES);
         let inside = GRANTED / step;
         let offset = u64::from(self.input.short()) % inside * step;
@@ -106,12 +106,12 @@ impl Scene<'_> {
 
     /// Writes a chain, runs the channel on it and moves the tail.
     fn chain(&mut self, core: usize, direction: Direction) {
-        let first = self.place(BYTES as u64);
+        let first = self.address_in_grant(BYTES as u64);
         let slots = 1 + self.input.below(CHAIN_MAX);
         let (mut at, mut tail) = (first, first);
         for slot in 0..slots {
             let next = match self.input.below(16) {
-                0 => self.place(BYTES as u64),
+                0 => self.address_in_grant(BYTES as u64),
                 // To itself, and back to the first.
                 1 => at,
                 2 => first,
@@ -124,7 +124,7 @@ impl Scene<'_> {
                     (if sof { SOF } else { 0 }) | (if eof { EOF } else { 0 })
                 }
             };
-            let buffer = self.place(16);
+            let buffer = self.address_in_grant(16);
             let control = self.length() | flags;
             let status = if self.input.one_in(16) { self.input.word() } else { 0 };
             self.write_descriptor(at, next, buffer, control, status);
@@ -132,7 +132,7 @@ impl Scene<'_> {
             at = next;
         }
         if self.input.one_in(16) {
-            tail = self.place(BYTES as u64);
+            tail = self.address_in_grant(BYTES as u64);
         }
         let running = self.input.one_in(3);
         let host = &self.host;
@@ -179,7 +179,7 @@ impl Scene<'_> {
     /// Starts a direct transfer. A running one goes on from the new address, which is written in
     /// two halves, with its own length.
     fn transfer(&mut self, core: usize, direction: Direction) {
-        let (address, length) = (self.place(16), self.length());
+        let (address, length) = (self.address_in_grant(16), self.length());
         let [low, high] = halves(address);
         self.highs.push(address >> 32 << 32);
         self.longest = self.longest.max(length);

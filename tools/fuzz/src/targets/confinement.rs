@@ -7,7 +7,7 @@ use zynq_pgs::{
 };
 
 use super::layout::{SeparateBodies, SeparateCollisions, StridedBodies, StridedCollisions};
-use super::scenes::{Scene, Spoilt, bits, parameters};
+use super::scenes::{InvalidValues, Scene, bits, parameters};
 use crate::boards;
 use crate::input::Input;
 use crate::tally::Tally;
@@ -39,7 +39,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
         }
         if number == 0 || input.one_in(4) {
             let most = if input.one_in(64) { 40 } else { 8 };
-            scene = Scene::any(&mut input, most, most, Spoilt::Seldom);
+            scene = Scene::any(&mut input, most, most, InvalidValues::Sometimes);
             if accelerator.set_shapes(&scene.shapes).is_err() {
                 tally.refused += 1;
                 // Isotropic, which every board takes.
@@ -66,7 +66,7 @@ fn step(
     tally: &mut Tally,
 ) {
     let passes = if input.one_in(64) { 12 } else { 3 };
-    let parameters = parameters(input, passes, Spoilt::Seldom);
+    let parameters = parameters(input, passes, InvalidValues::Sometimes);
     let first = layout(input);
     let again = input.one_in(4).then(|| layout(input));
     let (bodies, ended) = step_in(first, accelerator, scene, &parameters);

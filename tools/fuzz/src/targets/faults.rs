@@ -8,7 +8,7 @@ use bitstream_model::{
 };
 use zynq_pgs::{Accelerator, BoardChoice, Body, Error, OpenOptions, StepParameters};
 
-use super::scenes::{Scene, Spoilt, bits, parameters};
+use super::scenes::{InvalidValues, Scene, bits, parameters};
 use crate::boards;
 use crate::input::Input;
 use crate::tally::Tally;
@@ -73,7 +73,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     let plan = if input.one_in(8) {
         open_faulty(&mut input, &board, &config)
     } else if let Some(mut run) = Run::new(&mut input, &board) {
-        let plan = run.go(&mut input, &config);
+        let plan = run.take_steps(&mut input, &config);
         tally = run.tally;
         plan
     } else {
@@ -155,9 +155,9 @@ impl Run {
     fn new(input: &mut Input<'_>, board: &EmulatedBoard) -> Option<Self> {
         let port = board.cpu_port();
         let mut accelerator = open(&port).expect("nothing is wrong with the board");
-        let scene = Scene::any(input, 8, 8, Spoilt::Never);
+        let scene = Scene::any(input, 8, 8, InvalidValues::Never);
         accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
-        let mut parameters = parameters(input, 3, Spoilt::Never);
+        let mut parameters = parameters(input, 3, InvalidValues::Never);
         // With hazards, the result of a pipeline that does not wait depends on the arrival of
         // beats.
         parameters.order = None;
@@ -173,7 +173,7 @@ impl Run {
     }
 
     /// Takes steps with faults, and then without.
-    fn go(&mut self, input: &mut Input<'_>, config: &BoardConfig) -> FaultPlan {
+    fn take_steps(&mut self, input: &mut Input<'_>, config: &BoardConfig) -> FaultPlan {
         let plan = plan(input, config);
         self.under(input, &plan);
         plan
@@ -191,7 +191,7 @@ impl Run {
             if let Err(error) = ended {
                 assert!(!survivable, "{plan}: {error:?}");
                 if error.must_reopen() {
-                    return self.after_all(plan);
+                    return self.check_lost(plan);
                 }
             }
         }
@@ -200,7 +200,7 @@ impl Run {
         if let Err(error) = self.step(plan) {
             assert!(!survivable, "{plan}: {error:?}");
             if error.must_reopen() {
-                return self.after_all(plan);
+                return self.check_lost(plan);
             }
             self.step(plan).unwrap_or_else(|error| panic!("{plan}: no fault is left: {error:?}"));
         }
@@ -238,7 +238,7 @@ impl Run {
     }
 
     /// An accelerator that must be opened again reports it in every call, and touches nothing.
-    fn after_all(&mut self, plan: &FaultPlan) {
+    fn check_lost(&mut self, plan: &FaultPlan) {
         let before = self.board.counts();
         let again = self.step(plan).expect_err("it was given up");
         assert!(matches!(again, Error::MustReopen), "{plan}: {again:?}");

@@ -69,11 +69,11 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
             array(&mut input, name, *kind, &[rows.as_slice(), row].concat())
         })
         .collect();
-    let spoilt = input.one_in(2) || input.one_in(2);
-    if spoilt {
+    let damaged = input.one_in(2) || input.one_in(2);
+    if damaged {
         for _ in 0..1 + input.below(3) {
             let file = input.index(files.len());
-            spoil(&mut input, &mut files[file].file);
+            damage(&mut input, &mut files[file].file);
         }
     }
 
@@ -86,7 +86,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     match Folder::load_with(Path::new("folder"), open) {
         Ok(folder) => {
             let _ = folder.check_shapes(SHAPES);
-            if spoilt {
+            if damaged {
                 // A loaded step is complete.
                 assert!(
                     folder.bodies.iter().all(|b| folder.shapes.get(b.shape as usize).is_some())
@@ -98,7 +98,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
             tally.steps += 1;
         }
         Err(error) => {
-            assert!(spoilt, "{error}: {:?}", error.problem);
+            assert!(damaged, "{error}: {:?}", error.problem);
             // The error has a text for people.
             assert!(!error.to_string().is_empty() && !error.problem.to_string().is_empty());
             tally.refused += 1;
@@ -182,7 +182,7 @@ const WORDS: [&[u8]; 15] = [
     b"\xC3",
 ];
 
-fn spoil(input: &mut Input<'_>, file: &mut Vec<u8>) {
+fn damage(input: &mut Input<'_>, file: &mut Vec<u8>) {
     // Mostly in the header.
     let end = if input.one_in(4) { file.len() } else { file.len().min(90) };
     if end == 0 {
@@ -204,7 +204,7 @@ fn spoil(input: &mut Input<'_>, file: &mut Vec<u8>) {
             let word = input.pick(&WORDS);
             file.splice(at..at, word.iter().copied());
         }
-        5 => file.extend_from_slice(input.take(9)),
+        5 => file.extend_from_slice(input.bytes(9)),
         6 => file[at] ^= 1 << input.below(8),
         _ => file[at] = input.byte(),
     }

@@ -47,7 +47,7 @@ pub const ALL: &[Target] = &[
     },
     Target {
         name: "packets",
-        about: "spoilt steps of every profile: the accelerator is done, says why not, or waits; after \
+        about: "damaged steps of every profile: the accelerator is done, says why not, or waits; after \
                 a reset the step that was meant has the bits of a fresh board",
         run: packets::run,
         longest: 192,
@@ -55,7 +55,7 @@ pub const ALL: &[Target] = &[
     },
     Target {
         name: "folders",
-        about: "spoilt folders of arrays: the loader takes them or says what is wrong, and what it \
+        about: "damaged folders of arrays: the loader takes them or says what is wrong, and what it \
                 takes is what the files say",
         run: folders::run,
         longest: 256,

@@ -51,7 +51,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     let scatter_gather = !input.one_in(3);
     let host = Host::new(BoardConfig { scatter_gather, strict: false, ..config });
     let mut program = Program { input, host, buffers: Vec::new(), rings: Vec::new() };
-    program.furnish();
+    program.prepare_work();
     while !program.input.is_empty() {
         program.act();
     }
@@ -60,7 +60,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
 
 impl Program<'_> {
     /// Prepares work for the channels, to read and to write from the start.
-    fn furnish(&mut self) {
+    fn prepare_work(&mut self) {
         self.allocate_ring();
         self.allocate_ring();
         for access in [DeviceAccess::Read, DeviceAccess::Write] {
@@ -142,7 +142,7 @@ impl Program<'_> {
     /// A value, often an address in a buffer or a ring.
     fn value(&mut self) -> u32 {
         if self.input.one_in(3) {
-            let [low, high] = halves(self.place());
+            let [low, high] = halves(self.address_near_buffer());
             self.input.pick(&[low, high])
         } else {
             self.input.telling_word()
@@ -150,7 +150,7 @@ impl Program<'_> {
     }
 
     /// An address in or near an allocation.
-    fn place(&mut self) -> u64 {
+    fn address_near_buffer(&mut self) -> u64 {
         let known: Vec<u64> = self
             .buffers
             .iter()
@@ -184,7 +184,7 @@ impl Program<'_> {
         let (base, words) = (*base, Arc::clone(words));
         for slot in 0..words.len() / WORDS {
             let [low, high] = halves(base + ((slot + 1) * BYTES) as u64);
-            let buffer = halves(self.place());
+            let buffer = halves(self.address_near_buffer());
             let length = 16 * (1 + self.input.below(40));
             let flags = match self.input.below(4) {
                 0 => self.input.below(64) << 26,
@@ -212,7 +212,7 @@ impl Program<'_> {
     /// Starts a direct transfer.
     fn transfer(&mut self) {
         let (core, direction) = self.channel();
-        let [low, high] = halves(self.place());
+        let [low, high] = halves(self.address_near_buffer());
         let [address, address_high, length] = [6, 7, 8].map(|k| CHANNEL_REGISTERS[k]);
         self.host.write(core, direction, DMACR, 0x0001_7001);
         self.host.pause(1);
@@ -288,11 +288,11 @@ impl Program<'_> {
 
     fn take_back(&mut self) {
         let Some(which) = self.buffer() else { return };
-        self.take(which);
+        self.reclaim(which);
     }
 
     /// Takes a buffer back; if the device must not have written it, checks its content.
-    fn take(&mut self, which: usize) {
+    fn reclaim(&mut self, which: usize) {
         let buffer = &mut self.buffers[which];
         let taken = self.host.port.take_back(buffer.address);
         match &buffer.owner {
@@ -319,7 +319,7 @@ impl Program<'_> {
     /// Checks the invariants after any program.
     fn end(mut self) -> Tally {
         for which in 0..self.buffers.len() {
-            self.take(which);
+            self.reclaim(which);
         }
         let host = &self.host;
         let before = host.port.now();

@@ -15,10 +15,10 @@ pub(super) struct Scene {
 
 /// Whether a scene may hold invalid values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Spoilt {
+pub(super) enum InvalidValues {
     Never,
     /// Sometimes.
-    Seldom,
+    Sometimes,
 }
 
 /// No turn, a third of a turn, and a quarter.
@@ -29,17 +29,22 @@ const NORMALS: [[f32; 3]; 4] =
 
 impl Scene {
     /// A scene of at most `bodies` bodies and `collisions` collisions.
-    pub(super) fn any(input: &mut Input<'_>, bodies: u32, collisions: u32, spoilt: Spoilt) -> Self {
+    pub(super) fn any(
+        input: &mut Input<'_>,
+        bodies: u32,
+        collisions: u32,
+        invalid: InvalidValues,
+    ) -> Self {
         let mut shapes = vec![Shape::STATIC];
         for _ in 0..=input.below(3) {
             let inertia = input.pick(&[1.5, 0.5, 3.0]);
             let mut shape = Shape::isotropic(input.pick(&[1.0, 0.5, 4.0]), inertia);
-            if spoilt == Spoilt::Seldom && input.one_in(16) {
+            if invalid == InvalidValues::Sometimes && input.one_in(16) {
                 shape.inverse_inertia[1] *= 2.0;
             }
             shapes.push(shape);
         }
-        let wild = |input: &mut Input<'_>| spoilt == Spoilt::Seldom && input.one_in(200);
+        let wild = |input: &mut Input<'_>| invalid == InvalidValues::Sometimes && input.one_in(200);
         let bodies: Vec<Body> =
             (0..input.below(bodies + 1)).map(|k| body(input, k, &shapes, wild)).collect();
         let count = u32::try_from(bodies.len()).expect("a few");
@@ -131,7 +136,11 @@ fn collision(
 }
 
 /// Parameters; at most `passes` iterations of each solver.
-pub(super) fn parameters(input: &mut Input<'_>, passes: u32, spoilt: Spoilt) -> StepParameters {
+pub(super) fn parameters(
+    input: &mut Input<'_>,
+    passes: u32,
+    invalid: InvalidValues,
+) -> StepParameters {
     let mut parameters = StepParameters::default();
     parameters.time_step = input.pick(&[1.0 / 60.0, 1.0 / 240.0, 0.125]);
     parameters.contact_iterations = input.below(passes + 1);
@@ -154,7 +163,7 @@ pub(super) fn parameters(input: &mut Input<'_>, passes: u32, spoilt: Spoilt) -> 
             Order::BodyByBody(Ties::LowestIndex),
         ]));
     }
-    if spoilt == Spoilt::Seldom && input.one_in(100) {
+    if invalid == InvalidValues::Sometimes && input.one_in(100) {
         let value = f32::from_bits(input.word());
         match input.below(5) {
             0 => parameters.time_step = value,

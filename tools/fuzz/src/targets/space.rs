@@ -30,7 +30,7 @@ pub(super) struct State {
     stretches: Vec<Stretch>,
     granted: Vec<Range<u64>>,
     /// Requested data.
-    asked: Vec<Range<u64>>,
+    requested: Vec<Range<u64>>,
     /// Fetched descriptors.
     fetched: Vec<u64>,
 }
@@ -48,7 +48,7 @@ impl Space {
         Self(Arc::new(Mutex::new(State {
             stretches: bases.iter().map(stretch).collect(),
             granted: bases.iter().map(granted).collect(),
-            asked: Vec::new(),
+            requested: Vec::new(),
             fetched: Vec::new(),
         })))
     }
@@ -64,7 +64,7 @@ impl Space {
 
     /// Allows a direct transfer to access these bytes.
     pub(super) fn announce(&self, address: u64, bytes: u32) {
-        self.state().ask(address, bytes);
+        self.state().request(address, bytes);
     }
 
     /// The CPU's store to a granted word.
@@ -89,12 +89,12 @@ impl Space {
 }
 
 impl State {
-    fn ask(&mut self, address: u64, bytes: u32) {
+    fn request(&mut self, address: u64, bytes: u32) {
         // The engines have no byte lanes: they access whole beats.
         let beat = BEAT_BYTES as u64;
         let start = address & !(beat - 1);
         let end = start.saturating_add(u64::from(bytes).next_multiple_of(beat));
-        self.asked.push(start..end);
+        self.requested.push(start..end);
     }
 
     fn check_granted(&self, address: u64, bytes: u64) {
@@ -105,13 +105,13 @@ impl State {
     }
 
     /// Whether these bytes were requested; one access may span the transfers of adjacent buffers.
-    fn check_asked(&self, address: u64, beats: usize) {
+    fn check_requested(&self, address: u64, beats: usize) {
         let step = BEAT_BYTES as u64;
         let mut at = address;
         for _ in 0..beats {
             assert!(
-                self.asked.iter().any(|range| range.contains(&at)),
-                "nobody asked for the beat at {at:#x}"
+                self.requested.iter().any(|range| range.contains(&at)),
+                "no transfer requested the beat at {at:#x}"
             );
             at += step;
         }
@@ -130,7 +130,7 @@ impl DeviceMemory for Space {
     fn read_beats(&mut self, address: u64, to: &mut [Beat]) -> io::Result<()> {
         let mut state = self.state();
         state.check_granted(address, (to.len() * BEAT_BYTES) as u64);
-        state.check_asked(address, to.len());
+        state.check_requested(address, to.len());
         let mut at = address;
         for word in to.iter_mut().flat_map(|beat| &mut beat.0) {
             *word = *state.word(at);
@@ -142,7 +142,7 @@ impl DeviceMemory for Space {
     fn write_beats(&mut self, address: u64, from: &[Beat]) -> io::Result<()> {
         let mut state = self.state();
         state.check_granted(address, (from.len() * BEAT_BYTES) as u64);
-        state.check_asked(address, from.len());
+        state.check_requested(address, from.len());
         let mut at = address;
         for word in from.iter().flat_map(|beat: &Beat| -> [u32; LANES] { beat.0 }) {
             *state.word(at) = word;
@@ -163,8 +163,8 @@ impl DeviceMemory for Space {
         let buffer = u64::from(to[BUFFER]);
         let bytes = control::LENGTH.of(to[CONTROL]);
         // Engines with addresses of 32 bits ignore the upper half.
-        state.ask(buffer, bytes);
-        state.ask(buffer | (u64::from(to[BUFFER_MSB]) << 32), bytes);
+        state.request(buffer, bytes);
+        state.request(buffer | (u64::from(to[BUFFER_MSB]) << 32), bytes);
         state.fetched.push(address);
         Ok(())
     }
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "nobody asked for the beat at 0x1220")]
+    #[should_panic(expected = "no transfer requested the beat at 0x1220")]
     fn a_beat_more_than_the_descriptor_says_is_found() {
         let mut space = Space::new(&[0x1000], 0x400);
         descriptor(&mut space, 0x1100, 0x1200, 32);

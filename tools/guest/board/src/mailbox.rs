@@ -175,7 +175,7 @@ impl<W: Words> Client<W> {
     /// # Errors
     ///
     /// [`MailboxError::NoAnswer`] if the host does not answer in time.
-    pub fn ask(&mut self, access: Access) -> Result<u32, MailboxError<W::Error>> {
+    pub fn request(&mut self, access: Access) -> Result<u32, MailboxError<W::Error>> {
         let (action, address, value) = match access {
             Access::Read { address } => (READ, address, 0),
             Access::Write { address, value } => (WRITE, address, value),
@@ -224,7 +224,7 @@ impl<W: Words> Desk<W> {
     ///
     /// # Errors
     /// [`MailboxError::UnknownAction`], or the page cannot be reached.
-    pub fn take(&self) -> Result<Option<Access>, MailboxError<W::Error>> {
+    pub fn next_request(&self) -> Result<Option<Access>, MailboxError<W::Error>> {
         let load = |at| self.words.load(at).map_err(MailboxError::Page);
         let request = self.last.wrapping_add(1);
         if load(REQUEST)? != request {
@@ -287,7 +287,7 @@ mod tests {
         let mut seen = Vec::new();
         let started = Instant::now();
         while seen.len() < count && started.elapsed() < LIMIT {
-            if let Some(access) = desk.take().expect("understood") {
+            if let Some(access) = desk.next_request().expect("understood") {
                 seen.push(access);
                 let Access::Read { address } = access else {
                     desk.answer(0).expect("a page");
@@ -312,7 +312,7 @@ mod tests {
                 let read = Access::Read { address: 0x8_A004_0100 + client };
                 let write = Access::Write { address: 0xA000_0000, value: u32::MAX };
                 for access in [read, write, read] {
-                    let result = guest.ask(access).expect("answered");
+                    let result = guest.request(access).expect("answered");
                     let wanted = if access == write { 0 } else { 0xA004_0101 + client };
                     assert_eq!(u64::from(result), wanted);
                     expected.push(access);
@@ -329,7 +329,7 @@ mod tests {
         assert!(error.contains("found 0x00000000") && error.contains("guest-board"), "{error}");
         let _desk = Desk::open(&page).expect("a page");
         let mut guest = Client::open(&page, Duration::ZERO).expect("a host");
-        let error = guest.ask(Access::Read { address: 0x10 }).expect_err("it is silent");
+        let error = guest.request(Access::Read { address: 0x10 }).expect_err("it is silent");
         assert!(matches!(error, MailboxError::NoAnswer { .. }), "{error}");
     }
 
@@ -338,9 +338,12 @@ mod tests {
         let page = Page::new();
         (&page).store(REQUEST, 7).expect("a page");
         let desk = Desk::open(&page).expect("a page");
-        assert_eq!(desk.take().expect("nothing"), None);
+        assert_eq!(desk.next_request().expect("nothing"), None);
         (&page).store(ACTION, 3).expect("a page");
         (&page).store(REQUEST, 8).expect("a page");
-        assert!(matches!(desk.take(), Err(MailboxError::UnknownAction { request: 8, found: 3 })));
+        assert!(matches!(
+            desk.next_request(),
+            Err(MailboxError::UnknownAction { request: 8, found: 3 })
+        ));
     }
 }

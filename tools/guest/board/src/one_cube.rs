@@ -255,7 +255,7 @@ fn expect<E>(what: &str, expected: u32, found: u32) -> Result<(), StepError<E>> 
 }
 
 /// Reads a register until its value is as expected.
-fn until<M: Machine>(
+fn poll_until<M: Machine>(
     machine: &mut M,
     address: u64,
     what: impl fmt::Display,
@@ -276,12 +276,12 @@ fn reset<M: Machine>(machine: &mut M) -> Result<(), StepError<M::Error>> {
         machine.write(channel.at(DMACR), dmacr::RESET.mask())?;
     }
     for channel in Channel::all() {
-        until(machine, channel.at(DMACR), format_args!("{channel} out of reset"), |value| {
+        poll_until(machine, channel.at(DMACR), format_args!("{channel} out of reset"), |value| {
             !dmacr::RESET.is_set(value)
         })?;
     }
     machine.write(at(control::RESET), control::reset::RESET.mask())?;
-    until(machine, at(control::RESET), "the accelerator out of reset", |value| {
+    poll_until(machine, at(control::RESET), "the accelerator out of reset", |value| {
         !control::reset::RESET.is_set(value)
     })
 }
@@ -332,7 +332,7 @@ fn start<M: Machine>(
     let control = dmacr::IRQ_THRESHOLD.put(dmacr::RS.mask(), 1);
     let control = dmacr::IOC_IRQ_EN.put(control, u32::from(completion));
     machine.write(channel.at(DMACR), control)?;
-    until(machine, channel.at(DMASR), format_args!("{channel} running"), |value| {
+    poll_until(machine, channel.at(DMASR), format_args!("{channel} running"), |value| {
         !dmasr::HALTED.is_set(value)
     })
 }

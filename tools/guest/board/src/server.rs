@@ -108,7 +108,7 @@ impl<L: Line> Server<L> {
         let mut last_access = started;
         let mut looks = 0_u32;
         loop {
-            if let Some(access) = self.desk.take()? {
+            if let Some(access) = self.desk.next_request()? {
                 self.serve_one(access)?;
                 last_access = Instant::now();
             } else if last_access.elapsed() > EAGER {

@@ -66,11 +66,11 @@ impl Machine for Guest {
     type Error = GuestError;
 
     fn read(&mut self, address: u64) -> Result<u32, GuestError> {
-        Ok(self.registers.ask(Access::Read { address })?)
+        Ok(self.registers.request(Access::Read { address })?)
     }
 
     fn write(&mut self, address: u64, value: u32) -> Result<(), GuestError> {
-        self.registers.ask(Access::Write { address, value })?;
+        self.registers.request(Access::Write { address, value })?;
         Ok(())
     }
 

@@ -63,12 +63,12 @@ struct User<'a> {
 
 /// A file of a process.
 #[derive(Debug)]
-struct Held {
+struct HeldFile {
     path: PathBuf,
     number: Option<String>,
 }
 
-impl Held {
+impl HeldFile {
     /// Reads the kernel's link to the file, which is marked if the name is deleted.
     fn new(shown: &Path, number: Option<String>) -> Self {
         let text = shown.to_string_lossy();
@@ -116,12 +116,12 @@ fn users<'a>(proc: &Path, devices: &'a [Device]) -> Result<Vec<User<'a>>, LoadEr
 }
 
 /// Adds the files that a process has open.
-fn add_open(process: &Path, files: &mut Vec<Held>) -> io::Result<()> {
+fn add_open(process: &Path, files: &mut Vec<HeldFile>) -> io::Result<()> {
     for file in fs::read_dir(process.join("fd"))?.filter_map(Result::ok) {
         let Ok(shown) = fs::read_link(file.path()) else { continue };
         let meta = fs::metadata(file.path()).ok();
         let meta = meta.filter(|meta| meta.file_type().is_char_device());
-        files.push(Held::new(&shown, meta.map(|meta| number_text(meta.rdev()))));
+        files.push(HeldFile::new(&shown, meta.map(|meta| number_text(meta.rdev()))));
     }
     Ok(())
 }
@@ -134,11 +134,11 @@ fn number_text(number: u64) -> String {
 }
 
 /// Adds the files that a process has mapped: a mapping outlives the open file.
-fn add_mapped(process: &Path, files: &mut Vec<Held>) -> io::Result<()> {
+fn add_mapped(process: &Path, files: &mut Vec<HeldFile>) -> io::Result<()> {
     // Columns: addresses, rights, offset, device, inode, and the file if there is one.
     let file = |line: &str| line.split_ascii_whitespace().nth(5).map(PathBuf::from);
     let maps = fs::read_to_string(process.join("maps"))?;
-    files.extend(maps.lines().filter_map(file).map(|path| Held::new(&path, None)));
+    files.extend(maps.lines().filter_map(file).map(|path| HeldFile::new(&path, None)));
     Ok(())
 }
 
@@ -154,7 +154,7 @@ mod tests {
             text: String::new(),
         };
         let held = |path: &str, number: Option<&str>| {
-            Held::new(Path::new(path), number.map(str::to_owned))
+            HeldFile::new(Path::new(path), number.map(str::to_owned))
         };
         for (path, found) in [
             ("/dev/uio3", true),

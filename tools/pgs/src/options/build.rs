@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn no_option_is_the_default_board() {
         assert_eq!(BuildArgs::default().config(), BoardConfig::default());
-        assert_eq!(BuildArgs::default().given(), None);
+        assert_eq!(BuildArgs::default().board_option(), None);
     }
 
     #[test]

@@ -25,7 +25,7 @@ use super::build::{
 };
 
 /// One option of a build.
-struct Part {
+struct BuildOption {
     /// Its name on the command line; a text has it without the dashes.
     option: &'static str,
     /// The values that need no name before them.
@@ -40,7 +40,7 @@ struct Part {
 /// Reads and writes a choice by its names.
 macro_rules! chosen {
     ($field:ident, $name:ty) => {
-        Part {
+        BuildOption {
             get: |build| build.$field.map(|choice| choice.text()),
             set: |build, text| choose::<$name>(text).map(|choice| build.$field = Some(choice)),
             ..NONE
@@ -51,7 +51,7 @@ macro_rules! chosen {
 /// Reads and writes a number.
 macro_rules! number {
     ($field:ident, $parse:ident, $print:expr) => {
-        Part {
+        BuildOption {
             get: |build| build.$field.map($print),
             set: |build, text| $parse(text).map(|number| build.$field = Some(number)),
             ..NONE
@@ -59,51 +59,60 @@ macro_rules! number {
     };
 }
 
-const NONE: Part = Part { option: "", words: &[], values: "", get: |_| None, set: |_, _| Ok(()) };
+const NONE: BuildOption =
+    BuildOption { option: "", words: &[], values: "", get: |_| None, set: |_, _| Ok(()) };
 
 /// Every option but the profile, in the order of a text.
-const PARTS: [Part; 9] = [
-    Part { option: "--format", words: &["binary16", "thesis16"], ..chosen!(format, FormatName) },
-    Part {
+const OPTIONS: [BuildOption; 9] = [
+    BuildOption {
+        option: "--format",
+        words: &["binary16", "thesis16"],
+        ..chosen!(format, FormatName)
+    },
+    BuildOption {
         option: "--arithmetic",
         words: &["f32"],
         values: "f32|binary16",
         ..chosen!(arithmetic, ArithmeticName)
     },
-    Part {
+    BuildOption {
         option: "--hazards",
         words: &["interlocked", "unchecked"],
         ..chosen!(hazards, HazardsName)
     },
-    Part {
+    BuildOption {
         option: "--window",
         values: "SLOTS",
         ..number!(window, window, |slots| slots.to_string())
     },
-    Part {
+    BuildOption {
         option: "--subnormals",
         words: &["keep", "flush"],
         ..chosen!(subnormals, SubnormalsName)
     },
-    Part { option: "--inertia", words: &["isotropic", "world"], ..chosen!(inertia, InertiaName) },
-    Part {
+    BuildOption {
+        option: "--inertia",
+        words: &["isotropic", "world"],
+        ..chosen!(inertia, InertiaName)
+    },
+    BuildOption {
         option: "--bandwidth",
         values: "GBPS|unlimited",
         ..number!(bandwidth, bandwidth, bandwidth_word)
     },
-    Part {
+    BuildOption {
         option: "--length-width",
         values: "BITS",
         ..number!(length_width, length_width, |bits| bits.to_string())
     },
-    Part {
+    BuildOption {
         option: "--address-width",
         values: "BITS",
         ..number!(address_width, address_width, |bits| bits.to_string())
     },
 ];
 
-impl Part {
+impl BuildOption {
     /// Its name in a text.
     fn key(&self) -> &'static str {
         self.option.trim_start_matches('-')
@@ -146,7 +155,7 @@ fn profiles() -> String {
 /// Lists everything that may follow the profile.
 fn known() -> String {
     let mut words: Vec<String> = Vec::new();
-    for part in &PARTS {
+    for part in &OPTIONS {
         words.extend(part.words.iter().map(|word| (*word).to_owned()));
         if !part.values.is_empty() {
             words.push(format!("{}={}", part.key(), part.values));
@@ -158,8 +167,9 @@ fn known() -> String {
 impl BuildArgs {
     /// The first given option that describes a board. `--threads` does not: collision detection and
     /// packing use it with every board.
-    pub(crate) fn given(&self) -> Option<&'static str> {
-        let part = || PARTS.iter().find(|part| (part.get)(self).is_some()).map(|part| part.option);
+    pub(crate) fn board_option(&self) -> Option<&'static str> {
+        let part =
+            || OPTIONS.iter().find(|part| (part.get)(self).is_some()).map(|part| part.option);
         // How a board is computed does not describe it, and is in no text.
         let host = || self.lanes.map(|_| "--lanes");
         self.profile.map(|_| "--profile").or_else(part).or_else(host)
@@ -191,7 +201,7 @@ pub(crate) fn described(config: &BoardConfig) -> String {
 impl fmt::Display for BuildArgs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.profile.unwrap_or(&FLOAT).name)?;
-        for part in &PARTS {
+        for part in &OPTIONS {
             let Some(value) = (part.get)(self) else { continue };
             if part.words.contains(&value.as_str()) {
                 write!(f, ",{value}")?;
@@ -216,7 +226,7 @@ impl FromStr for BuildArgs {
         let mut build = Self { profile, ..Self::default() };
         for word in words {
             let (part, value) =
-                part_of(word).ok_or_else(|| BuildError::Word { found: word.to_owned() })?;
+                option_of(word).ok_or_else(|| BuildError::Word { found: word.to_owned() })?;
             if (part.get)(&build).is_some() {
                 return Err(BuildError::Twice { key: part.key() });
             }
@@ -231,10 +241,12 @@ impl FromStr for BuildArgs {
 }
 
 /// The option of a word in a text, and its value.
-fn part_of(word: &str) -> Option<(&'static Part, &str)> {
+fn option_of(word: &str) -> Option<(&'static BuildOption, &str)> {
     match word.split_once('=') {
-        Some((key, value)) => PARTS.iter().find(|part| part.key() == key).map(|part| (part, value)),
-        None => PARTS.iter().find(|part| part.words.contains(&word)).map(|part| (part, word)),
+        Some((key, value)) => {
+            OPTIONS.iter().find(|part| part.key() == key).map(|part| (part, value))
+        }
+        None => OPTIONS.iter().find(|part| part.words.contains(&word)).map(|part| (part, word)),
     }
 }
 
@@ -358,13 +370,13 @@ mod tests {
             ("float,address-width=32", "--address-width"),
         ] {
             let given = BuildArgs { profile: None, ..build(text).expect(text) };
-            assert_eq!(given.given(), Some(option));
+            assert_eq!(given.board_option(), Some(option));
         }
-        assert_eq!(build("float").expect("a build").given(), Some("--profile"));
+        assert_eq!(build("float").expect("a build").board_option(), Some("--profile"));
         let lanes = Some(LanesName::Off);
-        assert_eq!(BuildArgs { lanes, ..BuildArgs::default() }.given(), Some("--lanes"));
+        assert_eq!(BuildArgs { lanes, ..BuildArgs::default() }.board_option(), Some("--lanes"));
         // Detection and packing use them on a real board, too.
-        assert_eq!(BuildArgs { threads: Some(1), ..BuildArgs::default() }.given(), None);
+        assert_eq!(BuildArgs { threads: Some(1), ..BuildArgs::default() }.board_option(), None);
     }
 
     fn any_of<T: ValueEnum + fmt::Debug + 'static>() -> impl Strategy<Value = Option<T>> {

@@ -27,7 +27,7 @@ pub(crate) struct OrdersSent(Vec<(Order, u64)>);
 
 impl OrdersSent {
     /// Counts a step.
-    pub(crate) fn see(&mut self, order: Order) {
+    pub(crate) fn count(&mut self, order: Order) {
         match self.0.iter_mut().find(|(taken, _)| *taken == order) {
             Some((_, steps)) => *steps += 1,
             None => self.0.push((order, 1)),

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
 
-use crate::board::{self, Chosen};
+use crate::board::{self, ChosenBoard};
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::options::build::BuildArgs;
@@ -87,8 +87,8 @@ impl CheckArgs {
     }
 
     /// The first given option that only an emulated board has.
-    fn given(&self) -> Option<&'static str> {
-        self.quirk.map(|_| "--quirk").or(self.build.given())
+    fn board_option(&self) -> Option<&'static str> {
+        self.quirk.map(|_| "--quirk").or(self.build.board_option())
     }
 }
 
@@ -99,7 +99,8 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     board::require(common)?;
-    let Chosen { kind, options, reason, .. } = board::find(common, args.config(), args.given())?;
+    let ChosenBoard { kind, options, reason, .. } =
+        board::find(common, args.config(), args.board_option())?;
     let report = check(options).map_err(board::unusable)?;
     let kind = board::kind_text(kind);
     if common.json {

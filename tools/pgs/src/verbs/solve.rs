@@ -181,7 +181,7 @@ pub(crate) fn run(
         true => order::beside_bullet(&report, opened.accelerator.capabilities()),
         false => None,
     };
-    let solved = Solved {
+    let solved = StepResult {
         parameters,
         beside_bullet,
         report,
@@ -287,7 +287,7 @@ fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
 }
 
 /// The result of the step.
-struct Solved {
+struct StepResult {
     parameters: StepParameters,
     /// How the order relates to Bullet's, if the results are compared.
     beside_bullet: Option<&'static str>,
@@ -298,7 +298,7 @@ struct Solved {
     differences: Vec<Difference>,
 }
 
-impl Solved {
+impl StepResult {
     /// Share of the collisions with a hazard, over all passes.
     fn hazard_share(&self) -> f64 {
         let issued = self.report.collisions * u64::from(self.report.passes);

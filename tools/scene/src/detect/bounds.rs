@@ -45,7 +45,7 @@ impl Bounds {
     }
 
     /// Whether the body takes part.
-    pub(super) fn exist(&self) -> bool {
+    pub(super) fn takes_part(&self) -> bool {
         // All components are finite, or none is.
         !self.reach[0].is_nan()
     }
@@ -85,11 +85,11 @@ mod tests {
             let place = [0.0, value, 0.0];
             for body in [body(place, level), body([0.0; 3], [0.0, 0.0, value, 1.0])] {
                 let bounds = Bounds::of(&body, Geometry::CUBE);
-                assert!(!bounds.exist(), "{body:?}");
+                assert!(!bounds.takes_part(), "{body:?}");
                 assert!(!bounds.near(&bounds, f32::INFINITY) && !bounds.off_the_ground());
             }
         }
-        assert!(Bounds::of(&body([1e30; 3], level), Geometry::CUBE).exist());
+        assert!(Bounds::of(&body([1e30; 3], level), Geometry::CUBE).takes_part());
     }
 
     proptest! {

@@ -42,15 +42,15 @@ impl Drift {
 
     /// Includes a body with its earlier bounds.
     #[inline]
-    pub(super) fn add(&mut self, then: &Bounds, now: &Bounds) {
-        if !now.exist() {
+    pub(super) fn add(&mut self, before: &Bounds, now: &Bounds) {
+        if !now.takes_part() {
             // It has no pairs, since it is near to nothing.
             return;
         }
-        self.same &= then.exist();
+        self.same &= before.takes_part();
         for axis in 0..3 {
-            let way = now.centre[axis] - then.centre[axis];
-            let growth = now.reach[axis] - then.reach[axis];
+            let way = now.centre[axis] - before.centre[axis];
+            let growth = now.reach[axis] - before.reach[axis];
             let growth = if growth > 0.0 { growth } else { 0.0 };
             let (low, high) = (way - growth, way + growth);
             self.low[axis] = if low < self.low[axis] { low } else { self.low[axis] };
@@ -59,7 +59,7 @@ impl Drift {
     }
 
     /// The drift of both sets of bodies.
-    pub(super) fn and(mut self, other: &Self) -> Self {
+    pub(super) fn union(mut self, other: &Self) -> Self {
         for axis in 0..3 {
             self.low[axis] = self.low[axis].min(other.low[axis]);
             self.high[axis] = self.high[axis].max(other.high[axis]);
@@ -69,7 +69,7 @@ impl Drift {
     }
 
     /// Whether no two bodies have approached by more than the candidates allow.
-    fn is_small(&self) -> bool {
+    fn keeps_candidates(&self) -> bool {
         // The difference is below the limit without bodies, and NaN with infinities.
         let axis = |axis: usize| {
             let (low, high) = (self.low[axis], self.high[axis]);
@@ -83,7 +83,7 @@ impl Drift {
 #[derive(Debug, Default)]
 pub(super) struct Broad {
     /// The bounds at the time of the search.
-    then: Vec<Bounds>,
+    searched: Vec<Bounds>,
     candidates: Vec<(u32, u32)>,
     cells: Cells,
     /// The pairs that each thread found, in the order of the cells.
@@ -97,25 +97,25 @@ pub(super) struct Broad {
 
 impl Broad {
     /// The bounds of each body at the time of the search.
-    pub(super) fn then(&mut self, bodies: usize) -> &[Bounds] {
-        if self.then.len() != bodies {
+    pub(super) fn searched_bounds(&mut self, bodies: usize) -> &[Bounds] {
+        if self.searched.len() != bodies {
             // Other bodies have no known bounds, so they are searched.
-            self.then.clear();
-            self.then.resize(bodies, Bounds::NONE);
+            self.searched.clear();
+            self.searched.resize(bodies, Bounds::NONE);
             self.candidates.clear();
         }
-        &self.then
+        &self.searched
     }
 
     /// Candidates, which include all pairs of boxes at most [`GAP`] apart; lower index first,
-    /// sorted. `drift` is the bodies' movement since [the search](Self::then).
+    /// sorted. `drift` is the bodies' movement since [the search](Self::searched_bounds).
     pub(super) fn candidates(
         &mut self,
         bounds: &[Bounds],
         drift: &Drift,
         crew: &mut Crew,
     ) -> &[(u32, u32)] {
-        if !drift.is_small() {
+        if !drift.keeps_candidates() {
             self.search(bounds, crew);
         }
         &self.candidates
@@ -129,7 +129,7 @@ impl Broad {
         }
         // No bounds count as known until the candidates are complete: a panic leaves no half-done
         // state.
-        self.then.clear();
+        self.searched.clear();
         self.candidates.clear();
         self.cells.sort(bounds);
         let (cells, bodies) = (&self.cells, self.cells.len());
@@ -142,7 +142,7 @@ impl Broad {
         });
         let found = self.found.get(..count).unwrap_or_default();
         sort(found, &mut self.ends, bounds.len(), &mut self.candidates);
-        self.then.extend_from_slice(bounds);
+        self.searched.extend_from_slice(bounds);
     }
 }
 
@@ -236,8 +236,8 @@ mod tests {
     impl Kept {
         fn pairs(&mut self, bounds: &[Bounds]) -> Vec<(u32, u32)> {
             let mut drift = Drift::NONE;
-            for (then, now) in self.broad.then(bounds.len()).iter().zip(bounds) {
-                drift.add(then, now);
+            for (before, now) in self.broad.searched_bounds(bounds.len()).iter().zip(bounds) {
+                drift.add(before, now);
             }
             let near = |&&(a, b): &&(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
             let candidates = self.broad.candidates(bounds, &drift, &mut self.crew);
@@ -289,7 +289,7 @@ mod tests {
                         Event::Jump(centre) => *body = Bounds { centre, reach: [1.0; 3] },
                         Event::Vanish if index % 2 == 0 => *body = Bounds::NONE,
                         Event::Vanish => bounds.truncate(index + 1),
-                        Event::Turn(reach) if body.exist() => body.reach = reach,
+                        Event::Turn(reach) if body.takes_part() => body.reach = reach,
                         Event::Turn(_) => {}
                     }
                 }

@@ -133,7 +133,7 @@ fn merge(order: &mut Vec<(u64, u32)>, strays: &[(u64, u32)]) {
 
 /// The cell of a centre.
 fn cell(bounds: &Bounds) -> u64 {
-    if !bounds.exist() {
+    if !bounds.takes_part() {
         return NOWHERE;
     }
     let [x, y, z] = bounds.centre.map(cell_number);

@@ -113,7 +113,7 @@ impl Detector {
             self.threads = self.crew.threads();
         }
         self.workers.resize_with(self.crew.threads(), Worker::default);
-        let drift = self.place(bodies, geometries);
+        let drift = self.compute_bounds(bodies, geometries);
         collisions.clear();
         for worker in &self.workers {
             collisions.extend_from_slice(&worker.ground);
@@ -143,10 +143,10 @@ impl Detector {
 
     /// Computes the bounds of all bodies and collides them with the ground; returns their drift
     /// since the last search.
-    fn place(&mut self, bodies: &[Body], geometries: Geometries<'_>) -> Drift {
+    fn compute_bounds(&mut self, bodies: &[Body], geometries: Geometries<'_>) -> Drift {
         let Self { crew, bounds, broad, workers, .. } = self;
         bounds.resize(bodies.len(), Bounds::NONE);
-        let then = broad.then(bodies.len());
+        let searched = broad.searched_bounds(bodies.len());
         let (count, share) = shares(bodies.len(), crew, PLACED_PER_THREAD);
         for worker in &mut *workers {
             worker.drift = Drift::NONE;
@@ -155,12 +155,12 @@ impl Detector {
         let work = (0..).step_by(share).zip(bounds.chunks_mut(share)).zip(&mut workers[..count]);
         crew.each(work, |((first, bounds), worker)| {
             let range = first..first + bounds.len();
-            let placed = (first..).zip(&bodies[range.clone()]).zip(&then[range]).zip(bounds);
-            for (((index, body), then), bounds) in placed {
-                *bounds = worker.place(index, body, geometries.of(body), then);
+            let placed = (first..).zip(&bodies[range.clone()]).zip(&searched[range]).zip(bounds);
+            for (((index, body), before), bounds) in placed {
+                *bounds = worker.place(index, body, geometries.of(body), before);
             }
         });
-        workers.iter().fold(Drift::NONE, |drift, worker| drift.and(&worker.drift))
+        workers.iter().fold(Drift::NONE, |drift, worker| drift.union(&worker.drift))
     }
 }
 
@@ -172,13 +172,13 @@ impl Worker {
         index: usize,
         body: &Body,
         geometry: Option<Geometry>,
-        then: &Bounds,
+        before: &Bounds,
     ) -> Bounds {
         let (Some(geometry), Ok(number @ 1..)) = (geometry, u32::try_from(index)) else {
             return Bounds::NONE;
         };
         let bounds = Bounds::of(body, geometry);
-        self.drift.add(then, &bounds);
+        self.drift.add(before, &bounds);
         if !bounds.off_the_ground() {
             self.ground.extend(ground::collide(number, body, geometry));
         }

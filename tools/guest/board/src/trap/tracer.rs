@@ -340,7 +340,7 @@ impl Tracer {
             self.counts.reads += 1;
             Access::Read { address }
         };
-        let loaded = self.host.ask(request)?;
+        let loaded = self.host.request(request)?;
         general.complete(&access, loaded);
         (registers.regs, registers.sp) = (general.x, general.sp);
         registers.pc = pc.wrapping_add(4);

@@ -252,7 +252,7 @@ pub(crate) fn run(
     })
 }
 
-fn board_shapes(opened: &crate::board::Opened) -> u32 {
+fn board_shapes(opened: &crate::board::OpenBoard) -> u32 {
     opened.accelerator.capabilities().shape_capacity
 }
 

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use zynq_pgs::{Body, Collision, Error, Fault, InputError, Shape, StepParameters, StepReport};
 
 use super::spec::SideSpec;
-use crate::board::{self, Opened};
+use crate::board::{self, OpenBoard};
 use crate::common::{BoardName, CommonArgs};
 use crate::deviation::unmoved_share;
 use crate::failure::Failure;
@@ -104,7 +104,7 @@ pub(super) struct Failed {
 pub(super) struct Side<'a> {
     pub(super) name: &'static str,
     pub(super) spec: SideSpec,
-    pub(super) opened: Opened,
+    pub(super) opened: OpenBoard,
     pub(super) world: World<'a>,
     pub(super) failed: Option<Failed>,
     gravity: [f32; 3],
@@ -116,7 +116,7 @@ impl<'a> Side<'a> {
         name: &'static str,
         spec: SideSpec,
         common: &CommonArgs,
-        world: impl FnOnce(&Opened) -> Result<World<'a>, Failure>,
+        world: impl FnOnce(&OpenBoard) -> Result<World<'a>, Failure>,
         gravity: [f32; 3],
     ) -> Result<Self, Failure> {
         let common = CommonArgs { board: BoardName::Emulated, ..common.clone() };
@@ -229,7 +229,7 @@ impl<'a> Side<'a> {
 }
 
 /// Makes a failure of the driver's error; for a folder, with the array at fault.
-fn failure(opened: &Opened, world: &World<'_>, error: Error) -> Failure {
+fn failure(opened: &OpenBoard, world: &World<'_>, error: Error) -> Failure {
     match world {
         World::Folder { folder, .. } if error.is_input() => {
             Failure::input(step_input::locate(error, folder))

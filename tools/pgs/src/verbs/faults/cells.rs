@@ -65,7 +65,7 @@ fn positions(count: u64) -> Vec<u64> {
 
 /// Phases that represent all others of their kind: the first, the middle and the last contact pass,
 /// and the first and the last friction pass.
-fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
+fn is_tried(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
     match phase {
         StepPhase::Load | StepPhase::Poses | StepPhase::Results => true,
         StepPhase::Contact(pass) => [1, contact.div_ceil(2), contact].contains(&pass),
@@ -74,7 +74,7 @@ fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
 }
 
 /// The kind, with a delay so long that the step cannot end before the delay shows.
-fn felt(kind: FaultKind) -> FaultKind {
+fn with_long_delay(kind: FaultKind) -> FaultKind {
     match kind {
         FaultKind::Slow { .. } => FaultKind::Slow { clocks: 10_000 },
         FaultKind::LateCmplted { .. } => FaultKind::LateCmplted { ns: 3_000_000 },
@@ -83,7 +83,7 @@ fn felt(kind: FaultKind) -> FaultKind {
 }
 
 /// The places where a kind of fault can happen.
-enum Where {
+enum Site {
     /// At each beat of a packet.
     Beats,
     /// At each descriptor of a packet.
@@ -100,7 +100,7 @@ enum Where {
     Once,
 }
 
-fn place_of(kind: FaultKind) -> Where {
+fn site_of(kind: FaultKind) -> Site {
     use FaultKind as K;
     match kind {
         K::DmaIntErr
@@ -113,7 +113,7 @@ fn place_of(kind: FaultKind) -> Where {
         | K::OtherBitstream { .. }
         | K::PowerLost
         | K::IrqSpurious
-        | K::IrqStorm { .. } => Where::Beats,
+        | K::IrqStorm { .. } => Site::Beats,
         K::SgIntErr
         | K::SgSlvErr
         | K::SgDecErr
@@ -121,12 +121,12 @@ fn place_of(kind: FaultKind) -> Where {
         | K::BdIntErr
         | K::BdSlvErr
         | K::BdDecErr
-        | K::LateCmplted { .. } => Where::Descriptors,
-        K::LongPacket | K::NoTlast => Where::Ends,
-        K::HaltDelay { .. } | K::HaltNever => Where::Stops,
-        K::ResetSlow { .. } | K::ResetNever => Where::Resets,
-        K::AcceleratorError { .. } | K::AcceleratorHang => Where::Accelerator,
-        _ => Where::Once,
+        | K::LateCmplted { .. } => Site::Descriptors,
+        K::LongPacket | K::NoTlast => Site::Ends,
+        K::HaltDelay { .. } | K::HaltNever => Site::Stops,
+        K::ResetSlow { .. } | K::ResetNever => Site::Resets,
+        K::AcceleratorError { .. } | K::AcceleratorHang => Site::Accelerator,
+        _ => Site::Once,
     }
 }
 
@@ -135,14 +135,14 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
     let packets: Vec<_> = bench
         .packets
         .iter()
-        .filter(|packet| packet.phase.is_some_and(|phase| shown(phase, bench.iterations())))
+        .filter(|packet| packet.phase.is_some_and(|phase| is_tried(phase, bench.iterations())))
         .collect();
     let mut cells = Vec::new();
     let mut at_last = 0;
     let mut kinds = 0;
-    for kind in FaultKind::all().map(felt) {
-        match place_of(kind) {
-            Where::Beats => {
+    for kind in FaultKind::all().map(with_long_delay) {
+        match site_of(kind) {
+            Site::Beats => {
                 kinds += 3;
                 for packet in &packets {
                     let mut beats = positions(packet.beats);
@@ -153,7 +153,7 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
                     cells.extend(beats.into_iter().map(|beat| at(kind, packet, When::Beat(beat))));
                 }
             }
-            Where::Descriptors => {
+            Site::Descriptors => {
                 kinds += 3;
                 for packet in &packets {
                     let numbers = positions(packet.descriptors.into());
@@ -163,18 +163,18 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
                     );
                 }
             }
-            Where::Ends => {
+            Site::Ends => {
                 kinds += 1;
                 cells.extend(packets.iter().map(|packet| Cell::new(on(kind, packet), false)));
             }
-            Where::Stops => {
+            Site::Stops => {
                 for (core, direction) in channels(&bench.packets) {
                     cells.push(Cell::new(Fault::new(kind).on(core, direction), true));
                 }
             }
-            Where::Resets => cells.extend(resets(kind, bench)),
-            Where::Accelerator => cells.extend(in_accelerator(kind, bench)),
-            Where::Once => cells.push(Cell::new(Fault::new(kind), false)),
+            Site::Resets => cells.extend(resets(kind, bench)),
+            Site::Accelerator => cells.extend(in_accelerator(kind, bench)),
+            Site::Once => cells.push(Cell::new(Fault::new(kind), false)),
         }
     }
     let senders = channels(&bench.packets).filter(|(_, way)| *way == Direction::Mm2s).count();
@@ -234,8 +234,8 @@ fn resets(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
 fn in_accelerator(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
     let mut phases: Vec<StepPhase> = Vec::new();
     for phase in bench.packets.iter().filter_map(|packet| packet.phase) {
-        let shown = phase != StepPhase::Results && shown(phase, bench.iterations());
-        if shown && !phases.contains(&phase) {
+        let tried = phase != StepPhase::Results && is_tried(phase, bench.iterations());
+        if tried && !phases.contains(&phase) {
             phases.push(phase);
         }
     }
@@ -265,13 +265,13 @@ mod tests {
 
     #[test]
     fn passes_stand_for_those_between_them() {
-        let shown = |phase| shown(phase, [4, 4]);
+        let tried = |phase| is_tried(phase, [4, 4]);
         assert_eq!(
-            [1, 2, 3, 4].map(|pass| shown(StepPhase::Contact(pass))),
+            [1, 2, 3, 4].map(|pass| tried(StepPhase::Contact(pass))),
             [true, true, false, true]
         );
         assert_eq!(
-            [1, 2, 3, 4].map(|pass| shown(StepPhase::Friction(pass))),
+            [1, 2, 3, 4].map(|pass| tried(StepPhase::Friction(pass))),
             [true, false, false, true]
         );
     }

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
-use self::trial::{Bench, Verified};
+use self::trial::{Bench, CellResult};
 use crate::common::CommonArgs;
 use crate::environment;
 use crate::failure::{Failure, Verdict};
@@ -51,9 +51,9 @@ pub(crate) struct FaultsArgs {
 }
 
 /// The results of a profile's cells.
-struct Tried {
+struct ProfileResults {
     profile: &'static Profile,
-    cells: Vec<(Cell, Verified)>,
+    cells: Vec<(Cell, CellResult)>,
     impossible: Vec<Impossible>,
 }
 
@@ -82,7 +82,7 @@ pub(crate) fn run(
             continue;
         }
         let cells = try_all(&bench, cells);
-        all.push(Tried { profile, cells, impossible });
+        all.push(ProfileResults { profile, cells, impossible });
     }
     if args.list {
         return Ok(Verdict::Done);
@@ -97,14 +97,14 @@ pub(crate) fn run(
 }
 
 /// Tries the cells on all processors; the results are in the order of the cells.
-fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
+fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, CellResult)> {
     let bar: ProgressBar = progress_bar(u32::try_from(cells.len()).unwrap_or(u32::MAX));
     bar.set_message(bench.config.profile.name);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let next = AtomicUsize::new(0);
     let work = || {
         let mut found = Vec::new();
-        while let Some((place, cell)) = take(&next, &cells) {
+        while let Some((place, cell)) = next_cell(&next, &cells) {
             // A panic fails the cell and does not end the table.
             let tried = catch_unwind(AssertUnwindSafe(|| trial::run(bench, cell)));
             found.push((place, tried.unwrap_or_default()));
@@ -112,13 +112,13 @@ fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
         }
         found
     };
-    let found: Vec<(usize, Verified)> = std::thread::scope(|scope| {
+    let found: Vec<(usize, CellResult)> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
     });
     bar.finish_and_clear();
     // A cell without a result has passed nothing.
-    let mut all = vec![Verified::default(); cells.len()];
+    let mut all = vec![CellResult::default(); cells.len()];
     for (place, verified) in found {
         all[place] = verified;
     }
@@ -126,16 +126,16 @@ fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
 }
 
 /// The next cell that no thread has taken.
-fn take<'a>(next: &AtomicUsize, cells: &'a [Cell]) -> Option<(usize, &'a Cell)> {
+fn next_cell<'a>(next: &AtomicUsize, cells: &'a [Cell]) -> Option<(usize, &'a Cell)> {
     let place = next.fetch_add(1, Ordering::Relaxed);
     cells.get(place).map(|cell| (place, cell))
 }
 
-fn to_json(all: &[Tried]) -> Value {
+fn to_json(all: &[ProfileResults]) -> Value {
     let profiles: Vec<_> = all
         .iter()
         .map(|tried| {
-            let Tried { profile, cells, impossible } = tried;
+            let ProfileResults { profile, cells, impossible } = tried;
             let tally = Tally::of(cells.iter());
             json!({
                 "profile": profile.name,
@@ -151,7 +151,7 @@ fn to_json(all: &[Tried]) -> Value {
                     "passed": found.passed(),
                     "cause": found.cause,
                     "elapsed_ms": found.elapsed.as_secs_f64() * 1e3,
-                    "wrong": found.wrong(),
+                    "wrong": found.failed_checks(),
                 })).collect::<Vec<_>>(),
             })
         })

@@ -4,10 +4,10 @@ use std::io::{self, Write};
 
 use serde_json::{Value, json};
 
-use super::Tried;
+use super::ProfileResults;
 use super::cells::Cell;
 use super::expected::Expected;
-use super::trial::Verified;
+use super::trial::CellResult;
 use crate::numbers::grouped;
 use crate::output::table::{Column, heading, line};
 
@@ -37,7 +37,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    pub(super) fn of<'a>(cells: impl Iterator<Item = &'a (Cell, Verified)>) -> Self {
+    pub(super) fn of<'a>(cells: impl Iterator<Item = &'a (Cell, CellResult)>) -> Self {
         let mut all = Self::default();
         for (_, found) in cells {
             all.tried += 1;
@@ -82,7 +82,7 @@ impl Tally {
 
 /// Prints a row for each kind over all profiles; then profiles, phases, impossible combinations,
 /// and failures.
-pub(super) fn print(all: &[Tried], out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn print(all: &[ProfileResults], out: &mut dyn Write) -> io::Result<()> {
     let cells = || all.iter().flat_map(|tried| &tried.cells);
     heading(out, &COLUMNS)?;
     let mut kinds: Vec<&str> = Vec::new();
@@ -100,7 +100,7 @@ pub(super) fn print(all: &[Tried], out: &mut dyn Write) -> io::Result<()> {
     line(out, &COLUMNS, Tally::of(cells()).cells("all", ""))?;
 
     writeln!(out)?;
-    for Tried { profile, cells, .. } in all {
+    for ProfileResults { profile, cells, .. } in all {
         let Tally { tried, passed, .. } = Tally::of(cells.iter());
         writeln!(
             out,
@@ -128,14 +128,14 @@ pub(super) fn print(all: &[Tried], out: &mut dyn Write) -> io::Result<()> {
         let what = these.map(|impossible| impossible.what).next().unwrap_or_default();
         writeln!(out, "not tried: {what} ({} cells)", grouped(count as u64))?;
     }
-    for Tried { profile, cells, .. } in all {
+    for ProfileResults { profile, cells, .. } in all {
         for (cell, found) in cells.iter().filter(|(_, found)| !found.passed()) {
             writeln!(
                 out,
                 "FAILED {} '{}': {}; cause {}, expected {:?}",
                 profile.name,
                 cell.plan,
-                found.wrong().join(", "),
+                found.failed_checks().join(", "),
                 found.cause.unwrap_or("none"),
                 cell.expected,
             )?;

@@ -50,7 +50,7 @@ pub(super) struct Bench {
 
 /// The results of a cell.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Verified {
+pub(super) struct CellResult {
     /// The cause in the error; none if the step succeeded.
     pub(super) cause: Option<&'static str>,
     /// Whether the fault happened, and no other violation.
@@ -68,13 +68,13 @@ pub(super) struct Verified {
     pub(super) elapsed: Duration,
 }
 
-impl Verified {
+impl CellResult {
     pub(super) fn passed(&self) -> bool {
-        self.wrong().is_empty()
+        self.failed_checks().is_empty()
     }
 
     /// The checks that failed.
-    pub(super) fn wrong(&self) -> Vec<&'static str> {
+    pub(super) fn failed_checks(&self) -> Vec<&'static str> {
         let all = [
             (self.happened, "happened"),
             (self.named, "named"),
@@ -175,8 +175,8 @@ impl Bench {
 }
 
 /// Tries a cell.
-pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
-    let mut found = Verified::default();
+pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
+    let mut found = CellResult::default();
     let Ok((board, mut accelerator)) = open(bench.config, &bench.small.shapes) else {
         return found;
     };
@@ -212,7 +212,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
             let lost = aftermath == Aftermath::MustReopen;
             found.named = found.cause == Some(cause)
                 && (channel.is_none() || channel == channel_of(error))
-                && shown(cell, error)
+                && locates_fault(cell, error)
                 && error.must_reopen() == lost
                 && error.may_retry() != lost;
             found.bodies = bodies == bits(&state.bodies);
@@ -221,7 +221,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
         (Ok(_) | Err(_), _) => false,
     };
     if lost {
-        found.next = says_lost(&mut accelerator, small, &mut step);
+        found.next = reports_lost(&mut accelerator, small, &mut step);
         drop(accelerator);
         found.next &= reopen(&board).is_err();
         return found;
@@ -254,7 +254,7 @@ fn channel_of(error: &Error) -> Option<(usize, Direction)> {
 /// missing bytes.
 ///
 /// When the accelerator detects a fault, its channel may be ahead by the content of the FIFOs.
-fn shown(cell: &Cell, error: &Error) -> bool {
+fn locates_fault(cell: &Cell, error: &Error) -> bool {
     let Some((core, direction)) = cell.channel() else { return true };
     let same_way = |way| (way == zynq_pgs::Direction::S2mm) == (direction == Direction::S2mm);
     let states = error.diagnosis().map(|diagnosis| &diagnosis.channels);
@@ -283,7 +283,7 @@ fn shown(cell: &Cell, error: &Error) -> bool {
 }
 
 /// Whether every call reports that the board must be opened again.
-fn says_lost(
+fn reports_lost(
     accelerator: &mut Accelerator,
     state: &State,
     step: &mut impl FnMut(

@@ -4,7 +4,7 @@ use zynq_pgs::{Body, CONTACT_POINTS, Collision, Shape};
 
 /// The sums that include a kind of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum Membership {
     /// In both sums.
     Given,
     /// Streamed with every collision, although the bodies have these numbers already.
@@ -17,13 +17,14 @@ pub(super) enum Part {
 pub(super) struct Sum {
     pub(super) name: &'static str,
     /// Whether the sum includes a part.
-    pub(super) has: fn(Part) -> bool,
+    pub(super) has: fn(Membership) -> bool,
 }
 
 /// The numbers that a step streams, with the positions of both bodies in every collision.
-pub(super) const AS_STREAMED: Sum = Sum { name: "as streamed", has: |part| part != Part::Relative };
+pub(super) const AS_STREAMED: Sum =
+    Sum { name: "as streamed", has: |part| part != Membership::Relative };
 /// Every input number of a step, once.
-pub(super) const EACH_ONCE: Sum = Sum { name: "each once", has: |part| part == Part::Given };
+pub(super) const EACH_ONCE: Sum = Sum { name: "each once", has: |part| part == Membership::Given };
 /// Both sums.
 pub(super) const SUMS: [Sum; 2] = [AS_STREAMED, EACH_ONCE];
 
@@ -38,7 +39,7 @@ impl Sum {
 /// The numbers of one kind.
 pub(super) struct Numbers {
     pub(super) name: &'static str,
-    pub(super) part: Part,
+    pub(super) part: Membership,
     pub(super) values: Vec<f32>,
 }
 
@@ -46,7 +47,7 @@ pub(super) struct Numbers {
 pub(super) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision]) -> Vec<Numbers> {
     let of_bodies = |name, field: fn(&Body) -> &[f32]| Numbers {
         name,
-        part: Part::Given,
+        part: Membership::Given,
         values: bodies.iter().flat_map(field).copied().collect(),
     };
     let position = |body: u32| {
@@ -75,27 +76,27 @@ pub(super) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision
     vec![
         of_bodies("velocity", |body| &body.velocity.linear),
         of_bodies("spin", |body| &body.velocity.angular),
-        of_pairs("normal", Part::Given, &|c| c.normal.to_vec()),
-        of_pairs("positions of A and B", Part::Repeated, &|c| {
+        of_pairs("normal", Membership::Given, &|c| c.normal.to_vec()),
+        of_pairs("positions of A and B", Membership::Repeated, &|c| {
             [position(c.body_a), position(c.body_b)].concat()
         }),
-        of_pairs("contact points", Part::Given, &|c| points(c, &|point| point)),
-        of_pairs("distances", Part::Given, &|c| {
+        of_pairs("contact points", Membership::Given, &|c| points(c, &|point| point)),
+        of_pairs("distances", Membership::Given, &|c| {
             c.contacts[..used(c)].iter().map(|contact| contact.distance).collect()
         }),
         of_bodies("position", |body| &body.pose.position),
         of_bodies("orientation", |body| &body.pose.orientation),
-        of_pairs("relative: B - A", Part::Relative, &|c| {
-            less(seen_from(c.body_b, c.body_a), seen_from(c.body_a, c.body_b)).to_vec()
+        of_pairs("relative: B - A", Membership::Relative, &|c| {
+            subtract(seen_from(c.body_b, c.body_a), seen_from(c.body_a, c.body_b)).to_vec()
         }),
-        of_pairs("relative: points - A", Part::Relative, &|c| {
-            points(c, &|point| less(point, seen_from(c.body_a, c.body_b)))
+        of_pairs("relative: points - A", Membership::Relative, &|c| {
+            points(c, &|point| subtract(point, seen_from(c.body_a, c.body_b)))
         }),
     ]
 }
 
 /// a - b.
-fn less(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+fn subtract(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 

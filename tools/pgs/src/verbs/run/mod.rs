@@ -12,7 +12,7 @@ use zynq_pgs::{BoardKind, StepParameters, StepReport};
 
 use self::row::{ALL_COLUMNS, Row, columns, step};
 use self::summary::{Summary, Totals};
-use crate::board::{self, Opened};
+use crate::board::{self, OpenBoard};
 use crate::bug_report::FaultArgs;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
@@ -149,7 +149,7 @@ fn take_steps(
     args: &RunArgs,
     common: &CommonArgs,
     parameters: &StepParameters,
-    opened: &mut Opened,
+    opened: &mut OpenBoard,
     scene: &mut Scene,
     interrupt: &Interrupt,
     out: &mut dyn Write,
@@ -163,9 +163,9 @@ fn take_steps(
         let Some(row) = row else { break };
         course.done += 1;
         course.retries += u64::from(row.report.retries);
-        course.totals.see(&row);
-        course.footprint.see(&variant, &row.report);
-        course.orders.see(row.report.order);
+        course.totals.add(&row);
+        course.footprint.include(&variant, &row.report);
+        course.orders.count(row.report.order);
         if course.done == 1 && !common.json {
             // The heading waits for the first step: a refused scene prints only the refusal.
             progress.suspend(|| print_heading(args, opened, &row.report, out))?;
@@ -187,14 +187,14 @@ fn take_steps(
 }
 
 /// Whether the times of the board are modelled.
-fn is_emulated(opened: &Opened) -> bool {
+fn is_emulated(opened: &OpenBoard) -> bool {
     matches!(opened.accelerator.board().kind, BoardKind::Emulated | BoardKind::Served)
 }
 
 /// The board, the scene, the first step's order, and the names of the columns.
 fn print_heading(
     args: &RunArgs,
-    opened: &Opened,
+    opened: &OpenBoard,
     first: &StepReport,
     out: &mut dyn Write,
 ) -> io::Result<()> {
@@ -213,12 +213,12 @@ fn print_heading(
 fn summary<'a>(
     args: &RunArgs,
     parameters: &'a StepParameters,
-    opened: &Opened,
+    opened: &OpenBoard,
     scene: &mut Scene,
     course: &'a Course,
 ) -> Option<Summary<'a>> {
     let last = course.last.as_ref()?;
-    let facts = summary::Board {
+    let facts = summary::BoardFacts {
         profile: opened.accelerator.capabilities().variant.profile,
         is_emulated: is_emulated(opened),
         bandwidth: opened.config().map(|config| bandwidth_text(config.bandwidth)),
@@ -230,7 +230,7 @@ fn summary<'a>(
 fn print_end(
     args: &RunArgs,
     parameters: &StepParameters,
-    opened: &Opened,
+    opened: &OpenBoard,
     scene: &mut Scene,
     course: &Course,
     out: &mut dyn Write,
@@ -261,7 +261,7 @@ fn print_end(
 fn document(
     args: &RunArgs,
     parameters: &StepParameters,
-    opened: &Opened,
+    opened: &OpenBoard,
     scene: &mut Scene,
     mut course: Course,
     complete: bool,

@@ -52,7 +52,7 @@ struct HostSums {
 
 impl Totals {
     /// Adds a step.
-    pub(super) fn see(&mut self, row: &Row) {
+    pub(super) fn add(&mut self, row: &Row) {
         let report = &row.report;
         self.steps += 1;
         self.collisions_most = self.collisions_most.max(report.collisions);
@@ -113,7 +113,7 @@ struct Thesis {
 const THESIS_PASSES: u32 = 8;
 
 impl Thesis {
-    fn beside(profile: &Profile, passes: u32) -> Self {
+    fn for_run(profile: &Profile, passes: u32) -> Self {
         let half = recorded::HALF_DESIGN.profile.name == profile.name;
         let design = if half { &recorded::HALF_DESIGN } else { &recorded::FLOAT_DESIGN };
         let shape = StepShape::new(thesis::BODIES, thesis::COLLISIONS);
@@ -146,7 +146,7 @@ impl Thesis {
 
 /// The state of the pile at the end.
 #[derive(Debug, Clone, Copy)]
-struct End {
+struct FinalState {
     /// Kinetic energy without gravity's last addition, J.
     kinetic_energy: f64,
     /// The common speed of all bodies at this energy, m/s.
@@ -155,7 +155,7 @@ struct End {
     deepest: f64,
 }
 
-impl End {
+impl FinalState {
     fn of(scene: &mut Scene, last: &Row) -> Self {
         scene.detect();
         let deepest = penetration(scene.collisions()).largest;
@@ -182,7 +182,7 @@ impl End {
 
 /// The board of a run.
 #[derive(Debug)]
-pub(super) struct Board {
+pub(super) struct BoardFacts {
     pub(super) profile: &'static Profile,
     /// Whether its times are modelled.
     pub(super) is_emulated: bool,
@@ -194,10 +194,10 @@ pub(super) struct Board {
 pub(super) struct Summary<'a> {
     totals: &'a Totals,
     parameters: &'a StepParameters,
-    board: Board,
+    board: BoardFacts,
     /// Whether the scene is the thesis' cubes.
     cubes: bool,
-    end: End,
+    end: FinalState,
 }
 
 impl<'a> Summary<'a> {
@@ -205,15 +205,15 @@ impl<'a> Summary<'a> {
     pub(super) fn new(
         totals: &'a Totals,
         parameters: &'a StepParameters,
-        board: Board,
+        board: BoardFacts,
         cubes: bool,
         (scene, last): (&mut Scene, &Row),
     ) -> Self {
-        Self { totals, parameters, board, cubes, end: End::of(scene, last) }
+        Self { totals, parameters, board, cubes, end: FinalState::of(scene, last) }
     }
 
     fn thesis(&self) -> Option<Thesis> {
-        self.cubes.then(|| Thesis::beside(self.board.profile, self.totals.passes))
+        self.cubes.then(|| Thesis::for_run(self.board.profile, self.totals.passes))
     }
 
     /// For people.
@@ -347,17 +347,17 @@ mod tests {
     /// 254,000 cycles a pass at 275 MHz are 0.9236 ms; 190,500 at 250 MHz are 0.762 ms.
     #[test]
     fn the_thesis_is_shown_for_as_many_passes() {
-        let ms = |profile, passes| Thesis::beside(profile, passes).same_passes_ms;
+        let ms = |profile, passes| Thesis::for_run(profile, passes).same_passes_ms;
         assert!((ms(&FLOAT, 8) - 7.49).abs() < 1e-9);
         assert!((ms(&FLOAT, 20) - (7.49 + 12.0 * 0.923_636)).abs() < 1e-3);
         assert!((ms(&HALF, 9) - (6.23 + 0.762)).abs() < 1e-3);
         assert!((ms(&MIXED, 8) - 7.49).abs() < 1e-9, "it has no design of its own there");
-        let text = Thesis::beside(&FLOAT, 8).text(8);
+        let text = Thesis::for_run(&FLOAT, 8).text(8);
         assert!(
             text.ends_with("float design 7.49 ms, GTX 980 13.64 ms, i7-3770 53.01 ms"),
             "{text}"
         );
-        let text = Thesis::beside(&FLOAT, 20).text(20);
+        let text = Thesis::for_run(&FLOAT, 20).text(20);
         assert!(text.ends_with("; 20 passes are 18.57 ms by its 254,000 cycles a pass"), "{text}");
     }
 }
