@@ -88,7 +88,7 @@ pub(crate) fn require(common: &CommonArgs) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::new(Cause::NoBoard, format!("there is no board: {reason}")).next(
-        "see with `pgs list` what there is, and name a node with --board uio:NODE; or take the \
+        "list the nodes with `pgs list`, and name a node with --board uio:NODE; or take the \
          emulated board with --board emulated",
     ))
 }
@@ -121,22 +121,23 @@ pub(crate) fn find(
         let ignored = *memory_of_environment && *name == BoardName::Emulated;
         if *memory != MemoryChoice::Automatic && !ignored {
             let (option, next) = match memory_of_environment {
-                true => (MEMORY, "say which board is meant: --board emulated or --board uio"),
+                true => (MEMORY, "choose the board with --board emulated or --board uio"),
                 false => ("--memory", "leave out --memory, or add --board uio"),
             };
-            let error =
-                format!("{option} is for real boards, this one is emulated and has its own");
+            let error = format!(
+                "{option} is for real boards; this one is emulated and has memory of its own"
+            );
             return Err(Failure::input(error).next(next));
         }
         let emulated = EmulatedBoard::new(config).map_err(not_built)?;
         (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
     } else if let (BoardName::Socket(_), Some(option)) = (name, given) {
-        let error = format!("{option} says how to build an emulated board, this one is built");
+        let error = format!("{option} builds an emulated board, but this one is already built");
         return Err(Failure::input(error).next(format!("give {option} to its `pgs serve`")));
     } else if let BoardName::Socket(socket) = name {
         (BoardChoice::Served { socket: socket.clone() }, None)
     } else if let Some(option) = given {
-        let error = format!("{option} says how to build an emulated board, this one is real");
+        let error = format!("{option} builds an emulated board, but this one is real");
         return Err(
             Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
         );

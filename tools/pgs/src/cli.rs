@@ -14,14 +14,14 @@ Examples:
   pgs                                  step the thesis' scene of 38,880 cubes
   pgs --grid 10x10x10 --steps 60       a smaller one; the same as `pgs run --grid ...`
   pgs solve vectors/one_cube --compare
-  pgs compare float half               how far two builds of the board come apart
+  pgs compare float half               how far two builds of the board diverge
   pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
   pgs order --input vectors/full_step186
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check                            test the board; --board emulated where there is none
-  pgs faults                           every fault at every place, and what the driver makes of it
+  pgs faults                           every fault at every place, and the driver's reaction
   pgs serve --socket /tmp/board        and elsewhere: pgs --board socket:/tmp/board
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.

@@ -48,7 +48,7 @@ fn results_that_cannot_be_written_leave_the_earlier_ones() {
     let ran = on_a_full_disk(&["solve", text(&large), "--out", text(&out)]);
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     assert!(ran.stderr.contains("cannot be written"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("is as it was before"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("is unchanged"), "{}", ran.stderr);
     assert_eq!(content(&out), before);
 
     // Folders made for the results are removed.

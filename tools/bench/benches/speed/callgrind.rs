@@ -56,12 +56,11 @@ pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), 
             black_box(packer.pack(&step.bodies, &step.collisions, &step.shapes));
         }
         (Only::Emulated, Some(profile)) => {
-            let profile =
-                Profile::by_name(profile).ok_or("--profile: there is none of that name")?;
+            let profile = Profile::by_name(profile).ok_or("--profile: no profile has this name")?;
             let config = BoardConfig { profile, threads: 1, ..BoardConfig::default() };
             Emulated::new(step, config)?.take()?;
         }
-        _ => return Err("--profile belongs to --only emulated, which wants one".into()),
+        _ => return Err("--only emulated needs a --profile, and nothing else takes one".into()),
     }
     let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
     println!(
@@ -133,7 +132,7 @@ pub(crate) fn count(
     let mut parameters = StepParameters::default();
     (parameters.contact_iterations, parameters.friction_iterations) = (contact, friction);
     let collected = log.lines().find_map(|line| line.split_once("Collected :"));
-    let (_, collected) = collected.ok_or("callgrind does not say what it collected")?;
+    let (_, collected) = collected.ok_or("callgrind does not report its counts")?;
     let instructions: f64 = collected.trim().parse()?;
     if instructions == 0.0 {
         return Err(format!("callgrind has not seen {function}").into());

@@ -223,7 +223,7 @@ impl Run {
                     let corrupt = plan.faults.iter().filter(corrupt).map(|fault| fault.times);
                     assert!(
                         corrupt.sum::<u32>() > 1,
-                        "{plan}: not the bits of an undisturbed step"
+                        "{plan}: not the bits of a step without faults"
                     );
                 }
                 Ok(())

@@ -209,7 +209,7 @@ fn unreadable(path: &Path, source: &io::Error) -> String {
         io::ErrorKind::PermissionDenied => {
             format!("run the command as root, or let it read {}", path.display())
         }
-        _ => format!("is the disk or network whole that holds {}?", path.display()),
+        _ => format!("check the disk or network that holds {}", path.display()),
     }
 }
 

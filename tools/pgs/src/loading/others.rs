@@ -30,7 +30,7 @@ pub(super) fn refuse_if_bound(system: &dyn System) -> Result<(), LoadError> {
 /// Overlays of other names that are or may be applied, with their status.
 fn overlays(system: &dyn System) -> Result<Vec<(PathBuf, String)>, LoadError> {
     let Ok(directory) = overlay::interface(system) else {
-        log::info!("there is no interface for overlays: whether one is applied is not known");
+        log::info!("without an interface for overlays, an applied one does not show");
         return Ok(Vec::new());
     };
     let entries = fs::read_dir(&directory);

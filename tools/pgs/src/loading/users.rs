@@ -109,7 +109,7 @@ fn users<'a>(proc: &Path, devices: &'a [Device]) -> Result<Vec<User<'a>>, LoadEr
         }
     }
     if hidden > 0 {
-        log::warn!("what {hidden} processes of others have open is not known");
+        log::warn!("{hidden} processes of other users hide their open files");
     }
     users.sort_unstable_by_key(|(place, id, _)| (*place, *id));
     Ok(users.into_iter().map(|(.., user)| user).collect())

@@ -137,7 +137,7 @@ pub(crate) enum BuildError {
     #[error("expected a build to begin with a profile ({}), found {found:?}", profiles())]
     Profile { found: String },
     /// A word of no option.
-    #[error("{found:?} is nothing that a board can be built with, known are {}", known())]
+    #[error("{found:?} is no option of a build; known are {}", known())]
     Word { found: String },
     /// An option is given twice.
     #[error("{key} is given twice")]

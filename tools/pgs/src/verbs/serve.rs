@@ -29,8 +29,8 @@ Examples:
   pgs serve --socket /tmp/board --memory file:/dev/shm/board --profile half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
 
-One driver at a time has the board. One that is killed leaves it as it is, engines running; the next
-one resets it. Ctrl-C ends it and removes the socket; the memory's file stays.";
+One driver at a time has the board. A killed driver leaves the engines running, and the next driver
+resets them. Ctrl-C ends the server and removes the socket; the memory's file stays.";
 
 /// Serve an emulated board to drivers in other processes: registers at a Unix socket, memory in a
 /// file.

@@ -54,18 +54,18 @@ The folder holds one .npy array a property, in C order; metres, kilograms, secon
   contact_npoints   (M) <u4        contact points of each collision, 1 to 4
   contact_normal    (M, 3) <f4     unit normal, which points from B to A
   contact_points    (M, 4, 4) <f4  x, y, z of a point on B's surface, and its signed distance d from A,
-                                   whose surface is at point + d * normal: negative is penetration.
-                                   Of the four only the first contact_npoints are read
+                                   whose surface is at point + d * normal; negative for penetration.
+                                   Only the first contact_npoints of the four are read
 
 A step needs at least one body. One without collisions has contact arrays of M = 0; an array without rows may
 also have shape (0,) and any type, as numpy.array([]) has. With position drift 0 and a position coefficient
-equal to the time step a distance is a velocity in m/s: the point is pushed apart at least as fast as a negative
-one says, and may approach as fast as a positive one says.
+equal to the time step, a distance is a velocity in m/s: a negative one is the least speed of separation, and
+a positive one the greatest speed of approach.
 
---no-integrate leaves the rest of a step to whoever calls: forces and gravity, damping, gyroscopic terms,
-motion. Poses come back as they were.
+--no-integrate leaves the rest of a step to the caller: forces and gravity, damping, gyroscopic terms,
+motion. Poses stay unchanged.
 
---out replaces earlier results together: where one cannot be written all stay as they were.";
+--out replaces earlier results together: if one cannot be written, all stay unchanged.";
 
 /// Take one step from a folder of arrays.
 #[derive(Debug, Clone, Args)]
@@ -171,7 +171,7 @@ pub(crate) fn run(
     if let Some(path) = &args.out {
         folder::write_results(path, &bodies).map_err(|error| {
             Failure::input(error).next(format!(
-                "make room, or give another folder with --out; {} is as it was before",
+                "make room, or give another folder with --out; {} is unchanged",
                 path.display()
             ))
         })?;
@@ -239,7 +239,7 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
         (VELOCITIES_FRICTION, own.friction_iterations, friction)
     } else {
         let error = format!(
-            "nothing to compare with: there are no expected results after {contact} contact and \
+            "there are no expected results after {contact} contact and \
              {friction} friction iterations {} integration",
             if parameters.integrate { "and the" } else { "without" },
         );

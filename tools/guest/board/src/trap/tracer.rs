@@ -86,7 +86,7 @@ pub enum TraceError {
         address: u64,
     },
     /// A mapping of registers that cannot be forwarded.
-    #[error("{what} of the register mapping at {address:#x} is not passed on by this tracer")]
+    #[error("{what} of the register mapping at {address:#x} is not supported by this tracer")]
     NotPassedOn {
         /// The mapping.
         what: &'static str,

@@ -185,7 +185,7 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
     phases.dedup();
     let impossible = vec![
         Impossible {
-            what: "S2MM outside the results: it moves nothing then",
+            what: "S2MM outside the results: it moves nothing there",
             cells: kinds * phases.len() * receivers,
         },
         Impossible {

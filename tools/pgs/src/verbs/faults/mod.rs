@@ -29,14 +29,15 @@ const EXAMPLES: &str = "\
 Examples:
   pgs faults                      every profile
   pgs faults --profile float
-  pgs faults --list               what each cell injects, without trying it
+  pgs faults --list               the fault of each cell, without trying it
   pgs faults --json > faults.json
   pgs run --grid 3x3x3 --steps 2 --fault 'stall@dma1.mm2s,phase=contact2,beat=5'
 
-A cell is one fault at one place. It passes if the fault happened; a fatal one was named rightly, with
-its channel, before the deadline of the step, and changed no body; a survivable one changed no bit of
-the result, and was felt: the step took longer, or more interrupts came; and the next step gives the bits of an undisturbed one, or, where the board is lost, every
-call says so.";
+A cell is one fault at one place. It passes if the fault happened, and
+
+  a fatal fault    was named correctly, with its channel, before the deadline, and changed no body
+  a survivable one changed no bit of the result, and had an effect: a longer step or more interrupts
+  the next step    gives the bits of a step without faults; or every call reports that the board is lost";
 
 /// Try every fault at every place of a step.
 #[derive(Debug, Clone, Args)]

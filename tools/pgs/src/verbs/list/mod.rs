@@ -22,7 +22,7 @@ Examples:
   pgs list
   pgs list --json
 
-A UIO node is recognised by its regions, whatever its name; the line says how to use it.";
+A UIO node is recognised by its regions, independently of its name; its line shows the option that uses it.";
 
 /// List the boards: UIO nodes, DMA buffers, inaccessible devices with the reason, and the emulated
 /// board.

@@ -21,7 +21,7 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 fn platforms() -> Table {
     let mut table = Table::new(
         "platforms",
-        "What the thesis records of GPU, CPU and board (T6.5, T6.9)",
+        "The thesis' records of GPU, CPU and board (T6.5, T6.9)",
         &[
             ("platform", "platform"),
             ("ms", "ms"),

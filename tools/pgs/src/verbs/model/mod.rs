@@ -37,8 +37,8 @@ Examples:
   pgs model --section step,ports --bandwidth 8.5 --json
   pgs model --markdown > tables.md
 
-Every row says what it is: exact (counted), modelled (by formula: a step that stalls on hazards
-takes longer), recorded (a figure of the thesis) or open (nobody knows). Nothing here was measured.";
+The kind of every row is exact (counted), modelled (by formula: a step that stalls on hazards takes
+longer), recorded (a figure of the thesis) or open (unknown). No figure was measured.";
 
 /// Version of this verb's JSON layout: 2 since it holds several profiles and the tables.
 const SCHEMA: u32 = 2;

@@ -19,7 +19,7 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 fn arrays(scene: &Scene) -> Table {
     let mut table = Table::new(
         "ports",
-        "On-chip accesses of one issue: what the ports allow",
+        "On-chip accesses of one issue, and the limit of the ports",
         &[
             ("profile", "profile"),
             ("array", "array"),
@@ -108,7 +108,7 @@ fn access(ports: &PortUse, access: &Access) -> String {
 fn schedule(scene: &Scene) -> Table {
     let mut table = Table::new(
         "schedule",
-        "Who has which port in which cycle of the interval",
+        "Schedule of the ports, by cycle of the interval",
         &[
             ("profile", "profile"),
             ("array", "array"),
@@ -145,9 +145,9 @@ fn schedule(scene: &Scene) -> Table {
         }
     }
     table.note(
-        "Clock counts the block RAM's clocks within a cycle. Writes are those of an issue that \
+        "Clock counts the block RAM's clocks within a cycle. Writes belong to an issue that \
          entered the pipeline earlier. Take: the last use of a body in the pass before, written into \
-         the memory of the unit that has the next one; two of them at once are the most.",
+         the memory of the next unit; at most two happen at once.",
     );
     table
 }
@@ -189,8 +189,8 @@ fn alternatives(scene: &Scene) -> Table {
     table.note(PUMP);
     table.note(
         "Considered instead: banks by body colour, one read and one write a cycle each, without copy \
-         or pump. The two bodies of a collision must then never share a bank, which the order of the \
-         collisions has to see to.",
+         or pump. The order of the collisions must then keep the two bodies of a collision in \
+         different banks.",
     );
     table
 }

@@ -58,8 +58,9 @@ fn cycles(scene: &Scene) -> Table {
     ));
     if scene.variants.iter().any(|variant| has_window(&variant.profile.flow)) {
         table.note(
-            "Where the collisions stream once all passes run side by side: one pass is all of them, fill \
-             is by how much the last is behind the first. Load and integration run beside them.",
+            "Where the collisions stream once, all passes run in parallel: \"one pass\" has the cycles of all \
+             passes, and \"fill\" is the lag of the last pass behind the first. Load and integration run in \
+             parallel, too.",
         );
     }
     table.note(

@@ -32,8 +32,8 @@ Depth is the hazard window in issue slots: the cycles from the read of a velocit
 initiation interval. A collision is hazardous if it shares a moving body with one of the depth - 1 slots before
 it. A body is alive from its first collision to its last; spans are counted in issue slots, empty ones included.
 
-The folder is that of `pgs solve`; if it also holds gpu_order.npy (M) <u4, the order in which Bullet's GPU takes the
-collisions, it is measured too.";
+The folder is one for `pgs solve`. If it also holds gpu_order.npy (M) <u4, the order of Bullet's GPU, this order is
+measured, too.";
 
 /// Show the cost of each order of the collisions: hazards, empty slots, live bodies, host time.
 #[derive(Debug, Clone, Args)]
@@ -119,7 +119,7 @@ pub(crate) fn run(
 
 /// The input of a folder is checked by the driver.
 fn refused(error: OrderError) -> Failure {
-    Failure::input(error).next("`pgs solve` says more about input that cannot be taken")
+    Failure::input(error).next("`pgs solve` tells more about refused input")
 }
 
 fn print(source: &Source, measured: &Measured, out: &mut dyn Write) -> std::io::Result<()> {

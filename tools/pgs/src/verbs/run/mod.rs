@@ -38,22 +38,22 @@ Examples:
   pgs run --contact-iterations 4 --friction-iterations 4 --drop 5     the thesis' passes
   pgs run --grid 10x10x10 --steps 600 --report-every 30
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
-  pgs run --hazards unchecked --order as-given   the same as the thesis orders: piles gain energy
+  pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes --inertia world --grid 8x8x8
   pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
-  pgs run --retries 2 --report fault.json        try a failed step again; keep all about the fault
+  pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
-The grid, the cubes and the solver's constants are the thesis'. The drop is a choice: the thesis names
-no height. So are 10 + 10 iterations: with the thesis' 4 + 4 a pile of 30 layers sinks 0.2 m into
-itself and bounces.
+The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
+thesis names no height. So are 10 + 10 iterations: with the thesis' 4 + 4 a pile of 30 layers sinks
+0.2 m into itself and bounces.
 
-Columns: step; pairs of bodies in contact; deepest penetration of the contacts that the step is given;
+Columns: step; pairs of bodies in contact; deepest penetration in the contacts given to the step;
 kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the step
-on the board, which is modelled where the board is emulated; time of this machine.";
+on the board, modelled for an emulated board; time of this machine.";
 
 /// Default rows of the table.
 const ROWS: u32 = 15;
