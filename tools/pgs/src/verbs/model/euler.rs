@@ -31,7 +31,7 @@ pub(super) fn tables() -> Vec<Table> {
             Kind::Exact.cell(),
         ]);
     }
-    table.note("a dt² n (n - 1) / 2 is 499.500 m for dt = 1/100 s; the thesis prints the beginning of what single \
-         precision makes of it.");
+    table.note("a dt² n (n - 1) / 2 is 499.500 m for dt = 1/100 s; the thesis prints the first digits of the \
+         single-precision result.");
     vec![table]
 }

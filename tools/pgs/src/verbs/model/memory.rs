@@ -155,8 +155,8 @@ fn blocks(scene: &Scene) -> Table {
         ]);
     }
     table.note(
-        "Arrays only: FIFOs of streams and cores come on top. The thesis' shares are what its \
-         synthesis reported.",
+        "Arrays only: FIFOs of streams and cores come on top. The thesis' shares are from its \
+         synthesis report.",
     );
     table
 }
