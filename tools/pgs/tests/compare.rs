@@ -4,26 +4,18 @@
 
 mod common;
 
-use common::{Ran, copy, golden, patch, run, skipped, variable};
+use common::{Ran, copy, golden, near, number, patch, run, skipped, variable};
 use serde_json::Value;
 
 fn json(ran: &Ran) -> Value {
     assert!(ran.stderr.is_empty(), "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("one JSON document and nothing else")
+    ran.json()
 }
 
 fn compare(arguments: &[&str]) -> Value {
     let ran = run([&["compare", "--json"], arguments].concat());
     assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.stderr);
     json(&ran)
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
-}
-
-fn near(found: &Value, wanted: f64, tolerance: f64) {
-    assert!((number(found) - wanted).abs() <= tolerance, "{found} for {wanted}");
 }
 
 /// Asserts that every number of a difference is 0 and every share 1.

@@ -50,7 +50,7 @@ fn solve(folder: &Path, options: &[&str]) -> Value {
     let folder = folder.to_str().expect("a path in UTF-8");
     let ran = run([&["solve", folder, "--json"], options].concat());
     assert_eq!(ran.code, Some(0), "{folder} {options:?}: {}{}", ran.stdout, ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("a JSON document")
+    ran.json()
 }
 
 /// Compares one stage of every folder; every array must agree in all bits.

@@ -57,7 +57,7 @@ impl System {
     }
 
     fn document(&self) -> Value {
-        serde_json::from_str(&self.list(&["--json"]).stdout).expect("one JSON document")
+        self.list(&["--json"]).json()
     }
 }
 

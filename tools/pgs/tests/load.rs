@@ -56,7 +56,7 @@ fn a_loaded_bitstream_is_reported_as_text_and_as_json() {
 
     let ran = load(root.path(), &bitstream(root.path()), &["--json", "--partial"]);
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let document: Value = serde_json::from_str(&ran.stdout).expect("one JSON document");
+    let document = ran.json();
     assert_eq!(document["schema"], 1);
     assert_eq!(document["verb"], "load");
     assert_eq!(document["bitstream"]["firmware"], "zynq-pgs.bit.bin");

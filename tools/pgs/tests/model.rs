@@ -4,7 +4,7 @@ mod common;
 
 use std::collections::BTreeSet;
 
-use common::{Ran, run};
+use common::{Ran, near, run};
 use serde_json::{Value, json};
 
 fn model(arguments: &[&str]) -> Ran {
@@ -14,7 +14,7 @@ fn model(arguments: &[&str]) -> Ran {
 fn document(arguments: &[&str]) -> Value {
     let ran = model(&[arguments, &["--json"]].concat());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("one JSON document and nothing else")
+    ran.json()
 }
 
 fn table<'a>(document: &'a Value, id: &str) -> &'a Value {
@@ -33,11 +33,6 @@ fn row<'a>(document: &'a Value, id: &str, with: &[(&str, &str)]) -> &'a Value {
 
 fn keys(value: &Value) -> BTreeSet<&str> {
     value.as_object().expect("an object").keys().map(String::as_str).collect()
-}
-
-fn near(value: &Value, expected: f64, tolerance: f64) {
-    let found = value.as_f64().unwrap_or_else(|| panic!("{value} is no number"));
-    assert!((found - expected).abs() <= tolerance, "{found}, expected {expected}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use common::{Ran, golden, pgs, run};
+use common::{Ran, golden, pgs, run, text};
 
 /// Names and contents of a folder, by name.
 fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
@@ -29,10 +29,6 @@ fn on_a_full_disk(arguments: &[&str]) -> Ran {
     let mut shell = Command::new("sh");
     shell.env("PGS_BOARD", "emulated").env("RUST_LOG", "error");
     shell.arg("-c").arg(script).arg("sh").args(arguments).output().expect("a shell").into()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a path in UTF-8")
 }
 
 #[test]

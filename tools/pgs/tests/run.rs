@@ -15,7 +15,7 @@ fn ran(options: &str) -> Ran {
 }
 
 fn document(options: &str) -> Value {
-    serde_json::from_str(&ran(&format!("{options} --json")).stdout).expect("one document")
+    ran(&format!("{options} --json")).json()
 }
 
 /// The fact behind a label, its lines joined.

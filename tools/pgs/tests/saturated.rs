@@ -8,7 +8,7 @@ use serde_json::Value;
 fn json(arguments: &[&str]) -> Value {
     let ran = run(arguments.iter().chain(&["--json"]));
     assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("one JSON document")
+    ran.json()
 }
 
 /// A cube so heavy that stopping it takes more than 2^44 N s.

@@ -27,6 +27,8 @@
 mod build;
 mod detect;
 mod error;
+#[cfg(test)]
+mod fixtures;
 mod geometry;
 mod grid;
 mod measure;
@@ -45,6 +47,7 @@ pub use measure::{
     kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,
     potential_energy,
 };
+pub use random::SplitMix64;
 pub use shapes::ShapesOptions;
 pub use spheres::{RADII, SPHERES_MAX, Spheres};
 

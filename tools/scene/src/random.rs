@@ -1,11 +1,15 @@
 //! Generates random numbers, the same for a seed on every machine.
 
-/// Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
+/// A generator of random numbers.
+///
+/// Source: Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
 #[derive(Debug)]
-pub(crate) struct SplitMix64(u64);
+pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    pub(crate) const fn new(seed: u64) -> Self {
+    /// Starts the sequence of a seed.
+    #[must_use]
+    pub const fn new(seed: u64) -> Self {
         Self(seed)
     }
 
@@ -14,6 +18,12 @@ impl SplitMix64 {
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         z ^ (z >> 31)
+    }
+
+    /// A number below `end`; 0 if `end` is 0.
+    pub fn below(&mut self, end: usize) -> usize {
+        // The upper half of the product is below `end`.
+        usize::try_from((u128::from(self.next()) * end as u128) >> 64).unwrap_or(0)
     }
 
     /// From 0 to 7.

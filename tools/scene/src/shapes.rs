@@ -105,6 +105,7 @@ fn orientation(random: &mut SplitMix64) -> [f32; 4] {
 mod tests {
     use super::*;
     use crate::MARGIN;
+    use crate::fixtures::{bits, digest};
 
     fn scene(grid: &str, drop: f32, seed: u64) -> Scene {
         let grid = grid.parse().expect("a grid");
@@ -248,24 +249,9 @@ mod tests {
         let mut scene = pressed(5);
         // The second time with used buffers.
         scene.detect();
-        let mut digest = 0xCBF2_9CE4_8422_2325_u64;
-        let mut take = |words: &[u32]| {
-            for word in words {
-                digest = (digest ^ u64::from(*word)).wrapping_mul(0x0100_0000_01B3);
-            }
-        };
-        for shape in scene.shapes() {
-            take(&shape.inverse_inertia.map(f32::to_bits));
-        }
-        for c in scene.detect() {
-            take(&[c.body_a, c.body_b, c.count]);
-            take(&c.normal.map(f32::to_bits));
-            for contact in c.contacts {
-                take(&contact.point.map(f32::to_bits));
-                take(&[contact.distance.to_bits()]);
-            }
-        }
-        // FNV-1a, 64 bits, over the words.
-        assert_eq!(format!("{digest:016x}"), "28968f8797c25c60");
+        let inertias = scene.shapes().iter().flat_map(|shape| shape.inverse_inertia);
+        let words: Vec<u32> = inertias.map(f32::to_bits).collect();
+        let found = digest(words.into_iter().chain(bits(scene.detect())));
+        assert_eq!(found, "28968f8797c25c60");
     }
 }

@@ -2,45 +2,24 @@
 //! with one thread, and with several that share the work.
 #![allow(unsafe_code, reason = "an allocator that counts is an unsafe trait")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[path = "../../../tests/common/counting_allocator.rs"]
+mod counting_allocator;
+
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use counting_allocator::CountingAllocator;
 use scene::{Scene, SceneOptions};
 
 /// Counts the calls of all threads. Only detection's threads run in this program: it is a test
 /// without a harness, whose threads would count, too.
 static COUNTED: AtomicU64 = AtomicU64::new(0);
 
-/// Counts the calls to the system's allocator.
-struct Counting;
-
 fn count() {
     COUNTED.fetch_add(1, Ordering::Relaxed);
 }
 
-// SAFETY: every call goes to the system's allocator with the arguments as they came; counting
-// itself does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises about `layout` are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
-        unsafe { System.realloc(pointer, layout, bytes) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: CountingAllocator = CountingAllocator(count);
 
 /// Steps of one direction, and of all directions.
 const WAY: usize = 6;

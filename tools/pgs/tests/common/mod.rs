@@ -7,6 +7,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
 
+use serde_json::Value;
 use tempfile::TempDir;
 
 /// Where the data of the golden arrays begins: `.npy` pads its header to 128 bytes here.
@@ -74,6 +75,29 @@ impl From<Output> for Ran {
 /// Runs `pgs` with these arguments.
 pub(crate) fn run<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Ran {
     pgs().args(arguments).output().expect("the command starts").into()
+}
+
+impl Ran {
+    /// Parses stdout.
+    pub(crate) fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).expect("one JSON document and nothing else")
+    }
+}
+
+/// A number in a document.
+pub(crate) fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// Asserts that a number in a document differs from `expected` by at most `tolerance`.
+pub(crate) fn near(value: &Value, expected: f64, tolerance: f64) {
+    let found = number(value);
+    assert!((found - expected).abs() <= tolerance, "{found}, expected {expected}");
+}
+
+/// A path as an argument.
+pub(crate) fn text(path: &Path) -> &str {
+    path.to_str().expect("a path in UTF-8")
 }
 
 /// A folder of golden arrays.

@@ -69,14 +69,10 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use zynq_pgs::{Pose, Velocity};
 
     use super::super::ground;
     use super::*;
-
-    fn body(position: [f32; 3], orientation: [f32; 4]) -> Body {
-        Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
-    }
+    use crate::fixtures::body;
 
     #[test]
     fn what_is_not_finite_takes_no_part() {

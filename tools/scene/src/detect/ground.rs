@@ -86,17 +86,12 @@ fn offer_face(body: &Body, half_extents: [f32; 3], points: &mut Points) {
 #[cfg(test)]
 #[allow(clippy::float_cmp, reason = "the normal is a constant")]
 mod tests {
-    use zynq_pgs::{Pose, Velocity};
-
     use super::*;
+    use crate::fixtures::body as cube;
 
     /// The collision of a cube.
     fn collide(index: u32, body: &Body) -> Option<Collision> {
         super::collide(index, body, Geometry::CUBE)
-    }
-
-    fn cube(position: [f32; 3], orientation: [f32; 4]) -> Body {
-        Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
     }
 
     #[test]

@@ -207,9 +207,8 @@ fn shares(things: usize, crew: &Crew, least: usize) -> (usize, usize) {
 
 #[cfg(test)]
 mod tests {
-    use zynq_pgs::{Pose, Velocity};
-
     use super::*;
+    use crate::fixtures::{LEVEL, bits, body, digest};
 
     const CUBES: Geometries<'static> = Geometries(&[None, Some(Geometry::CUBE)]);
 
@@ -220,12 +219,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             f32::from(u16::try_from(state >> 16).expect("16 bits")) / 65_536.0
         };
-        let body = |position, orientation| Body {
-            pose: Pose { position, orientation },
-            velocity: Velocity::default(),
-            shape: 1,
-        };
-        let mut bodies = vec![body([0.0, -400.0, 0.0], [0.0, 0.0, 0.0, 1.0])];
+        let mut bodies = vec![body([0.0, -400.0, 0.0], LEVEL)];
         for _ in 0..cubes {
             let position = [random() * 60.0, random() * 20.0, random() * 60.0];
             let q = [random() - 0.5, random() - 0.5, random() - 0.5, random() + 0.1];
@@ -233,19 +227,6 @@ mod tests {
             bodies.push(body(position, q.map(|value| value / length)));
         }
         bodies
-    }
-
-    pub(super) fn bits(collisions: &[Collision]) -> Vec<u32> {
-        let mut bits = Vec::new();
-        for c in collisions {
-            bits.extend([c.body_a, c.body_b, c.count]);
-            bits.extend(c.normal.map(f32::to_bits));
-            for contact in c.contacts {
-                bits.extend(contact.point.map(f32::to_bits));
-                bits.push(contact.distance.to_bits());
-            }
-        }
-        bits
     }
 
     #[test]
@@ -300,11 +281,7 @@ mod tests {
             let y = if couple % 2 == 0 { 1.0 } else { 1.1 };
             let way = if couple % 4 < 2 { 2.1 } else { 2.6 };
             for x in [x, x + way] {
-                bodies.push(Body {
-                    pose: Pose { position: [x, y, z], orientation: [0.0, 0.0, 0.0, 1.0] },
-                    velocity: Velocity::default(),
-                    shape: 1,
-                });
+                bodies.push(body([x, y, z], LEVEL));
             }
         }
         bodies
@@ -353,12 +330,7 @@ mod tests {
     fn the_bits_are_the_same_in_every_build_and_on_every_architecture() {
         let mut collisions = Vec::new();
         Detector::default().detect(&heap(4000), CUBES, &mut collisions);
-        // FNV-1a, 64 bits, over the words.
-        let mut digest = 0xCBF2_9CE4_8422_2325_u64;
-        for word in bits(&collisions) {
-            digest = (digest ^ u64::from(word)).wrapping_mul(0x0100_0000_01B3);
-        }
-        assert_eq!(format!("{digest:016x}"), "7d5f4d8395f1ff8a");
+        assert_eq!(digest(bits(&collisions)), "7d5f4d8395f1ff8a");
     }
 
     #[test]

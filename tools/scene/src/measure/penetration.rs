@@ -87,17 +87,14 @@ pub fn carry_along(collisions: &[Collision], before: &[Body], after: &[Body]) ->
 
 #[cfg(test)]
 mod tests {
-    use zynq_pgs::{Contact, Pose, Velocity};
+    use zynq_pgs::Contact;
 
     use super::*;
+    use crate::fixtures::{LEVEL, body};
 
     fn collision(distances: [f32; 4], count: u32) -> Collision {
         let contacts = distances.map(|distance| Contact { point: [0.0, 1.0, 2.0], distance });
         Collision { body_a: 0, body_b: 1, normal: [0.0, -1.0, 0.0], count, contacts }
-    }
-
-    fn body(position: [f32; 3], orientation: [f32; 4]) -> Body {
-        Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 0 }
     }
 
     #[test]
@@ -115,7 +112,6 @@ mod tests {
 
     #[test]
     fn contacts_go_along_with_their_bodies() {
-        const LEVEL: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
         // B lies on A, half a metre deep; then it is lifted by a quarter of a metre.
         let before = [body([0.0; 3], LEVEL), body([0.0, 2.0, 0.0], LEVEL)];
         let mut after = before;

@@ -1,5 +1,6 @@
 //! Measures every order of the collisions at every depth.
 
+use scene::SplitMix64;
 use zynq_pgs::order::{
     Checker, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer, Schedule, Ties,
     colour_count,
@@ -105,21 +106,12 @@ fn kinds(source: &Source) -> Result<Vec<(String, Kind)>, OrderError> {
     Ok(kinds)
 }
 
-/// Fisher and Yates' shuffle with numbers of `SplitMix64`.
+/// Fisher and Yates' shuffle.
 fn shuffled(count: usize) -> Vec<u32> {
-    let mut state = SEED;
-    let mut random = |below: usize| {
-        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        let z = u128::from(z ^ (z >> 31));
-        // The upper half of the product is below the bound.
-        usize::try_from((z * below as u128) >> 64).unwrap_or(0)
-    };
+    let mut random = SplitMix64::new(SEED);
     let mut order: Vec<u32> = (0..).take(count).collect();
     for k in (1..count).rev() {
-        order.swap(k, random(k + 1));
+        order.swap(k, random.below(k + 1));
     }
     order
 }

@@ -2,20 +2,14 @@
 
 #![allow(clippy::float_cmp, reason = "of boxes along the axes the normal is exact")]
 
-use zynq_pgs::{Contact, Pose, Velocity};
+use zynq_pgs::Contact;
 
 use super::super::MARGIN;
 use super::super::lanes::Portable;
-use super::super::tests::bits;
 use super::*;
 use crate::Geometry;
+use crate::fixtures::{LEVEL, bits, body as cube};
 use crate::random::SplitMix64;
-
-const LEVEL: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
-
-fn cube(position: [f32; 3], orientation: [f32; 4]) -> Body {
-    Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
-}
 
 /// The collisions of pairs; asserts that the portable lanes find the same bits.
 fn all(
