@@ -10,8 +10,9 @@
 //! host computes, since a board has another host. So an option gives the time of packing there
 //! (`--pack-ms`, by default 7 ms for the thesis' step), and the scene lets this time pass on the
 //! board's clock while the driver reads it. Storing the results takes as long per byte, or
-//! `--unpack-ms`. The step is always the same, of a standing scene or of a folder. The steps run one
-//! after the other (serial), and each packed while the one before it is on the board (overlapped).
+//! `--unpack-ms`. The step is always the same, of a standing scene or of a folder. The steps run
+//! one after the other (serial), and each packed while the one before it is on the board
+//! (overlapped).
 //!
 //! The output also has the host times of this machine, medians of steps without any time added: the
 //! cost of a step besides packing, ordering and waiting.

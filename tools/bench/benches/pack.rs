@@ -10,16 +10,18 @@
 //!
 //! The step is one of the thesis' cubes, standing on the ground, or the one in a folder of arrays
 //! (`--input`; or else `full_step186` of the folder that the environment variable `PGS_VECTORS`
-//! names). One thread does everything, unless `--threads` asks for more. Each item is measured alone:
-//! it and a `memcpy` from warm memory to warm memory run in turn. The first runs of a stretch do not
-//! count, so that the caches hold as much of the item's buffers as they can. The output has the bytes
-//! written, medians, GB/s of these bytes, and the throughput relative to that of `memcpy`.
+//! names). One thread does everything, unless `--threads` asks for more. Each item is measured
+//! alone: it and a `memcpy` from warm memory to warm memory run in turn. The first runs of a
+//! stretch do not count, so that the caches hold as much of the item's buffers as they can. The
+//! output has the bytes written, medians, GB/s of these bytes, and the throughput relative to that
+//! of `memcpy`.
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
-//! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the one that
-//!   is the default on a bitstream that does not wait, or `--order`, in the window of `float`
-//! - `bare, ...`: the same collisions read and as many bytes written to as many channels, in the same loops,
-//!   and nothing made of them: about the least that packing can take
+//! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the
+//!   one that is the default on a bitstream that does not wait, or `--order`, in the window of
+//!   `float`
+//! - `bare, ...`: the same collisions read and as many bytes written to as many channels, in the
+//!   same loops, and nothing made of them: about the least that packing can take
 //! - `step, ...`: bodies, then collisions
 //! - `checked, ...`: the same with the validation of everything on the way, as a step does it
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
@@ -28,8 +30,8 @@
 //! With `--threads` packing and unpacking are also compared with one thread, in the same turns.
 //! `memcpy` and the other items use one thread only; the other items are left out.
 //!
-//! `--cpu-time` measures the time of the running thread instead of the wall time, which is far longer
-//! on a busy machine.
+//! `--cpu-time` measures the time of the running thread instead of the wall time, which is far
+//! longer on a busy machine.
 
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]

@@ -71,7 +71,7 @@ impl<'a> Input<'a> {
         self.below(rate) == rate - 1
     }
 
-    /// One of the choices, of which there is at least one.
+    /// One of the choices; there must be at least one.
     pub fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.index(choices.len())]
     }

@@ -1,7 +1,8 @@
 //! Command line tool of the zynq-pgs driver: steps scenes and folders of arrays on a board, real
 //! or emulated.
 //!
-//! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to both. The exit codes are those of [`failure`].
+//! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to
+//! both. The exit codes are those of [`failure`].
 
 #![forbid(unsafe_code)]
 

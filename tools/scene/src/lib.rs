@@ -1,4 +1,4 @@
-//! The box-on-plane scene of the thesis, a scene of shapes shapes and a pile of spheres, with
+//! The box-on-plane scene of the thesis, a scene of several shapes and a pile of spheres, with
 //! collision detection.
 //!
 //! A grid of cubes above a plane, as Bullet's demo `box on plane` builds it. A [`Scene`] holds the
@@ -16,13 +16,13 @@
 //! # Ok::<(), scene::SceneError>(())
 //! ```
 //!
-//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes and capsules of shapes masses instead.
-//! [`Spheres`] is a pile that is no grid, for what depends on the order of collisions.
+//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes and capsules of several masses instead.
+//! [`Spheres`] is an irregular pile, for tests of the order of collisions.
 //!
 //! The bits of every result are the same on every architecture and with every number of threads:
 //! arithmetic is f32 in a written order, parry3d is built with `enhanced-determinism`, and neither
-//! threads nor what is kept from an earlier detection decide an order. Scenes are built, and collisions
-//! detected, in the standard floating-point environment, whatever the caller's is.
+//! threads nor state kept from an earlier detection decide an order. Building scenes and detecting
+//! collisions use the standard floating-point environment, whatever the caller's is.
 
 mod build;
 mod detect;

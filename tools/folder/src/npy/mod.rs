@@ -1,15 +1,15 @@
 //! Reads and writes `.npy` arrays of f32 and u32.
 //!
-//! Little-endian, C order. It writes format 1.0, as `numpy.save` does for such arrays; it also reads 2.0
-//! and 3.0, whose header length has four bytes.
+//! Little-endian, C order. It writes format 1.0, as `numpy.save` does for such arrays; it also
+//! reads 2.0 and 3.0, whose header length has four bytes.
 //!
 //! ```text
 //! 0        6     8        10              10 + header length
 //! \x93NUMPY 1 0  u16 LE   {'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }...\n  data
 //! ```
 //!
-//! A file is untrusted: the shape in its header is compared with the expected shape, with the limit of
-//! any board and with the file's length before memory is allocated for it.
+//! A file is untrusted: the shape in its header is compared with the expected shape, with the limit
+//! of any board and with the file's length before memory is allocated for it.
 //!
 //! The crate `npyz` would bring a parser generator and a type system for records; a step needs two
 //! element types only.
@@ -221,7 +221,7 @@ fn elements_of<T: Element>(mut source: impl Read, count: usize) -> Result<Vec<T>
 struct Array {
     /// The length of its first dimension.
     rows: usize,
-    /// The number of elements, all of which are in the file.
+    /// The number of elements; the file has all of them.
     elements: usize,
 }
 

@@ -11,8 +11,8 @@
 //! 0x44 RESULT    host    what was read
 //! ```
 //!
-//! Each end compares a number with the one that it expects, so that a half-written word counts as not
-//! written yet.
+//! Each end compares a number with the one that it expects, so that a half-written word counts as
+//! not written yet.
 
 use std::fmt;
 use std::time::{Duration, Instant};
