@@ -26,8 +26,8 @@ Examples:
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 
-Exit codes: 0 done; 1 a comparison or a check failed; 2 wrong usage or unreadable input; 3 no usable board, or
-no rights; 4 hardware fault or deadline; 130 interrupted.";
+Exit codes: 0 done; 1 a comparison or a check failed; 2 wrong usage or unreadable input; 3 no
+usable board, or no rights; 4 hardware fault or deadline; 130 interrupted.";
 
 /// Steps rigid bodies on the zynq-pgs accelerator, real or emulated.
 ///

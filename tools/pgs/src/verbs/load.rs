@@ -19,10 +19,11 @@ Examples:
   pgs load --json /lib/firmware/xilinx/zynq-pgs/zynq-pgs.bit.bin
   pgs load zynq-pgs.bit.bin --manager fpga1    if several FPGA managers may be the ZynqMP's
 
-Needs root and the vendor's kernel. A file outside the kernel's firmware folders is copied there during
-loading. The command refuses to load while a program has a UIO node of the logic or /dev/mem open.
-Without --replace-others it also refuses while another overlay is applied or a driver is bound to the
-logic. Remove the overlay by rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
+Needs root and the vendor's kernel. A file outside the kernel's firmware folders is copied there
+during loading. The command refuses to load while a program has a UIO node of the logic or /dev/mem
+open. Without --replace-others it also refuses while another overlay is applied or a driver is
+bound to the logic. Remove the overlay by rmdir /sys/kernel/config/device-tree/overlays/pgs; see
+device-tree/README.md.";
 
 /// Load a bitstream into the board through the kernel's FPGA manager.
 #[derive(Debug, Clone, Args)]

@@ -39,7 +39,8 @@ Examples:
   pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
   pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
 
-The folder holds one .npy array a property, in C order; metres, kilograms, seconds, radians, world frame:
+The folder holds one .npy array a property, in C order; metres, kilograms, seconds, radians, world
+frame:
 
   params            (8) <f4        time step, position drift, position coefficient, friction, angular
                                    damping, gravity x, y, z
@@ -57,13 +58,13 @@ The folder holds one .npy array a property, in C order; metres, kilograms, secon
                                    whose surface is at point + d * normal; negative for penetration.
                                    Only the first contact_npoints of the four are read
 
-A step needs at least one body. One without collisions has contact arrays of M = 0; an array without rows may
-also have shape (0,) and any type, as numpy.array([]) has. With position drift 0 and a position coefficient
-equal to the time step, a distance is a velocity in m/s: a negative one is the least speed of separation, and
-a positive one the greatest speed of approach.
+A step needs at least one body. One without collisions has contact arrays of M = 0; an array
+without rows may also have shape (0,) and any type, as numpy.array([]) has. With position drift 0
+and a position coefficient equal to the time step, a distance is a velocity in m/s: a negative one
+is the least speed of separation, and a positive one the greatest speed of approach.
 
---no-integrate leaves the rest of a step to the caller: forces and gravity, damping, gyroscopic terms,
-motion. Poses stay unchanged.
+--no-integrate leaves the rest of a step to the caller: forces and gravity, damping, gyroscopic
+terms, motion. Poses stay unchanged.
 
 --out replaces earlier results together: if one cannot be written, all stay unchanged.";
 

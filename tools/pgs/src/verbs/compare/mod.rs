@@ -33,24 +33,25 @@ Examples:
   pgs compare half,thesis16 half,binary16 --steps 300 --every 10 --json
   pgs compare float,world mixed,world --scene shapes --grid 8x8x8
 
-A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A change
-is a word: binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocked, unchecked,
-keep, flush, isotropic, world; or window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
-length-width=BITS and address-width=BITS. The order of a board's collisions is one of auto, as-given,
-hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest, colours.
-Without an order, a board that waits on hazards takes the collisions as given, so that two such
-boards solve them in the same order. Each board detects its own collisions.
+A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
+change is a word: binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocked,
+unchecked, keep, flush, isotropic, world; or window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
+length-width=BITS and address-width=BITS. The order of a board's collisions is one of auto,
+as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest,
+colours. Without an order, a board that waits on hazards takes the collisions as given, so that two
+such boards solve them in the same order. Each board detects its own collisions.
 
 Only moving bodies are compared; A is the original. Relative deviations are |B - A| / |A| of each
 component (thesis eq. 4.1) and leave out components where A is 0. A velocity is within 1 % if it
-differs from A's by at most 1 % of A's; with 0 only 0 agrees. Momenta are shown by their length, and
-B-A is the length of the difference; angular momentum is about the origin, potential energy from
-y = 0. Unmoved is the share of position components whose bits the step did not change from the ones
-sent to the board. Penetration is measured after the step: in a scene over all contacts detected then;
-in a folder, which has no geometry, over the step's own contacts, carried along with their bodies.
+differs from A's by at most 1 % of A's; with 0 only 0 agrees. Momenta are shown by their length,
+and B-A is the length of the difference; angular momentum is about the origin, potential energy
+from y = 0. Unmoved is the share of position components whose bits the step did not change from the
+ones sent to the board. Penetration is measured after the step: in a scene over all contacts
+detected then; in a folder, which has no geometry, over the step's own contacts, carried along with
+their bodies.
 
-If a step fails on one board, this board stops and the other goes on. Exit code 0 if every step was taken, 1
-if one failed.";
+If a step fails on one board, this board stops and the other goes on. Exit code 0 if every step was
+taken, 1 if one failed.";
 
 /// Default rows of the table.
 const ROWS: u32 = 10;

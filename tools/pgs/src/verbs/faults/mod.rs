@@ -37,7 +37,7 @@ A cell is one fault at one place. It passes if the fault happened, and
 
   a fatal fault    was named correctly, with its channel, before the deadline, and changed no body
   a survivable one changed no bit of the result, and had an effect: a longer step or more interrupts
-  the next step    gives the bits of a step without faults; or every call reports that the board is lost";
+  the next step    gives the bits of a step without faults, or every call reports a lost board";
 
 /// Try every fault at every place of a step.
 #[derive(Debug, Clone, Args)]

@@ -22,7 +22,8 @@ Examples:
   pgs list
   pgs list --json
 
-A UIO node is recognised by its regions, independently of its name; its line shows the option that uses it.";
+A UIO node is recognised by its regions, independently of its name; its line shows the option that
+uses it.";
 
 /// List the boards: UIO nodes, DMA buffers, inaccessible devices with the reason, and the emulated
 /// board.

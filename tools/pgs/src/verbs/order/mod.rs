@@ -28,12 +28,13 @@ Examples:
   pgs order --spheres 20000
   pgs order --grid 10x10x10 --drop 0.5 --steps 60 --json
 
-Depth is the hazard window in issue slots: the cycles from the read of a velocity to its write-back, by the
-initiation interval. A collision is hazardous if it shares a moving body with one of the depth - 1 slots before
-it. A body is alive from its first collision to its last; spans are counted in issue slots, empty ones included.
+Depth is the hazard window in issue slots: the cycles from the read of a velocity to its
+write-back, by the initiation interval. A collision is hazardous if it shares a moving body with
+one of the depth - 1 slots before it. A body is alive from its first collision to its last; spans
+are counted in issue slots, empty ones included.
 
-The folder is one for `pgs solve`. If it also holds gpu_order.npy (M) <u4, the order of Bullet's GPU, this order is
-measured, too.";
+The folder is one for `pgs solve`. If it also holds gpu_order.npy (M) <u4, the order of Bullet's
+GPU, this order is measured, too.";
 
 /// Show the cost of each order of the collisions: hazards, empty slots, live bodies, host time.
 #[derive(Debug, Clone, Args)]

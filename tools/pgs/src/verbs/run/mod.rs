@@ -52,8 +52,8 @@ thesis names no height. So are 10 + 10 iterations: with the thesis' 4 + 4 a pile
 0.2 m into itself and bounces.
 
 Columns: step; pairs of bodies in contact; deepest penetration in the contacts given to the step;
-kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the step
-on the board, modelled for an emulated board; time of this machine.";
+kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the
+step on the board, modelled for an emulated board; time of this machine.";
 
 /// Default rows of the table.
 const ROWS: u32 = 15;
