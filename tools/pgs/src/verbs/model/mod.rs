@@ -59,7 +59,7 @@ pub(crate) struct ModelArgs {
     /// Profile of the bitstream
     #[arg(long, value_name = "NAME", default_value = ALL, value_parser = names())]
     profile: String,
-    /// Also profiles with the world inertia of every body, streamed and kept on chip
+    /// Take the profiles with the world inertia of every body, streamed and kept on chip
     #[arg(long)]
     world_inertia: bool,
     /// Memory bandwidth of the table of times in GB/s, or "unlimited" [default: unlimited, 17.07,
