@@ -59,8 +59,8 @@ impl Geometry {
     ///
     /// # Errors
     ///
-    /// [`InputError::ShapeParameter`]: a size or the mass is not above 0, or is so large or small
-    /// that the inertia leaves the range of f32.
+    /// [`InputError::ShapeParameter`]: a size or the mass is not above 0, or so large or small that
+    /// the inertia leaves f32.
     pub fn shape(&self, mass: f32) -> Result<Shape, InputError> {
         match *self {
             Self::Box { half_extents } => Shape::cuboid(mass, half_extents),
