@@ -58,7 +58,6 @@ impl Geometry {
     /// The mass properties of a solid, homogeneous body of `mass` kg.
     ///
     /// # Errors
-    ///
     /// [`InputError::ShapeParameter`]: a size or the mass is not above 0, or so large or small that
     /// the inertia leaves f32.
     pub fn shape(&self, mass: f32) -> Result<Shape, InputError> {
