@@ -5,13 +5,16 @@
 #![cfg(feature = "emulation")]
 #![allow(unsafe_code, reason = "an allocator that counts is an unsafe trait")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[path = "common/counting_allocator.rs"]
+mod counting_allocator;
+
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, ThreadId};
 
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, EmulatedBoard, Hazards};
+use counting_allocator::CountingAllocator;
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Body, Collision, Collisions, Contact, OpenOptions, Pose, Shape,
@@ -27,9 +30,6 @@ thread_local! {
 /// Calls of all threads that have read a [`Watching`] container, from then on.
 static OF_WATCHED: AtomicU64 = AtomicU64::new(0);
 
-/// The system's allocator, counting the calls of each thread.
-struct Counting;
-
 fn count() {
     // A thread that is ending has no counter any more.
     let _ = COUNTED.try_with(|counted| counted.set(counted.get() + 1));
@@ -38,29 +38,8 @@ fn count() {
     }
 }
 
-// SAFETY: every call goes to the system's allocator with the arguments as they came; counting
-// itself does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises about `layout` are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
-        unsafe { System.realloc(pointer, layout, bytes) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: CountingAllocator = CountingAllocator(count);
 
 /// A row of cubes on the ground, each also in contact with the next.
 fn scene() -> (Vec<Body>, Vec<Collision>) {

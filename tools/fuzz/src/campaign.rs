@@ -1,7 +1,7 @@
-//! This file runs a target many times, on as many threads as wished, under a watchdog.
+//! Runs a target many times, on several threads, under a watchdog.
 //!
-//! An execution that does not end cannot be ended: the campaign stops, and its thread is left behind
-//! until the program ends.
+//! An execution that hangs cannot be stopped: the campaign ends, and its thread runs on until the
+//! program ends.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -15,20 +15,20 @@ use crate::random;
 use crate::tally::Tally;
 use crate::targets::Target;
 
-/// How often to run, and how.
+/// The number of executions, and their settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
     /// Executions.
     pub executions: u64,
-    /// Of the inputs.
+    /// Seed of the inputs.
     pub seed: u64,
     /// Threads, at least one; fewer where the system does not give them.
     pub threads: usize,
-    /// What an execution may take.
+    /// Time limit of an execution.
     pub limit: Duration,
 }
 
-/// What a target did.
+/// The result of a campaign.
 #[derive(Debug)]
 pub struct Summary {
     /// Its name.
@@ -39,9 +39,9 @@ pub struct Summary {
     pub time: Duration,
     /// Threads that ran them.
     pub threads: Threads,
-    /// What they did.
+    /// Counts over all executions.
     pub tally: Tally,
-    /// The first one that ended badly; none was begun after it.
+    /// The first execution that failed; none starts after it.
     pub finding: Option<Finding>,
 }
 
@@ -74,29 +74,29 @@ fn start(work: Box<dyn FnOnce() + Send>) -> io::Result<()> {
     thread::Builder::new().name("fuzz".to_owned()).spawn(work).map(drop)
 }
 
-/// Executions that a thread takes at once.
+/// Executions that a thread takes at a time.
 const BLOCK: u64 = 16;
-/// How often the watchdog looks.
-const LOOK: Duration = Duration::from_millis(200);
+/// Interval of the watchdog.
+const WATCH_INTERVAL: Duration = Duration::from_millis(200);
 /// No execution.
 const NOTHING: u64 = u64::MAX;
 
-/// What a thread is at.
+/// The state of a thread.
 #[derive(Debug)]
 struct At {
     /// The execution's number.
     number: AtomicU64,
-    /// When it began, ms since the campaign's start.
+    /// Its start, ms since the campaign's start.
     since: AtomicU64,
 }
 
-/// What the threads share.
+/// The threads' shared state.
 #[derive(Debug)]
 struct Shared {
     plan: Plan,
     target: &'static Target,
     start: Instant,
-    /// The next execution that nobody has.
+    /// The next execution that no thread has taken.
     next: AtomicU64,
     done: AtomicU64,
     stop: AtomicBool,
@@ -110,7 +110,7 @@ impl Shared {
         u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// What a thread does.
+    /// Takes and runs executions until none is left.
     fn work(&self, thread: usize) {
         let at = &self.at[thread];
         let mut input = Vec::new();
@@ -149,7 +149,7 @@ impl Shared {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    /// The execution that has taken too long, if there is one.
+    /// An execution beyond its time limit, if there is one.
     fn overdue(&self) -> Option<u64> {
         let now = self.milliseconds();
         let limit = u64::try_from(self.plan.limit.as_millis()).unwrap_or(u64::MAX);
@@ -161,7 +161,7 @@ impl Shared {
     }
 }
 
-/// Runs a target. `progress` hears from time to time how many executions have ended.
+/// Runs a target. `progress` gets the number of ended executions from time to time.
 pub fn run(target: &'static Target, plan: &Plan, progress: impl FnMut(u64)) -> Summary {
     run_on(start, target, plan, progress)
 }
@@ -190,7 +190,7 @@ fn run_on(
     let mut used = Threads { ran: 0, refused: None, watched: true };
     while used.ran < threads {
         let (shared, ended, thread) = (Arc::clone(&shared), ended.clone(), used.ran);
-        // Nobody listens any more once an execution has hung.
+        // After a hang nobody receives the result.
         let work = move || {
             shared.work(thread);
             drop(ended);
@@ -209,7 +209,7 @@ fn run_on(
         shared.work(0);
     }
     // The channel closes when the last thread ends.
-    while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+    while end.recv_timeout(WATCH_INTERVAL) == Err(RecvTimeoutError::Timeout) {
         progress(shared.done.load(Ordering::Relaxed));
         if let Some(number) = shared.overdue() {
             let mut input = Vec::new();

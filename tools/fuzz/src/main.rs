@@ -14,36 +14,36 @@ use fuzz::finding;
 use fuzz::targets::{self, Target};
 use serde_json::json;
 
-/// Runs fuzz targets on inputs that are made from a seed: the same ones on every machine and with
-/// every number of threads.
+/// Runs fuzz targets on inputs made from a seed: the same inputs on every machine and with every
+/// number of threads.
 ///
 /// A target that panics or hangs is a finding: its input is written into a file, and the exit code
 /// is 1.
 #[derive(Debug, Parser)]
 #[command(name = "fuzz", version)]
 struct Args {
-    /// The target, or `all`; `list` says which there are.
+    /// The target, or `all`; `list` shows the targets
     #[arg(default_value = "all")]
     target: String,
-    /// Executions; those of `all` are shared out, more to the targets that take less time.
+    /// Executions; `all` shares them out, more to the faster targets
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     executions: u64,
-    /// Of the inputs.
+    /// Seed of the inputs
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
-    /// Threads; as many as there are processors unless given.
+    /// Threads [default: one a processor]
     #[arg(long, value_name = "T")]
     threads: Option<usize>,
-    /// An execution that takes longer hangs, s.
+    /// Time after which an execution counts as hanging, s
     #[arg(long, value_name = "SECONDS", default_value_t = 20)]
     limit: u64,
-    /// Where inputs of findings are written.
+    /// Folder for the inputs of findings
     #[arg(long, value_name = "FOLDER", default_value = "target/fuzz-findings")]
     findings: PathBuf,
-    /// Runs the input of that file once, instead; a panic is not caught.
+    /// Run the input in this file once instead; a panic is not caught
     #[arg(long, value_name = "FILE")]
     replay: Option<PathBuf>,
-    /// Prints one JSON document instead of a table.
+    /// Print one JSON document instead of a table
     #[arg(long)]
     json: bool,
 }
@@ -147,7 +147,7 @@ fn run(args: &Args, chosen: &[&'static Target], out: &mut dyn Write) -> io::Resu
         );
         summaries.push(summary);
         if hung {
-            // Its thread still takes a processor's time.
+            // Its thread still uses processor time.
             break;
         }
     }
@@ -174,7 +174,7 @@ fn print_summary(summary: &Summary, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "{:<12} {}", "", counts.join(", "))
 }
 
-/// Writes the inputs of what was found, and the document or the last lines.
+/// Writes the inputs of findings, and the document or the last lines.
 fn finish(
     args: &Args,
     summaries: &[Summary],

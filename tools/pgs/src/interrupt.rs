@@ -1,5 +1,5 @@
-//! Lets Ctrl-C end a command: between two steps, or in the middle of one, which the driver then
-//! stops and undoes. A hang-up of the terminal and a request to terminate count as Ctrl-C.
+//! Ends a command at Ctrl-C: between two steps, or inside one, which the driver then stops and
+//! undoes. A hang-up of the terminal and a request to terminate count as Ctrl-C.
 //!
 //! A signal that the process was told to ignore stays ignored: SIGHUP under `nohup`, SIGINT in a
 //! script's background job.
@@ -15,10 +15,10 @@ use zynq_pgs::Cancellation;
 
 /// The signals that ask a command to end.
 const ASKING: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
-/// Where the kernel says which signals a process ignores.
+/// Where the kernel lists the signals that a process ignores.
 const STATUS: &str = "/proc/self/status";
 
-/// Has `act` done, in a thread of its own, when Ctrl-C is pressed or the system asks to end.
+/// Calls `act`, in a thread of its own, at Ctrl-C or when the system asks the process to end.
 pub(crate) fn take_over(act: impl FnMut() + Send + 'static) {
     // Without /proc nothing is known to be ignored, and the channels must not be left running.
     let ignored = fs::read_to_string(STATUS).ok().and_then(|status| ignored_of(&status));
@@ -62,7 +62,7 @@ fn handle(signals: Vec<i32>, mut act: impl FnMut() + Send + 'static) -> io::Resu
 pub(crate) struct Interrupt(Cancellation);
 
 impl Interrupt {
-    /// Takes Ctrl-C over from the system, which would leave the channels running.
+    /// Replaces the system's handling of Ctrl-C, which would leave the channels running.
     pub(crate) fn install() -> Self {
         let cancellation = Cancellation::new();
         let seen = cancellation.clone();
@@ -74,7 +74,7 @@ impl Interrupt {
         self.0.is_cancelled()
     }
 
-    /// What stops a step in the middle.
+    /// Cancels a running step.
     pub(crate) fn cancellation(&self) -> Cancellation {
         self.0.clone()
     }

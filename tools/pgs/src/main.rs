@@ -1,29 +1,28 @@
 //! Command line tool of the zynq-pgs driver: steps scenes and folders of arrays on a board, real
 //! or emulated.
 //!
-//! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to both. The exit codes are those of [`failure`].
+//! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to
+//! both. The exit codes are those of [`failure`].
 
 #![forbid(unsafe_code)]
 
-mod args;
 mod board;
-mod build;
-mod compare;
+mod bug_report;
+mod cli;
+mod common;
 mod deviation;
 mod diagnosis;
+mod difference;
 mod environment;
 mod failure;
 mod footprint;
 mod interrupt;
 mod loading;
-mod memory;
+mod narrow;
+mod numbers;
 mod options;
-mod ordering;
-mod origin;
-mod planned;
-mod scenes;
-mod sixteen;
-mod solver;
+mod output;
+mod step_input;
 mod verbs;
 
 use std::io::{self, Write};
@@ -32,9 +31,8 @@ use std::sync::Arc;
 
 use signal_hook::consts::SIGXFSZ;
 use signal_hook::flag;
-use step_folder::{folder, npy};
 
-/// Has the log written to stderr: warnings, or what the environment asks for.
+/// Sends the log to stderr: warnings, unless the environment sets another filter.
 fn log_to_stderr() {
     let text = |name: &str, default: &str| {
         let found = environment::variable(name).map(|text| text.to_string_lossy().into_owned());
@@ -58,12 +56,14 @@ fn survive_file_limit() {
 fn main() -> ExitCode {
     log_to_stderr();
     survive_file_limit();
-    let command = match args::parse(std::env::args_os(), |name| std::env::var_os(name)) {
+    let command = match cli::parse(std::env::args_os(), |name| std::env::var_os(name)) {
         Ok(command) => command,
         Err(message) => return failure::report_usage(&message),
     };
     let mut out = io::stdout().lock();
-    let done = verbs::run(&command, &mut out)
+    let done = command
+        .verb
+        .run(&command.common, &mut out)
         .and_then(|verdict| out.flush().map(|()| verdict).map_err(failure::Failure::from));
     match done {
         Ok(verdict) => verdict.code(),

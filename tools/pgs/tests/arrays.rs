@@ -1,4 +1,5 @@
-//! A folder of arrays as it is exported in practice: what is taken, and what is refused with its true cause.
+//! Folders of arrays as other programs export them: accepted forms, and refusals that name the true
+//! cause.
 
 mod common;
 
@@ -26,12 +27,12 @@ fn solve(folder: &Path, more: &[&str]) -> Ran {
     output.expect("it starts").into()
 }
 
-/// The command with a folder after these arguments.
+/// Runs the command with a folder behind the arguments.
 fn with_folder(arguments: &[&str], folder: &TempDir) -> Ran {
     pgs().args(arguments).arg(folder.path()).output().expect("it starts").into()
 }
 
-/// Code 2, one error, and all of this in it.
+/// Asserts code 2 and one error that holds all of `said`.
 fn assert_said(ran: &Ran, said: &[&str]) {
     assert_eq!(ran.code, Some(2), "{said:?}: {} {}", ran.stdout, ran.stderr);
     assert_eq!(ran.stderr.matches("error: ").count(), 1, "{}", ran.stderr);
@@ -40,7 +41,7 @@ fn assert_said(ran: &Ran, said: &[&str]) {
     }
 }
 
-/// Writes a file whose header names this type and this shape, with some data behind it.
+/// Writes a file whose header names this type and shape, with some data behind it.
 fn write_as(path: &Path, descr: &str, order: &str, shape: &str, data: &[u8]) {
     let header = format!("{{'descr': {descr}, 'fortran_order': {order}, 'shape': {shape}, }}\n");
     let mut file = File::create(path).expect("the array");
@@ -207,7 +208,7 @@ fn what_is_no_file_or_no_folder_is_called_what_it_is() {
     assert_said(&solve(&missing, &[]), &["missing", "a folder of .npy arrays, found nothing"]);
 }
 
-/// Sparse files of gigabytes, in an address space that does not take them.
+/// Sparse files of gigabytes are refused in an address space that is too small for them.
 #[test]
 fn no_memory_is_taken_for_what_a_file_claims() {
     let claim = |folder: &TempDir, file: &str, shape: &str, bytes: u64| {
@@ -234,7 +235,7 @@ fn no_memory_is_taken_for_what_a_file_claims() {
     claim(&folder, "contact_points.npy", "(1000000000, 4, 4)", 64_000_000_000);
     assert_said(&bounded(&folder, ""), &["contact_points.npy", "expected shape (2, 4, 4)"]);
 
-    // A pass of those that `iterations.npy` claims.
+    // A pass that `iterations.npy` claims.
     let stage = "--compare --no-integrate --contact-iterations 2 --friction-iterations 0";
     let folder = copy("two_cubes");
     patch(&folder, "iterations.npy", 0, 4_000_000_000_u32.to_le_bytes());

@@ -1,4 +1,4 @@
-//! Whatever a folder of arrays holds, `pgs solve` answers with one clear error and code 2.
+//! `pgs solve` answers any content of a folder of arrays with one clear error and code 2.
 
 mod common;
 
@@ -8,7 +8,7 @@ use common::{DATA, Ran, copy, patch, pgs, write};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
-/// What a comparison of the whole step reads, and the values in each array of `two_cubes`.
+/// The files of a comparison of the whole step, and the values in each array of `two_cubes`.
 const FILES: [(&str, usize); 16] = [
     ("params.npy", 8),
     ("iterations.npy", 2),
@@ -28,10 +28,10 @@ const FILES: [(&str, usize); 16] = [
     ("out_angvel.npy", 9),
 ];
 
-/// What comparisons of single stages read besides.
+/// Further files of comparisons of single stages.
 const STAGE_FILES: [(&str, usize); 2] = [("out_vel_contact.npy", 72), ("out_vel_friction.npy", 72)];
 
-/// A file, the index of a value in its array, and the bytes to put there.
+/// A file, the index of a value in its array, and the bytes to write there.
 type Patch<'a> = (&'a str, usize, [u8; 4]);
 
 fn solve(folder: &TempDir) -> Ran {
@@ -39,7 +39,7 @@ fn solve(folder: &TempDir) -> Ran {
     Ran::from(output.expect("it starts"))
 }
 
-/// The folder is refused with code 2, and the message holds all of `said`.
+/// Asserts that the folder is refused with code 2, and that the message holds all of `said`.
 fn assert_refused(folder: &TempDir, said: &[&str]) {
     let ran = solve(folder);
     assert_eq!(ran.code, Some(2), "{said:?}: {} {}", ran.stdout, ran.stderr);
@@ -203,21 +203,21 @@ fn more_collisions_than_the_memory_holds_are_refused() {
     assert_refused(&folder, &["contact_bodies.npy", "262142", "262141"]);
 }
 
-/// What a comparison can be made with.
+/// Options of the possible comparisons.
 const STAGES: [&[&str]; 3] = [
     &[],
     &["--contact-iterations", "2", "--friction-iterations", "0", "--no-integrate"],
     &["--contact-iterations", "4", "--friction-iterations", "3", "--no-integrate"],
 ];
 
-/// What happens to a file.
+/// A change of a file.
 #[derive(Debug, Clone, Copy)]
 enum Damage {
-    /// One byte anywhere, the header included.
+    /// Set one byte anywhere, the header included.
     Byte(u8),
-    /// The file ends early.
+    /// Truncate the file.
     Cut,
-    /// One value.
+    /// Set one value.
     Word(u32),
 }
 

@@ -1,4 +1,4 @@
-//! `pgs check` names the cause of every board that is built wrongly, and its exit code says so.
+//! `pgs check` names the cause of every defect of a board, and its exit code tells success.
 
 mod common;
 
@@ -9,7 +9,7 @@ fn check(arguments: &[&str]) -> Ran {
     run(["check"].iter().chain(arguments))
 }
 
-/// The names of the lines with that outcome.
+/// The names of the lines with this outcome.
 fn lines_that(document: &Value, outcome: &str) -> Vec<String> {
     let lines = document["lines"].as_array().expect("the lines");
     lines
@@ -25,7 +25,7 @@ fn a_good_board_ends_with_0_and_eleven_lines() {
     assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
     assert_eq!(ran.stdout.lines().filter(|line| line.starts_with("ok    ")).count(), 11);
     assert!(ran.stdout.ends_with("11 ok, 0 failed, 0 skipped\n"), "{}", ran.stdout);
-    let document: Value = serde_json::from_str(&check(&["--json"]).stdout).expect("JSON");
+    let document = check(&["--json"]).json();
     assert_eq!(document["schema"], 1);
     assert_eq!(document["verb"], "check");
     assert_eq!(document["board"]["kind"], "emulated");
@@ -56,7 +56,7 @@ fn every_quirk_ends_with_1_and_fails_its_own_line_alone() {
 
         let ran = check(&["--json", "--quirk", quirk]);
         assert_eq!(ran.code, Some(1), "{quirk}");
-        let document: Value = serde_json::from_str(&ran.stdout).expect("JSON");
+        let document = ran.json();
         assert_eq!(document["passed"], false, "{quirk}");
         assert_eq!(lines_that(&document, "failed"), [line], "{quirk}");
         let total = lines_that(&document, "ok").len() + lines_that(&document, "skipped").len() + 1;
@@ -100,7 +100,7 @@ fn the_emulated_board_does_not_stand_in_for_one_that_is_missing() {
         assert!(ran.stderr.contains("there is no UIO node named \"pgs\""), "{}", ran.stderr);
         assert!(ran.stderr.contains("--board emulated"), "{}", ran.stderr);
     }
-    // Asked for, by option or by variable.
+    // The option or the variable asks for the emulated board.
     let mut command = pgs();
     let ran = command.env_remove("PGS_BOARD").args(["check", "--board", "emulated"]).output();
     assert_eq!(ran.expect("runs").status.code(), Some(0));

@@ -10,10 +10,6 @@ use std::process::{Command, Stdio};
 use common::{Ran, golden, patch, pgs, run};
 use serde_json::Value;
 
-fn json(ran: &Ran) -> Value {
-    serde_json::from_str(&ran.stdout).expect("one JSON document and nothing else")
-}
-
 fn assert_keys(value: &Value, keys: &[&str]) {
     for key in keys {
         assert!(value.get(key).is_some(), "no key {key} in {value:#}");
@@ -155,7 +151,7 @@ fn falling_back_to_the_emulated_board_is_said() {
 fn run_reports_every_step_as_json() {
     let ran = run(["--json", "--grid", "2x2x2", "--steps", "3", "--drop", "0"]);
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let document = json(&ran);
+    let document = ran.json();
     assert_keys(&document, &["schema", "verb", "config", "board", "complete", "steps", "digest"]);
     assert_eq!(document["schema"], 1);
     assert_eq!(document["digest"]["algorithm"], "fnv1a-64");
@@ -192,7 +188,7 @@ fn reports_say_how_the_board_is_built() {
     let scene = ["--grid", "2x2x2", "--steps", "2", "--drop", "0"];
     let ran = run([&["--json"], &options[..], &more[..], &scene[..]].concat());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let board = &json(&ran)["board"];
+    let board = &ran.json()["board"];
     assert_eq!(board["profile"], "half");
     assert_eq!(board["design"], "half,f32,world");
     assert_eq!(board["emulation"]["build"], "half,f32,unchecked,window=64,world");
@@ -226,7 +222,7 @@ fn a_step_takes_as_long_as_the_deadline_says_and_no_longer() {
     assert_eq!(with(&["--deadline", "0"]).code, Some(2));
 }
 
-/// What a step that takes too long says: in lines, as a document, in a report.
+/// A step beyond its deadline is reported: in lines, as a document, in a report.
 #[test]
 fn a_step_that_fails_is_told_with_every_channel_for_people_programs_and_bug_reports() {
     let folder = tempfile::tempdir().expect("a directory");
@@ -256,20 +252,20 @@ fn a_step_that_fails_is_told_with_every_channel_for_people_programs_and_bug_repo
     std::fs::remove_file(&report).expect("it is there");
     let ran = run(["run", "--json"].iter().chain(&slow).chain(&late));
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
-    let error = &json(&ran)["error"];
+    let error = &ran.json()["error"];
     assert_eq!((&error["fault"], &error["aftermath"]), (&"deadline".into(), &"ready".into()));
     let channels = error["diagnosis"]["channels"].as_array().expect("channels");
     assert_eq!(channels.len(), 8);
     assert_eq!(channels[6]["channel"], "dma2 MM2S");
     assert_eq!(channels[6]["descriptors_complete"], 2);
 
-    // Nothing failed: nothing is written.
+    // Without a failure nothing is written.
     std::fs::remove_file(&report).expect("it is there");
     let ran = run(["run"].iter().chain(&slow).chain(&["--report", path]));
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     assert!(!report.exists() && !ran.stdout.contains("retries"), "{}", ran.stdout);
 
-    // Where the report cannot be written the fault is told all the same.
+    // A report that cannot be written does not hide the fault.
     let nowhere = ["--deadline", "1", "--report", "/nonexistent/fault.json"];
     let ran = run(["run"].iter().chain(&slow).chain(&nowhere));
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
@@ -279,7 +275,7 @@ fn a_step_that_fails_is_told_with_every_channel_for_people_programs_and_bug_repo
 #[test]
 fn the_pile_has_impulses_after_landing_and_none_before() {
     let ran = run(["--json", "--grid", "3x2x3", "--steps", "70", "--drop", "5"]);
-    let document = json(&ran);
+    let document = ran.json();
     let impulses = |step: usize| {
         document["steps"][step - 1]["impulse_sum_n_s"].as_f64().expect("the board counts them")
     };
@@ -301,7 +297,7 @@ fn solve_compares_with_every_stage_of_the_golden_step() {
             let arguments = ["solve", folder, "--compare", "--json", "--subnormals", subnormals];
             let ran = run(arguments.iter().chain(&case));
             assert_eq!(ran.code, Some(0), "{case:?}: {} {}", ran.stdout, ran.stderr);
-            let document = json(&ran);
+            let document = ran.json();
             assert_keys(
                 &document,
                 &["schema", "folder", "board", "step", "digest", "hazard_share"],
@@ -329,7 +325,7 @@ fn a_difference_ends_with_1_and_is_measured() {
     assert!(ran.stdout.contains("out_quat.npy: 0 of 12 values differ in bits"), "{}", ran.stdout);
     assert!(ran.stderr.is_empty(), "the answer is a result: {}", ran.stderr);
     let ran = run(["solve", path, "--compare", "--json"]);
-    assert_eq!((ran.code, &json(&ran)["equal"]), (Some(1), &Value::Bool(false)));
+    assert_eq!((ran.code, &ran.json()["equal"]), (Some(1), &Value::Bool(false)));
 }
 
 #[test]
@@ -350,7 +346,7 @@ fn written_results_are_the_golden_files() {
 fn list_names_the_board_that_would_be_opened() {
     let ran = run(["list", "--json"]);
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let document = json(&ran);
+    let document = ran.json();
     assert_keys(&document, &["schema", "board", "uio_nodes", "uio_error", "emulated"]);
     assert_keys(&document, &["u_dma_bufs", "logic_error", "unreadable_uio_nodes"]);
     assert_keys(&document, &["u_dma_buf_states", "fpga_managers"]);
@@ -395,7 +391,7 @@ fn ctrl_c_ends_after_the_step_with_130_and_a_digest() {
         .spawn()
         .expect("it starts");
     let mut lines = BufReader::new(child.stdout.take().expect("a pipe")).lines();
-    // The row of the first step comes after Ctrl-C was taken over.
+    // Ctrl-C is handled before the row of the first step appears.
     let row =
         lines.find(|line| line.as_ref().is_ok_and(|line| line.trim_start().starts_with("1 ")));
     assert!(row.is_some(), "a row of the first step");

@@ -1,14 +1,15 @@
-//! `pgs compare` and `pgs formats` keep their promises: zero differences of equals, measures that
-//! can be computed by hand, what a failing board leaves, and the figures of the full step.
+//! `pgs compare` and `pgs formats` keep their promises: zero differences between equal boards,
+//! measures that a reader can compute by hand, the rest after a board fails, and the figures of the
+//! full step.
 
 mod common;
 
-use common::{Ran, copy, golden, patch, run, skipped, variable};
+use common::{Ran, copy, golden, near, number, patch, run, skipped, variable};
 use serde_json::Value;
 
 fn json(ran: &Ran) -> Value {
     assert!(ran.stderr.is_empty(), "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("one JSON document and nothing else")
+    ran.json()
 }
 
 fn compare(arguments: &[&str]) -> Value {
@@ -17,15 +18,7 @@ fn compare(arguments: &[&str]) -> Value {
     json(&ran)
 }
 
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
-}
-
-fn near(found: &Value, wanted: f64, tolerance: f64) {
-    assert!((number(found) - wanted).abs() <= tolerance, "{found} for {wanted}");
-}
-
-/// Every number of a difference is 0, every share 1.
+/// Asserts that every number of a difference is 0 and every share 1.
 fn assert_no_difference(value: &Value, name: &str) {
     match value {
         Value::Object(fields) => {
@@ -72,10 +65,10 @@ fn free_fall_is_measured_as_it_is_computed() {
     near(&last["translational_energy_j"], 4.0 * speed * speed / 2.0, 1e-3);
     near(&last["rotational_energy_j"], 0.0, 0.0);
     near(&last["linear_momentum_n_s"][1], -4.0 * speed, 1e-4);
-    // About the origin: x and z of the centres are 1 and 3.2 m.
+    // About the origin: the x and z of the centres are 1 and 3.2 m.
     near(&last["angular_momentum_n_m_s"][0], 2.0 * (1.0 + 3.2) * speed, 1e-3);
     near(&last["angular_momentum_n_m_s"][2], -2.0 * (1.0 + 3.2) * speed, 1e-3);
-    // Only y moves.
+    // Only y changes.
     near(&last["unmoved_share"], 2.0 / 3.0, 1e-9);
     assert_eq!(last["penetration"]["contacts"], 0);
     assert_no_difference(&rows[rows.len() - 1]["difference"], "");
@@ -105,7 +98,7 @@ fn unchecked_hazards_show_in_energy_and_velocities() {
     assert!(number(&last["position"]["relative_largest_percent"]) > 1.0, "{last}");
 }
 
-/// What the thesis' hardware needs so that it computes what hardware computes that waits.
+/// The thesis' hardware, in an order without hazards, computes the same as hardware that waits.
 #[test]
 fn without_hazards_it_does_not_matter_who_waits() {
     let scene = ["--grid", "5x5x5", "--steps", "80", "--every", "80", "--verify"];
@@ -149,17 +142,18 @@ fn a_pile_of_shapes_takes_world_inertia_and_loses_its_energy() {
     assert!(number(&last["a"]["penetration"]["mean_m"]) < 0.05, "{last}");
 }
 
-/// How far a board's energy may be off float's in any row, of the start's. Seen: 0.004 % of it.
+/// Largest deviation of a board's energy from float's in any row, as a share of the start's.
+/// Measured: 0.004 %.
 const ENERGY: f64 = 0.000_5;
-/// How far any energy may lie above the start's, of it: explicit integration gives a fall of t
-/// seconds g² dt t / 2 J/kg, 0.8 % here.
+/// Largest gain of any energy over the start's, as a share of it: explicit integration adds g² dt t
+/// / 2 J/kg to a fall of t seconds, 0.8 % here.
 const GAIN: f64 = 0.01;
-/// How far the share of position components that stand still may be off float's.
+/// Largest deviation from float's in the share of unmoved position components.
 const UNMOVED: f64 = 0.01;
-/// Length of the difference of momenta, of float's length. Seen: 5 %.
+/// Length of the momentum's difference, as a share of float's length. Measured: 5 %.
 const MOMENTUM: f64 = 0.1;
 
-/// J, of a state: kinetic and potential.
+/// Energy of a state, J: kinetic and potential.
 fn energy(state: &Value) -> f64 {
     number(&state["kinetic_energy_j"]) + number(&state["potential_energy_j"])
 }
@@ -170,7 +164,7 @@ fn length(vector: &Value) -> f64 {
     squares.sum::<f64>().sqrt()
 }
 
-/// What a row shows of B that A does not have: the first of it in words.
+/// The first deviation of B from A that a row shows, in words.
 fn strays(row: &Value, start: f64) -> Option<String> {
     let (a, b) = (&row["a"], &row["b"]);
     let off = (energy(b) - energy(a)).abs();
@@ -206,7 +200,7 @@ fn over_many_steps_mixed_stays_with_float_and_half_freezes() {
     let fell = energy(&mixed[11]["a"]);
     assert!(fell < 0.6 * start, "a pile that lies has lost its fall: {fell} of {start} J");
 
-    // The same measures see what sixteen bits throughout do to the pile.
+    // The same measures detect the effect of sixteen bits throughout on the pile.
     let half = rows(&against_float("half"));
     let straying = half[1..].iter().filter(|row| strays(row, start).is_some()).count();
     assert!(straying >= 8, "{straying}");
@@ -251,7 +245,7 @@ fn what_one_format_cannot_carry_fails_on_its_board_only() {
     assert!(failed["error"].as_str().is_some_and(|e| e.contains("body 1")), "{failed}");
     assert!(document["a"]["failed"].is_null());
 
-    // What neither takes is wrong input.
+    // Input that neither board takes is wrong input.
     patch(&folder, "body_linvel.npy", 3, f32::NAN.to_le_bytes());
     let ran = run(["compare", "float", "half", "--input", path]);
     assert_eq!(ran.code, Some(2), "{}", ran.stdout);
@@ -309,7 +303,7 @@ fn formats_has_a_row_for_every_kind_of_number() {
     assert!(text.stdout.contains("as streamed by size"), "{}", text.stdout);
 }
 
-/// The figures of the specification's half precision, on the thesis' scene.
+/// The specification's figures of half precision, on the thesis' scene.
 #[test]
 fn the_full_step_shows_what_half_precision_costs() {
     let folder = variable("PGS_VECTORS").map(std::path::PathBuf::from);
@@ -325,11 +319,11 @@ fn the_full_step_shows_what_half_precision_costs() {
     // Measured outside this project with inputs rounded to binary16: 76 % and 0.018 %.
     near(&state["linear_velocity"]["within_1_percent_share"], 0.76, 0.01);
     near(&state["position"]["relative_mean_percent"], 0.02, 0.004);
-    // Positions in binary16 that stay where they are: 62 %.
+    // Positions in binary16 that stay: 62 %.
     near(&half["b"]["unmoved_share"], 0.62, 0.01);
     near(&half["a"]["unmoved_share"], 0.0004, 0.0002);
 
-    // What mixed must keep: 97 % within 1 %, and positions that move as float's do.
+    // The requirements on mixed: 97 % within 1 %, and positions that move as float's do.
     let mixed = difference("mixed");
     let kept = number(&mixed["difference"]["linear_velocity"]["within_1_percent_share"]);
     assert!(kept >= 0.97, "{kept}");

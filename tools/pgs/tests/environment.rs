@@ -1,4 +1,5 @@
-//! Variables of the environment: blank is unset, wrong is named, and what the command line says goes before.
+//! Variables of the environment: a blank one counts as unset, an error names a wrong one, and the
+//! command line overrides them.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! Faults of the emulated board on the command line: planned ones, and the table of all.
+//! Faults of the emulated board on the command line: planned ones, and the table of all faults.
 
 use std::process::{Command, Output};
 
@@ -25,7 +25,7 @@ fn run(more: &[&str]) -> Output {
     pgs(&arguments)
 }
 
-/// Of the design with the fewest cells; the others are tried by `pgs faults`.
+/// Tests the design with the fewest cells; `pgs faults` tries the others.
 #[test]
 fn every_fault_at_every_place_of_the_simplest_design_is_met() {
     let output = pgs(&["faults", "--profile", "naive", "--json"]);

@@ -2,7 +2,7 @@
 //! DMA and emulated accelerator.
 //!
 //! The small scenes are in `tests/golden`. With the environment variable `PGS_VECTORS` every folder
-//! below that directory is compared too; among them `full_step186`, the thesis' scene.
+//! below that folder is compared, too; one of them is `full_step186`, the thesis' scene.
 mod common;
 
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 use common::{run, skipped, variable};
 use serde_json::Value;
 
-/// The folder of all vectors, if there is one; says once if there is none.
+/// The folder of all vectors, if there is one; reports once if there is none.
 fn all_vectors() -> Option<PathBuf> {
     static ROOT: LazyLock<Option<PathBuf>> = LazyLock::new(|| {
         let root = variable("PGS_VECTORS").map(PathBuf::from);
@@ -23,7 +23,7 @@ fn all_vectors() -> Option<PathBuf> {
     ROOT.clone()
 }
 
-/// Folders of arrays below `root`, in the order of their names.
+/// Folders of arrays below `root`, by name.
 fn folders_below(root: &Path) -> Vec<PathBuf> {
     let mut folders: Vec<_> = std::fs::read_dir(root)
         .unwrap_or_else(|error| panic!("cannot read {}: {error}", root.display()))
@@ -45,12 +45,12 @@ fn folders() -> Vec<PathBuf> {
     folders
 }
 
-/// Runs `pgs solve FOLDER --json OPTIONS`; its document.
+/// Runs `pgs solve FOLDER --json OPTIONS`; returns its document.
 fn solve(folder: &Path, options: &[&str]) -> Value {
     let folder = folder.to_str().expect("a path in UTF-8");
     let ran = run([&["solve", folder, "--json"], options].concat());
     assert_eq!(ran.code, Some(0), "{folder} {options:?}: {}{}", ran.stdout, ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("a JSON document")
+    ran.json()
 }
 
 /// Compares one stage of every folder; every array must agree in all bits.
@@ -88,7 +88,7 @@ fn the_velocities_after_each_friction_iteration_are_bullets() {
     }
 }
 
-/// The digests of the small piles, the same in debug and release builds and on every processor.
+/// The digests of the small piles: the same in debug and release builds and on every processor.
 #[test]
 fn the_digests_of_the_small_piles_do_not_change() {
     let expected = [
@@ -105,7 +105,7 @@ fn the_digests_of_the_small_piles_do_not_change() {
     }
 }
 
-/// A run is the same every time, everywhere: scene, collision detection, driver and board.
+/// A run gives the same bits every time, everywhere: scene, collision detection, driver and board.
 #[test]
 fn the_digest_of_a_run_does_not_change() {
     let run = |options: &str| {
@@ -123,7 +123,7 @@ fn the_digest_of_a_run_does_not_change() {
     }
 }
 
-/// Stale reads and lost updates as measured outside this project on the same step: 71.8 % of the
+/// Stale reads and lost updates, as measured outside this project on the same step: 71.8 % of the
 /// collisions, and 171.2 kJ where a sequential solve leaves 127.2 kJ.
 #[test]
 fn unchecked_hardware_adds_energy_to_the_full_step() {

@@ -1,5 +1,5 @@
-//! A driver that is killed in the middle of whatever it does leaves a board that the next one can
-//! use: the same digest as if nothing had been, and nothing of the dead one's transfers lands in it.
+//! A driver that is killed at any moment leaves a board that the next driver can use: with the same
+//! digest as on a fresh board, and undisturbed by the transfers of the killed one.
 //!
 //! `PGS_KILLS=200 cargo test --release -p pgs --test kill -- --nocapture` kills two hundred times.
 
@@ -12,22 +12,22 @@ use std::time::Instant;
 
 use common::{Tied, pgs, signal, variable};
 
-/// Kills, if nobody says otherwise.
+/// Default number of kills.
 const KILLS: u32 = 20;
-/// Where the moments come from.
+/// Seed of the moments.
 const SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Every step is long on the board, and a run is short.
+/// A run is short, and each of its steps takes long on the board.
 const RUN: [&str; 6] = ["--grid", "8x8x8", "--steps", "12", "--report-every", "12"];
 
-/// A run on the board at `socket`.
+/// Starts a run on the board at `socket`.
 fn driver(socket: &Path) -> Command {
     let mut command = pgs();
     command.arg("--board").arg(format!("socket:{}", socket.display())).args(RUN);
     command
 }
 
-/// A whole run; its digest.
+/// Completes a run; returns its digest.
 fn digest(socket: &Path, after: &str) -> String {
     let output = driver(socket).output().expect("it runs");
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -38,7 +38,7 @@ fn digest(socket: &Path, after: &str) -> String {
     last.to_owned()
 }
 
-/// The next of a row of random numbers (xorshift64).
+/// The next random number (xorshift64).
 fn next(state: &mut u64) -> u64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -66,7 +66,7 @@ fn a_board_whose_driver_was_killed_serves_the_next_one_as_if_nothing_had_been() 
     }
 
     let expected = digest(&socket, "before any kill");
-    // The first run takes longer than those that come after it.
+    // The first run takes longer than the ones after it.
     let begin = Instant::now();
     assert_eq!(digest(&socket, "once more"), expected);
     let whole = begin.elapsed();
@@ -76,7 +76,7 @@ fn a_board_whose_driver_was_killed_serves_the_next_one_as_if_nothing_had_been() 
             driver(&socket).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
         let share = next(&mut state) % 1000;
         let moment = whole * u32::try_from(share).expect("below 1000") / 1000;
-        // Nothing is awaited here: this is the random moment.
+        // Not a synchronisation: this is the random moment.
         std::thread::sleep(moment);
         child.kill().expect("killed, or ended by itself");
         child.wait().expect("it ends");
@@ -91,7 +91,7 @@ fn a_board_whose_driver_was_killed_serves_the_next_one_as_if_nothing_had_been() 
     let summary = rest.lines().last().expect("a summary").to_owned();
     let _ = writeln!(std::io::stderr(), "{kills} kills in a run of {whole:?}: {summary}");
     assert!(summary.ends_with(", 0 violations"), "{summary}");
-    // Whole runs leave a board at rest: all of these were killed in the middle of a step.
+    // Whole runs leave a board at rest, so each of these was killed inside a step.
     let running = rest.lines().filter(|line| line.ends_with("left, engines running")).count();
     assert!(running >= kills as usize / 10, "{running} of {kills} kills met a running engine");
 }

@@ -1,4 +1,4 @@
-//! `pgs list` recognises a board by its regions, and says of each device how it is used, on systems
+//! `pgs list` recognises a board by its regions, and reports the use of each device, on systems
 //! made of files.
 
 mod common;
@@ -24,7 +24,7 @@ impl System {
         fs::write(path, format!("{text}\n")).expect("written");
     }
 
-    /// The node `uio<number>` with these regions, and its device file.
+    /// Adds the node `uio<number>` with these regions, and its device file.
     fn node(&self, number: u32, name: &str, regions: &[(&str, u64)]) {
         let node = Path::new("sys/class/uio").join(format!("uio{number}"));
         self.file(node.join("name"), name);
@@ -40,7 +40,7 @@ impl System {
         self.file(Path::new("dev").join(format!("uio{number}")), "");
     }
 
-    /// A u-dma-buf of that class.
+    /// Adds a u-dma-buf of this class.
     fn buffer(&self, class: &str, name: &str, attributes: &[&str]) {
         for attribute in attributes {
             self.file(Path::new("sys/class").join(class).join(name).join(attribute), "0");
@@ -57,7 +57,7 @@ impl System {
     }
 
     fn document(&self) -> Value {
-        serde_json::from_str(&self.list(&["--json"]).stdout).expect("one JSON document")
+        self.list(&["--json"]).json()
     }
 }
 
@@ -69,7 +69,7 @@ const REGIONS: [(&str, u64); 5] = [
     ("control", 0xA004_0000),
 ];
 
-/// The line of a text that begins so.
+/// The line of a text that begins with `begins`.
 fn line<'a>(ran: &'a Ran, begins: &str) -> &'a str {
     ran.stdout.lines().find(|line| line.starts_with(begins)).expect(begins)
 }

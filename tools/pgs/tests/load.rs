@@ -9,7 +9,7 @@ use common::{Ran, run};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A system whose logic is programmed and stays so: its files do not react.
+/// A system whose logic stays programmed: its files do not react to writes.
 fn system() -> TempDir {
     let root = tempfile::tempdir().expect("a directory");
     let manager = root.path().join("sys/class/fpga_manager/fpga0");
@@ -56,7 +56,7 @@ fn a_loaded_bitstream_is_reported_as_text_and_as_json() {
 
     let ran = load(root.path(), &bitstream(root.path()), &["--json", "--partial"]);
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let document: Value = serde_json::from_str(&ran.stdout).expect("one JSON document");
+    let document = ran.json();
     assert_eq!(document["schema"], 1);
     assert_eq!(document["verb"], "load");
     assert_eq!(document["bitstream"]["firmware"], "zynq-pgs.bit.bin");

@@ -4,7 +4,7 @@ mod common;
 
 use std::collections::BTreeSet;
 
-use common::{Ran, run};
+use common::{Ran, near, run};
 use serde_json::{Value, json};
 
 fn model(arguments: &[&str]) -> Ran {
@@ -14,7 +14,7 @@ fn model(arguments: &[&str]) -> Ran {
 fn document(arguments: &[&str]) -> Value {
     let ran = model(&[arguments, &["--json"]].concat());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("one JSON document and nothing else")
+    ran.json()
 }
 
 fn table<'a>(document: &'a Value, id: &str) -> &'a Value {
@@ -22,7 +22,7 @@ fn table<'a>(document: &'a Value, id: &str) -> &'a Value {
     tables.iter().find(|table| table["id"] == id).unwrap_or_else(|| panic!("no table {id}"))
 }
 
-/// The one row in which these members have these values.
+/// The only row in which these members have these values.
 fn row<'a>(document: &'a Value, id: &str, with: &[(&str, &str)]) -> &'a Value {
     let rows = table(document, id)["rows"].as_array().expect("rows");
     let found: Vec<_> =
@@ -33,11 +33,6 @@ fn row<'a>(document: &'a Value, id: &str, with: &[(&str, &str)]) -> &'a Value {
 
 fn keys(value: &Value) -> BTreeSet<&str> {
     value.as_object().expect("an object").keys().map(String::as_str).collect()
-}
-
-fn near(value: &Value, expected: f64, tolerance: f64) {
-    let found = value.as_f64().unwrap_or_else(|| panic!("{value} is no number"));
-    assert!((found - expected).abs() <= tolerance, "{found}, expected {expected}");
 }
 
 #[test]
@@ -67,7 +62,7 @@ fn the_totals_of_tables_4_1_to_4_6_are_exact() {
             near(&row["mib"], *mib, 0.005);
             near(&row["difference_percent"], 0.0, 0.0);
             near(&row["beats_difference_percent"], 0.0, 0.0);
-            // The thesis cuts two of its footprints off where it rounds all others.
+            // The thesis truncates two of its footprints and rounds all others.
             let printed = match (id, row["state"].as_str()) {
                 ("T4.3", Some("after")) => 1.03,
                 ("T4.5", Some("after")) => 15.00,
@@ -80,7 +75,7 @@ fn the_totals_of_tables_4_1_to_4_6_are_exact() {
     }
     let before = row(&document, "T4.1", &[("state", "before")]);
     let streamed = row(&document, "records", &[("profile", "float")]);
-    // A result has 16 words with its padding where the thesis counts 6.
+    // A result has 16 words with its padding; the thesis counts 6.
     near(&streamed["output_difference_percent"], (16.0 / 6.0 - 1.0) * 100.0, 1e-9);
     let each = [&before["each"], &before["each_bytes"], &before["each_beats"]];
     assert_eq!(each, [&json!(56), &json!(224), &json!(14.0)]);
@@ -139,7 +134,7 @@ fn on_chip_memory_is_that_of_section_4_4_2() {
     assert_eq!([dsp, lut, ff], [42.0, 49.0, 29.0]);
     assert_eq!(logic("float")["kind"], "recorded");
     assert_eq!((&logic("mixed")["dsp"], &logic("mixed")["kind"]), (&Value::Null, &json!("open")));
-    // By bits, of what the thesis' synthesis reported.
+    // Deviation in bits from the thesis' synthesis report.
     near(&blocks("float")["ideal_difference_percent"], 70.56 / 70.0 * 100.0 - 100.0, 0.01);
     near(&blocks("half")["ideal_difference_percent"], 46.38 / 48.0 * 100.0 - 100.0, 0.01);
     for profile in ["float", "half"] {
@@ -262,7 +257,7 @@ fn the_json_keys_are_stable() {
     assert_eq!(float["thesis_words"]["cycles"]["total"], 2_066_270);
     assert_eq!(float["streamed_words"]["cycles"]["total"], 2_093_000);
     assert_eq!(float["memory"]["block_ram"], 2_965_120);
-    assert_eq!(float["thesis_words"]["times"].as_array().map(Vec::len), Some(3));
+    assert_eq!(float["thesis_words"]["times"].as_array().map(Vec::len), Some(4));
     assert_eq!(float["thesis"]["cycles"], 2_062_697);
     let ids: Vec<_> = document["tables"]
         .as_array()
@@ -351,7 +346,7 @@ fn world_inertia_costs_cycles_and_memory() {
     assert_eq!(inertia["interval"], 1);
 }
 
-/// O4: bytes at most a sixth and an eleventh of float's, MiB on chip, nothing of it measured.
+/// O4: bytes at most a sixth and an eleventh of float's, MiB on chip; nothing is measured.
 #[test]
 fn the_designs_that_stream_once_move_and_hold_what_they_must() {
     let document = document(&["--profile", "windowed16", "--section", "windowed"]);

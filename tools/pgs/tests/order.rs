@@ -1,21 +1,17 @@
 //! `pgs order`: its table, on the scenes of the repository and, with `PGS_VECTORS`, on the thesis'
-//! scene, where the figures were measured outside this project.
+//! scene, whose figures were measured outside this project.
 mod common;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use common::{golden, run, skipped, variable};
+use common::{golden, number, run, skipped, text, variable};
 use serde_json::Value;
 
-/// Runs `pgs order --json`; its document.
+/// Runs `pgs order --json`; returns its document.
 fn order(arguments: &[&str]) -> Value {
     let ran = run([&["order", "--json", "--runs", "1"], arguments].concat());
     assert_eq!(ran.code, Some(0), "{arguments:?}: {}{}", ran.stdout, ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("a JSON document")
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a path in UTF-8")
+    ran.json()
 }
 
 /// The row of an order at a depth.
@@ -25,11 +21,7 @@ fn row<'a>(document: &'a Value, order: &str, depth: u64) -> &'a Value {
     found.unwrap_or_else(|| panic!("no row {order} {depth} in {document:#}"))
 }
 
-fn number(row: &Value, key: &str) -> f64 {
-    row[key].as_f64().unwrap_or_else(|| panic!("no number {key} in {row:#}"))
-}
-
-/// Those without hazards.
+/// The orders without hazards.
 const OURS: [&str; 2] = ["hazard-free", "hazard-free-nearby"];
 
 #[test]
@@ -44,7 +36,7 @@ fn every_order_is_shown_at_every_depth_and_ours_has_no_hazard() {
     for arguments in scenes {
         let document = order(arguments);
         let rows = document["rows"].as_array().expect("a list");
-        // As given, random, three times the thesis', colours, two of ours.
+        // As given, random, three of the thesis, colours, two of ours.
         assert_eq!(rows.len(), 4 * 8, "{arguments:?}");
         for depth in [1, 4, 16, 192] {
             for ours in OURS.map(|order| row(&document, order, depth)) {
@@ -54,7 +46,7 @@ fn every_order_is_shown_at_every_depth_and_ours_has_no_hazard() {
         for row in rows.iter().filter(|row| !OURS.iter().any(|order| row["order"] == *order)) {
             assert_eq!(row["empty"], 0, "{row:#}");
         }
-        assert!(number(&document["scene"], "collisions") > 100.0);
+        assert!(number(&document["scene"]["collisions"]) > 100.0);
     }
 }
 
@@ -114,13 +106,13 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
     }
 }
 
-/// One order gives way to another here and there: each step's report says which it was.
+/// One order falls back to another in some steps: each step's report names its order.
 #[test]
 fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
     let scene =
         ["run", "--hazards", "unchecked", "--grid", "9x9x9", "--steps", "66", "--drop", "5"];
     let ran = run([&["--json"], &scene[..]].concat());
-    let document: Value = serde_json::from_str(&ran.stdout).expect("a document");
+    let document = ran.json();
     let steps = document["steps"].as_array().expect("steps");
     let mut counted = Vec::<(&str, u32)>::new();
     for name in steps.iter().map(|step| step["order"]["name"].as_str().expect("a name")) {
@@ -138,7 +130,7 @@ fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
     assert!(one.contains("order      hazard-free\n") && !one.contains("orders"), "{one}");
 }
 
-/// `full_step186`, if it is there; says once if it is not.
+/// `full_step186`, if it exists; reports once if it does not.
 fn full_step() -> Option<PathBuf> {
     let Some(root) = variable("PGS_VECTORS").map(PathBuf::from) else {
         skipped("the orders of full_step186 (PGS_VECTORS is not set)");
@@ -157,8 +149,9 @@ fn full_step() -> Option<PathBuf> {
 fn the_full_step_has_the_hazards_and_live_bodies_that_others_measured() {
     let Some(folder) = full_step() else { return };
     let document = order(&["--input", text(&folder)]);
-    let percent = |order: &str, depth| number(row(&document, order, depth), "hazard_share") * 100.0;
-    let alive = |order: &str| number(row(&document, order, 64), "most_alive");
+    let percent =
+        |order: &str, depth| number(&row(&document, order, depth)["hazard_share"]) * 100.0;
+    let alive = |order: &str| number(&row(&document, order, 64)["most_alive"]);
     for (order, shares, most) in [
         ("as given", [71.0, 71.8, 80.0], 2_173.0),
         ("Bullet's GPU batches", [4.3, 32.9, 59.6], 13_933.0),
@@ -192,8 +185,8 @@ fn the_full_step_is_ordered_without_hazards_and_with_few_bodies_alive() {
     for (depth, empty) in [(16, 0.3), (32, 0.3), (64, 0.3), (96, 0.3), (128, 0.5), (192, 0.7)] {
         let ours = row(&document, "hazard-free", depth);
         assert_eq!(ours["hazards"], 0, "{depth}");
-        assert!(number(ours, "empty_share") * 100.0 <= empty, "{depth}: {ours:#}");
-        assert!(number(ours, "most_alive") <= 800.0, "{depth}: {ours:#}");
-        assert!(number(ours, "longest_span") <= 3_300.0, "{depth}: {ours:#}");
+        assert!(number(&ours["empty_share"]) * 100.0 <= empty, "{depth}: {ours:#}");
+        assert!(number(&ours["most_alive"]) <= 800.0, "{depth}: {ours:#}");
+        assert!(number(&ours["longest_span"]) <= 3_300.0, "{depth}: {ours:#}");
     }
 }

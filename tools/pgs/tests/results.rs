@@ -1,4 +1,4 @@
-//! Files of results replace earlier ones as a whole: after a failure these are as they were.
+//! Files of results replace earlier ones together: after a failure the earlier files are unchanged.
 
 mod common;
 
@@ -6,9 +6,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use common::{Ran, golden, pgs, run};
+use common::{Ran, golden, pgs, run, text};
 
-/// Names and contents of a folder, in the order of the names.
+/// Names and contents of a folder, by name.
 fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let entries = fs::read_dir(folder).expect("the folder").map(|entry| {
         let path = entry.expect("an entry").path();
@@ -20,7 +20,7 @@ fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
     found
 }
 
-/// The command where no file may be longer than half a KiB, as if the disk were full then.
+/// Runs the command with a limit of half a KiB on files, as on a full disk.
 fn on_a_full_disk(arguments: &[&str]) -> Ran {
     let command = pgs();
     let words = std::iter::once(command.get_program()).chain(command.get_args());
@@ -29,10 +29,6 @@ fn on_a_full_disk(arguments: &[&str]) -> Ran {
     let mut shell = Command::new("sh");
     shell.env("PGS_BOARD", "emulated").env("RUST_LOG", "error");
     shell.arg("-c").arg(script).arg("sh").args(arguments).output().expect("a shell").into()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a path in UTF-8")
 }
 
 #[test]
@@ -48,10 +44,10 @@ fn results_that_cannot_be_written_leave_the_earlier_ones() {
     let ran = on_a_full_disk(&["solve", text(&large), "--out", text(&out)]);
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     assert!(ran.stderr.contains("cannot be written"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("is as it was before"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("is unchanged"), "{}", ran.stderr);
     assert_eq!(content(&out), before);
 
-    // The folders that were made for them go again.
+    // Folders made for the results are removed.
     let deep = folder.path().join("a/b");
     let ran = on_a_full_disk(&["solve", text(&large), "--out", text(&deep)]);
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);

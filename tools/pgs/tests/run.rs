@@ -1,11 +1,11 @@
-//! What `pgs run` shows a person, and the same for programs.
+//! The output of `pgs run`, for people and for programs.
 
 mod common;
 
 use common::{Ran, run};
 use serde_json::Value;
 
-/// Columns of a terminal that shows every line whole.
+/// Columns of the terminal.
 const WIDTH: usize = 100;
 
 fn ran(options: &str) -> Ran {
@@ -15,7 +15,7 @@ fn ran(options: &str) -> Ran {
 }
 
 fn document(options: &str) -> Value {
-    serde_json::from_str(&ran(&format!("{options} --json")).stdout).expect("one document")
+    ran(&format!("{options} --json")).json()
 }
 
 /// The fact behind a label, its lines joined.
@@ -90,7 +90,7 @@ fn the_thesis_is_left_out_where_its_scene_is_not_stepped() {
     assert!(!text.contains("thesis"), "{text}");
 }
 
-/// The lattice leaves the rim of its top layer on an edge: seven cubes here, which topple, fall and
+/// The lattice leaves the rim of its top layer on an edge: here seven cubes, which topple, fall and
 /// come to rest.
 #[test]
 fn a_pile_comes_to_rest_without_energy() {
@@ -108,7 +108,7 @@ fn iterations_and_time_step_are_those_of_the_command_line() {
     let document = document(options);
     assert_eq!(document["steps"][0]["passes"], 5);
     assert_eq!(document["config"]["time_step"], "1/120 s");
-    // v = -g dt twice, and x by the first.
+    // v = -g dt twice, and x by the first v.
     let fall = 8.0 * 9.8_f64.powi(2) * (2.0 / 120.0_f64).powi(2) / 2.0;
     let energy = document["steps"][1]["kinetic_energy_j"].as_f64().expect("a number");
     assert!((energy - fall).abs() < 1e-4, "{energy} J of {fall}");

@@ -8,10 +8,10 @@ use serde_json::Value;
 fn json(arguments: &[&str]) -> Value {
     let ran = run(arguments.iter().chain(&["--json"]));
     assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.stderr);
-    serde_json::from_str(&ran.stdout).expect("one JSON document")
+    ran.json()
 }
 
-/// A cube so heavy that it takes more than 2^44 N s to stop it.
+/// A cube so heavy that stopping it takes more than 2^44 N s.
 #[test]
 fn impulses_beyond_the_counter_are_at_least_its_maximum() {
     let folder = copy("one_cube");
@@ -57,7 +57,7 @@ fn waits_beyond_the_counter_leave_the_stalls_open() {
     );
     assert!(cycles["total"].as_u64() > Some(8_000_000_000), "{cycles}");
 
-    // So many that stalls could be the more.
+    // So long that stalls could outweigh the waits.
     let scene = ["run", "--grid", "3x3x3", "--drop", "0", "--steps", "1", "--deadline", "3600000"];
     let fault = "slow=2000000000@dma0.mm2s,phase=contact1,beat=30";
     let slowed = [&scene[..], &["--fault", fault]].concat();

@@ -1,5 +1,4 @@
-//! A served board from the command line: one driver at a time, Ctrl-C in the middle of a step, and
-//! what is refused.
+//! A served board from the command line: one driver at a time, Ctrl-C inside a step, and refusals.
 
 mod common;
 
@@ -43,7 +42,7 @@ impl Served {
         self.folder.path().join("board")
     }
 
-    /// A command on this board.
+    /// Runs a command on this board.
     fn command(&self, board: &Path) -> Command {
         let mut command = pgs();
         command.arg("--board").arg(format!("socket:{}", board.display()));
@@ -52,7 +51,7 @@ impl Served {
         command
     }
 
-    /// Ends it; what it did.
+    /// Ends it; returns its output.
     fn end(mut self) -> Ran {
         signal("-TERM", self.child.0.id());
         let (mut stdout, mut stderr) = (String::new(), String::new());
@@ -81,7 +80,7 @@ fn a_served_board_gives_the_digest_of_the_emulated_one() {
     let check: Ran =
         served.command(&served.socket()).arg("check").output().expect("it runs").into();
     assert!(check.stdout.ends_with("11 ok, 0 failed, 0 skipped\n"), "{}", check.stdout);
-    // How it is built is a matter of the one who serves it.
+    // The server's options describe the build.
     let half: Ran = served
         .command(&served.socket())
         .args(["run", "--profile", "half"])
@@ -212,12 +211,12 @@ fn memory_that_the_system_does_not_give_is_refused_and_nothing_is_left() {
     }
 }
 
-/// Stands between a driver and a board, and lets no interrupt come: the board seems to stall.
+/// Stands between a driver and a board, and holds all interrupts back: the board seems to stall.
 struct Stalling {
     socket: PathBuf,
-    /// One for every wait.
+    /// One message for every wait.
     waits: Receiver<()>,
-    /// All other requests since the first wait, once the driver is gone.
+    /// All other requests since the first wait, sent after the driver has left.
     after: Receiver<Vec<Request>>,
 }
 
@@ -237,13 +236,13 @@ impl Stalling {
             while driver.read_exact(&mut request).is_ok() {
                 let asked = Request::decode(&request).expect("a request");
                 match asked {
-                    // Draining, at opening, asks for no time.
+                    // Draining at opening waits for no time.
                     Request::WaitInterrupt { time } if !time.is_zero() => {
                         stalled = true;
                         let now = Answer::decode(&answer).expect("an answer").now;
                         let nothing = Answer { status: Status::Nothing, value: 0, number: 0, now };
                         answer = nothing.encode();
-                        // The test may have seen enough.
+                        // The test may have stopped listening.
                         let _ = tell_wait.send(());
                     }
                     _ => {
@@ -275,7 +274,7 @@ fn ctrl_c_ends_a_step_that_stalls_and_a_second_driver_is_refused_meanwhile() {
             _ => command.args(["--grid", "3x3x3", "--step", "4"]),
         };
         let child = command
-            // An hour, which the stalling board lets pass in some seconds.
+            // An hour, which passes on the stalling board within seconds.
             .args(["--deadline", "3600000"])
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -299,7 +298,7 @@ fn ctrl_c_ends_a_step_that_stalls_and_a_second_driver_is_refused_meanwhile() {
         signal("-INT", child.id());
         let ran = Ran::from(child.wait_with_output().expect("it ends"));
         assert_eq!((ran.code, ran.stderr.as_str()), (Some(130), ""), "{verb}");
-        // It has reset every core before it went.
+        // The driver has reset every core before it left.
         let since = stalling.after.recv().expect("the driver is gone");
         for core in 0..4 {
             let reset = |request: &Request| {

@@ -1,10 +1,10 @@
-//! This file compares arrays bit by bit.
+//! Compares arrays bit by bit.
 
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-/// How an array differs from what was expected.
+/// The difference between an array and its expected values.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Difference {
     /// Name of the expected array.
@@ -15,11 +15,11 @@ pub(crate) struct Difference {
     pub(crate) differing: usize,
     /// Largest absolute difference; infinite if a value found is not a number.
     pub(crate) largest: f64,
-    /// Index of the first value that differs, counted through the array.
+    /// Index of the first value that differs, in the flattened array.
     pub(crate) first: Option<usize>,
 }
 
-/// An expected value that is no number: no comparison would mean anything.
+/// An expected value is NaN, and a comparison with it would mean nothing.
 #[derive(Debug, Error)]
 #[error("{}: value {index} (counted through the array) is NaN, expected a number", path.display())]
 pub(crate) struct NotANumber {
@@ -27,7 +27,7 @@ pub(crate) struct NotANumber {
     index: usize,
 }
 
-/// Refuses expected values that are not numbers.
+/// Refuses expected values that are NaN.
 pub(crate) fn check(path: &Path, expected: &[f32]) -> Result<(), NotANumber> {
     match expected.iter().position(|value| value.is_nan()) {
         None => Ok(()),
@@ -35,7 +35,7 @@ pub(crate) fn check(path: &Path, expected: &[f32]) -> Result<(), NotANumber> {
     }
 }
 
-/// Compares `found` with `expected`, which are of one length and without NaN in `expected`.
+/// Compares `found` with `expected`, which have the same length; `expected` holds no NaN.
 pub(crate) fn compare(
     array: impl Into<String>,
     found: impl Iterator<Item = f32>,
@@ -57,7 +57,7 @@ pub(crate) fn compare(
         }
     }
     if difference.values != expected.len() {
-        // Never by a folder whose shapes were checked; then what is missing differs.
+        // Impossible with a folder whose shapes were checked; missing values count as different.
         difference.first.get_or_insert(difference.values);
         difference.differing += expected.len() - difference.values;
         difference.largest = f64::INFINITY;

@@ -1,36 +1,6 @@
-//! This file lays text out in columns.
+//! Formats numbers for people: groups of digits, five digits, bounds.
 
-use std::io::{self, Write};
-
-/// A column: two lines of heading, and its width in characters.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Column {
-    pub(super) name: &'static str,
-    pub(super) unit: &'static str,
-    pub(super) width: usize,
-}
-
-/// Writes the two lines of heading.
-pub(super) fn heading(out: &mut dyn Write, columns: &[Column]) -> io::Result<()> {
-    line(out, columns, columns.iter().map(|column| column.name.to_owned()))?;
-    line(out, columns, columns.iter().map(|column| column.unit.to_owned()))
-}
-
-/// Writes one row, each cell at the right of its column.
-pub(super) fn line(
-    out: &mut dyn Write,
-    columns: &[Column],
-    cells: impl IntoIterator<Item = String>,
-) -> io::Result<()> {
-    let mut row = String::new();
-    for (column, cell) in columns.iter().zip(cells) {
-        let width = column.width;
-        row.push_str(&format!("{cell:>width$} "));
-    }
-    writeln!(out, "{}", row.trim_end())
-}
-
-/// A whole number with a comma between groups of three digits.
+/// Writes a whole number with a comma between groups of three digits.
 pub(crate) fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
@@ -43,8 +13,8 @@ pub(crate) fn grouped(number: u64) -> String {
     text
 }
 
-/// Five digits, with an exponent where they would not fit into seven places.
-pub(super) fn number(value: f64) -> String {
+/// Writes five digits, with an exponent where they would not fit into seven columns.
+pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
         "0".to_owned()
@@ -56,16 +26,16 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// On which side a number is known that a saturated counter has to do with.
+/// The direction of a bound that a saturated counter leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Bound {
+pub(crate) enum Bound {
     AtLeast,
     AtMost,
 }
 
 impl Bound {
-    /// A count that is exact unless a counter is saturated, in words.
-    pub(super) fn words(self, saturated: bool, count: u64) -> String {
+    /// Writes a count in words; it is a bound if a counter is saturated.
+    pub(crate) fn words(self, saturated: bool, count: u64) -> String {
         let count = grouped(count);
         match (saturated, self) {
             (false, _) => count,
@@ -74,13 +44,13 @@ impl Bound {
         }
     }
 
-    /// The same in few characters.
-    pub(super) fn cell(self, saturated: bool, count: u64) -> String {
+    /// Writes the same in few characters.
+    pub(crate) fn cell(self, saturated: bool, count: u64) -> String {
         if saturated { self.short(count as f64) } else { grouped(count) }
     }
 
-    /// A bound in three digits; rounded so that it is true.
-    pub(super) fn short(self, bound: f64) -> String {
+    /// Writes a bound in three digits, rounded so that it stays true.
+    pub(crate) fn short(self, bound: f64) -> String {
         let unit = 10_f64.powf(bound.max(1.0).log10().floor() - 2.0);
         match self {
             Self::AtLeast => format!(">={:.2e}", (bound / unit).floor() * unit),
@@ -89,8 +59,8 @@ impl Bound {
     }
 }
 
-/// A number with its sign.
-pub(super) fn signed(value: f64) -> String {
+/// Writes a number with its sign.
+pub(crate) fn signed(value: f64) -> String {
     if value > 0.0 { format!("+{}", number(value)) } else { number(value) }
 }
 

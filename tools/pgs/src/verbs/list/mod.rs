@@ -1,4 +1,4 @@
-//! The verb `list`: which boards there are, and what keeps one from being used.
+//! The verb `list`: lists the boards of the system, and the obstacles to their use.
 
 mod inventory;
 
@@ -11,10 +11,10 @@ use zynq_pgs::platform::{
     System, UioListing, fpga_managers, require_bitstream, u_dma_buf_names, uio_listing,
 };
 
-use super::SCHEMA;
-use crate::args::CommonArgs;
 use crate::board;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
+use crate::output::SCHEMA;
 use inventory::{Buffer, Node, explained, state, unreadable_json};
 
 const EXAMPLES: &str = "\
@@ -22,9 +22,11 @@ Examples:
   pgs list
   pgs list --json
 
-A UIO node is recognised by its regions, whatever its name; the line says how to use it.";
+A UIO node is recognised by its regions, independently of its name; its line shows the option that
+uses it.";
 
-/// List the boards: UIO nodes, DMA buffers, what is inaccessible and why, and the emulated board.
+/// List the boards: UIO nodes, DMA buffers, inaccessible devices with the reason, and the emulated
+/// board.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ListArgs {
@@ -33,7 +35,7 @@ pub(crate) struct ListArgs {
     system_root: PathBuf,
 }
 
-/// Lists what there is.
+/// Lists the boards.
 pub(crate) fn run(
     args: &ListArgs,
     common: &CommonArgs,

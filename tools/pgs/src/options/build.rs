@@ -1,20 +1,19 @@
-//! This file holds the options of the emulated board and of a step, and how they are written on the
-//! command line.
+//! The options that describe an emulated board, and their names on the command line.
 
 use std::fmt::Display;
 use std::str::FromStr;
-use std::time::Duration;
 
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, Inertia, PROFILES, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals, THREADS_MAX};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use zynq_pgs::StepParameters;
 
-/// How the emulated board is built; a real board is as its bitstream is.
+use super::bandwidth::bandwidth;
+
+/// The build of the emulated board; a real board is built as its bitstream is.
 ///
-/// [`build`](crate::build) writes and reads all of it as one text.
+/// [`build_text`](super::build_text) writes and reads a build as one text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 #[command(next_help_heading = "Emulated board")]
 pub(crate) struct BuildArgs {
@@ -24,12 +23,12 @@ pub(crate) struct BuildArgs {
     /// Numbers on streams of 16 bits [default: binary16]
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatName>,
-    /// Operators of the pipeline; what it stores stays as wide as the profile has it [default: that
+    /// Precision of the pipeline's operators; storage keeps the width of the profile [default: that
     /// of the profile]
     #[arg(long, value_enum)]
     pub(crate) arithmetic: Option<ArithmeticName>,
-    /// Inertia that is the same about every axis, or any (boxes, capsules), streamed with every body
-    /// [default: isotropic]
+    /// Inertia of a body: equal about every axis, or any (boxes, capsules), streamed with every
+    /// body [default: isotropic]
     #[arg(long, value_enum)]
     pub(crate) inertia: Option<InertiaName>,
     /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
@@ -50,37 +49,36 @@ pub(crate) struct BuildArgs {
     /// Width of DMA addresses in bits, 32 to 64 [default: 40]
     #[arg(long, value_name = "BITS", value_parser = address_width)]
     pub(crate) address_width: Option<u32>,
-    /// Threads of this machine that an emulated board's arithmetic may take, finding the collisions of a
-    /// scene, and writing the records of a step and reading its results; no result depends on it
-    /// [default: as many as there are, at most 4]
+    /// Threads of this machine for the emulated board's arithmetic, for collision detection, and
+    /// for packing and unpacking a step; no result depends on their number [default: one a
+    /// processor, at most 4]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub(crate) threads: Option<usize>,
-    /// Whether independent collisions are computed side by side; no result depends on it [default:
-    /// on]
+    /// Compute independent collisions side by side; no result depends on it [default: on]
     #[arg(long, value_enum)]
     pub(crate) lanes: Option<LanesName>,
 }
 
-/// A choice of a build whose names stand on the command line and in its text.
+/// A choice of a build, with the same names on the command line and in a build's text.
 pub(crate) trait Choice: ValueEnum + PartialEq + 'static {
-    /// What it means.
+    /// The value that a name stands for.
     type Meaning: PartialEq;
 
-    /// What this name means.
+    /// The value of this name.
     fn meaning(&self) -> Self::Meaning;
 
-    /// The name of a meaning, if it has one.
+    /// The name of a value, if it has one.
     fn of(meaning: &Self::Meaning) -> Option<Self> {
         Self::value_variants().iter().find(|name| name.meaning() == *meaning).cloned()
     }
 
-    /// As it is written.
+    /// The name as written.
     fn text(&self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 }
 
-/// Names of one choice, and what each means.
+/// Defines the names of a choice and their values.
 macro_rules! choice {
     ($name:ident means $meaning:ty: $($(#[$doc:meta])* $variant:ident is $value:expr),+ $(,)?) => {
         #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -127,28 +125,28 @@ choice!(SubnormalsName means Subnormals:
     Flush is Subnormals::Flush,
 );
 
-/// Reads the name of a profile.
+/// Parses the name of a profile.
 pub(crate) fn profile() -> impl TypedValueParser<Value = &'static Profile> {
     PossibleValuesParser::new(PROFILES.iter().map(|profile| profile.name))
         .try_map(|name| Profile::by_name(&name).ok_or("there is no such profile"))
 }
 
-/// Reads a number of slots.
+/// Parses a number of slots.
 pub(crate) fn window(text: &str) -> Result<u32, String> {
     whole(text, 1, u32::MAX)
 }
 
-/// Reads a number of threads.
+/// Parses a number of threads.
 pub(crate) fn threads(text: &str) -> Result<usize, String> {
     whole(text, 1, THREADS_MAX)
 }
 
-/// Reads the width of a length register.
+/// Parses the width of a length register.
 pub(crate) fn length_width(text: &str) -> Result<u32, String> {
     whole(text, 8, 26)
 }
 
-/// Reads the width of an address.
+/// Parses the width of an address.
 pub(crate) fn address_width(text: &str) -> Result<u32, String> {
     whole(text, 32, 64)
 }
@@ -165,7 +163,7 @@ fn whole<T: Copy + FromStr + PartialOrd + Display>(
 }
 
 impl BuildArgs {
-    /// The board that they describe.
+    /// The configuration of the described board.
     pub(crate) fn config(&self) -> BoardConfig {
         let default = BoardConfig::default();
         let profile = self.profile.unwrap_or(&FLOAT);
@@ -186,12 +184,12 @@ impl BuildArgs {
         }
     }
 
-    /// The profile's formats with what is asked for instead.
+    /// The profile's number formats, with the formats of the options in their place.
     fn numbers(&self, own: &Numbers) -> Numbers {
         let mut numbers = *own;
         if let Some(format) = self.format.map(|name| name.meaning()) {
             let narrow = |stream: StreamFormat| stream.bits() == format.bits();
-            // Where no stream has 16 bits the board says which widths do not fit.
+            // Where no stream has 16 bits, the board's error tells which widths do not fit.
             let none = ![own.collisions, own.bodies, own.poses].into_iter().any(narrow);
             for stream in [&mut numbers.collisions, &mut numbers.bodies, &mut numbers.poses] {
                 if none || narrow(*stream) {
@@ -205,7 +203,7 @@ impl BuildArgs {
         numbers
     }
 
-    /// What makes this board of the default board of its profile.
+    /// The options that turn the default board of a profile into this one.
     pub(crate) fn of(config: &BoardConfig) -> Self {
         fn unlike<T: PartialEq + Copy>(value: T, default: T) -> Option<T> {
             (value != default).then_some(value)
@@ -235,94 +233,14 @@ impl BuildArgs {
     }
 }
 
-/// How long a step may take on the board.
-#[derive(Debug, Clone, Copy, Default, Args)]
-pub(crate) struct DeadlineArgs {
-    /// How long a step may take on the board, ms [default: 10, and four times what its collisions
-    /// take one after the other]
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
-    deadline: Option<u32>,
-}
-
-impl DeadlineArgs {
-    /// The same parameters with this deadline.
-    pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
-        if let Some(milliseconds) = self.deadline {
-            parameters.deadline = Some(Duration::from_millis(milliseconds.into()));
-        }
-        parameters
-    }
-}
-
-const BYTES_PER_GB: f64 = 1e9;
-/// Faster than any memory; beyond it a typing error is likelier.
-const BANDWIDTH_MAX: f64 = 1000.0;
-/// Slower than any memory.
-const BANDWIDTH_MIN: f64 = 0.1;
-
-/// A bandwidth, as it is written on the command line.
-pub(crate) fn bandwidth(text: &str) -> Result<Bandwidth, String> {
-    if text == "unlimited" {
-        return Ok(Bandwidth::Unlimited);
-    }
-    let wrong = || {
-        format!(
-            "expected a number of GB/s from {BANDWIDTH_MIN} to {BANDWIDTH_MAX}, or \"unlimited\""
-        )
-    };
-    let number: f64 = text.parse().map_err(|_| wrong())?;
-    if !(BANDWIDTH_MIN..=BANDWIDTH_MAX).contains(&number) {
-        return Err(wrong());
-    }
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a whole number between 1e6 and 1e12 after the check"
-    )]
-    let rate = (number * BYTES_PER_GB).round() as u64;
-    Ok(Bandwidth::BytesPerSecond(rate))
-}
-
-/// A bandwidth for people.
-pub(crate) fn bandwidth_text(bandwidth: Bandwidth) -> String {
-    match bandwidth_gigabytes(bandwidth) {
-        None => "unlimited".to_owned(),
-        Some(rate) => format!("{rate} GB/s"),
-    }
-}
-
-/// A bandwidth in GB/s, or nothing if it is unlimited.
-pub(crate) fn bandwidth_gigabytes(bandwidth: Bandwidth) -> Option<f64> {
-    bandwidth_number(bandwidth).map(|rate| rate as f64 / BYTES_PER_GB)
-}
-
-/// A bandwidth for programs: bytes a second, or null.
-pub(crate) fn bandwidth_number(bandwidth: Bandwidth) -> Option<u64> {
-    match bandwidth {
-        Bandwidth::Unlimited => None,
-        Bandwidth::BytesPerSecond(rate) => Some(rate),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn bandwidths_are_read_as_they_are_shown() {
-        assert_eq!(bandwidth("12.8"), Ok(Bandwidth::ZCU102_SUSTAINED));
-        assert_eq!(bandwidth("17.07"), Ok(Bandwidth::ZCU102_PEAK));
-        assert_eq!(bandwidth("unlimited"), Ok(Bandwidth::Unlimited));
-        assert_eq!(bandwidth_text(Bandwidth::ZCU102_SUSTAINED), "12.8 GB/s");
-        for wrong in ["", "0", "-1", "nan", "inf", "1e9", "12.8GB", "Unlimited"] {
-            bandwidth(wrong).expect_err(wrong);
-        }
-    }
-
-    #[test]
     fn no_option_is_the_default_board() {
         assert_eq!(BuildArgs::default().config(), BoardConfig::default());
-        assert_eq!(BuildArgs::default().given(), None);
+        assert_eq!(BuildArgs::default().board_option(), None);
     }
 
     #[test]
@@ -341,7 +259,7 @@ mod tests {
         assert_eq!(half.velocities, Precision::Binary16, "storage stays");
         let (_, mixed) = numbers("mixed", Some(FormatName::Thesis16), None);
         assert_eq!((mixed.collisions, mixed.bodies), (thesis, StreamFormat::F32));
-        // Refused by the board, which says why.
+        // The board refuses it, and names the reason.
         let (_, float) = numbers("float", Some(FormatName::Thesis16), None);
         assert_eq!((float.collisions, float.bodies), (thesis, thesis));
     }

@@ -1,4 +1,6 @@
-//! Options of the solver: iterations and time step.
+//! Options of the solver: iterations, time step and deadline.
+
+use std::time::Duration;
 
 use bitstream_model::interface::control::ITERATIONS_MAX;
 use clap::Args;
@@ -20,7 +22,7 @@ pub(crate) struct SolverArgs {
 }
 
 impl SolverArgs {
-    /// The same parameters with these iterations and this time step.
+    /// Sets the iterations and the time step.
     pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
         if let Some(iterations) = self.contact_iterations {
             parameters.contact_iterations = iterations;
@@ -35,6 +37,25 @@ impl SolverArgs {
     }
 }
 
+/// The deadline of a step.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(crate) struct DeadlineArgs {
+    /// Longest time of a step on the board, ms [default: 10, plus four times the time of its
+    /// collisions one after the other]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..=3_600_000))]
+    deadline: Option<u32>,
+}
+
+impl DeadlineArgs {
+    /// Sets the deadline.
+    pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
+        if let Some(milliseconds) = self.deadline {
+            parameters.deadline = Some(Duration::from_millis(milliseconds.into()));
+        }
+        parameters
+    }
+}
+
 fn iterations() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(..=i64::from(ITERATIONS_MAX))
 }
@@ -42,7 +63,7 @@ fn iterations() -> clap::builder::RangedI64ValueParser<u32> {
 /// Longest time step, s. A longer one is a typing error.
 const TIME_STEP_MAX: f32 = 1.0;
 
-/// Reads a time step.
+/// Parses a time step.
 fn time_step(text: &str) -> Result<f32, String> {
     let number = |text: &str| text.trim().parse::<f32>().ok();
     let seconds = match text.split_once('/') {
@@ -55,7 +76,7 @@ fn time_step(text: &str) -> Result<f32, String> {
     }
 }
 
-/// A time step for people: as a fraction of a second where it is one.
+/// Formats a time step: as a fraction of a second where it is one.
 pub(crate) fn time_step_text(seconds: f32) -> String {
     let steps = (1.0 / seconds).round();
     #[expect(clippy::float_cmp, reason = "the number that the fraction is read as, or another")]

@@ -1,4 +1,4 @@
-//! This file is the choice of a real board's DMA memory, as it is written on the command line.
+//! Parses the DMA memory of a real board.
 
 use std::ops::Range;
 
@@ -10,8 +10,8 @@ use zynq_pgs::{Caching, MemoryChoice};
 const EXPECTED: &str = "expected auto, u-dma-buf[:NAME[:write-combining]], uio[:NODE], \
                         devmem[:ADDRESS+BYTES] or file:PATH";
 
-/// Reads a choice of memory.
-pub(crate) fn memory(text: &str) -> Result<MemoryChoice, String> {
+/// Parses a choice of memory.
+pub(crate) fn memory_choice(text: &str) -> Result<MemoryChoice, String> {
     let expected = || EXPECTED.to_owned();
     let (kind, rest) = match text.split_once(':') {
         Some((kind, rest)) if !rest.is_empty() => (kind, Some(rest)),
@@ -28,7 +28,7 @@ pub(crate) fn memory(text: &str) -> Result<MemoryChoice, String> {
                 Some((name, "cached")) => (name, Caching::Cached),
                 Some(_) => return Err(expected()),
             };
-            // The name becomes a part of paths.
+            // The name becomes part of a path.
             if name.is_empty() || name.contains('/') || name.starts_with('.') {
                 return Err(format!("{name:?} is no name of a buffer"));
             }
@@ -66,18 +66,18 @@ mod tests {
         let u_dma_buf =
             |name: &str, caching| Ok(MemoryChoice::UDmaBuf { name: name.to_owned(), caching });
         let uio = |node: &str| Ok(MemoryChoice::Uio { node: node.to_owned() });
-        assert_eq!(memory("auto"), Ok(MemoryChoice::Automatic));
-        assert_eq!(memory("u-dma-buf"), u_dma_buf("pgs", Caching::Cached));
-        assert_eq!(memory("u-dma-buf:b0"), u_dma_buf("b0", Caching::Cached));
+        assert_eq!(memory_choice("auto"), Ok(MemoryChoice::Automatic));
+        assert_eq!(memory_choice("u-dma-buf"), u_dma_buf("pgs", Caching::Cached));
+        assert_eq!(memory_choice("u-dma-buf:b0"), u_dma_buf("b0", Caching::Cached));
         assert_eq!(
-            memory("u-dma-buf:b0:write-combining"),
+            memory_choice("u-dma-buf:b0:write-combining"),
             u_dma_buf("b0", Caching::WriteCombining)
         );
-        assert_eq!(memory("uio"), uio("pgs-memory"));
-        assert_eq!(memory("uio:m"), uio("m"));
+        assert_eq!(memory_choice("uio"), uio("pgs-memory"));
+        assert_eq!(memory_choice("uio:m"), uio("m"));
         let dev_mem = |window| Ok(MemoryChoice::DevMem { window });
-        assert_eq!(memory("devmem"), dev_mem(0x5000_0000..0x5400_0000));
-        assert_eq!(memory("devmem:0x1000+4096"), dev_mem(0x1000..0x2000));
+        assert_eq!(memory_choice("devmem"), dev_mem(0x5000_0000..0x5400_0000));
+        assert_eq!(memory_choice("devmem:0x1000+4096"), dev_mem(0x1000..0x2000));
     }
 
     #[test]
@@ -96,7 +96,7 @@ mod tests {
             "devmem:0xffffffffffffffff+2",
             "devmem:-1+2",
         ] {
-            memory(wrong).expect_err(wrong);
+            memory_choice(wrong).expect_err(wrong);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! This file builds a pile of several shapes and masses.
+//! Builds a pile of several shapes and masses.
 
 use pgs_support::float_env::standard;
 use zynq_pgs::{Body, Shape};
@@ -7,7 +7,7 @@ use crate::build::{at_rest, check_drop};
 use crate::random::SplitMix64;
 use crate::{Geometry, Grid, Scene, SceneError};
 
-/// The kinds of bodies: outline, and mass in kg. Boxes and capsules have other inertias about other
+/// The kinds of bodies: geometry, and mass in kg. The inertia of boxes and capsules differs between
 /// axes.
 const KINDS: [(Geometry, f32); 8] = [
     (Geometry::Box { half_extents: [0.6; 3] }, 1.0),
@@ -20,18 +20,18 @@ const KINDS: [(Geometry, f32); 8] = [
     (Geometry::Capsule { half_height: 0.6, radius: 0.4 }, 4.0),
 ];
 
-/// Distance between the centres of neighbours, m: no two bodies touch, however they are turned.
+/// Distance between the centres of neighbours, m: no two bodies touch in any orientation.
 const SPACING: f32 = 2.4;
 
-/// What a pile of several shapes is made of.
+/// The options of a pile of several shapes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapesOptions {
     /// Number of bodies along each axis.
     pub grid: Grid,
-    /// Height of the lowest layer above the ground at the start, m: of what the largest body could
-    /// reach.
+    /// Height above the ground at the start, m, of the lowest point that the largest body could
+    /// reach in the lowest layer.
     pub drop: f32,
-    /// Decides which body has which shape, mass and orientation.
+    /// Seed of every body's shape, mass and orientation.
     pub seed: u64,
 }
 
@@ -43,13 +43,14 @@ impl Default for ShapesOptions {
 
 impl Scene {
     /// Builds a pile of cubes, spheres, boxes and capsules of several masses, at rest: on a lattice
-    /// about the origin, each layer half a distance beside the one below, shapes and orientations
-    /// at random. The same seed gives the same bits everywhere.
+    /// about the origin, each layer half a distance beside the one below, with random shapes and
+    /// orientations. The same seed gives the same bits everywhere.
     ///
     /// Boxes of 1 x 0.5 x 2 m and capsules have no isotropic inertia: only a bitstream with world
     /// inertia takes them.
     ///
     /// # Errors
+    ///
     /// [`SceneError::Drop`] if the drop is negative, not a number or above
     /// [`DROP_MAX`](crate::DROP_MAX). [`SceneError::Shape`] does not happen with the kinds above.
     pub fn of_shapes(options: &ShapesOptions) -> Result<Self, SceneError> {
@@ -86,13 +87,13 @@ impl Scene {
     }
 }
 
-/// A unit quaternion, every direction as likely as any other.
+/// A unit quaternion, uniformly distributed.
 fn orientation(random: &mut SplitMix64) -> [f32; 4] {
     loop {
         let q = [(); 4].map(|()| random.sign());
         let squared = ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3];
-        // In the ball, and not so near to its centre that rounding decides the direction. Of the
-        // cube around it three in ten are.
+        // Accepts points in the ball that are not so near its centre that rounding decides the
+        // direction. Three in ten points of the cube around it are in the ball.
         if (0.01..=1.0).contains(&squared) {
             let length = squared.sqrt();
             return q.map(|value| value / length);
@@ -104,6 +105,7 @@ fn orientation(random: &mut SplitMix64) -> [f32; 4] {
 mod tests {
     use super::*;
     use crate::MARGIN;
+    use crate::fixtures::{bits, digest};
 
     fn scene(grid: &str, drop: f32, seed: u64) -> Scene {
         let grid = grid.parse().expect("a grid");
@@ -159,7 +161,7 @@ mod tests {
         for (geometry, _) in KINDS {
             let radius = geometry.bounding_radius();
             assert!(2.0 * radius + MARGIN < SPACING, "{geometry:?}");
-            // What the cells of the broad phase are made for.
+            // The assumption of the broad phase's cells.
             assert!(radius <= Geometry::CUBE.bounding_radius(), "{geometry:?}");
         }
     }
@@ -193,7 +195,7 @@ mod tests {
         }
     }
 
-    /// The scene pushed together until everything touches: as a pile is, or deeper.
+    /// The scene, compressed until everything touches: as in a pile, or deeper.
     fn pressed(seed: u64) -> Scene {
         let mut scene = scene("7x7x7", 0.0, seed);
         for body in &mut scene.bodies_mut()[1..] {
@@ -222,7 +224,7 @@ mod tests {
             kinds.insert((shape(c.body_a).div_ceil(2), shape(c.body_b).div_ceil(2)));
             for contact in &c.contacts[..usize::try_from(c.count).expect("small")] {
                 assert!(contact.distance.is_finite() && contact.distance <= MARGIN, "{c:?}");
-                // Deep inside each other the nearest sides are not opposite ones.
+                // With deep overlap, the nearest sides are not opposite ones.
                 if c.contacts.iter().any(|contact| contact.distance < -0.1) {
                     continue;
                 }
@@ -238,7 +240,7 @@ mod tests {
             }
         }
         assert!(shallow > 100, "{shallow}");
-        // Ground and four kinds of bodies, with each of the four.
+        // The ground and four kinds of bodies, each with each of the four.
         assert_eq!(kinds.len(), 20, "{kinds:?}");
     }
 
@@ -247,24 +249,9 @@ mod tests {
         let mut scene = pressed(5);
         // The second time with used buffers.
         scene.detect();
-        let mut digest = 0xCBF2_9CE4_8422_2325_u64;
-        let mut take = |words: &[u32]| {
-            for word in words {
-                digest = (digest ^ u64::from(*word)).wrapping_mul(0x0100_0000_01B3);
-            }
-        };
-        for shape in scene.shapes() {
-            take(&shape.inverse_inertia.map(f32::to_bits));
-        }
-        for c in scene.detect() {
-            take(&[c.body_a, c.body_b, c.count]);
-            take(&c.normal.map(f32::to_bits));
-            for contact in c.contacts {
-                take(&contact.point.map(f32::to_bits));
-                take(&[contact.distance.to_bits()]);
-            }
-        }
-        // FNV-1a, 64 bits, over the words.
-        assert_eq!(format!("{digest:016x}"), "28968f8797c25c60");
+        let inertias = scene.shapes().iter().flat_map(|shape| shape.inverse_inertia);
+        let words: Vec<u32> = inertias.map(f32::to_bits).collect();
+        let found = digest(words.into_iter().chain(bits(scene.detect())));
+        assert_eq!(found, "28968f8797c25c60");
     }
 }

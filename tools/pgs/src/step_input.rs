@@ -1,4 +1,4 @@
-//! Loads a step from a folder, and says which of its arrays the driver complains about.
+//! Loads a step from a folder, and names the array that the driver refuses.
 
 use std::path::Path;
 
@@ -6,25 +6,25 @@ use thiserror::Error;
 use zynq_pgs::InputError;
 
 use crate::failure::Failure;
-use crate::folder::{
+use step_folder::folder::{
     BODY_ANGULAR, BODY_INVERSE_INERTIA, BODY_INVERSE_MASS, BODY_LINEAR, BODY_ORIENTATION,
     BODY_POSITION, COLLISION_BODIES, COLLISION_COUNT, COLLISION_NORMAL, COLLISION_POINTS, Folder,
     ITERATIONS, PARAMS,
 };
 
-/// Loads the step in a folder that is named on the command line.
+/// Loads the step in a folder named on the command line.
 pub(crate) fn load(path: &Path) -> Result<Folder, Failure> {
     let folder = Folder::load(path).map_err(|error| {
         Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
     })?;
     if folder.bodies.is_empty() {
-        // Said before anything else: without bodies there are no shapes, no indices and no board either.
+        // Checked first: without bodies there are no shapes, no indices and no board.
         return Err(Failure::input(locate(InputError::NoBodies.into(), &folder)));
     }
     Ok(folder)
 }
 
-/// Input that the driver refused, with the file that it stands in.
+/// Input that the driver refused, with the file that holds it.
 #[derive(Debug, Error)]
 #[error("{place}")]
 pub(crate) struct Located {
@@ -33,7 +33,7 @@ pub(crate) struct Located {
     source: zynq_pgs::Error,
 }
 
-/// Names the array, and for a shape the first body that has it.
+/// Names the array, and for a shape the first body with it.
 pub(crate) fn locate(source: zynq_pgs::Error, folder: &Folder) -> Located {
     let place = match &source {
         zynq_pgs::Error::Input(input) => place(input, &folder.path, &folder.shape_bodies),
@@ -57,7 +57,7 @@ fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
     }
 }
 
-/// The array that holds the refused value.
+/// The array that holds a refused value.
 fn file_of(error: &InputError) -> &'static str {
     match error {
         InputError::BodyNotFinite { field, .. }
@@ -93,11 +93,11 @@ fn file_of(error: &InputError) -> &'static str {
         | InputError::NormalLength { .. } => COLLISION_NORMAL,
         InputError::ContactNotFinite { .. }
         | InputError::CollisionOutOfRange { contact: Some(_), .. } => COLLISION_POINTS,
-        // Positions of its bodies; a normal of unit length is in range.
+        // The positions of the bodies; a normal of unit length is always in range.
         InputError::CollisionOutOfRange { contact: None, .. } => BODY_POSITION,
         InputError::Parameter { .. } | InputError::ParameterOutOfRange { .. } => PARAMS,
         InputError::TooManyIterations { .. } => ITERATIONS,
-        // No bodies, too many bodies, and what later versions of the driver add.
+        // No bodies, too many bodies, and errors of later versions of the driver.
         _ => BODY_POSITION,
     }
 }

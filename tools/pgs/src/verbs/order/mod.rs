@@ -1,4 +1,4 @@
-//! The verb `order`: what each order of a step's collisions costs, for every depth of the pipeline.
+//! The verb `order`: measures each order of a step's collisions, for every depth of the pipeline.
 
 mod cost;
 mod curve;
@@ -13,10 +13,11 @@ use scene::Grid;
 use serde_json::{Value, json};
 use zynq_pgs::order::{IssueWindow, OrderError};
 
-use super::SCHEMA;
-use super::table::{Column, grouped, heading, line};
-use crate::args::CommonArgs;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
+use crate::numbers::grouped;
+use crate::output::SCHEMA;
+use crate::output::table::{Column, heading, line};
 use rows::{Measured, Row};
 use source::Source;
 
@@ -27,27 +28,28 @@ Examples:
   pgs order --spheres 20000
   pgs order --grid 10x10x10 --drop 0.5 --steps 60 --json
 
-Depth is the hazard window in issue slots: the cycles from the read of a velocity to its write-back, by the
-initiation interval. A collision is hazardous if it shares a moving body with one of the depth - 1 slots before
-it. A body is alive from its first collision to its last; spans are counted in issue slots, empty ones included.
+Depth is the hazard window in issue slots: the cycles from the read of a velocity to its
+write-back, by the initiation interval. A collision is hazardous if it shares a moving body with
+one of the depth - 1 slots before it. A body is alive from its first collision to its last; spans
+are counted in issue slots, empty ones included.
 
-The folder is that of `pgs solve`; if it also holds gpu_order.npy (M) <u4, the order in which Bullet's GPU takes the
-collisions, it is measured too.";
+The folder is one for `pgs solve`. If it also holds gpu_order.npy (M) <u4, the order of Bullet's
+GPU, this order is measured, too.";
 
-/// Show what each order of the collisions costs: hazards, empty slots, bodies alive, host time.
+/// Show the cost of each order of the collisions: hazards, empty slots, live bodies, host time.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct OrderArgs {
     /// Collisions of a folder of .npy arrays.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["grid", "steps", "drop", "spheres", "seed"])]
     input: Option<PathBuf>,
-    /// Collisions of a pile of so many spheres of three sizes, which is no grid.
+    /// Collisions of an irregular pile with this many spheres of three sizes.
     #[arg(long, value_name = "N", conflicts_with_all = ["grid", "steps", "drop"])]
     spheres: Option<u32>,
-    /// Which pile of spheres.
+    /// Seed of the pile of spheres.
     #[arg(long, value_name = "SEED", default_value_t = 1, requires = "spheres")]
     seed: u64,
-    /// Collisions of cubes dropped on the ground; so many along each axis.
+    /// Collisions of a pile of cubes dropped on the ground; cubes along each axis.
     #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
     grid: Grid,
     /// Steps that the cubes take before their collisions are ordered.
@@ -65,13 +67,14 @@ pub(crate) struct OrderArgs {
         value_parser = clap::value_parser!(u32).range(1..=i64::from(IssueWindow::DEPTH_MAX))
     )]
     depth: Vec<u32>,
-    /// Collisions that enter in one issue slot.
+    /// Collisions that enter the pipeline in one issue slot.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(IssueWindow::PER_ISSUE_MAX)))]
     per_issue: u32,
-    /// Runs of which the host cost is the median.
+    /// Runs for the median host time.
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
-    /// Write the bodies alive in each slot, for every order at the last depth: .csv or .svg.
+    /// Write the number of live bodies in each slot, for every order at the last depth: .csv or
+    /// .svg.
     #[arg(long, value_name = "FILE", value_parser = curve::path)]
     curve: Option<PathBuf>,
 }
@@ -115,9 +118,9 @@ pub(crate) fn run(
     Ok(Verdict::Done)
 }
 
-/// The driver judges what a folder holds.
+/// The input of a folder is checked by the driver.
 fn refused(error: OrderError) -> Failure {
-    Failure::input(error).next("`pgs solve` says more about input that cannot be taken")
+    Failure::input(error).next("`pgs solve` tells more about refused input")
 }
 
 fn print(source: &Source, measured: &Measured, out: &mut dyn Write) -> std::io::Result<()> {

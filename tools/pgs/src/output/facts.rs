@@ -1,4 +1,4 @@
-//! Writes labelled facts in lines that a terminal of 100 columns shows whole.
+//! Writes labelled facts in lines of at most 100 columns.
 
 use std::io::{self, Write};
 
@@ -7,8 +7,8 @@ pub(crate) const WIDTH: usize = 100;
 /// Columns of a label.
 const LABEL: usize = 11;
 
-/// Writes a fact behind its label, in as many lines as it takes. Lines end between words; a word
-/// that is longer than a line keeps its length.
+/// Writes a fact behind its label, in as many lines as it needs. Lines end between words; a word
+/// longer than a line stays whole.
 pub(crate) fn fact(out: &mut dyn Write, label: &str, text: &str) -> io::Result<()> {
     let mut line = format!("{label:<LABEL$}");
     let mut columns = LABEL;

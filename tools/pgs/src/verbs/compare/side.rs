@@ -1,4 +1,4 @@
-//! This file is one of the two boards on its way through the steps.
+//! Steps one of the two compared boards and measures its state.
 
 use scene::{
     KineticEnergy, Momentum, Penetration, Scene, carry_along, kinetic_energy_parts, momentum,
@@ -7,21 +7,21 @@ use scene::{
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Collision, Error, Fault, InputError, Shape, StepParameters, StepReport};
 
-use super::Side;
-use crate::args::{BoardName, CommonArgs};
-use crate::board::{self, Opened};
+use super::spec::SideSpec;
+use crate::board::{self, OpenBoard};
+use crate::common::{BoardName, CommonArgs};
 use crate::deviation::unmoved_share;
 use crate::failure::Failure;
-use crate::folder::Folder;
-use crate::origin;
-use crate::sixteen::Sixteen;
+use crate::narrow::NarrowFormat;
+use crate::step_input;
 use step_folder::digest;
+use step_folder::folder::Folder;
 
-/// What a board steps.
+/// The bodies and collisions that a board steps.
 pub(super) enum World<'a> {
-    /// A scene, whose collisions are found anew after every step.
+    /// A scene, whose collisions are detected after every step.
     Scene(Box<Scene>),
-    /// One step from a folder of arrays, whose shapes are not known.
+    /// One step from a folder of arrays, without the shapes' geometry.
     Folder { folder: &'a Folder, bodies: Vec<Body> },
 }
 
@@ -40,7 +40,7 @@ impl World<'_> {
         }
     }
 
-    /// Whether each of the bodies can move.
+    /// Whether each body can move.
     pub(super) fn moving(&self) -> Vec<bool> {
         let shapes = self.shapes();
         let moves = |body: &Body| {
@@ -51,21 +51,21 @@ impl World<'_> {
     }
 }
 
-/// What there is to measure of a state.
+/// The measures of a state.
 pub(super) struct Measured {
-    /// Of the collisions that `penetration` is about.
+    /// The number of collisions that `penetration` measures.
     pub(super) collisions: u64,
     pub(super) kinetic: KineticEnergy,
     /// J.
     pub(super) potential: f64,
     pub(super) momentum: Momentum,
-    /// After the step: of the collisions that are found then, or of the step's own contacts,
-    /// carried along with their bodies.
+    /// Measured after the step: over the newly detected collisions, or over the step's own
+    /// contacts, carried along with their bodies.
     pub(super) penetration: Penetration,
-    /// Share of the position components that the step left as the board was sent them; none before
-    /// the first.
+    /// Share of the position components whose bits, as sent to the board, the step did not change;
+    /// none at the start.
     pub(super) unmoved: Option<f64>,
-    /// Of the step that led here; none before the first.
+    /// The report of the step that led here; none at the start.
     pub(super) report: Option<StepReport>,
 }
 
@@ -87,41 +87,41 @@ impl Measured {
                 "largest_m": penetration.largest,
             },
             "unmoved_share": self.unmoved,
-            "step": self.report.as_ref().map(crate::verbs::report_json),
+            "step": self.report.as_ref().map(crate::output::report_json),
         })
     }
 }
 
-/// Why a board takes no more steps.
+/// The failure that ended a board's steps.
 pub(super) struct Failed {
     pub(super) step: u32,
-    /// The first body that it is about, where the error says which.
+    /// The first body that the error names, if it names one.
     pub(super) body: Option<usize>,
     pub(super) failure: Failure,
 }
 
-/// One board, and what it steps.
-pub(super) struct Lane<'a> {
+/// One board and its world.
+pub(super) struct Side<'a> {
     pub(super) name: &'static str,
-    pub(super) side: Side,
-    pub(super) opened: Opened,
+    pub(super) spec: SideSpec,
+    pub(super) opened: OpenBoard,
     pub(super) world: World<'a>,
     pub(super) failed: Option<Failed>,
     gravity: [f32; 3],
 }
 
-impl<'a> Lane<'a> {
-    /// Builds the board, and has it take the shapes of what `world` makes.
+impl<'a> Side<'a> {
+    /// Builds the board, and gives it the shapes of the world that `world` makes.
     pub(super) fn open(
         name: &'static str,
-        side: Side,
+        spec: SideSpec,
         common: &CommonArgs,
-        world: impl FnOnce(&Opened) -> Result<World<'a>, Failure>,
+        world: impl FnOnce(&OpenBoard) -> Result<World<'a>, Failure>,
         gravity: [f32; 3],
     ) -> Result<Self, Failure> {
         let common = CommonArgs { board: BoardName::Emulated, ..common.clone() };
         let begin = || {
-            let mut opened = board::open(&common, &side.build)?;
+            let mut opened = board::open(&common, &spec.build)?;
             let world = world(&opened)?;
             if let Err(error) = opened.accelerator.set_shapes(world.shapes()) {
                 return Err(failure(&opened, &world, error));
@@ -129,11 +129,11 @@ impl<'a> Lane<'a> {
             Ok((opened, world))
         };
         let (opened, world) =
-            begin().map_err(|failure: Failure| failure.about(format!("board {name} ({side})")))?;
-        Ok(Self { name, side, opened, world, failed: None, gravity })
+            begin().map_err(|failure: Failure| failure.about(format!("board {name} ({spec})")))?;
+        Ok(Self { name, spec, opened, world, failed: None, gravity })
     }
 
-    /// Finds the collisions of the first step and measures what there is before it.
+    /// Detects the collisions of the first step and measures the start.
     pub(super) fn start(&mut self) -> Measured {
         match &mut self.world {
             World::Scene(scene) => {
@@ -147,13 +147,13 @@ impl<'a> Lane<'a> {
         }
     }
 
-    /// Takes a step and measures what comes of it; nothing if the board has failed.
+    /// Takes a step and measures the state after it; none if the board has failed.
     pub(super) fn step(&mut self, number: u32, parameters: &StepParameters) -> Option<Measured> {
         if self.failed.is_some() {
             return None;
         }
         let capabilities = self.opened.accelerator.capabilities();
-        let parameters = &self.side.ordering.apply_to_compare(*parameters, capabilities);
+        let parameters = &self.spec.ordering.apply_to_compare(*parameters, capabilities);
         let before = self.world.bodies().to_vec();
         let accelerator = &mut self.opened.accelerator;
         let stepped = match &mut self.world {
@@ -201,10 +201,10 @@ impl<'a> Lane<'a> {
         }
     }
 
-    /// A number as the streams of the bodies carry it.
+    /// Rounds a number as the streams of the bodies do.
     fn carried(&self, value: f32) -> f32 {
-        let format = self.side.build.config().variant().numbers.poses;
-        Sixteen::of(format).and_then(|format| format.round_trip(value)).unwrap_or(value)
+        let format = self.spec.build.config().variant().numbers.poses;
+        NarrowFormat::of(format).and_then(|format| format.round_trip(value)).unwrap_or(value)
     }
 
     pub(super) fn digest(&self) -> String {
@@ -215,7 +215,7 @@ impl<'a> Lane<'a> {
     pub(super) fn to_json(&self) -> Value {
         let mut value = self.opened.to_json();
         value["name"] = self.name.into();
-        value["build"] = self.side.to_string().into();
+        value["build"] = self.spec.to_string().into();
         value["digest"] = json!({ "algorithm": digest::ALGORITHM, "value": self.digest() });
         value["failed"] = self.failed.as_ref().map_or(Value::Null, |failed| {
             json!({
@@ -228,17 +228,17 @@ impl<'a> Lane<'a> {
     }
 }
 
-/// The failure that an error of the driver is; for a folder with the array that it is about.
-fn failure(opened: &Opened, world: &World<'_>, error: Error) -> Failure {
+/// Makes a failure of the driver's error; for a folder, with the array at fault.
+fn failure(opened: &OpenBoard, world: &World<'_>, error: Error) -> Failure {
     match world {
         World::Folder { folder, .. } if error.is_input() => {
-            Failure::input(origin::locate(error, folder))
+            Failure::input(step_input::locate(error, folder))
         }
         _ => opened.failure(error),
     }
 }
 
-/// The body that an error is about.
+/// The body that an error names.
 fn body_of(error: &Error) -> Option<usize> {
     match error {
         Error::Step { fault, .. } => match **fault {

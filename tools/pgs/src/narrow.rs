@@ -1,24 +1,24 @@
-//! This file says what becomes of a number in sixteen bits, computed from what the formats mean and
-//! not from how anybody packs them.
+//! Rounds numbers to 16-bit formats, from the definitions of the formats: an implementation
+//! independent of the driver's packing.
 
 use bitstream_model::interface::number::StreamFormat;
 
-/// A way to write a number in sixteen bits and to read it back.
+/// A 16-bit format of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Sixteen {
-    /// IEEE 754, to nearest even.
+pub(crate) enum NarrowFormat {
+    /// IEEE 754, rounded to nearest even.
     Binary16,
-    /// The thesis' own as this project writes it: small magnitudes become 2^-15.
+    /// The thesis' own format, as this project writes it: small magnitudes become 2^-15.
     Thesis16,
-    /// The thesis' own taken literally: three bits of the exponent are cut out, and what they said
-    /// is guessed from the one before them.
+    /// The thesis' own format taken literally: three bits of the exponent are cut out, and reading
+    /// guesses them from the bit before.
     Thesis16Literal,
 }
 
-impl Sixteen {
+impl NarrowFormat {
     pub(crate) const ALL: [Self; 3] = [Self::Binary16, Self::Thesis16, Self::Thesis16Literal];
 
-    /// What a stream of that format makes of its numbers; nothing if it has more than sixteen bits.
+    /// The format of a stream; `None` for streams of more than sixteen bits.
     pub(crate) const fn of(stream: StreamFormat) -> Option<Self> {
         match stream {
             StreamFormat::F32 => None,
@@ -35,8 +35,8 @@ impl Sixteen {
         }
     }
 
-    /// What is read back of a finite number. `None` where it is not a number, or where the driver
-    /// refuses to write it.
+    /// Writes a finite number and reads it back. `None` for a NaN, and for a number that the driver
+    /// refuses to write.
     pub(crate) fn round_trip(self, value: f32) -> Option<f32> {
         let largest = match self {
             Self::Binary16 => StreamFormat::Binary16.largest(),
@@ -53,7 +53,7 @@ impl Sixteen {
     }
 }
 
-/// Smallest exponent of a normal binary16 number; below it the step stays the same.
+/// Smallest exponent of a normal binary16 number; smaller numbers keep its step.
 const EXPONENT_MIN: i32 = -14;
 /// Bits of the mantissa.
 const MANTISSA: i32 = 10;
@@ -63,7 +63,7 @@ fn exponent(value: f32) -> i32 {
     i32::from((value.to_bits() >> 23 & 0xFF) as u8) - 127
 }
 
-/// The nearest binary16 number, of two the even one. Every step is exact in f64 but the rounding.
+/// The nearest binary16 number; ties go to the even one. Only the rounding is inexact in f64.
 fn binary16(value: f32) -> f32 {
     // A subnormal f32 is far below half of the smallest step.
     let step = 2.0_f64.powi(exponent(value).max(EXPONENT_MIN) - MANTISSA);
@@ -82,8 +82,8 @@ fn thesis16(value: f32) -> f32 {
     f32::from_bits(value.to_bits() & !0x1FFF)
 }
 
-/// Of the f32's bits the sign, the top and the four low bits of the exponent and ten of the mantissa
-/// are kept; the three bits between become the complement of the top one, the rest 0.
+/// Keeps the f32's sign, the top bit and the four low bits of the exponent, and ten bits of the
+/// mantissa. The three bits between become the complement of the top bit, all others 0.
 fn literal(value: f32) -> f32 {
     const KEPT: u32 = 0xC780_0000 | 0x007F_E000;
     const BETWEEN: u32 = 0x3800_0000;
@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    fn bits(format: Sixteen, value: f32) -> Option<u32> {
+    fn bits(format: NarrowFormat, value: f32) -> Option<u32> {
         format.round_trip(value).map(f32::to_bits)
     }
 
@@ -121,7 +121,11 @@ mod tests {
             // Up to the smallest normal number.
             (6.103_4e-5, 6.103_515_6e-5),
         ] {
-            assert_eq!(bits(Sixteen::Binary16, value), Some(f32::to_bits(expected)), "{value}");
+            assert_eq!(
+                bits(NarrowFormat::Binary16, value),
+                Some(f32::to_bits(expected)),
+                "{value}"
+            );
         }
     }
 
@@ -137,23 +141,27 @@ mod tests {
             (smallest * 1.5, smallest * 1.5),
             (65_504.0, 65_504.0),
         ] {
-            assert_eq!(bits(Sixteen::Thesis16, value), Some(f32::to_bits(expected)), "{value}");
+            assert_eq!(
+                bits(NarrowFormat::Thesis16, value),
+                Some(f32::to_bits(expected)),
+                "{value}"
+            );
         }
     }
 
     #[test]
     fn what_the_driver_refuses_is_no_number() {
         for value in [65_505.0, -1e9, f32::INFINITY, f32::NAN] {
-            assert_eq!(bits(Sixteen::Binary16, value), None, "{value}");
-            assert_eq!(bits(Sixteen::Thesis16, value), None, "{value}");
+            assert_eq!(bits(NarrowFormat::Binary16, value), None, "{value}");
+            assert_eq!(bits(NarrowFormat::Thesis16, value), None, "{value}");
         }
     }
 
     #[test]
     fn taken_literally_small_numbers_become_large() {
-        let of = |value| bits(Sixteen::Thesis16Literal, value).map(f32::from_bits);
+        let of = |value| bits(NarrowFormat::Thesis16Literal, value).map(f32::from_bits);
         assert_eq!(of(0.0), Some(2.0_f32.powi(-15)));
-        // 2^-16 has the exponent bits of 1.0, but for the three.
+        // 2^-16 has the exponent bits of 1.0, apart from the three cut out.
         assert_eq!(of(2.0_f32.powi(-16)), Some(1.0));
         assert_eq!(of(-1.5 * 2.0_f32.powi(-16)), Some(-1.5));
         assert_eq!(of(2.0_f32.powi(17)), Some(2.0));
@@ -163,23 +171,23 @@ mod tests {
         #[test]
         fn between_its_limits_the_literal_format_is_ours(value in 3.1e-5_f32..65_504.0, minus: bool) {
             let value = if minus { -value } else { value };
-            prop_assert_eq!(bits(Sixteen::Thesis16Literal, value), bits(Sixteen::Thesis16, value));
+            prop_assert_eq!(bits(NarrowFormat::Thesis16Literal, value), bits(NarrowFormat::Thesis16, value));
         }
 
         #[test]
         fn what_binary16_gives_stays_as_it_is(word in 0_u16..0x7C00) {
-            // Decoded as IEEE 754 says: every finite number of the format.
+            // Decodes every finite number of the format, as IEEE 754 defines it.
             let (field, mantissa) = (i32::from(word >> 10), f32::from(word & 0x3FF));
             let value = match field {
                 0 => mantissa * 2.0_f32.powi(-24),
                 _ => (1024.0 + mantissa) * 2.0_f32.powi(field - 25),
             };
-            prop_assert_eq!(bits(Sixteen::Binary16, value), Some(value.to_bits()));
+            prop_assert_eq!(bits(NarrowFormat::Binary16, value), Some(value.to_bits()));
         }
 
         #[test]
         fn no_number_is_farther_than_half_a_step(value in 6.2e-5_f32..65_504.0) {
-            let back = Sixteen::Binary16.round_trip(value).expect("in range");
+            let back = NarrowFormat::Binary16.round_trip(value).expect("in range");
             prop_assert!(((back - value) / value).abs() <= 1.0 / 2048.0);
         }
     }

@@ -1,22 +1,22 @@
-//! This file is the choice of a scene on the command line.
+//! The scene, as chosen on the command line.
 
 use clap::{Args, ValueEnum};
 use scene::{Grid, Inertia, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
+use zynq_pgs::Capabilities;
 
-use crate::board::Opened;
 use crate::failure::Failure;
-use crate::options::BuildArgs;
-use crate::verbs::table::grouped;
+use crate::numbers::grouped;
+use crate::options::build::BuildArgs;
 
-/// Drop if not said otherwise, m: the pile lands within half a second.
+/// Default drop, m: the pile lands within half a second.
 const DROP: f32 = 1.0;
 
-/// Which scene, and how large.
+/// The scene and its size.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SceneArgs {
-    /// What falls: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules of
-    /// several masses), which takes a board with --inertia world.
+    /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules
+    /// of several masses), for which the board needs --inertia world.
     #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
     scene: SceneName,
     /// Bodies along each axis; y is up.
@@ -25,11 +25,10 @@ pub(crate) struct SceneArgs {
     /// Height of the lowest bodies above the ground at the start, m.
     #[arg(long, value_name = "H", default_value_t = DROP, value_parser = drop_height)]
     drop: f32,
-    /// Inverse inertia of the cubes: what Bullet computes (0.3676), or a textbook's (1.5) [default:
-    /// bullet]
+    /// Inverse inertia of the cubes: Bullet's (0.3676), or a textbook's (1.5) [default: bullet]
     #[arg(long, value_enum)]
     cube_inertia: Option<CubeInertia>,
-    /// Decides which of the shapes lies where, and how it is turned [default: 1]
+    /// Seed of the shapes' kinds and orientations [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 }
@@ -64,7 +63,7 @@ fn drop_height(text: &str) -> Result<f32, String> {
 }
 
 impl SceneArgs {
-    /// Builds the scene. It takes as many threads as the emulated board may.
+    /// Builds the scene. Detection uses as many threads as the emulated board may.
     pub(crate) fn build(&self, board: &BuildArgs) -> Result<Scene, Failure> {
         let Self { grid, drop, .. } = *self;
         let built = match self.scene {
@@ -92,9 +91,9 @@ impl SceneArgs {
         self.seed.unwrap_or(ShapesOptions::default().seed)
     }
 
-    /// Refuses a grid that does not fit before memory is taken for it.
-    pub(crate) fn check_size(&self, opened: &Opened) -> Result<(), Failure> {
-        let capacity = opened.accelerator.capabilities().body_capacity;
+    /// Refuses a grid that does not fit, before memory is allocated for it.
+    pub(crate) fn check_size(&self, capabilities: &Capabilities) -> Result<(), Failure> {
+        let capacity = capabilities.body_capacity;
         if self.grid.cubes() < capacity {
             return Ok(());
         }
