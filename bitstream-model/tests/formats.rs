@@ -386,7 +386,7 @@ fn relative(step: &Step, format: StreamFormat) -> Step {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(64))]
 
     /// Between the streams everything is f32: the result is what `float` makes of the words.
     #[test]

@@ -4,7 +4,7 @@
 mod common;
 
 use bitstream_model::interface::control;
-use bitstream_model::interface::profile::{FLOAT, HALF, MIXED};
+use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
 use proptest::prelude::*;
 
@@ -33,14 +33,21 @@ fn config() -> impl Strategy<Value = BoardConfig> {
         prop::option::of(prop::sample::select(&[1_u32, 3, 20, 600][..])),
     )
         .prop_map(|(profile, fifo_beats, length_width, bandwidth, window_slots)| BoardConfig {
-            profile,
             length_width,
             bandwidth,
             window_slots,
-            strict: false,
-            delays: Delays { fifo_beats, ..Delays::default() },
-            ..BoardConfig::default()
+            ..board(profile, fifo_beats)
         })
+}
+
+/// A board that goes on after a violation.
+fn board(profile: &'static Profile, fifo_beats: usize) -> BoardConfig {
+    BoardConfig {
+        profile,
+        strict: false,
+        delays: Delays { fifo_beats, ..Delays::default() },
+        ..BoardConfig::default()
+    }
 }
 
 fn iterations() -> impl Strategy<Value = [u32; 2]> {
@@ -99,13 +106,10 @@ proptest! {
     #[test]
     fn a_step_with_faults_is_the_same_with_and_without(
         config in config(),
-        (bodies, collisions, seed, apart) in (9..100_u32, 1..400_u32, any::<u64>(), any::<bool>()),
+        scene in (9..100_u32, 1..400_u32, any::<u64>(), any::<bool>()),
         iterations in iterations(),
     ) {
-        let step = with_gaps(scene(bodies, collisions, seed, apart), seed, config.profile);
-        let step = Step { iterations, ..step };
-        let plan = FaultPlan::random(seed, &config, iterations[0], iterations[1]);
-        same(config, Some(&plan), 2, |machine| machine.step(&step));
+        step_with_faults(config, scene, iterations);
     }
 
     #[test]
@@ -133,21 +137,57 @@ proptest! {
     #[test]
     fn a_host_that_looks_all_the_time_sees_the_same(
         config in config(),
-        (bodies, seed, apart) in (9..200_u32, any::<u64>(), any::<bool>()),
+        scene in (9..200_u32, any::<u64>(), any::<bool>()),
         pauses in prop::collection::vec(1..4000_u64, 1..20),
     ) {
-        let step = with_gaps(scene(bodies, 500, seed, apart), seed, config.profile);
-        let config = BoardConfig { length_width: 26, ..config };
-        let seen = same(config, None, 1, |machine| {
-            let (flight, _) = begin(machine, &step, |_, _, _| {});
-            for nanoseconds in &pauses {
-                machine.host.port.pause(std::time::Duration::from_nanos(*nanoseconds));
-                machine.host.status(1, common::BOTH[0]);
-                machine.host.control(control::AP_CTRL);
-            }
-            machine.wait(&flight, 40 * LONG)?;
-            Ok(machine.collect(&flight, step.bodies.len()))
-        });
-        prop_assert!(seen.steps[0].is_ok());
+        host_that_looks(config, scene, &pauses);
     }
+}
+
+/// One step, with faults that follow from the seed of the scene.
+fn step_with_faults(
+    config: BoardConfig,
+    (bodies, collisions, seed, apart): (u32, u32, u64, bool),
+    iterations: [u32; 2],
+) {
+    let step = with_gaps(scene(bodies, collisions, seed, apart), seed, config.profile);
+    let step = Step { iterations, ..step };
+    let plan = FaultPlan::random(seed, &config, iterations[0], iterations[1]);
+    same(config, Some(&plan), 2, |machine| machine.step(&step));
+}
+
+/// One step of 500 collisions, during which the host reads registers after each pause, in ns.
+fn host_that_looks(config: BoardConfig, (bodies, seed, apart): (u32, u64, bool), pauses: &[u64]) {
+    let step = with_gaps(scene(bodies, 500, seed, apart), seed, config.profile);
+    let config = BoardConfig { length_width: 26, ..config };
+    let seen = same(config, None, 1, |machine| {
+        let (flight, _) = begin(machine, &step, |_, _, _| {});
+        for nanoseconds in pauses {
+            machine.host.port.pause(std::time::Duration::from_nanos(*nanoseconds));
+            machine.host.status(1, common::BOTH[0]);
+            machine.host.control(control::AP_CTRL);
+        }
+        machine.wait(&flight, 40 * LONG)?;
+        Ok(machine.collect(&flight, step.bodies.len()))
+    });
+    assert!(seen.steps[0].is_ok());
+}
+
+// Inputs that the properties above failed on once, shrunk.
+
+#[test]
+fn a_host_that_looks_after_a_nanosecond_sees_the_same() {
+    host_that_looks(board(&FLOAT, 16), (60, 0, false), &[1]);
+}
+
+#[test]
+fn a_fault_of_a_board_with_one_window_slot_is_the_same_with_and_without() {
+    let config = BoardConfig { length_width: 10, window_slots: Some(1), ..board(&FLOAT, 16) };
+    step_with_faults(config, (35, 46, 987_651_107_387_363_228, false), [4, 4]);
+}
+
+#[test]
+fn a_fault_of_a_step_with_one_collision_is_the_same_with_and_without() {
+    let config = BoardConfig { length_width: 10, ..board(&FLOAT, 16) };
+    step_with_faults(config, (12, 1, 6_219_227_694_810_742_345, false), [4, 4]);
 }
