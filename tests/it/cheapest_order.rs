@@ -1,13 +1,12 @@
 //! A step that names no order has the cheapest one on the board at hand.
 //!
-//! `cargo test -p zynq-pgs --test cheapest_order -- --nocapture` prints the cycles of each order.
+//! `cargo test -p zynq-pgs --test it cheapest_order:: -- --nocapture` prints the cycles of each order.
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
 
-mod common;
-
+use crate::common;
+use crate::common::{bits, open, ordered};
 use bitstream_model::{Bandwidth, BoardConfig, Hazards};
-use common::{bits, open, ordered};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED};
 use zynq_pgs::order::Order;

@@ -4,15 +4,14 @@
 #![allow(unsafe_code, reason = "Rust does not say what it computes in a foreign environment")]
 #![allow(clippy::print_stdout, reason = "what is skipped is said")]
 
-mod common;
-
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::common;
+use crate::common::bits;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, PROFILES, Profile};
 use bitstream_model::{BoardConfig, EmulatedBoard};
-use common::bits;
 use crew::float_env::foreign::{Environment, environments, under};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderInput, Orderer};

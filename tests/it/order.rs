@@ -2,16 +2,14 @@
 //! look, hardware that waits and a solver that takes one collision after the other give the same
 //! bits, and the order costs its empty entries and nothing else.
 //!
-//! With `PGS_VECTORS` also the thesis' step; `cargo test -p zynq-pgs --test order -- --nocapture`
+//! With `PGS_VECTORS` also the thesis' step; `cargo test -p zynq-pgs --test it order:: -- --nocapture`
 //! prints the figures.
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
 
-mod common;
-mod vectors;
-
+use crate::common::{bits, by_hand, open, ordered};
+use crate::vectors;
 use bitstream_model::{BoardConfig, Hazards};
-use common::{bits, by_hand, open, ordered};
 use scene::{Scene, SceneOptions, kinetic_energy};
 use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
 use zynq_pgs::order::{Order, OrderError, Ties};

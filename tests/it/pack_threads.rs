@@ -2,16 +2,14 @@
 //! profile, as given and in order, and where steps are prepared, too.
 #![cfg(feature = "emulation")]
 
-mod common;
-
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
+use crate::common::{bits, ordered};
 use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED, WINDOWED16};
 use bitstream_model::{BoardConfig, EmulatedBoard};
-use common::{bits, ordered};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{

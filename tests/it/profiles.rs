@@ -2,14 +2,12 @@
 //! costs, and what each refuses.
 #![cfg(feature = "emulation")]
 
-mod common;
-
+use crate::common::{bits, open, ordered};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{
     FLOAT, Flow, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile,
 };
-use common::{bits, open, ordered};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{

@@ -1,14 +1,12 @@
 //! The widths of length registers and addresses decide how a step is cut into descriptors, and
 //! nothing else.
 //!
-//! `cargo test -p zynq-pgs --test widths -- --nocapture` prints the descriptors of each.
+//! `cargo test -p zynq-pgs --test it widths:: -- --nocapture` prints the descriptors of each.
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the counts are printed for whoever wants to see them")]
 
-mod common;
-
+use crate::common::{bits, open};
 use bitstream_model::BoardConfig;
-use common::{bits, open};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::{StepParameters, StepReport};
 

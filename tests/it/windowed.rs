@@ -1,21 +1,19 @@
 //! The design that streams the collisions once, through the driver: the same bits as one collision
 //! after the other in the same order, and a refusal of everything that it would wait for for ever.
 //!
-//! With `PGS_VECTORS` also the thesis' step; `cargo test -p zynq-pgs --test windowed -- --nocapture`
+//! With `PGS_VECTORS` also the thesis' step; `cargo test -p zynq-pgs --test it windowed:: -- --nocapture`
 //! prints the figures.
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
 
-mod common;
-mod vectors;
-
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::common::{bits, by_hand, open, ordered};
+use crate::vectors;
 use bitstream_model::interface::profile::{
     FLOAT, Flow, HALF, Inertia, MIXED, Profile, WINDOWED, WINDOWED16, Window,
 };
 use bitstream_model::{Bandwidth, BoardConfig};
-use common::{bits, by_hand, open, ordered};
 use scene::{Scene, SceneOptions, ShapesOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{

@@ -1,7 +1,5 @@
 //! The accelerator behind its streams and registers: results, refusals, counters.
 
-mod common;
-
 use bitstream_model::interface::axi_dma::dmasr;
 use bitstream_model::interface::control::{self, ErrorCode, ap_ctrl, irq};
 use bitstream_model::interface::profile::FLOAT;
@@ -10,12 +8,12 @@ use bitstream_model::interface::register::Register;
 use bitstream_model::timing::{Records, StepCycles, StepTime};
 use bitstream_model::{Bandwidth, BoardConfig, Direction, Hazards, Subnormals, ViolationKind};
 
-use common::ring::{EOF, SOF};
-use common::scene::{
+use crate::common::ring::{EOF, SOF};
+use crate::common::scene::{
     AT_REST, Body, Collision, Lane, STATIC, Step, bits, ground_contact, one_cube, result_beats,
 };
-use common::sg::{Failure, Flight, LONG, Machine, Outcome};
-use common::{CORES, microseconds, numbered};
+use crate::common::sg::{Failure, Flight, LONG, Machine, Outcome};
+use crate::common::{CORES, microseconds, numbered};
 
 const UNLIMITED: Bandwidth = Bandwidth::Unlimited;
 

@@ -1,7 +1,5 @@
 //! Direct mode: the same steps without descriptors, one transfer a channel at a time.
 
-mod common;
-
 use std::time::Duration;
 
 use bitstream_model::interface::axi_dma::{
@@ -11,10 +9,10 @@ use bitstream_model::interface::control::{self, ap_ctrl};
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use bitstream_model::{BoardConfig, Denied, Direction, ViolationKind};
 
-use common::ring::halves;
-use common::scene::{Body, Step, bits, unpack};
-use common::sg::{LONG, Machine};
-use common::{CORES, Host, microseconds, numbered};
+use crate::common::ring::halves;
+use crate::common::scene::{Body, Step, bits, unpack};
+use crate::common::sg::{LONG, Machine};
+use crate::common::{CORES, Host, microseconds, numbered};
 
 fn without_scatter_gather() -> BoardConfig {
     BoardConfig { scatter_gather: false, ..BoardConfig::default() }

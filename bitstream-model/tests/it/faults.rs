@@ -1,16 +1,15 @@
 //! Every fault that a board can be told to have, as a driver sees it at registers, descriptors and
 //! the interrupt line; and a board that is as before once it was reset.
 
-mod common;
-
 use bitstream_model::interface::axi_dma::{DMACR, dmacr, dmasr};
 use bitstream_model::interface::control::{self, ErrorCode};
 use bitstream_model::interface::profile::WINDOWED;
 use bitstream_model::{BoardConfig, Direction, Fault, FaultKind, FaultPlan, StepPhase, When};
 
-use common::scene::{Step, bits};
-use common::sg::{Failure, Machine};
-use common::{BOTH, CORES};
+use crate::common;
+use crate::common::scene::{Step, bits};
+use crate::common::sg::{Failure, Machine};
+use crate::common::{BOTH, CORES};
 
 fn machine() -> Machine {
     Machine::new(BoardConfig::default())

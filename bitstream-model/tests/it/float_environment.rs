@@ -2,16 +2,14 @@
 #![allow(unsafe_code, reason = "Rust does not say what it computes in a foreign environment")]
 #![allow(clippy::print_stdout, reason = "what is skipped is said")]
 
-mod common;
-
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{HALF, Inertia, PROFILES, Profile};
 use crew::float_env::foreign::{Environment, environments, under};
 
-use common::replaying::{Visible, scene, visible};
-use common::scene::{AT_REST, Body, Step};
-use common::sg::Machine;
+use crate::common::replaying::{Visible, scene, visible};
+use crate::common::scene::{AT_REST, Body, Step};
+use crate::common::sg::Machine;
 
 /// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
 const THESIS16: Numbers = Numbers {

@@ -2,17 +2,17 @@
 
 #![expect(clippy::float_cmp, reason = "the expected values are exact")]
 
-mod common;
-
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Subnormals};
 use half::f16;
 use proptest::prelude::*;
 
-use common::packing::{decode, encode};
-use common::scene::{AT_REST, Body, Collision, STATIC, Step, bits, ground_contact, one_cube};
-use common::sg::{Machine, Outcome};
+use crate::common::packing::{decode, encode};
+use crate::common::scene::{
+    AT_REST, Body, Collision, STATIC, Step, bits, ground_contact, one_cube,
+};
+use crate::common::sg::{Machine, Outcome};
 
 const BINARY16: StreamFormat = StreamFormat::Binary16;
 const THESIS16: StreamFormat = StreamFormat::Thesis16;

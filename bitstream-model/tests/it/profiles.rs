@@ -2,8 +2,6 @@
 
 #![expect(clippy::float_cmp, reason = "the expected values are exact")]
 
-mod common;
-
 use bitstream_model::interface::control::{self, ErrorCode};
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{
@@ -14,9 +12,9 @@ use bitstream_model::interface::stripe::Stripe;
 use bitstream_model::timing::{Records, StepCycles};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, EmulatedBoard, Hazards};
 
-use common::packing::{Row, beats, result_beats};
-use common::scene::{AT_REST, Body, Collision, STATIC, Step, bits, ground_contact};
-use common::sg::{Failure, Machine, Outcome};
+use crate::common::packing::{Row, beats, result_beats};
+use crate::common::scene::{AT_REST, Body, Collision, STATIC, Step, bits, ground_contact};
+use crate::common::sg::{Failure, Machine, Outcome};
 
 fn config(profile: &'static Profile) -> BoardConfig {
     BoardConfig { profile, bandwidth: Bandwidth::Unlimited, ..BoardConfig::default() }

@@ -1,8 +1,6 @@
 //! Whatever a program does to the registers and the descriptors: the board neither panics nor
 //! hangs, and a reset makes it work again.
 
-mod common;
-
 use bitstream_model::interface::address_map::{CONTROL_BASE, dma_base};
 use bitstream_model::interface::axi_dma::{ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, DMACR, LENGTH};
 use bitstream_model::interface::control::{self, ap_ctrl};
@@ -16,10 +14,11 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 
-use common::ring::{Ring, WHOLE, halves};
-use common::scene::{Step, bits};
-use common::sg::{Flight, LONG, Machine};
-use common::{BOTH, CORES, Host, microseconds, numbered};
+use crate::common;
+use crate::common::ring::{Ring, WHOLE, halves};
+use crate::common::scene::{Step, bits};
+use crate::common::sg::{Flight, LONG, Machine};
+use crate::common::{BOTH, CORES, Host, microseconds, numbered};
 
 /// Descriptors and beats that a random program plays with.
 const SLOTS: usize = 8;

@@ -1,15 +1,13 @@
 //! A board that is built wrongly misbehaves in the way that was asked for, and in no other.
 
-mod common;
-
 use std::time::Duration;
 
+use crate::common::{BOTH, CORES, Host};
 use bitstream_model::interface::axi_dma::{DMACR, LENGTH, dmacr};
 use bitstream_model::interface::control::{
     AP_CTRL, CLOCK_KHZ, DMA, GIE, IDENTIFICATION, IER, ISR, RESET, VERSION,
 };
 use bitstream_model::{BoardConfig, InterruptWiring, Quirks, Resettable};
-use common::{BOTH, CORES, Host};
 
 fn built_with(quirks: Quirks) -> Host {
     Host::new(BoardConfig { quirks, ..BoardConfig::default() })

@@ -1,7 +1,5 @@
 //! The registers of the emulated AXI DMAs: reset values, access kinds, side effects.
 
-mod common;
-
 use bitstream_model::interface::address_map::{CONTROL_BASE, dma_base};
 use bitstream_model::interface::axi_dma::{
     ADDRESS, ADDRESS_MSB, CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, TAILDESC, TAILDESC_MSB,
@@ -11,8 +9,8 @@ use bitstream_model::interface::control;
 use bitstream_model::interface::descriptor::status;
 use bitstream_model::{BoardConfig, Direction, ViolationKind};
 
-use common::ring::{Ring, WHOLE, halves};
-use common::{BOTH, CORES, Host, numbered};
+use crate::common::ring::{Ring, WHOLE, halves};
+use crate::common::{BOTH, CORES, Host, numbered};
 use std::time::Duration;
 
 /// Reset values of the MM2S half, as PG021 prints them; S2MM has the same 0x30 higher.

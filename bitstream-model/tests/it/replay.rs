@@ -1,16 +1,15 @@
 //! Decoding collisions once and replaying them is nobody's business but the host's: results,
 //! registers, counters, cycles and faults are those of decoding them in every pass.
 
-mod common;
-
 use bitstream_model::interface::control;
 use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
 use proptest::prelude::*;
 
-use common::replaying::{OTHERS, begin, begin_once, below, same, scene, with_gaps};
-use common::scene::Step;
-use common::sg::LONG;
+use crate::common;
+use crate::common::replaying::{OTHERS, begin, begin_once, below, same, scene, with_gaps};
+use crate::common::scene::Step;
+use crate::common::sg::LONG;
 
 fn config() -> impl Strategy<Value = BoardConfig> {
     (

@@ -1,19 +1,19 @@
 //! A pass is replayed only as long as it brings the bytes that the first one brought: other buffers,
 //! other bytes, buffers that change hands, packets that end elsewhere.
 
-mod common;
-
 use bitstream_model::interface::control;
 use bitstream_model::interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
 use bitstream_model::interface::record::Beat;
 use bitstream_model::{BoardConfig, DeviceAccess, Direction, FaultPlan};
 use half::f16;
 
-use common::packing::result_beats;
-use common::replaying::{PROFILES, Seen, begin, begin_once, large, same, scene, whole_length};
-use common::ring::WHOLE;
-use common::scene::Lane;
-use common::sg::{Failure, Flight, LONG};
+use crate::common::packing::result_beats;
+use crate::common::replaying::{
+    PROFILES, Seen, begin, begin_once, large, same, scene, whole_length,
+};
+use crate::common::ring::WHOLE;
+use crate::common::scene::Lane;
+use crate::common::sg::{Failure, Flight, LONG};
 
 /// Where the first contact point of each collision is on the streams of a design, or of each issue.
 #[derive(Debug, Clone, Copy)]

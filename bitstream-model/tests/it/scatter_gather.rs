@@ -1,16 +1,14 @@
 //! Scatter-gather: steps on rings, and everything that can be wrong with a descriptor.
 
-mod common;
-
 use bitstream_model::interface::axi_dma::{CURDESC, CURDESC_MSB, DMACR, DMASR, dmacr, dmasr};
 use bitstream_model::interface::descriptor::{CONTROL, STATUS, status};
 use bitstream_model::interface::record::Beat;
 use bitstream_model::{BoardConfig, Denied, DeviceAccess, Direction, ViolationKind};
 
-use common::ring::{EOF, Ring, SOF, WHOLE, halves};
-use common::scene::{Body, Step, bits};
-use common::sg::{Failure, Flight, LONG, Machine};
-use common::{BOTH, CORES, Host, microseconds, numbered};
+use crate::common::ring::{EOF, Ring, SOF, WHOLE, halves};
+use crate::common::scene::{Body, Step, bits};
+use crate::common::sg::{Failure, Flight, LONG, Machine};
+use crate::common::{BOTH, CORES, Host, microseconds, numbered};
 
 fn assert_same(found: &[Body], expected: &[Body]) {
     assert_eq!(found.len(), expected.len());

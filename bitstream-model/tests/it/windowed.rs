@@ -1,8 +1,6 @@
 //! The design that streams the collisions once: the same bits as one pass after the other, and the cycles
 //! that its rules give.
 
-mod common;
-
 use bitstream_model::interface::control::{self, ErrorCode};
 use bitstream_model::interface::descriptor::status;
 use bitstream_model::interface::profile::{
@@ -13,11 +11,11 @@ use bitstream_model::interface::stripe::Stripe;
 use bitstream_model::{Bandwidth, BoardConfig, Delays, EmulatedBoard, Hazards, Subnormals};
 use proptest::prelude::*;
 
-use common::clock::{Clock, Counted};
-use common::packing::result_beats;
-use common::ring::{EOF, SOF};
-use common::scene::{AT_REST, Body, Collision, MOVING, STATIC, Step, bits, ground_contact};
-use common::sg::{Failure, Flight, LONG, Machine, Outcome};
+use crate::common::clock::{Clock, Counted};
+use crate::common::packing::result_beats;
+use crate::common::ring::{EOF, SOF};
+use crate::common::scene::{AT_REST, Body, Collision, MOVING, STATIC, Step, bits, ground_contact};
+use crate::common::sg::{Failure, Flight, LONG, Machine, Outcome};
 
 /// The same numbers and records, one pass after the other.
 static SEQUENTIAL: Profile = Profile { flow: Flow::Passes, ..WINDOWED };

@@ -1,13 +1,11 @@
 //! A folder of arrays as it is exported in practice: what is taken, and what is refused with its true cause.
 
-mod common;
-
 use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use common::{Ran, copy, golden, patch, pgs, run, write};
+use crate::common::{Ran, copy, golden, patch, pgs, run, write};
 use tempfile::TempDir;
 
 const COLLISION_FILES: [&str; 4] =

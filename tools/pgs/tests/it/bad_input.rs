@@ -1,10 +1,8 @@
 //! Whatever a folder of arrays holds, `pgs solve` answers with one clear error and code 2.
 
-mod common;
-
 use std::fs;
 
-use common::{DATA, Ran, copy, patch, pgs, write};
+use crate::common::{DATA, Ran, copy, patch, pgs, write};
 use proptest::prelude::*;
 use tempfile::TempDir;
 

@@ -1,8 +1,6 @@
 //! `pgs check` names the cause of every board that is built wrongly, and its exit code says so.
 
-mod common;
-
-use common::{Ran, pgs, run, skipped};
+use crate::common::{Ran, pgs, run, skipped};
 use serde_json::Value;
 
 fn check(arguments: &[&str]) -> Ran {

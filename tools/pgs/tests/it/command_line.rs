@@ -2,12 +2,11 @@
 
 #![allow(clippy::print_stdout, reason = "a test says aloud what it skips")]
 
-mod common;
-
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
-use common::{Ran, golden, patch, pgs, run};
+use crate::common;
+use crate::common::{Ran, golden, patch, pgs, run};
 use serde_json::Value;
 
 fn json(ran: &Ran) -> Value {

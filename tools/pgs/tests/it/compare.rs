@@ -1,9 +1,7 @@
 //! `pgs compare` and `pgs formats` keep their promises: zero differences of equals, measures that
 //! can be computed by hand, what a failing board leaves, and the figures of the full step.
 
-mod common;
-
-use common::{Ran, copy, golden, patch, run, skipped, variable};
+use crate::common::{Ran, copy, golden, patch, run, skipped, variable};
 use serde_json::Value;
 
 fn json(ran: &Ran) -> Value {

@@ -1,8 +1,7 @@
 //! Variables of the environment: blank is unset, wrong is named, and what the command line says goes before.
 
-mod common;
-
-use common::{Ran, golden, pgs};
+use crate::common;
+use crate::common::{Ran, golden, pgs};
 
 /// `pgs solve --digest` with these variables.
 fn solve(variables: &[(&str, &str)], more: &[&str]) -> Ran {

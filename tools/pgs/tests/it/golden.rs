@@ -3,12 +3,12 @@
 //!
 //! The small scenes are in `tests/golden`. With the environment variable `PGS_VECTORS` every folder
 //! below that directory is compared too; among them `full_step186`, the thesis' scene.
-mod common;
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use common::{run, skipped, variable};
+use crate::common;
+use crate::common::{run, skipped, variable};
 use serde_json::Value;
 
 /// The folder of all vectors, if there is one; says once if there is none.

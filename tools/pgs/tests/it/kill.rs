@@ -1,16 +1,14 @@
 //! A driver that is killed in the middle of whatever it does leaves a board that the next one can
 //! use: the same digest as if nothing had been, and nothing of the dead one's transfers lands in it.
 //!
-//! `PGS_KILLS=200 cargo test --release -p pgs --test kill -- --nocapture` kills two hundred times.
-
-mod common;
+//! `PGS_KILLS=200 cargo test --release -p pgs --test it kill:: -- --nocapture` kills two hundred times.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use common::{Tied, pgs, signal, variable};
+use crate::common::{Tied, pgs, signal, variable};
 
 /// Kills, if nobody says otherwise.
 const KILLS: u32 = 20;

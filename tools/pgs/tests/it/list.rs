@@ -1,12 +1,10 @@
 //! `pgs list` recognises a board by its regions, and says of each device how it is used, on systems
 //! made of files.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{Ran, pgs};
+use crate::common::{Ran, pgs};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,11 +1,9 @@
 //! `pgs load` as a command: exit codes, messages and JSON, on a system made of files.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{Ran, run};
+use crate::common::{Ran, run};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,10 +1,8 @@
 //! `pgs model` shows every table of the thesis beside ours, as text, Markdown and JSON.
 
-mod common;
-
 use std::collections::BTreeSet;
 
-use common::{Ran, run};
+use crate::common::{Ran, run};
 use serde_json::{Value, json};
 
 fn model(arguments: &[&str]) -> Ran {

@@ -1,10 +1,10 @@
 //! `pgs order`: its table, on the scenes of the repository and, with `PGS_VECTORS`, on the thesis'
 //! scene, where the figures were measured outside this project.
-mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{golden, run, skipped, variable};
+use crate::common;
+use crate::common::{golden, run, skipped, variable};
 use serde_json::Value;
 
 /// Runs `pgs order --json`; its document.

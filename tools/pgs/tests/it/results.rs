@@ -1,12 +1,10 @@
 //! Files of results replace earlier ones as a whole: after a failure these are as they were.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use common::{Ran, golden, pgs, run};
+use crate::common::{Ran, golden, pgs, run};
 
 /// Names and contents of a folder, in the order of the names.
 fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {

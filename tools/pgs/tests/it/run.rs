@@ -1,8 +1,6 @@
 //! What `pgs run` shows a person, and the same for programs.
 
-mod common;
-
-use common::{Ran, run};
+use crate::common::{Ran, run};
 use serde_json::Value;
 
 /// Columns of a terminal that shows every line whole.

@@ -1,8 +1,6 @@
 //! A counter that stopped at its maximum is shown as a bound, and is no number for programs.
 
-mod common;
-
-use common::{copy, golden, patch, run};
+use crate::common::{copy, golden, patch, run};
 use serde_json::Value;
 
 fn json(arguments: &[&str]) -> Value {

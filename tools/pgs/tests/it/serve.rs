@@ -1,17 +1,16 @@
 //! A served board from the command line: one driver at a time, Ctrl-C in the middle of a step, and
 //! what is refused.
 
-mod common;
-
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 
+use crate::common;
+use crate::common::{Ran, Tied, pgs, run, signal};
 use bitstream_model::interface::address_map::dma_base;
 use bitstream_model::remote::message::{ANSWER_BYTES, Answer, REQUEST_BYTES, Request, Status};
-use common::{Ran, Tied, pgs, run, signal};
 
 /// `pgs serve` in a process of its own.
 struct Served {
