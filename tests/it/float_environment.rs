@@ -9,7 +9,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common;
 use crate::common::bits;
-use crate::common::bits;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, PROFILES, Profile};
 use bitstream_model::{BoardConfig, EmulatedBoard};
