@@ -50,7 +50,7 @@ impl EmulatedBoard {
         granted: Vec<Range<u64>>,
     ) -> Result<Self, ConfigError> {
         config.check()?;
-        Ok(Self::of(config, Memory::outside(memory, granted)))
+        Ok(Self::of(config, Memory::external(memory, granted)))
     }
 
     fn of(config: BoardConfig, memory: Memory) -> Self {
