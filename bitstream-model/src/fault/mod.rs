@@ -71,8 +71,8 @@ pub enum FaultKind {
     },
     /// A packet ends with this beat; the rest of it is lost.
     ShortPacket,
-    /// One more beat follows a packet and carries its TLAST. A receiver's buffers need not have room
-    /// for it.
+    /// One more beat follows a packet and carries its TLAST. A receiver's buffers need not have
+    /// room for it.
     LongPacket,
     /// A packet has no TLAST.
     NoTlast,

@@ -53,7 +53,7 @@ impl Connection {
     }
 
     /// Takes the request that has arrived, if it is whole.
-    pub(super) fn take(&mut self) -> Option<[u8; REQUEST_BYTES]> {
+    pub(super) fn take_request(&mut self) -> Option<[u8; REQUEST_BYTES]> {
         let whole = self.is_whole();
         if whole {
             (self.filled, self.due) = (0, None);

@@ -83,7 +83,7 @@ impl PendingConnections {
     pub(super) fn refuse_callers(&mut self, now: Duration) {
         while let Some(caller) = self.caller() {
             let Caller::Requesting(mut connection) = caller else { continue };
-            let Some(request) = connection.take() else { continue };
+            let Some(request) = connection.take_request() else { continue };
             let status = match Request::decode(&request) {
                 Ok(Request::Hello { version: VERSION }) => Status::Busy,
                 Ok(Request::Hello { .. }) => Status::OtherVersion,

@@ -104,7 +104,7 @@ impl<'a> Session<'a> {
         // A driver that has the memory may take any time between two requests, but not inside one.
         let first = (!self.has_memory).then(|| Instant::now() + FIRST_LIMIT);
         loop {
-            if let Some(request) = self.connection.take() {
+            if let Some(request) = self.connection.take_request() {
                 return Ok(Some(request));
             }
             let until = self.connection.due().into_iter().chain(first).min();

@@ -3,9 +3,9 @@
 //!
 //! ```text
 //! collisions -> pass 0 -> delay line -> pass 1 -> delay line -> ... -> pass P-1
-//! velocities ----^ first use                                             | last use
-//!                  places (velocity, mass, scoreboard) <-----------------+-> integration -> results
-//!                                                                    poses -----^
+//! velocities ----^ first use                                            | last use
+//!                  places (velocity, mass, scoreboard) <----------------+-> integration -> results
+//!                                                                   poses -----^
 //! ```
 //!
 //! `entry.rs` reads the marks of a record, `place.rs` is the table of live bodies with its
