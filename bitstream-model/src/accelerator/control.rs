@@ -132,7 +132,7 @@ impl Registers {
         }
     }
 
-    /// Resets all registers but the counters: those of the last step stay readable.
+    /// Resets all registers but the counters of the last step, which stay readable.
     pub(super) fn reset(&mut self) {
         self.arguments = [0; ARGUMENT_WORDS];
         self.gie = false;

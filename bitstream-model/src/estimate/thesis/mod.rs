@@ -1,8 +1,8 @@
 //! Figures of the thesis, for comparison with the figures that follow from the profiles.
 //!
 //! [`data`] counts words as the thesis' Tables 4.1 to 4.6 do, for any scene. [`recorded`] holds the
-//! figures that the thesis measured or cites; none of them is a figure of this project. [`euler`]
-//! recomputes its Figure 2.6.
+//! figures that the thesis measured or cites; this project has measured none. [`euler`] recomputes
+//! its Figure 2.6.
 
 pub mod data;
 pub mod euler;
