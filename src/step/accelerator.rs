@@ -1,18 +1,20 @@
-//! This file is the accelerator as a caller sees it, and the first half of a step.
+//! The accelerator as a caller sees it, and the first half of a step.
 //!
-//! Validate, order, reserve, pack (`load.rs`); hand over, start; then, in [`InFlight`], wait, take
-//! back, check, unpack, commit: nothing of the caller's changes before the last.
+//! A step is five calls there and five back. [`Accelerator::submit`] checks, orders, reserves, packs
+//! (`pack.rs`) and starts; [`InFlight::wait`] waits, takes back, checks, reads and commits
+//! (`in_flight.rs`). The caller's bodies change in the last call, and only there.
 
 use std::fmt;
 use std::sync::Arc;
 
 use pgs_support::float_env::standard;
 
-use super::in_flight::{Flight, InFlight, Started, Stopwatch};
+use super::in_flight::{Flight, InFlight, Started};
 use super::ordering::Ordering;
 use super::pack::{Engines, PackedStep};
 use super::report::StepReport;
 use super::retry::with_retries;
+use super::stopwatch::Stopwatch;
 use crate::beat::pack::pool::PackPool;
 use crate::board::bank::{Bank, PerBank};
 use crate::board::cancellation::Cancellation;
@@ -42,8 +44,8 @@ pub struct Accelerator {
     pub(super) shapes_loaded: u64,
     /// The bank of the step that was started last, into which the next one that is not prepared goes.
     pub(super) bank: Bank,
-    /// What lies in the banks.
-    pub(super) loads: PerBank<Option<PackedStep>>,
+    /// The step that lies in each bank.
+    pub(super) packed: PerBank<Option<PackedStep>>,
     /// How it was ordered.
     pub(super) orderings: PerBank<Ordering>,
     /// Results of a step until all are checked. Kept, so that a step allocates nothing.
@@ -57,7 +59,7 @@ impl fmt::Debug for Accelerator {
             .field("board", &self.board)
             .field("capabilities", &self.device.capabilities)
             .field("shapes", &self.shapes.len())
-            .field("loads", &self.loads)
+            .field("packed", &self.packed)
             .field("dead", &self.device.dead)
             .finish_non_exhaustive()
     }
@@ -110,7 +112,7 @@ impl Accelerator {
             shapes: Vec::new(),
             shapes_loaded: 0,
             bank: Bank::First,
-            loads: PerBank::default(),
+            packed: PerBank::default(),
             orderings: PerBank::default(),
             spare: Vec::new(),
         }
@@ -195,11 +197,10 @@ impl Accelerator {
     ) -> Result<InFlight<'_>, Error> {
         standard(move || {
             self.device.settle(&self.shapes)?;
-            let mut watch = Stopwatch::start();
+            let (mut watch, accesses) = (Stopwatch::start(), self.accesses());
             let into = (self.bank, Engines::Idle);
-            let accesses = self.accesses();
-            let load = self.load(into, bodies, collisions, parameters, &mut watch)?;
-            let flight = self.begin(load, watch, accesses)?;
+            let step = self.pack(into, bodies, collisions, parameters, &mut watch)?;
+            let flight = self.begin(step, watch, accesses)?;
             Ok(InFlight::new(self, flight))
         })
     }
@@ -212,24 +213,24 @@ impl Accelerator {
     /// Starts a step that lies in its bank. Nothing is in flight.
     pub(super) fn begin(
         &mut self,
-        load: PackedStep,
+        step: PackedStep,
         watch: Stopwatch,
         accesses: (u64, u64),
     ) -> Result<Flight, Error> {
-        let PackedStep { plan, parameters, bank, .. } = &load;
-        let mut flight = Flight { load, started: None, watch, accesses };
+        let PackedStep { plan, parameters, bank, .. } = &step;
+        let mut flight = Flight { step, started: None, watch, accesses };
         self.bank = *bank;
-        if load.sent.is_some() {
+        if step.sent.is_some() {
             let device = &mut self.device;
             let limit = plan.deadline(parameters, &device.capabilities);
             let deadline = Deadline::after(&*device.platform, limit);
             let armed = device.arm(plan, *bank, parameters);
-            flight.load.host.start += flight.watch.lap();
+            flight.step.host.start += flight.watch.lap();
             let doorbells = armed
                 .and_then(|()| device.start())
                 .map_err(|symptom| device.fail(symptom, &self.shapes))?;
             // From here on the board is at work.
-            flight.load.host.wait = flight.watch.lap();
+            flight.step.host.wait = flight.watch.lap();
             flight.started = Some(Started { deadline, doorbells });
         }
         Ok(flight)

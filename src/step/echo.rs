@@ -69,7 +69,7 @@ impl Accelerator {
     fn run_echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Symptom> {
         let plan = plan(echo.bodies.len(), self.device.capabilities.variant);
         let bank = self.bank;
-        self.loads[bank] = None;
+        self.packed[bank] = None;
         if echo.fresh_buffers {
             self.device.release_buffers(bank);
         }

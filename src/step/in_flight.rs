@@ -1,6 +1,4 @@
-//! This file is the second half of a step: wait, take back, check, unpack, commit.
-
-use std::time::{Duration, Instant};
+//! The second half of a step: wait, take back, check, read, commit.
 
 use pgs_support::float_env::standard;
 
@@ -8,7 +6,8 @@ use super::accelerator::Accelerator;
 use super::locate::locate;
 use super::pack::PackedStep;
 use super::report::{HostTimes, StepCycles, StepReport};
-use super::results::{commit, commit_velocities};
+use super::results::{check_received, commit, commit_velocities, read};
+use super::stopwatch::Stopwatch;
 use crate::board::symptom::Symptom;
 use crate::control_block::{Counters, Saturated};
 use crate::error::Error;
@@ -33,7 +32,7 @@ pub struct InFlight<'a> {
 /// What is known of a step between its start and its end.
 #[derive(Debug)]
 pub(super) struct Flight {
-    pub(super) load: PackedStep,
+    pub(super) step: PackedStep,
     /// Nothing, where nothing moves and nothing is streamed.
     pub(super) started: Option<Started>,
     pub(super) watch: Stopwatch,
@@ -90,7 +89,7 @@ impl<'a> InFlight<'a> {
 
     /// Waits for the board, and takes back what it held of the step.
     pub(super) fn collect<B: Bodies + ?Sized>(&mut self, bodies: &B) -> Result<Ended, Error> {
-        let (found, expected) = (bodies.len(), self.flight.load.bodies);
+        let (found, expected) = (bodies.len(), self.flight.step.bodies);
         if found != expected {
             let Accelerator { device, shapes, .. } = &mut *self.accelerator;
             device.settle(shapes)?;
@@ -101,7 +100,7 @@ impl<'a> InFlight<'a> {
 
     fn take_results(&mut self) -> Result<Ended, Symptom> {
         let Self { accelerator, flight } = self;
-        let PackedStep { plan, bank, sent, .. } = flight.load;
+        let PackedStep { plan, bank, sent, .. } = flight.step;
         // What the caller did meanwhile.
         flight.watch.lap();
         let device = &mut accelerator.device;
@@ -114,8 +113,8 @@ impl<'a> InFlight<'a> {
         let interrupts = device.wait(&plan, &deadline)?;
         let counters = device.collect(&deadline)?;
         device.take_back(bank)?;
-        flight.load.host.wait += flight.watch.lap();
-        Accelerator::check_received(&plan, sent, &counters)?;
+        flight.step.host.wait += flight.watch.lap();
+        check_received(&plan, sent, &counters)?;
         let mut report = self.report(&counters);
         (report.doorbells, report.interrupts) = (doorbells, interrupts);
         report.descriptors = self.accelerator.device.descriptors();
@@ -129,11 +128,13 @@ impl<'a> InFlight<'a> {
         bodies: &B,
     ) -> Result<(), Fault> {
         let Self { accelerator, flight } = self;
-        let PackedStep { plan, bank, arranged, .. } = &flight.load;
-        // Of a step that was not started there are no sums.
+        let PackedStep { plan, bank, arranged, .. } = &flight.step;
+        let Accelerator { device, orderings, spare, .. } = &mut **accelerator;
+        let lives = arranged.live.map(|_| orderings[*bank].lives());
+        // A step that was not started has no sums.
         let answered = ended.counters.sums.map(|(_, answered)| answered);
-        accelerator.unpack(plan, *bank, bodies, arranged.live, answered)?;
-        flight.load.host.unpack = flight.watch.lap();
+        read(device, spare, (plan, *bank), bodies, lives, answered)?;
+        flight.step.host.unpack = flight.watch.lap();
         Ok(())
     }
 
@@ -144,13 +145,13 @@ impl<'a> InFlight<'a> {
         bodies: &mut B,
     ) -> StepReport {
         let Self { accelerator, flight } = self;
-        match flight.load.parameters.integrate {
+        match flight.step.parameters.integrate {
             true => commit(&accelerator.spare, bodies),
             false => commit_velocities(&accelerator.spare, bodies),
         }
-        flight.load.host.commit = flight.watch.lap();
+        flight.step.host.commit = flight.watch.lap();
         let mut report = ended.report;
-        report.host = flight.load.host;
+        report.host = flight.step.host;
         log::debug!(
             "step: {} bodies, {} collisions and {} empty entries ({:?}), {} passes, {} cycles ({} \
              stalled, {} waiting), {} hazards{}",
@@ -177,7 +178,7 @@ impl<'a> InFlight<'a> {
 
     /// Says of which of the caller's collisions an error speaks.
     pub(super) fn located(&self, mut error: Error) -> Error {
-        let PackedStep { arranged, bank, .. } = &self.flight.load;
+        let PackedStep { arranged, bank, .. } = &self.flight.step;
         if arranged.scheduled {
             let ordering = &self.accelerator.orderings[*bank];
             let lives = arranged.live.map(|_| ordering.lives());
@@ -188,7 +189,7 @@ impl<'a> InFlight<'a> {
 
     /// What the step streamed and counted, so far.
     fn report(&self, counters: &Counters) -> StepReport {
-        let PackedStep { plan, arranged, bodies, collisions, empty, .. } = &self.flight.load;
+        let PackedStep { plan, arranged, bodies, collisions, empty, .. } = &self.flight.step;
         let (work, waits) = (u64::from(counters.work), u64::from(counters.waits));
         let stalls = counters.cycles.saturating_sub(work).saturating_sub(waits);
         let (reads, writes) = self.accelerator.accesses();
@@ -224,22 +225,5 @@ impl Drop for InFlight<'_> {
     fn drop(&mut self) {
         let Accelerator { device, shapes, .. } = &mut *self.accelerator;
         standard(|| device.abandon(shapes));
-    }
-}
-
-/// Host time by laps.
-#[derive(Debug)]
-pub(super) struct Stopwatch(Instant);
-
-impl Stopwatch {
-    /// Begins the first lap.
-    pub(super) fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    /// Time since the last lap.
-    pub(super) fn lap(&mut self) -> Duration {
-        let now = Instant::now();
-        now - std::mem::replace(&mut self.0, now)
     }
 }

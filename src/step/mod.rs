@@ -9,8 +9,10 @@ mod pack;
 mod packing;
 mod prepared;
 pub(crate) mod report;
+mod reserve;
 mod results;
 mod retry;
+mod stopwatch;
 #[cfg(all(test, feature = "emulation"))]
 mod tests;
 mod written;

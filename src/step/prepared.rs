@@ -1,4 +1,4 @@
-//! This file packs a step while another is on the board, and starts it when that one has ended.
+//! Packs a step while another is on the board, and starts it when that one has ended.
 //!
 //! ```text
 //!   CPU    | pack 0 |  pack 1  |unpack 0|  pack 2  |unpack 1| ...
@@ -8,9 +8,11 @@
 use pgs_support::float_env::standard;
 
 use super::accelerator::Accelerator;
-use super::in_flight::{Flight, InFlight, Stopwatch};
+use super::in_flight::{Flight, InFlight};
 use super::pack::{Engines, PackId, PackedStep};
 use super::report::StepReport;
+use super::reserve::or_free;
+use super::stopwatch::Stopwatch;
 use crate::board::bank::Bank;
 use crate::error::{Aftermath, Error};
 use crate::fault::Fault;
@@ -28,7 +30,7 @@ use crate::validate::InputError;
 #[must_use = "a step that was prepared is not started by itself"]
 pub struct Prepared {
     pub(super) bank: Bank,
-    pub(super) ticket: PackId,
+    pub(super) id: PackId,
 }
 
 impl InFlight<'_> {
@@ -79,28 +81,28 @@ impl InFlight<'_> {
     ) -> Result<Prepared, Error> {
         standard(|| {
             let accelerator = &mut *self.accelerator;
-            let into = (self.flight.load.bank.other(), Engines::Working);
+            let into = (self.flight.step.bank.other(), Engines::Working);
             let mut watch = Stopwatch::start();
-            let load = accelerator.load(into, bodies, collisions, parameters, &mut watch)?;
-            self.hand_over(load)
+            let step = accelerator.pack(into, bodies, collisions, parameters, &mut watch)?;
+            self.hand_over(step)
         })
     }
 
-    /// Hands what was packed while this step is on the board over to the device.
-    pub(super) fn hand_over(&mut self, mut load: PackedStep) -> Result<Prepared, Error> {
-        let (accelerator, bank) = (&mut *self.accelerator, load.bank);
+    /// Hands a step that was packed while this one is on the board over to the device.
+    pub(super) fn hand_over(&mut self, mut step: PackedStep) -> Result<Prepared, Error> {
+        let (accelerator, bank) = (&mut *self.accelerator, step.bank);
         let mut watch = Stopwatch::start();
-        if load.sent.is_some() {
+        if step.sent.is_some() {
             // Cleaning caches, or copying, takes its time, too.
-            accelerator.device.hand_over(&load.plan, bank).map_err(|error| {
-                accelerator.loads[bank] = None;
+            accelerator.device.hand_over(&step.plan, bank).map_err(|error| {
+                accelerator.packed[bank] = None;
                 let fault = Box::new(Fault::from(error));
                 Error::Step { fault, aftermath: Aftermath::Untouched, diagnosis: None }
             })?;
-            load.host.start = watch.lap();
-            accelerator.loads[bank] = Some(load);
+            step.host.start = watch.lap();
+            accelerator.keep(step);
         }
-        Ok(Prepared { bank, ticket: load.ticket })
+        Ok(Prepared { bank, id: step.id })
     }
 
     /// Waits as [`wait`](Self::wait) does, and starts a prepared step as soon as the board is through
@@ -125,7 +127,7 @@ impl InFlight<'_> {
         next: &Prepared,
     ) -> (Result<StepReport, Error>, Result<Self, Error>) {
         let ended = self.collect(bodies);
-        if next.bank == self.flight.load.bank {
+        if next.bank == self.flight.step.bank {
             // The same step once more, where the results are that are not read yet.
             let report = ended.and_then(|ended| self.finish(ended, bodies));
             let started = self.accelerator.begin_prepared(next, Memory::Freed);
@@ -197,32 +199,33 @@ impl Accelerator {
         self.device.settle(&self.shapes)?;
         let watch = Stopwatch::start();
         let accesses = self.accesses();
-        let load = self.loads[prepared.bank].filter(|load| load.ticket == prepared.ticket);
-        let Some(load @ PackedStep { plan, bank, shapes_loaded, .. }) = load else {
+        let step = self.packed[prepared.bank].filter(|step| step.id == prepared.id);
+        let Some(step @ PackedStep { plan, bank, shapes_loaded, .. }) = step else {
             return Err(InputError::NotPrepared.into());
         };
-        if load.sent.is_some() && !self.device.holds(bank) {
+        if step.sent.is_some() && !self.device.holds(bank) {
             // Lost to a fault.
             return Err(InputError::NotPrepared.into());
         }
         if shapes_loaded != self.shapes_loaded {
             return Err(InputError::ShapesChanged.into());
         }
-        let mut ready = self.device.check_cancelled().map_err(Into::into);
-        if ready.is_ok() && load.sent.is_some() {
+        let Self { device, packed, shapes, .. } = self;
+        let mut ready = device.check_cancelled().map_err(Into::into);
+        if ready.is_ok() && step.sent.is_some() {
             ready = match memory {
-                Memory::Freed => {
-                    self.or_free(bank, |this| this.device.rings_or_reset(&plan, &this.shapes))
-                }
-                Memory::Kept => self.device.rings_or_reset(&plan, &self.shapes),
+                Memory::Freed => or_free((&mut *device, &mut *packed), bank, |device| {
+                    device.rings_or_reset(&plan, shapes)
+                }),
+                Memory::Kept => device.rings_or_reset(&plan, shapes),
             };
         }
-        ready.map_err(|symptom| self.device.fail(symptom, &self.shapes))?;
-        if load.sent.is_some() && !self.device.holds(bank) {
-            // Lost to a reset that the rings wanted.
-            self.loads[bank] = None;
+        ready.map_err(|symptom| device.fail(symptom, shapes))?;
+        if step.sent.is_some() && !device.holds(bank) {
+            // Lost to a reset that the rings needed.
+            packed[bank] = None;
             return Err(InputError::NotPrepared.into());
         }
-        self.begin(load, watch, accesses)
+        self.begin(step, watch, accesses)
     }
 }

@@ -1,11 +1,10 @@
-//! This file checks the results of a step and reads them, all before any of them is committed.
+//! Checks the results of a step and reads them, all before any of them is committed.
 //!
-//! Each beat is read once: what is checked is checked on its way.
+//! Each beat is read once, and checked on its way.
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
 
-use super::accelerator::Accelerator;
 use super::packing::Sent;
 use crate::axi_dma::Direction;
 use crate::beat::pack::pool::PackPool;
@@ -17,62 +16,54 @@ use crate::board::plan::Plan;
 use crate::board::port::Port;
 use crate::control_block::Counters;
 use crate::fault::Fault;
-use crate::order::LiveReport;
+use crate::order::Lives;
 use crate::record::finite::finite;
 use crate::record::result::{self, Record};
 use crate::scene::Bodies;
 
-impl Accelerator {
-    /// Compares the accelerator's sum of the words that it received with ours, if it has one.
-    pub(super) fn check_received(
-        plan: &Plan,
-        sent: Sent,
-        counters: &Counters,
-    ) -> Result<(), Fault> {
-        let Some((received, _)) = counters.sums else { return Ok(()) };
-        #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
-        let rounds = plan.rounds() as u32;
-        let expected = sent
-            .velocities
-            .wrapping_add(sent.collisions.wrapping_mul(rounds))
-            .wrapping_add(sent.poses);
-        if received != expected {
-            let direction = Direction::Mm2s;
-            return Err(Fault::Checksum { direction, expected, found: received });
-        }
-        Ok(())
+/// Compares the accelerator's sum of the words that it received with the driver's, if it has one.
+pub(super) fn check_received(plan: &Plan, sent: Sent, counters: &Counters) -> Result<(), Fault> {
+    let Some((received, _)) = counters.sums else { return Ok(()) };
+    #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
+    let rounds = plan.rounds() as u32;
+    let expected =
+        sent.velocities.wrapping_add(sent.collisions.wrapping_mul(rounds)).wrapping_add(sent.poses);
+    if received != expected {
+        let direction = Direction::Mm2s;
+        return Err(Fault::Checksum { direction, expected, found: received });
     }
+    Ok(())
+}
 
-    /// Reads the results into the spare, and compares the accelerator's sum of the words that it sent
-    /// with ours, if it has one.
-    ///
-    /// Where only live bodies are kept, `live` says so: results come in an order of their own then.
-    pub(super) fn unpack<B: Bodies + ?Sized>(
-        &mut self,
-        plan: &Plan,
-        bank: Bank,
-        bodies: &B,
-        live: Option<LiveReport>,
-        answered: Option<u32>,
-    ) -> Result<(), Fault> {
-        // A panic of the caller's loses it: the next step makes it anew.
-        let mut spare = std::mem::take(&mut self.spare);
-        let Device { s2mm, statics, packers, .. } = &mut self.device;
-        let channels = received(s2mm, plan, bank);
-        let layout = Segment::Results.layout(&plan.variant);
-        let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
-        let (found, broken) = match live.map(|_| self.orderings[bank].lives()) {
-            Some(lives) => results.scatter(lives.results(), bodies, &mut spare),
-            None => results.in_turn(plan.bodies, bodies, &statics[bank], &mut spare, packers),
-        };
-        self.spare = spare;
-        match (answered, broken) {
-            (Some(expected), _) if expected != found => {
-                Err(Fault::Checksum { direction: Direction::S2mm, expected, found })
-            }
-            (_, Some(body)) => Err(Fault::NotFinite { body }),
-            _ => Ok(()),
+/// Reads the results of a bank into `spare`, and compares `answered`, the accelerator's sum of the
+/// words that it sent, with the driver's.
+///
+/// A board that keeps only live bodies sends results in an order of their own: that of `lives`.
+pub(super) fn read<B: Bodies + ?Sized>(
+    device: &mut Device,
+    spare: &mut Vec<Record>,
+    (plan, bank): (&Plan, Bank),
+    bodies: &B,
+    lives: Option<&Lives>,
+    answered: Option<u32>,
+) -> Result<(), Fault> {
+    // A panic in the caller's code loses the memory: the next step allocates it anew.
+    let mut records = std::mem::take(spare);
+    let Device { s2mm, statics, packers, .. } = device;
+    let channels = received(s2mm, plan, bank);
+    let layout = Segment::Results.layout(&plan.variant);
+    let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
+    let (found, broken) = match lives {
+        Some(lives) => results.scatter(lives.results(), bodies, &mut records),
+        None => results.in_turn(plan.bodies, bodies, &statics[bank], &mut records, packers),
+    };
+    *spare = records;
+    match (answered, broken) {
+        (Some(expected), _) if expected != found => {
+            Err(Fault::Checksum { direction: Direction::S2mm, expected, found })
         }
+        (_, Some(body)) => Err(Fault::NotFinite { body }),
+        _ => Ok(()),
     }
 }
 

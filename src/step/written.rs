@@ -1,13 +1,15 @@
-//! This file brings a step into a bank of buffers whose collisions the caller writes as it finds them.
+//! Packs a step whose collisions the caller writes as it finds them.
 
 use pgs_support::float_env::standard_around;
 
 use super::accelerator::Accelerator;
-use super::in_flight::{InFlight, Stopwatch};
+use super::in_flight::InFlight;
 use super::ordering::{Arranged, in_order_of_writing};
 use super::pack::{Engines, PackId, PackedStep};
 use super::prepared::Prepared;
 use super::report::{HostTimes, OrderChoice};
+use super::reserve::{refuse, reserve};
+use super::stopwatch::Stopwatch;
 use crate::beat::pack::target::Target;
 use crate::beat::pack::writer::Writer;
 use crate::board::bank::Bank;
@@ -77,13 +79,13 @@ impl Accelerator {
             let narrow_phase = |writer: &mut Writer<'_>| caller.run(|| narrow_phase(writer));
             self.device.settle(&self.shapes)?;
             let into = (self.bank, Engines::Idle);
-            let load = self.load_written(into, bodies, announced, parameters, narrow_phase)?;
-            Ok(Prepared { bank: load.bank, ticket: load.ticket })
+            let step = self.pack_written(into, bodies, announced, parameters, narrow_phase)?;
+            Ok(Prepared { bank: step.bank, id: step.id })
         })
     }
 
-    /// As [`load`](Self::load), of collisions that are written.
-    fn load_written<B: Bodies + ?Sized>(
+    /// Packs as [`pack`](Self::pack) does, with collisions that `narrow_phase` writes.
+    fn pack_written<B: Bodies + ?Sized>(
         &mut self,
         (bank, engines): (Bank, Engines),
         bodies: &B,
@@ -94,31 +96,28 @@ impl Accelerator {
         self.forget(bank);
         let mut watch = Stopwatch::start();
         let mut host = HostTimes::default();
-        if !in_order_of_writing(&self.device.capabilities, parameters) {
+        let Self { device, limits, shapes, packed, .. } = self;
+        if !in_order_of_writing(&device.capabilities, parameters) {
             return Err(InputError::WrittenInOrder.into());
         }
-        let announced = Announced(announced);
-        preflight(bodies, &announced, &self.shapes, parameters, &self.limits)?;
+        let scene = preflight(bodies, &Announced(announced), shapes, parameters, limits)?;
         host.validate = watch.lap();
-        let mut plan = Plan {
-            bodies: bodies.len(),
-            collisions: announced.0,
-            passes: parameters.passes(),
-            variant: self.limits.variant,
-        };
-        if let Err(symptom) = self.make_room(&plan, bank, engines) {
-            return Err(self.refuse(symptom, engines));
-        }
-        let Self { device, limits, shapes, .. } = self;
-        let quick = Quick::new(preflight(bodies, &announced, shapes, parameters, limits)?);
-        let target = Target { variant: &plan.variant, shapes, quick: Some(&quick) };
-        let refuse = || validate(bodies, &Announced(0), shapes, parameters, limits);
+
+        let variant = limits.variant;
+        let passes = parameters.passes();
+        let mut plan = Plan { bodies: bodies.len(), collisions: announced, passes, variant };
+        reserve((&mut *device, packed), shapes, (&plan, bank), engines)
+            .map_err(|symptom| refuse(device, shapes, symptom, engines))?;
+
+        let quick = Quick::new(scene);
+        let target = Target { variant: &variant, shapes, quick: Some(&quick) };
+        let check_bodies = || validate(bodies, &Announced(0), shapes, parameters, limits);
         let (sent, written) =
-            device.pack_written(&plan, bank, target, bodies, refuse, narrow_phase)?;
+            device.pack_written(&plan, bank, target, bodies, check_bodies, narrow_phase)?;
         plan.collisions = written;
         host.pack = watch.lap();
-        let load = PackedStep {
-            ticket: PackId::new(),
+        Ok(self.keep(PackedStep {
+            id: PackId::new(),
             bank,
             plan,
             sent: Some(sent),
@@ -129,9 +128,7 @@ impl Accelerator {
             arranged: Arranged::as_given(OrderChoice::Asked),
             shapes_loaded: self.shapes_loaded,
             host,
-        };
-        self.loads[bank] = Some(load);
-        Ok(load)
+        }))
     }
 }
 
@@ -149,15 +146,15 @@ impl InFlight<'_> {
     ) -> Result<Prepared, Error> {
         standard_around(|caller| {
             let narrow_phase = |writer: &mut Writer<'_>| caller.run(|| narrow_phase(writer));
-            let into = (self.flight.load.bank.other(), Engines::Working);
-            let load =
-                self.accelerator.load_written(into, bodies, announced, parameters, narrow_phase)?;
-            self.hand_over(load)
+            let into = (self.flight.step.bank.other(), Engines::Working);
+            let step =
+                self.accelerator.pack_written(into, bodies, announced, parameters, narrow_phase)?;
+            self.hand_over(step)
         })
     }
 }
 
-/// So many collisions, of which nothing else is known yet.
+/// A number of collisions, of which only the number is known yet.
 struct Announced(usize);
 
 impl Collisions for Announced {
