@@ -3,13 +3,14 @@
 #![cfg(feature = "emulation")]
 
 use std::io::{Read as _, Write as _};
+use std::os::unix::fs::{FileExt as _, MetadataExt as _, PermissionsExt as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::interface::profile::Profile;
@@ -460,7 +461,7 @@ fn another_file_than_the_boards_memory_is_refused() {
     };
     let error = Accelerator::open(options()).expect_err("there is none");
     assert!(
-        matches!(error, Error::Open(OpenError::Platform(PlatformError::File { .. }))),
+        matches!(error, Error::Open(OpenError::Platform(PlatformError::ServedMemory { .. }))),
         "{error}"
     );
     std::fs::write(&other, [0; 1 << 16]).expect("written");
@@ -523,4 +524,231 @@ fn memory_is_a_file_of_whole_pages_that_no_driver_has() {
     assert!(matches!(error, MemoryFileError::NotRegular { .. }), "{error}");
     let error = MemoryFile::open(&path.join("x"), 0, None, 1 << 16).expect_err("no directory");
     assert!(matches!(error, MemoryFileError::File { .. }), "{error}");
+}
+
+#[test]
+fn a_file_that_no_board_has_made_is_refused_whatever_its_length() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let path = folder.path().join("photos.tar");
+    let open = || MemoryFile::open(&path, MEMORY_BASE, None, 1 << 20);
+    for length in [1, 4096, 1 << 16, (1 << 16) + 4096, 1 << 21, (1 << 20) + 4096] {
+        let content = vec![0x5A; length];
+        std::fs::write(&path, &content).expect("written");
+        let error = open().expect_err("somebody's own");
+        let found = length as u64;
+        assert!(
+            matches!(&error, MemoryFileError::NotMade { found: f, .. } if *f == found),
+            "{error}"
+        );
+        assert!(error.to_string().contains("name another file, or remove it"), "{error}");
+        assert_eq!(std::fs::read(&path).expect("there"), content);
+    }
+
+    // An empty one holds nothing that could be lost; from then on it is the board's.
+    std::fs::write(&path, []).expect("written");
+    for _ in 0..2 {
+        let memory = open().expect("empty, then made");
+        assert_eq!(memory.addresses(), MEMORY_BASE..MEMORY_BASE + (1 << 20));
+    }
+    // Cut or lengthened it is another file.
+    let made = std::fs::metadata(&path).expect("there").len();
+    for length in [made - 1, made - 4096, made + 1] {
+        let file = std::fs::File::options().write(true).open(&path).expect("there");
+        file.set_len(length).expect("changed");
+        let error = open().expect_err("changed");
+        assert!(matches!(error, MemoryFileError::NotMade { .. }), "{length}: {error}");
+    }
+}
+
+#[test]
+fn memory_is_reserved_and_what_the_file_system_does_not_give_is_refused() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let path = folder.path().join("memory");
+    let blocks = || std::fs::metadata(&path).expect("there").blocks() * 512;
+    MemoryFile::open(&path, MEMORY_BASE, None, 1 << 20).expect("room");
+    assert!(blocks() >= 1 << 20, "{} bytes", blocks());
+    // A hole in the board's own file is filled.
+    let mark = std::fs::read(&path).expect("there").split_off(1 << 20);
+    let file = std::fs::File::create(&path).expect("emptied");
+    file.write_all_at(&mark, 1 << 20).expect("written");
+    assert!(blocks() < 1 << 20, "{} bytes", blocks());
+    MemoryFile::open(&path, MEMORY_BASE, None, 1 << 20).expect("room");
+    assert!(blocks() >= 1 << 20, "{} bytes", blocks());
+
+    // More than any file system has.
+    let most = 1 << 62;
+    let whole = folder.path().join("whole");
+    let error = MemoryFile::open(&whole, 0, Some(most), 0).expect_err("no such file system");
+    assert!(matches!(&error, MemoryFileError::NoRoom { bytes, .. } if *bytes == most), "{error}");
+    assert!(error.to_string().contains("serve a smaller one"), "{error}");
+    assert!(!whole.exists(), "nothing that was begun is left");
+    std::fs::write(&whole, []).expect("written");
+    MemoryFile::open(&whole, 0, Some(most), 0).expect_err("no such file system");
+    assert_eq!(std::fs::metadata(&whole).expect("there still").len(), 0);
+}
+
+#[test]
+fn a_memory_that_was_changed_since_its_board_was_served_is_refused() {
+    let served = Served::new(BoardConfig::default());
+    let path = served.socket().with_extension("memory");
+    let file = std::fs::File::options().write(true).open(&path).expect("there");
+    file.set_len(1 << 16).expect("cut");
+    let error = Accelerator::open(served.options()).expect_err("cut");
+    assert!(
+        matches!(
+            error,
+            Error::Open(OpenError::Platform(PlatformError::UnusableMemory { bytes: 0x1_0000, .. }))
+        ),
+        "{error}"
+    );
+}
+
+/// Seconds in which a driver or a board has to find out about the other.
+const SOON: Duration = Duration::from_secs(9);
+
+#[test]
+fn connections_that_say_nothing_do_not_hold_the_board() {
+    let served = Served::new(BoardConfig::default());
+    let hello = Request::Hello { version: VERSION }.encode();
+    let silent = raw(&served);
+    let mut half = raw(&served);
+    half.write_all(&hello[..7]).expect("sent");
+    let started = Instant::now();
+    steps(&mut served.open(), 5);
+    assert!(matches!(served.visit().ended, Ended::Left));
+    // Nor do they for more than seconds.
+    for mut stream in [silent, half] {
+        stream.set_read_timeout(Some(SOON)).expect("set");
+        assert_eq!(stream.read(&mut [0]).expect("hung up in time"), 0);
+        let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
+        assert_eq!(error.to_string(), "it sent no request within 5s");
+    }
+    assert!(started.elapsed() >= Duration::from_secs(4), "they had their time");
+    steps(&mut served.open(), 5);
+}
+
+#[test]
+fn who_says_hello_and_no_more_loses_the_board_in_seconds_and_keeps_nobody_waiting() {
+    let served = Served::new(BoardConfig::default());
+    let hello = Request::Hello { version: VERSION }.encode();
+    let mut mute = raw(&served);
+    assert_eq!(ask(&mut mute, &hello).status, Status::Done);
+    let started = Instant::now();
+    let error = Accelerator::open(served.options()).expect_err("somebody has it");
+    assert!(
+        matches!(&error, Error::Open(OpenError::Platform(PlatformError::ServerBusy { socket }))
+            if *socket == served.socket()),
+        "{error}"
+    );
+    assert!(started.elapsed() < SOON, "{:?}", started.elapsed());
+    mute.set_read_timeout(Some(SOON)).expect("set");
+    assert_eq!(mute.read(&mut [0]).expect("hung up in time"), 0);
+    let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
+    assert_eq!(error.to_string(), "it asked for no memory within 5s");
+    steps(&mut served.open(), 5);
+    assert!(matches!(served.visit().ended, Ended::Left));
+
+    // Nor does half a request, or an answer that nobody reads.
+    let inode = std::fs::metadata(served.socket().with_extension("memory")).expect("there").ino();
+    let memory = Request::Memory { inode }.encode();
+    let mut half = raw(&served);
+    assert_eq!(ask(&mut half, &hello).status, Status::Done);
+    assert_eq!(ask(&mut half, &memory).status, Status::Done);
+    half.write_all(&memory[..15]).expect("sent");
+    half.set_read_timeout(Some(SOON)).expect("set");
+    assert_eq!(half.read(&mut [0]).expect("hung up in time"), 0);
+    let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
+    assert_eq!(error.to_string(), "it sent half a request and no more within 5s");
+
+    let mut deaf = raw(&served);
+    deaf.set_write_timeout(Some(2 * SOON)).expect("set");
+    let many = memory.repeat(1 << 12);
+    deaf.write_all(&hello).expect("sent");
+    while deaf.write_all(&many).is_ok() {}
+    let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
+    assert_eq!(error.to_string(), "it read no answer within 5s");
+    steps(&mut served.open(), 5);
+}
+
+#[test]
+fn a_driver_that_is_idle_keeps_the_board_and_others_are_told_at_once() {
+    let served = Served::new(BoardConfig::default());
+    let mut idle = served.open();
+    let (first, _) = steps(&mut idle, 5);
+    // Longer than anything that is not a driver may take; others come meanwhile.
+    let until = Instant::now() + Duration::from_secs(6);
+    let hello = Request::Hello { version: VERSION }.encode();
+    let other = Request::Hello { version: VERSION + 1 }.encode();
+    let silent = raw(&served);
+    while Instant::now() < until {
+        let mut stream = raw(&served);
+        stream.set_read_timeout(Some(SOON)).expect("set");
+        assert_eq!(ask(&mut stream, &hello).status, Status::Busy);
+        assert_eq!(stream.read(&mut [0]).expect("hung up"), 0);
+        assert_eq!(ask(&mut raw(&served), &other).status, Status::OtherVersion);
+        assert_eq!(ask(&mut raw(&served), &[0; 16]).status, Status::Refused);
+        let error = Accelerator::open(served.options()).expect_err("somebody has it");
+        assert!(
+            matches!(&error, Error::Open(OpenError::Platform(PlatformError::Busy { .. }))),
+            "{error}"
+        );
+        std::thread::park_timeout(Duration::from_millis(50));
+    }
+    drop(silent);
+    let (again, _) = steps(&mut idle, 5);
+    assert_eq!(again, first);
+    drop(idle);
+    let visit = served.visit();
+    assert!(matches!(visit.ended, Ended::Left) && !visit.left_running, "{visit:?}");
+    assert_eq!(served.board.violations(), []);
+}
+
+#[test]
+fn a_crowd_of_silent_connections_keeps_no_driver_away() {
+    let served = Served::new(BoardConfig::default());
+    let crowd: Vec<_> = (0..100).map(|_| raw(&served)).collect();
+    let started = Instant::now();
+    steps(&mut served.open(), 5);
+    assert!(started.elapsed() < SOON, "{:?}", started.elapsed());
+    drop(crowd);
+}
+
+#[test]
+fn what_keeps_a_driver_from_a_socket_is_said_with_the_next_step() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let refused = |socket: &Path, errno: i32, next: &str| {
+        let error = Accelerator::open(at(socket)).expect_err("no board");
+        let Error::Open(OpenError::Platform(PlatformError::NoServer { source, .. })) = &error
+        else {
+            panic!("{error}")
+        };
+        assert_eq!(source.raw_os_error(), Some(errno), "{source}");
+        let found = error.next_step().expect("a next step");
+        assert!(found.contains(next), "{found}");
+    };
+    use nix::errno::Errno;
+    let socket = folder.path().join("board");
+    refused(&socket, Errno::ENOENT as i32, "start one with `pgs serve --socket");
+    drop(UnixListener::bind(&socket).expect("bound"));
+    refused(&socket, Errno::ECONNREFUSED as i32, "nobody serves a board at it any more: start");
+    let file = folder.path().join("file");
+    std::fs::write(&file, "mine").expect("written");
+    refused(&file, Errno::ENOTSOCK as i32, "is not a board's socket");
+    refused(folder.path(), Errno::ENOTSOCK as i32, "is not a board's socket");
+    refused(&file.join("x"), Errno::ENOTDIR as i32, "is not a board's socket");
+    let long = folder.path().join("x".repeat(120));
+    refused(&long, Errno::ENAMETOOLONG as i32, "at most 107 bytes");
+    let other = folder.path().join("datagrams");
+    let _datagrams = std::os::unix::net::UnixDatagram::bind(&other).expect("bound");
+    refused(&other, Errno::EPROTOTYPE as i32, "is not a board's socket");
+
+    // The right to connect is that to write to the socket; root has it always.
+    let served = Served::new(BoardConfig::default());
+    let forbid = std::fs::Permissions::from_mode(0o000);
+    std::fs::set_permissions(served.socket(), forbid).expect("ours");
+    if UnixStream::connect(served.socket()).is_ok() {
+        let _ = writeln!(std::io::stderr(), "skipped: a socket without rights (as root)");
+    } else {
+        refused(&served.socket(), Errno::EACCES as i32, "run as the user who serves it");
+    }
 }

@@ -16,14 +16,16 @@
 //! 7 unmask           0                    0
 //! ```
 //!
-//! A driver sends the next request when it has the answer to the last one. The first is a hello.
+//! A driver sends the next request when it has the answer to the last one. The first is a hello,
+//! the second asks for the memory. Both come within seconds: from then on the driver has the board,
+//! and may take its time. The board answers every other hello with busy meanwhile.
 
 use std::time::Duration;
 
 use thiserror::Error;
 
 /// Version of these messages.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// "PGSBOARD": operand of a hello.
 pub const HELLO: u64 = u64::from_le_bytes(*b"PGSBOARD");
 /// Length of a request, bytes.
@@ -164,11 +166,19 @@ pub enum Status {
     OtherVersion,
     /// The request was none. The board hangs up.
     Refused,
+    /// Another driver has the board, which hangs up.
+    Busy,
 }
 
 impl Status {
-    const ALL: [Self; 5] =
-        [Self::Done, Self::Nothing, Self::OtherMemory, Self::OtherVersion, Self::Refused];
+    const ALL: [Self; 6] = [
+        Self::Done,
+        Self::Nothing,
+        Self::OtherMemory,
+        Self::OtherVersion,
+        Self::Refused,
+        Self::Busy,
+    ];
 }
 
 /// What the board says.
@@ -186,7 +196,7 @@ pub struct Answer {
 
 /// An answer that is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("expected a status from 0 to 4, found {found}")]
+#[error("expected a status from 0 to 5, found {found}")]
 pub struct AnswerError {
     /// What stands there.
     pub found: u32,
@@ -263,8 +273,8 @@ mod tests {
             assert_eq!(Answer::decode(&answer.encode()), Ok(answer));
         }
         let mut bytes = [0; ANSWER_BYTES];
-        bytes[0] = 5;
-        assert_eq!(Answer::decode(&bytes), Err(AnswerError { found: 5 }));
+        bytes[0] = 6;
+        assert_eq!(Answer::decode(&bytes), Err(AnswerError { found: 6 }));
     }
 
     #[test]

@@ -1,17 +1,20 @@
-//! This file is a board's memory that lies in a file, where another process sees it too.
+//! A board's memory that lies in a file, where another process sees it too.
 //!
-//! Whole system calls, no mapping: nothing here can be changed under a reference.
+//! Whole system calls, no mapping: nothing here can be changed under a reference. The driver maps
+//! the file, so that all its bytes are reserved: a page that the file system has not would end the
+//! driver with SIGBUS.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::ops::Range;
 use std::os::unix::fs::{FileExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 
 use nix::errno::Errno;
-use nix::fcntl::{Flock, FlockArg};
+use nix::fcntl::{FallocateFlags, Flock, FlockArg, fallocate};
 use thiserror::Error;
 
+use super::mark::{self, MARK_BYTES};
 use crate::memory::external::DeviceMemory;
 use pgs_interface::record::Beat;
 
@@ -51,6 +54,33 @@ pub enum MemoryFileError {
         /// Which.
         path: PathBuf,
     },
+    /// No board has made it.
+    #[error(
+        "the memory {} has {found} bytes and not the mark of a file that a board has made: refusing \
+         to overwrite it; name another file, or remove it if nobody needs it",
+        path.display()
+    )]
+    NotMade {
+        /// Which file.
+        path: PathBuf,
+        /// Its length, bytes.
+        found: u64,
+    },
+    /// The file system does not give so much.
+    #[error(
+        "the memory {} of {bytes} bytes cannot be reserved: serve a smaller one, or name a file on \
+         another file system",
+        path.display()
+    )]
+    NoRoom {
+        /// Which file.
+        path: PathBuf,
+        /// The memory's length, bytes.
+        bytes: u64,
+        /// What the kernel says.
+        #[source]
+        source: io::Error,
+    },
     /// It has a length that memory cannot have, or another than was asked for.
     #[error(
         "the memory {} has {found} bytes, expected {}: remove it, or name another",
@@ -78,10 +108,12 @@ pub enum MemoryFileError {
 
 impl MemoryFile {
     /// Opens the file at `path`, or makes one of `wanted` bytes, for `default` if nothing is
-    /// wanted. Its first byte is at `base` on the bus.
+    /// wanted. Its first byte is at `base` on the bus. A file that is there and empty is taken as
+    /// one that is made: nothing is lost.
     ///
     /// # Errors
-    /// [`MemoryFileError`]; a file that is there keeps its length and its content.
+    /// [`MemoryFileError`]; a file that is there keeps its length and its content, and none that
+    /// was begun is left.
     pub fn open(
         path: &Path,
         base: u64,
@@ -99,16 +131,10 @@ impl MemoryFile {
         if path.exists() && !path.is_file() {
             return Err(MemoryFileError::NotRegular { path: path_buf() });
         }
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(failed("opened"))?;
-        // Only to see that nobody has it: a driver holds the lock as long as it has the board.
+        let (file, made) = open_or_make(path)?;
+        // Nobody has it meanwhile: a driver holds the lock as long as it has the board.
         let file = match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
-            Ok(locked) => locked.unlock().map_err(|(_, errno)| failed("unlocked")(errno.into()))?,
+            Ok(locked) => locked,
             Err((_, Errno::EWOULDBLOCK)) => {
                 return Err(MemoryFileError::Busy { path: path_buf() });
             }
@@ -116,15 +142,25 @@ impl MemoryFile {
         };
         let metadata = file.metadata().map_err(failed("measured"))?;
         let bytes = match metadata.len() {
-            0 => {
-                file.set_len(new).map_err(failed("made"))?;
-                new
-            }
-            found if !fits(found) || wanted.is_some_and(|wanted| wanted != found) => {
-                return Err(length(found));
-            }
-            found => found,
+            0 => new,
+            found => mark::memory_bytes(&file)
+                .map_err(failed("read"))?
+                .ok_or_else(|| MemoryFileError::NotMade { path: path_buf(), found })?,
         };
+        if !fits(bytes) || wanted.is_some_and(|wanted| wanted != bytes) {
+            return Err(length(bytes));
+        }
+        // The mark first: a file that was begun is ours from its first byte on.
+        let written = if metadata.len() == 0 { mark::write(&file, bytes) } else { Ok(()) };
+        if let Err(source) = written.and_then(|()| reserve(&file, bytes + MARK_BYTES)) {
+            if made {
+                fs::remove_file(path).map_err(failed("removed"))?;
+            } else if metadata.len() == 0 {
+                file.set_len(0).map_err(failed("emptied"))?;
+            }
+            return Err(MemoryFileError::NoRoom { path: path_buf(), bytes, source });
+        }
+        let file = file.unlock().map_err(|(_, errno)| failed("unlocked")(errno.into()))?;
         Ok(Self { file, base, bytes, inode: metadata.ino() })
     }
 
@@ -161,6 +197,50 @@ impl MemoryFile {
     }
 }
 
+/// Opens the file, or makes it, which is then `true`.
+fn open_or_make(path: &Path) -> Result<(File, bool), MemoryFileError> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true);
+    let failed = |act| move |source| MemoryFileError::File { act, path: path.to_owned(), source };
+    match options.open(path) {
+        Ok(file) => Ok((file, false)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let made = options.create_new(true).open(path);
+            made.map(|file| (file, true)).map_err(failed("made"))
+        }
+        Err(error) => Err(failed("opened")(error)),
+    }
+}
+
+/// Has the file system set the room for a file's first bytes aside; what stands there stays.
+fn reserve(file: &File, bytes: u64) -> io::Result<()> {
+    let length = i64::try_from(bytes).map_err(|_| io::Error::from(Errno::EFBIG))?;
+    loop {
+        match fallocate(file, FallocateFlags::empty(), 0, length) {
+            Ok(()) => return Ok(()),
+            Err(Errno::EINTR) => {}
+            // Some file systems cannot, as NFS before 4.2.
+            Err(Errno::EOPNOTSUPP | Errno::ENOSYS) => return rewrite(file, bytes),
+            Err(errno) => return Err(errno.into()),
+        }
+    }
+}
+
+/// Writes a file's first bytes as they are, so that there is room for them.
+fn rewrite(file: &File, bytes: u64) -> io::Result<()> {
+    let mut piece = vec![0; 1 << 16];
+    let mut place = 0;
+    while place < bytes {
+        let rest = usize::try_from(bytes - place).unwrap_or(usize::MAX);
+        let length = piece.len().min(rest);
+        let piece = &mut piece[..length];
+        file.read_exact_at(piece, place)?;
+        file.write_all_at(piece, place)?;
+        place += length as u64;
+    }
+    file.sync_data()
+}
+
 impl DeviceMemory for MemoryFile {
     fn read_beats(&mut self, address: u64, to: &mut [Beat]) -> io::Result<()> {
         self.read(address, bytemuck::cast_slice_mut(to))
@@ -179,5 +259,38 @@ impl DeviceMemory for MemoryFile {
         let bytes = value.to_le_bytes();
         self.write(address, &bytes[..3])?;
         self.write(address + 3, &bytes[3..])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sparse file of that length, with those bytes at its begin.
+    fn sparse(begin: &[u8], bytes: u64) -> (tempfile::TempDir, File) {
+        let folder = tempfile::tempdir().expect("a directory");
+        let mut options = OpenOptions::new();
+        let file = options.read(true).write(true).create_new(true);
+        let file = file.open(folder.path().join("sparse")).expect("made");
+        file.write_all_at(begin, 0).expect("written");
+        file.set_len(bytes).expect("a hole");
+        (folder, file)
+    }
+
+    #[test]
+    fn what_is_reserved_is_there_and_keeps_its_content() {
+        const BYTES: u64 = (1 << 20) + 3;
+        for act in [reserve, rewrite] {
+            let (_folder, file) = sparse(b"mine", BYTES);
+            let given = || file.metadata().expect("measured").blocks() * 512;
+            assert!(given() < BYTES, "a hole");
+            act(&file, BYTES).expect("room");
+            assert!(given() >= BYTES, "{}", given());
+            let mut found = vec![1; 1 << 20];
+            file.read_exact_at(&mut found, 0).expect("read");
+            assert_eq!(&found[..4], b"mine");
+            assert!(found[4..].iter().all(|byte| *byte == 0));
+            assert_eq!(file.metadata().expect("measured").len(), BYTES);
+        }
     }
 }

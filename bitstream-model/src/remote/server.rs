@@ -9,13 +9,20 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
+use nix::errno::Errno;
 use thiserror::Error;
 
+use super::connect::connect;
+use super::lobby::{Caller, Lobby};
 use super::memory_file::{MemoryFile, MemoryFileError};
-use super::visit::{Host, Visit};
+use super::visit::{Ended, Host, Visit};
 use crate::config::{BoardConfig, ConfigError};
 use crate::handle::EmulatedBoard;
+
+/// How long a server that has a socket already may take to accept somebody.
+const IN_USE_LIMIT: Duration = Duration::from_secs(1);
 
 /// Why a board cannot be served.
 #[derive(Debug, Error)]
@@ -92,7 +99,7 @@ pub struct Server {
     board: EmulatedBoard,
     /// Inode and bus address.
     memory: (u64, u64),
-    listener: UnixListener,
+    lobby: Lobby,
     path: PathBuf,
     stopper: Stopper,
 }
@@ -117,12 +124,16 @@ impl Server {
             if !metadata.file_type().is_socket() {
                 return Err(ServeError::NoSocket { path });
             }
-            match UnixStream::connect(socket) {
+            match connect(socket, IN_USE_LIMIT) {
                 Ok(_) => return Err(ServeError::InUse { path }),
-                Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
-                    fs::remove_file(socket).map_err(failed("replaced"))?;
-                }
-                Err(error) => return Err(failed("reached")(error)),
+                Err(error) => match error.raw_os_error().map(Errno::from_raw) {
+                    Some(Errno::ECONNREFUSED) => {
+                        fs::remove_file(socket).map_err(failed("replaced"))?;
+                    }
+                    // Somebody listens, and accepts nobody.
+                    Some(Errno::EAGAIN) => return Err(ServeError::InUse { path }),
+                    _ => return Err(failed("reached")(error)),
+                },
             }
         }
         let granted = memory.addresses();
@@ -135,7 +146,8 @@ impl Server {
             listener: UnixStream::from(OwnedFd::from(same)),
             visitor: Mutex::new(None),
         }));
-        Ok(Self { board, memory: identity, listener, path, stopper })
+        let lobby = Lobby::new(listener).map_err(failed("shared"))?;
+        Ok(Self { board, memory: identity, lobby, path, stopper })
     }
 
     /// The board, as its builder sees it.
@@ -151,7 +163,8 @@ impl Server {
     }
 
     /// Serves one driver after the other until it is stopped; `visited` is told of each that left,
-    /// before the next is served.
+    /// before the next is served. A connection that comes meanwhile does not count: its hello is
+    /// answered with [`Status::Busy`](pgs_interface::message::Status::Busy).
     ///
     /// # Errors
     /// [`ServeError::Socket`] if no driver can come any more.
@@ -159,28 +172,34 @@ impl Server {
         &mut self,
         mut visited: impl FnMut(&EmulatedBoard, Visit),
     ) -> Result<(), ServeError> {
+        let failed = |act, source| ServeError::Socket { act, path: self.path.clone(), source };
         while !self.stopper.is_asked() {
-            let stream = match self.listener.accept() {
-                Ok((stream, _)) => stream,
-                Err(_) if self.stopper.is_asked() => break,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                // It came and went.
-                Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
-                Err(source) => {
-                    return Err(ServeError::Socket {
-                        act: "served",
-                        path: self.path.clone(),
-                        source,
-                    });
+            if let Some(error) = self.lobby.failure() {
+                return Err(failed("served", error));
+            }
+            let caller = match self.lobby.caller() {
+                None => {
+                    self.lobby.attend(None, None).map_err(|error| failed("served", error))?;
+                    continue;
                 }
+                Some(Caller::Ended(ended)) => Err(ended),
+                Some(Caller::Here(connection)) => match connection.stream() {
+                    Ok(stream) => {
+                        self.stopper.set_visitor(Some(stream));
+                        Ok(connection)
+                    }
+                    Err(error) => Err(Ended::Broken(error)),
+                },
             };
-            let failed =
-                |source| ServeError::Socket { act: "shared", path: self.path.clone(), source };
-            self.stopper.set_visitor(Some(stream.try_clone().map_err(failed)?));
             if self.stopper.is_asked() {
                 break;
             }
-            let visit = Host::new(&self.board, self.memory, stream).serve();
+            let visit = match caller {
+                Ok(connection) => {
+                    Host::new(&self.board, self.memory, connection, &mut self.lobby).serve()
+                }
+                Err(ended) => Visit { requests: 0, ended, left_running: self.board.is_running() },
+            };
             self.stopper.set_visitor(None);
             visited(&self.board, visit);
         }

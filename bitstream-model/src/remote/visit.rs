@@ -1,18 +1,15 @@
 //! This file serves one driver, from its hello until it is gone.
 
-use std::io::{self, ErrorKind, Read as _, Write as _};
-use std::os::unix::net::UnixStream;
-use std::time::Duration;
+use std::io::{self, ErrorKind};
+use std::time::{Duration, Instant};
 
+use super::connection::{Connection, Presence, TRANSFER_LIMIT, late};
+use super::lobby::{FIRST_LIMIT, Lobby};
 use crate::handle::{CpuPort, EmulatedBoard};
-use pgs_interface::message::{
-    ANSWER_BYTES, Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION,
-};
+use pgs_interface::message::{Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION};
 
 /// How much virtual time passes between two looks whether the driver is still there.
 const SLICE: Duration = Duration::from_micros(20);
-/// How long the rest of a request that has begun may take, and an answer that nobody reads.
-const TRANSFER_LIMIT: Duration = Duration::from_secs(5);
 
 /// How a visit ended.
 #[derive(Debug)]
@@ -45,36 +42,41 @@ pub(super) struct Host<'a> {
     port: CpuPort,
     /// Inode and bus address of the memory.
     memory: (u64, u64),
-    stream: UnixStream,
-    /// What has come of the next request.
-    request: [u8; REQUEST_BYTES],
-    filled: usize,
+    /// Whether the driver was told that it has the memory.
+    has_memory: bool,
+    connection: Connection,
+    lobby: &'a mut Lobby,
 }
 
-/// Whether a driver waits for an answer, or is gone.
-enum Presence {
-    There,
-    Gone,
+impl Ended {
+    /// How a connection ended that failed.
+    pub(super) fn of(error: io::Error) -> Self {
+        match error.kind() {
+            ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => Self::Left,
+            _ => Self::Broken(error),
+        }
+    }
 }
 
 impl<'a> Host<'a> {
-    pub(super) fn new(board: &'a EmulatedBoard, memory: (u64, u64), stream: UnixStream) -> Self {
+    pub(super) fn new(
+        board: &'a EmulatedBoard,
+        memory: (u64, u64),
+        connection: Connection,
+        lobby: &'a mut Lobby,
+    ) -> Self {
         let port = board.cpu_port();
-        Self { board, port, memory, stream, request: [0; REQUEST_BYTES], filled: 0 }
+        Self { board, port, memory, has_memory: false, connection, lobby }
     }
 
     /// Serves until the driver is gone.
     pub(super) fn serve(mut self) -> Visit {
         let mut requests = 0;
-        let ended = self.serve_all(&mut requests).unwrap_or_else(|error| match error.kind() {
-            ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => Ended::Left,
-            _ => Ended::Broken(error),
-        });
+        let ended = self.serve_all(&mut requests).unwrap_or_else(Ended::of);
         Visit { requests, ended, left_running: self.board.is_running() }
     }
 
     fn serve_all(&mut self, requests: &mut u64) -> io::Result<Ended> {
-        self.stream.set_write_timeout(Some(TRANSFER_LIMIT))?;
         while let Some(bytes) = self.next_request()? {
             let first = *requests == 0;
             let request = Request::decode(&bytes).and_then(|request| match request {
@@ -90,9 +92,8 @@ impl<'a> Host<'a> {
                 }
             };
             *requests += 1;
-            match self.serve_one(request)? {
-                Presence::There => {}
-                Presence::Gone => return Ok(Ended::Left),
+            if self.serve_one(request)? == Presence::Gone {
+                return Ok(Ended::Left);
             }
         }
         Ok(Ended::Left)
@@ -100,31 +101,28 @@ impl<'a> Host<'a> {
 
     /// The next request; `None` if the driver is gone.
     fn next_request(&mut self) -> io::Result<Option<[u8; REQUEST_BYTES]>> {
-        // A driver may take all the time of the world between two requests, but not inside one.
-        while self.filled < REQUEST_BYTES {
-            let limit = (self.filled > 0).then_some(TRANSFER_LIMIT);
-            if limit.is_some() {
-                self.stream.set_read_timeout(limit)?;
+        // Once a driver has the memory, it may take all the time of the world between two requests,
+        // but not inside one.
+        let first = (!self.has_memory).then(|| Instant::now() + FIRST_LIMIT);
+        loop {
+            if let Some(request) = self.connection.take() {
+                return Ok(Some(request));
             }
-            let read = self.stream.read(&mut self.request[self.filled..]);
-            if limit.is_some() {
-                self.stream.set_read_timeout(None)?;
+            let until = self.connection.due().into_iter().chain(first).min();
+            if until.is_some_and(|until| until <= Instant::now()) {
+                return Err(match self.connection.due() {
+                    Some(_) => late("sent half a request and no more", TRANSFER_LIMIT),
+                    None => late("asked for no memory", FIRST_LIMIT),
+                });
             }
-            match read {
-                Ok(0) => return Ok(None),
-                Ok(read) => self.filled += read,
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
+            if self.look(until)? == Presence::Gone {
+                return Ok(None);
             }
         }
-        self.filled = 0;
-        Ok(Some(self.request))
     }
 
     fn answer(&mut self, status: Status, value: u32, number: u64) -> io::Result<()> {
-        let bytes: [u8; ANSWER_BYTES] =
-            Answer { status, value, number, now: self.port.now() }.encode();
-        self.stream.write_all(&bytes)
+        self.connection.send(&Answer { status, value, number, now: self.port.now() }.encode())
     }
 
     fn serve_one(&mut self, request: Request) -> io::Result<Presence> {
@@ -140,7 +138,8 @@ impl<'a> Host<'a> {
             }
             Request::Memory { inode } => {
                 let (own, address) = self.memory;
-                let status = if inode == own { Status::Done } else { Status::OtherMemory };
+                self.has_memory = inode == own;
+                let status = if self.has_memory { Status::Done } else { Status::OtherMemory };
                 self.answer(status, 0, address)?;
             }
             Request::Read { address } => {
@@ -193,33 +192,18 @@ impl<'a> Host<'a> {
             if left.is_zero() {
                 return Ok(Passed::Time);
             }
-            if matches!(self.look()?, Presence::Gone) {
+            if self.look(Some(Instant::now()))? == Presence::Gone {
                 return Ok(Passed::Gone);
             }
         }
     }
 
-    /// Whether the driver is still there.
-    fn look(&mut self) -> io::Result<Presence> {
-        if self.filled == REQUEST_BYTES {
-            return Ok(Presence::There);
-        }
-        self.stream.set_nonblocking(true)?;
-        let read = self.stream.read(&mut self.request[self.filled..]);
-        self.stream.set_nonblocking(false)?;
-        match read {
-            Ok(0) => Ok(Presence::Gone),
-            Ok(read) => {
-                self.filled += read;
-                Ok(Presence::There)
-            }
-            Err(error)
-                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
-            {
-                Ok(Presence::There)
-            }
-            Err(error) => Err(error),
-        }
+    /// Whether the driver is still there, when it has sent something or it is too late. Everybody
+    /// who calls meanwhile is turned away.
+    fn look(&mut self, until: Option<Instant>) -> io::Result<Presence> {
+        let sent = self.lobby.attend(Some(&self.connection), until)?;
+        self.lobby.turn_away(self.port.now());
+        if sent { self.connection.take_in() } else { Ok(Presence::There) }
     }
 }
 

@@ -3,6 +3,7 @@
 //! An execution that does not end cannot be ended: the campaign stops, and its thread is left behind
 //! until the program ends.
 
+use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,7 +22,7 @@ pub struct Plan {
     pub executions: u64,
     /// Of the inputs.
     pub seed: u64,
-    /// Threads, at least one.
+    /// Threads, at least one; fewer where the system does not give them.
     pub threads: usize,
     /// What an execution may take.
     pub limit: Duration,
@@ -36,10 +37,41 @@ pub struct Summary {
     pub executions: u64,
     /// Host time.
     pub time: Duration,
+    /// Threads that ran them.
+    pub threads: Threads,
     /// What they did.
     pub tally: Tally,
     /// The first one that ended badly; none was begun after it.
     pub finding: Option<Finding>,
+}
+
+/// The threads of a campaign.
+#[derive(Debug)]
+pub struct Threads {
+    /// How many ran executions.
+    pub ran: usize,
+    /// Why there were fewer than planned; `None` if all came.
+    pub refused: Option<io::Error>,
+    /// Whether a watchdog looked for hangs. The only thread of a program cannot be watched.
+    pub watched: bool,
+}
+
+impl Threads {
+    /// What is missing of the plan, in words; `None` if nothing is.
+    #[must_use]
+    pub fn missing(&self) -> Option<String> {
+        let error = self.refused.as_ref()?;
+        let watch = if self.watched { "" } else { ", and no watchdog for hangs" };
+        Some(format!("{} of the planned threads only{watch}: {error}", self.ran))
+    }
+}
+
+/// Starts a thread, or says why the system gives none.
+type Start = fn(Box<dyn FnOnce() + Send>) -> io::Result<()>;
+
+/// As the system does it. Nobody waits for the thread.
+fn start(work: Box<dyn FnOnce() + Send>) -> io::Result<()> {
+    thread::Builder::new().name("fuzz".to_owned()).spawn(work).map(drop)
 }
 
 /// Executions that a thread takes at once.
@@ -130,7 +162,17 @@ impl Shared {
 }
 
 /// Runs a target. `progress` hears from time to time how many executions have ended.
-pub fn run(target: &'static Target, plan: &Plan, mut progress: impl FnMut(u64)) -> Summary {
+pub fn run(target: &'static Target, plan: &Plan, progress: impl FnMut(u64)) -> Summary {
+    run_on(start, target, plan, progress)
+}
+
+/// The same on threads that come from `start`.
+fn run_on(
+    start: Start,
+    target: &'static Target,
+    plan: &Plan,
+    mut progress: impl FnMut(u64),
+) -> Summary {
     let threads = plan.threads.max(1);
     let at = || At { number: AtomicU64::new(NOTHING), since: AtomicU64::new(0) };
     let shared = Arc::new(Shared {
@@ -145,15 +187,27 @@ pub fn run(target: &'static Target, plan: &Plan, mut progress: impl FnMut(u64)) 
         found: Mutex::default(),
     });
     let (ended, end) = mpsc::channel::<()>();
-    for thread in 0..threads {
-        let (shared, ended) = (Arc::clone(&shared), ended.clone());
+    let mut used = Threads { ran: 0, refused: None, watched: true };
+    while used.ran < threads {
+        let (shared, ended, thread) = (Arc::clone(&shared), ended.clone(), used.ran);
         // Nobody listens any more once an execution has hung.
-        thread::spawn(move || {
+        let work = move || {
             shared.work(thread);
             drop(ended);
-        });
+        };
+        match start(Box::new(work)) {
+            Ok(()) => used.ran += 1,
+            Err(error) => {
+                used.refused = Some(error);
+                break;
+            }
+        }
     }
     drop(ended);
+    if used.ran == 0 {
+        used = Threads { ran: 1, watched: false, ..used };
+        shared.work(0);
+    }
     // The channel closes when the last thread ends.
     while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
         progress(shared.done.load(Ordering::Relaxed));
@@ -171,6 +225,7 @@ pub fn run(target: &'static Target, plan: &Plan, mut progress: impl FnMut(u64)) 
         target: target.name,
         executions: shared.done.load(Ordering::Relaxed),
         time: shared.start.elapsed(),
+        threads: used,
         tally,
         finding: found.into_iter().next(),
     }
@@ -197,6 +252,34 @@ mod tests {
         assert_eq!((one.executions, four.executions), (1000, 1000));
         assert!(one.tally.beats > 0 && one.tally == four.tally);
         assert!(one.finding.is_none() && four.finding.is_none());
+    }
+
+    /// Gives two threads, then none, as a container's limit on processes does.
+    fn two(work: Box<dyn FnOnce() + Send>) -> io::Result<()> {
+        static GIVEN: AtomicU64 = AtomicU64::new(0);
+        match GIVEN.fetch_add(1, Ordering::Relaxed) {
+            0 | 1 => start(work),
+            _ => none(work),
+        }
+    }
+
+    fn none(_: Box<dyn FnOnce() + Send>) -> io::Result<()> {
+        Err(io::ErrorKind::WouldBlock.into())
+    }
+
+    #[test]
+    fn where_the_system_refuses_threads_fewer_run_everything_and_the_summary_says_so() {
+        static TARGET: Target =
+            Target { name: "counts", about: "", run: counts, longest: 9, share: 1 };
+        let all = run(&TARGET, &plan(1000, 4), |_| ());
+        assert!(all.threads.missing().is_none() && all.threads.ran == 4, "{:?}", all.threads);
+        for (start, ran, watched) in [(two as Start, 2, true), (none, 1, false)] {
+            let fewer = run_on(start, &TARGET, &plan(1000, 4), |_| ());
+            assert_eq!((fewer.executions, fewer.tally), (1000, all.tally));
+            assert_eq!((fewer.threads.ran, fewer.threads.watched), (ran, watched));
+            let missing = fewer.threads.missing().expect("threads are missing");
+            assert_eq!(missing.contains("no watchdog"), !watched, "{missing}");
+        }
     }
 
     fn fails(input: &[u8]) -> Tally {

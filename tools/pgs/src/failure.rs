@@ -112,8 +112,8 @@ impl Failure {
     }
 
     fn is_closed_pipe(&self) -> bool {
-        let io = self.error.downcast_ref::<io::Error>();
-        self.cause == Cause::Output && io.is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)
+        let stdout = self.error.downcast_ref::<StdoutError>();
+        stdout.is_some_and(|error| error.0.kind() == io::ErrorKind::BrokenPipe)
     }
 
     /// The messages from the outermost to the innermost, one a line, and the next step.
@@ -163,16 +163,28 @@ struct About {
     source: Box<dyn Error + Send + Sync>,
 }
 
+/// Stdout took no more.
+#[derive(Debug, Error)]
+#[error("standard output cannot be written")]
+struct StdoutError(#[source] io::Error);
+
 /// Verbs write to stdout only; files have errors of their own.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
-        Self::new(Cause::Output, error)
+        Self::new(Cause::Output, StdoutError(error)).next("make room, or redirect it elsewhere")
     }
 }
 
-/// 0 for help and version, 2 for wrong usage.
-pub(crate) fn usage_code(message: &clap::Error) -> ExitCode {
-    ExitCode::from(if message.use_stderr() { 2 } else { 0 })
+/// Writes what the command line's parser has to say: help and version to stdout with code 0, a
+/// usage error to stderr with code 2.
+pub(crate) fn report_usage(message: &clap::Error) -> ExitCode {
+    let printed = message.print().and_then(|()| io::stdout().flush());
+    match printed {
+        // If nobody can be told of a usage error, the code still says it.
+        _ if message.use_stderr() => ExitCode::from(2),
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => Failure::from(error).report(&mut io::stderr().lock()),
+    }
 }
 
 #[cfg(test)]
@@ -225,6 +237,10 @@ mod tests {
         Failure::from(io::Error::from(io::ErrorKind::BrokenPipe)).report(&mut stderr);
         assert!(stderr.is_empty());
         Failure::from(io::Error::from(io::ErrorKind::StorageFull)).report(&mut stderr);
-        assert!(!stderr.is_empty());
+        let text = String::from_utf8(stderr).expect("text");
+        assert!(
+            text.starts_with("error: standard output cannot be written\n  because: "),
+            "{text}"
+        );
     }
 }

@@ -28,7 +28,10 @@ mod verbs;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
+use std::sync::Arc;
 
+use signal_hook::consts::SIGXFSZ;
+use signal_hook::flag;
 use step_folder::{folder, npy};
 
 /// Has the log written to stderr: warnings, or what the environment asks for.
@@ -43,16 +46,21 @@ fn log_to_stderr() {
         .init();
 }
 
+/// Has a write past the limit on the size of files (`ulimit -f`) fail with an error that is told,
+/// where the system would end the program.
+fn survive_file_limit() {
+    // Nobody asks the flag: the write says it.
+    if let Err(error) = flag::register(SIGXFSZ, Arc::default()) {
+        log::warn!("a file that grows past the limit will end the program: {error}");
+    }
+}
+
 fn main() -> ExitCode {
     log_to_stderr();
+    survive_file_limit();
     let command = match args::parse(std::env::args_os(), |name| std::env::var_os(name)) {
         Ok(command) => command,
-        Err(message) => {
-            // Help goes to stdout with code 0, a usage error to stderr with code 2. Nobody is left
-            // to tell if either is closed.
-            let _ = message.print();
-            return failure::usage_code(&message);
-        }
+        Err(message) => return failure::report_usage(&message),
     };
     let mut out = io::stdout().lock();
     let done = verbs::run(&command, &mut out)

@@ -407,3 +407,37 @@ fn ctrl_c_ends_after_the_step_with_130_and_a_digest() {
     assert!(rest.iter().any(|line| line.starts_with("interrupted after ")), "{rest:?}");
     assert!(rest.iter().any(|line| line.starts_with("digest ")), "{rest:?}");
 }
+
+#[test]
+fn a_full_stdout_is_named_and_ends_with_2() {
+    for arguments in [
+        &["--help"][..],
+        &["run", "-h"],
+        &["help", "solve"],
+        &["--version"],
+        &["--grid", "2x2x2", "--steps", "2"],
+        &["--grid", "2x2x2", "--steps", "2", "--json"],
+        &["compare", "float", "half", "--grid", "2x2x2", "--steps", "1"],
+        &["list"],
+        &["model", "--collisions", "1", "--bodies", "2"],
+        &["check"],
+        &["faults", "--list", "--profile", "naive"],
+    ] {
+        let full = std::fs::File::options().write(true).open("/dev/full").expect("a full device");
+        let ran: Ran = pgs().args(arguments).stdout(full).output().expect("it starts").into();
+        assert_eq!(ran.code, Some(2), "{arguments:?}: {}", ran.stderr);
+        assert!(
+            ran.stderr.contains("error: standard output cannot be written\n  because: No space"),
+            "{arguments:?}: {}",
+            ran.stderr
+        );
+    }
+    // The same for what a folder of arrays makes of it, and for a command line that is wrong.
+    let full = || std::fs::File::options().write(true).open("/dev/full").expect("a full device");
+    let digest = pgs().args(["solve", "--digest"]).arg(golden("one_cube")).stdout(full()).output();
+    let ran = Ran::from(digest.expect("it starts"));
+    assert_eq!(ran.code, Some(2));
+    assert!(ran.stderr.contains("standard output"), "{}", ran.stderr);
+    let wrong = pgs().arg("--frobnicate").stderr(full()).output().expect("it starts");
+    assert_eq!(wrong.status.code(), Some(2));
+}

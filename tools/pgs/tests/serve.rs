@@ -10,7 +10,9 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 
 use bitstream_model::interface::address_map::dma_base;
-use bitstream_model::interface::message::{ANSWER_BYTES, Answer, REQUEST_BYTES, Request, Status};
+use bitstream_model::interface::message::{
+    ANSWER_BYTES, Answer, REQUEST_BYTES, Request, Status, VERSION,
+};
 use common::{Ran, Tied, pgs, run, signal};
 
 /// `pgs serve` in a process of its own.
@@ -104,6 +106,17 @@ fn where_no_board_is_served_there_is_none() {
     let ran = run(["--board", &board, "--grid", "2x2x2"]);
     assert_eq!(ran.code, Some(3));
     assert!(ran.stderr.contains("start one with `pgs serve --socket"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("because: No such file or directory"), "{}", ran.stderr);
+    for (make, because, next) in [
+        (left as fn(&Path), "because: Connection refused", "at it any more: start one with"),
+        (plain, "because: Socket operation on non-socket", "is not a board's socket: name the one"),
+    ] {
+        make(&socket);
+        let ran = run(["--board", &board, "--grid", "2x2x2"]);
+        assert_eq!(ran.code, Some(3));
+        assert!(ran.stderr.contains(because) && ran.stderr.contains(next), "{}", ran.stderr);
+        std::fs::remove_file(&socket).expect("there");
+    }
     let serve = |rest: &[&str]| {
         let mut command = pgs();
         command.arg("serve").arg("--socket").arg(&socket).args(rest);
@@ -112,13 +125,90 @@ fn where_no_board_is_served_there_is_none() {
     for (rest, reason) in [
         (&["--memory", "uio"][..], "the memory of a served board is a file"),
         (&["--board", "uio"], "serves an emulated board"),
-        (&["--memory", "file:/nonexistent/memory"], "cannot be opened"),
+        (&["--memory", "file:/nonexistent/memory"], "cannot be made"),
         (&["--format", "thesis16"], "take a profile with streams of 16 bits"),
     ] {
         let ran = serve(rest);
         assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{rest:?}");
         assert!(ran.stderr.contains(reason), "{rest:?}: {}", ran.stderr);
         assert!(!socket.exists());
+    }
+}
+
+/// Leaves a socket that nobody serves.
+fn left(path: &Path) {
+    drop(UnixListener::bind(path).expect("bound"));
+}
+
+/// Leaves a plain file.
+fn plain(path: &Path) {
+    std::fs::write(path, "mine").expect("written");
+}
+
+#[test]
+fn a_board_that_somebody_else_has_is_busy() {
+    let served = Served::new();
+    let mut stream = UnixStream::connect(served.socket()).expect("connected");
+    let hello = Request::Hello { version: VERSION }.encode();
+    stream.write_all(&hello).expect("sent");
+    stream.read_exact(&mut [0; ANSWER_BYTES]).expect("answered");
+    let ran: Ran = served.command(&served.socket()).output().expect("it runs").into();
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(3), ""));
+    assert!(ran.stderr.contains("has another driver: end that first"), "{}", ran.stderr);
+    drop(stream);
+    served.end();
+}
+
+#[test]
+fn a_file_that_no_board_has_made_stays_as_it_is() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let (own, socket) = (folder.path().join("photos.tar"), folder.path().join("board"));
+    let content = vec![0x5A; 1 << 21];
+    std::fs::write(&own, &content).expect("written");
+    let memory = format!("file:{}", own.display());
+    let mut command = pgs();
+    command.args(["serve", "--memory", &memory, "--socket"]).arg(&socket);
+    let ran = Ran::from(command.output().expect("it runs"));
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""));
+    assert!(ran.stderr.contains("refusing to overwrite it; name another file"), "{}", ran.stderr);
+    assert_eq!(std::fs::read(&own).expect("there"), content);
+}
+
+/// `pgs serve` with 16 MiB of memory in `folder`, behind a shell's preparation; then what is in the
+/// folder.
+fn serve_after(shell: &[&str], prepare: &str, folder: &Path) -> Ran {
+    let pgs = pgs();
+    let mut command = Command::new(shell[0]);
+    let act = format!("{prepare} && {{ \"$@\"; code=$?; ls -A \"$FOLDER\"; exit $code; }}");
+    command.args(&shell[1..]).args(["-c", &act, "sh"]).env("FOLDER", folder);
+    command.arg(pgs.get_program()).args(pgs.get_args()).args(["serve", "--memory-mib", "16"]);
+    command.arg("--socket").arg(folder.join("board")).env("PGS_BOARD", "emulated");
+    command.output().expect("it runs").into()
+}
+
+#[test]
+fn memory_that_the_system_does_not_give_is_refused_and_nothing_is_left() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let ran = serve_after(&["sh"], "ulimit -f 64", folder.path());
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{}", ran.stderr);
+    assert!(ran.stderr.contains("because: File too large"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("give a smaller --memory-mib"), "{}", ran.stderr);
+
+    // A small file system of our own, if the system lets us have one.
+    let small = "mount -t tmpfs -o size=1m small \"$FOLDER\"";
+    let shells = [&["unshare", "-m", "sh"][..], &["unshare", "-rm", "sh"]];
+    let can = |shell: &&&[&str]| {
+        let mut command = Command::new(shell[0]);
+        command.args(&shell[1..]).args(["-c", small]).env("FOLDER", folder.path());
+        command.output().is_ok_and(|output| output.status.success())
+    };
+    let Some(shell) = shells.iter().find(can) else {
+        return common::skipped("memory on a full file system (no right to mount one)");
+    };
+    let ran = serve_after(shell, small, folder.path());
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{}", ran.stderr);
+    for text in ["of 16777216 bytes cannot be reserved", "because: No space", "--shm-size"] {
+        assert!(ran.stderr.contains(text), "{text}: {}", ran.stderr);
     }
 }
 

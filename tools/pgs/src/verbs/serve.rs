@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::interface::message::MEMORY_SUFFIX;
-use bitstream_model::remote::{Ended, MemoryFile, ServeError, Server, Visit};
+use bitstream_model::remote::{Ended, MemoryFile, MemoryFileError, ServeError, Server, Visit};
 use clap::Args;
 use serde_json::json;
 use zynq_pgs::{MemoryChoice, StepParameters};
@@ -29,7 +29,7 @@ Examples:
   pgs serve --socket /tmp/board --memory file:/dev/shm/board --profile half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
 
-One driver at a time has the board. One that is killed leaves it as it is, engines running; the next
+One driver at a time has the board; a connection that says nothing for 5 s is closed. One that is killed leaves it as it is, engines running; the next
 one resets it. Ctrl-C ends it and removes the socket; the memory's file stays.";
 
 /// Serve an emulated board to drivers in other processes: registers at a Unix socket, memory in a
@@ -86,8 +86,7 @@ pub(crate) fn run(
     let planned = args.planned.plan(&config, &StepParameters::default());
     let wanted = args.memory_mib.map(|mib| mib << 20);
     let made = !path.exists();
-    let memory =
-        MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(Failure::input)?;
+    let memory = MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(no_memory)?;
     let addresses = memory.addresses();
     let mut server = Server::bind(config, memory, &args.socket).map_err(|error| {
         let removed = if made { fs::remove_file(&path) } else { Ok(()) };
@@ -96,6 +95,10 @@ pub(crate) fn run(
         }
         match error {
             ServeError::Config(error) => not_built(error),
+            error @ ServeError::Socket { .. } => Failure::input(error).next(
+                "name a socket with --socket whose folder is there and may be written to, and whose \
+                 path has at most 107 bytes",
+            ),
             error => Failure::input(error),
         }
     })?;
@@ -161,6 +164,19 @@ pub(crate) fn run(
         )?;
     }
     Ok(Verdict::Done)
+}
+
+/// There is no memory for the board.
+fn no_memory(error: MemoryFileError) -> Failure {
+    let no_room = matches!(error, MemoryFileError::NoRoom { .. });
+    let failure = Failure::input(error);
+    match no_room {
+        true => failure.next(
+            "give a smaller --memory-mib, make room, or name another file with --memory file:PATH; \
+             a container's /dev/shm is as large as its --shm-size says",
+        ),
+        false => failure,
+    }
 }
 
 fn at(number: u64) -> usize {

@@ -7,9 +7,9 @@ use std::fmt;
 use std::io::Write;
 use std::path::PathBuf;
 use std::str::FromStr;
-use std::thread;
 
 use clap::Args;
+use pgs_support::Crew;
 use serde_json::{Value, json};
 use zynq_pgs::StepParameters;
 
@@ -213,13 +213,17 @@ pub(crate) fn run(
     let moving = lanes.0.world.moving();
     let interrupt = Interrupt::install();
     let progress = progress_bar(steps);
-    let (a, b) = both(&mut lanes, |lane| Some(lane.start()));
+    let mut crew = Crew::new("compare", 1);
+    if let Some(error) = crew.refused() {
+        log::warn!("no thread of its own for board B, which takes its steps after A: {error}");
+    }
+    let (a, b) = both(&mut crew, &mut lanes, |lane| Some(lane.start()));
     let mut last = Row { step: 0, a, b, deviation: None };
     let mut documents = vec![last.to_json()];
     let mut done = 0;
     while done < steps && !interrupt.is_set() {
         done += 1;
-        let (a, b) = both(&mut lanes, |lane| lane.step(done, &parameters));
+        let (a, b) = both(&mut crew, &mut lanes, |lane| lane.step(done, &parameters));
         if done == 1 && a.is_none() && b.is_none() {
             // Nothing to be compared, and nothing that one build does better than the other.
             let Lane { name, side, failed, .. } = &mut lanes.0;
@@ -296,21 +300,17 @@ fn board_shapes(opened: &crate::board::Opened) -> u32 {
     opened.accelerator.capabilities().shape_capacity
 }
 
-/// Does the same with both boards, side by side.
-fn both<'a, R: Send>(
+/// Does the same with both boards: side by side, or one after the other where there is no second
+/// thread.
+fn both<'a>(
+    crew: &mut Crew,
     lanes: &mut (Lane<'a>, Lane<'a>),
-    act: impl Fn(&mut Lane<'a>) -> R + Sync,
-) -> (R, R) {
-    let (a, b) = (&mut lanes.0, &mut lanes.1);
-    thread::scope(|scope| {
-        let other = scope.spawn(|| act(b));
-        let one = act(a);
-        match other.join() {
-            Ok(other) => (one, other),
-            // A panic goes on as it would have without a thread.
-            Err(panic) => std::panic::resume_unwind(panic),
-        }
-    })
+    act: impl Fn(&mut Lane<'a>) -> Option<Measured> + Sync,
+) -> (Option<Measured>, Option<Measured>) {
+    let mut measured = (None, None);
+    let shares = [(&mut lanes.0, &mut measured.0), (&mut lanes.1, &mut measured.1)];
+    crew.each(shares.into_iter(), |(lane, to)| *to = act(lane));
+    measured
 }
 
 #[cfg(test)]

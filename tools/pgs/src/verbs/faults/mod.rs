@@ -8,11 +8,11 @@ mod trial;
 
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bitstream_model::interface::profile::{PROFILES, Profile};
 use clap::Args;
 use indicatif::ProgressBar;
+use pgs_support::Crew;
 use serde_json::{Value, json};
 
 use self::cells::{Cell, Impossible};
@@ -95,39 +95,23 @@ pub(crate) fn run(
     Ok(if failed { Verdict::Differs } else { Verdict::Done })
 }
 
-/// Tries cells on all processors; in their order, whoever was first.
+/// Tries cells on all processors, or on as many as the system gives threads for; in their order,
+/// whoever was first.
 fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
     let bar: ProgressBar = progress_bar(u32::try_from(cells.len()).unwrap_or(u32::MAX));
     bar.set_message(bench.config.profile.name);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut found = Vec::new();
-        while let Some((place, cell)) = take(&next, &cells) {
-            // A panic is what fails everywhere, not what ends the table.
-            let tried = catch_unwind(AssertUnwindSafe(|| trial::run(bench, cell)));
-            found.push((place, tried.unwrap_or_default()));
-            bar.inc(1);
-        }
-        found
-    };
-    let found: Vec<(usize, Verified)> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
-    });
-    bar.finish_and_clear();
+    let mut crew = Crew::new("faults", threads - 1);
     // What is missing has passed nothing.
     let mut all = vec![Verified::default(); cells.len()];
-    for (place, verified) in found {
-        all[place] = verified;
-    }
+    crew.each(cells.iter().zip(&mut all), |(cell, to)| {
+        // A panic is what fails everywhere, not what ends the table.
+        let tried = catch_unwind(AssertUnwindSafe(|| trial::run(bench, cell)));
+        *to = tried.unwrap_or_default();
+        bar.inc(1);
+    });
+    bar.finish_and_clear();
     cells.into_iter().zip(all).collect()
-}
-
-/// The next cell that nobody has taken.
-fn take<'a>(next: &AtomicUsize, cells: &'a [Cell]) -> Option<(usize, &'a Cell)> {
-    let place = next.fetch_add(1, Ordering::Relaxed);
-    cells.get(place).map(|cell| (place, cell))
 }
 
 fn to_json(all: &[Tried]) -> Value {
