@@ -1,4 +1,4 @@
-//! This folder decides in which order the collisions of a step enter the pipeline.
+//! Decides in which order the collisions of a step enter the pipeline.
 //!
 //! ```text
 //! bodies, collisions -> input -> sweep -> groups -> schedule -> check
@@ -12,8 +12,8 @@
 //! [`Order::HazardFreeNearby`] instead keeps the collisions near to where they were given. Hardware that
 //! ignores hazards, hardware that waits on them and a sequential solver then give the same bits.
 //!
-//! An order is a function of its input alone: the same on every machine, and the same whatever was
-//! ordered before, so that a step taken again from a stored state is the same step.
+//! An order is a function of its input alone. It is the same on every machine, and does not depend
+//! on earlier orders, so that a step that is repeated from a stored state is the same step.
 //!
 //! # Example
 //!
@@ -59,7 +59,7 @@ pub use error::OrderError;
 pub use input::{InputBuffers, OrderInput};
 pub(crate) use interlock::Interlock;
 pub use live::LiveReport;
-pub(crate) use live::{Crowded, Lives, Room};
+pub(crate) use live::{LiveError, Lives, Room};
 pub use orderer::{OrderCosts, Orderer, colour_count};
 pub use report::{OrderReport, live_curve};
 pub use schedule::{Ordered, Schedule};

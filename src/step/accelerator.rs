@@ -42,17 +42,19 @@ pub struct Accelerator {
     pub(super) shapes: Vec<Shape>,
     /// How often shapes were loaded.
     pub(super) shapes_loaded: u64,
-    /// The bank of the step that was started last, into which the next one that is not prepared goes.
+    /// The bank of the step that was started last. A step that is not prepared goes into it.
     pub(super) bank: Bank,
     /// The step that lies in each bank.
     pub(super) packed: PerBank<Option<PackedStep>>,
-    /// How it was ordered.
+    /// The ordering of the step in each bank.
     pub(super) orderings: PerBank<Ordering>,
-    /// Results of a step until all are checked. Kept, so that a step allocates nothing.
-    pub(super) spare: Vec<Record>,
+    /// Results of a step until all are checked. The memory is kept, so that a step allocates
+    /// nothing.
+    pub(super) staged: Vec<Record>,
 }
 
-/// What it is, and a summary of the step in each bank: not the records, results and tables, which grow with it.
+/// Prints the board and a summary of the step in each bank, but no records, results or tables:
+/// their size grows with the step.
 impl fmt::Debug for Accelerator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Accelerator")
@@ -85,7 +87,7 @@ impl Accelerator {
         Ok(Self::assemble(found.description, device))
     }
 
-    /// The accelerator of a board that was brought up.
+    /// Makes the accelerator of a board that was brought up.
     pub(crate) fn assemble(board: BoardDescription, device: Device) -> Self {
         let Capabilities { variant, version, clock_khz, .. } = device.capabilities;
         log::info!(
@@ -114,24 +116,24 @@ impl Accelerator {
             bank: Bank::First,
             packed: PerBank::default(),
             orderings: PerBank::default(),
-            spare: Vec::new(),
+            staged: Vec::new(),
         }
     }
 
-    /// Which board was opened, and why.
+    /// The board that was opened, and the reason for the choice.
     #[must_use]
     pub fn board(&self) -> &BoardDescription {
         &self.board
     }
 
-    /// What the bitstream says of itself.
+    /// The capabilities that the bitstream reports.
     #[must_use]
     pub fn capabilities(&self) -> &Capabilities {
         &self.device.capabilities
     }
 
-    /// Loads the shapes that bodies refer to by index, in place of all earlier ones. A step that was
-    /// [prepared](InFlight::prepare) with those is not started any more.
+    /// Loads the shapes that bodies refer to by index, in place of all earlier ones. A step that
+    /// was [prepared](InFlight::prepare) with the earlier shapes is refused from now on.
     ///
     /// # Errors
     /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
@@ -148,16 +150,16 @@ impl Accelerator {
         })
     }
 
-    /// From now on this ends steps early, in place of an earlier one.
+    /// Lets `cancellation` end steps early, in place of an earlier one.
     pub fn set_cancellation(&mut self, cancellation: Cancellation) {
         self.device.cancellation = Some(cancellation);
     }
 
     /// Solves the contacts of one time step and integrates it.
     ///
-    /// Collisions are taken in the [order](StepParameters::order) that the parameters ask for.
-    /// Static bodies are left as they are. The bodies change only if the step succeeds, and then all
-    /// at once.
+    /// The board takes the collisions in the [order](StepParameters::order) that the parameters ask
+    /// for. Static bodies stay as they are. The bodies change only if the step succeeds, and then
+    /// all at once.
     ///
     /// Units: metres, kilograms, seconds, radians, world frame.
     ///
@@ -182,10 +184,10 @@ impl Accelerator {
         Ok(report)
     }
 
-    /// Starts a [step](Self::step) and returns at once: the caller may do other work until it asks
+    /// Starts a [step](Self::step) and returns at once. The caller may do other work until it asks
     /// for the results with [`InFlight::wait`].
     ///
-    /// The bodies are copied here, and looked at again only there.
+    /// This call copies the bodies; only [`InFlight::wait`] touches them again.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -210,7 +212,7 @@ impl Accelerator {
         (self.device.counts.reads(), self.device.counts.writes())
     }
 
-    /// Starts a step that lies in its bank. Nothing is in flight.
+    /// Starts a step that lies in its bank, while no other is in flight.
     pub(super) fn begin(
         &mut self,
         step: PackedStep,

@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering as Atomic};
 
 use super::accelerator::Accelerator;
-use super::ordering::{Arranged, Hardware, Ordering};
-use super::packing::{Sent, Source};
+use super::ordering::{OrderSummary, Ordering, OrderingContext};
+use super::packing::{PackInput, SentSums};
 use super::report::HostTimes;
 use super::reserve::{refuse, reserve};
 use super::stopwatch::Stopwatch;
@@ -16,12 +16,12 @@ use crate::order::Ordered;
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 use crate::validate::{InputError, Limits, Quick, Scene, preflight, validate};
 
-/// Tells one packing from all others of this process.
+/// Identifies one packing among all packings of this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct PackId(u64);
 
 impl PackId {
-    /// An id that no other packing has.
+    /// Makes an id that no other packing has.
     pub(super) fn new() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         Self(NEXT.fetch_add(1, Atomic::Relaxed))
@@ -35,29 +35,29 @@ pub(super) struct PackedStep {
     pub(super) bank: Bank,
     pub(super) plan: Plan,
     /// The sums of the words sent; `None` if no body moves and nothing is streamed.
-    pub(super) sent: Option<Sent>,
+    pub(super) sent: Option<SentSums>,
     pub(super) parameters: StepParameters,
-    /// Bodies and collisions as given.
+    /// Number of the caller's bodies.
     pub(super) bodies: usize,
     pub(super) collisions: usize,
-    /// Entries that the order added.
+    /// Empty entries that the order added.
     pub(super) empty: usize,
-    pub(super) arranged: Arranged,
-    /// How often shapes had been loaded.
+    pub(super) order_summary: OrderSummary,
+    /// `Accelerator::shapes_loaded` at the time of packing.
     pub(super) shapes_loaded: u64,
     pub(super) host: HostTimes,
 }
 
-/// What the engines do while a step is packed.
+/// The state of the DMA engines while a step is packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Engines {
-    /// Nothing: they may be stopped and reset, and all memory but the bank's may be freed.
+    /// Without work: they may be stopped and reset, and all memory but the bank's may be freed.
     Idle,
-    /// They work on another step, which nothing may disturb.
+    /// At work on another step, which nothing may disturb.
     Working,
 }
 
-/// A step as the caller gives it.
+/// The caller's arguments of a step, with the board's shapes and limits.
 struct Input<'a, B: ?Sized, C: ?Sized> {
     bodies: &'a B,
     collisions: &'a C,
@@ -67,31 +67,31 @@ struct Input<'a, B: ?Sized, C: ?Sized> {
 }
 
 impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
-    /// Refuses what is wrong whatever the bodies and collisions hold.
+    /// Refuses sizes and parameters that no bodies or collisions could make right.
     fn check(&self) -> Result<Scene<'a>, InputError> {
         preflight(self.bodies, self.collisions, self.shapes, self.parameters, self.limits)
     }
 
-    /// Refuses everything that packing would find, with the words for it.
+    /// Refuses everything that packing would find, and names it.
     fn check_all(&self) -> Result<(), InputError> {
         validate(self.bodies, self.collisions, self.shapes, self.parameters, self.limits)
     }
 
     /// Orders the collisions.
-    fn order(&self, ordering: &mut Ordering, device: &Device) -> Result<Arranged, InputError> {
+    fn order(&self, ordering: &mut Ordering, device: &Device) -> Result<OrderSummary, InputError> {
         let capabilities = &device.capabilities;
-        let on = Hardware { capabilities, limits: self.limits, shapes: self.shapes };
-        let arranged = ordering.arrange(self.bodies, self.collisions, self.parameters, on);
-        // A fault of the input is reported before a fault of its order.
-        arranged.or_else(|error| self.check_all().and(Err(error)))
+        let context = OrderingContext { capabilities, limits: self.limits, shapes: self.shapes };
+        let order_summary = ordering.order(self.bodies, self.collisions, self.parameters, context);
+        // An error of the input is reported before an error of its order.
+        order_summary.or_else(|error| self.check_all().and(Err(error)))
     }
 
     /// Lays the step out over the channels.
-    fn plan(&self, ordering: &Ordering, arranged: &Arranged) -> Plan {
-        let lives = arranged.live.map(|_| ordering.lives());
+    fn plan(&self, ordering: &Ordering, order_summary: &OrderSummary) -> Plan {
+        let lives = order_summary.live.map(|_| ordering.lives());
         let collisions = match lives {
             Some(lives) => lives.words().len(),
-            None if arranged.scheduled => ordering.schedule().len(),
+            None if order_summary.scheduled => ordering.schedule().len(),
             None => self.collisions.len(),
         };
         Plan {
@@ -102,26 +102,26 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
         }
     }
 
-    /// Writes the records into the bank. `false` if the screening doubts the input.
+    /// Writes the records into the bank. Returns `false` if the screening doubts the input.
     fn pack(
         &self,
         device: &mut Device,
-        (ordering, arranged): (&Ordering, &Arranged),
+        (ordering, order_summary): (&Ordering, &OrderSummary),
         (plan, bank): (&Plan, Bank),
         scene: Scene<'a>,
-    ) -> (Sent, bool) {
+    ) -> (SentSums, bool) {
         let Self { bodies, collisions, shapes, .. } = *self;
         let quick = Quick::new(scene);
-        let (lives, quick) = (arranged.live.map(|_| ordering.lives()), Some(&quick));
-        if arranged.scheduled {
+        let (lives, quick) = (order_summary.live.map(|_| ordering.lives()), Some(&quick));
+        if order_summary.scheduled {
             let schedule = ordering.schedule();
             let added = Some(plan.collisions.saturating_sub(schedule.collisions()));
             let collisions = &Ordered { collisions, schedule };
-            let source = Source { bodies, collisions, added, lives, shapes, quick };
-            device.pack(plan, bank, &source)
+            let input = PackInput { bodies, collisions, added, lives, shapes, quick };
+            device.pack(plan, bank, &input)
         } else {
-            let source = Source { bodies, collisions, added: None, lives, shapes, quick };
-            device.pack(plan, bank, &source)
+            let input = PackInput { bodies, collisions, added: None, lives, shapes, quick };
+            device.pack(plan, bank, &input)
         }
     }
 }
@@ -144,15 +144,16 @@ impl Accelerator {
         let scene = input.check()?;
         host.validate = watch.lap();
 
-        let arranged = input.order(&mut orderings[bank], device)?;
+        let order_summary = input.order(&mut orderings[bank], device)?;
         host.order = watch.lap();
 
         let ordering = &orderings[bank];
-        let plan = input.plan(ordering, &arranged);
-        let all_sent = !arranged.scheduled || ordering.schedule().collisions() == collisions.len();
+        let plan = input.plan(ordering, &order_summary);
+        let all_sent =
+            !order_summary.scheduled || ordering.schedule().collisions() == collisions.len();
         let cancelled = engines == Engines::Idle && device.check_cancelled().is_err();
-        // Packing screens what it sends. What it does not send, or what another error would hide, is
-        // checked here.
+        // Packing screens everything that it sends. The full check is for the rest: input that is
+        // not sent, and input whose error another error would hide.
         if !all_sent || plan.bodies == 0 || cancelled || !device.has_room(&plan, bank) {
             input.check_all()?;
         }
@@ -161,18 +162,19 @@ impl Accelerator {
 
         let mut sent = None;
         if plan.bodies > 0 {
-            let (sums, passed) = input.pack(device, (ordering, &arranged), (&plan, bank), scene);
+            let (sums, passed) =
+                input.pack(device, (ordering, &order_summary), (&plan, bank), scene);
             if !passed {
                 input.check_all()?;
-                // The input is right now, and was not when it was packed.
+                // The input is right now, and was not right when it was packed.
                 return Err(InputError::Unsteady.into());
             }
             sent = Some(sums);
         }
         host.pack = watch.lap();
 
-        // Entries that fill the last issue are of the order's making too.
-        let empty = match arranged.scheduled {
+        // Entries that fill the last issue count as added by the order, too.
+        let empty = match order_summary.scheduled {
             true => plan.collisions.saturating_sub(ordering.schedule().collisions()),
             false => 0,
         };
@@ -185,20 +187,20 @@ impl Accelerator {
             bodies: bodies.len(),
             collisions: collisions.len(),
             empty,
-            arranged,
+            order_summary,
             shapes_loaded: self.shapes_loaded,
             host,
         }))
     }
 
-    /// Remembers what lies in a bank.
+    /// Records which step lies in a bank.
     pub(super) fn keep(&mut self, step: PackedStep) -> PackedStep {
         self.packed[step.bank] = Some(step);
         step
     }
 
-    /// Forgets what lies in a bank, and takes its buffers back. Whatever becomes of the next packing,
-    /// a refusal or a caller's panic, the earlier step is gone.
+    /// Forgets the step in a bank, and takes its buffers back. The earlier step is gone even if the
+    /// next packing ends in a refusal or in a panic of the caller's code.
     pub(super) fn forget(&mut self, bank: Bank) {
         self.packed[bank] = None;
         self.device.take_back_unused(bank);

@@ -1,4 +1,4 @@
-//! Packs a step while another is on the board, and starts it when that one has ended.
+//! Packs a step while another is on the board, and starts it after the end of that step.
 //!
 //! ```text
 //!   CPU    | pack 0 |  pack 1  |unpack 0|  pack 2  |unpack 1| ...
@@ -21,13 +21,18 @@ use crate::validate::InputError;
 
 /// A step whose records lie in DMA memory, ready to be [started](Accelerator::start).
 ///
-/// It may be started more than once, as after a fault: its records stay until other ones take their
-/// place. That is the next step [prepared](InFlight::prepare) before it was started, or the second
-/// after; and, once it was started, the next step that is [submitted](Accelerator::submit) without
-/// being prepared. One that was [written](Accelerator::write) with nothing on the board makes way for
-/// the next submitted step even if it was not started. Dropping it costs nothing and frees nothing.
+/// A prepared step may be started more than once, as after a fault: its records stay until other
+/// ones take their place.
+///
+/// - Before it is started, the next step that is [prepared](InFlight::prepare) replaces it.
+/// - After it was started, the second next step that is prepared replaces it, and so does the next
+///   step that is [submitted](Accelerator::submit) without being prepared.
+/// - A step that was [written](Accelerator::write) with nothing on the board makes way for the next
+///   submitted step, started or not.
+///
+/// Dropping it costs nothing and frees nothing.
 #[derive(Debug)]
-#[must_use = "a step that was prepared is not started by itself"]
+#[must_use = "a prepared step does not start by itself: call `start`"]
 pub struct Prepared {
     pub(super) bank: Bank,
     pub(super) id: PackId,
@@ -36,10 +41,10 @@ pub struct Prepared {
 impl InFlight<'_> {
     /// Validates, orders and packs another step while the board works on this one.
     ///
-    /// What is packed is what the caller gives now. A step that starts from the results of this one
-    /// cannot be prepared before they are there; what can be is the step of another world on the same
-    /// board, or one whose bodies were predicted. This step is not touched, whatever happens: it is
-    /// waited for as before.
+    /// The records hold the caller's values of now. A step that starts from the results of this one
+    /// cannot be prepared before they are there. The step of another world on the same board can
+    /// be, and so can a step whose bodies were predicted. In any case this step goes on,
+    /// and the caller waits for it as before.
     ///
     /// ```
     /// use zynq_pgs::{Accelerator, Body, Collision, OpenOptions, Pose, Shape, StepParameters};
@@ -66,13 +71,13 @@ impl InFlight<'_> {
     /// # }
     /// ```
     ///
-    /// The first call allocates a second set of buffers, as large as the first. Where there is too
-    /// little memory for both, steps that are not prepared work as ever.
+    /// The first call allocates a second set of buffers, as large as the first. Where memory is too
+    /// small for both sets, steps that are not prepared work as before.
     ///
     /// # Errors
-    /// [`Error::Input`]: the input was refused. [`Error::Step`] with
-    /// [`Fault::NoMemory`]: there is no room for a second set of buffers.
-    /// Either way what was prepared before is gone, and is refused when it is started.
+    /// [`Error::Input`]: the input was refused. [`Error::Step`] with [`Fault::NoMemory`]: there is
+    /// no room for a second set of buffers. Either way the step that was prepared before is gone,
+    /// and [`Accelerator::start`] refuses it.
     pub fn prepare<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
@@ -88,12 +93,12 @@ impl InFlight<'_> {
         })
     }
 
-    /// Hands a step that was packed while this one is on the board over to the device.
+    /// Hands a step over to the device that was packed while this one is on the board.
     pub(super) fn hand_over(&mut self, mut step: PackedStep) -> Result<Prepared, Error> {
         let (accelerator, bank) = (&mut *self.accelerator, step.bank);
         let mut watch = Stopwatch::start();
         if step.sent.is_some() {
-            // Cleaning caches, or copying, takes its time, too.
+            // Cleaning caches, or copying, takes time, too.
             accelerator.device.hand_over(&step.plan, bank).map_err(|error| {
                 accelerator.packed[bank] = None;
                 let fault = Box::new(Fault::from(error));
@@ -105,14 +110,15 @@ impl InFlight<'_> {
         Ok(Prepared { bank, id: step.id })
     }
 
-    /// Waits as [`wait`](Self::wait) does, and starts a prepared step as soon as the board is through
-    /// with this one: its results are read and stored while the board works on the next.
+    /// Waits as [`wait`](Self::wait) does, and starts a prepared step as soon as the board has
+    /// ended this one. The results are read and stored while the board works on the next step.
     ///
-    /// The two steps do not depend on each other: whether this one succeeds, fails or is refused its
-    /// bodies, the next is started if the board can be.
+    /// The two steps do not depend on each other: the next one is started if the board can start
+    /// it, even if this one fails or its bodies are refused.
     ///
     /// # Errors
-    /// First those of [`wait`](Self::wait), then those of [`Accelerator::start`].
+    /// The first result has the errors of [`wait`](Self::wait), the second has the errors of
+    /// [`Accelerator::start`].
     pub fn wait_and_start<B: Bodies + ?Sized>(
         self,
         bodies: &mut B,
@@ -128,21 +134,23 @@ impl InFlight<'_> {
     ) -> (Result<StepReport, Error>, Result<Self, Error>) {
         let ended = self.collect(bodies);
         if next.bank == self.flight.step.bank {
-            // The same step once more, where the results are that are not read yet.
+            // The same step once more: its results would overwrite the results that are not read
+            // yet.
             let report = ended.and_then(|ended| self.finish(ended, bodies));
             let started = self.accelerator.begin_prepared(next, Memory::Freed);
             return (report, started.map(|flight| self.followed_by(flight)));
         }
-        // Until the end of this function `self` is there to stop it, if the caller's code panics.
+        // `self` lives until the end of this function and stops the step if the caller's code
+        // panics.
         let mut started = self.accelerator.begin_prepared(next, Memory::Kept);
         if self.accelerator.device.dead {
-            // The results were in memory that is left to the device now.
+            // The results lie in memory that now belongs to the device.
             return (
                 ended.and(Err(Error::MustReopen)),
                 started.map(|flight| self.followed_by(flight)),
             );
         }
-        // What starting took is not this step's.
+        // The time of the start belongs to the next step.
         self.flight.watch.lap();
         let report = ended.and_then(|ended| match self.read(&ended, bodies) {
             Ok(()) => Ok(self.commit(ended, bodies)),
@@ -151,7 +159,7 @@ impl InFlight<'_> {
                 let aftermath = Aftermath::Untouched;
                 Err(self.located(Error::Step { fault, aftermath, diagnosis: None }))
             }
-            // Who sends wrong words is reset, which stops the next step, too.
+            // An accelerator that sends wrong words is reset, which stops the next step, too.
             Err(fault) => {
                 let Accelerator { device, shapes, .. } = &mut *self.accelerator;
                 let error = device.fail_overtaken(fault, shapes);
@@ -164,17 +172,17 @@ impl InFlight<'_> {
         (report, started.map(|flight| self.followed_by(flight)))
     }
 
-    /// The next step, in place of one that has ended.
+    /// Replaces the step that has ended by the next one.
     fn followed_by(mut self, flight: Flight) -> Self {
         self.flight = flight;
         self
     }
 }
 
-/// What may become of memory that the board has no use for, where there is too little.
+/// Whether starting a step may free the memory of the other bank, where memory is short.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Memory {
-    /// There are results in it.
+    /// The other bank holds results.
     Kept,
     Freed,
 }
@@ -184,10 +192,10 @@ impl Accelerator {
     /// [written](Self::write).
     ///
     /// # Errors
-    /// [`Error::Input`]: [`InputError::NotPrepared`] if its records are not there any more, or never
-    /// were in this accelerator; [`InputError::ShapesChanged`] if [other shapes](Self::set_shapes)
-    /// were loaded since. [`Error::Step`] and [`Error::MustReopen`] as [`Self::step`]. Where
-    /// [`Error::may_retry`] says so the prepared step may be started again.
+    /// [`Error::Input`]: [`InputError::NotPrepared`] if its records are not there any more, or
+    /// never were in this accelerator; [`InputError::ShapesChanged`] if [other
+    /// shapes](Self::set_shapes) were loaded since. [`Error::Step`] and [`Error::MustReopen`] as
+    /// [`Self::step`]. Where [`Error::may_retry`] is true the prepared step may be started again.
     pub fn start(&mut self, prepared: &Prepared) -> Result<InFlight<'_>, Error> {
         standard(move || {
             let flight = self.begin_prepared(prepared, Memory::Freed)?;
@@ -204,7 +212,7 @@ impl Accelerator {
             return Err(InputError::NotPrepared.into());
         };
         if step.sent.is_some() && !self.device.holds(bank) {
-            // Lost to a fault.
+            // The records were lost to a fault.
             return Err(InputError::NotPrepared.into());
         }
         if shapes_loaded != self.shapes_loaded {
@@ -222,7 +230,7 @@ impl Accelerator {
         }
         ready.map_err(|symptom| device.fail(symptom, shapes))?;
         if step.sent.is_some() && !device.holds(bank) {
-            // Lost to a reset that the rings needed.
+            // The records were lost to a reset that the rings needed.
             packed[bank] = None;
             return Err(InputError::NotPrepared.into());
         }

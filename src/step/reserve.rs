@@ -1,4 +1,4 @@
-//! Reserves the memory of a step, and says why a step could not be packed.
+//! Reserves the memory of a step, and makes the error of a step that could not be packed.
 
 use super::pack::{Engines, PackedStep};
 use crate::board::bank::{Bank, PerBank};
@@ -9,10 +9,10 @@ use crate::error::{Aftermath, Error};
 use crate::fault::Fault;
 use crate::scene::Shape;
 
-/// A board, and the steps that lie in its banks.
+/// A board, and the steps in its banks.
 type Banks<'a> = (&'a mut Device, &'a mut PerBank<Option<PackedStep>>);
 
-/// Makes the buffers of a bank large enough for a step, and the rings if no engine works.
+/// Makes the buffers of a bank large enough for a step, and the rings too if the engines are idle.
 pub(super) fn reserve(
     (device, packed): Banks<'_>,
     shapes: &[Shape],
@@ -30,15 +30,15 @@ pub(super) fn reserve(
             or_free((device, packed), bank, |device| device.reserve_or_reset(plan, bank, shapes))
         }
         Engines::Working => device.reserve_buffers(plan, bank).map_err(|error| {
-            // A part of them is of no use, and may be the memory that the next step lacks.
+            // A part of the buffers is of no use, and may be the memory that the next step lacks.
             device.release_buffers(bank);
             Fault::NoMemory(error).into()
         }),
     }
 }
 
-/// Tries again with the memory of the other bank if there is too little. The step that was prepared
-/// there is lost.
+/// Makes an attempt, and repeats it with the memory of the other bank if memory is short. The step
+/// that was prepared in the other bank is then lost.
 pub(super) fn or_free(
     (device, packed): Banks<'_>,
     bank: Bank,
@@ -63,7 +63,7 @@ pub(super) fn refuse(
     engines: Engines,
 ) -> Error {
     match (symptom, engines) {
-        // The board has no part in it, and is at work.
+        // The board has no part in the fault, and is at work.
         (Symptom::Known(fault), Engines::Working) => {
             let fault = Box::new(fault);
             Error::Step { fault, aftermath: Aftermath::Untouched, diagnosis: None }

@@ -1,8 +1,8 @@
-//! Host time by laps.
+//! Measures host time by laps.
 
 use std::time::{Duration, Instant};
 
-/// Measures the phases of a step on the host, one lap each.
+/// Times the phases of a step on the host, one lap each.
 #[derive(Debug)]
 pub(super) struct Stopwatch(Instant);
 

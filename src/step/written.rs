@@ -4,7 +4,7 @@ use pgs_support::float_env::standard_around;
 
 use super::accelerator::Accelerator;
 use super::in_flight::InFlight;
-use super::ordering::{Arranged, in_order_of_writing};
+use super::ordering::{OrderSummary, in_order_of_writing};
 use super::pack::{Engines, PackId, PackedStep};
 use super::prepared::Prepared;
 use super::report::{HostTimes, OrderChoice};
@@ -20,7 +20,7 @@ use crate::validate::InputError;
 use crate::validate::{Quick, preflight, validate};
 
 impl Accelerator {
-    /// Packs a step whose collisions `narrow_phase` writes, at most `announced` of them: their
+    /// Packs a step whose collisions `narrow_phase` writes, at most `announced` of them. Their
     /// records go straight into the memory that the board reads, and the caller needs no array of
     /// them.
     ///
@@ -29,11 +29,13 @@ impl Accelerator {
     /// hazards. A bitstream that keeps only live bodies wants all collisions at once, and so does a
     /// step that is to verify its order.
     ///
-    /// The step takes the place of the one that was started last; [`Self::start`] starts it. One that
-    /// is stepped or submitted before that takes its place in turn: it is refused then.
-    /// [`StepReport::host`](crate::StepReport::host) counts the narrow phase as packing.
+    /// The step takes the place of the one that was started last; [`Self::start`] starts it. A step
+    /// that is stepped or submitted before that start takes its place in turn, and the written step
+    /// is then refused. [`StepReport::host`](crate::StepReport::host) counts the narrow phase as
+    /// packing.
     ///
-    /// `narrow_phase` runs in the caller's own [floating-point environment](crate#the-floating-point-environment).
+    /// `narrow_phase` runs in the caller's own [floating-point
+    /// environment](crate#the-floating-point-environment).
     ///
     /// ```
     /// use zynq_pgs::{Accelerator, Body, Collision, Contact, OpenOptions, Pose, Shape};
@@ -66,8 +68,9 @@ impl Accelerator {
     ///
     /// # Errors
     /// [`Error::Input`] as [`Self::step`], and [`InputError::WrittenInOrder`],
-    /// [`InputError::MoreThanAnnounced`]. [`Error::Step`] if there is no memory for so many, or the
-    /// step was cancelled; [`Error::MustReopen`] after a fault that could not be cleared.
+    /// [`InputError::MoreThanAnnounced`]. [`Error::Step`] if memory is too small for `announced`
+    /// collisions, or the step was cancelled; [`Error::MustReopen`] after a fault that could not be
+    /// cleared.
     pub fn write<B: Bodies + ?Sized>(
         &mut self,
         bodies: &B,
@@ -125,7 +128,7 @@ impl Accelerator {
             bodies: bodies.len(),
             collisions: written,
             empty: 0,
-            arranged: Arranged::as_given(OrderChoice::Asked),
+            order_summary: OrderSummary::as_given(OrderChoice::Asked),
             shapes_loaded: self.shapes_loaded,
             host,
         }))
@@ -136,7 +139,7 @@ impl InFlight<'_> {
     /// As [`Accelerator::write`], while the board works on this step: see [`Self::prepare`].
     ///
     /// # Errors
-    /// Those of [`Accelerator::write`] and of [`Self::prepare`].
+    /// The errors of [`Accelerator::write`] and of [`Self::prepare`].
     pub fn write<B: Bodies + ?Sized>(
         &mut self,
         bodies: &B,
@@ -154,7 +157,7 @@ impl InFlight<'_> {
     }
 }
 
-/// A number of collisions, of which only the number is known yet.
+/// A number of collisions whose values do not exist yet.
 struct Announced(usize);
 
 impl Collisions for Announced {

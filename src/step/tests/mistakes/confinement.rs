@@ -1,24 +1,24 @@
-//! This file plants descriptors that leave their buffer by a beat, or point to somebody else's: the
-//! board must tell each of them, else its silence in other tests would say nothing.
+//! Plants descriptors that leave their buffer by a beat, or point to memory of another owner. The
+//! board must report each of them; otherwise its silence in other tests would prove nothing.
 
 use bitstream_model::{BoardConfig, Direction};
 
 use super::kinds::{ChannelId, Mistake};
-use super::{Bench, Verdict, caught, chain_of};
+use super::{Bench, Verdict, assert_reported, chain_of};
 use crate::StepParameters;
 
-/// Sizes from which on every channel has a step whose data ends with its buffer.
+/// In this range of sizes every channel has a step whose data ends with its buffer.
 const SIZES: std::ops::Range<u32> = 9..90;
 
-/// Steps of growing sizes; until the mistake had its occasion, or the channel's data ended with its
-/// buffer.
+/// Runs steps of growing sizes until the mistake had its occasion, or the channel's data ended with
+/// its buffer.
 fn growing(config: BoardConfig, mistake: Option<Mistake>, channel: ChannelId) -> Verdict {
     let mut bench = Bench::open(config, mistake, None)?;
     for cubes in SIZES {
         let (stepped, _) = bench.step_with(cubes, &StepParameters::default());
         let board = bench.planted.board();
         if let (Some(_), Some(violation)) = (mistake, board.violations().first()) {
-            assert!(bench.planted.planted(), "told, and not planted: {violation}");
+            assert!(bench.planted.planted(), "reported, but not planted: {violation}");
             return Err(violation.kind.to_string());
         }
         stepped.map_err(|error| chain_of(&error))?;
@@ -31,7 +31,8 @@ fn growing(config: BoardConfig, mistake: Option<Mistake>, channel: ChannelId) ->
     bench.close()
 }
 
-/// What the board says of an access that leaves its buffer: where it began inside, and where not.
+/// The board's messages for an access that leaves its buffer: with its start inside, and with its
+/// start outside.
 const LEFT: [&str; 2] = ["it runs past the end of its buffer", "no buffer is granted there"];
 
 fn each_channel(plant: impl Fn(ChannelId) -> Mistake, told: &[&str]) {
@@ -41,7 +42,8 @@ fn each_channel(plant: impl Fn(ChannelId) -> Mistake, told: &[&str]) {
             for direction in [Direction::Mm2s, Direction::S2mm] {
                 let channel = (core, direction);
                 let mistake = plant(channel);
-                let found = caught(mistake, "", |mistake| growing(config, mistake, channel));
+                let found =
+                    assert_reported(mistake, "", |mistake| growing(config, mistake, channel));
                 assert!(found.starts_with(&format!("dma{core} {direction}: ")), "{found}");
                 assert!(told.iter().any(|told| found.ends_with(told)), "{found}");
             }
