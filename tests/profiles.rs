@@ -280,8 +280,8 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
         "found 65537 bodies, the bitstream takes at most 65536: give fewer, or load another \
          (profiles that could: naive, float, windowed, windowed16)"
     );
-    // 2 x 24 + 300,000 x 16 = 4,800,048 bytes; (4,194,304 - 48) / 16 = 262,141. The collisions alone
-    // are beyond float's 262,144.
+    // 2 x 24 + 300,000 x 16 = 4,800,048 bytes; (4,194,304 - 48) / 16 = 262,141. The collisions
+    // alone are beyond float's 262,144.
     let mut bodies = few;
     let text = refused(of(&FLOAT), &mut bodies, &vec![collisions[0]; 300_000]);
     assert!(

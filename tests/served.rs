@@ -362,13 +362,13 @@ fn a_board_of_endless_interrupts_and_no_time_is_given_up_in_time() {
             return;
         }
         let bytes = answer.as_slice().try_into().expect("an answer");
-        let mut said = Answer::decode(bytes).expect("the board's");
-        said.now = Duration::ZERO;
+        let mut decoded = Answer::decode(bytes).expect("the board's");
+        decoded.now = Duration::ZERO;
         let wait = Request::WaitInterrupt { time: Duration::ZERO }.encode();
         if request[0] == wait[0] {
-            (said.status, said.value) = (Status::Done, 1);
+            (decoded.status, decoded.value) = (Status::Done, 1);
         }
-        *answer = said.encode().to_vec();
+        *answer = decoded.encode().to_vec();
     });
     let relay = Relay::new(&served.socket(), Some(falsify));
     let options = OpenOptions {

@@ -286,8 +286,8 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
     assert!(matches!(error, Error::Input(InputError::TooManyLive { .. })), "{error:?}");
 }
 
-/// Collisions, one of which loses its contact points after the read `good_reads`, for good or for one
-/// read.
+/// Collisions, one of which loses its contact points after the read `good_reads`, for good or for
+/// one read.
 struct Unsteady<'a> {
     list: &'a [Collision],
     which: usize,

@@ -170,8 +170,8 @@ fn refused(error: &IdentityError) -> (Line, Outcome) {
             Line::Identification,
             format!("{found:#010x}"),
             format!("{IDENTIFICATION_VALUE:#010x} (\"PGS1\")"),
-            "load the accelerator's bitstream, or correct the control block's address in the device \
-             tree",
+            "load the accelerator's bitstream, or correct the control block's address in the \
+             device tree",
         ),
         IdentityError::Version { major, minor } => {
             (Line::Version, format!("{major}.{minor}"), format!("{VERSION_MAJOR}.x"), SAME_DRIVER)

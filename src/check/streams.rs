@@ -257,7 +257,8 @@ fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
     if woken < INTERRUPT_STEPS {
         return Err(Outcome::failed(
             format!(
-                "{woken} of {INTERRUPT_STEPS} steps ended with an interrupt, the driver found the others by polling"
+                "{woken} of {INTERRUPT_STEPS} steps ended with an interrupt, the driver found the \
+                 others by polling"
             ),
             "an interrupt at the end of every step",
             "check that the interrupt output of the PL is connected and enabled, and that its \

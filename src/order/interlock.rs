@@ -66,7 +66,8 @@ pub(super) struct StallCounter {
 }
 
 impl StallCounter {
-    /// Cycles of all passes over the collisions `entries` of the input, in this order, stalls included.
+    /// Cycles of all passes over the collisions `entries` of the input, in this order, stalls
+    /// included.
     ///
     /// Counting ends early above `limit`; the result is then a lower bound that is above `limit`.
     pub(super) fn cycles(

@@ -11,16 +11,15 @@
 //! poses, results 1, 3, 2, 4, then the same
 //! ```
 //!
-//! All passes run side by side, each behind the one before it. Pass k issues entry `n` after pass k
-//! - 1 has issued the last uses of two sets of bodies: the bodies of entry `n`, and the bodies of
-//! all entries before it. These last uses end at entry `reach(n)`. Two rules follow; where one of
-//! them does not hold, the accelerator waits for ever:
+//! All passes run side by side. A pass issues entry `n` when the pass before it has issued entry
+//! `reach(n)`: the last of the last uses of all bodies in entries 0 to `n`. Two rules follow; where
+//! one of them does not hold, the accelerator waits for ever:
 //!
 //! - `reach(n) - n` is at most the longest span of a body, which must be less than the delay lines
 //!   between the passes are long;
 //! - a body whose last use is entry `m` leaves its place once pass P - 1 has issued `m`, for which
-//!   pass 0 must have issued `reach(reach(...(m)))`, P - 1 times: only behind that entry may another
-//!   body take the place.
+//!   pass 0 must have issued `reach(reach(...(m)))`, P - 1 times: only behind that entry may
+//!   another body take the place.
 //!
 //! Source: interface specification, the windowed flow.
 

@@ -32,7 +32,8 @@ impl OrderReport {
     /// Measures a schedule of the input's collisions.
     ///
     /// # Errors
-    /// [`OrderError`]: the input cannot be ordered, or an entry names a collision that is not there.
+    /// [`OrderError`]: the input cannot be ordered, or an entry names a collision that is not
+    /// there.
     pub fn measure(
         schedule: &Schedule,
         input: &OrderInput<'_>,

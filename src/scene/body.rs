@@ -12,8 +12,8 @@ use bytemuck::{Pod, Zeroable};
 pub struct Pose {
     /// Centre of mass, m.
     pub position: [f32; 3],
-    /// Unit quaternion in the order x, y, z, w; it turns the body's own axes to the world's. No rotation is
-    /// `[0.0, 0.0, 0.0, 1.0]`.
+    /// Unit quaternion in the order x, y, z, w; it turns the body's own axes to the world's. No
+    /// rotation is `[0.0, 0.0, 0.0, 1.0]`.
     pub orientation: [f32; 4],
 }
 

@@ -10,7 +10,8 @@ use super::Order;
 ///
 /// # A distance as a velocity
 ///
-/// At a contact point that is `distance` apart, the solver lets A and B approach along the normal at
+/// At a contact point that is `distance` apart, the solver lets A and B approach along the normal
+/// at
 ///
 /// ```text
 /// (distance + position_drift) * position_coefficient / time_step        m/s
@@ -59,8 +60,8 @@ use super::Order;
 ///     let before = bodies[1].velocity.linear[1];
 ///     bodies[1].velocity.linear[1] -= 9.8 * parameters.time_step;
 ///
-///     // The ground is A and the ball B: the normal points down, and the point is the ball's lowest. A ball
-///     // that comes down is to go up with 0.8 of its speed.
+///     // The ground is A and the ball B: the normal points down, and the point is the ball's
+///     // lowest. A ball that comes down is to go up with 0.8 of its speed.
 ///     let point = [0.0, height, 0.0];
 ///     let contact = Contact { point, distance: RESTITUTION * before.min(0.0) };
 ///     let touch = Collision {
@@ -109,8 +110,8 @@ pub struct StepParameters {
     pub contact_iterations: u32,
     /// Passes of the friction solver over all collisions.
     pub friction_iterations: u32,
-    /// Whether to integrate after the solver: damp, turn and move each body, then add gravity to its
-    /// velocity.
+    /// Whether to integrate after the solver: damp, turn and move each body, then add gravity to
+    /// its velocity.
     ///
     /// Without it the velocities come back as the solver left them, undamped and without gravity.
     /// The poses stay the caller's own to the bit on every profile, also where the streams have

@@ -125,7 +125,7 @@ impl Shape {
             }
         }
         // In f64 nothing here leaves the range of numbers, and f32 rounds once.
-        #[expect(clippy::cast_possible_truncation, reason = "rounded to f32, and looked at below")]
+        #[expect(clippy::cast_possible_truncation, reason = "rounded to f32, and checked below")]
         let inverse = |value: f64| (1.0 / value) as f32;
         let inverse_mass = inverse(mass.into());
         let inverse_inertia = inertia(sizes.map(|(_, size)| size.into()))

@@ -1,7 +1,7 @@
 //! The accelerator as a caller sees it, and the first half of a step.
 //!
-//! A step is five calls there and five back. [`Accelerator::submit`] checks, orders, reserves, packs
-//! (`pack.rs`) and starts; [`InFlight::wait`] waits, takes back, checks, reads and commits
+//! A step is five calls there and five back. [`Accelerator::submit`] checks, orders, reserves,
+//! packs (`pack.rs`) and starts; [`InFlight::wait`] waits, takes back, checks, reads and commits
 //! (`in_flight.rs`). The caller's bodies change in the last call, and only there.
 
 use std::fmt;

@@ -193,9 +193,9 @@ mod tests {
         let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
         let at = |variant: Variant, channel, slot| source_of(7, &variant, Place { channel, slot });
         let half = |channel, slot| at(HALF.default_variant(), channel, slot);
-        // Velocities are seven beats, two groups: four on channel 0, so that the poses begin at beat
-        // 4 there, and on channel 2, with two, at beat 4 too (64 bytes).
-        // Body 0: pose and velocity are the first beats of channel 0.
+        // Velocities are seven beats, two groups: four on channel 0, so that the poses begin at
+        // beat 4 there, and on channel 2, with two, at beat 4 too (64 bytes). Body 0: pose and
+        // velocity are the first beats of channel 0.
         assert_eq!([half(0, 0), half(0, 1)], [Some((0, 64)), Some((0, 0))]);
         // Body 2: beats 4 and 5 of the results; its pose and its velocity are beat 2 of their
         // segments.

@@ -25,8 +25,8 @@ use crate::validate::InputError;
 /// ones take their place.
 ///
 /// - Before it is started, the next step that is [prepared](InFlight::prepare) replaces it.
-/// - After it was started, the second next step that is prepared replaces it, and so does the next
-///   step that is [submitted](Accelerator::submit) without being prepared.
+/// - After its start, the second step that is prepared replaces it, and so does the next step that
+///   is [submitted](Accelerator::submit) without being prepared.
 /// - A step that was [written](Accelerator::write) with nothing on the board makes way for the next
 ///   submitted step, started or not.
 ///
@@ -41,10 +41,10 @@ pub struct Prepared {
 impl InFlight<'_> {
     /// Validates, orders and packs another step while the board works on this one.
     ///
-    /// The records hold the caller's values of now. A step that starts from the results of this one
-    /// cannot be prepared before they are there. The step of another world on the same board can
-    /// be, and so can a step whose bodies were predicted. In any case this step goes on,
-    /// and the caller waits for it as before.
+    /// The records hold the caller's values of now. A step that starts from the results of this
+    /// one cannot be prepared before they are there. The step of another world on the same board
+    /// can be, and so can a step whose bodies were predicted. In any case this step goes on, and
+    /// the caller waits for it as before.
     ///
     /// ```
     /// use zynq_pgs::{Accelerator, Body, Collision, OpenOptions, Pose, Shape, StepParameters};
@@ -188,8 +188,8 @@ enum Memory {
 }
 
 impl Accelerator {
-    /// Starts a step that was [prepared](InFlight::prepare) while an earlier one was on the board, or
-    /// [written](Self::write).
+    /// Starts a step that was [prepared](InFlight::prepare) while an earlier one was on the board,
+    /// or [written](Self::write).
     ///
     /// # Errors
     /// [`Error::Input`]: [`InputError::NotPrepared`] if its records are not there any more, or

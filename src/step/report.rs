@@ -64,15 +64,15 @@ pub enum Limit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OrderChoice {
-    /// The caller chose: [`StepParameters::order`](crate::StepParameters::order) names the order, or
-    /// the caller wrote the collisions one after the other.
+    /// The caller chose: [`StepParameters::order`](crate::StepParameters::order) names the order,
+    /// or the caller wrote the collisions one after the other.
     Asked,
     /// The board does not wait on hazards. Only an order without hazards is solved right.
     NoInterlock,
     /// The board keeps only live bodies on chip. The order keeps few bodies alive.
     LiveBodies,
-    /// The board waits on hazards. This order takes fewer cycles than the other one of two: the order
-    /// as given and the order without hazards.
+    /// The board waits on hazards. This order takes the fewest cycles of two: the order as given
+    /// and the order without hazards.
     Cheapest(OrderCosts),
 }
 

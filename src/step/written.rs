@@ -25,9 +25,9 @@ impl Accelerator {
     /// them.
     ///
     /// The board solves them in the order in which they are written. The parameters must ask for
-    /// [`Order::AsGiven`](crate::order::Order::AsGiven), or for no order on a bitstream that waits on
-    /// hazards. A bitstream that keeps only live bodies wants all collisions at once, and so does a
-    /// step that is to verify its order.
+    /// [`Order::AsGiven`](crate::order::Order::AsGiven), or for no order on a bitstream that waits
+    /// on hazards. A bitstream that keeps only live bodies wants all collisions at once, and so
+    /// does a step that is to verify its order.
     ///
     /// The step takes the place of the one that was started last; [`Self::start`] starts it. A step
     /// that is stepped or submitted before that start takes its place in turn, and the written step
@@ -57,7 +57,8 @@ impl Accelerator {
     ///             point: [x + dx, y + 0.5, z + dz],
     ///             distance: 0.0,
     ///         });
-    ///         records.push(&Collision { body_a, body_b, normal: [0.0, 1.0, 0.0], count: 4, contacts });
+    ///         let normal = [0.0, 1.0, 0.0];
+    ///         records.push(&Collision { body_a, body_b, normal, count: 4, contacts });
     ///     }
     /// })?;
     /// let report = board.start(&step)?.wait(&mut tower)?;

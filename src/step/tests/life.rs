@@ -333,8 +333,8 @@ fn a_step_that_may_be_cancelled_and_is_not_is_the_same_step() {
         let accesses = report.register_reads + report.register_writes;
         (report.cycles, (report.cycles.work, report.interrupts, accesses, bits(&bodies)))
     });
-    let looks = u64::from(config.profile.clock_khz) * 10;
-    assert!(reports[0].0.total > 2 * looks, "{} cycles", reports[0].0.total);
+    let polls = u64::from(config.profile.clock_khz) * 10;
+    assert!(reports[0].0.total > 2 * polls, "{} cycles", reports[0].0.total);
     assert!(reports[0].1 == reports[1].1);
     // The emulated board checks its starving streams at the end of a wait, too, which costs a few
     // clocks.

@@ -80,7 +80,7 @@ fn mistake_17_buffer_used_again_after_a_time_out() {
 /// Whether a type implements a trait. The compiler prefers the type's own constant to the trait's.
 macro_rules! implements {
     ($type:ty: $($bound:tt)+) => {{
-        #[allow(dead_code, reason = "it is only looked at by the compiler")]
+        #[allow(dead_code, reason = "only the compiler reads it")]
         struct Probe<T: ?Sized>(std::marker::PhantomData<T>);
         #[allow(dead_code, reason = "where every type has the trait")]
         trait Otherwise {

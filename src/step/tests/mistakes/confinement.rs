@@ -35,7 +35,7 @@ fn growing(config: BoardConfig, mistake: Option<Mistake>, channel: ChannelId) ->
 /// start outside.
 const LEFT: [&str; 2] = ["it runs past the end of its buffer", "no buffer is granted there"];
 
-fn each_channel(plant: impl Fn(ChannelId) -> Mistake, told: &[&str]) {
+fn each_channel(plant: impl Fn(ChannelId) -> Mistake, messages: &[&str]) {
     for length_width in [26, 8] {
         let config = BoardConfig { length_width, ..BoardConfig::default() };
         for core in [0, 3] {
@@ -45,28 +45,28 @@ fn each_channel(plant: impl Fn(ChannelId) -> Mistake, told: &[&str]) {
                 let found =
                     assert_reported(mistake, "", |mistake| growing(config, mistake, channel));
                 assert!(found.starts_with(&format!("dma{core} {direction}: ")), "{found}");
-                assert!(told.iter().any(|told| found.ends_with(told)), "{found}");
+                assert!(messages.iter().any(|message| found.ends_with(message)), "{found}");
             }
         }
     }
 }
 
 #[test]
-fn a_length_that_is_a_beat_too_long_is_told() {
+fn a_length_that_is_a_beat_too_long_is_reported() {
     each_channel(Mistake::BeatTooLong, &LEFT);
 }
 
 #[test]
-fn an_address_that_is_a_beat_too_high_is_told() {
+fn an_address_that_is_a_beat_too_high_is_reported() {
     each_channel(Mistake::BeatTooHigh, &LEFT);
 }
 
 #[test]
-fn a_buffer_that_was_freed_is_told() {
+fn a_buffer_that_was_freed_is_reported() {
     each_channel(Mistake::FreedBuffer, &["no buffer is granted there"]);
 }
 
 #[test]
-fn a_buffer_of_the_cpu_is_told() {
+fn a_buffer_of_the_cpu_is_reported() {
     each_channel(Mistake::CpuBuffer, &["the CPU owns the buffer"]);
 }

@@ -18,7 +18,7 @@
 //! | 9 | descriptor used with Cmplted set | [`addresses`]`::mistake_09_descriptor_used_again_uncleared` | the board: a stale descriptor |
 //! | 10 | threshold above the outstanding packets | [`waits`]`::mistake_10_threshold_above_the_packets` | steps that end without their interrupt |
 //! | 11 | UIO: unmasked before acknowledged, or no second look | [`waits`]`::mistake_11_unmasked_before_acknowledged_or_not_looked_at_again` | the level of the line, and the register accesses |
-//! | 12 | interrupt counted, not looked into | [`waits`]`::mistake_12_interrupt_taken_for_completion` | buffers taken back while engines run |
+//! | 12 | interrupt counted, status not read | [`waits`]`::mistake_12_interrupt_taken_for_completion` | buffers taken back while engines run |
 //! | 13 | caches not maintained | [`buffers`]`::mistake_13_caches_not_maintained` | the sums of words; the self-test |
 //! | 14 | received length ignored | [`buffers`]`::mistake_14_received_length_ignored` | a short packet that is taken as whole |
 //! | 15 | length spills into the packet marks | [`addresses`]`::mistake_15_length_spills_into_the_packet_marks` | the board: SOF and EOF that do not pair |
