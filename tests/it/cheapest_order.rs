@@ -1,8 +1,8 @@
-//! A step that names no order has the cheapest one on the board at hand.
+//! Tests that a step that names no order gets the cheapest one on the board at hand.
 //!
 //! `cargo test -p zynq-pgs --test it cheapest_order:: -- --nocapture` prints the cycles of each order.
 #![cfg(feature = "emulation")]
-#![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
+#![allow(clippy::print_stdout, reason = "the figures are the output of the test")]
 
 use crate::common;
 use crate::common::{bits, open, ordered};
@@ -78,7 +78,7 @@ fn wall() -> (Vec<Body>, Vec<Collision>) {
     (bodies, collisions)
 }
 
-/// Takes one step; the report and the bits of the bodies afterwards.
+/// Runs one step. Returns the report, and the bits of the bodies afterwards.
 fn step(
     config: BoardConfig,
     (mut bodies, collisions): (Vec<Body>, Vec<Collision>),
@@ -92,7 +92,7 @@ fn step(
     (report, bits(&bodies))
 }
 
-/// Cycles as given, hazard-free-nearby, and of the default order; and the report of the last.
+/// Reports of the step as given, in the order near to it, and in the default order.
 fn compared(config: BoardConfig, scene: fn() -> (Vec<Body>, Vec<Collision>)) -> [StepReport; 3] {
     let given = step(config, scene(), &ordered(Order::AsGiven)).0;
     let nearby = step(config, scene(), &ordered(Order::HazardFreeNearby)).0;
@@ -166,12 +166,12 @@ fn a_pile_is_reordered_and_costs_a_fraction() {
     }
 }
 
-/// The driver predicts what the board counts: exactly for the order given where it is taken, and from
-/// above for the other.
+/// The driver predicts the cycles that the board counts. The prediction is exact for the order as
+/// given if the step takes it, and an upper bound for the other order.
 #[test]
 fn predicted_cycles_are_those_of_the_board() {
     for config in waiting() {
-        // Nothing is waited for but hazards.
+        // Hazards are the only cause of waiting.
         let config = BoardConfig { bandwidth: Bandwidth::Unlimited, ..config };
         let fill = 4 * u64::from(config.profile.contact.fill + config.profile.friction.fill);
         let predicted_and_counted = |scene: fn() -> (Vec<Body>, Vec<Collision>)| {
@@ -191,8 +191,8 @@ fn predicted_cycles_are_those_of_the_board() {
     }
 }
 
-/// The order changes what is waited for, and nothing of the result: a board that takes one collision
-/// after the other gives the same bits.
+/// The order changes the stalls and no bit of the result: a board that takes one collision after
+/// the other gives the same bits.
 #[test]
 fn the_default_is_the_sequential_solve_of_its_order() {
     let (waited, found) = step(BoardConfig::default(), wall(), &StepParameters::default());
@@ -224,7 +224,7 @@ fn the_report_says_why_an_order_was_taken() {
     assert_eq!((report.order, report.order_choice), (Order::HazardFree, OrderChoice::LiveBodies));
     let report = choice(BoardConfig::default(), &ordered(Order::Colours));
     assert_eq!((report.order, report.order_choice), (Order::Colours, OrderChoice::Asked));
-    // Without hazards, so that it can be proved.
+    // An order without hazards can be verified.
     let mut verified = none;
     verified.verify_order = true;
     let report = choice(BoardConfig::default(), &verified);
@@ -243,7 +243,7 @@ fn a_step_without_passes_or_collisions_is_sent_as_given() {
     assert_eq!((report.order, report.cycles.stalls), (Order::AsGiven, 0));
 }
 
-/// A window of more issue slots than an order can keep apart.
+/// A window with more issue slots than an order can keep apart.
 #[test]
 fn a_window_that_cannot_be_ordered_for_leaves_the_order_as_given() {
     let config = BoardConfig { window_slots: Some(20_000), ..BoardConfig::default() };

@@ -1,5 +1,4 @@
-//! The self-test passes on a board that is built as it should be, and names the cause on one that
-//! is not.
+//! Tests that the self-test passes on a good board, and names the cause on a bad one.
 
 #![cfg(feature = "emulation")]
 
@@ -43,8 +42,8 @@ fn detail<'a>(report: &'a CheckReport, name: &str) -> &'a str {
     }
 }
 
-/// Checks a board with that quirk: `name` alone fails, with `found` in what was found, `expected`
-/// in what was expected and `next` in what to do; the lines behind it are skipped if `stops`.
+/// Checks a board with these quirks. `name` alone fails: its `found`, `expected` and `next` texts
+/// contain the given ones. The lines behind it are skipped if `stops`.
 fn fails(quirks: Quirks, name: &str, stops: bool, [found, expected, next]: [&str; 3]) {
     let (report, board) = checked(BoardConfig { quirks, ..BoardConfig::default() });
     assert!(!report.passed());
@@ -65,7 +64,8 @@ fn fails(quirks: Quirks, name: &str, stops: bool, [found, expected, next]: [&str
             other => panic!("{other:?}"),
         }
     }
-    // Virtual time: a wait without end would never return, one of minutes would show here.
+    // The clock is virtual: a wait without end would never return, and a wait of minutes would show
+    // here.
     let seconds = board.counts().cycles / 275_000_000;
     assert!(seconds < 5, "{seconds} s on the board's clock");
 }
@@ -85,10 +85,11 @@ fn a_board_as_it_should_be_passes_every_line() {
     assert!(detail(&report, "sums").contains("4 steps"));
     assert!(detail(&report, "coherency").contains("3 rounds of 1501 bodies"));
     assert!(detail(&report, "interrupt").contains("each of 3 steps"));
-    // The descriptors of the echoes are those that follow from their lengths in pieces of 192 bytes:
-    // 1 body: 2 velocities and 2 poses, 1 result on each of 4 channels;
-    // 7: one each on 3 x 4 channels; 101 bodies: 50 or 51 beats are 5 pieces, twice 4 channels, and
-    // 101 result beats are 9; 4099: one each.
+    // The number of descriptors of the echoes follows from their lengths in pieces of 192 bytes:
+    // - 1 body: 2 velocities and 2 poses, 1 result on each of 4 channels;
+    // - 7 bodies: one each on 3 x 4 channels;
+    // - 101 bodies: 50 or 51 beats are 5 pieces, twice 4 channels, and 101 result beats are 9;
+    // - 4099 bodies: one each.
     let descriptors = (2 + 2 + 4) + 12 + (2 * 4 * 5 + 4 * 9) + 12;
     assert!(detail(&report, "echo").contains(&format!("{descriptors} descriptors")));
     assert!(board.counts().cycles < 275_000 * 100, "less than 0.1 s on the board's clock");
@@ -111,7 +112,7 @@ fn boards_of_other_builds_pass_too() {
         assert!(report.passed(), "{report:#?}");
         let length = detail(&report, "length register");
         assert!(length.starts_with(&format!("{} bits", config.length_width)), "{length}");
-        // The driver copes with a narrow register, and says what it costs.
+        // The driver works with a narrow register, and reports its cost.
         assert_eq!(length.contains("fewer descriptors"), config.length_width < 26, "{length}");
     }
 }
@@ -149,7 +150,7 @@ fn boards_of_every_profile_pass_every_line() {
     }
 }
 
-/// Data that is not the newest is named on a board whose results carry padding, too.
+/// Stale data is named on a board whose results carry padding, too.
 #[test]
 fn stale_data_is_named_on_a_board_of_sixteen_bits() {
     for (coherency, side) in [
@@ -253,7 +254,7 @@ fn a_core_without_scatter_gather_is_named() {
 #[test]
 fn a_stream_that_carries_nothing_ends_the_test_at_the_echo() {
     for core in 0..4 {
-        // A single body has nothing for the last two senders: a later echo meets them.
+        // A single body has nothing for the last two senders: a later echo finds their fault.
         for direction in [Direction::Mm2s, Direction::S2mm] {
             let quirks = Quirks { unconnected: Some((core, direction)), ..Quirks::default() };
             let found = format!("no end after 200ms: dma{core} {direction} 0x");
@@ -288,7 +289,7 @@ fn a_length_width_that_was_given_is_what_the_cores_are_held_against() {
     let report = check(options(14)).expect("reachable");
     assert!(report.passed(), "{report:#?}");
     assert!(detail(&report, "length register").contains("as given"));
-    // What the failing line advises is what opening needs.
+    // The advice of the failing line is the option that opening needs.
     assert!(Accelerator::open(options(14)).is_ok());
     assert!(Accelerator::open(options(26)).is_err());
     assert!(matches!(check(options(27)), Err(Error::Open(OpenError::LengthWidth { .. }))));

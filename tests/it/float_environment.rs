@@ -1,8 +1,8 @@
-//! However the caller's thread rounds, flushes or traps, a step is the same, and so is the thread's
-//! environment when it is done.
+//! Tests that a step is the same however the caller's thread rounds, flushes or traps, and that the
+//! driver restores the thread's environment.
 #![cfg(feature = "emulation")]
 #![allow(unsafe_code, reason = "Rust does not say what it computes in a foreign environment")]
-#![allow(clippy::print_stdout, reason = "what is skipped is said")]
+#![allow(clippy::print_stdout, reason = "a skipped test is reported")]
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -28,12 +28,12 @@ const THESIS16: Numbers = Numbers {
     ..Numbers::F32
 };
 
-/// So many bodies and collisions, at least, are some for several threads.
+/// Number of bodies and collisions from which several threads share the work.
 const SEVERAL: usize = 2_041;
 
-/// Does something in every environment of a caller; it is left as it was.
+/// Runs `work` in every environment of a caller, and checks that each environment stays as it was.
 ///
-/// What is given here computes nothing itself: it calls the driver, moves words, and compares them.
+/// `work` computes nothing itself: it calls the driver, moves words, and compares them.
 fn everywhere(mut work: impl FnMut(&str)) {
     if environments().next().is_none() {
         println!("skipped: nothing is known of this processor's floating-point environment");
@@ -48,7 +48,7 @@ fn everywhere(mut work: impl FnMut(&str)) {
     }
 }
 
-/// A pile, and what it is of.
+/// A pile, and the inertia of its shapes.
 struct Pile {
     shapes: Vec<Shape>,
     bodies: Vec<Body>,
@@ -56,8 +56,9 @@ struct Pile {
 }
 
 impl Pile {
-    /// A pile in which the environment decides bits. No number has few digits, so that all are rounded. Some
-    /// bodies hang in the air with subnormal velocities, across gravity, and lose them where they are flushed.
+    /// A pile in which the environment decides bits. All of its numbers have many digits, so that
+    /// all are rounded. Some bodies hang in the air with subnormal velocities across gravity, and
+    /// lose the velocities where subnormals are flushed.
     fn new(inertia: Inertia) -> Self {
         let grid = "14x11x14".parse().expect("a grid");
         let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
@@ -76,7 +77,8 @@ impl Pile {
         if inertia == Inertia::World {
             shapes[1] = Shape::cuboid(0.7, [0.9, 1.0, 1.1]).expect("a box");
         }
-        // Turned when all collisions are found: what is rounded counts here, not what it looks like.
+        // The bodies turn after all collisions are found: rounding counts here, and not how the
+        // pile looks.
         for (index, body) in (0..).zip(&mut bodies).skip(1) {
             body.pose.orientation = [0.1 + off(index), -off(index), 0.03, 0.95];
         }
@@ -89,7 +91,7 @@ impl Pile {
         Self { shapes, bodies, collisions }
     }
 
-    /// Opens a board whose threads, and the driver's, are so many.
+    /// Opens a board with `threads` threads, for the board and for the driver.
     fn open(&self, config: BoardConfig, threads: usize) -> (EmulatedBoard, Accelerator) {
         let board = EmulatedBoard::new(BoardConfig { threads, ..config }).expect("a board");
         let choice = BoardChoice::Emulated(board.cpu_port());
@@ -100,7 +102,7 @@ impl Pile {
         (board, accelerator)
     }
 
-    /// What comes of one step.
+    /// The outcome of one step.
     fn step(&self, config: BoardConfig, threads: usize) -> Outcome {
         let (board, mut accelerator) = self.open(config, threads);
         let mut bodies = self.bodies.clone();
@@ -111,7 +113,7 @@ impl Pile {
     }
 }
 
-/// The bits of the bodies, and what the board counted.
+/// The bits of the bodies, and the board's counters.
 #[derive(PartialEq)]
 struct Outcome {
     bits: Vec<u32>,
@@ -132,7 +134,7 @@ fn same_everywhere(config: BoardConfig) {
     assert!(expected.bits != bits(&pile.bodies), "they move");
     for threads in [1, 2] {
         let same = |name: &str| {
-            // Not in words, which nobody could read.
+            // A message with all words would be too long to read.
             let found = pile.step(config, threads) == expected;
             assert!(found, "{:?}, {name}, {threads} threads", config.variant());
         };
@@ -160,17 +162,18 @@ fn a_step_in_the_sixteen_bits_of_the_thesis_is_the_same_in_every_environment() {
     same_everywhere(BoardConfig { numbers: Some(THESIS16), ..of(&HALF, Inertia::Isotropic) });
 }
 
-/// Two steps, the second prepared while the first is on the board; one that is written while the second is
-/// there, and one that is written while nothing is. The narrow phase runs in the environment `outside`.
+/// Runs four steps: one, a second that is prepared while the first is on the board, one that is
+/// written while the second is there, and one that is written while the board is idle. The narrow
+/// phase runs in the environment `outside`.
 fn overlapped(pile: &Pile, threads: usize, outside: Environment) -> [Outcome; 4] {
     let (board, mut accelerator) = pile.open(of(&MIXED, Inertia::World), threads);
     let Pile { bodies, collisions, .. } = pile;
-    // What is written comes as given; what is prepared does too, so that both are one step.
-    let (parameters, some) = (common::ordered(Order::AsGiven), &collisions[..SEVERAL]);
+    // A written step comes as given, and so does the prepared one, so that both are one step.
+    let (parameters, part) = (common::ordered(Order::AsGiven), &collisions[..SEVERAL]);
     let left = |what| assert_eq!(Environment::current(), outside, "after {what}");
     let narrow_phase = |records: &mut Writer<'_>| {
         left("entering the narrow phase");
-        some.iter().for_each(|collision| records.push(collision));
+        part.iter().for_each(|collision| records.push(collision));
         left("pushing");
     };
     let mut after = [0; 4].map(|_| bodies.clone());
@@ -178,7 +181,7 @@ fn overlapped(pile: &Pile, threads: usize, outside: Environment) -> [Outcome; 4]
 
     let mut flight = accelerator.submit(bodies, collisions, &parameters).expect("a start");
     left("submit");
-    let next = flight.prepare(bodies, some, &parameters).expect("there is memory");
+    let next = flight.prepare(bodies, part, &parameters).expect("there is memory");
     left("prepare");
     let (ended, started) = flight.wait_and_start(first, &next);
     left("wait_and_start");
@@ -219,7 +222,7 @@ fn overlapped_and_written_steps_are_the_same_in_every_environment() {
     }
 }
 
-/// Bodies that count how often they are asked in another environment than the standard one, and may panic.
+/// Bodies that count the calls in another environment than the standard one, and may panic.
 struct Watched<'a> {
     pile: &'a Pile,
     after: Vec<Body>,
@@ -254,7 +257,7 @@ impl Bodies for Watched<'_> {
     }
 }
 
-/// Collisions that count it there.
+/// Collisions that count into the same counter.
 struct Found<'a>(&'a Watched<'a>);
 
 impl Collisions for Found<'_> {
@@ -312,7 +315,8 @@ fn what_else_computes_is_the_same_in_every_environment() {
             shape.ok().map(words).map(|(m, [x, y, z])| [m, x, y, z].map(f32::to_bits))
         })
     };
-    // A column along z, of subnormal height: flushed, all of its bodies are at one place.
+    // A column along z of subnormal height: with flushed subnormals, all of its bodies are at one
+    // place.
     let bodies: Vec<Body> = (0..40_u32)
         .map(|k| Body {
             pose: Pose {
@@ -325,7 +329,7 @@ fn what_else_computes_is_the_same_in_every_environment() {
         .collect();
     let pairs = |k: u32| [[k, (k + 1) % 40], [k, (k + 7) % 40]];
     let pairs: Vec<[u32; 2]> = (0..40).flat_map(pairs).collect();
-    // It moves, if only just.
+    // The body moves, if only just.
     let heavy = Shape::isotropic(1e-39, 0.0);
     let order = || {
         let (mut buffers, mut orderer) = (InputBuffers::new(), Orderer::new());

@@ -1,5 +1,5 @@
-//! A dropped pile lands: impulses are zero in free fall and not after, bodies stay what they are,
-//! and the board has nothing to complain of.
+//! Tests that a dropped pile lands: impulses are zero in free fall and not after, no body changes
+//! its shape, and the board records no violation.
 #![cfg(feature = "emulation")]
 
 use bitstream_model::{BoardConfig, EmulatedBoard};
@@ -72,9 +72,9 @@ fn energy(scene: &Scene, parameters: &StepParameters) -> f64 {
     kinetic.total() + scene::potential_energy(bodies, shapes, gravity)
 }
 
-/// Kinetic energy of a pile rises long after it has landed: the cubes along two sides of the top layer
-/// have their centre above the edge of the cube below. They topple and fall; all others stay where they
-/// are, and energy as a whole only falls.
+/// The kinetic energy of a pile rises long after it has landed: the cubes along two sides of the
+/// top layer have their centre above the edge of the cube below. They topple and fall. All other
+/// cubes stay where they are, and the total energy only falls.
 #[test]
 fn the_unsupported_rim_of_a_pile_topples_and_nothing_gains_energy() {
     let board = EmulatedBoard::new(BoardConfig::default()).expect("a board as by default");

@@ -1,11 +1,11 @@
-//! Without hazards it does not matter whether the pipeline waits for them: hardware that does not
-//! look, hardware that waits and a solver that takes one collision after the other give the same
-//! bits, and the order costs its empty entries and nothing else.
+//! Tests that an order without hazards gives the same bits on hardware that ignores hazards, on
+//! hardware that waits, and in a solver that takes one collision after the other. The order costs
+//! its empty entries and nothing else.
 //!
-//! With `PGS_VECTORS` also the thesis' step; `cargo test -p zynq-pgs --test it order:: -- --nocapture`
-//! prints the figures.
+//! With `PGS_VECTORS` it also tests the thesis' step; `cargo test -p zynq-pgs --test it order:: --
+//! --nocapture` prints the figures.
 #![cfg(feature = "emulation")]
-#![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
+#![allow(clippy::print_stdout, reason = "the figures are the output of the test")]
 
 use crate::common::{bits, by_hand, open, ordered};
 use crate::vectors;
@@ -21,7 +21,7 @@ fn with(hazards: Hazards) -> BoardConfig {
     BoardConfig { hazards, ..BoardConfig::default() }
 }
 
-/// Every collision sees what all before it did.
+/// A board in which every collision reads the result of all collisions before it.
 fn sequential() -> BoardConfig {
     BoardConfig { window_slots: Some(1), ..BoardConfig::default() }
 }
@@ -37,7 +37,7 @@ fn pile(text: &str, drop: f32) -> Scene {
     Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).expect("a small scene")
 }
 
-/// Steps a scene on a board; the state at the end, and every report.
+/// Steps a scene on a board. Returns the state at the end, and every report.
 fn run(
     config: BoardConfig,
     mut scene: Scene,
@@ -60,8 +60,8 @@ fn run(
 /// Issue slots of the window of `float`.
 const DEPTH: u32 = 158;
 
-/// Steps a scene in the default order without hazards for the window of `float`, one collision after the
-/// other.
+/// Steps a scene in the default order without hazards for the window of `float`, one collision
+/// after the other.
 fn run_by_hand(mut scene: Scene, steps: usize) -> Vec<u32> {
     let (_, mut accelerator) = open(sequential());
     accelerator.set_shapes(scene.shapes()).expect("they fit");
@@ -83,7 +83,7 @@ fn a_pile_takes_the_same_way_whether_the_pipeline_waits_or_not() {
     let scene = || pile("8x8x8", 0.5);
     let (waiting, reports) =
         run(with(Hazards::Interlocked), scene(), STEPS, &verified(Order::HazardFreeNearby));
-    // The default where nothing waits.
+    // The default on hardware that does not wait.
     let (unchecked, loose) =
         run(with(Hazards::Unchecked), scene(), STEPS, &StepParameters::default());
     let by_hand = run_by_hand(scene(), STEPS);
@@ -115,12 +115,12 @@ fn a_pile_takes_the_same_way_whether_the_pipeline_waits_or_not() {
         assert_eq!(proved.empty as u64, report.empty);
         assert_eq!(loose.verified, None);
     }
-    // As given, hardware that does not wait goes another way.
+    // As given, hardware that does not wait gives other bits.
     let (stale, _) = run(with(Hazards::Unchecked), scene(), STEPS, &ordered(Order::AsGiven));
     assert!(differing(&stale) > 0);
 }
 
-/// An order on hardware that waits is the sequential solve of that order.
+/// An order on hardware that waits gives the bits of a sequential solve in that order.
 #[test]
 fn as_given_is_solved_one_collision_after_the_other_where_hazards_are_waited_for() {
     let as_given = ordered(Order::AsGiven);
@@ -131,7 +131,7 @@ fn as_given_is_solved_one_collision_after_the_other_where_hazards_are_waited_for
     assert!(reports[0].cycles.stalls > 0, "it stands on the ground");
 }
 
-/// The caller finds every body where it put it, and what was asked for is what was sent.
+/// Every body comes back at its index, and the board receives the requested order.
 #[test]
 fn every_order_is_sent_on_every_design_and_none_moves_a_body_elsewhere() {
     let orders = [
@@ -169,7 +169,8 @@ fn every_order_is_sent_on_every_design_and_none_moves_a_body_elsewhere() {
     }
 }
 
-/// Verifying does not change what is sent, and refuses what has hazards before anything is.
+/// Verifying does not change the order that is sent, and refuses an order with hazards before the
+/// driver writes a register.
 #[test]
 fn what_cannot_be_proved_is_not_sent() {
     let (board, mut accelerator) = open(with(Hazards::Unchecked));
@@ -194,7 +195,7 @@ fn what_cannot_be_proved_is_not_sent() {
     assert_eq!(report.expect("it has none").verified.expect("verified").hazards, 0);
 }
 
-/// A hub that touches everything needs a window for each of its collisions.
+/// A hub that touches all other bodies needs a window for each of its collisions.
 #[test]
 fn an_order_that_does_not_fit_is_refused_with_its_numbers() {
     let (board, mut accelerator) = open(with(Hazards::Unchecked));

@@ -1,10 +1,10 @@
-//! Packing the next step overlaps the one on the board: on the board's own clock a step takes the
-//! longer of the two, and hardly more.
+//! Tests that packing the next step overlaps the one on the board: on the board's own clock a step
+//! takes the longer of the two times, and hardly more.
 //!
-//! The emulated board's clock passes with register accesses and with waiting, and stands still while
-//! the host computes. So the caller's own containers let it pass: each body and each collision that
-//! is read for packing, and each body that is stored, takes its share of the time that all of them
-//! are to take.
+//! The emulated board's clock advances with register accesses and with waiting, and stands still
+//! while the host computes. The caller's own containers therefore advance it: each body and each
+//! collision that is read for packing, and each body that is stored, takes its share of the total
+//! time.
 #![cfg(feature = "emulation")]
 
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -16,7 +16,7 @@ use zynq_pgs::{
     Shape, StepParameters, Velocity,
 };
 
-/// A world whose host takes that long, on the board's clock, to pack it and to store its results.
+/// A world with the host's times to pack it and to store its results, on the board's clock.
 #[derive(Debug, Clone)]
 struct World {
     bodies: Vec<Body>,
@@ -26,18 +26,18 @@ struct World {
     port: CpuPort,
 }
 
-/// Parts in which time passes.
-const PIECES: u32 = 100;
+/// Number of parts in which the packing time advances.
+const PARTS: u32 = 100;
 
-/// The collisions of a world while they are packed, which takes its time.
+/// The collisions of a world during packing. Reading them advances the clock.
 #[derive(Debug)]
 struct Packing<'a> {
     world: &'a World,
     left: AtomicU32,
 }
 
-/// Takes one of what is left; whether there was one.
-fn take(left: &AtomicU32) -> bool {
+/// Takes one part of the remaining ones. Returns whether one remained.
+fn take_part(left: &AtomicU32) -> bool {
     left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok()
 }
 
@@ -53,8 +53,8 @@ impl Collisions for Packing<'_> {
     }
 
     fn collision(&self, index: usize) -> Collision {
-        if index.is_multiple_of(self.len().div_ceil(2 * PIECES as usize)) && take(&self.left) {
-            self.world.port.pause(self.world.packing / PIECES);
+        if index.is_multiple_of(self.len().div_ceil(2 * PARTS as usize)) && take_part(&self.left) {
+            self.world.port.pause(self.world.packing / PARTS);
         }
         self.world.collisions[index]
     }
@@ -70,7 +70,7 @@ impl Bodies for World {
     }
 
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
-        let piece = self.bodies.len().div_ceil(PIECES as usize);
+        let piece = self.bodies.len().div_ceil(PARTS as usize);
         if index.is_multiple_of(piece) {
             let pieces = u32::try_from(self.bodies.len().div_ceil(piece)).expect("few");
             self.port.pause(self.storing / pieces);
@@ -111,10 +111,10 @@ impl World {
     }
 
     fn packing(&self) -> Packing<'_> {
-        Packing { world: self, left: AtomicU32::new(PIECES) }
+        Packing { world: self, left: AtomicU32::new(PARTS) }
     }
 
-    /// Its bits.
+    /// The bits of its bodies.
     fn bits(&self) -> Vec<u32> {
         let numbers = |body: &Body| {
             let (pose, velocity) = (body.pose, body.velocity);
@@ -134,10 +134,11 @@ fn open() -> (EmulatedBoard, Accelerator) {
     (board, accelerator)
 }
 
-/// Of each of two worlds.
+/// Steps of each of the two worlds.
 const STEPS: u32 = 4;
 
-/// Two worlds in turn, one step after the other; the time of a step on the board's clock.
+/// Runs two worlds alternately, one step after the other. Returns the time of a step on the board's
+/// clock.
 fn one_after_the_other(worlds: &mut [World; 2]) -> Duration {
     let (board, mut accelerator) = open();
     let port = board.cpu_port();
@@ -155,8 +156,8 @@ fn one_after_the_other(worlds: &mut [World; 2]) -> Duration {
     (port.now() - begun) / (2 * STEPS)
 }
 
-/// The same with each step packed while the one before it is on the board; from the start of the
-/// first step to that of the last.
+/// The same with each step packed while the one before it is on the board. Returns the time from
+/// the start of the first step to the start of the last.
 fn overlapped(worlds: &mut [World; 2]) -> Duration {
     let (board, mut accelerator) = open();
     let port = board.cpu_port();
@@ -191,7 +192,7 @@ fn a_step_takes_the_longer_of_packing_and_the_board() {
         report.expect("a good step").modelled_time()
     });
     let on_board = on_board.iter().sum::<Duration>() / 2;
-    // Shorter than the board, as long, and longer.
+    // Packing takes less time than the board, the same time, and more.
     for (times, divisor) in [(1, 3), (1, 1), (5, 2)] {
         let host = on_board * times / divisor;
         let (storing, packing) = (host / 8, host - host / 8);

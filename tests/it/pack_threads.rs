@@ -1,5 +1,5 @@
-//! However many threads write the records of a step and read its results, the step is the same: on every
-//! profile, as given and in order, and where steps are prepared, too.
+//! Tests that a step is the same for every number of threads that write its records and read its
+//! results: on every profile, as given and in order, and for prepared steps, too.
 #![cfg(feature = "emulation")]
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -16,10 +16,10 @@ use zynq_pgs::{
     Accelerator, BoardChoice, Body, Collision, Collisions, OpenOptions, Shape, StepReport,
 };
 
-/// So many bodies and collisions, at least, are some for several threads.
+/// Number of bodies and collisions from which several threads share the work.
 const SEVERAL: usize = 3 * 2_048;
 
-/// A pile that stands, and what it is of.
+/// A standing pile, and the inertia of its shapes.
 struct Pile {
     shapes: Vec<Shape>,
     bodies: Vec<Body>,
@@ -52,7 +52,7 @@ impl Pile {
         (board, accelerator)
     }
 
-    /// Two steps, the second prepared during the first: what comes of each.
+    /// Runs two steps, the second prepared during the first. Returns the outcome of each.
     fn steps(&self, config: BoardConfig, order: Order, threads: Option<usize>) -> [Outcome; 2] {
         let (board, mut accelerator) = self.open(config, threads);
         let parameters = ordered(order);
@@ -72,7 +72,7 @@ impl Pile {
     }
 }
 
-/// Collisions that the caller's thread does not pack alone, if it shall not.
+/// Collisions that the caller's thread cannot pack alone, if they are shared.
 struct Shared<'a> {
     list: &'a [Collision],
     caller: ThreadId,
@@ -97,19 +97,19 @@ impl Collisions for Shared<'_> {
         self.list[index]
     }
 
-    /// Packing alone says it.
-    fn soon(&self, _: usize) {
+    /// Only packing calls this method.
+    fn prefetch(&self, _: usize) {
         if thread::current().id() != self.caller {
             self.helped.store(true, Ordering::Relaxed);
         }
         while !self.helped.load(Ordering::Relaxed) {
-            assert!(Instant::now() < self.until, "nobody helps");
+            assert!(Instant::now() < self.until, "no second thread packs");
             thread::yield_now();
         }
     }
 }
 
-/// The bits of the bodies, and what the board counted.
+/// The bits of the bodies, and the board's counters.
 #[derive(PartialEq)]
 struct Outcome {
     bits: Vec<u32>,
@@ -134,7 +134,8 @@ fn steps_are_the_same_with_any_number_of_threads() {
     let pile = Pile::standing();
     let (as_given, in_order) = (Order::AsGiven, Order::HazardFree);
     let profiles = [&NAIVE, &FLOAT, &HALF, &MIXED];
-    // A body of the others is not used over as many collisions as the order given takes.
+    // The other profiles do not keep a body over the number of collisions that the order given
+    // needs.
     let narrow = [&WINDOWED, &WINDOWED16].map(|profile| (profile, in_order));
     let wide = profiles.into_iter().flat_map(|it| [(it, as_given), (it, in_order)]);
     for (profile, order) in wide.chain(narrow) {
@@ -144,13 +145,13 @@ fn steps_are_the_same_with_any_number_of_threads() {
         assert!(expected[0] != expected[1], "with other collisions it is another step");
         for threads in [Some(2), Some(3), None] {
             let found = pile.steps(config, order, threads);
-            // Not in words, which nobody could read.
+            // A message with all words would be too long to read.
             assert!(found == expected, "{} {order:?}: {threads:?}", profile.name);
         }
     }
 }
 
-/// Whichever thread reads it: one error, that of the first, and nothing was done.
+/// Every number of threads reports the same error, the first one, and leaves the bodies unchanged.
 #[test]
 fn what_is_refused_is_refused_in_the_same_words_with_any_number_of_threads() {
     let pile = Pile::standing();
@@ -172,7 +173,7 @@ fn what_is_refused_is_refused_in_the_same_words_with_any_number_of_threads() {
     }
 }
 
-/// Collisions of which one cannot be read.
+/// Collisions, one of which panics when it is read.
 struct Torn<'a> {
     list: &'a [Collision],
     at: usize,
@@ -191,7 +192,7 @@ impl Collisions for Torn<'_> {
     }
 }
 
-/// Whichever thread it is on, the caller has it, and a working accelerator.
+/// The caller gets the panic of any thread, and has a working accelerator afterwards.
 #[test]
 fn a_panic_while_records_are_read_is_the_callers() {
     let pile = Pile::standing();

@@ -1,6 +1,6 @@
-//! Any sequence of submitting, preparing, starting, waiting, dropping and forgetting, with faults of
-//! the board in between: every step that ends well has the bits of one that was alone, the board finds
-//! nothing that the driver did wrong, and what was prepared last starts.
+//! Tests any sequence of submitting, preparing, starting, waiting, dropping and forgetting, with
+//! faults of the board in between. Every step that ends well has the bits of a step that was alone,
+//! the board records no violation, and the step that was prepared last starts.
 #![cfg(feature = "emulation")]
 
 use std::collections::BTreeMap;
@@ -15,24 +15,24 @@ use zynq_pgs::{
     Pose, Prepared, Shape, StepParameters, Velocity,
 };
 
-/// What is done with a step that is on the board, after so many clocks.
+/// The end of a step that has been on the board for some clocks.
 #[derive(Debug, Clone, Copy)]
 enum End {
     Wait,
-    /// And one of the prepared steps, counted from the last, is started behind it.
+    /// Waits, and starts one of the prepared steps behind it, counted from the last.
     WaitAndStart(usize),
     Drop,
     Forget,
 }
 
-/// One step: where it comes from, what is prepared meanwhile, how it ends.
+/// One step: its source, the steps that are prepared meanwhile, and its end.
 #[derive(Debug, Clone)]
 struct Act {
-    /// Shapes are loaded before.
+    /// Whether shapes are loaded before.
     shapes: bool,
-    /// A channel stalls.
+    /// The channel that stalls.
     stall: Option<(usize, bool)>,
-    /// One that was prepared, counted from the last; otherwise one of so many cubes is submitted.
+    /// The prepared step to start, counted from the last. `None` submits a step of `cubes` cubes.
     start: Option<usize>,
     cubes: u8,
     prepare: Vec<u8>,
@@ -99,14 +99,14 @@ fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
     (board, accelerator)
 }
 
-/// A driver of one board, and what is known of its prepared steps.
+/// A driver of one board, and the test's knowledge of its prepared steps.
 struct Trial {
     config: BoardConfig,
     board: EmulatedBoard,
-    /// Cubes of each, the last one last.
+    /// The prepared steps with their number of cubes, the last one last.
     prepared: Vec<(Prepared, u8)>,
-    /// The last one was not replaced, nor its shapes.
-    last_is_good: bool,
+    /// Whether neither the last step nor its shapes were replaced.
+    last_can_start: bool,
     alone: BTreeMap<u8, Vec<Body>>,
 }
 
@@ -123,8 +123,8 @@ impl Trial {
         })
     }
 
-    /// Looks at what came of a step.
-    fn ended<T>(&mut self, cubes: u8, bodies: &[Body], ended: &Result<T, Error>) {
+    /// Checks the outcome of a step.
+    fn check_end<T>(&mut self, cubes: u8, bodies: &[Body], ended: &Result<T, Error>) {
         match ended {
             Ok(_) => assert_eq!(bodies, self.alone(cubes)),
             Err(error) => {
@@ -134,21 +134,21 @@ impl Trial {
         }
     }
 
-    /// Which of the prepared steps that is, counted from the last.
+    /// The index of a prepared step that is counted from the last.
     fn place(&self, from_last: usize) -> Option<usize> {
         self.prepared.len().checked_sub(from_last + 1)
     }
 
-    /// Looks at why a prepared step was not started.
-    fn refused(&self, place: usize, error: &Error) {
+    /// Checks why a prepared step was not started.
+    fn check_refusal(&self, place: usize, error: &Error) {
         let gone =
             matches!(error, Error::Input(InputError::NotPrepared | InputError::ShapesChanged));
         assert!(gone, "{error}");
-        assert!(!self.last_is_good || place + 1 < self.prepared.len(), "{error}");
+        assert!(!self.last_can_start || place + 1 < self.prepared.len(), "{error}");
     }
 
-    /// Goes on with a step on the board as the act says, and with those started behind it.
-    fn fly(&mut self, mut flight: InFlight<'_>, mut cubes: u8, act: &Act) {
+    /// Continues a step on the board as `act` demands, and the steps that start behind it.
+    fn continue_flight(&mut self, mut flight: InFlight<'_>, mut cubes: u8, act: &Act) {
         let clock = u64::from(self.config.profile.clock_khz);
         let mut behind = 0;
         loop {
@@ -157,7 +157,7 @@ impl Trial {
                 let parameters = StepParameters::default();
                 let packed = flight.prepare(&bodies, &collisions, &parameters);
                 self.prepared.push((packed.expect("it fits"), *number));
-                self.last_is_good = true;
+                self.last_can_start = true;
             }
             let port = self.board.cpu_port();
             port.pause(Duration::from_nanos(act.clocks * 1_000_000 / clock));
@@ -174,24 +174,24 @@ impl Trial {
                     }
                     _ => {
                         let ended = flight.wait(&mut bodies);
-                        self.ended(cubes, &bodies, &ended);
+                        self.check_end(cubes, &bodies, &ended);
                     }
                 };
             };
             let (ended, started) = flight.wait_and_start(&mut bodies, &self.prepared[next].0);
-            self.ended(cubes, &bodies, &ended);
+            self.check_end(cubes, &bodies, &ended);
             match started {
                 Ok(started) => (flight, cubes) = (started, self.prepared[next].1),
-                Err(error) => return self.refused(next, &error),
+                Err(error) => return self.check_refusal(next, &error),
             }
             behind += 1;
         }
     }
 
-    fn take(&mut self, accelerator: &mut Accelerator, act: &Act) {
+    fn run_step(&mut self, accelerator: &mut Accelerator, act: &Act) {
         if act.shapes {
             accelerator.set_shapes(&SHAPES).expect("they fit");
-            self.last_is_good = false;
+            self.last_can_start = false;
         }
         if let Some((core, sent)) = act.stall {
             let direction = if sent { Direction::Mm2s } else { Direction::S2mm };
@@ -201,16 +201,16 @@ impl Trial {
             let (prepared, cubes) = &self.prepared[place];
             let cubes = *cubes;
             match accelerator.start(prepared) {
-                Ok(flight) => self.fly(flight, cubes, act),
-                Err(error) => self.refused(place, &error),
+                Ok(flight) => self.continue_flight(flight, cubes, act),
+                Err(error) => self.check_refusal(place, &error),
             }
             return;
         }
         let (bodies, collisions) = scene(act.cubes);
-        // The last one was started, perhaps: its bank is the one that is packed into then.
-        self.last_is_good = false;
+        // The last step may have been started; packing then goes into its bank.
+        self.last_can_start = false;
         let flight = accelerator.submit(&bodies, &collisions, &StepParameters::default());
-        self.fly(flight.expect("it fits"), act.cubes, act);
+        self.continue_flight(flight.expect("it fits"), act.cubes, act);
     }
 }
 
@@ -238,14 +238,14 @@ proptest! {
             config,
             board: board.clone(),
             prepared: Vec::new(),
-            last_is_good: false,
+            last_can_start: false,
             alone: BTreeMap::new(),
         };
         for act in &acts {
-            trial.take(&mut accelerator, act);
+            trial.run_step(&mut accelerator, act);
             prop_assert_eq!(board.violations(), []);
         }
-        // Whatever was left: the next step works.
+        // The next step works whatever the sequence left.
         board.clear_faults();
         let (mut bodies, collisions) = scene(7);
         accelerator.step(&mut bodies, &collisions, &StepParameters::default()).expect("ready");

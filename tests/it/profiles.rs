@@ -1,5 +1,5 @@
-//! Every profile takes the same scene through the same driver: what they have in common, what each
-//! costs, and what each refuses.
+//! Takes the same scene through the driver on every profile, and tests their common results, the
+//! costs of each, and the refusals of each.
 #![cfg(feature = "emulation")]
 
 use crate::common::{bits, open, ordered};
@@ -27,7 +27,7 @@ fn of(profile: &'static Profile) -> BoardConfig {
     BoardConfig { profile, ..BoardConfig::default() }
 }
 
-/// What a step of a small pile, standing on the ground, does on a board.
+/// The outcome of a step of a small pile that stands on the ground.
 struct Stepped {
     bodies: Vec<Body>,
     report: StepReport,
@@ -50,7 +50,7 @@ fn step(config: BoardConfig) -> Stepped {
     scene.detect();
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     let (bodies, collisions) = scene.parts_mut();
-    // One order on every design that can have it: only then are results to be compared.
+    // One order on every design that can have it: otherwise the results could not be compared.
     let parameters = match config.profile.flow {
         Flow::Passes => ordered(Order::AsGiven),
         Flow::Window(_) => StepParameters::default(),
@@ -99,9 +99,9 @@ fn sixteen_bits_stay_near_float() {
         assert!(p > 0.0 || v > 0.0, "{name}: sixteen bits that round nothing");
         assert!(p <= position && v <= velocity, "{name}: {p} m, {v} m/s");
     };
-    // Poses in f32: what is rounded are offsets below 2 m, by 2^-11 of their value.
+    // Poses in f32: only offsets below 2 m are rounded, by 2^-11 of their value.
     near(of(&MIXED), 1e-5, 1e-3);
-    // Positions in binary16: half of 2^-8 m at 4 to 8 m, when they come and when they go.
+    // Positions in binary16 are rounded by half of 2^-8 m at 4 to 8 m, on input and on output.
     near(of(&HALF), 4e-3, 1e-2);
     // Cut off: 2^-8 m each time.
     near(BoardConfig { numbers: Some(THESIS16), ..of(&HALF) }, 8e-3, 5e-2);
@@ -130,7 +130,7 @@ fn a_step_costs_the_bytes_and_doorbells_of_its_profile() {
                 (2 * five(bodies) + 8 * 7 * pairs, five(2 * bodies), 3)
             }
             "mixed" => (4 * bodies + 8 * 3 * collisions, 4 * bodies, 3),
-            // All but the ground, and every collision once.
+            // All bodies but the ground, and every collision once.
             "windowed" => {
                 let moving = bodies - 1;
                 (4 * moving + 6 * (collisions + empty), 4 * moving, 4)
@@ -147,8 +147,8 @@ fn a_step_costs_the_bytes_and_doorbells_of_its_profile() {
     }
 }
 
-/// A row of cubes, each on the ground, at any number of them: odd ones leave half an issue and part
-/// of a group.
+/// A row of cubes on the ground, with every number of them: odd numbers leave half an issue and
+/// part of a group.
 #[test]
 fn any_number_of_bodies_and_collisions_goes_through_every_profile() {
     for profile in PROFILES {
@@ -199,7 +199,7 @@ fn row(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
     (bodies, collisions)
 }
 
-/// What a board refuses, with nothing sent: the whole text.
+/// The whole text of a refusal, with nothing sent.
 fn refused(config: BoardConfig, bodies: &mut [Body], collisions: &[Collision]) -> String {
     let (board, mut accelerator) = open(config);
     accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
@@ -228,7 +228,7 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     assert!(
         refused(thesis, &mut bodies, &collisions).contains("bodies in thesis16, which ends at")
     );
-    // Its body A, the ground, does not count, but its contact points are where they were.
+    // Body A, the ground, is not counted, but its contact points have not moved.
     let text = refused(of(&MIXED), &mut bodies, &collisions);
     assert_eq!(
         text,
@@ -278,8 +278,8 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
         "found 65537 bodies, the bitstream takes at most 65536: give fewer, or load another \
          (profiles that could: naive, float, windowed, windowed16)"
     );
-    // 2 x 24 + 300,000 x 16 = 4,800,048 bytes; (4,194,304 - 48) / 16 = 262,141. The collisions alone
-    // are beyond float's 262,144.
+    // 2 x 24 + 300,000 x 16 = 4,800,048 bytes; (4,194,304 - 48) / 16 = 262,141. The collisions
+    // alone are beyond float's 262,144.
     let mut bodies = few;
     let text = refused(of(&FLOAT), &mut bodies, &vec![collisions[0]; 300_000]);
     assert!(
@@ -293,7 +293,7 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
     assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
 }
 
-/// What a step computes beyond 65,504 comes back as infinity (binary16) or F = 31 (thesis16).
+/// A result beyond 65,504 comes back as infinity (binary16) or F = 31 (thesis16).
 #[test]
 fn results_that_sixteen_bits_cannot_hold_are_a_fault_and_change_nothing() {
     let configs = [of(&HALF), BoardConfig { numbers: Some(THESIS16), ..of(&HALF) }];

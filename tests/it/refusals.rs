@@ -1,6 +1,6 @@
-//! A step that is refused says the same whether its buffers are there already, so that it is looked
-//! at while it is packed, or not, so that it is validated first; and in either order. Afterwards all
-//! is as it was.
+//! Tests that a refused step reports the same error in both cases and in either order: its buffers
+//! exist and packing checks the input, or validation comes first. Afterwards bodies and board are
+//! unchanged.
 #![cfg(feature = "emulation")]
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -48,7 +48,8 @@ fn open(profile: &'static Profile) -> Accelerator {
 
 type Mistake = (&'static str, fn(&mut Vec<Body>, &mut Vec<Collision>));
 
-/// One at a time, and the last two together: bodies are looked at first, the first of them first.
+/// One mistake at a time, and the last two together: bodies are checked first, in order of their
+/// index.
 const MISTAKES: [Mistake; 15] = [
     ("position", |bodies, _| bodies[77].pose.position[1] = f32::NAN),
     ("orientation", |bodies, _| bodies[30].pose.orientation = [0.0; 4]),
@@ -82,7 +83,7 @@ fn a_refusal_is_the_same_before_packing_and_while_packing() {
     for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED] {
         let orders = [Order::AsGiven, Order::HazardFree];
         for order in orders.into_iter().filter(|order| {
-            // Where only live bodies are kept, the order is made in any case.
+            // A board that keeps only live bodies needs the order in any case.
             profile.name != "windowed" || *order == Order::HazardFree
         }) {
             let mut parameters = StepParameters::default();
@@ -100,9 +101,9 @@ fn a_refusal_is_the_same_before_packing_and_while_packing() {
                 let found = warm.step(&mut wrong, &list, &parameters).expect_err(name);
                 assert!(found.is_input(), "{} {order:?} {name}: {found}", profile.name);
                 assert_eq!(format!("{found:?}"), format!("{cold:?}"), "{name}");
-                assert_eq!(format!("{wrong:?}"), before, "{name}: the bodies are as they were");
+                assert_eq!(format!("{wrong:?}"), before, "{name}: the bodies are unchanged");
             }
-            // Nothing of it is left.
+            // The next step is undisturbed.
             let mut state = bodies.clone();
             warm.step(&mut state, &collisions, &parameters).expect("a step");
             assert_eq!(state, expected);
@@ -110,20 +111,20 @@ fn a_refusal_is_the_same_before_packing_and_while_packing() {
     }
 }
 
-/// What a caller keeps; one of it is wrong at one look, and right at all others.
+/// A caller's container in which one element is wrong at one read, and right at all others.
 struct Unsteady<T> {
     list: Vec<T>,
     which: usize,
     wrong: T,
-    /// The first is 1.
-    at_look: usize,
-    looks: AtomicUsize,
+    /// The number of the wrong read; the first is 1.
+    at_read: usize,
+    reads: AtomicUsize,
 }
 
 impl<T: Copy> Unsteady<T> {
-    fn look(&self, index: usize) -> T {
+    fn read(&self, index: usize) -> T {
         let wrong =
-            index == self.which && self.looks.fetch_add(1, Ordering::Relaxed) + 1 == self.at_look;
+            index == self.which && self.reads.fetch_add(1, Ordering::Relaxed) + 1 == self.at_read;
         if wrong { self.wrong } else { self.list[index] }
     }
 }
@@ -134,7 +135,7 @@ impl Collisions for Unsteady<Collision> {
     }
 
     fn collision(&self, index: usize) -> Collision {
-        self.look(index)
+        self.read(index)
     }
 }
 
@@ -144,7 +145,7 @@ impl Bodies for Unsteady<Body> {
     }
 
     fn body(&self, index: usize) -> Body {
-        self.look(index)
+        self.read(index)
     }
 
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
@@ -152,13 +153,13 @@ impl Bodies for Unsteady<Body> {
     }
 }
 
-/// Collisions that are said to lie elsewhere than they do.
-struct Nowhere {
+/// Collisions whose `structures` do not agree with their values.
+struct WrongStructures {
     all: Vec<Collision>,
     order: Vec<u32>,
 }
 
-impl Collisions for Nowhere {
+impl Collisions for WrongStructures {
     fn len(&self) -> usize {
         self.all.len()
     }
@@ -182,32 +183,32 @@ fn what_lies_nowhere_is_never_sent() {
         open(profile).step(&mut expected, &all, &parameters).expect("a step");
         let mut order: Vec<u32> = (0..).zip(&all).map(|(at, _)| at).collect();
         order[42] = u32::MAX;
-        let mut nowhere = Nowhere { all: all.clone(), order };
+        let mut wrong_structures = WrongStructures { all: all.clone(), order };
         let mut state = bodies.clone();
-        let found = open(profile).step(&mut state, &nowhere, &parameters);
-        let found = found.expect_err("one lies nowhere");
+        let found = open(profile).step(&mut state, &wrong_structures, &parameters);
+        let found = found.expect_err("one lies wrong_structures");
         assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
         assert_eq!(state, bodies);
 
-        // If they are not as many, they are asked for one by one.
-        let fewer = nowhere.order.len() - 1;
+        // If their number differs, the driver reads them one by one.
+        let fewer = wrong_structures.order.len() - 1;
         for count in [fewer, fewer + 2] {
-            nowhere.order.resize(count, 0);
+            wrong_structures.order.resize(count, 0);
             let mut state = bodies.clone();
-            open(profile).step(&mut state, &nowhere, &parameters).expect("a step");
+            open(profile).step(&mut state, &wrong_structures, &parameters).expect("a step");
             assert_eq!(state, expected, "{count}");
         }
     }
 }
 
-/// What is wrong only while it is packed must not be sent, though nothing is wrong with it later.
+/// An element that is wrong only during packing must not be sent, although it is right afterwards.
 #[test]
 fn what_is_wrong_at_one_look_alone_is_never_sent() {
     let (bodies, collisions) = scene();
     for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16] {
-        // In an order each is looked at once more, before.
+        // Ordering reads each element once before packing does.
         let orders = [(Order::AsGiven, 1), (Order::HazardFree, 2)];
-        for (order, at_look) in orders.into_iter().skip(usize::from(profile.flow != Flow::Passes)) {
+        for (order, at_read) in orders.into_iter().skip(usize::from(profile.flow != Flow::Passes)) {
             let mut parameters = StepParameters::default();
             parameters.order = Some(order);
             let mut board = open(profile);
@@ -216,33 +217,35 @@ fn what_is_wrong_at_one_look_alone_is_never_sent() {
 
             let mut state = bodies.clone();
             let right = collisions[42];
-            // The second looks like what fills a gap in an order.
+            // The second one equals the padding that fills a gap in an order.
             for body_b in [right.body_b, right.body_a] {
                 let wrong = Collision { count: 0, body_b, ..right };
-                let (list, looks) = (collisions.clone(), AtomicUsize::new(0));
-                let fickle = Unsteady { list, which: 42, wrong, at_look, looks };
-                let found = board.step(&mut state, &fickle, &parameters).expect_err("one is wrong");
+                let (list, reads) = (collisions.clone(), AtomicUsize::new(0));
+                let unsteady = Unsteady { list, which: 42, wrong, at_read, reads };
+                let found =
+                    board.step(&mut state, &unsteady, &parameters).expect_err("one is wrong");
                 assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
                 assert_eq!(state, bodies);
             }
 
             let wrong = Body { shape: 9, ..bodies[42] };
-            let (list, looks) = (bodies.clone(), AtomicUsize::new(0));
-            let mut fickle = Unsteady { list, which: 42, wrong, at_look, looks };
-            // Where live bodies alone are kept they are read once more for their velocities, and once
-            // more for their poses.
-            let again = if profile.flow == Flow::Passes { 0 } else { 2 };
-            for at_look in at_look..=at_look + again {
-                (fickle.at_look, fickle.looks) = (at_look, AtomicUsize::new(0));
-                let found = board.step(&mut fickle, &collisions, &parameters);
+            let (list, reads) = (bodies.clone(), AtomicUsize::new(0));
+            let mut unsteady = Unsteady { list, which: 42, wrong, at_read, reads };
+            // Where the board keeps only live bodies, the driver reads them once more for their
+            // velocities, and once more for their poses.
+            let further = if profile.flow == Flow::Passes { 0 } else { 2 };
+            for at_read in at_read..=at_read + further {
+                (unsteady.at_read, unsteady.reads) = (at_read, AtomicUsize::new(0));
+                let found = board.step(&mut unsteady, &collisions, &parameters);
                 let found = found.expect_err("one is wrong");
                 assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
-                assert_eq!(fickle.list, bodies);
+                assert_eq!(unsteady.list, bodies);
             }
             if order == Order::AsGiven {
                 // The same where the caller writes its collisions.
-                fickle.looks = AtomicUsize::new(0);
-                let found = board.write(&fickle, 0, &parameters, |_| ()).expect_err("one is wrong");
+                unsteady.reads = AtomicUsize::new(0);
+                let found =
+                    board.write(&unsteady, 0, &parameters, |_| ()).expect_err("one is wrong");
                 assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
             }
 

@@ -1,5 +1,5 @@
-//! A board in another process is a board: same bits, same cycles; and nothing that the other side
-//! does is a panic or a wait without end.
+//! Tests that a board in another process gives the same bits and cycles, and that no act of the
+//! other side causes a panic or a wait without end.
 #![cfg(feature = "emulation")]
 
 use std::io::{Read as _, Write as _};
@@ -73,10 +73,10 @@ impl Served {
         let folder = tempfile::tempdir().expect("a directory");
         let mut server = bind(config, &folder.path().join("board")).expect("served");
         let (board, stopper) = (server.board().clone(), server.stopper());
-        let (tell, visits) = channel();
+        let (sender, visits) = channel();
         let thread = std::thread::spawn(move || {
-            let told = |_: &EmulatedBoard, visit: Visit| drop(tell.send(visit));
-            server.serve(told).expect("served until it is stopped");
+            let report = |_: &EmulatedBoard, visit: Visit| drop(sender.send(visit));
+            server.serve(report).expect("served until it is stopped");
         });
         Self { folder, board, stopper, visits, thread: Some(thread) }
     }
@@ -96,7 +96,7 @@ impl Served {
         accelerator
     }
 
-    /// How the last visit ended.
+    /// The end of the last visit.
     fn visit(&self) -> Visit {
         self.visits.recv().expect("a visit that ended")
     }
@@ -131,7 +131,7 @@ fn steps(accelerator: &mut Accelerator, cubes: u16) -> (Vec<[u32; 13]>, Vec<Step
     (bits(&bodies), reports)
 }
 
-/// Cycles, register accesses, interrupts, descriptors: all but host time.
+/// Cycles, register accesses, interrupts, descriptors: all figures but host time.
 fn counted(report: &StepReport) -> [u64; 9] {
     let StepReport { cycles, register_reads, register_writes, interrupts, .. } = *report;
     [
@@ -178,7 +178,7 @@ fn a_served_board_gives_the_bits_and_the_cycles_of_one_in_this_process() {
 fn a_board_has_one_driver_at_a_time() {
     let served = Served::new(BoardConfig::default());
     let mut first = served.open();
-    let error = Accelerator::open(served.options()).expect_err("somebody has it");
+    let error = Accelerator::open(served.options()).expect_err("another driver has it");
     let Error::Open(OpenError::Platform(PlatformError::Busy { path })) = &error else {
         panic!("{error}")
     };
@@ -195,7 +195,7 @@ fn a_driver_that_leaves_in_the_middle_of_a_step_leaves_the_engines_running_for_t
     let (expected, _) = steps(&mut alone.open(), 40);
     alone.stop();
 
-    // The messages of an opening and of a step's start, as they went; then silence.
+    // The messages of an opening and of a step's start, in their order; then silence.
     let served = Served::new(BoardConfig::default());
     let (mut bodies, collisions) = scene(40);
     let relay = Relay::new(&served.socket(), None);
@@ -212,7 +212,7 @@ fn a_driver_that_leaves_in_the_middle_of_a_step_leaves_the_engines_running_for_t
     assert!(matches!(visit.ended, Ended::Left) && visit.left_running, "{visit:?}");
     assert!(served.board.is_running());
 
-    // The one that was cut off cannot even stop it; its bodies are as they were.
+    // The driver that was cut off cannot even stop the step; its bodies are unchanged.
     let before = bits(&bodies);
     let error = flight.wait(&mut bodies).expect_err("no board any more");
     assert!(error.must_reopen(), "{error}");
@@ -228,19 +228,19 @@ fn a_driver_that_leaves_in_the_middle_of_a_step_leaves_the_engines_running_for_t
     assert_eq!(served.board.violations(), []);
 }
 
-/// Falsifies the answer to a request, which is the board's of that number.
-type Spoil = Box<dyn Fn(usize, &[u8], &mut Vec<u8>) + Send>;
+/// Falsifies an answer of the board, by the number of the request.
+type Falsify = Box<dyn Fn(usize, &[u8], &mut Vec<u8>) + Send>;
 
 /// Falsifies one answer.
-fn once(at: usize, spoil: fn(&mut Vec<u8>)) -> Spoil {
+fn once(at: usize, falsify: fn(&mut Vec<u8>)) -> Falsify {
     Box::new(move |number, _, answer| {
         if number == at {
-            spoil(answer);
+            falsify(answer);
         }
     })
 }
 
-/// Passes messages on between a driver and a board, until it is cut.
+/// Passes messages between a driver and a board, until it is cut.
 struct Relay {
     _folder: tempfile::TempDir,
     socket: PathBuf,
@@ -248,31 +248,31 @@ struct Relay {
 }
 
 impl Relay {
-    /// To that board.
-    fn new(board: &Path, spoil: Option<Spoil>) -> Self {
+    /// Makes a relay to `board`.
+    fn new(board: &Path, falsify: Option<Falsify>) -> Self {
         let folder = tempfile::tempdir().expect("a directory");
         let socket = folder.path().join("relay");
         let listener = UnixListener::bind(&socket).expect("bound");
         let board = board.to_owned();
-        let (tell, ends) = channel();
+        let (sender, ends) = channel();
         std::thread::spawn(move || {
             let (mut driver, _) = listener.accept().expect("a driver");
             let mut board = UnixStream::connect(board).expect("a board");
             let ends = [&driver, &board].map(|end| end.try_clone().expect("cloned"));
-            tell.send(ends).expect("the test waits");
+            sender.send(ends).expect("the test waits");
             let mut request = [0; pgs_interface::message::REQUEST_BYTES];
             let mut number = 0;
             while driver.read_exact(&mut request).is_ok() {
                 let mut answer = vec![0; ANSWER_BYTES];
                 let passed = board.write_all(&request).and_then(|()| board.read_exact(&mut answer));
-                if let Some(spoil) = &spoil {
-                    spoil(number, &request, &mut answer);
+                if let Some(falsify) = &falsify {
+                    falsify(number, &request, &mut answer);
                 }
                 number += 1;
                 if passed.and_then(|()| driver.write_all(&answer)).is_err()
                     || answer.len() < ANSWER_BYTES
                 {
-                    // The test holds a copy of it.
+                    // The test holds a copy of the socket.
                     let _ = driver.shutdown(std::net::Shutdown::Both);
                     return;
                 }
@@ -283,7 +283,7 @@ impl Relay {
 
     /// Cuts both ends.
     fn cut(&self) {
-        for end in self.ends.recv().expect("somebody came") {
+        for end in self.ends.recv().expect("a driver came") {
             end.shutdown(std::net::Shutdown::Both).expect("cut");
         }
     }
@@ -313,7 +313,7 @@ fn a_server_that_is_stopped_in_the_middle_is_a_lost_board() {
     assert!(error.diagnosis().is_none(), "there was nothing to read");
     assert_eq!(bits(&bodies), before);
     drop(accelerator);
-    let error = Accelerator::open(served.options()).expect_err("nobody serves");
+    let error = Accelerator::open(served.options()).expect_err("no server");
     assert!(
         matches!(&error, Error::Open(OpenError::Platform(PlatformError::NoServer { socket, .. }))
             if *socket == served.socket()),
@@ -325,11 +325,11 @@ fn a_server_that_is_stopped_in_the_middle_is_a_lost_board() {
 fn answers_that_make_no_sense_are_errors_at_every_point_of_a_step() {
     let spoils: [fn(&mut Vec<u8>); 3] =
         [|answer| answer[0] = 9, |answer| answer.truncate(11), |answer| answer[0] = 4];
-    for spoil in spoils {
+    for falsify in spoils {
         // The hello, the memory, the first register, and later ones.
         for number in [0, 1, 2, 30, 60, 90, 110] {
             let served = Served::new(BoardConfig::default());
-            let relay = Relay::new(&served.socket(), Some(once(number, spoil)));
+            let relay = Relay::new(&served.socket(), Some(once(number, falsify)));
             let options = OpenOptions {
                 memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
                 ..at(&relay.socket)
@@ -344,7 +344,7 @@ fn answers_that_make_no_sense_are_errors_at_every_point_of_a_step() {
             });
             let error = stepped.expect_err("a false answer");
             assert!(matches!(error, Error::Open(_)) || error.must_reopen(), "{number}: {error}");
-            // The board is lost, and not without power.
+            // The error is a lost board, and not a board without power.
             let texts = chain(&error);
             assert!(texts.iter().any(|text| text.contains("is lost")), "{number}: {texts:?}");
             assert_eq!(bits(&bodies), before);
@@ -357,20 +357,20 @@ fn a_board_of_endless_interrupts_and_no_time_is_given_up_in_time() {
     let served = Served::new(BoardConfig::default());
     let started = Arc::new(AtomicBool::new(false));
     let lying = Arc::clone(&started);
-    let spoil: Spoil = Box::new(move |_, request, answer| {
+    let falsify: Falsify = Box::new(move |_, request, answer| {
         if !lying.load(Ordering::Relaxed) {
             return;
         }
         let bytes = answer.as_slice().try_into().expect("an answer");
-        let mut said = Answer::decode(bytes).expect("the board's");
-        said.now = Duration::ZERO;
+        let mut decoded = Answer::decode(bytes).expect("the board's");
+        decoded.now = Duration::ZERO;
         let wait = Request::WaitInterrupt { time: Duration::ZERO }.encode();
         if request[0] == wait[0] {
-            (said.status, said.value) = (Status::Done, 1);
+            (decoded.status, decoded.value) = (Status::Done, 1);
         }
-        *answer = said.encode().to_vec();
+        *answer = decoded.encode().to_vec();
     });
-    let relay = Relay::new(&served.socket(), Some(spoil));
+    let relay = Relay::new(&served.socket(), Some(falsify));
     let options = OpenOptions {
         memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
         ..at(&relay.socket)
@@ -440,7 +440,7 @@ fn requests_that_make_no_sense_end_the_visit_and_nothing_else() {
     let visit = served.visit();
     assert!(matches!(visit.ended, Ended::Left) && visit.requests == 3, "{visit:?}");
 
-    // A board that speaks of another version, or of another memory, says so.
+    // A board with another version, or with another memory, names it.
     let mut stream = raw(&served);
     let other = Request::Hello { version: VERSION + 1 }.encode();
     assert_eq!(ask(&mut stream, &other).status, Status::OtherVersion);
@@ -471,7 +471,7 @@ fn another_file_than_the_boards_memory_is_refused() {
             if *memory == other),
         "{error}"
     );
-    // Nor is a file any other board's memory.
+    // A file is no other board's memory either.
     for memory in [MemoryChoice::Uio { node: "m".to_owned() }, MemoryChoice::File { path: other }] {
         let board = match memory {
             MemoryChoice::Uio { .. } => served.options().board,
@@ -499,7 +499,7 @@ fn a_socket_has_one_server_and_one_that_was_left_behind_is_replaced() {
     drop(server);
     assert!(!left.exists());
 
-    // What is no socket stays.
+    // A file that is no socket stays.
     std::fs::write(&left, "mine").expect("written");
     let error = bind(BoardConfig::default(), &left).expect_err("a file");
     assert!(matches!(error, ServeError::NoSocket { .. }), "{error}");
@@ -534,7 +534,7 @@ fn a_file_that_no_board_has_made_is_refused_whatever_its_length() {
     for length in [1, 4096, 1 << 16, (1 << 16) + 4096, 1 << 21, (1 << 20) + 4096] {
         let content = vec![0x5A; length];
         std::fs::write(&path, &content).expect("written");
-        let error = open().expect_err("somebody's own");
+        let error = open().expect_err("a file of another owner");
         let found = length as u64;
         assert!(
             matches!(&error, MemoryFileError::NotMade { found: f, .. } if *f == found),
@@ -544,13 +544,13 @@ fn a_file_that_no_board_has_made_is_refused_whatever_its_length() {
         assert_eq!(std::fs::read(&path).expect("there"), content);
     }
 
-    // An empty one holds nothing that could be lost; from then on it is the board's.
+    // An empty file holds nothing to lose; from now on it belongs to the board.
     std::fs::write(&path, []).expect("written");
     for _ in 0..2 {
         let memory = open().expect("empty, then made");
         assert_eq!(memory.addresses(), MEMORY_BASE..MEMORY_BASE + (1 << 20));
     }
-    // Cut or lengthened it is another file.
+    // With another length it is another file.
     let made = std::fs::metadata(&path).expect("there").len();
     for length in [made - 1, made - 4096, made + 1] {
         let file = std::fs::File::options().write(true).open(&path).expect("there");
@@ -575,7 +575,7 @@ fn memory_is_reserved_and_what_the_file_system_does_not_give_is_refused() {
     MemoryFile::open(&path, MEMORY_BASE, None, 1 << 20).expect("room");
     assert!(blocks() >= 1 << 20, "{} bytes", blocks());
 
-    // More than any file system has.
+    // More bytes than any file system has.
     let most = 1 << 62;
     let whole = folder.path().join("whole");
     let error = MemoryFile::open(&whole, 0, Some(most), 0).expect_err("no such file system");
@@ -603,8 +603,8 @@ fn a_memory_that_was_changed_since_its_board_was_served_is_refused() {
     );
 }
 
-/// Seconds in which a driver or a board has to find out about the other.
-const SOON: Duration = Duration::from_secs(9);
+/// Time in which a driver or a board must notice a failure of the other side.
+const NOTICE_LIMIT: Duration = Duration::from_secs(9);
 
 #[test]
 fn connections_that_say_nothing_do_not_hold_the_board() {
@@ -616,9 +616,9 @@ fn connections_that_say_nothing_do_not_hold_the_board() {
     let started = Instant::now();
     steps(&mut served.open(), 5);
     assert!(matches!(served.visit().ended, Ended::Left));
-    // Nor do they for more than seconds.
+    // They do not keep the board for more than seconds, either.
     for mut stream in [silent, half] {
-        stream.set_read_timeout(Some(SOON)).expect("set");
+        stream.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
         assert_eq!(stream.read(&mut [0]).expect("hung up in time"), 0);
         let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
         assert_eq!(error.to_string(), "it sent no request within 5s");
@@ -634,37 +634,37 @@ fn who_says_hello_and_no_more_loses_the_board_in_seconds_and_keeps_nobody_waitin
     let mut mute = raw(&served);
     assert_eq!(ask(&mut mute, &hello).status, Status::Done);
     let started = Instant::now();
-    let error = Accelerator::open(served.options()).expect_err("somebody has it");
+    let error = Accelerator::open(served.options()).expect_err("another driver has it");
     assert!(
         matches!(&error, Error::Open(OpenError::Platform(PlatformError::ServerBusy { socket }))
             if *socket == served.socket()),
         "{error}"
     );
-    assert!(started.elapsed() < SOON, "{:?}", started.elapsed());
-    mute.set_read_timeout(Some(SOON)).expect("set");
+    assert!(started.elapsed() < NOTICE_LIMIT, "{:?}", started.elapsed());
+    mute.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
     assert_eq!(mute.read(&mut [0]).expect("hung up in time"), 0);
     let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
     assert_eq!(error.to_string(), "it asked for no memory within 5s");
     steps(&mut served.open(), 5);
     assert!(matches!(served.visit().ended, Ended::Left));
 
-    // Nor does half a request, or an answer that nobody reads.
+    // Half a request, or an answer that the driver does not read, ends the visit, too.
     let inode = std::fs::metadata(served.socket().with_extension("memory")).expect("there").ino();
     let memory = Request::Memory { inode }.encode();
     let mut half = raw(&served);
     assert_eq!(ask(&mut half, &hello).status, Status::Done);
     assert_eq!(ask(&mut half, &memory).status, Status::Done);
     half.write_all(&memory[..15]).expect("sent");
-    half.set_read_timeout(Some(SOON)).expect("set");
+    half.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
     assert_eq!(half.read(&mut [0]).expect("hung up in time"), 0);
     let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
     assert_eq!(error.to_string(), "it sent half a request and no more within 5s");
 
-    let mut deaf = raw(&served);
-    deaf.set_write_timeout(Some(2 * SOON)).expect("set");
+    let mut unread = raw(&served);
+    unread.set_write_timeout(Some(2 * NOTICE_LIMIT)).expect("set");
     let many = memory.repeat(1 << 12);
-    deaf.write_all(&hello).expect("sent");
-    while deaf.write_all(&many).is_ok() {}
+    unread.write_all(&hello).expect("sent");
+    while unread.write_all(&many).is_ok() {}
     let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
     assert_eq!(error.to_string(), "it read no answer within 5s");
     steps(&mut served.open(), 5);
@@ -675,19 +675,19 @@ fn a_driver_that_is_idle_keeps_the_board_and_others_are_told_at_once() {
     let served = Served::new(BoardConfig::default());
     let mut idle = served.open();
     let (first, _) = steps(&mut idle, 5);
-    // Longer than anything that is not a driver may take; others come meanwhile.
+    // Longer than the limit for others; other drivers come meanwhile.
     let until = Instant::now() + Duration::from_secs(6);
     let hello = Request::Hello { version: VERSION }.encode();
     let other = Request::Hello { version: VERSION + 1 }.encode();
     let silent = raw(&served);
     while Instant::now() < until {
         let mut stream = raw(&served);
-        stream.set_read_timeout(Some(SOON)).expect("set");
+        stream.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
         assert_eq!(ask(&mut stream, &hello).status, Status::Busy);
         assert_eq!(stream.read(&mut [0]).expect("hung up"), 0);
         assert_eq!(ask(&mut raw(&served), &other).status, Status::OtherVersion);
         assert_eq!(ask(&mut raw(&served), &[0; 16]).status, Status::Refused);
-        let error = Accelerator::open(served.options()).expect_err("somebody has it");
+        let error = Accelerator::open(served.options()).expect_err("another driver has it");
         assert!(
             matches!(&error, Error::Open(OpenError::Platform(PlatformError::Busy { .. }))),
             "{error}"
@@ -709,7 +709,7 @@ fn a_crowd_of_silent_connections_keeps_no_driver_away() {
     let crowd: Vec<_> = (0..100).map(|_| raw(&served)).collect();
     let started = Instant::now();
     steps(&mut served.open(), 5);
-    assert!(started.elapsed() < SOON, "{:?}", started.elapsed());
+    assert!(started.elapsed() < NOTICE_LIMIT, "{:?}", started.elapsed());
     drop(crowd);
 }
 
@@ -742,7 +742,7 @@ fn what_keeps_a_driver_from_a_socket_is_said_with_the_next_step() {
     let _datagrams = std::os::unix::net::UnixDatagram::bind(&other).expect("bound");
     refused(&other, Errno::EPROTOTYPE as i32, "is not a board's socket");
 
-    // The right to connect is that to write to the socket; root has it always.
+    // Connecting needs the right to write to the socket; root always has it.
     let served = Served::new(BoardConfig::default());
     let forbid = std::fs::Permissions::from_mode(0o000);
     std::fs::set_permissions(served.socket(), forbid).expect("ours");

@@ -1,6 +1,7 @@
-//! A scene of several shapes, two of them anisotropic, against a direct solver that is written here
-//! from the formulae alone: one collision after the other, in f32, every operation rounded on its
-//! own. It shares nothing with the driver or the board, and is compared bit for bit.
+//! Compares a scene of several shapes, two of them anisotropic, with a direct solver that is
+//! written here from the formulae alone: one collision after the other, in f32, every operation
+//! rounded on its own. It shares no code with the driver or the board, and the comparison is bit
+//! for bit.
 //!
 //! Sources: `bitstream-model/README.md`, arithmetic; Bullet's `b3Matrix3x3::setRotation` for the
 //! rotation matrix.
@@ -89,7 +90,7 @@ impl Tensor {
     }
 }
 
-/// A body while it is solved.
+/// A body during the solve.
 #[derive(Debug, Clone, Copy)]
 struct Moving {
     p: Vec3,
@@ -295,7 +296,7 @@ impl Random {
         [(); 3].map(|()| self.within(-size, size))
     }
 
-    /// A vector that is not too short to be made a unit one.
+    /// A vector that is long enough to be normalised.
     fn direction(&mut self) -> Vec3 {
         loop {
             let vector = self.vector(1.0);
@@ -388,7 +389,7 @@ fn shapes_of_any_inertia_are_solved_as_the_formulae_say() {
         let (board, mut accelerator) = open(Inertia::World);
         accelerator.set_shapes(&shapes).expect("with world inertia");
         let (mut found, collisions) = scene(seed);
-        // The reference takes the collisions as they come.
+        // The reference takes the collisions in the given order.
         let mut parameters = StepParameters::default();
         parameters.order = Some(Order::AsGiven);
         let mut expected = found.clone();

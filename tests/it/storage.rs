@@ -1,5 +1,5 @@
-//! However a caller stores bodies and collisions, a step has the same bits: arrays of structures and
-//! separate arrays.
+//! Tests that a step has the same bits for every storage of bodies and collisions: arrays of
+//! structures and separate arrays.
 #![cfg(feature = "emulation")]
 
 use crate::common;

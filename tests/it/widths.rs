@@ -1,9 +1,9 @@
-//! The widths of length registers and addresses decide how a step is cut into descriptors, and
+//! Tests that the widths of length registers and addresses change the descriptors of a step, and
 //! nothing else.
 //!
 //! `cargo test -p zynq-pgs --test it widths:: -- --nocapture` prints the descriptors of each.
 #![cfg(feature = "emulation")]
-#![allow(clippy::print_stdout, reason = "the counts are printed for whoever wants to see them")]
+#![allow(clippy::print_stdout, reason = "the counts are the output of the test")]
 
 use crate::common::{bits, open};
 use bitstream_model::BoardConfig;
@@ -29,7 +29,7 @@ fn steps(config: BoardConfig) -> (Vec<StepReport>, Vec<u32>) {
         let (bodies, collisions) = scene.parts_mut();
         let report = accelerator.step(bodies, collisions, &StepParameters::default());
         let report = report.unwrap_or_else(|error| panic!("{error}: {:?}", board.violations()));
-        // The board completed as many as the driver says that it queued.
+        // The board completed the number of descriptors that the driver reports.
         assert_eq!(board.counts().descriptors - before, report.descriptors);
         reports.push(report);
     }
@@ -39,13 +39,13 @@ fn steps(config: BoardConfig) -> (Vec<StepReport>, Vec<u32>) {
 
 /// Descriptors of a step, by the layout of the specification's streams.
 fn descriptors(length_width: u32, bodies: u64, collisions: u64) -> u64 {
-    // The longest piece: what the register holds, in whole bursts of 64 bytes.
+    // The longest piece: the largest length in whole bursts of 64 bytes that the register holds.
     let largest = ((1_u64 << length_width) - 1) / 64 * 64;
     let pieces = |beats: u64| (16 * beats).div_ceil(largest);
     (0..4)
         .map(|channel| {
             // Velocities and poses: two beats a body, dealt out in turn. Collisions: seven beats,
-            // of which the last channel has one. Results: one beat a body.
+            // one of them on the last channel. Results: one beat a body.
             let pairs = (2 * bodies - channel).div_ceil(4);
             let of_collision = if channel == 3 { 1 } else { 2 };
             2 * pieces(pairs) + PASSES * pieces(of_collision * collisions) + pieces(bodies)

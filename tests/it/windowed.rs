@@ -1,10 +1,11 @@
-//! The design that streams the collisions once, through the driver: the same bits as one collision
-//! after the other in the same order, and a refusal of everything that it would wait for for ever.
+//! Tests the design that streams the collisions once, through the driver. It gives the same bits as
+//! one collision after the other in the same order, and the driver refuses every step that would
+//! make it wait for ever.
 //!
-//! With `PGS_VECTORS` also the thesis' step; `cargo test -p zynq-pgs --test it windowed:: -- --nocapture`
-//! prints the figures.
+//! With `PGS_VECTORS` it also tests the thesis' step; `cargo test -p zynq-pgs --test it windowed:: --
+//! --nocapture` prints the figures.
 #![cfg(feature = "emulation")]
-#![allow(clippy::print_stdout, reason = "the figures are printed for whoever wants to see them")]
+#![allow(clippy::print_stdout, reason = "the figures are the output of the test")]
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -36,14 +37,15 @@ fn differing(one: &[Body], other: &[Body]) -> usize {
     bits(one).iter().zip(bits(other)).filter(|(one, other)| **one != *other).count()
 }
 
-/// Of 2^-9 m: differences of positions below 2^13 m are exact in f32.
+/// Points a metre of a grid of 2^-9 m: differences of positions below 2^13 m are exact in f32.
 const FINE: f32 = 512.0;
-/// Of half a metre: sums and differences within a small pile are exact in binary16 too.
+/// Points a metre of a grid of half a metre: sums and differences within a small pile are exact in
+/// binary16, too.
 const COARSE: f32 = 2.0;
 
-/// To a grid of so many points a metre, on which lever arms are the same numbers, whether they are made
-/// from world coordinates or from offsets. Of three contact points two are left, since a third is not
-/// exact.
+/// Moves bodies and contact points to a grid of `grid` points a metre. On it lever arms are the
+/// same numbers from world coordinates and from offsets. Of three contact points two remain, since
+/// a third is not exact.
 fn snap(bodies: &mut [Body], collisions: &mut [Collision], grid: f32) {
     let snap = |point: &mut [f32; 3]| {
         for number in point {
@@ -144,7 +146,7 @@ fn touch(body_a: u32, body_b: u32) -> Collision {
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 0.5)];
 
-/// What stands still is not streamed, wherever it is among the bodies; what touches nothing is.
+/// A static body is not streamed, wherever it is among the bodies; a body without contacts is.
 #[test]
 fn static_and_untouched_bodies_have_their_place_too() {
     for profile in [&WINDOWED, &WINDOWED16] {
@@ -171,7 +173,7 @@ fn static_and_untouched_bodies_have_their_place_too() {
             // Five bodies move: 2 + 2 beats in and 4 out, or 1 + 2 and 4.
             assert_eq!(report.bytes_from_device, 5 * 4 * 16);
             let mut expected = start.clone();
-            // The depth of either is more than there are collisions.
+            // The depth of either profile is larger than the number of collisions.
             parameters.order = Some(Order::AsGiven);
             let in_order = by_hand(Order::HazardFree, &expected, &all[..count], &SHAPES, DEPTH);
             float.step(&mut expected, &in_order, &parameters).expect("a step");
@@ -202,7 +204,7 @@ fn a_step_in_which_nothing_moves_sends_nothing() {
     windowed.step(&mut bodies, none, &StepParameters::default()).expect("the next one does");
 }
 
-/// Refused with nothing sent: the whole text.
+/// The whole text of a refusal, with nothing sent.
 fn refused(
     profile: &'static Profile,
     bodies: &mut [Body],
@@ -219,7 +221,7 @@ fn refused(
     (error, text)
 }
 
-/// A chain of cubes, and two of them far apart in it that touch each other.
+/// A chain of cubes; two of them that lie far apart in it touch each other.
 fn chain(links: u32) -> (Vec<Body>, Vec<Collision>) {
     let bodies = (0..=links).map(|x| body(f32::from(u16::try_from(x).expect("few")), 1)).collect();
     let mut collisions: Vec<_> = (0..links).map(|link| touch(link, link + 1)).collect();
@@ -242,7 +244,7 @@ fn a_body_that_lives_too_long_is_refused_with_the_profiles_that_could() {
          delay lines take spans of less than 2816: ask for another order (hazard-free keeps \
          spans short unless a body has dozens of collisions), or load another bitstream (profiles that could: naive, float, half, mixed)"
     );
-    // Exactly as long as they are, and one more.
+    // The longest chain that fits, and one link more.
     for (links, fits) in [(2_815, true), (2_816, false)] {
         let (mut bodies, collisions) = chain(links);
         let (board, mut windowed) = open(of(&WINDOWED));
@@ -271,7 +273,7 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
         text.ends_with("(profiles that could: naive, float, half, mixed, windowed, windowed16)"),
         "{text}"
     );
-    // What the driver says is enough is enough, and one less is not.
+    // The number of places that the driver demands is enough, and one less is not.
     let design = move |places: u32| with(move |window| window.slots = places + 1);
     let (board, mut windowed) = open(of(design(held)));
     windowed.set_shapes(scene.shapes()).expect("they fit");
@@ -282,18 +284,19 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
     assert!(matches!(error, Error::Input(InputError::TooManyLive { .. })), "{error:?}");
 }
 
-/// Collisions of which one has lost its contact points from some look on, or at that look alone.
-struct Fickle<'a> {
+/// Collisions, one of which loses its contact points after the read `good_reads`, for good or for
+/// one read.
+struct Unsteady<'a> {
     list: &'a [Collision],
     which: usize,
-    looks: AtomicUsize,
-    firm: usize,
+    reads: AtomicUsize,
+    good_reads: usize,
     once: bool,
-    /// Whether nothing tells it from what an order makes to fill a gap.
+    /// Whether it then equals the padding that fills a gap in an order.
     like_padding: bool,
 }
 
-impl Collisions for Fickle<'_> {
+impl Collisions for Unsteady<'_> {
     fn len(&self) -> usize {
         self.list.len()
     }
@@ -301,9 +304,9 @@ impl Collisions for Fickle<'_> {
     fn collision(&self, index: usize) -> Collision {
         let mut collision = self.list[index];
         if index == self.which {
-            let looks = self.looks.fetch_add(1, Ordering::Relaxed) + 1;
-            let lost = looks > self.firm;
-            if lost && !(self.once && looks > self.firm + 1) {
+            let reads = self.reads.fetch_add(1, Ordering::Relaxed) + 1;
+            let lost = reads > self.good_reads;
+            if lost && !(self.once && reads > self.good_reads + 1) {
                 collision.count = 0;
                 if self.like_padding {
                     collision.body_b = collision.body_a;
@@ -325,34 +328,41 @@ fn a_collision_that_loses_its_points_on_the_way_fails_the_step() {
     let start = scene.bodies().to_vec();
     let parameters = StepParameters::default();
     let (mut on_the_board, mut refused) = (0, 0);
-    let looks = [(1, false), (2, false), (1, true), (2, true), (3, true)];
-    let looks = looks.map(|(firm, once)| [false, true].map(|like| (firm, once, like)));
+    let reads = [(1, false), (2, false), (1, true), (2, true), (3, true)];
+    let reads = reads.map(|(good_reads, once)| [false, true].map(|like| (good_reads, once, like)));
     let all =
-        (0..list.len()).flat_map(|which| looks.as_flattened().iter().map(move |it| (which, *it)));
-    for (which, (firm, once, like_padding)) in all {
+        (0..list.len()).flat_map(|which| reads.as_flattened().iter().map(move |it| (which, *it)));
+    for (which, (good_reads, once, like_padding)) in all {
         let (_, mut windowed) = open(of(&WINDOWED));
         windowed.set_shapes(scene.shapes()).expect("they fit");
         let mut expected = start.clone();
         windowed.step(&mut expected, &list, &parameters).expect("a step");
         let mut bodies = start.clone();
-        let fickle =
-            Fickle { list: &list, which, looks: AtomicUsize::new(0), firm, once, like_padding };
-        match windowed.step(&mut bodies, &fickle, &parameters) {
-            // It was looked at no more.
-            Ok(_) => assert_eq!(differing(&bodies, &expected), 0, "{which} after {firm}"),
+        let unsteady = Unsteady {
+            list: &list,
+            which,
+            reads: AtomicUsize::new(0),
+            good_reads,
+            once,
+            like_padding,
+        };
+        match windowed.step(&mut bodies, &unsteady, &parameters) {
+            // The driver did not read it again.
+            Ok(_) => assert_eq!(differing(&bodies, &expected), 0, "{which} after {good_reads}"),
             Err(error) => {
                 on_the_board += usize::from(matches!(error, Error::Step { .. }));
                 refused += usize::from(error.is_input());
-                assert_eq!(differing(&bodies, &start), 0, "{which} after {firm}: {error}");
+                assert_eq!(differing(&bodies, &start), 0, "{which} after {good_reads}: {error}");
             }
         }
     }
-    // What is wrong when it is packed is refused, even if it looks like padding then.
+    // A collision that is wrong during packing is refused, even if it equals padding.
     assert!(refused >= 4 * list.len(), "{refused} of {}", list.len());
     assert_eq!(on_the_board, 0);
 }
 
-/// `half` integrates poses of sixteen bits, so that velocities are compared, and handed on.
+/// `half` integrates poses of sixteen bits. The test therefore compares velocities, and hands them
+/// on.
 #[test]
 fn sixteen_bits_give_the_velocities_of_half_waiting_in_the_same_order() {
     let grid = "6x6x6".parse().expect("a grid");
@@ -394,7 +404,7 @@ fn sixteen_bits_give_the_velocities_of_half_waiting_in_the_same_order() {
     assert_eq!(board.violations(), []);
 }
 
-/// Sixteen-bit arithmetic on coordinates that it keeps: near what single precision gives.
+/// Sixteen-bit arithmetic on coordinates in range: results near to single precision.
 #[test]
 fn sixteen_bits_stay_near_single_precision() {
     let step = |profile| {

@@ -1,7 +1,7 @@
-//! This file holds the registers of one DMA channel and what reading and writing them does.
+//! Registers of one DMA channel, and the effects of reads and writes.
 
 use super::Build;
-use super::faults::Faulty;
+use super::faults::FaultEffects;
 use crate::cast::{high, low, register};
 use crate::violation::{Log, ViolationKind};
 use pgs_interface::axi_dma::Direction;
@@ -15,7 +15,7 @@ use pgs_interface::record::BEAT_BYTES;
 /// Clocks of one tick of the delay timer.
 const DELAY_TICK: u64 = 125;
 
-/// What the engine is doing.
+/// The engine's current work.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Work {
     /// Nothing: stopped, idle, or never started.
@@ -71,10 +71,10 @@ pub(crate) struct Channel {
     pub(crate) in_packet: bool,
     /// The engine's clock; it may run a little behind the board's.
     pub(crate) time: u64,
-    /// Beats of the packet that were moved, and descriptors that were completed.
+    /// Beats and descriptors of the packet that are done: moved, completed.
     pub(crate) beats: u64,
     pub(super) descriptors: u32,
-    pub(crate) faulty: Faulty,
+    pub(crate) faulty: FaultEffects,
 }
 
 impl Channel {
@@ -98,26 +98,26 @@ impl Channel {
             time: 0,
             beats: 0,
             descriptors: 0,
-            faulty: Faulty::default(),
+            faulty: FaultEffects::default(),
         }
     }
 
-    /// Drops what it is doing.
+    /// Drops the current work.
     pub(super) fn stop(&mut self) {
         self.work = Work::None;
     }
 
-    /// Whether it has nothing to do.
+    /// Whether the engine has no work.
     pub(super) fn rests(&self) -> bool {
         matches!(self.work, Work::None)
     }
 
-    /// Whether it was told to stop and has not halted yet.
+    /// Whether RS was cleared and the channel has not halted yet.
     pub(super) fn stopping(&self) -> bool {
         matches!(self.transition, Some((_, Transition::Halt)))
     }
 
-    /// Puts off what it is about to show.
+    /// Delays the change of Halted that is under way.
     pub(super) fn halt_later(&mut self, cycles: u64) {
         if let Some((at, _)) = &mut self.transition {
             *at = at.saturating_add(cycles);
@@ -189,13 +189,13 @@ impl Channel {
             _ if at == TAILDESC.offset => {
                 self.tail = set_low(self.tail, descriptor_mask);
                 if !wide {
-                    doorbell = self.ring(build, now, log);
+                    doorbell = self.ring_doorbell(build, now, log);
                 }
             }
             _ if at == TAILDESC_MSB.offset => {
                 if wide {
                     self.tail = set_high(self.tail);
-                    doorbell = self.ring(build, now, log);
+                    doorbell = self.ring_doorbell(build, now, log);
                 }
             }
             _ if at == ADDRESS.offset => self.address = set_low(self.address, u32::MAX),
@@ -240,7 +240,7 @@ impl Channel {
     }
 
     /// A doorbell in scatter-gather mode: starts or resumes the engine, or moves its pause point.
-    fn ring(&mut self, build: &Build, now: u64, log: &mut Log) -> bool {
+    fn ring_doorbell(&mut self, build: &Build, now: u64, log: &mut Log) -> bool {
         let (core, direction) = (build.core, self.direction);
         if self.halted || !dmacr::RS.is_set(self.control) {
             log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
@@ -262,7 +262,7 @@ impl Channel {
         let (core, direction) = (build.core, self.direction);
         let mask = u32::MAX >> (32 - build.length_width);
         if self.halted {
-            // All ones, and the 0 that undoes it, are how a driver learns the register's width.
+            // A driver writes all ones to learn the register's width, and 0 to undo that.
             self.length = value & mask;
             if value != u32::MAX && value != 0 {
                 log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
@@ -331,14 +331,14 @@ impl Channel {
         };
         let late = self.faulty.late.iter().map(|(at, ..)| *at).min();
         let halt = self.transition.map(|(at, _)| at);
-        // A slow port moves its next beat only then.
+        // A slowed channel moves its next beat at its own time.
         let busy = matches!(self.work, Work::Descriptor(_) | Work::Direct { .. });
         let slow = (busy && self.faulty.slow > 0).then_some(self.time);
         [halt, self.delay_until, fetch, late, slow].into_iter().flatten().min()
     }
 
     pub(super) fn interrupt(&self) -> bool {
-        // Enables and status stand at the same bits of DMACR and DMASR.
+        // The enables of DMACR have the same bits as the interrupts of DMASR.
         self.latched & self.control & dmasr::IRQS != 0
     }
 
@@ -355,7 +355,7 @@ impl Channel {
         }
     }
 
-    /// A direct transfer has ended: one interrupt each, whatever the threshold.
+    /// A direct transfer has ended: it raises an interrupt whatever the threshold.
     pub(super) fn direct_done(&mut self) {
         self.latched |= dmasr::IOC_IRQ.mask();
         self.idle = true;

@@ -11,16 +11,16 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use pgs_interface::message::{ANSWER_BYTES, REQUEST_BYTES};
 
-/// How long the rest of a request that has begun may take, and an answer that nobody reads.
+/// Time limit for the rest of a request that has begun, and for the driver to read an answer.
 pub(super) const TRANSFER_LIMIT: Duration = Duration::from_secs(5);
 
-/// A connection, and what has come of its next request.
+/// A connection, and the bytes of its next request that have arrived.
 #[derive(Debug)]
 pub(super) struct Connection {
     stream: UnixStream,
     request: [u8; REQUEST_BYTES],
     filled: usize,
-    /// When a request that has begun must be whole.
+    /// The time at which the request that has begun must be whole.
     due: Option<Instant>,
 }
 
@@ -42,18 +42,18 @@ impl Connection {
         self.stream.try_clone()
     }
 
-    /// When the request that has begun must be whole; `None` if none has.
+    /// The time at which the request that has begun must be whole; `None` between requests.
     pub(super) fn due(&self) -> Option<Instant> {
         self.due
     }
 
-    /// Whether a whole request has come.
+    /// Whether a whole request has arrived.
     pub(super) fn is_whole(&self) -> bool {
         self.filled == REQUEST_BYTES
     }
 
-    /// The request that has come, if it is whole.
-    pub(super) fn take(&mut self) -> Option<[u8; REQUEST_BYTES]> {
+    /// Takes the request that has arrived, if it is whole.
+    pub(super) fn take_request(&mut self) -> Option<[u8; REQUEST_BYTES]> {
         let whole = self.is_whole();
         if whole {
             (self.filled, self.due) = (0, None);
@@ -61,8 +61,8 @@ impl Connection {
         whole.then_some(self.request)
     }
 
-    /// Takes in what has come of the next request, without waiting.
-    pub(super) fn take_in(&mut self) -> io::Result<Presence> {
+    /// Reads the bytes of the next request that have arrived, without waiting.
+    pub(super) fn read_available(&mut self) -> io::Result<Presence> {
         if self.is_whole() {
             return Ok(Presence::There);
         }
@@ -111,18 +111,18 @@ impl AsFd for Connection {
     }
 }
 
-/// The other side took too long.
+/// The error of a driver that took too long; `what` completes "it ...".
 pub(super) fn late(what: &str, limit: Duration) -> io::Error {
     io::Error::new(ErrorKind::TimedOut, format!("it {what} within {limit:?}"))
 }
 
-/// Waits until there is something to do, or it is too late; without end for `None`.
+/// Waits until one of `ends` is ready, or until the time `until`; without limit for `None`.
 pub(super) fn wait(ends: &mut [PollFd<'_>], until: Option<Instant>) -> io::Result<()> {
     let timeout = match until {
         None => PollTimeout::NONE,
         Some(until) => {
             let left = until.saturating_duration_since(Instant::now());
-            // Not a moment too early, which would be asked again and again.
+            // Rounded up: a wait that ends too early would repeat in a busy loop.
             let left = left.as_micros().div_ceil(1000);
             PollTimeout::try_from(left).unwrap_or(PollTimeout::MAX)
         }

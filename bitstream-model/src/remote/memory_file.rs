@@ -1,8 +1,8 @@
-//! A board's memory that lies in a file, where another process sees it too.
+//! A board's memory in a file that another process sees too.
 //!
-//! Whole system calls, no mapping: nothing here can be changed under a reference. The driver maps
-//! the file, so that all its bytes are reserved: a page that the file system has not would end the
-//! driver with SIGBUS.
+//! This side reads and writes with system calls and maps nothing: no byte changes under a
+//! reference. The driver maps the file. So all its bytes are reserved: a page without room in the
+//! file system would end the driver with SIGBUS.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -18,9 +18,9 @@ use super::mark::{self, MARK_BYTES};
 use crate::memory::external::DeviceMemory;
 use pgs_interface::record::Beat;
 
-/// The least that is of any use, bytes.
+/// Shortest memory that is of any use, bytes.
 const LEAST: u64 = 1 << 16;
-/// A file has whole pages of the largest size that there is.
+/// Bytes of the largest page of any kernel; the memory has whole pages of this size.
 const PAGE: u64 = 1 << 16;
 
 /// Memory in a file.
@@ -33,55 +33,55 @@ pub struct MemoryFile {
     inode: u64,
 }
 
-/// Why a file cannot be a board's memory.
+/// The reason why a file cannot be a board's memory.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum MemoryFileError {
-    /// It cannot be opened, made, or measured.
+    /// The file cannot be opened, made, or measured.
     #[error("the memory {} cannot be {act}", path.display())]
     File {
-        /// What was tried.
+        /// The operation that failed: "opened", "locked", ...
         act: &'static str,
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Why.
+        /// The kernel's error.
         #[source]
         source: io::Error,
     },
-    /// It is no regular file.
-    #[error("the memory {} is no regular file: name another", path.display())]
+    /// The path is not a regular file.
+    #[error("the memory {} is not a regular file: name another", path.display())]
     NotRegular {
-        /// Which.
+        /// The path.
         path: PathBuf,
     },
-    /// No board has made it.
+    /// No board has made the file.
     #[error(
         "the memory {} has {found} bytes and not the mark of a file that a board has made: refusing \
-         to overwrite it; name another file, or remove it if nobody needs it",
+         to overwrite it; name another file, or remove it if it is not needed",
         path.display()
     )]
     NotMade {
-        /// Which file.
+        /// The file.
         path: PathBuf,
         /// Its length, bytes.
         found: u64,
     },
-    /// The file system does not give so much.
+    /// The file system has no room for the memory.
     #[error(
         "the memory {} of {bytes} bytes cannot be reserved: serve a smaller one, or name a file on \
          another file system",
         path.display()
     )]
     NoRoom {
-        /// Which file.
+        /// The file.
         path: PathBuf,
         /// The memory's length, bytes.
         bytes: u64,
-        /// What the kernel says.
+        /// The kernel's error.
         #[source]
         source: io::Error,
     },
-    /// It has a length that memory cannot have, or another than was asked for.
+    /// The memory cannot have this length, or the file's length differs from the wanted one.
     #[error(
         "the memory {} has {found} bytes, expected {}: remove it, or name another",
         path.display(),
@@ -91,29 +91,29 @@ pub enum MemoryFileError {
         }
     )]
     Length {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Its length, bytes.
+        /// The memory's length, bytes.
         found: u64,
-        /// What was asked for, if anything was.
+        /// The wanted length, if the caller wants one.
         wanted: Option<u64>,
     },
-    /// A driver is at work on it.
+    /// A driver uses the file.
     #[error("the memory {} is in use: end the driver that has it, or name another", path.display())]
     Busy {
-        /// Which file.
+        /// The file.
         path: PathBuf,
     },
 }
 
 impl MemoryFile {
-    /// Opens the file at `path`, or makes one of `wanted` bytes, for `default` if nothing is
-    /// wanted. Its first byte is at `base` on the bus. A file that is there and empty is taken as
-    /// one that is made: nothing is lost.
+    /// Opens the file at `path`, or makes a file with a memory of `wanted` bytes, or of `default`
+    /// bytes if `wanted` is `None`. The memory's first byte is at `base` on the bus. An empty file
+    /// counts as a new one.
     ///
     /// # Errors
-    /// [`MemoryFileError`]; a file that is there keeps its length and its content, and none that
-    /// was begun is left.
+    /// [`MemoryFileError`]. An existing file then keeps its length and its content, and a new file
+    /// is removed.
     pub fn open(
         path: &Path,
         base: u64,
@@ -132,7 +132,7 @@ impl MemoryFile {
             return Err(MemoryFileError::NotRegular { path: path_buf() });
         }
         let (file, made) = open_or_make(path)?;
-        // Nobody has it meanwhile: a driver holds the lock as long as it has the board.
+        // The lock excludes every driver: a driver holds it as long as it has the board.
         let file = match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
             Ok(locked) => locked,
             Err((_, Errno::EWOULDBLOCK)) => {
@@ -150,7 +150,7 @@ impl MemoryFile {
         if !fits(bytes) || wanted.is_some_and(|wanted| wanted != bytes) {
             return Err(length(bytes));
         }
-        // The mark first: a file that was begun is ours from its first byte on.
+        // The mark first: an incomplete file is then known as ours.
         let written = if metadata.len() == 0 { mark::write(&file, bytes) } else { Ok(()) };
         if let Err(source) = written.and_then(|()| reserve(&file, bytes + MARK_BYTES)) {
             if made {
@@ -164,7 +164,7 @@ impl MemoryFile {
         Ok(Self { file, base, bytes, inode: metadata.ino() })
     }
 
-    /// The addresses that it answers.
+    /// Bus addresses of the memory.
     #[must_use]
     pub fn addresses(&self) -> Range<u64> {
         self.base..self.base + self.bytes
@@ -176,8 +176,9 @@ impl MemoryFile {
         self.inode
     }
 
-    /// Where an address lies in the file. A write past the end would make the file longer.
-    fn place(&self, address: u64, bytes: usize) -> io::Result<u64> {
+    /// Offset of an address in the file. A range past the end is an error: a write there would make
+    /// the file longer.
+    fn offset(&self, address: u64, bytes: usize) -> io::Result<u64> {
         let place = address
             .checked_sub(self.base)
             .filter(|place| place.checked_add(bytes as u64).is_some_and(|end| end <= self.bytes));
@@ -189,15 +190,15 @@ impl MemoryFile {
     }
 
     fn read(&self, address: u64, to: &mut [u8]) -> io::Result<()> {
-        self.file.read_exact_at(to, self.place(address, to.len())?)
+        self.file.read_exact_at(to, self.offset(address, to.len())?)
     }
 
     fn write(&self, address: u64, from: &[u8]) -> io::Result<()> {
-        self.file.write_all_at(from, self.place(address, from.len())?)
+        self.file.write_all_at(from, self.offset(address, from.len())?)
     }
 }
 
-/// Opens the file, or makes it, which is then `true`.
+/// Opens the file or makes it; returns whether it was made.
 fn open_or_make(path: &Path) -> Result<(File, bool), MemoryFileError> {
     let mut options = OpenOptions::new();
     options.read(true).write(true);
@@ -212,21 +213,21 @@ fn open_or_make(path: &Path) -> Result<(File, bool), MemoryFileError> {
     }
 }
 
-/// Has the file system set the room for a file's first bytes aside; what stands there stays.
+/// Reserves room in the file system for a file's first `bytes` bytes, and keeps their content.
 fn reserve(file: &File, bytes: u64) -> io::Result<()> {
     let length = i64::try_from(bytes).map_err(|_| io::Error::from(Errno::EFBIG))?;
     loop {
         match fallocate(file, FallocateFlags::empty(), 0, length) {
             Ok(()) => return Ok(()),
             Err(Errno::EINTR) => {}
-            // Some file systems cannot, as NFS before 4.2.
+            // Some file systems cannot reserve, for example NFS before 4.2.
             Err(Errno::EOPNOTSUPP | Errno::ENOSYS) => return rewrite(file, bytes),
             Err(errno) => return Err(errno.into()),
         }
     }
 }
 
-/// Writes a file's first bytes as they are, so that there is room for them.
+/// Writes a file's first bytes back unchanged, so that the file system allocates them.
 fn rewrite(file: &File, bytes: u64) -> io::Result<()> {
     let mut piece = vec![0; 1 << 16];
     let mut place = 0;
@@ -254,7 +255,7 @@ impl DeviceMemory for MemoryFile {
         self.read(address, bytemuck::cast_slice_mut(to))
     }
 
-    /// The uppermost byte last: there stand the flags that say that a descriptor is complete.
+    /// Writes the uppermost byte last: it holds the flags that show that a descriptor is complete.
     fn write_word(&mut self, address: u64, value: u32) -> io::Result<()> {
         let bytes = value.to_le_bytes();
         self.write(address, &bytes[..3])?;
@@ -266,7 +267,7 @@ impl DeviceMemory for MemoryFile {
 mod tests {
     use super::*;
 
-    /// A sparse file of that length, with those bytes at its begin.
+    /// A sparse file of `bytes` bytes that begins with `begin`.
     fn sparse(begin: &[u8], bytes: u64) -> (tempfile::TempDir, File) {
         let folder = tempfile::tempdir().expect("a directory");
         let mut options = OpenOptions::new();
@@ -278,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_reserved_is_there_and_keeps_its_content() {
+    fn reserved_bytes_are_allocated_and_keep_their_content() {
         const BYTES: u64 = (1 << 20) + 3;
         for act in [reserve, rewrite] {
             let (_folder, file) = sparse(b"mine", BYTES);

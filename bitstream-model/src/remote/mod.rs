@@ -8,16 +8,16 @@
 //!   DMA buffers ---------------> the file <---------------------- DMA engines
 //! ```
 //!
-//! [`pgs_interface::message`], [`mark`] and [`connect()`] are what both sides share. The rest is the
-//! board's side: it serves one driver after the other. One that vanishes leaves the board as it is,
-//! engines running, as a process that is killed leaves a real one.
+//! Both sides share [`pgs_interface::message`], [`mark`] and [`connect()`]. The rest is the board's
+//! side: it serves one driver after the other. A driver that vanishes leaves the board as it is,
+//! engines running, as a killed process leaves a real board.
 
 pub mod mark;
 
 mod connect;
 mod connection;
-mod lobby;
 mod memory_file;
+mod pending;
 mod server;
 mod visit;
 

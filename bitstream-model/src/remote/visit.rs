@@ -1,14 +1,14 @@
-//! This file serves one driver, from its hello until it is gone.
+//! Serves one driver, from its hello until it is gone.
 
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
 use super::connection::{Connection, Presence, TRANSFER_LIMIT, late};
-use super::lobby::{FIRST_LIMIT, Lobby};
+use super::pending::{FIRST_LIMIT, PendingConnections};
 use crate::handle::{CpuPort, EmulatedBoard};
 use pgs_interface::message::{Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION};
 
-/// How much virtual time passes between two looks whether the driver is still there.
+/// Virtual time between two checks whether the driver is still there.
 const SLICE: Duration = Duration::from_micros(20);
 
 /// How a visit ended.
@@ -17,39 +17,39 @@ const SLICE: Duration = Duration::from_micros(20);
 pub enum Ended {
     /// The driver closed the socket, or was killed.
     Left,
-    /// It sent something that is no request.
+    /// It sent bytes that are not a request.
     Refused(RequestError),
-    /// The socket failed, or a request did not come to its end in time.
+    /// The socket failed, or a request was not complete in time.
     Broken(io::Error),
 }
 
-/// What one driver did.
+/// A driver's use of the board, from its hello until it was gone.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Visit {
-    /// Requests that were served.
+    /// Number of requests served.
     pub requests: u64,
-    /// How it ended.
+    /// The way in which it ended.
     pub ended: Ended,
     /// Whether the accelerator or a DMA engine was still at work when the driver was gone.
     pub left_running: bool,
 }
 
-/// A driver, and the board that it has.
+/// A driver's session with the board.
 #[derive(Debug)]
-pub(super) struct Host<'a> {
+pub(super) struct Session<'a> {
     board: &'a EmulatedBoard,
     port: CpuPort,
     /// Inode and bus address of the memory.
     memory: (u64, u64),
-    /// Whether the driver was told that it has the memory.
+    /// Whether the board has confirmed the driver's memory.
     has_memory: bool,
     connection: Connection,
-    lobby: &'a mut Lobby,
+    pending: &'a mut PendingConnections,
 }
 
 impl Ended {
-    /// How a connection ended that failed.
+    /// The end of a connection that failed with `error`.
     pub(super) fn of(error: io::Error) -> Self {
         match error.kind() {
             ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => Self::Left,
@@ -58,15 +58,15 @@ impl Ended {
     }
 }
 
-impl<'a> Host<'a> {
+impl<'a> Session<'a> {
     pub(super) fn new(
         board: &'a EmulatedBoard,
         memory: (u64, u64),
         connection: Connection,
-        lobby: &'a mut Lobby,
+        pending: &'a mut PendingConnections,
     ) -> Self {
         let port = board.cpu_port();
-        Self { board, port, memory, has_memory: false, connection, lobby }
+        Self { board, port, memory, has_memory: false, connection, pending }
     }
 
     /// Serves until the driver is gone.
@@ -101,11 +101,10 @@ impl<'a> Host<'a> {
 
     /// The next request; `None` if the driver is gone.
     fn next_request(&mut self) -> io::Result<Option<[u8; REQUEST_BYTES]>> {
-        // Once a driver has the memory, it may take all the time of the world between two requests,
-        // but not inside one.
+        // A driver that has the memory may take any time between two requests, but not inside one.
         let first = (!self.has_memory).then(|| Instant::now() + FIRST_LIMIT);
         loop {
-            if let Some(request) = self.connection.take() {
+            if let Some(request) = self.connection.take_request() {
                 return Ok(Some(request));
             }
             let until = self.connection.due().into_iter().chain(first).min();
@@ -115,7 +114,7 @@ impl<'a> Host<'a> {
                     None => late("asked for no memory", FIRST_LIMIT),
                 });
             }
-            if self.look(until)? == Presence::Gone {
+            if self.check_presence(until)? == Presence::Gone {
                 return Ok(None);
             }
         }
@@ -132,7 +131,7 @@ impl<'a> Host<'a> {
                 let status = if version == VERSION { Status::Done } else { Status::OtherVersion };
                 self.answer(status, VERSION, 0)?;
                 if version != VERSION {
-                    // Whatever it says next means something else.
+                    // Its next requests would have another meaning.
                     return Ok(Presence::Gone);
                 }
             }
@@ -175,8 +174,8 @@ impl<'a> Host<'a> {
         Ok(Presence::There)
     }
 
-    /// Lets virtual time pass as long as the driver is there: one that is killed leaves the board
-    /// where it is then.
+    /// Lets virtual time pass as long as the driver is there. If the driver is killed, the board
+    /// stops at that time.
     fn pass(
         &mut self,
         time: Duration,
@@ -192,22 +191,22 @@ impl<'a> Host<'a> {
             if left.is_zero() {
                 return Ok(Passed::Time);
             }
-            if self.look(Some(Instant::now()))? == Presence::Gone {
+            if self.check_presence(Some(Instant::now()))? == Presence::Gone {
                 return Ok(Passed::Gone);
             }
         }
     }
 
-    /// Whether the driver is still there, when it has sent something or it is too late. Everybody
-    /// who calls meanwhile is turned away.
-    fn look(&mut self, until: Option<Instant>) -> io::Result<Presence> {
-        let sent = self.lobby.attend(Some(&self.connection), until)?;
-        self.lobby.turn_away(self.port.now());
-        if sent { self.connection.take_in() } else { Ok(Presence::There) }
+    /// Waits until the driver has sent bytes, or until the time `until`; returns whether it is
+    /// still there. Other drivers that send a request meanwhile get a refusal.
+    fn check_presence(&mut self, until: Option<Instant>) -> io::Result<Presence> {
+        let sent = self.pending.wait_for(Some(&self.connection), until)?;
+        self.pending.refuse_callers(self.port.now());
+        if sent { self.connection.read_available() } else { Ok(Presence::There) }
     }
 }
 
-/// What ended a stretch of virtual time.
+/// The reason why a stretch of virtual time ended.
 enum Passed {
     Time,
     Event(u32),

@@ -113,7 +113,7 @@ fn assert_refused(
     );
 }
 
-/// Four bodies, body 0 static; three good collisions, of which `change` spoils the last.
+/// Four bodies, body 0 static, and three good collisions; `change` spoils the last of them.
 fn spoilt(change: impl FnOnce(&mut Collision)) -> Step {
     let mut scene = Step::on_ground(3, 3);
     change(&mut scene.collisions[2]);
@@ -141,7 +141,7 @@ fn bad_records_are_refused_with_the_index_of_the_record() {
     assert_refused(&mut machine(), &scene, &scene.lanes(), ErrorCode::ShapeIndex, 0, 4);
 }
 
-/// Starts with arguments that no packets need follow.
+/// Starts with arguments that are refused before any packet.
 fn error_of(arguments: &[(Register, u32)]) -> (u32, u32, u32) {
     let machine = machine();
     Step::falling(4).write_arguments(&machine.host);
@@ -160,7 +160,7 @@ fn arguments_out_of_range_are_refused_at_the_start() {
     assert_eq!(error_of(&[(control::BODIES, 131_073)]), (argument, 0, 0x10));
     assert_eq!(error_of(&[(control::CONTACT_ITERATIONS, 256)]), (argument, 0, 0x20));
     assert_eq!(error_of(&[(control::FRICTION_ITERATIONS, u32::MAX)]), (argument, 0, 0x28));
-    // Together they are more than a register holds.
+    // Their sum is more than a register holds.
     let many = [control::COLLISIONS, control::CONTACT_ITERATIONS, control::FRICTION_ITERATIONS];
     assert_eq!(error_of(&many.map(|register| (register, u32::MAX))), (argument, 0, 0x20));
 }
@@ -260,7 +260,7 @@ fn padding_changes_nothing_wherever_it_stands() {
     let scene = one_cube();
     let mut machine = machine();
     let expected = machine.step(&scene).expect("the step completes");
-    // Indices that would be refused and a normal that would damp: nobody looks at them.
+    // Indices that would be refused and a normal that would damp, if they were read.
     let padding = Collision {
         bodies: [u32::MAX, 1],
         count: 0,
@@ -409,13 +409,13 @@ fn done_is_cleared_by_reading_and_interrupts_by_toggling() {
     assert_eq!(host.control(control::ISR), 0b010);
     host.set_control(control::ISR, 0b010);
     assert_eq!(host.control(control::ISR), 0);
-    // The bits toggle: a constant written blindly sets what was clear.
+    // The bits toggle: a constant written blindly sets bits that were clear.
     host.set_control(control::ISR, 0b100);
     assert_eq!(host.control(control::ISR), 0b100);
     host.set_control(control::ISR, 0b100);
     host.set_control(control::IER, 0b001);
     host.set_control(control::ISR, 0b111);
-    assert_eq!(host.control(control::ISR), 0b001, "only what is enabled can be set");
+    assert_eq!(host.control(control::ISR), 0b001, "only enabled bits can be set");
     host.set_control(control::ISR, 0b001);
     host.port.unmask_interrupt();
     assert_eq!(host.port.wait_interrupt(microseconds(5)), None);

@@ -23,7 +23,7 @@ fn transfer(host: &Host, core: usize, direction: Direction, address: u64, bytes:
     host.write(core, direction, LENGTH, u32::try_from(bytes).expect("at most 26 bits"));
 }
 
-/// Acknowledges IOC; returns whether it stood.
+/// Acknowledges IOC; returns whether it was set.
 fn completed(host: &Host, core: usize, direction: Direction) -> bool {
     let value = host.status(core, direction);
     assert_eq!(value & dmasr::ERRORS, 0, "dma{core} {direction}: {value:#x}");
@@ -41,8 +41,8 @@ fn run_all(host: &Host) {
     }
 }
 
-/// A step; the result buffers are `spare` beats longer than the packets. Returns the bodies and
-/// what LENGTH reads on each result channel.
+/// Runs a step; the result buffers are `spare` beats longer than the packets. Returns the bodies
+/// and the value of LENGTH on each result channel.
 fn step(host: &Host, step: &Step, spare: usize) -> (Vec<Body>, Vec<u32>) {
     step.write_arguments(host);
     let beats = step.bodies.len();

@@ -1,5 +1,5 @@
-//! Every fault that a board can be told to have, as a driver sees it at registers, descriptors and
-//! the interrupt line; and a board that is as before once it was reset.
+//! Every fault that can be injected, as a driver sees it at registers, descriptors and the
+//! interrupt line. After a reset the board works as before.
 
 use bitstream_model::{BoardConfig, Direction, Fault, FaultKind, FaultPlan, StepPhase, When};
 use pgs_interface::axi_dma::{DMACR, dmacr, dmasr};
@@ -23,12 +23,12 @@ fn plan(text: &str) -> FaultPlan {
     text.parse().unwrap_or_else(|error| panic!("{text}: {error}"))
 }
 
-/// What an undisturbed step gives.
+/// The bodies after a step without a fault.
 fn undisturbed() -> Vec<[[u32; 4]; 4]> {
     machine().step(&scene()).expect("no fault").bodies.iter().map(bits).collect()
 }
 
-/// Takes a step with a fault, which must happen; then resets and takes one as if it had not been.
+/// Runs a step with a fault, which must happen; after a reset the next step must be right.
 fn fails(text: &str) -> Failure {
     let mut machine = machine();
     machine.host.board.inject(plan(text));
@@ -41,7 +41,8 @@ fn fails(text: &str) -> Failure {
     failure
 }
 
-/// Takes a step with a fault, which must happen and change nothing; how much longer it took, clocks.
+/// Runs a step with a fault, which must happen and change no result; returns the clocks that it
+/// adds.
 fn survives(text: &str) -> i64 {
     let mut machines = [machine(), machine()];
     machines[1].host.board.inject(plan(text));
@@ -56,7 +57,7 @@ fn survives(text: &str) -> i64 {
 }
 
 #[test]
-fn each_error_bit_of_a_channel_is_set_where_it_was_asked_for() {
+fn each_error_bit_of_a_channel_is_set_where_it_is_planned() {
     for (name, bit) in [
         ("dma-int-err", dmasr::DMA_INT_ERR),
         ("dma-slv-err", dmasr::DMA_SLV_ERR),
@@ -89,7 +90,7 @@ fn a_channel_that_stalls_or_a_part_that_hangs_is_a_deadline() {
 }
 
 #[test]
-fn what_hangs_lets_time_pass_while_another_fault_is_due() {
+fn a_hanging_part_lets_time_pass_while_another_fault_is_due() {
     for text in ["no-done; dma-dec-err,step=9", "accelerator-hang; accelerator-error=3,step=9"] {
         let mut machine = machine();
         machine.host.board.inject(plan(text));
@@ -99,7 +100,7 @@ fn what_hangs_lets_time_pass_while_another_fault_is_due() {
 }
 
 #[test]
-fn packets_of_another_length_are_noticed_by_who_receives_them() {
+fn the_receiver_detects_packets_of_another_length() {
     let code = |failure| match failure {
         Failure::Accelerator(code, stream, _) => (code, stream),
         other => panic!("{other:?}"),
@@ -154,13 +155,13 @@ fn slow_ports_and_late_words_cost_time_and_change_nothing() {
 }
 
 #[test]
-fn an_interrupt_is_lost_or_late_and_the_descriptors_still_tell() {
+fn an_interrupt_is_lost_or_late_and_the_descriptors_still_complete() {
     for text in ["irq-drop", "irq-delay=300000"] {
         let mut machine = machine();
         machine.host.board.inject(plan(text));
         machine.step(&scene()).expect("the descriptors are complete");
         assert_eq!(machine.host.board.faults(), 1, "{text}");
-        // Whoever looks at the descriptors clears what would have raised the line.
+        // The host polls the descriptors, and clears the bits that would have raised the line.
         assert_eq!(machine.host.board.counts().interrupts, 0, "{text}");
         machine.step(&scene()).expect("no fault");
         assert_eq!(machine.host.board.counts().interrupts, 1, "{text}");
@@ -201,7 +202,7 @@ fn a_channel_halts_late_or_never_and_a_reset_ends_late_or_never() {
 }
 
 #[test]
-fn a_descriptor_can_tell_of_an_error_that_its_channel_does_not() {
+fn a_descriptor_can_have_an_error_bit_that_its_channel_lacks() {
     for (name, bit) in [("bd-int-err", 28), ("bd-slv-err", 29), ("bd-dec-err", 30)] {
         let mut machine = machine();
         machine.host.board.inject(plan(&format!("{name}@dma1.mm2s,phase=load")));
@@ -248,7 +249,7 @@ fn a_fault_of_a_part_that_does_not_exist_never_happens() {
 }
 
 #[test]
-fn a_fault_waits_for_its_step_and_comes_as_often_as_it_says() {
+fn a_fault_waits_for_its_step_and_happens_as_often_as_planned() {
     let mut machine = machine();
     machine.host.board.inject(plan("irq-spurious,step=3; stall@dma1.mm2s,step=2"));
     machine.step(&scene()).expect("the first step");
@@ -294,7 +295,7 @@ fn a_receiver_fails_in_each_step_that_is_taken_again() {
 }
 
 #[test]
-fn the_packets_of_a_step_are_told() {
+fn the_board_lists_the_packets_of_a_step() {
     let mut machine = machine();
     for _ in 0..2 {
         machine.step(&scene()).expect("no fault");

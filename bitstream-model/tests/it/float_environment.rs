@@ -1,4 +1,5 @@
-//! The board computes what it computes, however the threads round, flush or trap that drive it.
+//! The board's results do not depend on the floating-point environment of the threads that drive
+//! it: rounding, flushing, traps.
 #![allow(unsafe_code, reason = "Rust does not say what it computes in a foreign environment")]
 #![allow(clippy::print_stdout, reason = "what is skipped is said")]
 
@@ -11,7 +12,7 @@ use crate::common::replaying::{Visible, scene, visible};
 use crate::common::scene::{AT_REST, Body, Step};
 use crate::common::sg::Machine;
 
-/// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
+/// The thesis' sixteen bits on every stream, arithmetic in f32.
 const THESIS16: Numbers = Numbers {
     collisions: StreamFormat::Thesis16,
     bodies: StreamFormat::Thesis16,
@@ -30,8 +31,8 @@ fn boards() -> impl Iterator<Item = BoardConfig> {
     PROFILES.iter().flat_map(both).chain([thesis])
 }
 
-/// Numbers that have to be rounded, and every ninth body so slow that its velocity is subnormal: in f32
-/// such a body loses it in one that flushes.
+/// Numbers that have to be rounded, and every ninth body so slow that its velocity is subnormal: a
+/// flushing environment would lose it in f32.
 fn step() -> Step {
     let mut step = Step { damping: 0.99, gravity: [0.0, -9.8, 0.0], ..scene(300, 500, 11, true) };
     for body in step.bodies.iter_mut().skip(1).step_by(9).filter(|body| body.shape != 0) {
@@ -52,7 +53,7 @@ fn a_step_is_the_same_in_every_environment_on_every_number_of_threads() {
         let (told, lanes) = step().on(&config.variant());
         let bodies = told.bodies.len();
         let drive = |machine: &mut Machine| machine.drive(&told, &lanes).expect("it completes");
-        // The results are decoded outside.
+        // The results are decoded outside of the environment.
         let collect = |(machine, flight): &(Machine, _)| visible(&machine.collect(flight, bodies));
         let mut expected: Option<Visible> = None;
         for threads in [1, 2] {
@@ -69,12 +70,13 @@ fn a_step_is_the_same_in_every_environment_on_every_number_of_threads() {
             for (name, environment) in environments() {
                 let mut other = Machine::new(config);
                 let work = || {
-                    // Of a board that was built here, and of one that was built elsewhere.
+                    // One board is built in this environment, the other in the standard one.
                     let same = begun();
                     let flight = drive(&mut other);
                     (same, flight, Environment::current())
                 };
-                // SAFETY: what is done here, but for the board's part, moves words alone.
+                // SAFETY: outside of the board, `work` moves words and computes no floating-point
+                // number.
                 let (same, flight, left) = unsafe { under(environment, work) };
                 assert_eq!(left, environment, "{name}");
                 for found in [collect(&same), collect(&(other, flight))] {

@@ -1,4 +1,4 @@
-//! Number formats and inertia: what is on the streams, what is computed in, what is kept on chip.
+//! Number formats and inertia: on the streams, in the arithmetic, on chip.
 
 #![expect(clippy::float_cmp, reason = "the expected values are exact")]
 
@@ -45,7 +45,7 @@ fn run(config: BoardConfig, step: &Step) -> Outcome {
     outcome
 }
 
-/// What the bodies are, bit for bit; a NaN has no sign and no payload in binary16.
+/// The state of the bodies as bits; a NaN has no sign and no payload in binary16.
 fn states(bodies: &[Body]) -> Vec<[[u32; 4]; 4]> {
     let plain = |value: f32| if value.is_nan() { f32::NAN } else { value };
     bodies.iter().map(|body| bits(&mapped(body, plain))).collect()
@@ -62,7 +62,7 @@ fn mapped(body: &Body, f: impl Fn(f32) -> f32) -> Body {
     }
 }
 
-/// What is left of a number that goes over a stream.
+/// The value of a number after its way over a stream.
 fn carried(format: StreamFormat) -> impl Fn(f32) -> f32 {
     move |value| decode(format, encode(format, value))
 }
@@ -131,7 +131,7 @@ fn thesis16_has_no_zero_and_stops_at_both_ends() {
     // Cut off: 60,000 is a multiple of 32, 0.1 lies above 0.09997559.
     let expected = [-0.099_975_586, 60_000.0, -smallest];
     assert_eq!(found.linear.map(f32::to_bits), expected.map(f32::to_bits));
-    // Half a second of gravity is more than it carries.
+    // The velocity after half a second of gravity is more than the format carries.
     let fast = Step { gravity: [0.0, 20_000.0, 0.0], integrate: true, ..scene };
     let [_, y, _] = run(config(&HALF, THESIS16_STREAMS), &fast).bodies[0].linear;
     assert_eq!(encode(THESIS16, y) >> 10, 31, "{y} reads as overflow");
@@ -191,7 +191,7 @@ fn velocities_on_chip_are_rounded_when_they_are_loaded_and_written_back() {
         let found = run(config(&MIXED, numbers), &scene);
         assert_eq!(found.bodies[1].linear[1].to_bits(), (-expected).to_bits());
     }
-    // Half the impulse: what is left is not a binary16 number.
+    // Half the impulse: the remaining velocity is not a binary16 number.
     let scene = Step { friction: 0.0, ..stopped(1.0, 1.0) };
     let mut scene = Step { coefficient: 1.0, ..scene };
     scene.collisions[0].contacts = [[1.0, 0.0, 0.0, 0.1]; 4];
@@ -388,7 +388,7 @@ fn relative(step: &Step, format: StreamFormat) -> Step {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Between the streams everything is f32: the result is what `float` makes of the words.
+    /// Between the streams all numbers are f32: the result is that of `float` on the same words.
     #[test]
     fn what_goes_in_on_sixteen_bit_streams_is_what_is_solved(step in scene()) {
         for (numbers, format) in [(BINARY16_STREAMS, BINARY16), (THESIS16_STREAMS, THESIS16)] {

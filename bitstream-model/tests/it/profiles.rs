@@ -1,4 +1,4 @@
-//! Every profile end to end: stripes, padding, packets, cycles, hazards, and what its registers say.
+//! Every profile end to end: stripes, padding, packets, cycles, hazards, registers.
 
 #![expect(clippy::float_cmp, reason = "the expected values are exact")]
 
@@ -40,7 +40,7 @@ fn variants() -> Vec<Variant> {
     variants
 }
 
-/// Those whose passes run one after the other.
+/// The variants whose passes run one after the other.
 fn in_passes(variants: Vec<Variant>) -> impl Iterator<Item = Variant> {
     variants.into_iter().filter(|variant| variant.profile.flow == Flow::Passes)
 }
@@ -162,7 +162,7 @@ fn cycles_are_the_formula_and_stalls_and_waits_exactly() {
 
 /// The formula of the tests themselves, for the thesis' step, by hand.
 #[test]
-fn the_thesis_step_takes_so_many_cycles_on_each_profile() {
+fn the_thesis_step_takes_the_cycles_of_the_formula_on_each_profile() {
     let step = Step {
         bodies: vec![AT_REST; 38_880],
         collisions: vec![ground_contact(1, [0.0; 3]); 127_000],

@@ -1,5 +1,5 @@
-//! Whatever a program does to the registers and the descriptors: the board neither panics nor
-//! hangs, and a reset makes it work again.
+//! No program on the registers and the descriptors makes the board panic or hang, and a reset makes
+//! it work again.
 
 use bitstream_model::{
     Bandwidth, BoardConfig, Delays, Direction, EmulatedBoard, Hazards, Subnormals,
@@ -20,7 +20,7 @@ use crate::common::scene::{Step, bits};
 use crate::common::sg::{Flight, LONG, Machine};
 use crate::common::{BOTH, CORES, Host, microseconds, numbered};
 
-/// Descriptors and beats that a random program plays with.
+/// Descriptors and beats that a random program uses.
 const SLOTS: usize = 8;
 const BEATS: u32 = 64;
 
@@ -28,7 +28,7 @@ const BEATS: u32 = 64;
 enum Act {
     Read(u64),
     Write(u64, u32),
-    /// A register of a channel, with one of the values that mean something to it.
+    /// A register of a channel, with a value that has a meaning for it.
     Channel(usize, Direction, usize, u32),
     /// A descriptor: slot, offset in a buffer, CONTROL.
     Fill(usize, Direction, usize, u64, u32),
@@ -41,7 +41,7 @@ enum Act {
     Revive(usize),
     /// A packet as it should be, by descriptor or by LENGTH.
     Packet(usize, Direction, usize, u32),
-    /// Everything that a step needs but the waiting.
+    /// A whole step, but for the wait for its end.
     Step(u16, usize),
     Start(u32, u32, u32),
     Pause(u16),
@@ -107,7 +107,7 @@ fn act() -> impl Strategy<Value = Act> {
     ]
 }
 
-/// Every profile as it is, and with what else there is to choose.
+/// Every profile with its default options, with world inertia, and one with thesis16.
 fn variants() -> Vec<Variant> {
     let own = |inertia| {
         move |profile: &&'static Profile| Variant { inertia, ..profile.default_variant() }
@@ -182,7 +182,7 @@ impl Playground {
         Self { rings, buffers: all().map(|(_, way)| buffer(way)).collect() }
     }
 
-    /// The place of a channel in both lists.
+    /// The index of a channel in both lists.
     fn of(core: usize, direction: Direction) -> usize {
         2 * core + usize::from(direction == Direction::S2mm)
     }
@@ -355,7 +355,7 @@ proptest! {
         machine.arm(&mut flight, &vec![5 * (usize::from(bodies) + 1); lanes.len()]);
         machine.start();
         machine.send(&mut flight, &lanes);
-        // It completes, or the sticky error says why not: never a deadline, never a DMA error.
+        // It completes or ends in a sticky error: never in a deadline, never in a DMA error.
         let result = machine.wait(&flight, LONG);
         prop_assert!(
             matches!(result, Ok(()) | Err(common::sg::Failure::Accelerator(..))),
@@ -379,7 +379,7 @@ proptest! {
             bandwidth: Bandwidth::BytesPerSecond(rate),
             ..BoardConfig::default()
         };
-        // One at a time may be wild; else nearly nothing is built.
+        // At most one option is out of range: otherwise hardly any board could be built.
         let wild = |k: u32| pick % 8 == k;
         if !wild(0) { config.length_width = 26; }
         if !wild(1) { config.address_width = 40; }
@@ -403,7 +403,7 @@ proptest! {
     }
 }
 
-/// The programs above are worth something only if they get as far as this.
+/// The programs above test little unless they reach these states.
 #[test]
 fn random_programs_reach_engines_interrupts_and_results() {
     let mut runner = TestRunner::deterministic();

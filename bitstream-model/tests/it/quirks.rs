@@ -1,4 +1,4 @@
-//! A board that is built wrongly misbehaves in the way that was asked for, and in no other.
+//! A board with a quirk misbehaves in the way of its quirk, and in no other.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ fn built_with(quirks: Quirks) -> Host {
 }
 
 #[test]
-fn identification_and_version_read_what_was_asked_for() {
+fn identification_and_version_read_the_configured_values() {
     let host = built_with(Quirks {
         identification: 0x1234_5678,
         version: 0x0002_0003,

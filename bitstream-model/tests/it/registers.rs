@@ -97,7 +97,7 @@ fn with_all_interrupts() -> (Host, Ring) {
     ring.run(&host, dmacr::IRQ_DELAY.put(0, 1));
     ring.doorbell(&host, slot);
     host.pause(20);
-    // Nothing answers at this data address.
+    // No memory answers at this data address.
     let slot = ring.push(0x7_0000_0000, WHOLE | 64);
     ring.doorbell(&host, slot);
     host.pause(20);
@@ -224,7 +224,7 @@ fn a_doorbell_while_halted_is_latched_and_starts_nothing() {
 }
 
 #[test]
-fn all_ones_in_length_while_halted_tells_its_width() {
+fn all_ones_in_length_while_halted_read_back_as_its_width() {
     for scatter_gather in [true, false] {
         for width in [8, 14, 16, 23, 26] {
             let host = Host::new(BoardConfig {
@@ -259,7 +259,7 @@ fn a_length_while_halted_starts_nothing() {
 }
 
 #[test]
-fn a_length_wider_than_the_register_is_cut_and_moves_what_is_left() {
+fn a_length_wider_than_the_register_is_cut_and_moves_the_cut_length() {
     let config = BoardConfig { scatter_gather: false, length_width: 14, ..BoardConfig::default() };
     let host = Host::lenient(config);
     let direction = Direction::Mm2s;

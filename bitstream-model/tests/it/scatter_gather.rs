@@ -1,4 +1,4 @@
-//! Scatter-gather: steps on rings, and everything that can be wrong with a descriptor.
+//! Scatter-gather: steps on rings, and every mistake in a descriptor.
 
 use bitstream_model::{BoardConfig, Denied, DeviceAccess, Direction, ViolationKind};
 use pgs_interface::axi_dma::{CURDESC, CURDESC_MSB, DMACR, DMASR, dmacr, dmasr};
@@ -59,7 +59,7 @@ fn a_step_is_the_same_at_every_address_width_and_length_width() {
     }
 }
 
-/// One MM2S channel whose packets nobody reads: the FIFO takes 512 beats.
+/// One MM2S channel whose packets are not read: the FIFO takes 512 beats.
 fn one_channel(control: u32) -> (Host, Ring) {
     let host = Host::lenient(BoardConfig::default());
     let ring = Ring::new(&host, 0, Direction::Mm2s, 4);
@@ -67,7 +67,7 @@ fn one_channel(control: u32) -> (Host, Ring) {
     (host, ring)
 }
 
-/// The channel stopped with that error, which CURDESC points at, and only that.
+/// Checks that the channel stopped with `error` alone, and that CURDESC points at the descriptor.
 fn assert_failed(host: &Host, ring: &Ring, slot: usize, error: u32) {
     host.pause(20);
     let (core, direction) = (ring.core, ring.direction);
@@ -126,7 +126,7 @@ fn a_descriptor_of_length_0_is_dma_int_err() {
 }
 
 #[test]
-fn a_length_above_the_width_is_cut_and_told() {
+fn a_length_above_the_width_is_cut_and_a_violation() {
     let config = BoardConfig { length_width: 8, ..BoardConfig::default() };
     let host = Host::lenient(config);
     let mut ring = Ring::new(&host, 0, Direction::Mm2s, 4);
@@ -201,9 +201,9 @@ fn a_descriptor_in_a_data_buffer_is_sg_dec_err() {
 }
 
 #[test]
-fn a_ring_released_under_the_engine_is_sg_dec_err_and_told() {
+fn a_ring_released_under_the_engine_is_sg_dec_err_and_a_violation() {
     let (host, ring) = one_channel(0);
-    // Longer than the FIFO: the engine is still at it when its descriptor goes away.
+    // Longer than the FIFO: the engine is still at work when its descriptor is released.
     ring.fill(0, host.readable(&numbered(600)), WHOLE | (600 * 16));
     ring.doorbell(&host, 0);
     host.pause(20);
@@ -222,7 +222,7 @@ fn a_ring_released_under_the_engine_is_sg_dec_err_and_told() {
     );
 }
 
-/// What a channel says to a buffer that it may not touch.
+/// Checks the error and the violation of a channel at a buffer that it may not touch.
 fn assert_denied(
     direction: Direction,
     prepare: impl Fn(&Host) -> (u64, u32),
@@ -237,7 +237,7 @@ fn assert_denied(
             machine.mm2s[2].doorbell(&machine.host, slot);
         }
         Direction::S2mm => {
-            // All other streams have what they need.
+            // All other streams have their beats.
             let step = Step::falling(4);
             step.write_arguments(&machine.host);
             let mut flight = Flight::default();
@@ -253,7 +253,7 @@ fn assert_denied(
         Direction::S2mm => &machine.s2mm[2],
     };
     assert_failed(&machine.host, ring, 0, dmasr::DMA_DEC_ERR.mask());
-    assert!(status::DMA_DEC_ERR.is_set(ring.status(0)), "the descriptor tells, too");
+    assert!(status::DMA_DEC_ERR.is_set(ring.status(0)), "the descriptor has the error, too");
     assert!(!status::CMPLTED.is_set(ring.status(0)));
     match machine.host.violations()[..] {
         [ViolationKind::OutsideGrant { core: 2, direction: found, address, denied, .. }] => {
@@ -301,7 +301,7 @@ fn one_beat_past_the_end_of_a_buffer_is_denied() {
 }
 
 #[test]
-fn room_for_a_packet_past_the_end_of_a_buffer_is_told_even_if_the_packet_ends_before() {
+fn room_for_a_packet_past_the_end_of_a_buffer_is_a_violation_even_if_the_packet_ends_before() {
     let mut machine = Machine::new(BoardConfig { strict: false, ..BoardConfig::default() });
     let buffer = machine.host.writable(4);
     let step = Step::falling(4);
@@ -436,10 +436,10 @@ fn a_cyclic_ring_runs_round_whatever_cmplted_says() {
         ring.fill(slot, data, WHOLE | 64);
         ring.set(slot, STATUS, status::CMPLTED.mask());
     }
-    // No descriptor of the chain.
+    // This address is not in the chain.
     ring.doorbell_at(&host, 0x50);
     host.pause(20);
-    // Nobody reads the stream: the FIFO's 512 beats stop it, not the ring's 16.
+    // The stream is not read: the FIFO's 512 beats stop the engine, not the ring's 16.
     assert_eq!(host.board.counts().beats_read, 512);
     let value = host.status(0, Direction::Mm2s);
     assert_eq!(value & (dmasr::ERRORS | dmasr::IDLE.mask() | dmasr::HALTED.mask()), 0);
@@ -493,7 +493,7 @@ fn idle_says_that_the_tail_is_reached_and_a_new_tail_resumes() {
     host.assert_no_violation();
 }
 
-/// A step of three bodies (three result beats a stream) into result buffers of those beats.
+/// Runs a step of three bodies, three result beats a stream, into buffers of `buffers` beats.
 fn results_into(buffers: &[u32]) -> (Machine, Vec<usize>) {
     let mut machine = Machine::new(BoardConfig { strict: false, ..BoardConfig::default() });
     let step = Step::falling(3);
@@ -540,7 +540,7 @@ fn a_packet_longer_than_its_buffers_is_dma_int_err_and_halts() {
         assert_eq!(value & dmasr::ERRORS, dmasr::DMA_INT_ERR.mask(), "{value:#x}");
         assert!(dmasr::HALTED.is_set(value), "{value:#x}");
         assert!(!status::RXEOF.is_set(ring.status(slots[1])));
-        // Acknowledged, it does not come again by itself.
+        // An acknowledged interrupt does not come again by itself.
         machine.host.write(ring.core, ring.direction, DMASR, dmasr::IRQS);
         machine.host.pause(5);
         let value = machine.host.status(ring.core, ring.direction);

@@ -1,5 +1,5 @@
-//! The design that streams the collisions once: the same bits as one pass after the other, and the cycles
-//! that its rules give.
+//! The design that streams the collisions once: the same bits as one pass after the other, and the
+//! cycles of its rules.
 
 use bitstream_model::{Bandwidth, BoardConfig, Delays, EmulatedBoard, Hazards, Subnormals};
 use pgs_interface::control::{self, ErrorCode};
@@ -24,7 +24,7 @@ fn config(profile: &'static Profile) -> BoardConfig {
     BoardConfig { profile, bandwidth: Bandwidth::Unlimited, ..BoardConfig::default() }
 }
 
-/// A board whose streams hold a whole step, so that everything is there from the start.
+/// A board whose streams hold a whole step, so that all records are there from the start.
 fn deep(profile: &'static Profile) -> BoardConfig {
     let delays = Delays { fifo_beats: 1 << 14, ..Delays::default() };
     BoardConfig { delays, ..config(profile) }
@@ -42,7 +42,7 @@ fn design(profile: &Profile) -> Window {
     }
 }
 
-/// Places for everything, and room for the longest span.
+/// Places for all bodies, and room for the longest span.
 fn roomy(step: &Step, [contact_units, friction_units]: [u32; 2]) -> Window {
     let lag = u32::try_from(step.longest_span() + 1).expect("small");
     Window { contact_units, friction_units, slots: 8192, lag }
@@ -83,8 +83,8 @@ impl Random {
     }
 }
 
-/// A crowd: every collision is of bodies that are near to each other in number, or of a static one;
-/// here and there a bubble, and bodies that nothing touches.
+/// A crowd: the bodies of every collision have nearby indices, and at least one of them moves. Some
+/// collisions are bubbles, and some bodies are in no collision.
 fn crowd(seed: u64, bodies: usize, collisions: usize, reach: usize) -> Step {
     let mut random = Random(seed);
     let mut all: Vec<Body> = (0..bodies)
@@ -134,7 +134,7 @@ fn crowds() -> impl Strategy<Value = Step> {
         |(seed, bodies, collisions, reach, iterations)| {
             let bodies = bodies.max(reach);
             let mut step = Step { iterations, ..crowd(seed, bodies, collisions, reach) };
-            // One that moves, at least.
+            // At least one body moves.
             step.bodies[0].shape = MOVING;
             step
         },
@@ -213,7 +213,7 @@ proptest! {
     }
 }
 
-/// What the rules say about a step on a board on which nothing ever lacks.
+/// The counters of a step by the rules, on a board whose streams never lack a record.
 fn clock(config: &BoardConfig, step: &Step) -> Option<Counted> {
     let variant = config.variant();
     let profile = variant.profile;
@@ -267,7 +267,7 @@ fn trickle(config: BoardConfig, step: &Step, random: &mut Random) -> Result<Outc
     let mut machine = Machine::with_slots(config, 2048);
     let variant = machine.host.variant();
     let packed = step.packed_once(&variant);
-    let told = step.told(&packed.leave);
+    let told = step.moving_in_order(&packed.leave);
     told.write_arguments(&machine.host);
     let mut flight = Flight::default();
     let beats = result_beats(&variant, told.bodies.len());
@@ -340,7 +340,7 @@ fn a_span_as_long_as_the_delay_lines_and_one_place_too_few_end_in_the_error_for_
         assert_eq!(code, ErrorCode::Deadlock as u32);
         assert!((detail as usize) < step.collisions.len());
 
-        // The same places, whoever is in them, with one fewer.
+        // With the fewest places the step still ends.
         let fewest = step.fewest_slots();
         assert!(fewest > 3, "some bodies are alive at once");
         let tight = Window { slots: fewest, ..sound };
@@ -365,15 +365,15 @@ fn chain() -> (Step, Vec<[u32; 2]>) {
     (step, words)
 }
 
-/// What comes of those index words instead.
+/// The outcome of a step with the index words `words`.
 fn with_words(step: &Step, words: &[[u32; 2]]) -> Result<Outcome, Failure> {
     let mut machine = Machine::new(config(&WINDOWED));
     let lanes = step.lanes_of(&machine.host.variant(), words, &[1, 2, 3], &[1, 2, 3]);
-    machine.step_with(&step.told(&[1, 2, 3]), &lanes)
+    machine.step_with(&step.moving_in_order(&[1, 2, 3]), &lanes)
 }
 
 #[test]
-fn marks_that_mean_nothing_are_refused_with_the_collision() {
+fn invalid_marks_are_refused_with_the_collision() {
     let (step, sound) = chain();
     with_words(&step, &sound).expect("it is sound");
     assert_eq!(step.marked(8192).expect("there are places").words, sound);
@@ -412,7 +412,7 @@ fn more_first_uses_than_bodies_are_refused() {
     let (step, words) = chain();
     let mut machine = Machine::new(config(&WINDOWED));
     let lanes = step.lanes_of(&machine.host.variant(), &words, &[1, 2], &[1, 2]);
-    let failure = machine.step_with(&step.told(&[1, 2]), &lanes).expect_err("refused");
+    let failure = machine.step_with(&step.moving_in_order(&[1, 2]), &lanes).expect_err("refused");
     assert_eq!(failure, Failure::Accelerator(ErrorCode::BodyIndex as u32, 0, 2));
 }
 
@@ -440,7 +440,7 @@ fn a_packet_that_goes_on_is_refused_on_every_stream() {
     for (profile, _) in PAIRS {
         let step = crowd(5, 20, 31, 6);
         let packed = step.packed_once(&config(profile).variant());
-        let told = step.told(&packed.leave);
+        let told = step.moving_in_order(&packed.leave);
         for channel in 0..packed.lanes.len() {
             for segment in packed.lanes[channel].packets.clone() {
                 // One beat more.
@@ -467,13 +467,13 @@ fn a_packet_that_ends_before_the_last_record_is_refused_on_every_stream() {
     for (profile, _) in PAIRS {
         let step = crowd(5, 20, 31, 6);
         let packed = step.packed_once(&config(profile).variant());
-        let told = step.told(&packed.leave);
+        let told = step.moving_in_order(&packed.leave);
         for (channel, lane) in packed.lanes.iter().enumerate() {
             for segment in lane.packets.clone() {
                 let mut lanes = packed.lanes.clone();
                 let beats = &lane.segments[segment];
                 let (head, tail) = beats.split_at(beats.len() / 2);
-                // In two packets, the second of which stands where nothing else does.
+                // Two packets; the second takes the place of an empty segment.
                 let other = lanes[channel].segments.iter().position(Vec::is_empty).expect("one");
                 lanes[channel].segments[segment] = head.to_vec();
                 lanes[channel].segments[other] = tail.to_vec();
@@ -490,7 +490,7 @@ fn a_packet_that_ends_before_the_last_record_is_refused_on_every_stream() {
 }
 
 #[test]
-fn the_registers_say_what_the_design_is_made_of() {
+fn the_registers_report_the_parts_of_the_design() {
     for (profile, numbers) in [(&WINDOWED, 0), (&WINDOWED16, 0x11_1111)] {
         let machine = Machine::new(config(profile));
         let host = &machine.host;
@@ -545,7 +545,7 @@ fn designs_that_contradict_themselves_are_refused_with_what_is_expected() {
     assert!(refusal(unchecked).contains("expected `interlocked`"));
 }
 
-/// One mass on the ground, in as many collisions one after the other.
+/// One mass on the ground, in three collisions one after the other.
 #[test]
 fn a_body_that_is_used_twice_waits_a_window() {
     let step = Step { iterations: [1, 0], ..Step::on_ground(1, 3) };
@@ -561,8 +561,8 @@ fn a_body_that_is_used_twice_waits_a_window() {
 
 #[test]
 fn masses_of_their_own_flow_through_without_a_stall() {
-    // Every pass has its unit for itself, an entry every two cycles: the third begins when the first
-    // has ended. Each is a window behind the one before.
+    // Every pass has a unit for itself, an entry every two cycles: the third pass begins when the
+    // first has ended. Each pass is a window behind the previous one.
     let step = Step::on_ground(100, 100);
     let found = at_once(config(&WINDOWED), &step);
     assert_eq!((found.hazards, found.stalls, found.waits), (0, 0, 0));

@@ -1,4 +1,4 @@
-//! This file is a register region with a mistake in front of it.
+//! A register region with a planted mistake in front of it.
 
 use bitstream_model::Direction;
 use pgs_interface::axi_dma::{
@@ -10,12 +10,12 @@ use super::kinds::{ChannelId, Event, Mistake, Trouble};
 use super::planted::{CONTROL_BLOCK, Planted, State};
 use crate::platform::RegisterWindow;
 
-/// What [`Mistake::LengthWidthAssumed`] takes for granted, bits.
+/// The length width that [`Mistake::LengthWidthAssumed`] assumes, bits.
 const ASSUMED_WIDTH: u32 = 26;
 
-/// A register region behind mistakes.
+/// A register region behind planted mistakes.
 #[derive(Debug)]
-pub(crate) struct Door {
+pub(crate) struct PlantedRegion {
     planted: Planted,
     inner: Box<dyn RegisterWindow>,
     region: usize,
@@ -28,7 +28,7 @@ fn channel(region: usize, at: u32) -> (ChannelId, (usize, bool), u32) {
     ((region, direction), (region, receives), offset)
 }
 
-impl Door {
+impl PlantedRegion {
     pub(crate) fn new(planted: &Planted, inner: Box<dyn RegisterWindow>, region: usize) -> Self {
         Self { planted: planted.clone(), inner, region }
     }
@@ -82,7 +82,7 @@ impl Door {
         value
     }
 
-    /// The writes that take the place of one to a DMA core.
+    /// Makes the writes that replace one write to a DMA core.
     fn write_dma(&self, state: &mut State, at: u32, mut value: u32) {
         let region = self.region;
         let (channel, key, offset) = channel(region, at);
@@ -154,7 +154,7 @@ impl Door {
     }
 }
 
-impl RegisterWindow for Door {
+impl RegisterWindow for PlantedRegion {
     fn bytes(&self) -> u64 {
         self.inner.bytes()
     }
