@@ -245,7 +245,7 @@ impl Unpacker {
         let active = ..self.variant.profile.s2mm_widths.len();
         let results = Results { layout: &layout, channels: &channels[active] };
         let Self { statics, spare, packers, .. } = self;
-        let (sum, broken) = results.in_turn(bodies.len(), bodies, statics, spare, packers);
+        let (sum, broken) = results.read_in_order(bodies.len(), bodies, statics, spare, packers);
         broken.is_none().then_some(sum)
     }
 

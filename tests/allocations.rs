@@ -1,17 +1,20 @@
-//! A step allocates nothing once a step of the same size has run.
+//! Tests that a step allocates nothing once a step of the same size has run.
 //!
-//! The emulated board is asked for nothing on the heap either: what is counted is everything that
-//! happens during the call.
+//! The emulated board allocates nothing either: the count covers everything that happens during the
+//! call.
 #![cfg(feature = "emulation")]
 #![allow(unsafe_code, reason = "an allocator that counts is an unsafe trait")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[path = "common/counting_allocator.rs"]
+mod counting_allocator;
+
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, ThreadId};
 
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, EmulatedBoard, Hazards};
+use counting_allocator::CountingAllocator;
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Body, Collision, Collisions, Contact, OpenOptions, Pose, Shape,
@@ -24,11 +27,8 @@ thread_local! {
     static WATCHED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls of all threads that have read a [`Watching`] container, from then on.
+/// Number of allocator calls of all threads that have read a [`Watching`] container, from then on.
 static OF_WATCHED: AtomicU64 = AtomicU64::new(0);
-
-/// The system's allocator, counting the calls of each thread.
-struct Counting;
 
 fn count() {
     // A thread that is ending has no counter any more.
@@ -38,29 +38,8 @@ fn count() {
     }
 }
 
-// SAFETY: every call goes to the system's allocator with the arguments as they came; counting
-// itself does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises about `layout` are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
-        unsafe { System.realloc(pointer, layout, bytes) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: CountingAllocator = CountingAllocator(count);
 
 /// A row of cubes on the ground, each also in contact with the next.
 fn scene() -> (Vec<Body>, Vec<Collision>) {
@@ -98,7 +77,7 @@ fn open_for(config: BoardConfig, pack_threads: Option<usize>) -> Accelerator {
     accelerator
 }
 
-/// Ten steps; the allocations of each.
+/// Runs ten steps. Returns the allocations of each.
 fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
     let mut accelerator = open(config);
     let (mut bodies, collisions) = scene();
@@ -106,7 +85,7 @@ fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
     parameters.order = order;
     let mut counted = Vec::with_capacity(10);
     for step in 0..10 {
-        // The number of collisions changes, as it does in a scene that moves.
+        // The number of collisions changes, as it does in a moving scene.
         let of_step = &collisions[step % 3..];
         let before = COUNTED.get();
         accelerator.step(&mut bodies, of_step, &parameters).expect("nothing disturbs it");
@@ -115,7 +94,8 @@ fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
     counted
 }
 
-/// Ten steps, each prepared while the one before it is on the board; the allocations of each.
+/// Runs ten steps, each prepared while the one before it is on the board. Returns the allocations
+/// of each.
 fn allocations_prepared(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
     let mut accelerator = open(config);
     let (mut bodies, collisions) = scene();
@@ -136,7 +116,8 @@ fn allocations_prepared(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
     counted
 }
 
-/// Ten steps whose collisions are written one after the other; the allocations of each.
+/// Runs ten steps whose collisions are written one after the other. Returns the allocations of
+/// each.
 fn allocations_written(config: BoardConfig) -> Vec<u64> {
     let mut accelerator = open(config);
     let (mut bodies, collisions) = scene();
@@ -166,8 +147,8 @@ fn steps_two_to_ten_allocate_nothing() {
     assert_eq!(counted[1..], [0; 9], "{counted:?}");
 }
 
-/// How many entries stay empty depends on which collisions there are: each of the three sizes comes
-/// once before nothing may be allocated.
+/// The number of empty entries depends on the collisions: each of the three sizes comes once before
+/// the test forbids allocations.
 #[test]
 fn an_order_allocates_nothing_once_it_has_seen_a_step_of_that_size() {
     let unchecked = BoardConfig { hazards: Hazards::Unchecked, ..BoardConfig::default() };
@@ -209,7 +190,7 @@ fn written_steps_allocate_nothing() {
     }
 }
 
-/// The board has no part in preparing: what is counted is the driver's.
+/// The board has no part in preparing: the count is the driver's.
 #[test]
 fn preparing_allocates_nothing_on_a_design_that_keeps_live_bodies_alone() {
     let mut accelerator = open(profile("windowed"));
@@ -231,13 +212,13 @@ fn preparing_allocates_nothing_on_a_design_that_keeps_live_bodies_alone() {
     assert_eq!(counted[6..], [0; 4], "{counted:?}");
 }
 
-/// Collisions over and over, which mark the threads that read them; how many these are.
+/// A repeated list of collisions that marks and counts the threads that read it.
 struct Watching<'a> {
     list: &'a [Collision],
     count: usize,
     readers: &'a AtomicU64,
     caller: ThreadId,
-    /// Whether another one than the caller's read any.
+    /// Whether a thread other than the caller's read a collision.
     helped: &'a AtomicBool,
 }
 
@@ -257,12 +238,12 @@ impl Collisions for Watching<'_> {
     }
 }
 
-/// Neither on the caller's thread nor on those that help it with writing records.
+/// The count covers the caller's thread and the threads that help it to write records.
 #[test]
 fn steps_that_several_threads_pack_allocate_nothing_on_any_of_them() {
-    // Which thread comes in time is the system's to say: bounded, as it would never say it of one that
-    // does not exist.
-    const PATIENCE: usize = 10_000;
+    // The system decides which thread comes in time. The number of attempts is bounded for the case
+    // that there is no second thread.
+    const ATTEMPTS_MAX: usize = 10_000;
     let mut accelerator = open_for(BoardConfig::default(), Some(2));
     let (mut bodies, list) = scene();
     let (readers, helped) = (AtomicU64::new(0), AtomicBool::new(false));
@@ -273,16 +254,16 @@ fn steps_that_several_threads_pack_allocate_nothing_on_any_of_them() {
         accelerator.step(&mut bodies, &of_step, &parameters).expect("nothing disturbs it");
         OF_WATCHED.load(Ordering::Relaxed) - before
     };
-    let steps = (0..PATIENCE).find(|_| {
+    let steps = (0..ATTEMPTS_MAX).find(|_| {
         step(9000);
         readers.load(Ordering::Relaxed) == 2
     });
-    assert!(steps.is_some(), "nobody helps");
-    // Those in which somebody helped.
-    let sizes = [9000, 8000, 9000, 7000, 6500].into_iter().cycle().take(PATIENCE);
+    assert!(steps.is_some(), "no second thread packs");
+    // The steps in which another thread helped.
+    let sizes = [9000, 8000, 9000, 7000, 6500].into_iter().cycle().take(ATTEMPTS_MAX);
     let counted = sizes.map(|count| (step(count), helped.swap(false, Ordering::Relaxed)));
     let counted: Vec<u64> = counted.filter(|(_, helped)| *helped).map(|it| it.0).take(6).collect();
     assert_eq!(counted, [0; 6]);
-    // Or it would hold of nothing.
+    // The counter works: larger buffers are allocated.
     assert!(step(90_000) > 0, "larger buffers are made: does the allocator count?");
 }

@@ -1,5 +1,6 @@
-//! The device trees say what the interface says: regions, sizes, names, interrupt, clock, ports; buffers
-//! lie where every DMA core reaches them; the udev rule names every node and gives nobody else rights.
+//! Tests that the device trees agree with the interface: regions, sizes, names, interrupt, clock,
+//! ports. Buffers lie where every DMA core reaches them. The udev rule names every node and gives
+//! rights to its group alone.
 
 #[path = "device_tree/mod.rs"]
 mod device_tree;
@@ -15,7 +16,7 @@ use zynq_pgs::interface::profile::{FLOAT, PROFILES, Profile};
 const SPI: u32 = 0;
 const LEVEL_HIGH: u32 = 4;
 
-/// Every region of the interface: its map's name, address, length.
+/// Every region of the interface: the name of its map, address, length.
 fn interface() -> Vec<(&'static str, u64, u64)> {
     let dma = address_map::UIO_DMA_MAPS
         .iter()
@@ -25,7 +26,7 @@ fn interface() -> Vec<(&'static str, u64, u64)> {
     dma.chain([(address_map::UIO_CONTROL_MAP, address_map::CONTROL_BASE, bytes)]).collect()
 }
 
-/// Compares one property, and says which differs.
+/// Compares one property, and names it if it differs.
 fn equal<T: PartialEq + std::fmt::Debug>(
     node: &str,
     what: &str,
@@ -38,7 +39,7 @@ fn equal<T: PartialEq + std::fmt::Debug>(
     Err(format!("{node}: {what} is {found:?}, the interface says {expected:?}"))
 }
 
-/// Holds a node against the interface: its UIO name, its regions, and whether it has the interrupt.
+/// Compares a node with the interface: its UIO name, its regions, and whether it has the interrupt.
 fn check_node(
     tree: &Tree,
     node: &str,
@@ -67,16 +68,17 @@ fn check_node(
 
 /// Number of the PL clock 0 in the bindings of the chip's clock controller, `PL0_REF`.
 const PL0_REF: u32 = 71;
-/// Registers of the memory ports' widths, and what is 128 bits in them.
+/// Registers of the memory ports' widths, and the value for 128 bits.
 const PORT_REGISTERS: std::ops::Range<u32> = 0..14;
 const PORT_128: u32 = 0;
-/// The register of the widths of `M_AXI_HPM0_FPD` and `M_AXI_HPM1_FPD`, and both of 128 bits.
+/// The register of the widths of `M_AXI_HPM0_FPD` and `M_AXI_HPM1_FPD`, and the value for 128 bits
+/// on both.
 const FPD_REGISTER: u32 = 14;
 const FPD_128: u32 = 2 << 8 | 2 << 10;
-/// The profile of which the overlays are.
+/// The profile of the overlays.
 const PROFILE: &Profile = &FLOAT;
 
-/// Holds the clock and the ports of an overlay against the profile.
+/// Compares the clock and the ports of an overlay with the profile.
 fn check_fabric(tree: &Tree, parent: &str) -> Result<(), String> {
     let node = format!("{parent}/pgs-clock");
     let compatible = |node: &str| tree.strings(node, "compatible").unwrap_or_default().concat();
@@ -216,17 +218,17 @@ fn every_difference_from_the_interface_is_noticed() {
     }
 }
 
-/// Whether a node is to be used: without a status it is.
+/// Whether a node is enabled: a node without a status is.
 fn enabled(tree: &Tree, node: &str) -> bool {
     tree.strings(node, "status").is_none_or(|status| status == ["okay"])
 }
 
-/// The node of that label.
+/// The node with this label.
 fn labelled(tree: &Tree, label: &str) -> String {
     tree.strings("/__symbols__", label).expect("a label").concat()
 }
 
-/// The one region of a node, which every DMA core reaches and which lies in memory.
+/// The one region of a node. It lies in memory, and every DMA core reaches it.
 fn low_region(tree: &Tree, node: &str) -> (u64, u64) {
     let regions = tree.regions(node).expect("a region");
     let [(start, bytes)] = regions[..] else { panic!("{node}: {regions:x?}") };
@@ -300,7 +302,7 @@ fn names(pattern: &str) -> BTreeSet<String> {
     names
 }
 
-/// What a rule compares or assigns for a key.
+/// The value that a rule compares or assigns for a key.
 fn rule_value<'a>(rule: &'a str, key: &str) -> Option<&'a str> {
     let term = rule.split(", ").find(|term| term.starts_with(key))?;
     Some(term[key.len()..].trim_matches('"'))
@@ -348,7 +350,7 @@ fn the_readme_says_of_every_file_what_it_is_for() {
     if !tools_found() {
         return;
     }
-    // No node beside those that the README and the rule know.
+    // The file has no node that the README and the rule do not know.
     let tree = Tree::with_overlay("zynq-pgs-nodes.dtso", as_shipped);
     let ours = tree.children("/").into_iter().filter(|name| name.starts_with("pgs")).count();
     let fabric = ["`pgs-clock`", "`pgs-ports`"];

@@ -1,4 +1,4 @@
-//! This file holds the few conversions between integer widths, each with what makes it lossless.
+//! Conversions between integer widths, each with the reason why it loses nothing.
 
 const _: () = assert!(usize::BITS == 64, "buffers and counts are 64 bits wide here");
 

@@ -1,7 +1,7 @@
-//! The two handles of a board: what a driver may touch, and what its builder may see.
+//! The two handles of a board: [`CpuPort`] for its driver, [`EmulatedBoard`] for its builder.
 //!
-//! Every call of either goes through [`enter`]: a board computes in the standard floating-point environment,
-//! whatever the caller's is.
+//! Every call of either goes through [`with_board`]: a board computes in the standard
+//! floating-point environment, independently of the caller's.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicU32;
@@ -20,9 +20,9 @@ use crate::shortcut;
 use crate::violation::{RegisterAccess, Violation};
 use pgs_interface::record::Beat;
 
-/// Does something with a board: the one door to it.
-fn enter<R>(board: &Mutex<Board>, act: impl FnOnce(&mut Board) -> R) -> R {
-    // A panic elsewhere leaves numbers, never a broken structure.
+/// Locks a board and runs `act` on it in the standard floating-point environment.
+fn with_board<R>(board: &Mutex<Board>, act: impl FnOnce(&mut Board) -> R) -> R {
+    // A panic in another thread leaves wrong numbers at worst, never a broken structure.
     standard(|| act(&mut board.lock().unwrap_or_else(PoisonError::into_inner)))
 }
 
@@ -40,8 +40,8 @@ impl EmulatedBoard {
         Ok(Self::of(config, Memory::new(config.address_width, config.quirks.coherency)))
     }
 
-    /// Builds a board on memory that somebody else keeps, of which the device may touch the
-    /// granted ranges. Such a board allocates no memory itself.
+    /// Builds a board on external memory. The device may touch the granted ranges only. Such a
+    /// board allocates no memory itself.
     ///
     /// # Errors
     /// [`ConfigError`] if a number is outside its range.
@@ -51,14 +51,14 @@ impl EmulatedBoard {
         granted: Vec<Range<u64>>,
     ) -> Result<Self, ConfigError> {
         config.check()?;
-        Ok(Self::of(config, Memory::outside(memory, granted)))
+        Ok(Self::of(config, Memory::external(memory, granted)))
     }
 
     fn of(config: BoardConfig, memory: Memory) -> Self {
         Self(Arc::new(Mutex::new(standard(|| Board::new(config, memory, shortcut::of(&config))))))
     }
 
-    /// What a driver of this board may touch.
+    /// The handle for a driver of this board.
     #[must_use]
     pub fn cpu_port(&self) -> CpuPort {
         CpuPort(Arc::clone(&self.0))
@@ -67,44 +67,44 @@ impl EmulatedBoard {
     /// How the board was built.
     #[must_use]
     pub fn config(&self) -> BoardConfig {
-        enter(&self.0, |board| board.config)
+        with_board(&self.0, |board| board.config)
     }
 
-    /// What the driver did wrong, oldest first; the first 64 are kept.
+    /// The driver's violations, oldest first; the first 64 are kept.
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
-        enter(&self.0, |board| board.log.violations().to_vec())
+        with_board(&self.0, |board| board.log.violations().to_vec())
     }
 
     /// The last register accesses of the driver, oldest first; 32 are kept.
     #[must_use]
     pub fn register_accesses(&self) -> Vec<RegisterAccess> {
-        enter(&self.0, |board| board.log.recent())
+        with_board(&self.0, |board| board.log.recent())
     }
 
-    /// What has happened so far.
+    /// The board's counters since it was built.
     #[must_use]
     pub fn counts(&self) -> Counts {
-        enter(&self.0, |board| board.counts())
+        with_board(&self.0, |board| board.counts())
     }
 
-    /// Whether the accelerator or a DMA engine has work.
+    /// Whether the accelerator or a DMA engine is at work.
     #[must_use]
     pub fn is_running(&self) -> bool {
-        enter(&self.0, |board| board.running())
+        with_board(&self.0, |board| board.running())
     }
 
     /// The level of the interrupt line.
     #[must_use]
     pub fn interrupt_level(&self) -> bool {
-        enter(&self.0, |board| board.interrupt.level())
+        with_board(&self.0, |board| board.interrupt.level())
     }
 
     /// Makes the board fail as planned, from now on. A fault of a part that does not exist never
     /// happens.
     pub fn inject(&self, plan: impl Into<FaultPlan>) {
         let plan = plan.into();
-        enter(&self.0, |board| {
+        with_board(&self.0, |board| {
             for fault in plan.faults {
                 board.inject(fault);
             }
@@ -113,19 +113,19 @@ impl EmulatedBoard {
 
     /// Forgets the faults that have not happened.
     pub fn clear_faults(&self) {
-        enter(&self.0, |board| board.clear_faults());
+        with_board(&self.0, |board| board.clear_faults());
     }
 
-    /// How many faults have happened.
+    /// Number of faults that have happened.
     #[must_use]
     pub fn faults(&self) -> u64 {
-        enter(&self.0, |board| board.faults())
+        with_board(&self.0, |board| board.faults())
     }
 
-    /// The packets that have ended since the last step began, in that order.
+    /// The packets that have ended since the last step began, in the order of their ends.
     #[must_use]
     pub fn packets(&self) -> Vec<PacketCount> {
-        enter(&self.0, |board| board.packets().to_vec())
+        with_board(&self.0, |board| board.packets().to_vec())
     }
 }
 
@@ -137,18 +137,18 @@ impl CpuPort {
     /// Reads the register at a physical address.
     #[must_use]
     pub fn read32(&self, address: u64) -> u32 {
-        enter(&self.0, |board| board.read32(address))
+        with_board(&self.0, |board| board.read32(address))
     }
 
     /// Writes the register at a physical address.
     pub fn write32(&self, address: u64, value: u32) {
-        enter(&self.0, |board| board.write32(address, value));
+        with_board(&self.0, |board| board.write32(address, value));
     }
 
     /// Virtual time since the board was built.
     #[must_use]
     pub fn now(&self) -> Duration {
-        let nanoseconds = enter(&self.0, |board| {
+        let nanoseconds = with_board(&self.0, |board| {
             u128::from(board.now) * 1_000_000 / u128::from(board.config.profile.clock_khz)
         });
         Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
@@ -156,14 +156,14 @@ impl CpuPort {
 
     /// Lets virtual time pass.
     pub fn pause(&self, duration: Duration) {
-        enter(&self.0, |board| board.advance(deadline(board, duration), false));
+        with_board(&self.0, |board| board.advance(deadline(board, duration), false));
     }
 
     /// Waits for the interrupt as a read of a UIO file does: an event masks the line and returns
     /// the number of events so far; `None` after `timeout`.
     #[must_use]
     pub fn wait_interrupt(&self, timeout: Duration) -> Option<u32> {
-        enter(&self.0, |board| {
+        with_board(&self.0, |board| {
             board.advance(deadline(board, timeout), true);
             board.interrupt.take()
         })
@@ -171,7 +171,7 @@ impl CpuPort {
 
     /// Lets the next event through, as a write of 1 to a UIO file does.
     pub fn unmask_interrupt(&self) {
-        enter(&self.0, |board| board.interrupt.unmask());
+        with_board(&self.0, |board| board.interrupt.unmask());
     }
 
     /// Allocates contiguous memory for DMA: its bus address, and the beats, which the CPU owns.
@@ -179,7 +179,7 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError::Exhausted`] if there is no room below the DMA's address limit.
     pub fn allocate(&self, beats: usize) -> Result<(u64, Box<[Beat]>), MemoryError> {
-        enter(&self.0, |board| board.memory.allocate(beats))
+        with_board(&self.0, |board| board.memory.allocate(beats))
     }
 
     /// Allocates memory for descriptors, which both sides may touch at any time.
@@ -187,7 +187,7 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError::Exhausted`] if there is no room below the DMA's address limit.
     pub fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), MemoryError> {
-        enter(&self.0, |board| board.memory.allocate_shared(words))
+        with_board(&self.0, |board| board.memory.allocate_shared(words))
     }
 
     /// Moves a buffer to the device.
@@ -216,7 +216,7 @@ impl CpuPort {
         granted: usize,
         access: DeviceAccess,
     ) -> Result<(), MemoryError> {
-        enter(&self.0, |board| board.memory.hand_over(address, beats, granted, access))
+        with_board(&self.0, |board| board.memory.hand_over(address, beats, granted, access))
     }
 
     /// Moves a buffer back to the CPU.
@@ -224,22 +224,22 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError`] if nothing was allocated at `address`, or the device does not own it.
     pub fn take_back(&self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
-        enter(&self.0, |board| board.take_back(address))
+        with_board(&self.0, |board| board.take_back(address))
     }
 
-    /// Gives memory back; from then on the device may not touch it.
+    /// Frees memory; from then on the device may not touch it.
     ///
     /// # Errors
     /// [`MemoryError::Unknown`] if nothing was allocated at `address`.
     pub fn release(&self, address: u64) -> Result<(), MemoryError> {
-        enter(&self.0, |board| board.release(address))
+        with_board(&self.0, |board| board.release(address))
     }
 }
 
-/// The clock does not run further than this, a thousand years, so that sums of clocks do not overflow.
+/// The last clock cycle, after a thousand years: sums of clocks do not overflow.
 const CLOCK_END: u64 = u64::MAX / 2;
 
-/// The clock at which a time from now has passed.
+/// The clock cycle at which `duration` from now has passed.
 fn deadline(board: &Board, duration: Duration) -> u64 {
     let cycles = duration
         .as_nanos()

@@ -1,5 +1,5 @@
-//! This file says what a driver can do wrong, and keeps what it did, with the register accesses
-//! that led there.
+//! Violations: a driver's mistakes that a board detects, and the log of them with the register
+//! accesses before each.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::fmt;
 use crate::memory::Denied;
 use pgs_interface::axi_dma::Direction;
 
-/// What went wrong.
+/// The kind of a driver's mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ViolationKind {
@@ -17,7 +17,7 @@ pub enum ViolationKind {
         /// Physical address.
         address: u64,
     },
-    /// No region answers there.
+    /// No region has this address.
     #[error("register access at {address:#x}, where no region is")]
     UnmappedRegister {
         /// Physical address.
@@ -68,7 +68,7 @@ pub enum ViolationKind {
         core: usize,
         /// Which channel.
         direction: Direction,
-        /// What was written.
+        /// The length that was written.
         wanted: u32,
         /// Width of the length register.
         width: u32,
@@ -115,7 +115,7 @@ pub enum ViolationKind {
         address: u64,
         /// Bytes.
         bytes: u64,
-        /// Why not.
+        /// The reason.
         denied: Denied,
     },
     /// A descriptor with Cmplted still set.
@@ -179,10 +179,10 @@ impl fmt::Display for RegisterAccess {
     }
 }
 
-/// What went wrong, when, and what led there.
+/// A driver's mistake, its time, and the register accesses before it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Violation {
-    /// What.
+    /// The mistake.
     pub kind: ViolationKind,
     /// Clock cycle.
     pub cycle: u64,
@@ -200,12 +200,12 @@ impl fmt::Display for Violation {
     }
 }
 
-/// Register accesses that a violation is shown with.
+/// Register accesses that are kept with a violation.
 const ACCESSES_KEPT: usize = 32;
 /// Violations kept; later ones are only counted.
 const VIOLATIONS_KEPT: usize = 64;
 
-/// The board's record of wrong-doing.
+/// The board's log of violations.
 #[derive(Debug)]
 pub(crate) struct Log {
     recent: VecDeque<RegisterAccess>,
@@ -227,18 +227,18 @@ impl Log {
         }
     }
 
-    /// The channels have lost their state: a driver that does not know yet goes on with what they
-    /// were told to do.
+    /// The channels have lost their state. A driver that has not noticed yet goes on with its
+    /// transfers: doorbells to halted channels are no violations from now on.
     pub(crate) fn pardon(&mut self) {
         self.pardons = true;
     }
 
-    /// The driver resets: it knows.
+    /// The driver has noticed and resets: doorbells to halted channels are violations again.
     pub(crate) fn withdraw_pardon(&mut self) {
         self.pardons = false;
     }
 
-    /// Sets the time that violations are stamped with.
+    /// Sets the time stamp of violations.
     pub(crate) fn at(&mut self, now: u64) {
         self.now = now;
     }

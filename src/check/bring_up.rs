@@ -1,4 +1,4 @@
-//! This file tests what must hold before anything can be streamed, and leaves an open accelerator.
+//! Tests everything that must hold before streaming, and returns an open accelerator.
 
 use std::sync::Arc;
 
@@ -16,9 +16,9 @@ use crate::platform::{AccessCounts, RegisterMap, Window};
 use crate::step::Accelerator;
 
 const SAME_DRIVER: &str = "use the driver that belongs to the bitstream";
-const CLOCK: &str = "load the bitstream, and look whether the clock of the PL runs";
+const CLOCK: &str = "load the bitstream, and check that the clock of the PL runs";
 
-/// Goes through the stages of opening, one line each; `None` if the rest makes no sense.
+/// Runs the stages of opening, one line each. `None` if the other lines make no sense.
 ///
 /// The error is a board that cannot be reached at all.
 pub(super) fn bring_up(
@@ -45,7 +45,7 @@ pub(super) fn bring_up(
     lines.ok(Line::Regions, format!("the control block and {} DMA cores", cores.len()));
 
     let mut control = Control::new(window);
-    // Each is tried: several failures together point to their common reset.
+    // Each core is tested: several failures together point to their common reset.
     let mut failed: Vec<String> = cores
         .iter_mut()
         .filter_map(|core| core.reset(&*platform).err())
@@ -64,7 +64,7 @@ pub(super) fn bring_up(
         let outcome = Outcome::failed(
             failed.join("; "),
             format!("every part out of reset within {STATE_CHANGE:?}"),
-            "look whether the part's reset input is released, its clock runs, and its memory port \
+            "check whether the part's reset input is released, its clock runs, and its memory port \
              answers: an outstanding transfer holds a reset up",
         );
         lines.stop(Line::Reset, outcome);
@@ -94,7 +94,7 @@ pub(super) fn bring_up(
     Ok(Some(Accelerator::assemble(description, device)))
 }
 
-/// Identification, interface version and capabilities.
+/// Tests identification, interface version and capabilities.
 fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
     let identified = identify(window);
     let refused = identified.as_ref().err().map(refused);
@@ -130,7 +130,7 @@ fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
     Some(capabilities)
 }
 
-/// A profile, its streams, and what they carry unless it is f32 and isotropic.
+/// Describes a profile: its streams, and their number formats unless they are f32 and isotropic.
 fn described(variant: &Variant) -> String {
     let Variant { profile, numbers, inertia } = variant;
     let widths = |widths: &[u32]| match widths {
@@ -157,7 +157,7 @@ fn described(variant: &Variant) -> String {
     )
 }
 
-/// The line that a refused bitstream fails at.
+/// The line in which a refused bitstream fails, and its outcome.
 fn refused(error: &IdentityError) -> (Line, Outcome) {
     let (line, found, expected, next) = match error {
         IdentityError::Gone => (
@@ -170,8 +170,8 @@ fn refused(error: &IdentityError) -> (Line, Outcome) {
             Line::Identification,
             format!("{found:#010x}"),
             format!("{IDENTIFICATION_VALUE:#010x} (\"PGS1\")"),
-            "load the accelerator's bitstream, or correct the control block's address in the device \
-             tree",
+            "load the accelerator's bitstream, or correct the control block's address in the \
+             device tree",
         ),
         IdentityError::Version { major, minor } => {
             (Line::Version, format!("{major}.{minor}"), format!("{VERSION_MAJOR}.x"), SAME_DRIVER)
@@ -192,9 +192,10 @@ fn refused(error: &IdentityError) -> (Line, Outcome) {
     (line, Outcome::failed(found, expected, next))
 }
 
-/// Capabilities that contradict each other: what was found, what was expected.
+/// Finds capabilities that contradict each other: the values found, and the values expected.
 ///
-/// The capacity for bodies is one whatever the memory; that for collisions is one of the memory.
+/// The capacity for bodies counts without regard to memory; the capacity for collisions is one of
+/// the memory.
 fn contradiction(capabilities: &Capabilities) -> Option<(String, String)> {
     let memory = u64::from(capabilities.memory_bytes);
     let records = [
@@ -222,7 +223,7 @@ fn contradiction(capabilities: &Capabilities) -> Option<(String, String)> {
     })
 }
 
-/// The width of the length registers; the lines that follow go on with the one found.
+/// Tests the width of the length registers; the lines that follow use the width that was found.
 fn length(
     cores: &mut [Core],
     capabilities: &Capabilities,
@@ -236,7 +237,7 @@ fn length(
         match core.length_widths() {
             Ok(of_core) => widths.extend(of_core),
             Err(error) => {
-                let next = "look whether the region is that of an AXI DMA";
+                let next = "check that the region belongs to an AXI DMA";
                 let outcome = Outcome::failed(chain(&error), format!("{expected} bits"), next);
                 lines.stop(Line::Length, outcome);
                 return None;
@@ -263,9 +264,9 @@ fn length(
         of_channels.join(", ")
     };
     if !(LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&narrowest) {
-        // Nothing can be transferred with it: the rest of the lines would say nothing.
+        // Nothing can be transferred with this width, and the other lines would tell nothing.
         let next = format!(
-            "an AXI DMA has {LENGTH_WIDTH_MIN} to {LENGTH_WIDTH_MAX} bits: look whether the region \
+            "an AXI DMA has {LENGTH_WIDTH_MIN} to {LENGTH_WIDTH_MAX} bits: check whether the region \
              is that of one"
         );
         let expected = format!("{expected} bits, {source}");
@@ -281,7 +282,7 @@ fn length(
     Some(narrowest)
 }
 
-/// An error with its causes.
+/// The text of an error with its causes.
 pub(super) fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
@@ -315,7 +316,7 @@ mod tests {
             let (found, _) = contradiction(&capabilities).expect(text);
             assert!(found.contains(text), "{found}");
         }
-        // Indices may reach further than the memory.
+        // Indices may reach beyond the memory.
         assert_eq!(contradiction(&Capabilities { body_capacity: 174_763, ..good }), None);
     }
 

@@ -1,5 +1,5 @@
-//! This file compares what an echo returned with what was sent, and says where wrong data came
-//! from.
+//! Compares the results of an echo with the pattern that was sent, and names the source of wrong
+//! data.
 
 use std::fmt;
 
@@ -9,37 +9,37 @@ use pgs_interface::record::{BEAT_BYTES, Beat};
 use super::pattern::Pattern;
 use crate::axi_dma::Direction;
 use crate::beat::stripe::Place;
-use crate::step::{Echoed, source_of};
+use crate::step::{EchoResult, source_of};
 
-/// Where a wrong beat came from.
+/// The source of a wrong beat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Origin {
-    /// The device read what the buffer held before.
+    /// The device read the earlier contents of the buffer.
     StaleRead,
-    /// The CPU found what the buffer held before.
+    /// The CPU read the earlier contents of the buffer.
     StaleResult,
-    /// It belongs to another place of the results.
+    /// The beat belongs to another place of the results.
     Elsewhere(Place),
-    /// Nothing that was ever written.
+    /// The driver never wrote this beat.
     Unknown,
 }
 
-/// How the results of an echo differ from what was sent.
+/// The difference between the results of an echo and the pattern that was sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Difference {
-    /// Beats that differ.
+    /// Number of beats that differ.
     pub(super) wrong: usize,
-    /// Beats in all.
+    /// Number of beats.
     pub(super) total: usize,
-    /// Where the first of them came from; stale data counts before anything else.
+    /// Source of the first wrong beat; stale data comes before anything else.
     pub(super) origin: Origin,
     /// Channel of the buffer in question: the sender's for a stale read, else the receiver's.
     pub(super) channel: usize,
     /// Offset in that buffer, bytes.
     pub(super) offset: u64,
-    /// What was found.
+    /// Beat found.
     pub(super) found: Beat,
-    /// What was expected.
+    /// Beat expected.
     pub(super) expected: Beat,
 }
 
@@ -84,21 +84,21 @@ impl fmt::Display for Words<'_> {
     }
 }
 
-/// What is known of a run.
+/// A run to be judged.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run<'a> {
-    /// The bitstream's.
+    /// The bitstream's variant.
     pub(super) variant: &'a Variant,
     /// Number of bodies.
     pub(super) bodies: usize,
-    /// The results as they should be, by channel.
+    /// The right results, by channel.
     pub(super) expected: &'a [Vec<Beat>],
-    /// The results of the run before in the same buffers.
+    /// The results of the previous run in the same buffers.
     pub(super) before: Option<&'a [Vec<Beat>]>,
 }
 
-/// Compares; `None` if every beat is as it was sent.
-pub(super) fn judge(run: &Run<'_>, echoed: &Echoed) -> Option<Difference> {
+/// Compares the results with the pattern. `None` if all beats agree.
+pub(super) fn judge(run: &Run<'_>, echoed: &EchoResult) -> Option<Difference> {
     let mut differences = Vec::new();
     let mut total = 0;
     for (channel, expected) in run.expected.iter().enumerate() {
@@ -134,17 +134,17 @@ fn at(results: &[Vec<Beat>], place: Place) -> Option<Beat> {
     results.get(place.channel)?.get(place.slot).copied()
 }
 
-/// Whether a wrong beat is one that its buffer held before.
-fn stale(run: &Run<'_>, echoed: &Echoed, place: Place, found: Beat) -> Option<Origin> {
+/// The source of a wrong beat, if its buffer held the beat before.
+fn stale(run: &Run<'_>, echoed: &EchoResult, place: Place, found: Beat) -> Option<Origin> {
     let pattern = Pattern::of(run.variant);
-    let dirt = pattern.dirt();
-    if found == dirt(Direction::S2mm, place.channel, place.slot) {
+    let filler = pattern.filler();
+    if found == filler(Direction::S2mm, place.channel, place.slot) {
         return Some(Origin::StaleResult);
     }
-    // Padding is not sent: the accelerator makes it.
+    // The host does not send padding: the accelerator makes it.
     let (sender, offset) = source_of(run.bodies, run.variant, place)?;
     let slot = usize::try_from(offset).unwrap_or(usize::MAX) / BEAT_BYTES;
-    let sent = dirt(Direction::Mm2s, sender, slot);
+    let sent = filler(Direction::Mm2s, sender, slot);
     let returned = pattern.returned();
     if (0..)
         .zip(returned)
@@ -153,7 +153,7 @@ fn stale(run: &Run<'_>, echoed: &Echoed, place: Place, found: Beat) -> Option<Or
         return Some(Origin::StaleRead);
     }
     let before = run.before.and_then(|before| at(before, place));
-    // What the run before returned: the accelerator's sum tells whether it was sent again.
+    // The result of the previous run. The accelerator's sum tells whether the host sent it again.
     let arrived = echoed.sums.is_some_and(|(received, _)| received == echoed.sent);
     (before == Some(found)).then_some(if arrived { Origin::StaleResult } else { Origin::StaleRead })
 }
@@ -178,17 +178,17 @@ mod tests {
         pattern.results(&pattern.bodies(seed, BODIES), 4)
     }
 
-    fn dirt(direction: Direction, channel: usize, slot: usize) -> Beat {
-        Pattern::of(&FLOAT.default_variant()).dirt()(direction, channel, slot)
+    fn filler(direction: Direction, channel: usize, slot: usize) -> Beat {
+        Pattern::of(&FLOAT.default_variant()).filler()(direction, channel, slot)
     }
 
-    /// What is found if the results of pattern 2, run after pattern 1, are changed.
+    /// The difference after a change in the results of pattern 2, which runs after pattern 1.
     fn difference(sums_agree: bool, change: impl Fn(&mut Vec<Vec<Beat>>)) -> Option<Difference> {
         let (before, expected) = (pattern(1), pattern(2));
         let mut found = expected.clone();
         change(&mut found);
         let received = if sums_agree { 5 } else { 6 };
-        let echoed = Echoed {
+        let echoed = EchoResult {
             results: found,
             sent: 5,
             sums: Some((received, 0)),
@@ -230,11 +230,12 @@ mod tests {
     }
 
     #[test]
-    fn dirt_is_stale_on_whichever_side_it_lay() {
-        let found = difference(true, |r| r[2][4] = dirt(Direction::S2mm, 2, 4)).expect("differs");
+    fn filler_is_stale_on_either_side() {
+        let found = difference(true, |r| r[2][4] = filler(Direction::S2mm, 2, 4)).expect("differs");
         assert_eq!((found.origin, found.channel, found.offset), (Origin::StaleResult, 2, 64));
         // The position of body 1 is beat 2 of the poses: channel 2, where they begin at beat 4.
-        let found = difference(false, |r| r[0][1] = dirt(Direction::Mm2s, 2, 4)).expect("differs");
+        let found =
+            difference(false, |r| r[0][1] = filler(Direction::Mm2s, 2, 4)).expect("differs");
         assert_eq!((found.origin, found.channel, found.offset), (Origin::StaleRead, 2, 64));
     }
 

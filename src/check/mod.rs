@@ -7,7 +7,8 @@
 //! ```
 //!
 //! An echo is a step without collisions and without integration: every bitstream returns poses and
-//! velocities bit for bit. `pattern.rs` makes what is sent, `judge.rs` looks at what came back.
+//! velocities bit for bit. `pattern.rs` makes the pattern to send, and `judge.rs` compares the
+//! results with it.
 
 mod bring_up;
 mod judge;
@@ -24,10 +25,11 @@ use crate::error::Error;
 use crate::step::find;
 use report::Lines;
 
-/// Tests a board from its identification to its interrupt. Every wait is bounded: it takes well
-/// under a second on a good board, a few on a bad one.
+/// Tests a board from its identification to its interrupt. Every wait is bounded: the test takes
+/// well under a second on a good board, and a few seconds on a bad one.
 ///
-/// The board is reset. Nothing else may use it meanwhile, and it must be opened anew afterwards.
+/// The board is reset. No other process may use it during the test, and it must be opened anew
+/// afterwards.
 ///
 /// ```
 /// use zynq_pgs::{OpenOptions, Outcome, check};
@@ -45,7 +47,7 @@ use report::Lines;
 /// ```
 ///
 /// # Errors
-/// [`Error::Open`] if there is no board to be tested, or it cannot be reached.
+/// [`Error::Open`] if there is no board to test, or it cannot be reached.
 pub fn check(options: OpenOptions) -> Result<CheckReport, Error> {
     standard(|| check_found(find(&options)?, options.length_width))
 }

@@ -1,9 +1,9 @@
-//! This file makes what an echo sends: no beat twice, and every bit of every lane that comes back as
-//! 0 and as 1.
+//! Makes the pattern of an echo: no beat twice, and every bit of every lane comes back as 0 and as
+//! 1.
 //!
-//! They are numbers that every part on their way holds exactly. Where a stream, an array or the
-//! arithmetic for bodies has sixteen bits, that is sign, exponents of -14 to 15 and ten bits of
-//! mantissa, which are the same words in binary16 and in the thesis' format.
+//! Every part on the way holds these numbers exactly. Where a stream, an array or the arithmetic
+//! for bodies has sixteen bits, the numbers are limited to a sign, exponents of -14 to 15 and ten
+//! bits of mantissa. Their words are the same in binary16 and in the thesis' format.
 
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::Variant;
@@ -13,16 +13,16 @@ use pgs_support::chunks::Chunks;
 use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
 use crate::scene::{Body, Pose, Shape, Velocity};
-use crate::step::Dirt;
+use crate::step::FillPattern;
 
-/// Shapes that the bodies refer to in turn; all of them move, so that nothing is left out.
+/// Shapes that the bodies refer to in turn. All of them move, so that every body is sent.
 pub(super) const SHAPES: [Shape; 3] =
     [Shape::isotropic(1.0, 1.0), Shape::isotropic(2.0, 3.0), Shape::isotropic(0.5, 0.25)];
 
 /// Lanes of a body that come back.
 const WORDS_PER_BODY: u32 = 13;
 
-/// What a bitstream returns bit for bit.
+/// The numbers that a bitstream returns bit for bit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pattern {
     results: Layout,
@@ -31,7 +31,7 @@ pub(super) struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern for a bitstream.
+    /// Makes the pattern for a bitstream.
     pub(super) fn of(variant: &Variant) -> Self {
         let Numbers { bodies, poses, updates, velocities, .. } = variant.numbers;
         let short = [bodies, poses] != [StreamFormat::F32; 2]
@@ -55,7 +55,7 @@ impl Pattern {
         (0..count).map(body).collect()
     }
 
-    /// The result beats of bodies that come back as they were sent, by channel.
+    /// The result beats of bodies that come back unchanged, by channel.
     pub(super) fn results(&self, bodies: &[Body], channels: usize) -> Vec<Vec<Beat>> {
         let beats = |channel| self.results.beats_on_channel(bodies.len(), channel);
         let mut results: Vec<_> =
@@ -83,9 +83,9 @@ impl Pattern {
         results
     }
 
-    /// What buffers are dirtied with: nothing that a pattern holds. Read as a body it is a valid
-    /// one, so that an accelerator which gets it sends it back.
-    pub(super) fn dirt(&self) -> Dirt {
+    /// The contents of buffers before their use: numbers that no pattern holds. Read as a body they
+    /// are valid, so that an accelerator that receives them sends them back.
+    pub(super) fn filler(&self) -> FillPattern {
         match (self.results.rows_per_beat(), self.short) {
             (1, false) => |direction, channel, slot| row(number, direction, channel, slot),
             (1, true) => |direction, channel, slot| row(short_number, direction, channel, slot),
@@ -97,8 +97,8 @@ impl Pattern {
         }
     }
 
-    /// The bits of a beat of the results that come back as they were sent, whatever it holds: the
-    /// word beside a vec3 does not.
+    /// The bits of a beat that every result returns unchanged, whatever its contents. The word
+    /// beside a vec3 is not returned.
     pub(super) fn returned(&self) -> [u32; LANES] {
         const ALL: u32 = u32::MAX;
         if self.results.rows_per_beat() == 1 {
@@ -109,7 +109,7 @@ impl Pattern {
     }
 }
 
-/// A row of dirt: three numbers, and zero for shape and padding.
+/// A row of filler: three numbers, and zero for shape and padding.
 fn row(number: fn(u32, u32) -> u32, direction: Direction, channel: usize, slot: usize) -> Beat {
     let seed = match direction {
         Direction::Mm2s => 0xD1,
@@ -123,7 +123,7 @@ fn row(number: fn(u32, u32) -> u32, direction: Direction, channel: usize, slot: 
 
 /// A beat of two rows of short numbers, the first in its low half.
 fn pair([low, high]: &[[u32; LANES]; 2]) -> Beat {
-    // 0 stands for itself; every other number is a normal one of sixteen bits.
+    // 0 stands for itself; every other number is a normal one in sixteen bits.
     let word = |bits: u32| {
         let magnitude = (bits & !(1 << 31)).saturating_sub(112 << 23);
         ((bits & (1 << 31)) >> 16) | (magnitude >> 13)
@@ -149,10 +149,10 @@ fn number(seed: u32, index: u32) -> u32 {
     (word & 0x807F_FFFF) | (exponent << 23)
 }
 
-/// Such a number that sixteen bits hold.
+/// A number as [`number`] makes it, which sixteen bits hold.
 fn short_number(seed: u32, index: u32) -> u32 {
     let word = mixed(seed, index);
-    // Exponents of 1 to 30 there.
+    // Exponents of 1 to 30 in sixteen bits.
     let exponent = 112 + 1 + ((word >> 23) & 0xFF) % 30;
     (word & 0x807F_E000) | (exponent << 23)
 }
@@ -186,7 +186,7 @@ mod tests {
         let (pattern, channels) = of(&HALF.default_variant());
         let results = pattern.results(&pattern.bodies(1, 200), channels);
         for (channel, beats) in results.iter().enumerate() {
-            // Poses and velocities come by turns. Only a pose has a number beside its second vec3.
+            // Poses and velocities alternate. Only a pose has a number beside its second vec3.
             let ones =
                 beats.iter().fold([0; 4], |all, beat| [0, 1, 2, 3].map(|l| all[l] | beat.0[l]));
             let zeros =
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// Independent of how words are made elsewhere: by the value.
+    /// Checks the words by value, without the code that makes them.
     #[test]
     fn words_of_sixteen_bits_are_those_of_their_numbers() {
         let (pattern, channels) = of(&HALF.default_variant());
@@ -220,7 +220,7 @@ mod tests {
         let pattern = Pattern::of(&Variant { numbers, ..MIXED.default_variant() });
         let bodies = pattern.bodies(1, 100);
         assert!(bodies.iter().all(|body| body.velocity.linear[0].to_bits().trailing_zeros() >= 13));
-        assert_eq!(pattern.dirt()(Direction::Mm2s, 0, 7).0[0].trailing_zeros().min(13), 13);
+        assert_eq!(pattern.filler()(Direction::Mm2s, 0, 7).0[0].trailing_zeros().min(13), 13);
     }
 
     #[test]
@@ -242,7 +242,7 @@ mod tests {
             for slot in 0..1000 {
                 for direction in [Direction::Mm2s, Direction::S2mm] {
                     for channel in 0..4 {
-                        assert!(seen.insert(pattern.dirt()(direction, channel, slot).0));
+                        assert!(seen.insert(pattern.filler()(direction, channel, slot).0));
                     }
                 }
             }

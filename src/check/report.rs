@@ -1,12 +1,12 @@
-//! This file says what a self-test reports: one line for each thing tested, in a fixed order.
+//! The report of a self-test: one line per test, in a fixed order.
 
 use crate::board::BoardDescription;
 
-/// What was tested, and how it went.
+/// The tests and their outcomes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CheckReport {
-    /// Which board.
+    /// The board under test.
     pub board: BoardDescription,
     /// All lines, always the same ones in the same order.
     pub lines: Vec<CheckLine>,
@@ -20,37 +20,37 @@ impl CheckReport {
     }
 }
 
-/// One thing that was tested.
+/// One test.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CheckLine {
-    /// What.
+    /// Name of the test.
     pub name: &'static str,
-    /// How it went.
+    /// Outcome of the test.
     pub outcome: Outcome,
 }
 
-/// How a test went.
+/// The outcome of a test.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Outcome {
-    /// As it should.
+    /// The test passed.
     Ok {
-        /// What was seen.
+        /// The state that was found.
         detail: String,
     },
-    /// Not as it should.
+    /// The test failed.
     Failed {
-        /// What was seen.
+        /// The state that was found.
         found: String,
-        /// What should have been.
+        /// The state that was expected.
         expected: String,
-        /// What to do.
+        /// The next step for the reader.
         next: String,
     },
-    /// It was not tested.
+    /// The test was not run.
     Skipped {
-        /// Why not.
+        /// The reason.
         reason: String,
     },
 }
@@ -73,7 +73,7 @@ impl Outcome {
     }
 }
 
-/// What is tested, in this order.
+/// The tests, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Line {
     Identification,
@@ -125,12 +125,12 @@ impl Line {
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     outcomes: [Option<Outcome>; Line::ALL.len()],
-    /// The line after whose failure there is nothing left to test.
+    /// The line after whose failure no test makes sense.
     stopped_at: Option<Line>,
 }
 
 impl Lines {
-    /// Notes how a line went.
+    /// Records the outcome of a line.
     pub(super) fn set(&mut self, line: Line, outcome: Outcome) {
         self.outcomes[line as usize] = Some(outcome);
     }
@@ -139,13 +139,13 @@ impl Lines {
         self.set(line, Outcome::ok(detail));
     }
 
-    /// Notes a failure after which the rest makes no sense.
+    /// Records a failure after which no other line makes sense.
     pub(super) fn stop(&mut self, line: Line, outcome: Outcome) {
         self.set(line, outcome);
         self.stopped_at = Some(line);
     }
 
-    /// All lines; those without an outcome were skipped.
+    /// All lines; the lines without an outcome were skipped.
     pub(super) fn finish(self) -> Vec<CheckLine> {
         let reason = match self.stopped_at {
             Some(line) => format!("needs the line \"{}\"", line.name()),

@@ -1,4 +1,4 @@
-//! This file tests what only streaming shows: that data arrives, is the newest, and is announced.
+//! Tests the properties that only streaming shows: data arrives, is the newest, and is announced.
 
 use std::time::Duration;
 
@@ -13,24 +13,24 @@ use crate::beat::unpack::results::sum_of_words;
 use crate::board::BoardKind;
 use crate::error::Error;
 use crate::fault::{ChannelState, Fault};
-use crate::step::{Accelerator, ECHO_LIMIT, Echo, Echoed};
+use crate::step::{Accelerator, ECHO_LIMIT, Echo, EchoResult};
 
-/// Bodies of the echoes: the least, odd numbers that leave channels of different lengths, and one
-/// that fills a length register of 14 bits more than once.
+/// Numbers of bodies of the echoes: the smallest; odd numbers that give channels different lengths;
+/// and one that fills a length register of 14 bits more than once.
 const SIZES: [u32; 4] = [1, 7, 101, 4099];
 /// Up to this size the packets are cut into short pieces.
 const SHORT_PIECES_UP_TO: u32 = 101;
-/// Bodies of a round of the coherency test: more than the lines of a first-level cache.
+/// Number of bodies in a round of the coherency test: more than the lines of a first-level cache.
 const COHERENCY_BODIES: u32 = 1501;
 const COHERENCY_ROUNDS: u32 = 3;
 const INTERRUPT_STEPS: u64 = 3;
-/// How long to listen for an interrupt that nothing asked for.
+/// Time in which no interrupt may come without a cause.
 const QUIET: Duration = Duration::from_millis(2);
 
 /// Runs the lines that stream.
 pub(super) fn streams(mut accelerator: Accelerator, lines: &mut Lines) {
     if let Err(error) = accelerator.set_shapes(&SHAPES) {
-        let next = "load the bitstream anew";
+        let next = "load the bitstream again";
         lines.stop(Line::Echo, Outcome::failed(chain(&error), "shapes that can be loaded", next));
         return;
     }
@@ -48,14 +48,14 @@ pub(super) fn streams(mut accelerator: Accelerator, lines: &mut Lines) {
     lines.set(Line::Interrupt, outcome);
 }
 
-/// Sizes that the bitstream has room for.
+/// A number of bodies for which the bitstream has room, at most `bodies`.
 fn fitting(accelerator: &Accelerator, bodies: u32) -> u32 {
     let capabilities = accelerator.capabilities();
     let room = capabilities.memory_bytes / capabilities.bytes_per_body.max(1);
     bodies.min(capabilities.body_capacity).min(room).max(1)
 }
 
-/// A step that did not end as it should.
+/// The outcome of a step that failed.
 fn step_failed(error: &Error) -> Outcome {
     let (found, next) = match error {
         Error::Step { fault, diagnosis, .. } => match &**fault {
@@ -64,7 +64,7 @@ fn step_failed(error: &Error) -> Outcome {
                     "no end after {ECHO_LIMIT:?}: {}",
                     still_moving(diagnosis.as_ref().map_or(&[], |found| &found.channels))
                 ),
-                "look whether the stream of the named channel is connected to the accelerator and \
+                "check whether the stream of the named channel is connected to the accelerator and \
                  its memory port is enabled",
             ),
             Fault::NoMemory(error) | Fault::Platform(error) => (
@@ -73,11 +73,11 @@ fn step_failed(error: &Error) -> Outcome {
             ),
             fault => (
                 chain(fault),
-                "look whether the addresses of the buffers are mapped for the channel in the block \
+                "check whether the addresses of the buffers are mapped for the channel in the block \
                  design, and whether streams are exchanged",
             ),
         },
-        error => (chain(error), "load the bitstream anew"),
+        error => (chain(error), "load the bitstream again"),
     };
     let expected = format!("a step without collisions to end within {ECHO_LIMIT:?}");
     Outcome::failed(found, expected, next)
@@ -88,7 +88,7 @@ fn still_moving(channels: &[ChannelState]) -> String {
     let busy = |direction: Direction| -> Vec<_> {
         channels
             .iter()
-            // A channel that is halted had nothing to do in this step.
+            // A halted channel had nothing to do in this step.
             .filter(|state| !state.status.idle() && !state.status.halted())
             .filter(|state| state.channel.direction == direction)
             .map(|state| format!("{} {}", state.channel, state.status))
@@ -103,7 +103,7 @@ fn still_moving(channels: &[ChannelState]) -> String {
 }
 
 /// Sends patterns of several sizes through fresh buffers. The error is a step that failed.
-fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<Echoed>, Outcome> {
+fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<EchoResult>, Outcome> {
     let variant = accelerator.capabilities().variant;
     let (pattern, channels) = (Pattern::of(&variant), variant.profile.s2mm_widths.len());
     let mut sizes = SIZES.map(|size| fitting(accelerator, size)).to_vec();
@@ -116,7 +116,7 @@ fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<Echoed
             bodies: &bodies,
             short_pieces: *size <= SHORT_PIECES_UP_TO,
             fresh_buffers: true,
-            dirt: None,
+            filler: None,
         };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         let expected = pattern.results(&bodies, channels);
@@ -142,7 +142,7 @@ fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<Echoed
     Ok(runs)
 }
 
-/// What to do about wrong data.
+/// The advice for wrong data.
 fn advice(difference: &Difference) -> &'static str {
     match difference.origin {
         Origin::StaleRead | Origin::StaleResult => {
@@ -151,17 +151,17 @@ fn advice(difference: &Difference) -> &'static str {
              device tree, all of them)"
         }
         Origin::Elsewhere(_) => {
-            "look whether streams are exchanged between the cores and the accelerator"
+            "check whether streams are exchanged between the cores and the accelerator"
         }
         Origin::Unknown => {
-            "look whether the widths of the memory ports, which boot software sets, are those of \
+            "check whether the widths of the memory ports, which boot software sets, are those of \
              the bitstream, and whether the streams meet timing"
         }
     }
 }
 
-/// Compares the accelerator's sums with ours.
-fn sums(runs: &[Echoed]) -> Outcome {
+/// Compares the accelerator's sums with the driver's.
+fn sums(runs: &[EchoResult]) -> Outcome {
     for run in runs {
         let Some((received, answered)) = run.sums else {
             return Outcome::skipped("this bitstream does not sum its words");
@@ -187,7 +187,7 @@ fn sums(runs: &[Echoed]) -> Outcome {
     Outcome::ok(format!("both directions agree in {} steps", runs.len()))
 }
 
-/// Sends pattern after pattern through the same buffers, dirtied in between.
+/// Sends patterns through the same buffers, one after the other, with filler in between.
 fn coherency(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
     let variant = accelerator.capabilities().variant;
     let (pattern, channels) = (Pattern::of(&variant), variant.profile.s2mm_widths.len());
@@ -199,7 +199,7 @@ fn coherency(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
             bodies: &bodies,
             short_pieces: false,
             fresh_buffers: round == 0,
-            dirt: Some(pattern.dirt()),
+            filler: Some(pattern.filler()),
         };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         let expected = pattern.results(&bodies, channels);
@@ -223,16 +223,16 @@ fn coherency(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
     )))
 }
 
-/// Looks whether every step's end raises the interrupt, and nothing else does.
+/// Tests that every step's end raises the interrupt, and nothing else does.
 fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
     if accelerator.board().kind == BoardKind::DevMem {
         return Ok(Outcome::skipped("there is no interrupt through /dev/mem: open the UIO node"));
     }
     let unusable = |error: crate::platform::PlatformError| {
-        let next = "look whether the device tree gives the node an interrupt";
+        let next = "check that the device tree gives the node an interrupt";
         Outcome::failed(chain(&error), "an interrupt that can be waited for", next)
     };
-    // One event may still stand from before; a second one has no source.
+    // One event may be pending from before; a second one has no source.
     let mut events = 0;
     while events < 2 && accelerator.interrupt_within(QUIET).map_err(unusable)? {
         events += 1;
@@ -241,7 +241,7 @@ fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
         return Err(Outcome::failed(
             "interrupts that come again although nothing asks for one",
             "none while every source is quiet",
-            "look whether the line's type in the device tree is level, active high (4), and what \
+            "check that the line's type in the device tree is level, active high (4), and what \
              else drives it",
         ));
     }
@@ -249,17 +249,19 @@ fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
         .bodies(0x200, fitting(accelerator, COHERENCY_BODIES));
     let mut woken = 0;
     for _ in 0..INTERRUPT_STEPS {
-        let echo = Echo { bodies: &bodies, short_pieces: false, fresh_buffers: false, dirt: None };
+        let echo =
+            Echo { bodies: &bodies, short_pieces: false, fresh_buffers: false, filler: None };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         woken += u64::from(echoed.interrupts > 0);
     }
     if woken < INTERRUPT_STEPS {
         return Err(Outcome::failed(
             format!(
-                "{woken} of {INTERRUPT_STEPS} steps ended with an interrupt, the others were found by looking"
+                "{woken} of {INTERRUPT_STEPS} steps ended with an interrupt, the driver found the \
+                 others by polling"
             ),
             "an interrupt at the end of every step",
-            "look whether the interrupt output of the PL is connected and enabled, and whether its \
+            "check that the interrupt output of the PL is connected and enabled, and that its \
              number in the device tree is right: it is the interrupt controller's less 32",
         ));
     }
@@ -271,9 +273,9 @@ mod tests {
     use super::*;
 
     /// A run of one beat whose words add up to 10.
-    fn run(sent: u32, sums: Option<(u32, u32)>) -> Echoed {
+    fn run(sent: u32, sums: Option<(u32, u32)>) -> EchoResult {
         let results = vec![vec![Beat([1, 2, 3, 4])], Vec::new()];
-        Echoed { results, sent, sums, interrupts: 1, descriptors: 1 }
+        EchoResult { results, sent, sums, interrupts: 1, descriptors: 1 }
     }
 
     #[test]

@@ -1,10 +1,12 @@
-//! This file is the thesis' order: collisions body by body, to keep few bodies alive at once.
+//! The thesis' order: collisions body by body, to keep few bodies alive at once.
 //!
-//! All collisions of one body, then all that are left of the active body with the fewest left, and
-//! so on; a body becomes active with its first collision. What the thesis leaves open is a choice:
-//! its first body is the moving body of the lowest index, a body's collisions are taken in
-//! ascending order, static bodies are never active, and of several bodies with equally few left the
-//! tie rule decides. If no active body is left, the next one of the lowest index begins again.
+//! All collisions of one body come first. Then come all remaining collisions of the active body
+//! with the fewest remaining, and so on. A body becomes active with its first collision. If no body
+//! is active, the algorithm begins again with the next moving body of the lowest index.
+//!
+//! The thesis leaves three points open, and this code chooses: it begins with the moving body of
+//! the lowest index, it takes a body's collisions in ascending order, and it never makes static
+//! bodies active. A tie rule decides between bodies with equally few collisions left.
 //!
 //! Source: thesis §4.7, Algorithm 3.
 
@@ -41,7 +43,7 @@ impl Bodies<'_> {
         Some((self.left[body as usize], self.ties.rank(age), body))
     }
 
-    /// A collision of the body is taken.
+    /// Counts one collision of the body as done.
     fn take_one(&mut self, body: u32) {
         if !self.input.moving[body as usize] {
             return;
@@ -107,7 +109,7 @@ pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule)
             current = bodies.active.first().map(|(_, _, body)| *body);
         }
     }
-    // Pairs of two static bodies belong to no body's turn.
+    // Pairs of two static bodies belong to no body's turn and come last.
     let rest = (0..).zip(&done).filter(|(_, done)| !**done).map(|(index, _)| index);
     schedule.entries.extend(rest);
 }

@@ -1,6 +1,6 @@
-//! This file proves that a schedule is one: every collision once, no moving body twice in a window.
+//! Verifies a schedule: every collision once, and no moving body twice in a window.
 //!
-//! It knows nothing of how schedules are made.
+//! This module does not know how schedules are made.
 
 use super::schedule::EMPTY;
 use super::{IssueWindow, OrderError, OrderInput, Schedule};
@@ -14,7 +14,7 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// Without memory of its own yet.
+    /// Makes a checker that has allocated nothing yet.
     #[must_use]
     pub fn new() -> Self {
         Self::default()

@@ -1,8 +1,8 @@
-//! This file colours collisions so that no two of one colour share a moving body, and orders them
+//! Colours collisions so that no two collisions of one colour share a moving body, and orders them
 //! by colour.
 //!
-//! Each collision takes the lowest colour that neither body has. Colours are looked for 64 at a
-//! time: what finds none is coloured in a further round.
+//! Each collision takes the lowest colour that neither body has. A round searches 64 colours; a
+//! collision that finds none of them free waits for a further round.
 
 use super::{OrderInput, Schedule};
 

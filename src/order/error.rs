@@ -1,6 +1,6 @@
-//! This file lists what can be wrong with the input of an order, and with an order.
+//! The errors of an order and of its input.
 
-/// Why there is no order, or why an order is not what it should be.
+/// An error in the input of an order, or in a schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrderError {
@@ -27,7 +27,7 @@ pub enum OrderError {
 
     /// Arrays of different lengths.
     #[error(
-        "{moving} bodies are said to move or not, {positions} have a position: give both for all"
+        "found {moving} entries of `moving` and {positions} positions: give one of each per body"
     )]
     UnequalLengths {
         /// Entries of `moving`.
@@ -36,19 +36,19 @@ pub enum OrderError {
         positions: usize,
     },
 
-    /// More than an order can count.
+    /// More bodies or collisions than an order can count.
     #[error("found {found} {what}, at most {most} can be ordered")]
     TooMany {
         /// "bodies" or "collisions".
         what: &'static str,
-        /// How many there are.
+        /// Number found.
         found: usize,
-        /// How many there may be.
+        /// Largest number.
         most: usize,
     },
 
-    /// A collision with a body that is not there.
-    #[error("collision {collision} names body {body}, there are {bodies}")]
+    /// A collision with a body that does not exist.
+    #[error("collision {collision} names body {body}, there are {bodies} bodies")]
     NoSuchBody {
         /// Index of the collision.
         collision: usize,
@@ -67,7 +67,7 @@ pub enum OrderError {
         body: u32,
     },
 
-    /// Some bodies have so many collisions that keeping them apart takes too many empty slots.
+    /// Some bodies have too many collisions: the distance between them takes too many empty slots.
     #[error(
         "an order without hazards at a depth of {depth} issue slots needs more than {limit} \
          entries for {collisions} collisions: a moving body has too many of them"
@@ -75,14 +75,14 @@ pub enum OrderError {
     TooLong {
         /// Depth, issue slots.
         depth: u32,
-        /// Entries that there may be.
+        /// Largest number of entries.
         limit: usize,
         /// Collisions given.
         collisions: usize,
     },
 
-    /// An entry names a collision that is not there.
-    #[error("entry {entry} of the schedule names collision {found}, there are {collisions}")]
+    /// An entry names a collision that does not exist.
+    #[error("entry {entry} of the schedule names collision {found}, of {collisions} collisions")]
     NoSuchCollision {
         /// Index of the entry.
         entry: usize,

@@ -1,8 +1,8 @@
-//! This file places swept collisions in issue slots so that no hazard can occur.
+//! Places swept collisions in issue slots so that no hazard can occur.
 //!
 //! Slots are taken in groups of an eighth of the depth. A body is used at most once in any nine
-//! groups in a row, so that a whole depth lies between two uses wherever in their groups they
-//! stand: nothing is compared within a group.
+//! groups in a row. A whole depth therefore lies between two uses, wherever in their groups they
+//! stand, and nothing is compared within a group.
 //!
 //! ```text
 //! group      base                                    base + 63
@@ -21,11 +21,11 @@ use super::schedule::EMPTY;
 use super::sweep::Swept;
 use super::{IssueWindow, OrderError, Schedule};
 
-/// Parts that a depth is divided into.
+/// Number of groups that a depth is divided into.
 const PARTS: usize = 8;
 /// Groups in the window.
 const GROUPS: usize = u64::BITS as usize;
-/// Most collisions that wait.
+/// Largest number of waiting collisions.
 const WAITING_MAX: usize = 256;
 
 /// Which groups are closed for a body: bit `i` is group `base + i`.
@@ -36,7 +36,7 @@ struct Closed {
 }
 
 impl Closed {
-    /// The same, counted from a later base.
+    /// The same groups, counted from a later base.
     #[inline]
     fn from(self, base: u64) -> u64 {
         let moved = base - self.base;
@@ -44,34 +44,34 @@ impl Closed {
     }
 }
 
-/// Memory of the placement, which is kept.
+/// Memory of the placement. It is kept from order to order.
 #[derive(Debug, Default)]
 pub(super) struct Groups {
-    /// By rank; the last is for everything static and never closed.
+    /// By rank. The last one is for all static bodies, and never closed.
     bodies: Vec<Closed>,
     waiting: Vec<Swept>,
 }
 
 impl Groups {
-    /// Places every collision of the sweep; `moving` is the rank of what does not move.
+    /// Places every collision of the sweep.
     ///
     /// # Errors
-    /// [`OrderError::TooLong`] if that takes more than `limit` entries.
+    /// [`OrderError::TooLong`] if the placement takes more than `limit` entries.
     pub(super) fn place(
         &mut self,
         sweep: &[Swept],
-        moving: u32,
+        static_rank: u32,
         window: IssueWindow,
         limit: usize,
         schedule: &mut Schedule,
     ) -> Result<(), OrderError> {
         self.bodies.clear();
-        self.bodies.resize(moving as usize + 1, Closed::default());
+        self.bodies.resize(static_rank as usize + 1, Closed::default());
         self.waiting.clear();
         schedule.clear();
         let too_long =
             OrderError::TooLong { depth: window.depth(), limit, collisions: sweep.len() };
-        let mut open = Open::new(window, moving, &mut self.bodies, &mut schedule.entries);
+        let mut open = Open::new(window, static_rank, &mut self.bodies, &mut schedule.entries);
         for swept in sweep {
             while open.first_is_full() {
                 open.advance();
@@ -110,7 +110,7 @@ struct Open<'a> {
     size: usize,
     /// Groups on either side of a use that it closes.
     reach: usize,
-    /// The groups that a use closes, `reach` groups behind the first of them.
+    /// The groups that a use closes, with the first of them at bit `reach`.
     around: u64,
     /// The groups that are too near the end of the window to be used yet.
     beyond: u64,
@@ -118,9 +118,9 @@ struct Open<'a> {
     base: u64,
     /// Where the first group begins.
     start: usize,
-    /// Entries taken of each group, by its number modulo 64.
+    /// Number of entries taken in each group, by its number modulo 64.
     taken: [u32; GROUPS],
-    moving: usize,
+    static_rank: usize,
     bodies: &'a mut [Closed],
     entries: &'a mut Vec<u32>,
 }
@@ -128,7 +128,7 @@ struct Open<'a> {
 impl<'a> Open<'a> {
     fn new(
         window: IssueWindow,
-        moving: u32,
+        static_rank: u32,
         bodies: &'a mut [Closed],
         entries: &'a mut Vec<u32>,
     ) -> Self {
@@ -148,7 +148,7 @@ impl<'a> Open<'a> {
             base: 0,
             start: 0,
             taken: [0; GROUPS],
-            moving: moving as usize,
+            static_rank: static_rank as usize,
             bodies,
             entries,
         }
@@ -189,7 +189,7 @@ impl<'a> Open<'a> {
         let around = around as u64;
         self.bodies[a] = Closed { groups: closed[0] | around, base: self.base };
         self.bodies[b] = Closed { groups: closed[1] | around, base: self.base };
-        self.bodies[self.moving] = Closed::default();
+        self.bodies[self.static_rank] = Closed::default();
         let taken = &mut self.taken[ring(self.base + u64::from(group))];
         self.entries[self.start + group as usize * self.size + *taken as usize] = swept.index;
         *taken += 1;
@@ -199,13 +199,13 @@ impl<'a> Open<'a> {
         true
     }
 
-    /// Tries again what waits, in its order.
+    /// Tries the waiting collisions again, in their order.
     fn retry(&mut self, waiting: &mut Vec<Swept>) {
         waiting.retain(|swept| !self.place(swept));
     }
 }
 
-/// Where a group's count is.
+/// The position of a group's count in `taken`.
 #[allow(clippy::cast_possible_truncation, reason = "below 64")]
 fn ring(group: u64) -> usize {
     (group % GROUPS as u64) as usize

@@ -1,30 +1,30 @@
-//! This file says what an order is made from: pairs of bodies, which bodies move, where they are.
+//! The input of an order: pairs of bodies, which bodies move, and their positions.
 
 use pgs_support::float_env::standard;
 
 use super::OrderError;
 use crate::scene::{Bodies, Collisions, Shape};
 
-/// What an order is made from.
+/// The input of an order.
 #[derive(Debug, Clone, Copy)]
 pub struct OrderInput<'a> {
     /// Bodies A and B of each collision.
     pub pairs: &'a [[u32; 2]],
-    /// Whether each body moves. What stands still is no hazard.
+    /// Whether each body moves. A static body causes no hazard.
     pub moving: &'a [bool],
     /// Centres of mass, world frame, m.
     pub positions: &'a [[f32; 3]],
 }
 
 impl OrderInput<'_> {
-    /// Refuses what cannot be ordered; of several mistakes the one with the lowest index.
+    /// Refuses input that cannot be ordered. Reports the error with the lowest index.
     pub(super) fn check(&self) -> Result<(), OrderError> {
         let bodies = self.moving.len();
         if bodies != self.positions.len() {
             let (moving, positions) = (bodies, self.positions.len());
             return Err(OrderError::UnequalLengths { moving, positions });
         }
-        // Sums of two ranks are kept in 32 bits.
+        // Sums of two ranks are stored in 32 bits.
         let too_many = |what, found: usize, most: usize| match found <= most {
             true => Ok(()),
             false => Err(OrderError::TooMany { what, found, most }),
@@ -32,7 +32,7 @@ impl OrderInput<'_> {
         too_many("bodies", bodies, 1 << 30)?;
         too_many("collisions", self.pairs.len(), 1 << 30)?;
         let limit = u32::try_from(bodies).unwrap_or(u32::MAX);
-        // Without a branch per pair.
+        // This test has no branch per pair.
         let wrong = |[a, b]: [u32; 2]| (a >= limit) | (b >= limit) | (a == b);
         if !self.pairs.iter().fold(false, |any, pair| any | wrong(*pair)) {
             return Ok(());
@@ -49,7 +49,8 @@ impl OrderInput<'_> {
     }
 }
 
-/// Input read from a caller's own bodies and collisions, in memory that is kept.
+/// Input that was read from a caller's own bodies and collisions. Its memory is kept from step to
+/// step.
 #[derive(Debug, Clone, Default)]
 pub struct InputBuffers {
     pairs: Vec<[u32; 2]>,
@@ -58,7 +59,7 @@ pub struct InputBuffers {
 }
 
 impl InputBuffers {
-    /// Without anything in them.
+    /// Makes an empty buffer.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -97,7 +98,7 @@ impl InputBuffers {
         }
     }
 
-    /// What was read last.
+    /// The input that was read last.
     #[must_use]
     pub fn input(&self) -> OrderInput<'_> {
         OrderInput { pairs: &self.pairs, moving: &self.moving, positions: &self.positions }

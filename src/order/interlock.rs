@@ -1,9 +1,9 @@
-//! Predicts how long a pipeline that waits on hazards takes for an order of the collisions.
+//! Predicts the cycles of a pipeline that waits on hazards for an order of the collisions.
 //!
 //! A collision issues when the one before it has issued and the velocities of its moving bodies are
 //! written back, a window after their last use. One walk over the order gives both kinds of pass,
-//! which differ in their window alone. Memory is left out: an order changes what is waited for, not
-//! what is streamed.
+//! which differ in their window alone. Memory is left out: an order changes the stalls, and not the
+//! streams.
 //!
 //! Source: interface specification, hazards.
 
@@ -36,29 +36,29 @@ impl Interlock {
         }
     }
 
-    /// Cycles of all passes over `entries` entries without a hazard among them.
+    /// Cycles of all passes over `entries` entries without a hazard.
     pub(crate) fn cycles_without_hazards(&self, entries: usize) -> u64 {
         let passes: u64 = self.passes.iter().sum();
         let issues = entries.div_ceil(self.per_issue) as u64;
         issues.saturating_mul(self.interval).saturating_mul(passes)
     }
 
-    /// Cycles that the passes spend at the least on a body with `uses` collisions, one waiting for
-    /// the other.
+    /// The least number of cycles that the passes spend on a body with `uses` collisions, each of
+    /// which waits for the one before.
     pub(crate) fn cycles_of_one_body(&self, uses: usize) -> u64 {
         let between = uses.saturating_sub(1) as u64;
         let window = self.of_all_passes(self.windows);
         between.saturating_mul(window)
     }
 
-    /// Cycles of all passes, of which one of each kind takes so many.
+    /// Cycles of all passes, from the cycles of one pass of each kind.
     fn of_all_passes(&self, cycles: [u64; 2]) -> u64 {
         let [contact, friction] = [0, 1].map(|kind| cycles[kind].saturating_mul(self.passes[kind]));
         contact.saturating_add(friction)
     }
 }
 
-/// Counts cycles, in memory that is kept.
+/// Counts cycles. Its memory is kept from order to order.
 #[derive(Debug, Default)]
 pub(super) struct StallCounter {
     /// By body, and by kind of pass: the cycle from which its velocity can be read.
@@ -66,10 +66,10 @@ pub(super) struct StallCounter {
 }
 
 impl StallCounter {
-    /// Cycles of all passes over the collisions `entries` of the input, in this order, stalls included.
+    /// Cycles of all passes over the collisions `entries` of the input, in this order, stalls
+    /// included.
     ///
-    /// Counting ends early once there are more than `limit`; the result is then a lower bound that
-    /// is above `limit`.
+    /// Counting ends early above `limit`; the result is then a lower bound that is above `limit`.
     pub(super) fn cycles(
         &mut self,
         input: &OrderInput<'_>,

@@ -1,5 +1,5 @@
-//! This file says what a design is told that keeps only live bodies: where each body lives, where it
-//! is used first and last, and in which order velocities go in and results come out.
+//! Computes the extra data for a design that keeps only live bodies: the place of each body, its
+//! first and last use, and the orders in which velocities go in and results come out.
 //!
 //! ```text
 //! entry          0        1        2        3        4
@@ -7,20 +7,19 @@
 //! places         1  2     3  0     0  0     1  3     2  4      body 0 is static: place 0
 //! first use      F  F     F                                F
 //! last use                                  L  L     L  L
-//! velocities     1, 2, 3, 4, then what is never used
+//! velocities     1, 2, 3, 4, then the unused ones
 //! poses, results 1, 3, 2, 4, then the same
 //! ```
 //!
-//! All passes run side by side, each behind the one before it. Entry `n` issues to pass k when pass
-//! k - 1 has issued the last uses of its bodies and of those of all entries before it: entry
-//! `reach(n)` and everything before. Two things follow, and the accelerator waits for ever where they
-//! do not hold:
+//! All passes run side by side. A pass issues entry `n` when the pass before it has issued entry
+//! `reach(n)`: the last of the last uses of all bodies in entries 0 to `n`. Two rules follow; where
+//! one of them does not hold, the accelerator waits for ever:
 //!
 //! - `reach(n) - n` is at most the longest span of a body, which must be less than the delay lines
 //!   between the passes are long;
 //! - a body whose last use is entry `m` leaves its place once pass P - 1 has issued `m`, for which
-//!   pass 0 must have issued `reach(reach(...(m)))`, P - 1 times: only behind that entry may another
-//!   body take the place.
+//!   pass 0 must have issued `reach(reach(...(m)))`, P - 1 times: only behind that entry may
+//!   another body take the place.
 //!
 //! Source: interface specification, the windowed flow.
 
@@ -29,10 +28,10 @@ use pgs_interface::record::live::{FIRST, LAST, PLACE};
 
 use super::{OrderInput, Schedule};
 
-/// No entry: of a body that is not used.
+/// The first use of a body that has none.
 const NEVER: u32 = u32::MAX;
 
-/// What a design has room for.
+/// The capacity of a design for one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Room {
     /// Places for moving bodies.
@@ -41,41 +40,41 @@ pub(crate) struct Room {
     pub(crate) lag: u32,
     /// Contact and friction passes.
     pub(crate) passes: u32,
-    /// Entries that enter together: there are as many as fill whole issues.
+    /// Entries that enter together. The number of entries is a multiple of it.
     pub(crate) per_issue: u32,
 }
 
 impl Room {
-    /// What a design has room for in a step of so many passes.
+    /// The capacity of a design in a step of `passes` passes.
     pub(crate) fn of(window: &Window, passes: u32, per_issue: u32) -> Self {
         let places = window.slots.saturating_sub(1).min(PLACE);
         Self { places, lag: window.lag, passes, per_issue }
     }
 }
 
-/// Why a schedule cannot be sent.
+/// The reason why a schedule cannot be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Crowded {
+pub(crate) enum LiveError {
     /// A body lives too long.
-    Span { body: u32, first: u32, last: u32 },
-    /// There are too few places: so many are needed.
-    Places { held: u32 },
+    SpanTooLong { body: u32, first: u32, last: u32 },
+    /// The schedule needs `held` places, more than the design has.
+    TooFewPlaces { held: u32 },
 }
 
-/// How many bodies a schedule keeps on chip, and how long.
+/// The number of bodies that a schedule keeps on chip, and the length of their lives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct LiveReport {
     /// Most moving bodies between their first and their last use.
     pub most_alive: u32,
-    /// Most moving bodies that hold a place: from their first use until the last pass is done with
-    /// them.
+    /// Most moving bodies that hold a place: from their first use to the end of their last use in
+    /// the last pass.
     pub most_held: u32,
     /// Longest span of a moving body, from its first use to its last, entries.
     pub longest_span: u32,
 }
 
-/// Lives of the bodies of a step, in memory that is kept.
+/// Lives of the bodies of a step. The memory is kept from step to step.
 #[derive(Debug, Default)]
 pub(crate) struct Lives {
     words: Vec<[u32; 2]>,
@@ -84,7 +83,8 @@ pub(crate) struct Lives {
     report: LiveReport,
     /// First and last entry of each body.
     uses: Vec<(u32, u32)>,
-    /// For each entry the last that pass 0 must have issued before the last pass can issue it.
+    /// For each entry the last entry that pass 0 must have issued before the last pass can issue
+    /// it.
     reach: Vec<u32>,
     /// The entry behind the last use of the body in each place.
     occupied: Vec<u32>,
@@ -94,22 +94,22 @@ pub(crate) struct Lives {
 
 impl Lives {
     /// The words beside normal and offset of each entry's record: place and marks. Entries behind
-    /// the schedule's are empty.
+    /// the end of the schedule are empty.
     pub(crate) fn words(&self) -> &[[u32; 2]] {
         &self.words
     }
 
-    /// Moving bodies in the order of their first use, then those that are not used.
+    /// Moving bodies in the order of their first use, then the unused ones.
     pub(crate) fn velocities(&self) -> &[u32] {
         &self.velocities
     }
 
-    /// Moving bodies in the order in which they are done, then those that are not used.
+    /// Moving bodies in the order of their last use, then the unused ones.
     pub(crate) fn results(&self) -> &[u32] {
         &self.results
     }
 
-    /// What the schedule needs.
+    /// The demand of the schedule.
     pub(crate) fn report(&self) -> LiveReport {
         self.report
     }
@@ -118,13 +118,13 @@ impl Lives {
     /// collisions.
     ///
     /// # Errors
-    /// [`Crowded`]: a body that lives too long, or too few places.
-    pub(crate) fn settle(
+    /// [`LiveError`]: a body that lives too long, or too few places.
+    pub(crate) fn assign_places(
         &mut self,
         schedule: &Schedule,
         input: &OrderInput<'_>,
         room: Room,
-    ) -> Result<(), Crowded> {
+    ) -> Result<(), LiveError> {
         self.find_uses(schedule, input);
         self.order_bodies(schedule, input);
         self.report = LiveReport::default();
@@ -133,13 +133,13 @@ impl Lives {
         if let Some((body, (first, last))) = longest {
             self.report.longest_span = last - first;
             if last - first >= room.lag {
-                return Err(Crowded::Span { body, first: *first, last: *last });
+                return Err(LiveError::SpanTooLong { body, first: *first, last: *last });
             }
         }
         self.find_reach(schedule, input, room.passes);
         self.count(schedule, input);
         if self.report.most_held > room.places {
-            return Err(Crowded::Places { held: self.report.most_held });
+            return Err(LiveError::TooFewPlaces { held: self.report.most_held });
         }
         self.mark(schedule, input, room.places);
         let issues = self.words.len().next_multiple_of(room.per_issue.max(1) as usize);
@@ -182,7 +182,8 @@ impl Lives {
         }
     }
 
-    /// For each entry the one that pass 0 must have issued before the last pass can issue it.
+    /// For each entry finds the entry that pass 0 must have issued before the last pass can issue
+    /// it.
     fn find_reach(&mut self, schedule: &Schedule, input: &OrderInput<'_>, passes: u32) {
         self.reach.clear();
         let mut furthest = 0;
@@ -193,7 +194,8 @@ impl Lives {
             }
             self.reach.push(furthest);
         }
-        // `passes - 1` steps on. A step never leads back, so that what lies ahead is still as it was.
+        // `passes - 1` steps on. A step never leads back, so the entries ahead still hold the first
+        // step.
         for entry in 0..self.reach.len() {
             let mut reached = self.reach[entry];
             for _ in 2..passes {
@@ -210,7 +212,7 @@ impl Lives {
         }
     }
 
-    /// Counts the bodies that are alive, and those that hold a place.
+    /// Counts the bodies that are alive, and the bodies that hold a place.
     fn count(&mut self, schedule: &Schedule, input: &OrderInput<'_>) {
         let LiveReport { most_alive, most_held, .. } = &mut self.report;
         let mut done = moving_bodies(schedule, input).peekable();
@@ -231,16 +233,17 @@ impl Lives {
         }
     }
 
-    /// Writes the words of each entry. There are places enough.
+    /// Writes the words of each entry. The number of places was checked before.
     fn mark(&mut self, schedule: &Schedule, input: &OrderInput<'_>, places: u32) {
         self.words.clear();
         self.places.clear();
         self.places.resize(input.moving.len(), 0);
         self.occupied.clear();
         self.occupied.resize(places as usize + 1, 0);
-        // Taken in turn, so that bodies that live at the same time lie next to each other.
+        // Places are taken in turn, so that bodies that live at the same time lie next to each
+        // other.
         let mut next = 0;
-        // Entries before this one are done with.
+        // The places that are free after this entry have been released.
         let mut done = 0_u32;
         for (entry, bodies) in moving_bodies(schedule, input) {
             while self.reach.get(done as usize).is_some_and(|reached| *reached < entry) {
@@ -302,7 +305,7 @@ mod tests {
         };
         let order = schedule(&[Some(0), Some(1), None, Some(2), Some(3)]);
         let mut lives = Lives::default();
-        lives.settle(&order, &input, WIDE).expect("there is room");
+        lives.assign_places(&order, &input, WIDE).expect("there is room");
         let words = [
             [1 | FIRST, 2 | FIRST],
             [3 | FIRST, 0],
@@ -317,15 +320,18 @@ mod tests {
         assert_eq!(lives.report(), report);
         // One pass: bodies 1 and 3 are done when 4 comes, before they have left.
         lives
-            .settle(&order, &input, Room { passes: 1, places: 3, lag: 5, ..WIDE })
+            .assign_places(&order, &input, Room { passes: 1, places: 3, lag: 5, ..WIDE })
             .expect("just enough");
         assert_eq!(lives.words()[4], [2 | LAST, 1 | FIRST | LAST]);
         assert_eq!(lives.report(), LiveReport { most_held: 3, ..report });
         // Two passes: the second issues entry 3 once the first has issued entry 4.
         let two = Room { passes: 2, places: 3, lag: 5, ..WIDE };
-        assert_eq!(lives.settle(&order, &input, two), Err(Crowded::Places { held: 4 }));
-        let span = Crowded::Span { body: 2, first: 0, last: 4 };
-        assert_eq!(lives.settle(&order, &input, Room { lag: 4, ..WIDE }), Err(span));
+        assert_eq!(
+            lives.assign_places(&order, &input, two),
+            Err(LiveError::TooFewPlaces { held: 4 })
+        );
+        let span = LiveError::SpanTooLong { body: 2, first: 0, last: 4 };
+        assert_eq!(lives.assign_places(&order, &input, Room { lag: 4, ..WIDE }), Err(span));
     }
 
     #[test]
@@ -333,13 +339,13 @@ mod tests {
         let moving = [false, true, false, true, true];
         let input = OrderInput { pairs: &[], moving: &moving, positions: &[[0.0; 3]; 5] };
         let mut lives = Lives::default();
-        lives.settle(&Schedule::default(), &input, WIDE).expect("there is room");
+        lives.assign_places(&Schedule::default(), &input, WIDE).expect("there is room");
         assert_eq!((lives.velocities(), lives.results()), (&[1, 3, 4][..], &[1, 3, 4][..]));
         assert_eq!(lives.report(), LiveReport::default());
     }
 
-    /// Lets entries issue by the rules of the specification, without any time: what each pass does
-    /// next, as long as any can. Bodies must then be where the words say.
+    /// Lets entries issue by the rules of the specification, without time: each pass issues its
+    /// next entry as long as any pass can. Bodies must then be in the places that the words name.
     struct Accelerator<'a> {
         words: &'a [[u32; 2]],
         room: Room,
@@ -428,7 +434,7 @@ mod tests {
         }
     }
 
-    /// A line of bodies, each in touch with some near it: entries in a wild order.
+    /// A line of bodies, each in touch with some near it: entries in a random order.
     fn scene() -> impl Strategy<Value = (Vec<bool>, Vec<[u32; 2]>, Vec<Option<u32>>)> {
         (2_u32..40).prop_flat_map(|count| {
             let pairs = prop::collection::vec((0..count, 1..6_u32), 0..60);
@@ -446,7 +452,7 @@ mod tests {
                     state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                     usize::try_from(state >> 33).expect("31 bits") % below.max(1)
                 };
-                // Now and then far from where it was, now and then an empty entry.
+                // Now and then far from the old place, now and then an empty entry.
                 for at in 0..entries.len() {
                     let other = (at + random(5)).min(entries.len() - 1);
                     entries.swap(at, other);
@@ -460,8 +466,9 @@ mod tests {
     }
 
     proptest! {
-        /// Where the driver sees room the accelerator never waits for ever, finds every body in its
-        /// place, and gets and gives each exactly once; where it sees none there is none.
+        /// Where the driver finds room, the accelerator never waits for ever, finds every body in
+        /// its place, and receives and sends each body exactly once. Where the driver finds none,
+        /// the accelerator has none.
         #[test]
         fn marks_decode_back_and_never_lock_up(
             (moving, pairs, entries) in scene(),
@@ -474,7 +481,7 @@ mod tests {
             let order = schedule(&entries);
             let mut lives = Lives::default();
             let wide = Room { places: 40, lag: 100, passes, per_issue };
-            lives.settle(&order, &input, wide).expect("40 bodies, 66 entries");
+            lives.assign_places(&order, &input, wide).expect("40 bodies, 66 entries");
             let needs = lives.report();
             let room = Room {
                 places: if tight[0] { needs.most_held.max(1) } else { wide.places },
@@ -482,7 +489,7 @@ mod tests {
                 passes,
                 per_issue,
             };
-            lives.settle(&order, &input, room).expect("what it needs is enough");
+            lives.assign_places(&order, &input, room).expect("what it needs is enough");
             prop_assert_eq!(lives.report(), needs);
             let mut accelerator = Accelerator::new(lives.words(), lives.velocities(), room);
             prop_assert!(accelerator.run(), "stuck at {:?}", accelerator.issued);
@@ -508,8 +515,8 @@ mod tests {
             // The same marks in delay lines that are an entry too short.
             if passes > 1 && needs.longest_span > 0 {
                 let short = Room { lag: needs.longest_span, ..room };
-                let refused = Lives::default().settle(&order, &input, short);
-                let too_long = matches!(refused, Err(Crowded::Span { .. }));
+                let refused = Lives::default().assign_places(&order, &input, short);
+                let too_long = matches!(refused, Err(LiveError::SpanTooLong { .. }));
                 prop_assert!(too_long, "{:?}", refused);
                 let mut accelerator = Accelerator::new(lives.words(), lives.velocities(), short);
                 prop_assert!(!accelerator.run(), "it would have gone");
@@ -517,8 +524,8 @@ mod tests {
             if needs.most_held > 1 {
                 let few = Room { places: needs.most_held - 1, ..room };
                 prop_assert_eq!(
-                    Lives::default().settle(&order, &input, few),
-                    Err(Crowded::Places { held: needs.most_held })
+                    Lives::default().assign_places(&order, &input, few),
+                    Err(LiveError::TooFewPlaces { held: needs.most_held })
                 );
             }
         }

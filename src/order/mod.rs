@@ -1,4 +1,4 @@
-//! This folder decides in which order the collisions of a step enter the pipeline.
+//! Decides in which order the collisions of a step enter the pipeline.
 //!
 //! ```text
 //! bodies, collisions -> input -> sweep -> groups -> schedule -> check
@@ -9,11 +9,12 @@
 //! reads a stale velocity, and the impulse of the earlier one is lost. [`Order::HazardFree`] spaces
 //! the uses of every body so that this never happens, keeps few bodies alive at once (alive: from a
 //! body's first use to its last), and leaves slots empty only where nothing fits;
-//! [`Order::HazardFreeNearby`] instead keeps the collisions near to where they were given. Hardware that
-//! ignores hazards, hardware that waits on them and a sequential solver then give the same bits.
+//! [`Order::HazardFreeNearby`] instead keeps the collisions near to where they were given. Hardware
+//! that ignores hazards, hardware that waits on them and a sequential solver then give the same
+//! bits.
 //!
-//! An order is a function of its input alone: the same on every machine, and the same whatever was
-//! ordered before, so that a step taken again from a stored state is the same step.
+//! An order is a function of its input alone. It is the same on every machine, and does not depend
+//! on earlier orders, so that a step that is repeated from a stored state is the same step.
 //!
 //! # Example
 //!
@@ -25,7 +26,7 @@
 //! let input = OrderInput {
 //!     pairs: &[[0, 1], [0, 2], [0, 3], [0, 4], [0, 5], [1, 2], [2, 3], [3, 4], [4, 5]],
 //!     moving: &[false, true, true, true, true, true],
-//!     positions: &[[0.0; 3], [0.0; 3], [2.0, 0.0, 0.0], [4.0, 0.0, 0.0], [6.0, 0.0, 0.0], [8.0, 0.0, 0.0]],
+//!     positions: &[0.0, 0.0, 2.0, 4.0, 6.0, 8.0].map(|x| [x, 0.0, 0.0]),
 //! };
 //! let window = IssueWindow::new(3, 1)?;
 //! let mut orderer = Orderer::new();
@@ -59,7 +60,7 @@ pub use error::OrderError;
 pub use input::{InputBuffers, OrderInput};
 pub(crate) use interlock::Interlock;
 pub use live::LiveReport;
-pub(crate) use live::{Crowded, Lives, Room};
+pub(crate) use live::{LiveError, Lives, Room};
 pub use orderer::{OrderCosts, Orderer, colour_count};
 pub use report::{OrderReport, live_curve};
 pub use schedule::{Ordered, Schedule};

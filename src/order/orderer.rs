@@ -1,4 +1,4 @@
-//! This file makes an order of the kind that is asked for.
+//! Makes an order of the requested kind.
 
 use pgs_support::float_env::standard;
 
@@ -8,8 +8,9 @@ use super::sweep::Sweep;
 use super::tail::Tail;
 use super::{IssueWindow, Order, OrderError, OrderInput, Schedule, body_by_body, colours};
 
-/// Makes orders, keeping its memory from one to the next: no allocation once it has [made](Self::made) the
-/// same of a scene of that size, for [`Order::AsGiven`] and the orders without hazards.
+/// Makes orders, and keeps its memory from one to the next. For [`Order::AsGiven`] and the orders
+/// without hazards it allocates nothing once it has [made](Self::made) the same order of a scene of
+/// the same size.
 #[derive(Debug)]
 pub struct Orderer {
     sweep: Sweep,
@@ -30,10 +31,10 @@ impl Default for Orderer {
 }
 
 impl Orderer {
-    /// Entries of a schedule, at most, if not said otherwise.
+    /// The default limit of a schedule's length, entries.
     pub const ENTRIES_MAX: usize = 1 << 26;
 
-    /// Without memory of its own yet.
+    /// Makes an orderer that has allocated nothing yet.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -48,20 +49,20 @@ impl Orderer {
         }
     }
 
-    /// Allows schedules of so many entries, empty ones included, and no longer ones.
+    /// Sets the largest length of a schedule, in entries, empty ones included.
     pub fn set_limit(&mut self, entries: usize) {
         self.limit = entries.min(Self::ENTRIES_MAX);
     }
 
     /// Orders the collisions of a step.
     ///
-    /// Only the orders without hazards look at the window. The order is a function of the arguments
+    /// Only the orders without hazards use the window. The order is a function of the arguments
     /// alone.
     ///
     /// # Errors
-    /// [`OrderError`]: arrays of unequal lengths, a pair that names a body that is not there or one
-    /// body twice, too many of either, or a body with so many collisions that the schedule would be
-    /// longer than the [limit](Self::set_limit).
+    /// [`OrderError`]: arrays of unequal lengths, a pair with a body that does not exist or with
+    /// one body twice, too many bodies or collisions, or a body with too many collisions: the
+    /// schedule would be longer than the [limit](Self::set_limit).
     pub fn order(
         &mut self,
         input: &OrderInput<'_>,
@@ -96,7 +97,7 @@ impl Orderer {
             }
             Order::HazardFreeNearby => {
                 self.sweep.as_given(input);
-                let most = hardly_longer(input.pairs.len(), self.most_uses(input), window);
+                let most = nearby_entries_max(input.pairs.len(), self.most_uses(input), window);
                 if self.place(window, self.limit.min(most)).is_err() {
                     made = Order::HazardFree;
                     self.sweep.run(input);
@@ -108,17 +109,18 @@ impl Orderer {
         Ok(())
     }
 
-    /// Orders the collisions of a step for a pipeline that waits on hazards: as given, or near to that
-    /// and without hazards, whichever takes fewer cycles. [`made`](Self::made) says which.
+    /// Orders the collisions of a step for a pipeline that waits on hazards. Picks the order with
+    /// fewer cycles: as given, or near to it and without hazards. [`made`](Self::made) tells the
+    /// choice.
     ///
-    /// Such a pipeline needs no empty entries, because it waits by itself: the order has none. A body
-    /// with many collisions makes both orders wait about as long; as given is taken unless the other
-    /// saves more than one cycle in a hundred, and where there is no window to order for. Time and
-    /// memory are linear in the input.
+    /// Such a pipeline waits by itself, and the order has no empty entries. A body with many
+    /// collisions makes both orders wait about as long. The order as given is therefore taken
+    /// unless the other one saves more than one cycle in a hundred, and wherever there is no window
+    /// to order for. Time and memory are linear in the input.
     ///
     /// # Errors
-    /// [`OrderError`]: arrays of unequal lengths, a pair that names a body that is not there or one
-    /// body twice, too many of either.
+    /// [`OrderError`]: arrays of unequal lengths, a pair with a body that does not exist or with
+    /// one body twice, too many bodies or collisions.
     pub(crate) fn cheapest(
         &mut self,
         input: &OrderInput<'_>,
@@ -132,11 +134,12 @@ impl Orderer {
         let uses = self.most_uses(input);
         let no_order_beats =
             pipeline.cycles_without_hazards(collisions).max(pipeline.cycles_of_one_body(uses));
-        let longest = window.map_or(0, |window| hardly_longer(collisions, uses, window));
-        let counted_to = hardly_more(pipeline.cycles_without_hazards(longest).max(no_order_beats));
+        let longest = window.map_or(0, |window| nearby_entries_max(collisions, uses, window));
+        let counted_to =
+            one_percent_more(pipeline.cycles_without_hazards(longest).max(no_order_beats));
         let mut as_given = self.stalls.cycles(input, given(), pipeline, counted_to);
         let window = match window {
-            Some(window) if as_given > hardly_more(no_order_beats) => window,
+            Some(window) if as_given > one_percent_more(no_order_beats) => window,
             _ => return Ok(OrderCosts { as_given, reordered: None }),
         };
         match self.order(input, Order::HazardFreeNearby, window) {
@@ -147,13 +150,13 @@ impl Orderer {
             }
             Err(error) => return Err(error),
         }
-        // Without its empty entries it takes no longer.
+        // Without its empty entries the order takes no longer.
         let mut reordered = pipeline.cycles_without_hazards(self.schedule.len());
         self.schedule.drop_empty();
-        if as_given <= hardly_more(reordered) {
+        if as_given <= one_percent_more(reordered) {
             let entries = self.schedule.entries.iter().copied();
             reordered = self.stalls.cycles(input, entries, pipeline, u64::MAX);
-            let enough = hardly_more(reordered);
+            let enough = one_percent_more(reordered);
             if counted_to < enough {
                 as_given = self.stalls.cycles(input, given(), pipeline, enough);
             }
@@ -175,55 +178,56 @@ impl Orderer {
         moving.map(|(uses, _)| *uses as usize).max().unwrap_or(0)
     }
 
-    /// Places what was swept so that there are no hazards, in at most so many entries.
+    /// Places the swept collisions without hazards, in at most `limit` entries.
     fn place(&mut self, window: IssueWindow, limit: usize) -> Result<(), OrderError> {
-        let moving = self.sweep.moving();
+        let static_rank = self.sweep.static_rank();
         let sweep = &mut self.sweep.collisions;
-        self.tail.bring_forward(sweep, window.entries(), moving);
-        self.groups.place(sweep, moving, window, limit, &mut self.schedule)
+        self.tail.bring_forward(sweep, window.entries(), static_rank);
+        self.groups.place(sweep, static_rank, window, limit, &mut self.schedule)
     }
 
-    /// What the order made last is: what was asked for, or [`Order::HazardFree`] in its place. After an error
-    /// it says nothing.
+    /// The kind of the last order: the requested kind, or [`Order::HazardFree`] in its place. After
+    /// an error the value has no meaning.
     #[must_use]
     pub fn made(&self) -> Order {
         self.made
     }
 
-    /// The order made last; empty before the first.
+    /// The schedule of the last order; empty before the first.
     #[must_use]
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }
 }
 
-/// Entries of [`Order::HazardFreeNearby`] at most, of so many collisions, of which a moving body has so many.
+/// Largest number of entries of [`Order::HazardFreeNearby`] for `collisions` collisions, if the
+/// busiest moving body has `uses` of them.
 ///
-/// Whatever the order, the uses of a body lie a window apart. Beside that one entry in 64 and four windows
-/// may be empty: a choice, by which most piles of the thesis' cubes are left where they are (`pgs order
-/// --grid` shows the empty entries of either order).
-pub(super) fn hardly_longer(collisions: usize, uses: usize, window: IssueWindow) -> usize {
+/// In every order the uses of a body lie a window apart. Beyond that, one entry in 64 and four
+/// windows may be empty. This is a choice: it leaves most piles of the thesis' cubes where they are
+/// (`pgs order --grid` shows the empty entries of either order).
+pub(super) fn nearby_entries_max(collisions: usize, uses: usize, window: IssueWindow) -> usize {
     let entries = collisions.max(uses.saturating_sub(1) * window.entries());
-    // One empty entry in 64 is one beside each 63 others.
+    // One empty entry in 64 is one beside 63 others.
     entries + entries / 63 + 4 * window.entries()
 }
 
-/// What two orders cost a pipeline that waits on hazards: cycles of all passes of a step, stalls
-/// included, waits for memory and the filling of the pipeline left out.
+/// The cost of two orders on a pipeline that waits on hazards: cycles of all passes of a step,
+/// including stalls. Waits for memory and the fill of the pipeline are left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct OrderCosts {
-    /// Of [`Order::AsGiven`]. Where the other order was taken this is a lower bound: counting ends
-    /// when it is known to be more.
+    /// Cost of [`Order::AsGiven`]. Where the other order was taken this is a lower bound, because
+    /// counting ends as soon as the cost is known to be higher.
     pub as_given: u64,
-    /// Of [`Order::HazardFreeNearby`] without empty entries; `None` where none was made: hardly any
-    /// order takes less than as given, or a body has too many collisions to order them. Where it was
-    /// taken this is an upper bound.
+    /// Cost of [`Order::HazardFreeNearby`] without empty entries. `None` where this order was not
+    /// made: hardly any order takes fewer cycles than as given, or a body has too many collisions
+    /// to order them. Where it was taken this is an upper bound.
     pub reordered: Option<u64>,
 }
 
-/// One part in a hundred more: what another order must save at the least.
-const fn hardly_more(cycles: u64) -> u64 {
+/// One part in a hundred more: another order must save at least this much.
+const fn one_percent_more(cycles: u64) -> u64 {
     cycles.saturating_add(cycles / 100)
 }
 

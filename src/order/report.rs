@@ -1,24 +1,24 @@
-//! This file measures a schedule: hazards, lost updates, empty entries, bodies alive, spans.
+//! Measures a schedule: hazards, lost updates, empty entries, bodies alive, spans.
 
 use pgs_support::float_env::standard;
 
 use super::{IssueWindow, OrderError, OrderInput, Schedule};
 
-/// What a schedule costs on hardware of a window.
+/// The cost of a schedule on hardware with a given window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct OrderReport {
     /// Entries with a collision.
     pub collisions: usize,
-    /// Entries without.
+    /// Entries without a collision.
     pub empty: usize,
     /// Issue slots.
     pub slots: usize,
     /// Collisions that share a moving body with one of the `depth - 1` issue slots before, or with
     /// one before in its own slot: without an interlock they read a stale velocity.
     pub hazards: usize,
-    /// Write-backs that a later one of the same body overwrites without having seen them: without
-    /// an interlock these impulses are lost.
+    /// Write-backs that a later write-back of the same body overwrites without having read them:
+    /// without an interlock these impulses are lost.
     pub lost_updates: usize,
     /// Most moving bodies alive in one issue slot. A body is alive from its first use to its last.
     pub most_alive: usize,
@@ -32,7 +32,8 @@ impl OrderReport {
     /// Measures a schedule of the input's collisions.
     ///
     /// # Errors
-    /// [`OrderError`]: the input cannot be ordered, or an entry names a collision that is not there.
+    /// [`OrderError`]: the input cannot be ordered, or an entry names a collision that is not
+    /// there.
     pub fn measure(
         schedule: &Schedule,
         input: &OrderInput<'_>,
@@ -97,8 +98,8 @@ fn share(part: usize, whole: usize) -> f64 {
     if whole == 0 { 0.0 } else { standard(|| part as f64 / whole as f64) }
 }
 
-/// First and last slot of each moving body that is used; `each` sees every collision's slot and
-/// moving bodies.
+/// First and last slot of each moving body that is used. Calls `each` with every collision's slot
+/// and moving bodies.
 fn lives(
     schedule: &Schedule,
     input: &OrderInput<'_>,
@@ -169,7 +170,7 @@ mod tests {
         // Spans 1, 0, 1, 0.
         assert!((report.mean_span - 0.5).abs() < 1e-12);
         assert_eq!(measured(&entries, 1, 1).hazards, 0);
-        // Body 1 three slots after itself.
+        // The second use of body 1 lies three slots behind the first.
         let apart = [Some(0), Some(2), None, Some(1), Some(3)];
         assert_eq!(measured(&apart, 3, 1).hazards, 0);
         assert_eq!(measured(&apart, 4, 1).hazards, 2);

@@ -1,8 +1,9 @@
-//! This file holds an order: which collision stands in which entry, and which entries are empty.
+//! Holds an order: the collision of each entry, and the empty entries.
 
 use crate::scene::{Collision, Collisions, Structures};
 
-/// What an empty entry holds. No collision has this index: there are fewer.
+/// The value of an empty entry. No collision has this index, because the number of collisions is
+/// smaller.
 pub(super) const EMPTY: u32 = u32::MAX;
 
 /// The order in which collisions enter the pipeline.
@@ -22,7 +23,7 @@ impl Schedule {
         self.entries.len()
     }
 
-    /// Whether there are none.
+    /// Whether the schedule has no entries.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
@@ -40,7 +41,7 @@ impl Schedule {
         self.empty
     }
 
-    /// The collision in an entry; `None` if the entry is empty or not there.
+    /// The collision in an entry; `None` if the entry is empty or does not exist.
     #[must_use]
     #[inline]
     pub fn get(&self, entry: usize) -> Option<usize> {
@@ -67,7 +68,7 @@ impl Schedule {
     }
 }
 
-/// From the collision of each entry; `None` is an empty one.
+/// Makes a schedule from the collision of each entry; `None` is an empty one.
 impl FromIterator<Option<u32>> for Schedule {
     fn from_iter<I: IntoIterator<Item = Option<u32>>>(entries: I) -> Self {
         let entries: Vec<u32> = entries.into_iter().map(|entry| entry.unwrap_or(EMPTY)).collect();
@@ -76,15 +77,15 @@ impl FromIterator<Option<u32>> for Schedule {
     }
 }
 
-/// Collisions in the order of a schedule, an empty entry being one without contact points.
+/// Collisions in the order of a schedule. An empty entry is a collision without contact points.
 ///
-/// Such padding has no effect on the hardware, and is refused from callers: this view is for what
-/// is packed, not for what is validated.
+/// Such padding has no effect on the hardware, and is refused from callers: this view serves
+/// packing, and not validation.
 #[derive(Debug)]
 pub struct Ordered<'a, C: ?Sized> {
     /// The collisions, as given.
     pub collisions: &'a C,
-    /// Their order, made for as many collisions.
+    /// Their order; it was made for the same number of collisions.
     pub schedule: &'a Schedule,
 }
 
@@ -102,7 +103,7 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
 
     fn structures(&self) -> Option<Structures<'_>> {
         match self.collisions.structures()? {
-            // An empty entry is beyond them all.
+            // The index of an empty entry lies beyond the array.
             Structures::Array(all) if all.len() == self.collisions.len() => {
                 Some(Structures::Ordered { all, order: &self.schedule.entries })
             }
@@ -111,8 +112,8 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
     }
 
     #[inline]
-    fn soon(&self, index: usize) {
-        self.schedule.get(index).into_iter().for_each(|index| self.collisions.soon(index));
+    fn prefetch(&self, index: usize) {
+        self.schedule.get(index).into_iter().for_each(|index| self.collisions.prefetch(index));
     }
 
     fn lengths_agree(&self) -> bool {

@@ -1,16 +1,17 @@
-//! This file puts collisions in the order in which a plane sweeping through the scene meets them.
+//! Puts collisions in the order in which a plane that sweeps through the scene meets them.
 //!
-//! Bodies are ranked along an axis, and a collision stands at the sum of its bodies' ranks; one
-//! with a static body stands where its other body is. Ranks and not coordinates, so that a body far
-//! away changes nothing. The axis is the one along which the moving bodies are spread out furthest,
-//! because few bodies are then met at a time, tilted towards the second so that a layer of equal
-//! coordinates is swept as well.
+//! Bodies are ranked along an axis, and a collision stands at the sum of its bodies' ranks; a
+//! collision with a static body stands at the other body. Ranks serve in place of coordinates, so
+//! that a body far away changes nothing. The axis is the one along which the moving bodies spread
+//! furthest, because the plane then meets few bodies at a time. It is tilted towards the second
+//! axis, so that a layer of equal coordinates is swept as well.
 //!
 //! Both sorts are by counting: bodies in two passes over the leading bits of their coordinate,
-//! collisions in one pass over buckets of neighbouring sums. What falls together keeps the order
-//! in which it was given.
+//! collisions in one pass over buckets of neighbouring sums. Collisions with equal keys keep the
+//! order in which they were given.
 //!
-//! Or the order given is that of the sweep, and a body's index its rank.
+//! For an order near to the given one there is no sweep: the collisions stay as given, and a body's
+//! index is its rank.
 
 use super::OrderInput;
 
@@ -20,33 +21,33 @@ const TILT: f32 = 0.1;
 /// of nearly equal length do not take turns from step to step.
 const LONGER: f64 = 1.21;
 
-/// Bits of a body's coordinate that are sorted by, and bits of one pass.
+/// Leading bits of a body's coordinate that the sort uses, and bits of one pass.
 const KEY_BITS: u32 = 2 * DIGIT_BITS;
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
-/// Most buckets of collisions.
+/// Largest number of buckets of collisions.
 const BUCKETS_MAX: usize = 1 << 14;
 
-/// Rank of what does not move, until the sweep is made.
+/// Rank of a static body until the sweep is made.
 const STATIC: u32 = u32::MAX;
 
-/// A collision where the sweep meets it.
+/// A collision in the order of the sweep.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Swept {
-    /// Ranks of its bodies; a static one has the rank after the last.
+    /// Ranks of its bodies; a static body has the rank after the last.
     pub(super) ranks: [u32; 2],
-    /// Its index as given.
+    /// Its index in the given order.
     pub(super) index: u32,
 }
 
-/// Ranks and swept collisions, in memory that is kept.
+/// Ranks and swept collisions. The memory is kept from order to order.
 #[derive(Debug, Default)]
 pub(super) struct Sweep {
     /// Coordinate and index of the moving bodies, and room to sort them.
     keys: Vec<(u32, u32)>,
     sorted: Vec<(u32, u32)>,
     ranks: Vec<u32>,
-    moving: u32,
+    moving_count: u32,
     /// Where the next collision of each bucket goes.
     buckets: Vec<u32>,
     bucket_of: Vec<u16>,
@@ -54,9 +55,9 @@ pub(super) struct Sweep {
 }
 
 impl Sweep {
-    /// The rank of every static body, which is above that of every moving one.
-    pub(super) fn moving(&self) -> u32 {
-        self.moving
+    /// The rank of every static body. It is above the rank of every moving one.
+    pub(super) fn static_rank(&self) -> u32 {
+        self.moving_count
     }
 
     /// Sweeps the collisions of an input that was checked.
@@ -65,14 +66,14 @@ impl Sweep {
         self.sort(input.pairs);
     }
 
-    /// Takes the collisions of an input that was checked as they are given.
+    /// Takes the collisions of a checked input in their given order.
     pub(super) fn as_given(&mut self, input: &OrderInput<'_>) {
         let OrderInput { pairs, moving, .. } = *input;
         #[allow(clippy::cast_possible_truncation, reason = "an index of each is a u32: checked")]
-        let still = moving.len() as u32;
-        let rank = |body: u32| if moving[body as usize] { body } else { still };
+        let static_rank = moving.len() as u32;
+        let rank = |body: u32| if moving[body as usize] { body } else { static_rank };
         let swept = |(index, pair): (u32, &[u32; 2])| Swept { ranks: pair.map(rank), index };
-        self.moving = still;
+        self.moving_count = static_rank;
         self.collisions.clear();
         self.collisions.extend((0..).zip(pairs).map(swept));
     }
@@ -104,16 +105,16 @@ impl Sweep {
         }
         self.ranks.clear();
         self.ranks.resize(input.moving.len(), STATIC);
-        self.moving = 0;
+        self.moving_count = 0;
         for (_, index) in &self.keys {
-            self.ranks[*index as usize] = self.moving;
-            self.moving += 1;
+            self.ranks[*index as usize] = self.moving_count;
+            self.moving_count += 1;
         }
     }
 
     /// Sorts the collisions by the sum of their bodies' ranks.
     fn sort(&mut self, pairs: &[[u32; 2]]) {
-        let sums = 2 * self.moving as usize + 1;
+        let sums = 2 * self.moving_count as usize + 1;
         let mut shift = 0;
         while sums >> shift >= BUCKETS_MAX {
             shift += 1;
@@ -125,7 +126,7 @@ impl Sweep {
         self.bucket_of.clear();
         for pair in pairs {
             let [a, b] = ranks_of(pair);
-            // A body that does not move stands where the other one is.
+            // A collision with a static body stands at its other body.
             let (from_a, from_b) =
                 (if a == STATIC { b } else { a }, if b == STATIC { a } else { b });
             let sum = if a & b == STATIC { 0 } else { from_a + from_b };
@@ -138,7 +139,7 @@ impl Sweep {
         self.collisions.resize(pairs.len(), Swept::default());
         for (index, (pair, bucket)) in (0..).zip(pairs.iter().zip(&self.bucket_of)) {
             let next = &mut self.buckets[usize::from(*bucket)];
-            let ranks = ranks_of(pair).map(|rank| rank.min(self.moving));
+            let ranks = ranks_of(pair).map(|rank| rank.min(self.moving_count));
             self.collisions[*next as usize] = Swept { ranks, index };
             *next += 1;
         }
@@ -178,7 +179,7 @@ fn digits(key: u32) -> [usize; 2] {
     [key as usize % DIGITS, key as usize >> DIGIT_BITS]
 }
 
-/// Replaces counts by the sum of all before.
+/// Replaces each count by the sum of all counts before it.
 fn to_starts(counts: &mut [u32]) {
     let mut sum = 0;
     for count in counts {

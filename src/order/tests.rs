@@ -1,14 +1,14 @@
-//! Properties that every order has, whatever the scene.
+//! Properties of every order, in every scene.
 
 use proptest::prelude::*;
 
-use super::orderer::hardly_longer;
+use super::orderer::nearby_entries_max;
 use super::*;
 use crate::scene::{
     Body, Collision, CollisionArrays, Collisions, Contact, Pose, Shape, Structures, Velocity,
 };
 
-/// A scene without geometry: pairs, which bodies move, where they are.
+/// A scene without geometry: pairs, which bodies move, and positions.
 #[derive(Debug, Clone)]
 struct Given {
     pairs: Vec<[u32; 2]>,
@@ -25,7 +25,7 @@ impl Given {
 fn any_given(bodies: u32, pairs: usize) -> impl Strategy<Value = Given> {
     (2..=bodies).prop_flat_map(move |bodies| {
         let size = bodies as usize;
-        // The second body is another one.
+        // The second body differs from the first.
         let pair = (0..bodies, 1..bodies).prop_map(move |(a, b)| [a, (a + b) % bodies]);
         (
             prop::collection::vec(pair, 0..pairs),
@@ -81,7 +81,8 @@ proptest! {
         }
     }
 
-    /// It is one that is hardly longer than the collisions, or the other hazard-free one, and says which.
+    /// A hazard-free order near to the given one is hardly longer than the collisions, or gives way
+    /// to the other hazard-free order; [`Orderer::made`] tells which.
     #[test]
     fn a_nearby_order_is_short_or_the_other_one(
         given in any_given(200, 600),
@@ -93,7 +94,7 @@ proptest! {
         let uses = |body: u32| given.pairs.iter().filter(|pair| pair.contains(&body)).count();
         let moving = (0..).zip(&given.moving).filter(|(_, moving)| **moving);
         let most_uses = moving.map(|(body, _)| uses(body)).max().unwrap_or(0);
-        let most = hardly_longer(given.pairs.len(), most_uses, window);
+        let most = nearby_entries_max(given.pairs.len(), most_uses, window);
         if made == Order::HazardFreeNearby {
             prop_assert!(nearby.len() <= most, "{}", nearby.len());
         } else {
@@ -102,7 +103,7 @@ proptest! {
         }
     }
 
-    /// Every pair of uses is compared with every other.
+    /// Compares every pair of uses with every other.
     #[test]
     fn hazards_are_those_of_the_definition(given in any_given(40, 120), window in any_window()) {
         let input = given.input();
@@ -173,7 +174,7 @@ fn a_sheet_is_ordered_with_few_bodies_alive_and_hardly_an_empty_entry() {
         let report = OrderReport::measure(&schedule, &given.input(), window).expect("a schedule");
         // Two rows of 60, and two windows of two bodies a collision.
         assert!(report.most_alive <= 120 + 4 * window.entries(), "{report:?}");
-        // Emptying the pipeline at the end is all that costs.
+        // Emptying the pipeline at the end is the only cost.
         assert!(report.empty <= 2 * window.entries(), "{report:?}");
         let sorted = ordered(&given, Order::AsGiven, window);
         let sorted = OrderReport::measure(&sorted, &given.input(), window).expect("a schedule");
@@ -181,7 +182,7 @@ fn a_sheet_is_ordered_with_few_bodies_alive_and_hardly_an_empty_entry() {
     }
 }
 
-/// Collisions of bodies that are far apart are given one behind the other, as no sweep meets them.
+/// Collisions of distant bodies are given one behind the other, as no sweep meets them.
 #[test]
 fn a_nearby_order_moves_hardly_a_collision_far() {
     let mut given = sheet(160);
@@ -200,7 +201,7 @@ fn a_nearby_order_moves_hardly_a_collision_far() {
         let nearby = orderer.order(&given.input(), Order::HazardFreeNearby, window);
         let nearby = nearby.expect("an order").clone();
         assert_eq!(orderer.made(), Order::HazardFreeNearby, "{depth}");
-        // The open groups, what waits, and what is brought forward at the end.
+        // The open groups, the waiting collisions, and the ones brought forward at the end.
         let reach = 64 * (depth.div_ceil(8) * per_issue) as usize + 256 + 16 * window.entries();
         assert!(moved(&nearby) <= reach, "{depth}: {}", moved(&nearby));
         let swept = ordered(&given, Order::HazardFree, window);
@@ -219,11 +220,11 @@ fn a_nearby_order_is_about_as_long_as_any_has_to_be() {
         // Nine windows between ten uses.
         (10, 10, 432 + 6 + 192),
     ] {
-        assert_eq!(hardly_longer(collisions, uses, window), most, "{collisions}, {uses}");
+        assert_eq!(nearby_entries_max(collisions, uses, window), most, "{collisions}, {uses}");
     }
 }
 
-/// Where the other one is shorter, and the nearby one too long for the board.
+/// The other order is shorter, and the nearby one is too long for the board.
 #[test]
 fn a_nearby_order_gives_way_to_one_that_fits() {
     let window = IssueWindow::new(64, 1).expect("a window");
@@ -244,7 +245,7 @@ fn a_nearby_order_gives_way_to_one_that_fits() {
     assert_eq!(orderer.made(), Order::HazardFreeNearby);
 }
 
-/// The limit is that of the order that was made, and the error says it.
+/// The limit applies to the order that was made, and the error names it.
 #[test]
 fn a_nearby_order_has_the_same_limit() {
     let given = sheet(30);
@@ -271,7 +272,7 @@ fn a_body_that_meets_all_others_takes_one_collision_a_window() {
     let mut orderer = Orderer::new();
     let schedule = orderer.order(&given.input(), Order::HazardFree, window).expect("an order");
     assert_eq!(Checker::new().verify(schedule, &given.input(), window), Ok(()));
-    // 39 windows between 40 uses; a group is three slots, so that nothing lies closer than 27.
+    // 39 windows between 40 uses. A group is three slots, so the distance is never below 27.
     assert!((39 * 24 + 1..=39 * 27 + 1).contains(&schedule.len()), "{}", schedule.len());
 
     orderer.set_limit(500);
@@ -379,8 +380,8 @@ fn ordered_collisions_are_the_callers_with_padding_between() {
 
 #[test]
 fn collisions_in_order_lie_where_those_as_given_do() {
-    /// Those that lie somewhere, one by one.
-    fn lying<C: Collisions + ?Sized>(collisions: &C) -> Option<Vec<Collision>> {
+    /// The collisions in memory, one by one; `None` without structures.
+    fn in_memory<C: Collisions + ?Sized>(collisions: &C) -> Option<Vec<Collision>> {
         match collisions.structures()? {
             Structures::Array(all) => Some(all.to_vec()),
             Structures::Ordered { all, order } => {
@@ -392,16 +393,16 @@ fn collisions_in_order_lie_where_those_as_given_do() {
 
     let collision = |body_b| Collision { body_b, count: 1, ..Collision::NOTHING };
     let all: Vec<Collision> = (1..6).map(collision).collect();
-    assert_eq!(lying(&all).as_ref(), Some(&all));
-    assert_eq!(lying(all.as_slice()).as_ref(), Some(&all));
+    assert_eq!(in_memory(&all).as_ref(), Some(&all));
+    assert_eq!(in_memory(all.as_slice()).as_ref(), Some(&all));
     let schedule: Schedule =
         [Some(4), None, Some(2), Some(1), None, Some(0), Some(3)].into_iter().collect();
     let ordered = Ordered { collisions: &all, schedule: &schedule };
     let each: Vec<_> = (0..ordered.len()).map(|at| ordered.collision(at)).collect();
-    assert_eq!(lying(&ordered), Some(each));
+    assert_eq!(in_memory(&ordered), Some(each));
     assert_eq!(ordered.structures().map(|all| all.len()), Some(7));
 
-    // What lies nowhere, or in an order of its own, does not in this one.
+    // Collisions without structures, or in an order of their own, have none here either.
     let bodies: Vec<_> = all.iter().map(|collision| [collision.body_a, collision.body_b]).collect();
     let arrays = CollisionArrays {
         bodies: &bodies,
@@ -409,10 +410,10 @@ fn collisions_in_order_lie_where_those_as_given_do() {
         counts: &[1; 5],
         contacts: &[[[0.0; 4]; 4]; 5],
     };
-    assert!(lying(&Ordered { collisions: &arrays, schedule: &schedule }).is_none());
-    assert!(lying(&Ordered { collisions: &ordered, schedule: &schedule }).is_none());
+    assert!(in_memory(&Ordered { collisions: &arrays, schedule: &schedule }).is_none());
+    assert!(in_memory(&Ordered { collisions: &ordered, schedule: &schedule }).is_none());
 
-    /// Collisions of which all but one are said to lie somewhere.
+    /// Collisions whose structures lack the first one.
     struct ButOne(Vec<Collision>);
     impl Collisions for ButOne {
         fn len(&self) -> usize {
@@ -426,5 +427,5 @@ fn collisions_in_order_lie_where_those_as_given_do() {
         }
     }
     let but_one = ButOne(all.clone());
-    assert!(lying(&Ordered { collisions: &but_one, schedule: &schedule }).is_none());
+    assert!(in_memory(&Ordered { collisions: &but_one, schedule: &schedule }).is_none());
 }

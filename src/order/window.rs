@@ -1,4 +1,4 @@
-//! This file says how far apart the uses of a body must be, counted in issue slots.
+//! The distance that the uses of a body must have, counted in issue slots.
 
 use pgs_interface::profile::{Flow, Profile};
 
@@ -6,7 +6,7 @@ use super::OrderError;
 use crate::control_block::Capabilities;
 use crate::scene::StepParameters;
 
-/// Hazard window of a pipeline in issue slots, and how many collisions enter in one of them.
+/// Hazard window of a pipeline in issue slots, and number of collisions in each of them.
 ///
 /// Two uses of a moving body are free of hazards if their issue slots are at least
 /// [`depth`](Self::depth) apart. Collisions of one issue slot are zero apart.
@@ -37,8 +37,8 @@ impl IssueWindow {
     }
 
     /// The window of a step on a bitstream: the deeper of its two pipelines, since one order serves
-    /// both. Where all passes run side by side, an issue slot is the time in which every pass issues
-    /// one collision, which depends on how many passes there are.
+    /// both. Where all passes run side by side, an issue slot is the time in which every pass
+    /// issues one collision. It depends on the number of passes.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -47,7 +47,7 @@ impl IssueWindow {
         parameters: &StepParameters,
     ) -> Result<Self, OrderError> {
         let Capabilities { variant, contact, friction, .. } = capabilities;
-        // What the bitstream says of itself instead of what its profile has.
+        // The values that the bitstream reports replace the values of its profile.
         let reported = Profile {
             contact: *contact,
             friction: *friction,
@@ -59,7 +59,8 @@ impl IssueWindow {
         Self::of_profile(&reported, parameters)
     }
 
-    /// The window of a step on a design as its profile has it; errors as [`new`](Self::new).
+    /// The window of a step on a design with the values of its profile; errors as
+    /// [`new`](Self::new).
     pub(crate) fn of_profile(
         profile: &Profile,
         parameters: &StepParameters,
@@ -80,7 +81,7 @@ impl IssueWindow {
         Self::new(cycles.div_ceil(slot.max(1)).max(1), per_issue)
     }
 
-    /// Issue slots from a use of a body to the first that sees what it wrote.
+    /// Issue slots from a use of a body to the first slot that reads its write-back.
     #[must_use]
     pub const fn depth(self) -> u32 {
         self.depth
@@ -92,7 +93,8 @@ impl IssueWindow {
         self.per_issue
     }
 
-    /// Entries of a schedule between one use of a body and the first of the slot that sees it.
+    /// Entries of a schedule from a use of a body to the first entry of the slot that reads its
+    /// write-back.
     pub(super) const fn entries(self) -> usize {
         // At most 2^18.
         self.depth as usize * self.per_issue as usize
@@ -123,7 +125,7 @@ mod tests {
         let bullet = StepParameters::default();
         let windows: Vec<_> = profile::PROFILES.iter().map(|each| of(each, &bullet)).collect();
         assert_eq!(windows, [(12, 1), (158, 1), (106, 2), (316, 1), (79, 1), (106, 1)]);
-        // Twice as many contact passes take turns on their units.
+        // Twice the number of contact passes take turns on their units.
         let twice = StepParameters { contact_iterations: 8, ..bullet };
         assert_eq!(of(&profile::WINDOWED, &twice), (40, 1));
         assert_eq!(of(&profile::FLOAT, &twice), (158, 1));

@@ -392,13 +392,40 @@ pub enum PlatformError {
         /// What it overlaps.
         ram: String,
     },
-    /// Nobody serves a board at a socket.
+    /// There is no way to a board at a socket.
+    #[error("cannot connect to a board at {}", socket.display())]
+    NoServer {
+        /// The socket.
+        socket: PathBuf,
+        /// What the kernel says.
+        #[source]
+        source: std::io::Error,
+    },
+    /// Another driver has the served board.
+    #[error("the board served at {} has another driver: end that first", socket.display())]
+    ServerBusy {
+        /// The socket.
+        socket: PathBuf,
+    },
+    /// The process that serves a board does not answer the first message.
     #[error(
-        "no board is served at {}: start one with `pgs serve --socket {}`",
-        socket.display(),
+        "the board served at {} says nothing within {limit:?}: a step of another driver keeps it \
+         busy, or its process hangs; try again, or serve it again",
         socket.display()
     )]
-    NoServer {
+    ServerSilent {
+        /// The socket.
+        socket: PathBuf,
+        /// How long it may take.
+        limit: std::time::Duration,
+    },
+    /// The file of a served board's memory could not be used.
+    #[error("cannot {act} {}, the memory of the board served at {}", memory.display(), socket.display())]
+    ServedMemory {
+        /// What was tried.
+        act: &'static str,
+        /// The file.
+        memory: PathBuf,
         /// The socket.
         socket: PathBuf,
         /// What the kernel says.

@@ -33,6 +33,8 @@ impl PlatformError {
             Self::DevMemRefused { source, .. } => Some(of_dev_mem(source)),
             Self::NoMaintenance { path, source } => Some(of_maintenance(path, source)),
             Self::SyncMode { path, source, .. } => Some(of_mode(path, source)),
+            Self::NoServer { socket, source } => Some(of_socket(socket, source)),
+            Self::ServedMemory { memory, source, .. } => Some(of_served_memory(memory, source)),
             _ => None,
         }
     }
@@ -86,9 +88,7 @@ fn of_file(path: &Path, source: &io::Error) -> String {
         Some(Errno::EBUSY) => format!(
             "another program or a driver of the kernel has it: end that first (fuser -v {path})"
         ),
-        Some(Errno::EMFILE | Errno::ENFILE) => {
-            "close files, or raise the limit on open ones (ulimit -n)".to_owned()
-        }
+        Some(Errno::EMFILE | Errno::ENFILE) => FEWER_FILES.to_owned(),
         Some(Errno::ENOMEM | Errno::EAGAIN) => {
             "free memory, or raise the limits on it (ulimit -v, ulimit -l)".to_owned()
         }
@@ -115,6 +115,60 @@ fn of_dev_mem(source: &io::Error) -> String {
         ),
     }
 }
+
+/// A board's socket could not be connected to.
+fn of_socket(socket: &Path, source: &io::Error) -> String {
+    let path = socket.display();
+    let serve = format!("start one with `pgs serve --socket {path}`");
+    match errno(source) {
+        Some(Errno::ENOENT) => {
+            format!("no board is served there: {serve}, or name the socket of another")
+        }
+        Some(Errno::ECONNREFUSED) => {
+            format!("the socket is there, and nobody serves a board at it any more: {serve}")
+        }
+        Some(Errno::ENOTSOCK | Errno::EPROTOTYPE | Errno::ENOTDIR | Errno::ELOOP) => {
+            format!("{path} is not a board's socket: name the one that its `pgs serve` names")
+        }
+        Some(Errno::EACCES | Errno::EPERM) => format!(
+            "a board may be served there: run as the user who serves it, or let that user give the \
+             right to write to {path} and to search its folders (chmod, chgrp)"
+        ),
+        Some(Errno::EAGAIN) => format!(
+            "who listens there accepts nobody: end the other connections to {path}, or serve the \
+             board again"
+        ),
+        Some(Errno::EMFILE | Errno::ENFILE) => FEWER_FILES.to_owned(),
+        Some(Errno::ENAMETOOLONG) => {
+            "the kernel takes paths of sockets of at most 107 bytes: serve the board at a shorter \
+             one, or name it from a nearer folder"
+                .to_owned()
+        }
+        _ => format!("see whether the `pgs serve` of {path} still runs; otherwise {serve}"),
+    }
+}
+
+/// The memory's file of a served board could not be used.
+fn of_served_memory(memory: &Path, source: &io::Error) -> String {
+    let path = memory.display();
+    match errno(source) {
+        Some(Errno::EACCES | Errno::EPERM) => format!(
+            "run as the user who serves the board, or let that user give the right to read and \
+             write {path} and to search its folders (chmod, chgrp)"
+        ),
+        Some(Errno::EROFS) => format!(
+            "{path} is on a file system that is mounted read-only here: mount it writable, as a \
+             container's volume without :ro"
+        ),
+        Some(Errno::EMFILE | Errno::ENFILE) => FEWER_FILES.to_owned(),
+        _ => "name the file that its `pgs serve` names, with --memory file:PATH (a container sees \
+              it only in a folder that both share)"
+            .to_owned(),
+    }
+}
+
+/// What to do where a process has too many files open.
+const FEWER_FILES: &str = "close files, or raise the limit on open ones (ulimit -n)";
 
 /// The caches of a u-dma-buf cannot be maintained; without caches it can still be used.
 fn of_maintenance(path: &Path, source: &io::Error) -> String {

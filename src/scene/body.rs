@@ -1,4 +1,4 @@
-//! This file says what a body is, and how a caller's own arrays are seen as bodies.
+//! Bodies, and the trait that makes a caller's own arrays bodies.
 //!
 //! A step reads bodies and writes them back through [`Bodies`]. `[Body]` and `Vec<Body>` implement
 //! it (array of structures), [`BodyArrays`] implements it over separate arrays, and an engine with
@@ -12,8 +12,8 @@ use bytemuck::{Pod, Zeroable};
 pub struct Pose {
     /// Centre of mass, m.
     pub position: [f32; 3],
-    /// Unit quaternion in the order x, y, z, w; it turns the body's own axes to the world's. No rotation is
-    /// `[0.0, 0.0, 0.0, 1.0]`.
+    /// Unit quaternion in the order x, y, z, w; it turns the body's own axes to the world's. No
+    /// rotation is `[0.0, 0.0, 0.0, 1.0]`.
     pub orientation: [f32; 4],
 }
 
@@ -29,26 +29,28 @@ pub struct Velocity {
 
 /// A rigid body.
 ///
-/// Metres, kilograms, seconds and radians, in the world frame; which of its axes points up, gravity says.
-/// Its words lie in this order, without a gap.
+/// Units: metres, kilograms, seconds and radians, in the world frame. The direction of gravity
+/// decides which axis points up. The words lie in this order, without a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Body {
-    /// Where it is.
+    /// Position and orientation.
     pub pose: Pose,
-    /// How it moves; zero for a static body.
+    /// Linear and angular velocity; zero for a static body.
     pub velocity: Velocity,
     /// Index into the shapes given to `Accelerator::set_shapes`.
     pub shape: u32,
 }
 
-/// The bodies of a step, in whatever layout the caller keeps them.
+/// The bodies of a step, in the caller's own layout.
 ///
-/// A step calls [`body`](Self::body) for every index below [`len`](Self::len), any number of
-/// times, and, only when it has succeeded, [`commit`](Self::commit) once for each. Several threads may
-/// ask at the same time, each for bodies of its own ([`OpenOptions::pack_threads`]), and for that a
-/// container must be [`Sync`]; [`commit`](Self::commit) is the caller's thread alone. All of them run in the
-/// standard [floating-point environment](crate#the-floating-point-environment), and leave it as it is.
+/// A step calls [`body`](Self::body) for every index below [`len`](Self::len), any number of times.
+/// Only after success it calls [`commit`](Self::commit), once for each index.
+///
+/// Several threads may call [`body`](Self::body) at the same time, each for bodies of its own
+/// ([`OpenOptions::pack_threads`]); a container must therefore be [`Sync`]. Only the caller's
+/// thread calls [`commit`](Self::commit). All methods run in the standard [floating-point
+/// environment](crate#the-floating-point-environment), and must leave it as it is.
 ///
 /// [`OpenOptions::pack_threads`]: crate::OpenOptions::pack_threads
 pub trait Bodies: Sync {
@@ -61,21 +63,22 @@ pub trait Bodies: Sync {
     /// Stores the new state of body `index`.
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity);
 
-    /// All of them, where they lie in an array of structures: they are read there, without a copy.
+    /// All bodies as one slice, if they lie in an array of structures: a step reads them there,
+    /// without a copy.
     ///
-    /// They are what [`body`](Self::body) gives for every index. A view that changes anything leaves
-    /// it as it is.
+    /// Each must equal [`body`](Self::body) of its index. A view that changes any body must keep
+    /// the default.
     fn structures(&self) -> Option<&[Body]> {
         None
     }
 
-    /// Whether there are none.
+    /// Whether there are no bodies.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether everything that is kept separately is there for every index; a step refuses it
-    /// otherwise.
+    /// Whether separate arrays have an element for every index; otherwise a step refuses the
+    /// bodies.
     fn lengths_agree(&self) -> bool {
         true
     }

@@ -1,6 +1,6 @@
-//! This file says what a collision is, and how a caller's own arrays are seen as collisions.
+//! Collisions, and the trait that makes a caller's own arrays collisions.
 
-/// Contact points of a collision, at most.
+/// Largest number of contact points of a collision.
 pub use pgs_interface::record::CONTACT_POINTS;
 
 use bytemuck::{Pod, Zeroable};
@@ -14,22 +14,21 @@ use crate::simd::prefetch;
 pub struct Contact {
     /// The point on body B's surface, world frame, m.
     pub point: [f32; 3],
-    /// Signed distance along the normal, m: A's surface is at `point + distance * normal`, so that negative
-    /// is penetration.
+    /// Signed distance along the normal, m: A's surface is at `point + distance * normal`, so that
+    /// negative is penetration.
     ///
-    /// What a step makes of it says
-    /// [`StepParameters`](crate::StepParameters#a-distance-as-a-velocity), where it can also stand for a
-    /// velocity.
+    /// [`StepParameters`](crate::StepParameters#a-distance-as-a-velocity) describes its use in a
+    /// step, where it can also stand for a velocity.
     pub distance: f32,
 }
 
 /// Two bodies in contact at one to four points.
 ///
-/// Which of two bodies is A does not matter, as long as the normal points from B to A and the contact
-/// points lie on B. One of them may be static. All points have the one normal: a manifold with several, as
+/// Either body may be A, as long as the normal points from B to A and the contact points lie on B.
+/// One of them may be static. All points share the normal: a manifold with several normals, such as
 /// that of a mesh, is several collisions.
 ///
-/// Its words lie in this order, without a gap.
+/// The words lie in this order, without a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Collision {
@@ -41,12 +40,12 @@ pub struct Collision {
     pub normal: [f32; 3],
     /// Number of contact points, 1 to [`CONTACT_POINTS`].
     pub count: u32,
-    /// The contact points; those from `count` on are ignored.
+    /// The contact points; the elements from `count` on are ignored.
     pub contacts: [Contact; CONTACT_POINTS],
 }
 
 impl Collision {
-    /// One that says nothing: an entry without contact points, which has no effect.
+    /// An entry without contact points, which has no effect.
     pub(crate) const NOTHING: Self = Self {
         body_a: 0,
         body_b: 0,
@@ -56,14 +55,16 @@ impl Collision {
     };
 }
 
-/// The collisions of a step, in whatever layout the caller keeps them.
+/// The collisions of a step, in the caller's own layout.
 ///
 /// `[Collision]` and `Vec<Collision>` implement it, [`CollisionArrays`] implements it over separate
-/// arrays. The solver takes the collisions in the order that
-/// [`StepParameters::order`](crate::StepParameters::order) says. Several threads may ask at the same
-/// time, each for collisions of its own ([`OpenOptions::pack_threads`]), and for that a container must be
-/// [`Sync`]. Its methods run in the standard [floating-point
-/// environment](crate#the-floating-point-environment), and leave it as it is.
+/// arrays. The solver takes the collisions in the order of
+/// [`StepParameters::order`](crate::StepParameters::order).
+///
+/// Several threads may call it at the same time, each for collisions of its own
+/// ([`OpenOptions::pack_threads`]); a container must therefore be [`Sync`]. Its methods run in the
+/// standard [floating-point environment](crate#the-floating-point-environment), and must leave it
+/// as it is.
 ///
 /// [`OpenOptions::pack_threads`]: crate::OpenOptions::pack_threads
 pub trait Collisions: Sync {
@@ -73,29 +74,31 @@ pub trait Collisions: Sync {
     /// Collision `index`, which is below [`len`](Self::len).
     fn collision(&self, index: usize) -> Collision;
 
-    /// Where all of them lie, if they lie there as structures: they are read without a copy.
+    /// All collisions as structures in memory, if they lie there: a step reads them without a copy.
     ///
-    /// There are [`len`](Self::len) of them, each what [`collision`](Self::collision) gives. A view that
-    /// changes anything leaves this as it is. What is wrong there, and right as `collision` gives it, a step
-    /// refuses as [`InputError::Unsteady`](crate::validate::InputError::Unsteady).
+    /// Their number must be [`len`](Self::len), and each must equal [`collision`](Self::collision)
+    /// of its index. A view that changes any collision must keep the default. If a structure is
+    /// invalid and the value of `collision` is valid, a step refuses the input as
+    /// [`InputError::Unsteady`](crate::validate::InputError::Unsteady).
     fn structures(&self) -> Option<Structures<'_>> {
         None
     }
 
-    /// Says that collision `index`, which is below [`len`](Self::len), is asked for soon; of those that lie
-    /// there as [`structures`](Self::structures) it is not said. A layout that can have it fetched gains by
-    /// that, above all where collisions are read in an order of their own; nothing else comes of it.
-    fn soon(&self, index: usize) {
+    /// Hints that collision `index`, which is below [`len`](Self::len), will be read soon. It has
+    /// no other effect, and a step does not call it for [`structures`](Self::structures). A layout
+    /// that can prefetch gains by it, above all where collisions are read in another order than
+    /// they lie in memory.
+    fn prefetch(&self, index: usize) {
         let _ = index;
     }
 
-    /// Whether there are none.
+    /// Whether there are no collisions.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether everything that is kept separately is there for every index; a step refuses it
-    /// otherwise.
+    /// Whether separate arrays have an element for every index; otherwise a step refuses the
+    /// collisions.
     fn lengths_agree(&self) -> bool {
         true
     }
@@ -155,7 +158,7 @@ impl Collisions for CollisionArrays<'_> {
             .all(|length| *length == self.len())
     }
 
-    fn soon(&self, index: usize) {
+    fn prefetch(&self, index: usize) {
         self.bodies.get(index).into_iter().for_each(prefetch);
         self.normals.get(index).into_iter().for_each(prefetch);
         self.counts.get(index).into_iter().for_each(prefetch);

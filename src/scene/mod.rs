@@ -1,4 +1,4 @@
-//! What a caller gives a step and gets back.
+//! The input and output of a step: plain data of the caller.
 
 mod body;
 mod collision;

@@ -14,29 +14,33 @@ pub enum Order {
     /// No hazards at all and few bodies alive: swept along the longest axis of the scene, with uses
     /// of a body a whole depth apart and empty entries where nothing fits.
     HazardFree,
-    /// No hazards at all, and hardly a collision far from where it was given: what a step reads of the
-    /// caller's memory is in the caches, so that it is packed sooner. About as many bodies are alive as in
-    /// the order given. Any order has an entry for each collision, and a window between two uses of a body:
-    /// where this one would be longer than that by more than one entry in 64 and four windows, or longer
-    /// than the [limit](crate::order::Orderer::set_limit), it is [`Order::HazardFree`] instead, and [`Orderer::made`](crate::order::Orderer::made) says so.
+    /// No hazards at all, and collisions near to their given places. A step then finds the caller's
+    /// memory in the caches, and packs sooner. About the same number of bodies are alive as in the
+    /// order given.
+    ///
+    /// Any order has an entry for each collision, and a window between two uses of a body. This
+    /// order may be longer than that minimum by one entry in 64 and four windows. If it would be
+    /// longer still, or longer than the [limit](crate::order::Orderer::set_limit),
+    /// [`Order::HazardFree`] takes its place, and [`Orderer::made`](crate::order::Orderer::made)
+    /// tells so.
     HazardFreeNearby,
 }
 
 impl Order {
-    /// Whether no hazard is in it, whatever the window.
+    /// Whether the order is free of hazards, whatever the window.
     #[must_use]
     pub const fn is_hazard_free(self) -> bool {
         matches!(self, Self::HazardFree | Self::HazardFreeNearby)
     }
 }
 
-/// Which of the active bodies with the fewest collisions left comes first.
+/// The rule that picks one of several active bodies with the fewest collisions left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ties {
-    /// That of the lowest index.
+    /// The body of the lowest index.
     LowestIndex,
-    /// That which became active first.
+    /// The body that became active first.
     Oldest,
-    /// That which became active last.
+    /// The body that became active last.
     Newest,
 }

@@ -1,4 +1,4 @@
-//! This file holds the parameters of a step.
+//! The parameters of a step.
 
 use std::time::Duration;
 
@@ -10,24 +10,26 @@ use super::Order;
 ///
 /// # A distance as a velocity
 ///
-/// At a contact point that is `distance` apart, the solver lets A and B approach along the normal at
+/// At a contact point that is `distance` apart, the solver lets A and B approach along the normal
+/// at
 ///
 /// ```text
 /// (distance + position_drift) * position_coefficient / time_step        m/s
 /// ```
 ///
-/// and no faster; where that is negative they are pushed apart at least as fast. By the defaults a fifth of a
-/// penetration of more than 5 mm is so taken away in a step.
+/// and not faster. If this velocity is negative, the solver pushes them apart at least that fast.
+/// The defaults remove a fifth of the penetration beyond 5 mm in each step.
 ///
-/// With a drift of 0 and a coefficient equal to the time step this is `distance` itself, to rounding. A caller
-/// who knows better then gives a velocity in the place of every distance:
+/// With a drift of 0 and a coefficient equal to the time step this is `distance` itself, to
+/// rounding. The caller can then give a velocity in place of every distance:
 ///
 /// - restitution: minus the speed with which the bodies are to part;
-/// - Baumgarte stabilisation or ERP, with slop: minus a share of the penetration beyond the slop, by the time
-///   step;
-/// - a speculative margin: the gap by the time step, which lets the bodies touch and not penetrate.
+/// - Baumgarte stabilisation or ERP, with slop: minus a share of the penetration beyond the slop,
+///   divided by the time step;
+/// - a speculative margin: the gap divided by the time step, which lets the bodies touch and not
+///   penetrate.
 ///
-/// A ball dropped from 5 m, of which a bounce leaves 0.8 of its speed:
+/// A ball dropped from 5 m, with a bounce that leaves 0.8 of its speed:
 ///
 /// ```
 /// use zynq_pgs::{Accelerator, Body, Collision, Contact, OpenOptions, Pose, Shape};
@@ -58,8 +60,8 @@ use super::Order;
 ///     let before = bodies[1].velocity.linear[1];
 ///     bodies[1].velocity.linear[1] -= 9.8 * parameters.time_step;
 ///
-///     // The ground is A and the ball B: the normal points down, and the point is the ball's lowest. A ball
-///     // that comes down is to go up with 0.8 of its speed.
+///     // The ground is A and the ball B: the normal points down, and the point is the ball's
+///     // lowest. A ball that comes down is to go up with 0.8 of its speed.
 ///     let point = [0.0, height, 0.0];
 ///     let contact = Contact { point, distance: RESTITUTION * before.min(0.0) };
 ///     let touch = Collision {
@@ -94,28 +96,28 @@ use super::Order;
 pub struct StepParameters {
     /// Time step, s.
     pub time_step: f32,
-    /// Penetration that is left alone, m (Bullet: position drift).
+    /// Penetration that the solver leaves alone, m (Bullet: position drift).
     pub position_drift: f32,
-    /// Share of the penetration that a step takes away (Bullet: position coefficient).
+    /// Share of the penetration that a step removes (Bullet: position coefficient).
     pub position_coefficient: f32,
     /// Friction coefficient of every contact.
     pub friction: f32,
-    /// What is left of the angular velocity after a step that is integrated, from 0 to 1.
+    /// Share of the angular velocity that a step with integration leaves, from 0 to 1.
     pub angular_damping: f32,
-    /// Gravity, m/s², world frame; of a step that is integrated.
+    /// Gravity, m/s², world frame; only a step with integration uses it.
     pub gravity: [f32; 3],
     /// Passes of the contact solver over all collisions.
     pub contact_iterations: u32,
     /// Passes of the friction solver over all collisions.
     pub friction_iterations: u32,
-    /// Whether to integrate after the solver: damp, turn and move each body, then add gravity to its
-    /// velocity.
+    /// Whether to integrate after the solver: damp, turn and move each body, then add gravity to
+    /// its velocity.
     ///
-    /// Without it the velocities come back as the solver left them, undamped and without gravity, and the
-    /// poses unchanged on every profile: the caller's own, to the bit, also on one whose streams have sixteen
-    /// bits. An engine that keeps its own integration then keeps everything that belongs to it: forces and
-    /// gravity (added to the velocities before the step), gyroscopic terms, damping, continuous collision
-    /// detection, sleeping.
+    /// Without it the velocities come back as the solver left them, undamped and without gravity.
+    /// The poses stay the caller's own to the bit on every profile, also where the streams have
+    /// sixteen bits. An engine that keeps its own integration then keeps every other part of it:
+    /// forces and gravity (added to the velocities before the step), gyroscopic terms, damping,
+    /// continuous collision detection, sleeping.
     pub integrate: bool,
     /// Order in which the collisions are sent; `None` is the cheapest order on the board at hand:
     ///
@@ -125,27 +127,30 @@ pub struct StepParameters {
     /// | does not wait | [`Order::HazardFreeNearby`] |
     /// | keeps only live bodies on chip | [`Order::HazardFree`] |
     ///
-    /// [`StepReport::order_choice`](crate::StepReport::order_choice) says what was compared.
+    /// [`StepReport::order_choice`](crate::StepReport::order_choice) has the figures of the
+    /// comparison.
     ///
     /// A pipeline that waits solves the collisions one after the other in the order sent; a hazard
-    /// costs it cycles. Another order is another valid solution: to compare with a sequential solver
-    /// ask for [`Order::AsGiven`]. A pipeline that does not wait reads stale velocities at every
-    /// hazard and loses impulses: with any order that has hazards piles gain energy. One that keeps
-    /// only live bodies also refuses an order in which a body lives too long, or too many live at
-    /// once, as they do where collisions are sorted by body.
+    /// costs it cycles. Another order is another valid solution: to compare with a sequential
+    /// solver choose [`Order::AsGiven`].
+    ///
+    /// A pipeline that does not wait reads stale velocities at every hazard and loses impulses:
+    /// with any order that has hazards piles gain energy. A pipeline that keeps only live bodies
+    /// also refuses an order in which a body lives too long, or too many bodies live at once, as
+    /// happens where collisions are sorted by body.
     pub order: Option<Order>,
-    /// Whether to prove, before anything is sent, that no moving body recurs within the hazard
-    /// window; the step is refused otherwise. Where no order is asked for, a pipeline that waits is
-    /// then sent [`Order::HazardFreeNearby`] with its empty entries, which can be proved. For
+    /// Whether to verify, before anything is sent, that no moving body recurs within the hazard
+    /// window; a step with a hazard is refused. Without a choice of order, a pipeline that waits
+    /// then receives [`Order::HazardFreeNearby`] with its empty entries, which can be verified. For
     /// debugging: it takes host time, and memory anew in every step.
     pub verify_order: bool,
-    /// How long a step may take on the accelerator; `None` follows from the work: four times what
-    /// it takes if every collision waits for the one before it, what its bytes take at 100 MB/s,
-    /// and 10 ms.
+    /// Time limit of a step on the accelerator. `None` derives it from the work, as the sum of
+    /// three terms: four times the time in which every collision waits for the one before it, the
+    /// time of its bytes at 100 MB/s, and 10 ms.
     pub deadline: Option<Duration>,
-    /// How often a step that failed is taken again, after a reset that made the board ready. Each
-    /// attempt may take as long as the deadline says. What the board cannot be blamed for is not
-    /// tried again: refused input, results that are not finite, too little memory; nor is what was
+    /// Number of repetitions of a step that failed, each after a reset that made the board ready.
+    /// The deadline holds for each attempt. The driver repeats no step whose failure is not the
+    /// board's: refused input, results that are not finite, too little memory; and no step that was
     /// [cancelled](crate::Cancellation).
     pub retries: u32,
 }

@@ -1,9 +1,9 @@
-//! This file says what a shape is: the mass properties that bodies refer to by index.
+//! Shapes: the mass properties that bodies refer to by index.
 
 use pgs_support::float_env::standard;
 use thiserror::Error;
 
-/// A shape that has no mass properties.
+/// The error of a shape that has no mass properties.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
     "the {parameter} of a shape is {found:e}, expected a number above 0 with which mass and inertia \
@@ -50,13 +50,13 @@ impl Shape {
         Self { inverse_mass, inverse_inertia: [inverse_inertia; 3] }
     }
 
-    /// A solid box of uniform density: I.x = m (h.y² + h.z²) / 3, and so on around.
+    /// A solid box of uniform density: I.x = m (h.y² + h.z²) / 3, and likewise for y and z.
     ///
     /// Units: kg; half lengths of the edges along the body's x, y and z, m.
     ///
     /// # Errors
-    /// [`ShapeError`]: one of them is not above 0, or so large or small that the
-    /// inertia leaves f32.
+    /// [`ShapeError`]: an argument is not above 0, or it is so large or so small that the inertia
+    /// leaves f32.
     pub fn cuboid(mass: f32, half_extents: [f32; 3]) -> Result<Self, ShapeError> {
         let [hx, hy, hz] = half_extents;
         Self::solid(
@@ -105,7 +105,7 @@ impl Shape {
         })
     }
 
-    /// A shape whose inertia per kg follows from its sizes.
+    /// A shape whose inertia per kg follows from its size.
     fn solid<const N: usize>(
         mass: f32,
         sizes: &[(&'static str, f32); N],
@@ -125,7 +125,7 @@ impl Shape {
             }
         }
         // In f64 nothing here leaves the range of numbers, and f32 rounds once.
-        #[expect(clippy::cast_possible_truncation, reason = "rounded to f32, and looked at below")]
+        #[expect(clippy::cast_possible_truncation, reason = "rounded to f32, and checked below")]
         let inverse = |value: f64| (1.0 / value) as f32;
         let inverse_mass = inverse(mass.into());
         let inverse_inertia = inertia(sizes.map(|(_, size)| size.into()))
@@ -140,7 +140,7 @@ impl Shape {
         Ok(Self { inverse_mass, inverse_inertia })
     }
 
-    /// Whether its inertia is the same about every axis.
+    /// Whether the inertia is the same about every axis.
     #[must_use]
     #[inline(always)]
     pub fn is_isotropic(&self) -> bool {
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_capsule_lies_between_its_cylinder_and_its_sphere() {
-        // h = 1, r = 1, 10 kg: volumes 2 pi and 4/3 pi, so that 6 kg and 4 kg.
+        // h = 1, r = 1, 10 kg: volumes 2 pi and 4/3 pi, which are 6 kg and 4 kg.
         // I.y = 6/2 + 4 x 2/5 = 4.6; I.x = 6 (1/4 + 1/3) + 4 (2/5 + 1 + 3/4) = 3.5 + 8.6 = 12.1.
         let [x, y, z] = Shape::capsule(10.0, 1.0, 1.0).expect("a capsule").inverse_inertia;
         close(x, 1.0 / 12.1);

@@ -1,18 +1,18 @@
-//! Collisions that a caller keeps as structures, which a step reads in place.
+//! Collisions that a caller keeps as structures. A step reads them in place.
 
 use super::Collision;
 
-/// Where collisions lie ([`Collisions::structures`](crate::scene::Collisions::structures)).
+/// Collisions in memory ([`Collisions::structures`](crate::scene::Collisions::structures)).
 #[derive(Debug, Clone, Copy)]
 pub enum Structures<'a> {
-    /// One behind the other, in their order.
+    /// An array in the order of the collisions.
     Array(&'a [Collision]),
-    /// In an order of their own.
+    /// An array, and the order of the collisions in it.
     Ordered {
-        /// One behind the other.
+        /// The array.
         all: &'a [Collision],
-        /// Where each of them lies in `all`. Beyond its end is one without contact points, which has no
-        /// effect, and which a step refuses if it is a caller's.
+        /// The index of each collision in `all`. An index past the end stands for a collision
+        /// without contact points. It has no effect, and a step refuses it in a caller's input.
         order: &'a [u32],
     },
 }
@@ -27,7 +27,7 @@ impl Structures<'_> {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no collisions.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len() == 0

@@ -1,18 +1,20 @@
-//! This file is the accelerator as a caller sees it, and the first half of a step.
+//! The accelerator as a caller sees it, and the first half of a step.
 //!
-//! Validate, order, reserve, pack (`load.rs`); hand over, start; then, in [`InFlight`], wait, take
-//! back, check, unpack, commit: nothing of the caller's changes before the last.
+//! A step is five calls there and five back. [`Accelerator::submit`] checks, orders, reserves,
+//! packs (`pack.rs`) and starts; [`InFlight::wait`] waits, takes back, checks, reads and commits
+//! (`in_flight.rs`). The caller's bodies change in the last call, and only there.
 
 use std::fmt;
 use std::sync::Arc;
 
 use pgs_support::float_env::standard;
 
-use super::in_flight::{Flight, InFlight, Started, Stopwatch};
+use super::in_flight::{Flight, InFlight, Started};
 use super::ordering::Ordering;
 use super::pack::{Engines, PackedStep};
 use super::report::StepReport;
 use super::retry::with_retries;
+use super::stopwatch::Stopwatch;
 use crate::beat::pack::pool::PackPool;
 use crate::board::bank::{Bank, PerBank};
 use crate::board::cancellation::Cancellation;
@@ -40,24 +42,26 @@ pub struct Accelerator {
     pub(super) shapes: Vec<Shape>,
     /// How often shapes were loaded.
     pub(super) shapes_loaded: u64,
-    /// The bank of the step that was started last, into which the next one that is not prepared goes.
+    /// The bank of the step that was started last. A step that is not prepared goes into it.
     pub(super) bank: Bank,
-    /// What lies in the banks.
-    pub(super) loads: PerBank<Option<PackedStep>>,
-    /// How it was ordered.
+    /// The step that lies in each bank.
+    pub(super) packed: PerBank<Option<PackedStep>>,
+    /// The ordering of the step in each bank.
     pub(super) orderings: PerBank<Ordering>,
-    /// Results of a step until all are checked. Kept, so that a step allocates nothing.
-    pub(super) spare: Vec<Record>,
+    /// Results of a step until all are checked. The memory is kept, so that a step allocates
+    /// nothing.
+    pub(super) staged: Vec<Record>,
 }
 
-/// What it is, and a summary of the step in each bank: not the records, results and tables, which grow with it.
+/// Prints the board and a summary of the step in each bank, but no records, results or tables:
+/// their size grows with the step.
 impl fmt::Debug for Accelerator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Accelerator")
             .field("board", &self.board)
             .field("capabilities", &self.device.capabilities)
             .field("shapes", &self.shapes.len())
-            .field("loads", &self.loads)
+            .field("packed", &self.packed)
             .field("dead", &self.device.dead)
             .finish_non_exhaustive()
     }
@@ -83,7 +87,7 @@ impl Accelerator {
         Ok(Self::assemble(found.description, device))
     }
 
-    /// The accelerator of a board that was brought up.
+    /// Makes the accelerator of a board that was brought up.
     pub(crate) fn assemble(board: BoardDescription, device: Device) -> Self {
         let Capabilities { variant, version, clock_khz, .. } = device.capabilities;
         log::info!(
@@ -110,26 +114,26 @@ impl Accelerator {
             shapes: Vec::new(),
             shapes_loaded: 0,
             bank: Bank::First,
-            loads: PerBank::default(),
+            packed: PerBank::default(),
             orderings: PerBank::default(),
-            spare: Vec::new(),
+            staged: Vec::new(),
         }
     }
 
-    /// Which board was opened, and why.
+    /// The board that was opened, and the reason for the choice.
     #[must_use]
     pub fn board(&self) -> &BoardDescription {
         &self.board
     }
 
-    /// What the bitstream says of itself.
+    /// The capabilities that the bitstream reports.
     #[must_use]
     pub fn capabilities(&self) -> &Capabilities {
         &self.device.capabilities
     }
 
-    /// Loads the shapes that bodies refer to by index, in place of all earlier ones. A step that was
-    /// [prepared](InFlight::prepare) with those is not started any more.
+    /// Loads the shapes that bodies refer to by index, in place of all earlier ones. A step that
+    /// was [prepared](InFlight::prepare) with the earlier shapes is refused from now on.
     ///
     /// # Errors
     /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
@@ -146,16 +150,16 @@ impl Accelerator {
         })
     }
 
-    /// From now on this ends steps early, in place of an earlier one.
+    /// Lets `cancellation` end steps early, in place of an earlier one.
     pub fn set_cancellation(&mut self, cancellation: Cancellation) {
         self.device.cancellation = Some(cancellation);
     }
 
     /// Solves the contacts of one time step and integrates it.
     ///
-    /// Collisions are taken in the [order](StepParameters::order) that the parameters ask for.
-    /// Static bodies are left as they are. The bodies change only if the step succeeds, and then all
-    /// at once.
+    /// The board takes the collisions in the [order](StepParameters::order) that the parameters ask
+    /// for. Static bodies stay as they are. The bodies change only if the step succeeds, and then
+    /// all at once.
     ///
     /// Units: metres, kilograms, seconds, radians, world frame.
     ///
@@ -180,10 +184,10 @@ impl Accelerator {
         Ok(report)
     }
 
-    /// Starts a [step](Self::step) and returns at once: the caller may do other work until it asks
+    /// Starts a [step](Self::step) and returns at once. The caller may do other work until it asks
     /// for the results with [`InFlight::wait`].
     ///
-    /// The bodies are copied here, and looked at again only there.
+    /// This call copies the bodies; only [`InFlight::wait`] touches them again.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -195,11 +199,10 @@ impl Accelerator {
     ) -> Result<InFlight<'_>, Error> {
         standard(move || {
             self.device.settle(&self.shapes)?;
-            let mut watch = Stopwatch::start();
+            let (mut watch, accesses) = (Stopwatch::start(), self.accesses());
             let into = (self.bank, Engines::Idle);
-            let accesses = self.accesses();
-            let load = self.load(into, bodies, collisions, parameters, &mut watch)?;
-            let flight = self.begin(load, watch, accesses)?;
+            let step = self.pack(into, bodies, collisions, parameters, &mut watch)?;
+            let flight = self.begin(step, watch, accesses)?;
             Ok(InFlight::new(self, flight))
         })
     }
@@ -209,27 +212,27 @@ impl Accelerator {
         (self.device.counts.reads(), self.device.counts.writes())
     }
 
-    /// Starts a step that lies in its bank. Nothing is in flight.
+    /// Starts a step that lies in its bank, while no other is in flight.
     pub(super) fn begin(
         &mut self,
-        load: PackedStep,
+        step: PackedStep,
         watch: Stopwatch,
         accesses: (u64, u64),
     ) -> Result<Flight, Error> {
-        let PackedStep { plan, parameters, bank, .. } = &load;
-        let mut flight = Flight { load, started: None, watch, accesses };
+        let PackedStep { plan, parameters, bank, .. } = &step;
+        let mut flight = Flight { step, started: None, watch, accesses };
         self.bank = *bank;
-        if load.sent.is_some() {
+        if step.sent.is_some() {
             let device = &mut self.device;
             let limit = plan.deadline(parameters, &device.capabilities);
             let deadline = Deadline::after(&*device.platform, limit);
             let armed = device.arm(plan, *bank, parameters);
-            flight.load.host.start += flight.watch.lap();
+            flight.step.host.start += flight.watch.lap();
             let doorbells = armed
                 .and_then(|()| device.start())
                 .map_err(|symptom| device.fail(symptom, &self.shapes))?;
             // From here on the board is at work.
-            flight.load.host.wait = flight.watch.lap();
+            flight.step.host.wait = flight.watch.lap();
             flight.started = Some(Started { deadline, doorbells });
         }
         Ok(flight)

@@ -1,5 +1,5 @@
-//! This file runs a step that changes nothing: no contact points, no integration, so that every
-//! bitstream returns poses and velocities bit for bit. The self-test looks at what came back.
+//! Runs a step that changes nothing: no contact points, no integration. Every bitstream returns its
+//! poses and velocities bit for bit, and the self-test compares them.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use pgs_interface::profile::{Flow, Variant};
 use pgs_interface::record::Beat;
 
 use super::accelerator::Accelerator;
-use super::packing::Source;
+use super::packing::PackInput;
 use super::results::received;
 use crate::axi_dma::{Direction, largest_piece};
 use crate::beat::stripe::{Place, Segment};
@@ -19,33 +19,33 @@ use crate::order::{Ordered, Schedule};
 use crate::platform::{Deadline, PlatformError};
 use crate::scene::{Body, Collision, StepParameters};
 
-/// How long an echo may take. A quarter of it passes before the driver looks without an interrupt.
+/// Time limit of an echo. The driver polls without an interrupt after a quarter of it.
 pub(crate) const ECHO_LIMIT: Duration = Duration::from_millis(200);
 
-/// What a buffer is filled with before it is used: direction, channel, beat.
-pub(crate) type Dirt = fn(Direction, usize, usize) -> Beat;
+/// Fills a buffer before its use: a beat by direction, channel and index.
+pub(crate) type FillPattern = fn(Direction, usize, usize) -> Beat;
 
-/// What to send, and how.
+/// The bodies to send, and the state of the buffers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Echo<'a> {
     /// The bodies. They need not be valid: nothing is computed with them.
     pub(crate) bodies: &'a [Body],
     /// Whether to cut every packet into the shortest pieces, for many descriptors.
     pub(crate) short_pieces: bool,
-    /// Whether buffers of an earlier run are given up first.
+    /// Whether to release the buffers of an earlier run first.
     pub(crate) fresh_buffers: bool,
-    /// What to write over all buffers first.
-    pub(crate) dirt: Option<Dirt>,
+    /// The pattern to write over all buffers first.
+    pub(crate) filler: Option<FillPattern>,
 }
 
-/// What came back.
+/// The results and counters of an echo.
 #[derive(Debug)]
-pub(crate) struct Echoed {
+pub(crate) struct EchoResult {
     /// The result beats of each channel.
     pub(crate) results: Vec<Vec<Beat>>,
-    /// Sum of the words sent.
+    /// Sum of the words that the driver sent.
     pub(crate) sent: u32,
-    /// The accelerator's sums of words received and sent, if it has any.
+    /// The accelerator's sums of the words that it received and sent, if it keeps sums.
     pub(crate) sums: Option<(u32, u32)>,
     /// Interrupts that woke the driver.
     pub(crate) interrupts: u64,
@@ -54,8 +54,8 @@ pub(crate) struct Echoed {
 }
 
 impl Accelerator {
-    /// Runs an echo. After an error the board was reset, if it could be.
-    pub(crate) fn echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Error> {
+    /// Runs an echo. After an error the board was reset, if a reset was possible.
+    pub(crate) fn echo(&mut self, echo: &Echo<'_>) -> Result<EchoResult, Error> {
         self.device.settle(&self.shapes)?;
         let largest = self.device.largest;
         if echo.short_pieces {
@@ -66,15 +66,15 @@ impl Accelerator {
         echoed.map_err(|fault| self.device.fail(fault, &self.shapes))
     }
 
-    fn run_echo(&mut self, echo: &Echo<'_>) -> Result<Echoed, Symptom> {
+    fn run_echo(&mut self, echo: &Echo<'_>) -> Result<EchoResult, Symptom> {
         let plan = plan(echo.bodies.len(), self.device.capabilities.variant);
         let bank = self.bank;
-        self.loads[bank] = None;
+        self.packed[bank] = None;
         if echo.fresh_buffers {
             self.device.release_buffers(bank);
         }
         self.device.reserve_or_reset(&plan, bank, &self.shapes)?;
-        if let Some(dirt) = echo.dirt {
+        if let Some(filler) = echo.filler {
             let sides = [
                 (Direction::Mm2s, &mut self.device.mm2s),
                 (Direction::S2mm, &mut self.device.s2mm),
@@ -82,7 +82,7 @@ impl Accelerator {
             for (direction, ports) in sides {
                 for (channel, port) in ports.iter_mut().enumerate() {
                     for (slot, beat) in port.beats_mut(bank).iter_mut().enumerate() {
-                        *beat = dirt(direction, channel, slot);
+                        *beat = filler(direction, channel, slot);
                     }
                 }
             }
@@ -90,7 +90,7 @@ impl Accelerator {
         let none: &[Collision] = &[];
         let empty: Schedule = (0..plan.collisions).map(|_| None).collect();
         let padding = Ordered { collisions: none, schedule: &empty };
-        let source = Source {
+        let input = PackInput {
             bodies: echo.bodies,
             collisions: &padding,
             added: Some(plan.collisions),
@@ -98,7 +98,7 @@ impl Accelerator {
             shapes: &self.shapes,
             quick: None,
         };
-        let (sent, _) = self.device.pack(&plan, bank, &source);
+        let (sent, _) = self.device.pack(&plan, bank, &input);
         let parameters = StepParameters {
             contact_iterations: u32::from(plan.passes > 0),
             friction_iterations: 0,
@@ -113,7 +113,7 @@ impl Accelerator {
         let counters = self.device.collect(&deadline)?;
         self.device.take_back(bank)?;
         let channels = received(&self.device.s2mm, &plan, bank);
-        Ok(Echoed {
+        Ok(EchoResult {
             results: channels[..plan.channels()].iter().map(|beats| beats.to_vec()).collect(),
             sent: sent.velocities.wrapping_add(sent.collisions).wrapping_add(sent.poses),
             sums: counters.sums,
@@ -122,7 +122,7 @@ impl Accelerator {
         })
     }
 
-    /// Whether an interrupt comes within `timeout`, which is then let through again.
+    /// Whether an interrupt comes within `timeout`. Unmasks the interrupt afterwards.
     pub(crate) fn interrupt_within(&mut self, timeout: Duration) -> Result<bool, PlatformError> {
         let came = self.device.platform.wait_interrupt(timeout)?.is_some();
         if came {
@@ -132,8 +132,8 @@ impl Accelerator {
     }
 }
 
-/// Bodies alone; where collisions have streams of their own, as many of them that are padding, so
-/// that these streams carry something.
+/// The plan of an echo: bodies alone. Where collisions have streams of their own, padding
+/// collisions let these streams carry something.
 fn plan(bodies: usize, variant: Variant) -> Plan {
     let profile = variant.profile;
     let (collisions, passes) = match profile.flow {
@@ -143,8 +143,8 @@ fn plan(bodies: usize, variant: Variant) -> Plan {
     Plan { bodies, collisions, passes, variant }
 }
 
-/// The MM2S channel on which a beat of the results was sent, and its offset in that channel's
-/// buffer, bytes; `None` for padding, which was not.
+/// The MM2S channel that carried a beat of the results, and the beat's offset in the buffer of that
+/// channel, in bytes. `None` for padding, which no channel carried.
 pub(crate) fn source_of(bodies: usize, variant: &Variant, result: Place) -> Option<(usize, u64)> {
     let layout = |segment: Segment| {
         let layout = segment.layout(variant);
@@ -193,11 +193,12 @@ mod tests {
         let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
         let at = |variant: Variant, channel, slot| source_of(7, &variant, Place { channel, slot });
         let half = |channel, slot| at(HALF.default_variant(), channel, slot);
-        // Velocities are seven beats, two groups: four on channel 0, so that the poses begin at beat
-        // 4 there, and on channel 2, with two, at beat 4 too (64 bytes).
-        // Body 0: pose and velocity are the first beats of channel 0.
+        // Velocities are seven beats, two groups: four on channel 0, so that the poses begin at
+        // beat 4 there, and on channel 2, with two, at beat 4 too (64 bytes). Body 0: pose and
+        // velocity are the first beats of channel 0.
         assert_eq!([half(0, 0), half(0, 1)], [Some((0, 64)), Some((0, 0))]);
-        // Body 2: beats 4 and 5 of the results; its pose and velocity are each beat 2 of theirs.
+        // Body 2: beats 4 and 5 of the results; its pose and its velocity are beat 2 of their
+        // segments.
         assert_eq!([half(2, 0), half(0, 2)], [Some((1, 64)), Some((1, 0))]);
         // Body 6: beats 12 and 13; beat 6 of the velocities is the second group's second.
         assert_eq!(half(1, 5), Some((0, 48)));

@@ -1,6 +1,4 @@
-//! This file is the second half of a step: wait, take back, check, unpack, commit.
-
-use std::time::{Duration, Instant};
+//! The second half of a step: wait, take back, check, read, commit.
 
 use pgs_support::float_env::standard;
 
@@ -8,7 +6,8 @@ use super::accelerator::Accelerator;
 use super::locate::locate;
 use super::pack::PackedStep;
 use super::report::{HostTimes, StepCycles, StepReport};
-use super::results::{commit, commit_velocities};
+use super::results::{check_received, commit, commit_velocities, read};
+use super::stopwatch::Stopwatch;
 use crate::board::symptom::Symptom;
 use crate::control_block::{Counters, Saturated};
 use crate::error::Error;
@@ -19,36 +18,36 @@ use crate::validate::InputError;
 
 /// A step that the board works on.
 ///
-/// [`wait`](Self::wait) ends it. Dropped without, by a panic too, it stops and resets the board, in
-/// bounded time, and takes the buffers back; the step has then never been, and the accelerator is
-/// ready for the next. Even forgotten ([`std::mem::forget`]) it does no harm: the next call that
-/// needs the board resets it first.
+/// [`wait`](Self::wait) ends it. A step that is dropped without it, also by a panic, stops and
+/// resets the board in bounded time and takes the buffers back. Nothing of that step remains, and
+/// the accelerator is ready for the next. Even a forgotten step ([`std::mem::forget`]) does no
+/// harm: the next call that needs the board resets it first.
 #[derive(Debug)]
-#[must_use = "a step that is not waited for is stopped and was in vain"]
+#[must_use = "a step that is dropped in flight is stopped: call `wait` for its results"]
 pub struct InFlight<'a> {
     pub(super) accelerator: &'a mut Accelerator,
     pub(super) flight: Flight,
 }
 
-/// What is known of a step between its start and its end.
+/// The state of a step between its start and its end.
 #[derive(Debug)]
 pub(super) struct Flight {
-    pub(super) load: PackedStep,
-    /// Nothing, where nothing moves and nothing is streamed.
+    pub(super) step: PackedStep,
+    /// `None` where no body moves and nothing is streamed.
     pub(super) started: Option<Started>,
     pub(super) watch: Stopwatch,
     /// Register reads and writes before the step.
     pub(super) accesses: (u64, u64),
 }
 
-/// A step on the board.
+/// The deadline and the doorbells of a step on the board.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Started {
     pub(super) deadline: Deadline,
     pub(super) doorbells: u64,
 }
 
-/// What the board said at the end of a step, whose results are back in their bank.
+/// The counters of a step that has ended and whose results are back in their bank.
 #[derive(Debug)]
 pub(super) struct Ended {
     counters: Counters,
@@ -60,16 +59,16 @@ impl<'a> InFlight<'a> {
         Self { accelerator, flight }
     }
 
-    /// Waits for the results and puts them into the bodies, which must be those that were given to
+    /// Waits for the results and stores them in the bodies, which must be the bodies of the call to
     /// [`Accelerator::submit`] or [`InFlight::prepare`].
     ///
     /// The time between start and this call counts for the deadline and for no phase of
     /// [`StepReport::host`].
     ///
     /// # Errors
-    /// As [`Accelerator::step`]. [`InputError::OtherBodies`] if there are more or fewer bodies than
-    /// were given: the step is then stopped, and the accelerator is ready for the next;
-    /// [`Error::MustReopen`] in its place if the board could not be stopped.
+    /// As [`Accelerator::step`]. [`InputError::OtherBodies`] if the number of bodies differs from
+    /// the number at the start: the step is then stopped, and the accelerator is ready for the
+    /// next; [`Error::MustReopen`] in its place if the board could not be stopped.
     pub fn wait<B: Bodies + ?Sized>(mut self, bodies: &mut B) -> Result<StepReport, Error> {
         standard(move || {
             let ended = self.collect(bodies)?;
@@ -88,9 +87,9 @@ impl<'a> InFlight<'a> {
         Ok(self.commit(ended, bodies))
     }
 
-    /// Waits for the board, and takes back what it held of the step.
+    /// Waits for the board, and takes the buffers of the step back.
     pub(super) fn collect<B: Bodies + ?Sized>(&mut self, bodies: &B) -> Result<Ended, Error> {
-        let (found, expected) = (bodies.len(), self.flight.load.bodies);
+        let (found, expected) = (bodies.len(), self.flight.step.bodies);
         if found != expected {
             let Accelerator { device, shapes, .. } = &mut *self.accelerator;
             device.settle(shapes)?;
@@ -101,12 +100,12 @@ impl<'a> InFlight<'a> {
 
     fn take_results(&mut self) -> Result<Ended, Symptom> {
         let Self { accelerator, flight } = self;
-        let PackedStep { plan, bank, sent, .. } = flight.load;
-        // What the caller did meanwhile.
+        let PackedStep { plan, bank, sent, .. } = flight.step;
+        // The caller's own work since the start belongs to no phase.
         flight.watch.lap();
         let device = &mut accelerator.device;
         let (Some(Started { deadline, doorbells }), Some(sent)) = (flight.started, sent) else {
-            // Nothing moves, and nothing of it is streamed.
+            // No body moves, and nothing is streamed.
             let counts = device.capabilities.impulse_sum;
             let counters = Counters { impulse_sum: counts.then_some(0.0), ..Counters::default() };
             return Ok(Ended { counters, report: self.report(&counters) });
@@ -114,43 +113,45 @@ impl<'a> InFlight<'a> {
         let interrupts = device.wait(&plan, &deadline)?;
         let counters = device.collect(&deadline)?;
         device.take_back(bank)?;
-        flight.load.host.wait += flight.watch.lap();
-        Accelerator::check_received(&plan, sent, &counters)?;
+        flight.step.host.wait += flight.watch.lap();
+        check_received(&plan, sent, &counters)?;
         let mut report = self.report(&counters);
         (report.doorbells, report.interrupts) = (doorbells, interrupts);
         report.descriptors = self.accelerator.device.descriptors();
         Ok(Ended { counters, report })
     }
 
-    /// Checks and reads the results, which are in the accelerator's spare afterwards.
+    /// Checks the results and reads them into `Accelerator::staged`.
     pub(super) fn read<B: Bodies + ?Sized>(
         &mut self,
         ended: &Ended,
         bodies: &B,
     ) -> Result<(), Fault> {
         let Self { accelerator, flight } = self;
-        let PackedStep { plan, bank, arranged, .. } = &flight.load;
-        // Of a step that was not started there are no sums.
-        let answered = ended.counters.sums.map(|(_, answered)| answered);
-        accelerator.unpack(plan, *bank, bodies, arranged.live, answered)?;
-        flight.load.host.unpack = flight.watch.lap();
+        let PackedStep { plan, bank, order_summary, .. } = &flight.step;
+        let Accelerator { device, orderings, staged, .. } = &mut **accelerator;
+        let lives = order_summary.live.map(|_| orderings[*bank].lives());
+        // A step that was not started has no sums.
+        let sent_sum = ended.counters.sums.map(|(_, sent_sum)| sent_sum);
+        read(device, staged, (plan, *bank), bodies, lives, sent_sum)?;
+        flight.step.host.unpack = flight.watch.lap();
         Ok(())
     }
 
-    /// Puts what was read into the bodies.
+    /// Stores the staged results in the bodies.
     pub(super) fn commit<B: Bodies + ?Sized>(
         &mut self,
         ended: Ended,
         bodies: &mut B,
     ) -> StepReport {
         let Self { accelerator, flight } = self;
-        match flight.load.parameters.integrate {
-            true => commit(&accelerator.spare, bodies),
-            false => commit_velocities(&accelerator.spare, bodies),
+        match flight.step.parameters.integrate {
+            true => commit(&accelerator.staged, bodies),
+            false => commit_velocities(&accelerator.staged, bodies),
         }
-        flight.load.host.commit = flight.watch.lap();
+        flight.step.host.commit = flight.watch.lap();
         let mut report = ended.report;
-        report.host = flight.load.host;
+        report.host = flight.step.host;
         log::debug!(
             "step: {} bodies, {} collisions and {} empty entries ({:?}), {} passes, {} cycles ({} \
              stalled, {} waiting), {} hazards{}",
@@ -168,38 +169,38 @@ impl<'a> InFlight<'a> {
         report
     }
 
-    /// The error of the step, after which the board is ready for the next if it can be.
+    /// Resets the board if it can be reset, and returns the error of the step.
     fn failed(&mut self, symptom: Symptom) -> Error {
         let Accelerator { device, shapes, .. } = &mut *self.accelerator;
         let error = device.fail(symptom, shapes);
         self.located(error)
     }
 
-    /// Says of which of the caller's collisions an error speaks.
+    /// Adds the caller's own index of a collision or body to an error.
     pub(super) fn located(&self, mut error: Error) -> Error {
-        let PackedStep { arranged, bank, .. } = &self.flight.load;
-        if arranged.scheduled {
+        let PackedStep { order_summary, bank, .. } = &self.flight.step;
+        if order_summary.scheduled {
             let ordering = &self.accelerator.orderings[*bank];
-            let lives = arranged.live.map(|_| ordering.lives());
+            let lives = order_summary.live.map(|_| ordering.lives());
             locate(&mut error, ordering.schedule(), lives);
         }
         error
     }
 
-    /// What the step streamed and counted, so far.
+    /// The report of the step, with everything that is known before the results are read.
     fn report(&self, counters: &Counters) -> StepReport {
-        let PackedStep { plan, arranged, bodies, collisions, empty, .. } = &self.flight.load;
+        let PackedStep { plan, order_summary, bodies, collisions, empty, .. } = &self.flight.step;
         let (work, waits) = (u64::from(counters.work), u64::from(counters.waits));
         let stalls = counters.cycles.saturating_sub(work).saturating_sub(waits);
         let (reads, writes) = self.accelerator.accesses();
         StepReport {
             bodies: *bodies as u64,
             collisions: *collisions as u64,
-            order: arranged.order,
-            order_choice: arranged.choice,
+            order: order_summary.order,
+            order_choice: order_summary.choice,
             empty: *empty as u64,
-            verified: arranged.verified,
-            live: arranged.live,
+            verified: order_summary.verified,
+            live: order_summary.live,
             passes: u32::try_from(plan.passes).unwrap_or(u32::MAX),
             cycles: StepCycles { total: counters.cycles, work, stalls, waits },
             clock_khz: self.accelerator.device.capabilities.clock_khz,
@@ -220,26 +221,9 @@ impl<'a> InFlight<'a> {
 }
 
 impl Drop for InFlight<'_> {
-    /// Stops a step that nobody waited for.
+    /// Stops a step that the caller did not wait for.
     fn drop(&mut self) {
         let Accelerator { device, shapes, .. } = &mut *self.accelerator;
         standard(|| device.abandon(shapes));
-    }
-}
-
-/// Host time by laps.
-#[derive(Debug)]
-pub(super) struct Stopwatch(Instant);
-
-impl Stopwatch {
-    /// Begins the first lap.
-    pub(super) fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    /// Time since the last lap.
-    pub(super) fn lap(&mut self) -> Duration {
-        let now = Instant::now();
-        now - std::mem::replace(&mut self.0, now)
     }
 }

@@ -9,15 +9,17 @@ mod pack;
 mod packing;
 mod prepared;
 pub(crate) mod report;
+mod reserve;
 mod results;
 mod retry;
+mod stopwatch;
 #[cfg(all(test, feature = "emulation"))]
 mod tests;
 mod written;
 
 pub use accelerator::Accelerator;
 pub(crate) use accelerator::find;
-pub(crate) use echo::{Dirt, ECHO_LIMIT, Echo, Echoed, source_of};
+pub(crate) use echo::{ECHO_LIMIT, Echo, EchoResult, FillPattern, source_of};
 pub use in_flight::InFlight;
 pub use prepared::Prepared;
 pub use report::{HostTimes, Limit, OrderChoice, StepCycles, StepReport};

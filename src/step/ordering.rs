@@ -1,15 +1,16 @@
-//! This file puts the collisions of a step in the order in which they are sent.
+//! Puts the collisions of a step in the order of sending.
 //!
-//! In the caller's own order nothing is made: it is packed as it is. Otherwise pairs, positions and
-//! what moves are read into memory that is kept, ordered, and proved free of hazards if that was
-//! asked for. Where only live bodies are kept, every body is then given its place.
+//! The caller's own order needs no work: the collisions are packed as they are. For another order
+//! this module reads pairs, positions and masses into memory that it keeps from step to step,
+//! orders the collisions, and verifies on request that no hazard is left. Where the board keeps
+//! only live bodies, every body then gets its place.
 
 use pgs_interface::profile::Flow;
 
 use super::report::OrderChoice;
 use crate::control_block::Capabilities;
 use crate::order::{
-    Checker, Crowded, InputBuffers, Interlock, IssueWindow, LiveReport, Lives, Order, OrderError,
+    Checker, InputBuffers, Interlock, IssueWindow, LiveError, LiveReport, Lives, Order, OrderError,
     OrderInput, OrderReport, Orderer, Room, Schedule,
 };
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
@@ -25,80 +26,82 @@ pub(super) struct Ordering {
     lives: Lives,
 }
 
-/// How the collisions of a step were ordered.
+/// The order of the collisions of a step, and the reason for it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Arranged {
-    /// What was made.
+pub(super) struct OrderSummary {
+    /// The order that was made.
     pub(super) order: Order,
-    /// Why.
+    /// The reason for this order.
     pub(super) choice: OrderChoice,
-    /// Whether there is a schedule; without one they are as given.
+    /// Whether there is a schedule; without one the collisions stay as given.
     pub(super) scheduled: bool,
-    /// What the order is like, if it was to be verified.
+    /// The measured properties of the order, if it was to be verified.
     pub(super) verified: Option<OrderReport>,
-    /// What it takes of a design that keeps live bodies alone.
+    /// The demand of the order on a design that keeps live bodies alone.
     pub(super) live: Option<LiveReport>,
 }
 
-impl Arranged {
-    /// Collisions that are sent as the caller gives them.
+impl OrderSummary {
+    /// The summary of collisions that are sent as the caller gives them.
     pub(super) const fn as_given(choice: OrderChoice) -> Self {
         let order = Order::AsGiven;
         Self { order, choice, scheduled: false, verified: None, live: None }
     }
 }
 
-/// What a step runs on.
+/// The board's side of an ordering.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hardware<'a> {
+pub(super) struct OrderingContext<'a> {
     pub(super) capabilities: &'a Capabilities,
     pub(super) limits: &'a Limits,
     pub(super) shapes: &'a [Shape],
 }
 
-impl Hardware<'_> {
-    /// Entries of an order that fit beside so many bodies.
+impl OrderingContext<'_> {
+    /// Number of entries that fit beside `bodies` bodies.
     fn entries_max(&self, bodies: usize) -> usize {
         usize::try_from(self.limits.room_for_collisions(bodies)).unwrap_or(usize::MAX)
     }
 }
 
 impl Ordering {
-    /// Orders the collisions of a step. Its lengths and parameters were validated, what bodies and
-    /// collisions hold was not: their indices are checked here.
+    /// Orders the collisions of a step. Its lengths and parameters were validated before; the
+    /// indices in bodies and collisions were not, and are checked here.
     ///
     /// # Errors
     /// [`InputError::OrderTooLong`], [`InputError::Order`]; where only live bodies are kept,
     /// [`InputError::SpanTooLong`] and [`InputError::TooManyLive`].
-    pub(super) fn arrange<B: Bodies + ?Sized, C: Collisions + ?Sized>(
+    pub(super) fn order<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
         collisions: &C,
         parameters: &StepParameters,
-        on: Hardware<'_>,
-    ) -> Result<Arranged, InputError> {
-        let design = on.capabilities.window;
-        let (order, choice) = match Wanted::of(on.capabilities, parameters) {
-            Wanted::Cheapest => return self.cheapest(bodies, collisions, parameters, on),
-            Wanted::Order(Order::AsGiven, choice)
+        context: OrderingContext<'_>,
+    ) -> Result<OrderSummary, InputError> {
+        let design = context.capabilities.window;
+        let (order, choice) = match OrderRequest::of(context.capabilities, parameters) {
+            OrderRequest::Cheapest => {
+                return self.cheapest(bodies, collisions, parameters, context);
+            }
+            OrderRequest::Order(Order::AsGiven, choice)
                 if !parameters.verify_order && design.is_none() =>
             {
-                return Ok(Arranged::as_given(choice));
+                return Ok(OrderSummary::as_given(choice));
             }
-            Wanted::Order(order, choice) => (order, choice),
+            OrderRequest::Order(order, choice) => (order, choice),
         };
-        let window = IssueWindow::of(on.capabilities, parameters)?;
-        let mut input = self.buffers.gather(bodies, collisions, on.shapes);
+        let window = IssueWindow::of(context.capabilities, parameters)?;
+        let mut input = self.buffers.gather(bodies, collisions, context.shapes);
         let passes = parameters.contact_iterations.saturating_add(parameters.friction_iterations);
         if design.is_some() && passes == 0 {
-            // Without a pass there is nobody to take them.
+            // Without a pass the board takes no collisions.
             input.pairs = &[];
         }
-        self.orderer.set_limit(on.entries_max(input.moving.len()));
+        self.orderer.set_limit(context.entries_max(input.moving.len()));
         let schedule = match self.orderer.order(&input, order, window) {
             Ok(schedule) => schedule,
             Err(OrderError::TooLong { depth, limit, .. }) => {
-                return Err(too_long(&input, depth, limit, parameters, on.shapes));
+                return Err(too_long(&input, depth, limit, parameters, context.shapes));
             }
             Err(error) => return Err(error.into()),
         };
@@ -111,60 +114,61 @@ impl Ordering {
         };
         let live = match design {
             Some(design) => {
-                let room = Room::of(&design, passes, on.capabilities.collisions_per_issue);
-                let settled = self.lives.settle(schedule, &input, room);
+                let room = Room::of(&design, passes, context.capabilities.collisions_per_issue);
+                let assigned = self.lives.assign_places(schedule, &input, room);
                 let report = self.lives.report();
-                settled.map_err(|crowded| refused(crowded, report, room, &input, on.shapes))?;
+                assigned
+                    .map_err(|error| too_crowded(error, report, room, &input, context.shapes))?;
                 Some(report)
             }
             None => None,
         };
-        Ok(Arranged { order: self.orderer.made(), choice, scheduled: true, verified, live })
+        Ok(OrderSummary { order: self.orderer.made(), choice, scheduled: true, verified, live })
     }
 
-    /// Orders the collisions of a step for a pipeline that waits on hazards: whichever order takes
-    /// the fewest cycles.
+    /// Orders the collisions of a step for a pipeline that waits on hazards. Picks the order that
+    /// takes the fewest cycles.
     fn cheapest<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
         collisions: &C,
         parameters: &StepParameters,
-        on: Hardware<'_>,
-    ) -> Result<Arranged, InputError> {
-        let input = self.buffers.gather(bodies, collisions, on.shapes);
-        self.orderer.set_limit(on.entries_max(input.moving.len()));
-        // A window beyond what can be ordered leaves the order as given.
-        let window = IssueWindow::of(on.capabilities, parameters).ok();
-        let pipeline = Interlock::of(on.capabilities, parameters);
+        context: OrderingContext<'_>,
+    ) -> Result<OrderSummary, InputError> {
+        let input = self.buffers.gather(bodies, collisions, context.shapes);
+        self.orderer.set_limit(context.entries_max(input.moving.len()));
+        // A window that is too large for the orderer leaves the order as given.
+        let window = IssueWindow::of(context.capabilities, parameters).ok();
+        let pipeline = Interlock::of(context.capabilities, parameters);
         let costs = self.orderer.cheapest(&input, window, &pipeline)?;
         let (order, choice) = (self.orderer.made(), OrderChoice::Cheapest(costs));
         Ok(match order {
-            Order::AsGiven => Arranged::as_given(choice),
-            _ => Arranged { order, choice, scheduled: true, verified: None, live: None },
+            Order::AsGiven => OrderSummary::as_given(choice),
+            _ => OrderSummary { order, choice, scheduled: true, verified: None, live: None },
         })
     }
 
-    /// The schedule made last.
+    /// The schedule of the last order.
     pub(super) fn schedule(&self) -> &Schedule {
         self.orderer.schedule()
     }
 
-    /// Places, marks and orders of the bodies, of the schedule made last.
+    /// Places, marks and orders of the bodies for the last schedule.
     pub(super) fn lives(&self) -> &Lives {
         &self.lives
     }
 }
 
-/// The order that a step is to have.
+/// The order that the board and the parameters call for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Wanted {
-    /// This one.
+enum OrderRequest {
+    /// A fixed order, and the reason for it.
     Order(Order, OrderChoice),
-    /// Whichever costs a pipeline that waits on hazards least.
+    /// The order that costs the fewest cycles on a pipeline that waits on hazards.
     Cheapest,
 }
 
-impl Wanted {
+impl OrderRequest {
     fn of(capabilities: &Capabilities, parameters: &StepParameters) -> Self {
         match (parameters.order, capabilities.window) {
             (Some(order), _) => Self::Order(order, OrderChoice::Asked),
@@ -181,7 +185,7 @@ impl Wanted {
     }
 }
 
-/// Whether the collisions of a step may be sent as the caller writes them, one after the other.
+/// Whether the collisions of a step may be sent one after the other as the caller writes them.
 pub(super) fn in_order_of_writing(
     capabilities: &Capabilities,
     parameters: &StepParameters,
@@ -193,8 +197,9 @@ pub(super) fn in_order_of_writing(
     order && !parameters.verify_order && capabilities.window.is_none()
 }
 
-/// An order without hazards does not fit. The moving body with the most collisions tells which
-/// profiles could have room for it: its uses must lie a depth apart there too.
+/// The error of an order without hazards that does not fit. The moving body with the most
+/// collisions decides which profiles could have room for it, because its uses must lie a depth
+/// apart there too.
 #[cold]
 fn too_long(
     input: &OrderInput<'_>,
@@ -211,11 +216,11 @@ fn too_long(
             uses[body] += 1;
         }
     }
-    // Of several the first.
+    // The first body among equals.
     let most = uses.iter().copied().enumerate().rev().max_by_key(|(_, uses)| *uses);
     let (body, uses) = most.unwrap_or_default();
-    let demand = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
-    let carriers = demand.carriers(|variant| {
+    let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
+    let carriers = needs.carriers(|variant| {
         let Ok(window) = IssueWindow::of_profile(variant.profile, parameters) else { return false };
         let apart = window.depth() as usize * window.per_issue() as usize;
         let of_body = uses.saturating_sub(1).saturating_mul(apart).saturating_add(1);
@@ -223,43 +228,43 @@ fn too_long(
             Flow::Window(window) if of_body > window.lag as usize => return false,
             _ => {}
         }
-        // What took more than the limit here takes no less at a greater depth.
+        // An order that was longer than the limit here is not shorter at a greater depth.
         let as_here = if window.depth() >= depth { limit.saturating_add(1) } else { 0 };
         let entries = collisions.max(of_body).max(as_here);
-        SceneNeeds { collisions: entries, ..demand }.has_room(variant)
+        SceneNeeds { collisions: entries, ..needs }.has_room(variant)
     });
     InputError::OrderTooLong { collisions, bodies, limit, depth, body, uses, carriers }
 }
 
-/// An order in which bodies live too long, or too many at once.
+/// The error of an order in which bodies live too long, or too many at once.
 #[cold]
-fn refused(
-    crowded: Crowded,
+fn too_crowded(
+    error: LiveError,
     LiveReport { most_alive: alive, longest_span, .. }: LiveReport,
     room: Room,
     input: &OrderInput<'_>,
     shapes: &[Shape],
 ) -> InputError {
     let (bodies, collisions) = (input.moving.len(), input.pairs.len());
-    let demand = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
-    let held = match crowded {
-        Crowded::Span { .. } => 0,
-        Crowded::Places { held } => held,
+    let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
+    let held = match error {
+        LiveError::SpanTooLong { .. } => 0,
+        LiveError::TooFewPlaces { held } => held,
     };
-    let carriers = demand.carriers(|variant| match variant.profile.flow {
+    let carriers = needs.carriers(|variant| match variant.profile.flow {
         Flow::Passes => true,
         Flow::Window(window) => window.lag > longest_span && window.slots > held,
     });
     let at = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
-    match crowded {
-        Crowded::Span { body, first, last } => InputError::SpanTooLong {
+    match error {
+        LiveError::SpanTooLong { body, first, last } => InputError::SpanTooLong {
             body: at(body),
             first: at(first),
             last: at(last),
             lag: room.lag,
             carriers,
         },
-        Crowded::Places { held } => {
+        LiveError::TooFewPlaces { held } => {
             InputError::TooManyLive { held, alive, places: room.places, carriers }
         }
     }

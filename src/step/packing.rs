@@ -1,4 +1,4 @@
-//! This file writes the records of a step into the buffers of its ports.
+//! Writes the records of a step into the buffers of its ports.
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
@@ -17,65 +17,67 @@ use crate::scene::{Bodies, Collisions, Shape};
 use crate::validate::InputError;
 use crate::validate::Quick;
 
-/// What a step sent, for comparison with what the accelerator received.
+/// Sums of the words that a step sends, for comparison with the accelerator's sum.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sent {
+pub(super) struct SentSums {
     pub(super) velocities: u32,
     pub(super) collisions: u32,
     pub(super) poses: u32,
 }
 
-/// What is packed.
+/// The input of a packing.
 #[derive(Debug)]
-pub(super) struct Source<'a, B: ?Sized, C: ?Sized> {
+pub(super) struct PackInput<'a, B: ?Sized, C: ?Sized> {
     pub(super) bodies: &'a B,
-    /// In the order in which they are sent.
+    /// In the order of sending.
     pub(super) collisions: &'a C,
-    /// How many that order added, which was made for them; `None` if there is none.
+    /// Number of empty entries that the order added; `None` without a schedule.
     pub(super) added: Option<usize>,
     pub(super) lives: Option<&'a Lives>,
     pub(super) shapes: &'a [Shape],
-    /// Looks at everything on its way.
+    /// Screens the input during packing.
     pub(super) quick: Option<&'a Quick<'a>>,
 }
 
 impl Device {
-    /// Writes the records of a step into the buffers of a bank; whether validation refuses nothing of what it
-    /// was given.
+    /// Writes the records of a step into the buffers of a bank. Returns the sums of the words, and
+    /// whether the screening passed all input.
     pub(super) fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         plan: &Plan,
         bank: Bank,
-        source: &Source<'_, B, C>,
-    ) -> (Sent, bool) {
-        let Source { bodies, collisions, added, lives, shapes, quick } = *source;
-        let Cut { mut velocities, mut poses, mut entries } = Cut::of(&mut self.mm2s, plan, bank);
+        input: &PackInput<'_, B, C>,
+    ) -> (SentSums, bool) {
+        let PackInput { bodies, collisions, added, lives, shapes, quick } = *input;
+        let SegmentBuffers { mut velocities, mut poses, mut entries } =
+            SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
         let target = Target { variant: &plan.variant, shapes, quick };
         let packers = &mut self.packers;
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
-        let (velocities, poses, bodies_good) = match lives {
+        let (velocities, poses, bodies_passed) = match lives {
             None => pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), packers),
             Some(lives) => {
-                let good = survey(target, bodies, bodies.len(), into, packers);
+                let passed = survey(target, bodies, bodies.len(), into, packers);
                 let (first, last) = (lives.velocities(), lives.results());
                 let [first, last] = [first, last].map(|order| Chosen { bodies, order });
-                let (velocities, first_good) =
+                let (velocities, first_passed) =
                     pack_velocities(target, &first, plan.bodies, velocities, packers);
-                let (poses, last_good) = pack_poses(target, &last, plan.bodies, poses, packers);
-                (velocities, poses, good & first_good & last_good)
+                let (poses, last_passed) = pack_poses(target, &last, plan.bodies, poses, packers);
+                (velocities, poses, passed & first_passed & last_passed)
             }
         };
         let words = lives.map(Lives::words);
         let of_entries = Entries { collisions, count: plan.collisions, added, words };
-        let (collisions, good) =
+        let (collisions, passed) =
             pack_collisions(target, self.ends.ends(), &of_entries, &mut entries[active], packers);
-        (Sent { velocities, collisions, poses }, bodies_good & good)
+        (SentSums { velocities, collisions, poses }, bodies_passed & passed)
     }
 
-    /// Writes the records of a step whose collisions are written one after the other, by
-    /// `narrow_phase`; returns how many they are. What is refused of a body, `refuse` says.
+    /// Writes the records of a step whose collisions `narrow_phase` writes one after the other, and
+    /// returns the number of collisions. `refuse` names the error of a body that the screening
+    /// doubts.
     pub(super) fn pack_written<B: Bodies + ?Sized>(
         &mut self,
         plan: &Plan,
@@ -84,14 +86,15 @@ impl Device {
         bodies: &B,
         refuse: impl FnOnce() -> Result<(), InputError>,
         narrow_phase: impl FnOnce(&mut Writer<'_>),
-    ) -> Result<(Sent, usize), InputError> {
-        let Cut { mut velocities, mut poses, mut entries } = Cut::of(&mut self.mm2s, plan, bank);
+    ) -> Result<(SentSums, usize), InputError> {
+        let SegmentBuffers { mut velocities, mut poses, mut entries } =
+            SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
-        let (velocities, poses, good) =
+        let (velocities, poses, passed) =
             pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), &mut self.packers);
-        if !good {
+        if !passed {
             refuse()?;
             return Err(InputError::Unsteady);
         }
@@ -99,19 +102,19 @@ impl Device {
         let mut writer = Writer::new(target, ends, plan.collisions, entries);
         narrow_phase(&mut writer);
         let (collisions, count) = writer.finish()?;
-        Ok((Sent { velocities, collisions, poses }, count))
+        Ok((SentSums { velocities, collisions, poses }, count))
     }
 }
 
-/// The buffers of the MM2S ports, each cut into its three segments.
-struct Cut<'a> {
+/// The buffers of the MM2S ports, each split into its three segments.
+struct SegmentBuffers<'a> {
     velocities: [&'a mut [Beat]; DMA_COUNT_MAX],
     poses: [&'a mut [Beat]; DMA_COUNT_MAX],
     entries: [&'a mut [Beat]; DMA_COUNT_MAX],
 }
 
-impl<'a> Cut<'a> {
-    /// One borrow of each buffer, for what it was made large enough for.
+impl<'a> SegmentBuffers<'a> {
+    /// Borrows each buffer once, up to the length that the plan needs.
     fn of(ports: &'a mut [Port], plan: &Plan, bank: Bank) -> Self {
         type Channels<'a> = [&'a mut [Beat]; DMA_COUNT_MAX];
         let (mut velocities, mut poses, mut entries) =

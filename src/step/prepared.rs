@@ -1,4 +1,4 @@
-//! This file packs a step while another is on the board, and starts it when that one has ended.
+//! Packs a step while another is on the board, and starts it after the end of that step.
 //!
 //! ```text
 //!   CPU    | pack 0 |  pack 1  |unpack 0|  pack 2  |unpack 1| ...
@@ -8,9 +8,11 @@
 use pgs_support::float_env::standard;
 
 use super::accelerator::Accelerator;
-use super::in_flight::{Flight, InFlight, Stopwatch};
+use super::in_flight::{Flight, InFlight};
 use super::pack::{Engines, PackId, PackedStep};
 use super::report::StepReport;
+use super::reserve::or_free;
+use super::stopwatch::Stopwatch;
 use crate::board::bank::Bank;
 use crate::error::{Aftermath, Error};
 use crate::fault::Fault;
@@ -19,25 +21,30 @@ use crate::validate::InputError;
 
 /// A step whose records lie in DMA memory, ready to be [started](Accelerator::start).
 ///
-/// It may be started more than once, as after a fault: its records stay until other ones take their
-/// place. That is the next step [prepared](InFlight::prepare) before it was started, or the second
-/// after; and, once it was started, the next step that is [submitted](Accelerator::submit) without
-/// being prepared. One that was [written](Accelerator::write) with nothing on the board makes way for
-/// the next submitted step even if it was not started. Dropping it costs nothing and frees nothing.
+/// A prepared step may be started more than once, as after a fault: its records stay until other
+/// ones take their place.
+///
+/// - Before it is started, the next step that is [prepared](InFlight::prepare) replaces it.
+/// - After its start, the second step that is prepared replaces it, and so does the next step that
+///   is [submitted](Accelerator::submit) without being prepared.
+/// - A step that was [written](Accelerator::write) with nothing on the board makes way for the next
+///   submitted step, started or not.
+///
+/// Dropping it costs nothing and frees nothing.
 #[derive(Debug)]
-#[must_use = "a step that was prepared is not started by itself"]
+#[must_use = "a prepared step does not start by itself: call `start`"]
 pub struct Prepared {
     pub(super) bank: Bank,
-    pub(super) ticket: PackId,
+    pub(super) id: PackId,
 }
 
 impl InFlight<'_> {
     /// Validates, orders and packs another step while the board works on this one.
     ///
-    /// What is packed is what the caller gives now. A step that starts from the results of this one
-    /// cannot be prepared before they are there; what can be is the step of another world on the same
-    /// board, or one whose bodies were predicted. This step is not touched, whatever happens: it is
-    /// waited for as before.
+    /// The records hold the caller's values of now. A step that starts from the results of this
+    /// one cannot be prepared before they are there. The step of another world on the same board
+    /// can be, and so can a step whose bodies were predicted. In any case this step goes on, and
+    /// the caller waits for it as before.
     ///
     /// ```
     /// use zynq_pgs::{Accelerator, Body, Collision, OpenOptions, Pose, Shape, StepParameters};
@@ -64,13 +71,13 @@ impl InFlight<'_> {
     /// # }
     /// ```
     ///
-    /// The first call allocates a second set of buffers, as large as the first. Where there is too
-    /// little memory for both, steps that are not prepared work as ever.
+    /// The first call allocates a second set of buffers, as large as the first. Where memory is too
+    /// small for both sets, steps that are not prepared work as before.
     ///
     /// # Errors
-    /// [`Error::Input`]: the input was refused. [`Error::Step`] with
-    /// [`Fault::NoMemory`]: there is no room for a second set of buffers.
-    /// Either way what was prepared before is gone, and is refused when it is started.
+    /// [`Error::Input`]: the input was refused. [`Error::Step`] with [`Fault::NoMemory`]: there is
+    /// no room for a second set of buffers. Either way the step that was prepared before is gone,
+    /// and [`Accelerator::start`] refuses it.
     pub fn prepare<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
@@ -79,38 +86,39 @@ impl InFlight<'_> {
     ) -> Result<Prepared, Error> {
         standard(|| {
             let accelerator = &mut *self.accelerator;
-            let into = (self.flight.load.bank.other(), Engines::Working);
+            let into = (self.flight.step.bank.other(), Engines::Working);
             let mut watch = Stopwatch::start();
-            let load = accelerator.load(into, bodies, collisions, parameters, &mut watch)?;
-            self.hand_over(load)
+            let step = accelerator.pack(into, bodies, collisions, parameters, &mut watch)?;
+            self.hand_over(step)
         })
     }
 
-    /// Hands what was packed while this step is on the board over to the device.
-    pub(super) fn hand_over(&mut self, mut load: PackedStep) -> Result<Prepared, Error> {
-        let (accelerator, bank) = (&mut *self.accelerator, load.bank);
+    /// Hands the buffers of a newly packed step over to the device, while this step is on the board.
+    pub(super) fn hand_over(&mut self, mut step: PackedStep) -> Result<Prepared, Error> {
+        let (accelerator, bank) = (&mut *self.accelerator, step.bank);
         let mut watch = Stopwatch::start();
-        if load.sent.is_some() {
-            // Cleaning caches, or copying, takes its time, too.
-            accelerator.device.hand_over(&load.plan, bank).map_err(|error| {
-                accelerator.loads[bank] = None;
+        if step.sent.is_some() {
+            // Cleaning caches, or copying, takes time, too.
+            accelerator.device.hand_over(&step.plan, bank).map_err(|error| {
+                accelerator.packed[bank] = None;
                 let fault = Box::new(Fault::from(error));
                 Error::Step { fault, aftermath: Aftermath::Untouched, diagnosis: None }
             })?;
-            load.host.start = watch.lap();
-            accelerator.loads[bank] = Some(load);
+            step.host.start = watch.lap();
+            accelerator.keep(step);
         }
-        Ok(Prepared { bank, ticket: load.ticket })
+        Ok(Prepared { bank, id: step.id })
     }
 
-    /// Waits as [`wait`](Self::wait) does, and starts a prepared step as soon as the board is through
-    /// with this one: its results are read and stored while the board works on the next.
+    /// Waits as [`wait`](Self::wait) does, and starts a prepared step as soon as the board has
+    /// ended this one. The results are read and stored while the board works on the next step.
     ///
-    /// The two steps do not depend on each other: whether this one succeeds, fails or is refused its
-    /// bodies, the next is started if the board can be.
+    /// The two steps do not depend on each other: the next one is started if the board can start
+    /// it, even if this one fails or its bodies are refused.
     ///
     /// # Errors
-    /// First those of [`wait`](Self::wait), then those of [`Accelerator::start`].
+    /// The first result has the errors of [`wait`](Self::wait), the second has the errors of
+    /// [`Accelerator::start`].
     pub fn wait_and_start<B: Bodies + ?Sized>(
         self,
         bodies: &mut B,
@@ -125,22 +133,24 @@ impl InFlight<'_> {
         next: &Prepared,
     ) -> (Result<StepReport, Error>, Result<Self, Error>) {
         let ended = self.collect(bodies);
-        if next.bank == self.flight.load.bank {
-            // The same step once more, where the results are that are not read yet.
+        if next.bank == self.flight.step.bank {
+            // The same step once more: its results would overwrite the results that are not read
+            // yet.
             let report = ended.and_then(|ended| self.finish(ended, bodies));
             let started = self.accelerator.begin_prepared(next, Memory::Freed);
             return (report, started.map(|flight| self.followed_by(flight)));
         }
-        // Until the end of this function `self` is there to stop it, if the caller's code panics.
+        // `self` lives until the end of this function and stops the step if the caller's code
+        // panics.
         let mut started = self.accelerator.begin_prepared(next, Memory::Kept);
         if self.accelerator.device.dead {
-            // The results were in memory that is left to the device now.
+            // The results lie in memory that now belongs to the device.
             return (
                 ended.and(Err(Error::MustReopen)),
                 started.map(|flight| self.followed_by(flight)),
             );
         }
-        // What starting took is not this step's.
+        // The time of the start belongs to the next step.
         self.flight.watch.lap();
         let report = ended.and_then(|ended| match self.read(&ended, bodies) {
             Ok(()) => Ok(self.commit(ended, bodies)),
@@ -149,7 +159,7 @@ impl InFlight<'_> {
                 let aftermath = Aftermath::Untouched;
                 Err(self.located(Error::Step { fault, aftermath, diagnosis: None }))
             }
-            // Who sends wrong words is reset, which stops the next step, too.
+            // An accelerator that sends wrong words is reset, which stops the next step, too.
             Err(fault) => {
                 let Accelerator { device, shapes, .. } = &mut *self.accelerator;
                 let error = device.fail_overtaken(fault, shapes);
@@ -162,30 +172,30 @@ impl InFlight<'_> {
         (report, started.map(|flight| self.followed_by(flight)))
     }
 
-    /// The next step, in place of one that has ended.
+    /// Replaces the step that has ended by the next one.
     fn followed_by(mut self, flight: Flight) -> Self {
         self.flight = flight;
         self
     }
 }
 
-/// What may become of memory that the board has no use for, where there is too little.
+/// Whether starting a step may free the memory of the other bank, where memory is short.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Memory {
-    /// There are results in it.
+    /// The other bank holds results.
     Kept,
     Freed,
 }
 
 impl Accelerator {
-    /// Starts a step that was [prepared](InFlight::prepare) while an earlier one was on the board, or
-    /// [written](Self::write).
+    /// Starts a step that was [prepared](InFlight::prepare) while an earlier one was on the board,
+    /// or [written](Self::write).
     ///
     /// # Errors
-    /// [`Error::Input`]: [`InputError::NotPrepared`] if its records are not there any more, or never
-    /// were in this accelerator; [`InputError::ShapesChanged`] if [other shapes](Self::set_shapes)
-    /// were loaded since. [`Error::Step`] and [`Error::MustReopen`] as [`Self::step`]. Where
-    /// [`Error::may_retry`] says so the prepared step may be started again.
+    /// [`Error::Input`]: [`InputError::NotPrepared`] if its records are not there any more, or
+    /// never were in this accelerator; [`InputError::ShapesChanged`] if [other
+    /// shapes](Self::set_shapes) were loaded since. [`Error::Step`] and [`Error::MustReopen`] as
+    /// [`Self::step`]. Where [`Error::may_retry`] is true the prepared step may be started again.
     pub fn start(&mut self, prepared: &Prepared) -> Result<InFlight<'_>, Error> {
         standard(move || {
             let flight = self.begin_prepared(prepared, Memory::Freed)?;
@@ -197,32 +207,33 @@ impl Accelerator {
         self.device.settle(&self.shapes)?;
         let watch = Stopwatch::start();
         let accesses = self.accesses();
-        let load = self.loads[prepared.bank].filter(|load| load.ticket == prepared.ticket);
-        let Some(load @ PackedStep { plan, bank, shapes_loaded, .. }) = load else {
+        let step = self.packed[prepared.bank].filter(|step| step.id == prepared.id);
+        let Some(step @ PackedStep { plan, bank, shapes_loaded, .. }) = step else {
             return Err(InputError::NotPrepared.into());
         };
-        if load.sent.is_some() && !self.device.holds(bank) {
-            // Lost to a fault.
+        if step.sent.is_some() && !self.device.holds(bank) {
+            // The records were lost to a fault.
             return Err(InputError::NotPrepared.into());
         }
         if shapes_loaded != self.shapes_loaded {
             return Err(InputError::ShapesChanged.into());
         }
-        let mut ready = self.device.check_cancelled().map_err(Into::into);
-        if ready.is_ok() && load.sent.is_some() {
+        let Self { device, packed, shapes, .. } = self;
+        let mut ready = device.check_cancelled().map_err(Into::into);
+        if ready.is_ok() && step.sent.is_some() {
             ready = match memory {
-                Memory::Freed => {
-                    self.or_free(bank, |this| this.device.rings_or_reset(&plan, &this.shapes))
-                }
-                Memory::Kept => self.device.rings_or_reset(&plan, &self.shapes),
+                Memory::Freed => or_free((&mut *device, &mut *packed), bank, |device| {
+                    device.rings_or_reset(&plan, shapes)
+                }),
+                Memory::Kept => device.rings_or_reset(&plan, shapes),
             };
         }
-        ready.map_err(|symptom| self.device.fail(symptom, &self.shapes))?;
-        if load.sent.is_some() && !self.device.holds(bank) {
-            // Lost to a reset that the rings wanted.
-            self.loads[bank] = None;
+        ready.map_err(|symptom| device.fail(symptom, shapes))?;
+        if step.sent.is_some() && !device.holds(bank) {
+            // The records were lost to a reset that the rings needed.
+            packed[bank] = None;
             return Err(InputError::NotPrepared.into());
         }
-        self.begin(load, watch, accesses)
+        self.begin(step, watch, accesses)
     }
 }

@@ -1,4 +1,4 @@
-//! This file says what a step reports: cycles by kind, bytes, register accesses, host times.
+//! The report of a step: cycles by kind, bytes, register accesses, host times.
 
 use std::time::Duration;
 
@@ -8,10 +8,10 @@ use crate::control_block::time_of;
 use crate::control_block::{Saturated, impulse};
 use crate::order::{LiveReport, Order, OrderCosts, OrderReport};
 
-/// Clock cycles of a step on the accelerator, by what they were spent on.
+/// Clock cycles of a step on the accelerator, by their use.
 ///
-/// Where the counter of work or of waits is [saturated](StepReport::saturated), it is at least this, and the
-/// stalls are at most this.
+/// If the counter of work or of waits is [saturated](StepReport::saturated), the true count is at
+/// least the value here, and the true stalls are at most the stalls here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StepCycles {
     /// From start to done.
@@ -29,12 +29,12 @@ pub struct StepCycles {
 /// With the emulated board, `wait` is the time that the emulation takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct HostTimes {
-    /// Checking parameters, shapes and sizes. Bodies and collisions are looked at while they are
-    /// packed, except where a step's buffers have yet to be made.
+    /// Checking parameters, shapes and sizes. Packing checks bodies and collisions; only a step
+    /// whose buffers have yet to be made checks them here.
     pub validate: Duration,
     /// Putting the collisions in order.
     pub order: Duration,
-    /// Making buffers large enough, looking at bodies and collisions, and writing their records.
+    /// Making buffers large enough, checking bodies and collisions, and writing their records.
     pub pack: Duration,
     /// Handing over, descriptors, arguments.
     pub start: Duration,
@@ -46,7 +46,7 @@ pub struct HostTimes {
     pub commit: Duration,
 }
 
-/// What limits a step: what would have to be better for it to be faster.
+/// The part that limits a step: a faster step needs a better one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Limit {
@@ -60,23 +60,23 @@ pub enum Limit {
     Unknown,
 }
 
-/// Why the collisions of a step were sent in their order.
+/// The reason for the order in which the collisions of a step were sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OrderChoice {
-    /// The caller chose: [`StepParameters::order`](crate::StepParameters::order) names the order, or
-    /// the caller wrote the collisions one after the other.
+    /// The caller chose: [`StepParameters::order`](crate::StepParameters::order) names the order,
+    /// or the caller wrote the collisions one after the other.
     Asked,
     /// The board does not wait on hazards. Only an order without hazards is solved right.
     NoInterlock,
     /// The board keeps only live bodies on chip. The order keeps few bodies alive.
     LiveBodies,
-    /// The board waits on hazards. Of the order given and the order without hazards this one takes
-    /// fewer cycles.
+    /// The board waits on hazards. This order takes the fewest cycles of two: the order as given
+    /// and the order without hazards.
     Cheapest(OrderCosts),
 }
 
-/// What one step did.
+/// The counts, cycles and times of one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct StepReport {
@@ -84,17 +84,17 @@ pub struct StepReport {
     pub bodies: u64,
     /// Number of collisions.
     pub collisions: u64,
-    /// The order in which they were sent: [`Order::HazardFree`] where [`Order::HazardFreeNearby`] gave way
-    /// to it ([`Orderer::made`](crate::order::Orderer::made)).
+    /// The order in which the collisions were sent. [`Order::HazardFree`] where
+    /// [`Order::HazardFreeNearby`] gave way to it ([`Orderer::made`](crate::order::Orderer::made)).
     pub order: Order,
-    /// Why this order and no other.
+    /// The reason for this order.
     pub order_choice: OrderChoice,
-    /// Entries left empty between them, sent as collisions without contact points.
+    /// Empty entries between the collisions, sent as collisions without contact points.
     pub empty: u64,
-    /// What that order was proved to be, if it was to be [verified](crate::StepParameters::verify_order):
-    /// no hazards; how many bodies are alive at once, and how long.
+    /// The proof of the order, if it was to be [verified](crate::StepParameters::verify_order): no
+    /// hazards, the number of bodies alive at once, and the length of their lives.
     pub verified: Option<OrderReport>,
-    /// What the order takes of a bitstream that keeps only live bodies.
+    /// The demand of the order on a bitstream that keeps only live bodies.
     pub live: Option<LiveReport>,
     /// Passes over the collisions: contact and friction iterations.
     pub passes: u32,
@@ -108,31 +108,33 @@ pub struct StepReport {
     pub bytes_from_device: u64,
     /// Collisions that met a hazard, over all passes.
     pub hazards: u64,
-    /// Sum of the accumulated normal impulses after the last contact pass, N s; `None` if the bitstream does
-    /// not count it, or if the sum is [`IMPULSE_SUM_MAX`](Self::IMPULSE_SUM_MAX) or more, as
-    /// [`saturated`](Self::saturated) says.
+    /// Sum of the accumulated normal impulses after the last contact pass, N s. `None` if the
+    /// bitstream does not count it, or if the sum is [`IMPULSE_SUM_MAX`](Self::IMPULSE_SUM_MAX) or
+    /// more, as [`saturated`](Self::saturated) tells.
     pub impulse_sum: Option<f64>,
-    /// Which counters stopped at their maximum. What they count is that or more.
+    /// Which counters stopped at their maximum. The true count is that value or more.
     pub saturated: Saturated,
     /// 32-bit register reads.
     pub register_reads: u64,
     /// 32-bit register writes.
     pub register_writes: u64,
-    /// Writes that started something: tails of descriptor rings, and the accelerator's start.
+    /// Register writes that started something: tails of descriptor rings, and the accelerator's
+    /// start.
     pub doorbells: u64,
     /// Interrupts that woke the driver.
     pub interrupts: u64,
     /// Scatter-gather descriptors.
     pub descriptors: u64,
-    /// How often the step was taken again after a fault, as far as it was
-    /// [allowed](crate::StepParameters::retries). The register accesses are those of all attempts.
+    /// Number of repetitions of the step after faults, within the
+    /// [limit](crate::StepParameters::retries). The register accesses are the sum over all
+    /// attempts.
     pub retries: u32,
-    /// Where the host's time went.
+    /// The host's time, by phase.
     pub host: HostTimes,
 }
 
 impl StepReport {
-    /// Where the sum of the impulses stops, N s.
+    /// The maximum of the sum of impulses, N s.
     pub const IMPULSE_SUM_MAX: f64 = impulse(IMPULSE_SUM_MAX);
 
     /// Time from start to done on the accelerator: cycles divided by the clock.
@@ -143,16 +145,16 @@ impl StepReport {
         time_of(self.cycles.total, self.clock_khz)
     }
 
-    /// What limits the step: the larger of stalls and waits, if it adds more than 2 % to the
-    /// pipeline's own cycles; else the pipeline.
+    /// The part that limits the step: the larger of stalls and waits, if it adds more than 2 % to
+    /// the pipeline's own cycles; else the pipeline.
     ///
-    /// A pass takes the longer of computing and moving its data, so that any wait beyond the start
-    /// of the streams means that the pipeline is not what limits it.
+    /// A pass takes the longer of computing and moving its data. Any wait beyond the start of the
+    /// streams therefore means that the pipeline is not the limit.
     #[must_use]
     pub fn limit(&self) -> Limit {
         let StepCycles { work, stalls, waits, .. } = self.cycles;
         if self.saturated.stalls() {
-            // Waits are at least so many, stalls at most.
+            // The true waits are at least this number, the true stalls at most.
             let sure = !self.saturated.work && waits >= stalls && waits.saturating_mul(50) > work;
             return if sure { Limit::Streams } else { Limit::Unknown };
         }

@@ -1,12 +1,11 @@
-//! This file checks the results of a step and reads them, all before any of them is committed.
+//! Checks and reads all results of a step before any of them is committed.
 //!
-//! Each beat is read once: what is checked is checked on its way.
+//! Each beat is read once, and checked while it is read.
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
 
-use super::accelerator::Accelerator;
-use super::packing::Sent;
+use super::packing::SentSums;
 use crate::axi_dma::Direction;
 use crate::beat::pack::pool::PackPool;
 use crate::beat::stripe::{Layout, Segment};
@@ -17,66 +16,63 @@ use crate::board::plan::Plan;
 use crate::board::port::Port;
 use crate::control_block::Counters;
 use crate::fault::Fault;
-use crate::order::LiveReport;
+use crate::order::Lives;
 use crate::record::finite::finite;
 use crate::record::result::{self, Record};
 use crate::scene::Bodies;
 
-impl Accelerator {
-    /// Compares the accelerator's sum of the words that it received with ours, if it has one.
-    pub(super) fn check_received(
-        plan: &Plan,
-        sent: Sent,
-        counters: &Counters,
-    ) -> Result<(), Fault> {
-        let Some((received, _)) = counters.sums else { return Ok(()) };
-        #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
-        let rounds = plan.rounds() as u32;
-        let expected = sent
-            .velocities
-            .wrapping_add(sent.collisions.wrapping_mul(rounds))
-            .wrapping_add(sent.poses);
-        if received != expected {
-            let direction = Direction::Mm2s;
-            return Err(Fault::Checksum { direction, expected, found: received });
-        }
-        Ok(())
+/// Compares the accelerator's sum of the words that it received with the driver's, if the
+/// accelerator keeps sums.
+pub(super) fn check_received(
+    plan: &Plan,
+    sent: SentSums,
+    counters: &Counters,
+) -> Result<(), Fault> {
+    let Some((received, _)) = counters.sums else { return Ok(()) };
+    #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
+    let rounds = plan.rounds() as u32;
+    let expected =
+        sent.velocities.wrapping_add(sent.collisions.wrapping_mul(rounds)).wrapping_add(sent.poses);
+    if received != expected {
+        let direction = Direction::Mm2s;
+        return Err(Fault::Checksum { direction, expected, found: received });
     }
+    Ok(())
+}
 
-    /// Reads the results into the spare, and compares the accelerator's sum of the words that it sent
-    /// with ours, if it has one.
-    ///
-    /// Where only live bodies are kept, `live` says so: results come in an order of their own then.
-    pub(super) fn unpack<B: Bodies + ?Sized>(
-        &mut self,
-        plan: &Plan,
-        bank: Bank,
-        bodies: &B,
-        live: Option<LiveReport>,
-        answered: Option<u32>,
-    ) -> Result<(), Fault> {
-        // A panic of the caller's loses it: the next step makes it anew.
-        let mut spare = std::mem::take(&mut self.spare);
-        let Device { s2mm, statics, packers, .. } = &mut self.device;
-        let channels = received(s2mm, plan, bank);
-        let layout = Segment::Results.layout(&plan.variant);
-        let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
-        let (found, broken) = match live.map(|_| self.orderings[bank].lives()) {
-            Some(lives) => results.scatter(lives.results(), bodies, &mut spare),
-            None => results.in_turn(plan.bodies, bodies, &statics[bank], &mut spare, packers),
-        };
-        self.spare = spare;
-        match (answered, broken) {
-            (Some(expected), _) if expected != found => {
-                Err(Fault::Checksum { direction: Direction::S2mm, expected, found })
-            }
-            (_, Some(body)) => Err(Fault::NotFinite { body }),
-            _ => Ok(()),
+/// Reads the results of a bank into `staged`. Compares the driver's sum of the words with
+/// `sent_sum`, the accelerator's sum of the words that it sent.
+///
+/// A board that keeps only live bodies sends the results in the order of `lives`.
+pub(super) fn read<B: Bodies + ?Sized>(
+    device: &mut Device,
+    staged: &mut Vec<Record>,
+    (plan, bank): (&Plan, Bank),
+    bodies: &B,
+    lives: Option<&Lives>,
+    sent_sum: Option<u32>,
+) -> Result<(), Fault> {
+    // A panic in the caller's code loses the memory: the next step allocates it anew.
+    let mut records = std::mem::take(staged);
+    let Device { s2mm, statics, packers, .. } = device;
+    let channels = received(s2mm, plan, bank);
+    let layout = Segment::Results.layout(&plan.variant);
+    let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
+    let (found, broken) = match lives {
+        Some(lives) => results.read_scattered(lives.results(), bodies, &mut records),
+        None => results.read_in_order(plan.bodies, bodies, &statics[bank], &mut records, packers),
+    };
+    *staged = records;
+    match (sent_sum, broken) {
+        (Some(expected), _) if expected != found => {
+            Err(Fault::Checksum { direction: Direction::S2mm, expected, found })
         }
+        (_, Some(body)) => Err(Fault::NotFinite { body }),
+        _ => Ok(()),
     }
 }
 
-/// The result beats of each channel, in a bank.
+/// The result beats of each channel in a bank.
 pub(super) fn received<'a>(
     ports: &'a [Port],
     plan: &Plan,
@@ -93,36 +89,38 @@ pub(super) fn received<'a>(
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Results<'a> {
     pub(crate) layout: &'a Layout,
-    /// One a channel.
+    /// One slice of beats per channel.
     pub(crate) channels: &'a [&'a [Beat]],
 }
 
 impl Results<'_> {
-    /// Reads the results of `count` bodies in their order; the sum of the words that were read, and
-    /// the first body that is not finite.
+    /// Reads the results of `count` bodies in their order. Returns the sum of the words, and the
+    /// first body that is not finite.
     ///
-    /// A static body does not move, whatever comes back for it: `statics` are their indices, upwards.
-    pub(crate) fn in_turn<B: Bodies + ?Sized>(
+    /// A static body does not move, whatever comes back for it: `statics` are the indices of the
+    /// static bodies, ascending.
+    pub(crate) fn read_in_order<B: Bodies + ?Sized>(
         self,
         count: usize,
         bodies: &B,
         statics: &[u32],
-        spare: &mut Vec<Record>,
+        staged: &mut Vec<Record>,
         packers: &mut PackPool,
     ) -> (u32, Option<usize>) {
-        // What is there from the last step is overwritten.
-        spare.resize(count, Record::default());
-        let (sum, broken) = self.read_in_turn(statics, spare, packers);
+        // All records of the last step are overwritten.
+        staged.resize(count, Record::default());
+        let (sum, broken) = self.read_contiguous(statics, staged, packers);
         for index in statics.iter().map(|index| *index as usize) {
-            if let Some(to) = spare.get_mut(index) {
-                *to = own(bodies, index);
+            if let Some(to) = staged.get_mut(index) {
+                *to = unchanged(bodies, index);
             }
         }
         (sum, broken)
     }
 
-    /// What of it does not depend on the caller's container: it is compiled once, with the driver.
-    fn read_in_turn(
+    /// The part that does not depend on the caller's container: it is compiled once, with the
+    /// driver.
+    fn read_contiguous(
         self,
         statics: &[u32],
         into: &mut [Record],
@@ -137,16 +135,16 @@ impl Results<'_> {
         (sum, wrong.map(|(index, _)| index).find(moves))
     }
 
-    /// Reads results in the order of these bodies, and leaves all others as they are; otherwise as
-    /// [`Self::in_turn`].
-    fn scatter<B: Bodies + ?Sized>(
+    /// Reads results in the order of the bodies in `order`, and leaves all other bodies as they
+    /// are; otherwise as [`Self::read_in_order`].
+    fn read_scattered<B: Bodies + ?Sized>(
         self,
         order: &[u32],
         bodies: &B,
-        spare: &mut Vec<Record>,
+        staged: &mut Vec<Record>,
     ) -> (u32, Option<usize>) {
-        spare.clear();
-        spare.extend((0..bodies.len()).map(|index| own(bodies, index)));
+        staged.clear();
+        staged.extend((0..bodies.len()).map(|index| unchanged(bodies, index)));
         let mut broken: Option<usize> = None;
         let mut reader = Reader::new(self.layout, self.channels);
         let mut block = [Record::default(); BLOCK];
@@ -158,9 +156,9 @@ impl Results<'_> {
                 if !all_finite && !finite(record) {
                     broken = Some(broken.map_or(index, |lowest| lowest.min(index)));
                 }
-                // Should a caller's bodies have become fewer, there is nothing to be told of the
-                // others.
-                if let Some(to) = spare.get_mut(index) {
+                // If the caller's bodies have become fewer, the results of the missing ones are
+                // dropped.
+                if let Some(to) = staged.get_mut(index) {
                     *to = *record;
                 }
             }
@@ -169,13 +167,13 @@ impl Results<'_> {
     }
 }
 
-/// The record of a body's own state.
-fn own<B: Bodies + ?Sized>(bodies: &B, index: usize) -> Record {
+/// The record of a body's present state.
+fn unchanged<B: Bodies + ?Sized>(bodies: &B, index: usize) -> Record {
     let body = bodies.body(index);
     result::of(body.pose, body.velocity)
 }
 
-/// Stores what was read with the bodies.
+/// Stores the results in the bodies.
 pub(crate) fn commit<B: Bodies + ?Sized>(results: &[Record], bodies: &mut B) {
     for (index, record) in results.iter().enumerate() {
         let (pose, velocity) = result::decode(record);
@@ -183,8 +181,8 @@ pub(crate) fn commit<B: Bodies + ?Sized>(results: &[Record], bodies: &mut B) {
     }
 }
 
-/// Stores the velocities alone: what was not integrated has the caller's own poses, which a stream of
-/// sixteen bits would round on their way.
+/// Stores the velocities alone. A body that was not integrated keeps the caller's own pose, which a
+/// stream of sixteen bits would round.
 pub(super) fn commit_velocities<B: Bodies + ?Sized>(results: &[Record], bodies: &mut B) {
     for (index, record) in results.iter().enumerate() {
         let (_, velocity) = result::decode(record);
@@ -202,9 +200,9 @@ mod tests {
 
     const COUNT: usize = 40;
 
-    /// What is read of the results of so many bodies, one row a channel, of which these are not
-    /// finite.
-    fn of_broken<T>(broken: &[usize], read: impl FnOnce(Results<'_>, &Vec<Body>) -> T) -> T {
+    /// Calls `read` with the results of `COUNT` bodies, one row a channel. The bodies in `broken`
+    /// are not finite.
+    fn with_broken<T>(broken: &[usize], read: impl FnOnce(Results<'_>, &Vec<Body>) -> T) -> T {
         let layout = &Segment::Results.layout(&FLOAT.default_variant());
         let mut channels = vec![vec![Beat::default(); COUNT]; FLOAT.s2mm_widths.len()];
         for record in broken {
@@ -217,17 +215,17 @@ mod tests {
     }
 
     #[test]
-    fn the_first_body_that_moves_and_is_not_finite_is_told() {
+    fn the_first_body_that_moves_and_is_not_finite_is_reported() {
         let statics = [3, 7];
-        for (broken, told) in
+        for (broken, expected) in
             [(&[][..], None), (&[7, 3], None), (&[39, 7, 31], Some(31)), (&[4, 3, 38], Some(4))]
         {
-            let mut spare = Vec::new();
-            let (_, found) = of_broken(broken, |results, bodies| {
-                results.in_turn(COUNT, bodies, &statics, &mut spare, &mut PackPool::alone())
+            let mut staged = Vec::new();
+            let (_, found) = with_broken(broken, |results, bodies| {
+                results.read_in_order(COUNT, bodies, &statics, &mut staged, &mut PackPool::alone())
             });
-            assert_eq!(found, told, "{broken:?}");
-            for (index, record) in spare.iter().enumerate() {
+            assert_eq!(found, expected, "{broken:?}");
+            for (index, record) in staged.iter().enumerate() {
                 let stays = record[POSITION].0[0] == 5.0_f32.to_bits();
                 assert_eq!(stays, statics.contains(&u32::try_from(index).expect("few")), "{index}");
             }
@@ -235,15 +233,16 @@ mod tests {
     }
 
     #[test]
-    fn results_in_another_order_go_to_their_bodies_and_the_lowest_is_told() {
-        // From the last body down, but the first five.
+    fn results_in_another_order_go_to_their_bodies_and_the_lowest_is_reported() {
+        // Body 39 first, down to body 5. The first five bodies have no results.
         let order: Vec<u32> = (5..40).rev().collect();
-        for (broken, told) in [(&[][..], None), (&[2], Some(37)), (&[33, 4, 2], Some(6))] {
-            let mut spare = Vec::new();
-            let (_, found) =
-                of_broken(broken, |results, bodies| results.scatter(&order, bodies, &mut spare));
-            assert_eq!(found, told, "{broken:?}");
-            for (index, record) in spare.iter().enumerate() {
+        for (broken, expected) in [(&[][..], None), (&[2], Some(37)), (&[33, 4, 2], Some(6))] {
+            let mut staged = Vec::new();
+            let (_, found) = with_broken(broken, |results, bodies| {
+                results.read_scattered(&order, bodies, &mut staged)
+            });
+            assert_eq!(found, expected, "{broken:?}");
+            for (index, record) in staged.iter().enumerate() {
                 assert_eq!(record[POSITION].0[0] != 0, index < 5, "{index}");
                 let result = order.iter().position(|body| *body as usize == index);
                 assert_eq!(!finite(record), result.is_some_and(|at| broken.contains(&at)));

@@ -1,23 +1,23 @@
-//! This file takes a step again that failed, as often as it may be.
+//! Repeats a step that failed, within the limit that the caller sets.
 
 use crate::error::Error;
 use crate::fault::Fault;
 
-/// Attempts until one succeeds, at most `retries` times more than once and only while the board is
-/// ready for it; what came of it, and how often it was taken again.
+/// Calls `attempt` until it succeeds, with at most `retries` repetitions and only while the board
+/// is ready for the next attempt. Returns the result and the number of repetitions.
 pub(super) fn with_retries<T>(
     retries: u32,
     mut attempt: impl FnMut() -> Result<T, Error>,
 ) -> Result<(T, u32), Error> {
-    let mut again = 0;
+    let mut repeated = 0;
     loop {
         match attempt() {
-            Ok(done) => return Ok((done, again)),
-            // What the caller has ended is not begun anew.
-            Err(error) if error.may_retry() && !cancelled(&error) && again < retries => {
-                again += 1;
+            Ok(done) => return Ok((done, repeated)),
+            // The driver does not repeat a step that the caller has cancelled.
+            Err(error) if error.may_retry() && !cancelled(&error) && repeated < retries => {
+                repeated += 1;
                 let name = error.fault().map_or("a fault", |fault| fault.name());
-                log::info!("the step is taken again after {name} ({again} of {retries} times)");
+                log::info!("repeating the step after {name} ({repeated} of {retries} times)");
             }
             Err(error) => return Err(error),
         }
@@ -38,14 +38,14 @@ mod tests {
         Error::Step { fault, aftermath, diagnosis: None }
     }
 
-    /// The result of attempts that end in turn like that, and how many there were.
+    /// The result of attempts that end as `ends` lists, and the number of attempts.
     fn tried(retries: u32, ends: &[Option<Aftermath>]) -> (Result<u32, Error>, usize) {
         let mut attempts = 0;
         let result = with_retries(retries, || {
             attempts += 1;
             ends[attempts - 1].map_or(Ok(()), |aftermath| Err(fault(aftermath)))
         });
-        (result.map(|((), again)| again), attempts)
+        (result.map(|((), repeated)| repeated), attempts)
     }
 
     #[test]

@@ -1,13 +1,15 @@
-//! This file brings a step into a bank of buffers whose collisions the caller writes as it finds them.
+//! Packs a step whose collisions the caller writes as it finds them.
 
 use pgs_support::float_env::standard_around;
 
 use super::accelerator::Accelerator;
-use super::in_flight::{InFlight, Stopwatch};
-use super::ordering::{Arranged, in_order_of_writing};
+use super::in_flight::InFlight;
+use super::ordering::{OrderSummary, in_order_of_writing};
 use super::pack::{Engines, PackId, PackedStep};
 use super::prepared::Prepared;
 use super::report::{HostTimes, OrderChoice};
+use super::reserve::{refuse, reserve};
+use super::stopwatch::Stopwatch;
 use crate::beat::pack::target::Target;
 use crate::beat::pack::writer::Writer;
 use crate::board::bank::Bank;
@@ -18,20 +20,22 @@ use crate::validate::InputError;
 use crate::validate::{Quick, preflight, validate};
 
 impl Accelerator {
-    /// Packs a step whose collisions `narrow_phase` writes, at most `announced` of them: their
+    /// Packs a step whose collisions `narrow_phase` writes, at most `announced` of them. Their
     /// records go straight into the memory that the board reads, and the caller needs no array of
     /// them.
     ///
     /// The board solves them in the order in which they are written. The parameters must ask for
-    /// [`Order::AsGiven`](crate::order::Order::AsGiven), or for no order on a bitstream that waits on
-    /// hazards. A bitstream that keeps only live bodies wants all collisions at once, and so does a
-    /// step that is to verify its order.
+    /// [`Order::AsGiven`](crate::order::Order::AsGiven), or for no order on a bitstream that waits
+    /// on hazards. A bitstream that keeps only live bodies wants all collisions at once, and so
+    /// does a step that is to verify its order.
     ///
-    /// The step takes the place of the one that was started last; [`Self::start`] starts it. One that
-    /// is stepped or submitted before that takes its place in turn: it is refused then.
-    /// [`StepReport::host`](crate::StepReport::host) counts the narrow phase as packing.
+    /// The step takes the place of the one that was started last; [`Self::start`] starts it. A step
+    /// that is stepped or submitted before that start takes its place in turn, and the written step
+    /// is then refused. [`StepReport::host`](crate::StepReport::host) counts the narrow phase as
+    /// packing.
     ///
-    /// `narrow_phase` runs in the caller's own [floating-point environment](crate#the-floating-point-environment).
+    /// `narrow_phase` runs in the caller's own [floating-point
+    /// environment](crate#the-floating-point-environment).
     ///
     /// ```
     /// use zynq_pgs::{Accelerator, Body, Collision, Contact, OpenOptions, Pose, Shape};
@@ -53,7 +57,8 @@ impl Accelerator {
     ///             point: [x + dx, y + 0.5, z + dz],
     ///             distance: 0.0,
     ///         });
-    ///         records.push(&Collision { body_a, body_b, normal: [0.0, 1.0, 0.0], count: 4, contacts });
+    ///         let normal = [0.0, 1.0, 0.0];
+    ///         records.push(&Collision { body_a, body_b, normal, count: 4, contacts });
     ///     }
     /// })?;
     /// let report = board.start(&step)?.wait(&mut tower)?;
@@ -64,8 +69,9 @@ impl Accelerator {
     ///
     /// # Errors
     /// [`Error::Input`] as [`Self::step`], and [`InputError::WrittenInOrder`],
-    /// [`InputError::MoreThanAnnounced`]. [`Error::Step`] if there is no memory for so many, or the
-    /// step was cancelled; [`Error::MustReopen`] after a fault that could not be cleared.
+    /// [`InputError::MoreThanAnnounced`]. [`Error::Step`] if memory is too small for `announced`
+    /// collisions, or the step was cancelled; [`Error::MustReopen`] after a fault that could not be
+    /// cleared.
     pub fn write<B: Bodies + ?Sized>(
         &mut self,
         bodies: &B,
@@ -77,13 +83,13 @@ impl Accelerator {
             let narrow_phase = |writer: &mut Writer<'_>| caller.run(|| narrow_phase(writer));
             self.device.settle(&self.shapes)?;
             let into = (self.bank, Engines::Idle);
-            let load = self.load_written(into, bodies, announced, parameters, narrow_phase)?;
-            Ok(Prepared { bank: load.bank, ticket: load.ticket })
+            let step = self.pack_written(into, bodies, announced, parameters, narrow_phase)?;
+            Ok(Prepared { bank: step.bank, id: step.id })
         })
     }
 
-    /// As [`load`](Self::load), of collisions that are written.
-    fn load_written<B: Bodies + ?Sized>(
+    /// Packs as [`pack`](Self::pack) does, with collisions that `narrow_phase` writes.
+    fn pack_written<B: Bodies + ?Sized>(
         &mut self,
         (bank, engines): (Bank, Engines),
         bodies: &B,
@@ -94,31 +100,28 @@ impl Accelerator {
         self.forget(bank);
         let mut watch = Stopwatch::start();
         let mut host = HostTimes::default();
-        if !in_order_of_writing(&self.device.capabilities, parameters) {
+        let Self { device, limits, shapes, packed, .. } = self;
+        if !in_order_of_writing(&device.capabilities, parameters) {
             return Err(InputError::WrittenInOrder.into());
         }
-        let announced = Announced(announced);
-        preflight(bodies, &announced, &self.shapes, parameters, &self.limits)?;
+        let scene = preflight(bodies, &Announced(announced), shapes, parameters, limits)?;
         host.validate = watch.lap();
-        let mut plan = Plan {
-            bodies: bodies.len(),
-            collisions: announced.0,
-            passes: parameters.passes(),
-            variant: self.limits.variant,
-        };
-        if let Err(symptom) = self.make_room(&plan, bank, engines) {
-            return Err(self.refuse(symptom, engines));
-        }
-        let Self { device, limits, shapes, .. } = self;
-        let quick = Quick::new(preflight(bodies, &announced, shapes, parameters, limits)?);
-        let target = Target { variant: &plan.variant, shapes, quick: Some(&quick) };
-        let refuse = || validate(bodies, &Announced(0), shapes, parameters, limits);
+
+        let variant = limits.variant;
+        let passes = parameters.passes();
+        let mut plan = Plan { bodies: bodies.len(), collisions: announced, passes, variant };
+        reserve((&mut *device, packed), shapes, (&plan, bank), engines)
+            .map_err(|symptom| refuse(device, shapes, symptom, engines))?;
+
+        let quick = Quick::new(scene);
+        let target = Target { variant: &variant, shapes, quick: Some(&quick) };
+        let check_bodies = || validate(bodies, &Announced(0), shapes, parameters, limits);
         let (sent, written) =
-            device.pack_written(&plan, bank, target, bodies, refuse, narrow_phase)?;
+            device.pack_written(&plan, bank, target, bodies, check_bodies, narrow_phase)?;
         plan.collisions = written;
         host.pack = watch.lap();
-        let load = PackedStep {
-            ticket: PackId::new(),
+        Ok(self.keep(PackedStep {
+            id: PackId::new(),
             bank,
             plan,
             sent: Some(sent),
@@ -126,12 +129,10 @@ impl Accelerator {
             bodies: bodies.len(),
             collisions: written,
             empty: 0,
-            arranged: Arranged::as_given(OrderChoice::Asked),
+            order_summary: OrderSummary::as_given(OrderChoice::Asked),
             shapes_loaded: self.shapes_loaded,
             host,
-        };
-        self.loads[bank] = Some(load);
-        Ok(load)
+        }))
     }
 }
 
@@ -139,7 +140,7 @@ impl InFlight<'_> {
     /// As [`Accelerator::write`], while the board works on this step: see [`Self::prepare`].
     ///
     /// # Errors
-    /// Those of [`Accelerator::write`] and of [`Self::prepare`].
+    /// The errors of [`Accelerator::write`] and of [`Self::prepare`].
     pub fn write<B: Bodies + ?Sized>(
         &mut self,
         bodies: &B,
@@ -149,15 +150,15 @@ impl InFlight<'_> {
     ) -> Result<Prepared, Error> {
         standard_around(|caller| {
             let narrow_phase = |writer: &mut Writer<'_>| caller.run(|| narrow_phase(writer));
-            let into = (self.flight.load.bank.other(), Engines::Working);
-            let load =
-                self.accelerator.load_written(into, bodies, announced, parameters, narrow_phase)?;
-            self.hand_over(load)
+            let into = (self.flight.step.bank.other(), Engines::Working);
+            let step =
+                self.accelerator.pack_written(into, bodies, announced, parameters, narrow_phase)?;
+            self.hand_over(step)
         })
     }
 }
 
-/// So many collisions, of which nothing else is known yet.
+/// A number of collisions whose values do not exist yet.
 struct Announced(usize);
 
 impl Collisions for Announced {

@@ -1,4 +1,4 @@
-//! This file is what tests of whole steps share: opening a board, naming an order, comparing bits.
+//! Shares the parts of whole-step tests: opening a board, choosing an order, comparing bits.
 #![allow(dead_code, reason = "each test uses its part")]
 
 use bitstream_model::{BoardConfig, EmulatedBoard};
@@ -29,7 +29,7 @@ pub(crate) fn bits(bodies: &[Body]) -> Vec<u32> {
     bodies.iter().flat_map(numbers).map(f32::to_bits).collect()
 }
 
-/// The collisions as an order for that depth, issue slots, takes them one by one.
+/// The collisions one by one in an order for a depth of `depth` issue slots.
 pub(crate) fn by_hand(
     order: Order,
     bodies: &[Body],

@@ -1,4 +1,4 @@
-//! This file runs the device tree compiler and reads compiled trees.
+//! Runs the device tree compiler and reads compiled trees.
 
 use std::fs;
 use std::io::Write;
@@ -11,20 +11,20 @@ use tempfile::TempDir;
 /// The base tree that overlays are applied to.
 const BASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/device_tree/base.dts");
 
-/// The sources that are shipped.
+/// The folder of the shipped sources.
 pub(crate) fn sources() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("device-tree")
 }
 
-/// Says something past the harness, which keeps what passing tests print.
-fn say(what: &str) {
-    // If nobody can be told, the test is no worse for it.
-    let _ = writeln!(std::io::stderr(), "{what}");
+/// Prints a line past the harness, which keeps the output of passing tests.
+fn print_past_harness(line: &str) {
+    // If stderr is closed, the test is none the worse.
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Whether the tools are there; says once if they are not.
+/// Whether the tools are installed. Prints a line once if they are not.
 pub(crate) fn tools_found() -> bool {
-    // Emulated by qemu-user, starting a program that is not there succeeds, and ends with 127.
+    // With qemu-user, starting a missing program succeeds and ends with 127.
     let answers = |tool: &&str| {
         let asked = Command::new(tool).arg("--version").output();
         asked.is_ok_and(|answer| answer.status.success())
@@ -33,7 +33,9 @@ pub(crate) fn tools_found() -> bool {
     if !found {
         static SAID: Once = Once::new();
         SAID.call_once(|| {
-            say("skipped: device trees (dtc, fdtoverlay or fdtget is not installed)");
+            print_past_harness(
+                "skipped: device trees (dtc, fdtoverlay or fdtget is not installed)",
+            );
         });
     }
     found
@@ -48,7 +50,7 @@ fn succeed(command: &mut Command) -> Output {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{command:?}: {stderr}");
     if !stderr.trim().is_empty() {
-        say(&format!("{command:?}: {stderr}"));
+        print_past_harness(&format!("{command:?}: {stderr}"));
     }
     output
 }
@@ -70,7 +72,7 @@ impl Tree {
         );
     }
 
-    /// The base tree with a shipped overlay applied, each text of which `change` may replace.
+    /// The base tree with a shipped overlay. `change` may replace the text of each source.
     pub(crate) fn with_overlay(name: &str, change: impl Fn(String) -> String) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         for entry in fs::read_dir(sources()).expect("the sources") {

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use pgs_support::chunks::Chunks;
 use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
-/// A step of Bullet's.
+/// One step of Bullet.
 pub(crate) struct Step {
     pub(crate) shapes: Vec<Shape>,
     pub(crate) bodies: Vec<Body>,
     pub(crate) collisions: Vec<Collision>,
 }
 
-/// The folder of the thesis' step, if the environment leads there; a variable that is blank leads nowhere.
+/// The folder of the thesis' step, if the environment names one; a blank variable names none.
 pub(crate) fn full_step() -> Option<PathBuf> {
     let root = std::env::var_os("PGS_VECTORS")?;
     let blank = root.to_str().is_some_and(|root| root.trim().is_empty());
@@ -39,7 +39,7 @@ fn rows<const N: usize>(folder: &Path, name: &str) -> Vec<[f32; N]> {
     rows.iter().map(|row| row.map(f32::from_bits)).collect()
 }
 
-/// The step in `folder`. Its bodies are one static shape and one other.
+/// Reads the step in `folder`. Its bodies have one static shape and one other.
 pub(crate) fn load(folder: &Path) -> Step {
     let masses = rows::<1>(folder, "body_inv_mass.npy");
     let inertia = rows::<3>(folder, "body_inv_inertia.npy");

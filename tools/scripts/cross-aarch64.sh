@@ -34,8 +34,9 @@ if [ $run_tests = yes ]; then
 	# What computes, what drives and what converts: there another processor could make a difference.
 	# What reads command lines, finds files or judges texts has run where it was built.
 	time_of attend timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" \
-		-p zynq-pgs -p bitstream-model --lib --test shortcuts --test shortcuts_buffers \
-		--test float_environment
+		-p zynq-pgs -p bitstream-model --lib
+	time_of attend timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" \
+		-p zynq-pgs -p bitstream-model --test it -- shortcuts:: shortcuts_buffers:: float_environment::
 	# Bullet's bits from the binary itself, which no test has to be built for.
 	for folder in tests/golden/*/ ${PGS_VECTORS:+"$PGS_VECTORS"/*/}; do
 		[ -e "$folder/params.npy" ] || continue

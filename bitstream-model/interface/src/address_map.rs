@@ -1,4 +1,4 @@
-//! This file says where the register regions stand in the processing system's address map.
+//! Addresses of the register regions and of memory in the processing system's address map.
 //!
 //! ```text
 //! 0xA000_0000  AXI DMA 0   64 KiB  -+
@@ -43,19 +43,21 @@ pub const UIO_MEMORY_MAP: &str = "memory";
 /// Name of the u-dma-buf, where DMA memory comes from that kernel module.
 pub const U_DMA_BUF: &str = "pgs";
 
-/// Where the reserved memory begins unless it is said otherwise: in low DDR, so that cores with
-/// 32-bit addresses reach it.
+/// Default address of the reserved memory: in low DDR, so that cores with 32-bit addresses reach
+/// it.
 pub const MEMORY_BASE: u64 = 0x5000_0000;
-/// How much of it there is, bytes: 38,880 bodies with 127,000 collisions take 19 MB and some slack.
+/// Default length of the reserved memory, bytes: 38,880 bodies with 127,000 collisions take 19 MB
+/// and some slack.
 pub const MEMORY_BYTES: u64 = 64 << 20;
 
-/// Where low DDR begins and ends: 2 GiB on the ZCU102.
+/// Addresses of low DDR: 2 GiB on the ZCU102.
 pub const DDR_LOW: core::ops::Range<u64> = 0..0x8000_0000;
-/// Where high DDR begins and ends on the ZCU102: the other 2 GiB of its 4.
+/// Addresses of high DDR on the ZCU102: the other 2 GiB of its 4.
 pub const DDR_HIGH: core::ops::Range<u64> = 0x8_0000_0000..0x8_8000_0000;
 
-/// Where the processors reach the programmable logic: `M_AXI_HPM0_LPD`, then `M_AXI_HPM0_FPD` and
-/// `M_AXI_HPM1_FPD` below 4 GiB, the 8 GiB that both share, and the upper window of each (UG1085).
+/// Addresses through which the processors reach the programmable logic: `M_AXI_HPM0_LPD`, then
+/// `M_AXI_HPM0_FPD` and `M_AXI_HPM1_FPD` below 4 GiB, the 8 GiB that both share, and the upper
+/// window of each (UG1085).
 pub const LOGIC_WINDOWS: [core::ops::Range<u64>; 6] = [
     0x8000_0000..0xA000_0000,
     0xA000_0000..0xB000_0000,
@@ -65,7 +67,7 @@ pub const LOGIC_WINDOWS: [core::ops::Range<u64>; 6] = [
     0x48_0000_0000..0x80_0000_0000,
 ];
 
-/// Whether any of these bytes lie in the programmable logic. A range of no bytes is its address.
+/// Whether any of these bytes lie in the programmable logic. An empty range counts as one byte.
 #[must_use]
 pub fn is_in_logic(address: u64, bytes: u64) -> bool {
     let end = address.saturating_add(bytes.max(1));

@@ -1,4 +1,4 @@
-//! This file holds the register rows of the AMD AXI DMA v7.1, as PG021 gives them.
+//! Register rows of the AMD AXI DMA v7.1, as PG021 gives them.
 //!
 //! A core has two channels. The rows give MM2S offsets; S2MM repeats them [`S2MM_OFFSET`] higher.
 //! Registers are 32 bits wide, little-endian, and take aligned 32-bit accesses only.
@@ -49,11 +49,11 @@ pub mod dmacr {
     pub const RS: Field = Field::bit("RS", 0, Access::ReadWrite);
     /// Reads 1.
     pub const ALWAYS_ONE: Field = Field::bit("1", 1, Access::ReadOnly);
-    /// Soft reset of the whole core, whichever channel's bit is used; reads 1 until done.
+    /// Soft reset of the whole core, through either channel's bit; reads 1 until done.
     pub const RESET: Field = Field::bit("Reset", 2, Access::SelfClearing);
     /// All data accesses go to one address.
     pub const KEYHOLE: Field = Field::bit("Keyhole", 3, Access::ReadWrite);
-    /// The ring is run round and round; Cmplted and the tail are ignored.
+    /// The engine goes round the ring without an end; it ignores Cmplted and the tail.
     pub const CYCLIC_BD: Field = Field::bit("CyclicBD", 4, Access::ReadWrite);
     /// Interrupt on complete, enable.
     pub const IOC_IRQ_EN: Field = Field::bit("IOC_IrqEn", 12, Access::ReadWrite);
@@ -132,7 +132,8 @@ pub const DMACR: Register = Register {
     source: "PG021, MM2S_DMACR",
 };
 
-/// Status register. The reset value is that of a core without scatter-gather; with it bit 3 is set too.
+/// Status register. The reset value belongs to a core without scatter-gather; a core with
+/// scatter-gather sets bit 3 too.
 pub const DMASR: Register = Register {
     name: "DMASR",
     offset: 0x04,

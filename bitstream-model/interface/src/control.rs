@@ -1,4 +1,4 @@
-//! This file holds the register rows of the accelerator's control block.
+//! Register rows of the accelerator's control block.
 //!
 //! The first 16 bytes and the spacing of the arguments follow the `s_axilite` convention of
 //! Vivado HLS; everything from [`IDENTIFICATION`] on is this project's.
@@ -173,7 +173,7 @@ pub mod error {
 
     /// An [`ErrorCode`](super::ErrorCode); 0 is none.
     pub const CODE: Field = Field::bits("code", 0, 8, Access::ReadOnly);
-    /// The stream on which it was seen, for the codes that concern one.
+    /// The stream of the error, for the codes that concern one stream.
     pub const CHANNEL: Field = Field::bits("channel", 8, 8, Access::ReadOnly);
 }
 
@@ -245,7 +245,7 @@ pub const POSITION_DRIFT: Register = argument("POSITION_DRIFT", 0x40);
 pub const POSITION_COEFFICIENT: Register = argument("POSITION_COEFFICIENT", 0x48);
 /// Friction coefficient, f32.
 pub const FRICTION: Register = argument("FRICTION", 0x50);
-/// Angular damping: what is left of the angular velocity after a step, f32.
+/// Angular damping: the share of the angular velocity that is left after a step, f32.
 pub const ANGULAR_DAMPING: Register = argument("ANGULAR_DAMPING", 0x58);
 /// Gravity along x, m/s², f32.
 pub const GRAVITY_X: Register = argument("GRAVITY_X", 0x60);
@@ -305,13 +305,13 @@ pub const FRICTION_DEPTH: Register =
 pub const CLOCK_KHZ: Register = read_only("CLOCK_KHZ", 0x128, &[]);
 /// Largest number of bodies.
 pub const BODY_CAPACITY: Register = read_only("BODY_CAPACITY", 0x12C, &[]);
-/// Largest number of collisions, were there no bodies: see [`MEMORY_BYTES`].
+/// Largest number of collisions beside no bodies: see [`MEMORY_BYTES`].
 pub const COLLISION_CAPACITY: Register = read_only("COLLISION_CAPACITY", 0x130, &[]);
 /// Entries of the shape table.
 pub const SHAPE_CAPACITY: Register = read_only("SHAPE_CAPACITY", 0x134, &[]);
 /// On-chip memory that bodies and collisions share, bytes.
 pub const MEMORY_BYTES: Register = read_only("MEMORY_BYTES", 0x138, &[]);
-/// What a body and a collision take of it, bytes.
+/// Bytes of [`MEMORY_BYTES`] that a body takes, and that a collision takes.
 pub const MEMORY_PER_RECORD: Register =
     read_only("MEMORY_PER_RECORD", 0x13C, &[memory_per_record::BODY, memory_per_record::COLLISION]);
 /// How the AXI DMAs were built.
@@ -334,26 +334,26 @@ pub const NUMBERS: Register = read_only(
 /// The units of a design that streams the collisions once.
 pub const WINDOW: Register =
     read_only("WINDOW", 0x148, &[window::CONTACT_UNITS, window::FRICTION_UNITS]);
-/// What such a design has room for.
+/// Places and delay lines of a design that streams the collisions once.
 pub const WINDOW_CAPACITY: Register =
     read_only("WINDOW_CAPACITY", 0x14C, &[window_capacity::SLOTS, window_capacity::LAG]);
 
 /// Sticky error; cleared by a reset only.
 pub const ERROR: Register = read_only("ERROR", 0x180, &[error::CODE, error::CHANNEL]);
-/// What the sticky error is about: the index of the record, or the offending value.
+/// Detail of the sticky error: the index of the record, or the offending value.
 pub const ERROR_DETAIL: Register = read_only("ERROR_DETAIL", 0x184, &[]);
 /// Clock cycles of the last step from start to done, bits 31:0.
 pub const CYCLES_LO: Register = read_only("CYCLES_LO", 0x188, &[]);
 /// Clock cycles of the last step, bits 63:32.
 pub const CYCLES_HI: Register = read_only("CYCLES_HI", 0x18C, &[]);
-/// Cycles of it by the formula: neither waiting for a velocity to be written back nor for a stream.
-/// What is left of [`CYCLES_LO`] without these and [`WAIT_CYCLES`] are interlock stalls, which may
-/// take more than 32 bits. It stops at [`COUNTER_MAX`].
+/// Cycles of the last step by the formula: without the waits for a velocity that is not written
+/// back yet, and without the waits for a stream. It stops at [`COUNTER_MAX`]. [`CYCLES_LO`] less
+/// this and [`WAIT_CYCLES`] are the interlock stalls, which may take more than 32 bits.
 pub const WORK_CYCLES: Register = read_only("WORK_CYCLES", 0x190, &[]);
-/// Cycles of it in which the accelerator waited for a stream; stops at [`COUNTER_MAX`].
+/// Cycles of the last step in which the accelerator waited for a stream; stops at [`COUNTER_MAX`].
 pub const WAIT_CYCLES: Register = read_only("WAIT_CYCLES", 0x194, &[]);
-/// Collisions that met a hazard, over all passes: waited (interlocked) or read a stale velocity. It stops
-/// at [`COUNTER_MAX`].
+/// Collisions that met a hazard, over all passes: they waited (interlocked) or read a stale
+/// velocity (unchecked). It stops at [`COUNTER_MAX`].
 pub const HAZARDS: Register = read_only("HAZARDS", 0x198, &[]);
 /// Sum modulo 2^32 of all 32-bit words received in the last step.
 pub const SUM_RECEIVED: Register = read_only("SUM_RECEIVED", 0x19C, &[]);
@@ -371,12 +371,13 @@ pub const RESET: Register = row("RESET", 0x1C0, Access::SelfClearing, 0, &[reset
 /// Most passes of each kind that the pass counters hold.
 pub const ITERATIONS_MAX: u32 = 255;
 
-/// Where the counters of 32 bits stop: this, and anything more.
+/// The value at which the counters of 32 bits stop: it stands for this count and any larger one.
 pub const COUNTER_MAX: u32 = u32::MAX;
 
 /// Fraction bits of the impulse sum.
 pub const IMPULSE_SUM_FRACTION_BITS: u32 = 20;
-/// Where the impulse sum stops: this, and anything more; a sum that is infinite, too. 2^44 N s.
+/// The value at which the impulse sum stops, 2^44 N s: it stands for this sum, any larger one, and
+/// an infinite one.
 pub const IMPULSE_SUM_MAX: u64 = u64::MAX;
 
 /// First byte of the shape table.
@@ -442,7 +443,7 @@ pub const REGISTERS: &[Register] = &[
     RESET,
 ];
 
-/// What the sticky error can say.
+/// Codes of the sticky error.
 ///
 /// After an error the accelerator takes and sends no more beats, sets `ap_done` and waits for a
 /// [`RESET`].
@@ -468,12 +469,12 @@ pub enum ErrorCode {
     SelfCollision = 8,
     /// An argument outside its range (B = 0); detail: its offset.
     Argument = 9,
-    /// A beat of which not all bytes were valid (TKEEP); detail: the beat within the packet.
+    /// A beat with invalid bytes (TKEEP); detail: the beat within the packet.
     PartialBeat = 10,
     /// A collision of a place that holds no body; detail: the collision.
     EmptyPlace = 11,
-    /// Marks that can never be met: a body's uses lie further apart than the delay lines are long,
-    /// or its place is never freed; detail: the collision that waits for ever.
+    /// Marks that can never be satisfied: a body's uses lie further apart than the delay lines are
+    /// long, or its place is never freed; detail: the collision that waits for ever.
     Deadlock = 12,
 }
 
@@ -494,14 +495,14 @@ impl ErrorCode {
         Self::Deadlock,
     ];
 
-    /// The code out of the register's field; `None` for 0 and for codes not known here.
+    /// The code in the register's field; `None` for 0 and for unknown codes.
     #[must_use]
     pub fn from_register(error: u32) -> Option<Self> {
         let code = self::error::CODE.of(error);
         Self::ALL.into_iter().find(|known| *known as u32 == code)
     }
 
-    /// What the code says, for people.
+    /// A description of the error for error messages.
     #[must_use]
     pub const fn describe(self) -> &'static str {
         match self {

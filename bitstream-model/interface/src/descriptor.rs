@@ -1,4 +1,4 @@
-//! This file holds the layout of a scatter-gather descriptor (BD) in memory.
+//! Layout of a scatter-gather descriptor (BD) in memory.
 //!
 //! ```text
 //! 0x00 NXTDESC   0x04 NXTDESC_MSB   next descriptor, bits 31:6 and 63:32

@@ -1,43 +1,46 @@
-//! This file is what a driver and a board in another process say to each other.
+//! Messages between a driver and a board in another process.
 //!
-//! Every message has one length, so that there is none too long. Numbers are little endian.
+//! All requests have one length, and all answers another, so that no message is too long. Numbers
+//! are little-endian.
 //!
 //! ```text
 //! request, 16 bytes   0 act      4 value    8 operand
 //! answer, 24 bytes    0 status   4 value    8 number    16 virtual time, ns
 //!
-//! act                value                operand                      answer
-//! 1 hello            protocol's version   HELLO                        value: version
-//! 2 memory           0                    the file's inode             number: bus address of byte 0
-//! 3 read             0                    address                      value: what was read
-//! 4 write            what is written      address
-//! 5 pause            0                    ns, up to LONGEST_WAIT
-//! 6 wait for the interrupt   0            ns, up to LONGEST_WAIT       value: number of the event
-//! 7 unmask           0                    0
+//! act                       value               operand                 answer
+//! 1 hello                   protocol's version  HELLO                   value: version
+//! 2 memory                  0                   inode of the file       number: its bus address
+//! 3 read                    0                   address                 value: the register's
+//! 4 write                   the new value       address
+//! 5 pause                   0                   ns, up to LONGEST_WAIT
+//! 6 wait for the interrupt  0                   ns, up to LONGEST_WAIT  value: the event's number
+//! 7 unmask                  0                   0
 //! ```
 //!
-//! A driver sends the next request when it has the answer to the last one. The first is a hello.
+//! A driver sends the next request when it has the answer to the last one. The first is a hello,
+//! the second asks for the memory. Both come within seconds: from then on the driver has the board,
+//! and may take its time. The board answers every other hello with busy meanwhile.
 
 use std::time::Duration;
 
 use thiserror::Error;
 
 /// Version of these messages.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// "PGSBOARD": operand of a hello.
 pub const HELLO: u64 = u64::from_le_bytes(*b"PGSBOARD");
 /// Length of a request, bytes.
 pub const REQUEST_BYTES: usize = 16;
 /// Length of an answer, bytes.
 pub const ANSWER_BYTES: usize = 24;
-/// The longest that one request lets virtual time pass. Who waits longer asks again, so that an
-/// answer is never far.
+/// The longest virtual time that one request lets pass. A driver that waits longer sends the
+/// request again, so that an answer always comes soon.
 pub const LONGEST_WAIT: Duration = Duration::from_millis(10);
 
-/// What the memory's file is called, unless it is said otherwise: the socket's name and this.
+/// The memory's file has the socket's name and this suffix, unless the user names another file.
 pub const MEMORY_SUFFIX: &str = ".memory";
 
-/// What a driver asks for.
+/// One request of a driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
     /// Who is there?
@@ -59,55 +62,55 @@ pub enum Request {
     Write {
         /// Physical address.
         address: u64,
-        /// What is written.
+        /// The new value.
         value: u32,
     },
     /// Virtual time passes.
     Pause {
-        /// How much.
+        /// Length of the pause.
         time: Duration,
     },
     /// Virtual time passes until an interrupt comes.
     WaitInterrupt {
-        /// How much at most.
+        /// The longest wait.
         time: Duration,
     },
     /// Lets the next interrupt through.
     Unmask,
 }
 
-/// A request that is none.
+/// Bytes that are not a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RequestError {
-    /// There is no such act.
+    /// No act has this number.
     #[error("expected an act from 1 to 7, found {found}")]
     Act {
-        /// What stands there.
+        /// The act's number as received.
         found: u32,
     },
     /// A hello with another operand.
     #[error("expected a hello with {HELLO:#018x}, found {found:#018x}: is this a driver?")]
     Hello {
-        /// What stands there.
+        /// The operand as received.
         found: u64,
     },
-    /// A wait without end.
+    /// A wait that is too long.
     #[error("expected a wait of at most {LONGEST_WAIT:?}, found {found:?}")]
     Wait {
-        /// What was asked for.
+        /// The wait as received.
         found: Duration,
     },
-    /// Something before, or other than, the hello that comes first.
+    /// The first request is not a hello.
     #[error("expected a hello first, found {found:?}")]
     NoHello {
-        /// What came.
+        /// The first request.
         found: Request,
     },
 }
 
 impl Request {
-    /// As it is sent.
+    /// The request's bytes on the socket.
     #[must_use]
     pub fn encode(&self) -> [u8; REQUEST_BYTES] {
         let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
@@ -127,10 +130,10 @@ impl Request {
         bytes
     }
 
-    /// What was sent.
+    /// The request that these bytes encode.
     ///
     /// # Errors
-    /// [`RequestError`] if it is no request.
+    /// [`RequestError`] if the bytes are not a request.
     pub fn decode(bytes: &[u8; REQUEST_BYTES]) -> Result<Self, RequestError> {
         let (act, value, operand) = (word(bytes, 0), word(bytes, 4), number(bytes, 8));
         let time = || match Duration::from_nanos(operand) {
@@ -162,19 +165,27 @@ pub enum Status {
     OtherMemory,
     /// The board speaks another version.
     OtherVersion,
-    /// The request was none. The board hangs up.
+    /// The bytes were not a request. The board hangs up.
     Refused,
+    /// Another driver has the board, which hangs up.
+    Busy,
 }
 
 impl Status {
-    const ALL: [Self; 5] =
-        [Self::Done, Self::Nothing, Self::OtherMemory, Self::OtherVersion, Self::Refused];
+    const ALL: [Self; 6] = [
+        Self::Done,
+        Self::Nothing,
+        Self::OtherMemory,
+        Self::OtherVersion,
+        Self::Refused,
+        Self::Busy,
+    ];
 }
 
-/// What the board says.
+/// The board's answer to a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Answer {
-    /// How it went.
+    /// How the request went.
     pub status: Status,
     /// A register, a version, or the number of an interrupt.
     pub value: u32,
@@ -184,16 +195,16 @@ pub struct Answer {
     pub now: Duration,
 }
 
-/// An answer that is none.
+/// Bytes that are not an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("expected a status from 0 to 4, found {found}")]
+#[error("expected a status from 0 to 5, found {found}")]
 pub struct AnswerError {
-    /// What stands there.
+    /// The status as received.
     pub found: u32,
 }
 
 impl Answer {
-    /// As it is sent.
+    /// The answer's bytes on the socket.
     #[must_use]
     pub fn encode(&self) -> [u8; ANSWER_BYTES] {
         let status = Status::ALL.iter().position(|status| *status == self.status);
@@ -207,13 +218,13 @@ impl Answer {
         bytes
     }
 
-    /// What was sent.
+    /// The answer that these bytes encode.
     ///
     /// # Errors
-    /// [`AnswerError`] if it is no answer.
+    /// [`AnswerError`] if the bytes are not an answer.
     pub fn decode(bytes: &[u8; ANSWER_BYTES]) -> Result<Self, AnswerError> {
         let found = word(bytes, 0);
-        let status = usize::try_from(found).ok().and_then(|place| Status::ALL.get(place));
+        let status = usize::try_from(found).ok().and_then(|index| Status::ALL.get(index));
         Ok(Self {
             status: *status.ok_or(AnswerError { found })?,
             value: word(bytes, 4),
@@ -263,8 +274,8 @@ mod tests {
             assert_eq!(Answer::decode(&answer.encode()), Ok(answer));
         }
         let mut bytes = [0; ANSWER_BYTES];
-        bytes[0] = 5;
-        assert_eq!(Answer::decode(&bytes), Err(AnswerError { found: 5 }));
+        bytes[0] = 6;
+        assert_eq!(Answer::decode(&bytes), Err(AnswerError { found: 6 }));
     }
 
     #[test]
@@ -278,7 +289,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_understood_is_what_was_sent(bytes: [u8; REQUEST_BYTES]) {
+        fn bytes_that_decode_encode_to_the_same_request(bytes: [u8; REQUEST_BYTES]) {
             if let Ok(request) = Request::decode(&bytes) {
                 prop_assert_eq!(Request::decode(&request.encode()), Ok(request));
             }

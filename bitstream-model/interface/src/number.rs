@@ -1,8 +1,8 @@
-//! This file names the numeric formats: of words on the streams, of arithmetic, of on-chip arrays.
+//! Numeric formats: of words on the streams, of arithmetic, of on-chip arrays.
 
 /// How a number lies on a stream.
 ///
-/// Sixteen bits a number means that a record takes half as many beats: see
+/// With sixteen bits a number a record takes half the beats that it takes with 32: see
 /// [`record`](super::record).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
@@ -16,7 +16,7 @@ pub enum StreamFormat {
     ///
     /// With F the five exponent bits, a word means (1 + mantissa / 1024) x 2^(F - 15) for every F:
     /// on 2^-14 up to 2^16 this is binary16 rounded toward zero, but there is no zero, no
-    /// subnormal, no infinity. Who makes words saturates: a smaller magnitude, zero among them,
+    /// subnormal, no infinity. The encoder saturates: a smaller magnitude, zero among them,
     /// becomes the word 0 with its sign, which reads as 2^-15; a magnitude of 2^16 or more,
     /// infinity and NaN become F = 31.
     Thesis16 = 2,
@@ -35,7 +35,7 @@ impl StreamFormat {
         }
     }
 
-    /// Largest magnitude that it carries; beyond it a number must not be sent.
+    /// Largest magnitude that the format carries; a number beyond it must not be sent.
     #[must_use]
     pub const fn largest(self) -> f32 {
         match self {
@@ -65,8 +65,8 @@ impl StreamFormat {
     }
 }
 
-/// How wide the operators of the pipeline or the words of an on-chip array are. Every operation
-/// rounds on its own, to nearest even.
+/// Width of the pipeline's operators or of an on-chip array's words. Every operation rounds on its
+/// own, to nearest even.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Precision {
@@ -99,7 +99,7 @@ impl Precision {
     }
 }
 
-/// Which format stands where in one bitstream; reported in the NUMBERS register.
+/// The formats of one bitstream, place by place; reported in the NUMBERS register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Numbers {
     /// Collision records.
@@ -110,8 +110,8 @@ pub struct Numbers {
     pub poses: StreamFormat,
     /// Arithmetic of a constraint row: lever arms, moments, effective mass, bias, tangents.
     pub rows: Precision,
-    /// Arithmetic of what changes: relative speeds, impulses, velocities; and the integration, unless
-    /// poses are f32, which are integrated in f32.
+    /// Arithmetic of the changing values: relative speeds, impulses, velocities. The integration
+    /// uses it too, unless poses are f32: f32 poses are integrated in f32.
     pub updates: Precision,
     /// Velocities on chip.
     pub velocities: Precision,

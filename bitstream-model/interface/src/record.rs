@@ -1,4 +1,4 @@
-//! This file says how records lie in 128-bit beats.
+//! Layout of the records in 128-bit beats.
 //!
 //! A record is rows of four words, (vec3, word); lane 0 is bits 31:0, at the lowest address. In f32
 //! a row is a beat. In sixteen bits a row is half a beat, the first of two in bits 63:0, and the
@@ -96,12 +96,12 @@ pub mod relative {
     pub const CONTACTS: usize = 2;
 }
 
-/// The words beside normal and offset of a relative collision record, in a design that keeps what
-/// is alive: where the body is, and whether this is its first or last use.
+/// The words beside normal and offset of a relative collision record, in a design that keeps live
+/// bodies only: the place of the body, and whether this is its first or last use.
 pub mod live {
     /// The place of the body, in the low bits; 0 is every static body.
     pub const PLACE: u32 = (1 << 13) - 1;
-    /// The body comes alive: its velocity is the next of the velocity stream.
+    /// The body comes alive: its velocity is the next on the velocity stream.
     pub const FIRST: u32 = 1 << 13;
     /// The body's last collision of a pass: after the last pass it is integrated with the next pose
     /// of the pose stream, A before B.

@@ -1,4 +1,4 @@
-//! This file says what a register row is: name, offset, access, reset value, fields.
+//! The form of a register row: name, offset, access, reset value, fields.
 //!
 //! The rows themselves stand in [`axi_dma`](super::axi_dma) and [`control`](super::control).
 //! The driver's value types, the model's side effects and register dumps take their constants
@@ -31,7 +31,7 @@ pub struct Field {
     pub lsb: u32,
     /// Width in bits, 1 to 32.
     pub width: u32,
-    /// What reads and writes do.
+    /// Effect of reads and writes.
     pub access: Access,
 }
 
@@ -45,7 +45,7 @@ impl Field {
     /// `width` bits from `lsb` upward.
     ///
     /// # Panics
-    /// If the bits do not lie within 32; the rows are constants, so that it is a compile error.
+    /// If the bits do not lie within 32. The rows are constants, so that this is a compile error.
     #[must_use]
     pub const fn bits(name: &'static str, lsb: u32, width: u32, access: Access) -> Self {
         assert!(width >= 1 && lsb + width <= 32, "a field lies inside 32 bits");
@@ -58,7 +58,7 @@ impl Field {
         (u32::MAX >> (32 - self.width)) << self.lsb
     }
 
-    /// The field's value out of a register value.
+    /// The field's value in a register value.
     #[must_use]
     pub const fn of(&self, register: u32) -> u32 {
         (register & self.mask()) >> self.lsb
@@ -82,9 +82,9 @@ impl Field {
 pub struct Register {
     /// The manual's name.
     pub name: &'static str,
-    /// Byte offset in its region (for a DMA: of the MM2S half).
+    /// Byte offset in its region (for a DMA: in the MM2S half).
     pub offset: u32,
-    /// What reads and writes do, where the fields do not say otherwise.
+    /// Effect of reads and writes on bits without a field.
     pub access: Access,
     /// Value after reset.
     pub reset: u32,

@@ -1,4 +1,4 @@
-//! This file says on which stream each beat of an array travels.
+//! Stripes: the stream on which each beat of an array travels.
 //!
 //! The beats of an array are numbered through, from the first beat of its first record. They go
 //! out in groups; the table names the stream of every beat of a group, and on each stream beats
@@ -6,9 +6,9 @@
 //!
 //! ```text
 //! float, collisions 0 1 2 3 0 1 2      a group is one record of seven beats
-//! float, bodies     0 1 2 3            a group is as many beats as there are streams
+//! float, bodies     0 1 2 3            a group is one beat on each stream
 //! half, collisions  0 0 0 1 1 1 2      a group is two records of three and a half beats
-//! half, bodies      0 0 1 1 2          two beats on a 128-bit stream take as long as one on 64 bits
+//! half, bodies      0 0 1 1 2          two beats of a 128-bit stream last as long as one of 64
 //! ```
 
 /// How the beats of an array are dealt out to the streams.
@@ -16,8 +16,8 @@
 pub struct Stripe {
     /// Stream of each beat of a group.
     pub streams: &'static [u8],
-    /// Whether the last group is always whole: what is missing is filled with zeros that nobody
-    /// decodes. Without it the last group ends with the array.
+    /// Whether the last group is always whole: beats of zeros, which are never decoded, fill it up.
+    /// Without padding the last group ends with the array.
     pub padded: bool,
 }
 

@@ -1,4 +1,4 @@
-//! This file holds the registers of the control block and what reading and writing them does.
+//! Registers of the control block, and the effects of reads and writes.
 
 use crate::cast::{high, low, register};
 use crate::config::{BoardConfig, Hazards, Subnormals};
@@ -25,7 +25,7 @@ fn counter(count: u64) -> u32 {
     register(count.min(COUNTER_MAX.into()))
 }
 
-// The impulses are summed in 64 bits, and stay at their largest number.
+// The sum of the impulses has 64 bits and stops at the largest number.
 const _: () = assert!(IMPULSE_SUM_MAX == u64::MAX);
 
 /// The NUMBERS register.
@@ -43,11 +43,11 @@ fn formats(of: &Numbers) -> u32 {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Shape {
     pub(crate) inverse_mass: f32,
-    /// Isotropic; with world inertia it means nothing.
+    /// Isotropic; unused with world inertia.
     pub(crate) inverse_inertia: f32,
 }
 
-/// What the accelerator has counted in a step.
+/// The accelerator's counters of a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Counters {
     pub(super) cycles: u64,
@@ -59,7 +59,7 @@ pub(crate) struct Counters {
     pub(crate) impulse_sum: u64,
 }
 
-/// The arguments of a step, as they are taken at the start.
+/// The arguments of a step, latched at its start.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Arguments {
     pub(super) bodies: u32,
@@ -74,7 +74,7 @@ pub(crate) struct Arguments {
 /// Writable words between AP_CTRL and the capabilities.
 const ARGUMENT_WORDS: usize = 32;
 
-/// What a write asks of the accelerator.
+/// The action that a register write starts in the accelerator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Request {
     None,
@@ -97,7 +97,7 @@ pub(super) struct Registers {
     pub(super) counters: Counters,
 }
 
-/// The arguments, which live in `Registers::arguments` at a quarter of their offset.
+/// Offsets of the arguments. `Registers::arguments` holds each at a quarter of its offset.
 const ARGUMENTS: [u32; 13] = [
     BODIES.offset,
     COLLISIONS.offset,
@@ -132,7 +132,7 @@ impl Registers {
         }
     }
 
-    /// What a reset leaves: the counters of the last step stay readable.
+    /// Resets all registers but the counters of the last step, which stay readable.
     pub(super) fn reset(&mut self) {
         self.arguments = [0; ARGUMENT_WORDS];
         self.gie = false;
@@ -297,7 +297,7 @@ impl Registers {
             _ if offset == CYCLES_LO.offset => low(counters.cycles),
             _ if offset == CYCLES_HI.offset => high(counters.cycles),
             _ if offset == WORK_CYCLES.offset => {
-                // A step that ended in an error may have counted a stall before it was over.
+                // A step that ends in an error may have counted a whole stall before its end.
                 counter(counters.cycles.saturating_sub(counters.stalls + counters.waits))
             }
             _ if offset == WAIT_CYCLES.offset => counter(counters.waits),
@@ -318,12 +318,12 @@ impl Registers {
         (index < self.shapes.len()).then_some((index, at % SHAPE_STRIDE))
     }
 
-    /// Whether a write there is an error while a step runs.
+    /// Whether a write to this register is an error while a step runs.
     pub(super) fn is_argument(&self, offset: u32) -> bool {
         ARGUMENTS.contains(&offset) || self.shape_at(offset).is_some()
     }
 
-    /// Writes a register; `None` where there is none.
+    /// Writes a register; `None` if no register has this offset.
     pub(super) fn write(&mut self, offset: u32, value: u32) -> Option<Request> {
         if let Some((index, at)) = self.shape_at(offset) {
             match at {

@@ -1,10 +1,11 @@
-//! This file decides what a collision reads and when it may enter: read-after-write hazards.
+//! Read-after-write hazards of the pipeline: which velocities a collision reads, and when it may
+//! enter.
 //!
 //! A collision reads the velocities of its bodies when it enters and writes them back `window`
 //! cycles later. *Interlocked*, it waits until both are written. *Unchecked*, it enters in its
-//! issue slot whatever is under way: it reads what was last written back, and of two write-backs to
-//! one body the later one wins, so that the earlier impulse is lost. Static bodies never change and
-//! are no hazard.
+//! issue slot without waiting for write-backs: it reads the velocity that was last written back.
+//! Where two write-backs to one body overlap, the later one wins and the earlier impulse is lost.
+//! Static bodies never change and are no hazard.
 
 use super::solver::Velocity;
 use crate::cast::index;
@@ -14,12 +15,12 @@ use crate::config::Hazards;
 #[derive(Debug, Clone, Copy, Default)]
 struct WriteBack {
     bodies: [u32; 2],
-    /// Which of the two move; the others are not written.
+    /// Which of the two bodies move; a static body is not written.
     moving: [bool; 2],
     velocities: [Velocity; 2],
 }
 
-/// What a collision needs to enter.
+/// The bodies of a collision that is about to enter.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
     pub(crate) bodies: [u32; 2],
@@ -74,7 +75,7 @@ impl Pipeline {
         }
     }
 
-    /// A pass begins; everything of the one before has been written back.
+    /// A pass begins; the previous pass has written everything back.
     pub(super) fn start_pass(&mut self, window: u64) {
         self.window = window;
         self.collisions = 0;
@@ -88,7 +89,7 @@ impl Pipeline {
         }
     }
 
-    /// Issue slots from a read to the first slot that sees its write-back.
+    /// Issue slots from a collision's read to the first slot that sees its write-back.
     pub(super) fn depth(&self) -> u64 {
         self.window.div_ceil(self.interval).max(1)
     }
@@ -114,8 +115,8 @@ impl Pipeline {
         }
     }
 
-    /// Unchecked: writes back what is due before the next collision reads. A padding collision
-    /// takes its slot too.
+    /// Unchecked: does the write-backs that are due before the next collision reads. A padding
+    /// collision takes its slot too.
     pub(super) fn retire_due(&mut self, velocities: &mut [Velocity]) {
         let slot = self.collisions / self.per_issue;
         let due = slot.saturating_sub(self.depth() - 1) * self.per_issue;
@@ -136,7 +137,7 @@ impl Pipeline {
     }
 
     /// Unchecked: the collision has entered and will write `velocities`. Returns whether it read a
-    /// stale one.
+    /// stale velocity.
     pub(super) fn issue(&mut self, entry: &Entry, velocities: [Velocity; 2]) -> bool {
         let slot = self.slot_base + self.collisions / self.per_issue;
         let depth = self.depth();

@@ -1,4 +1,4 @@
-//! This file moves one body by one time step.
+//! Integration of one body over one time step.
 //!
 //! Source: Bullet (integrateTransforms of the OpenCL pipeline): position first, then gravity.
 

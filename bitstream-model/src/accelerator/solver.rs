@@ -1,12 +1,12 @@
-//! This file solves one collision in one pass: contact or friction, as Bullet's host code does.
+//! Solver of one collision in one pass: contact or friction, as Bullet's host code does.
 //!
 //! The conversion from the raw contact to the constraint row (effective mass, bias) is part of
 //! both, so that a pass needs nothing but the collision, the velocities and the accumulated
-//! impulses. It computes in the format `R`; what changes from collision to collision (relative
-//! speed, impulse, velocities) in `U`, which holds every number of `R`.
+//! impulses. The row is computed in the format `R`, the changing values (relative speed, impulse,
+//! velocities) in `U`, which holds every number of `R`.
 //!
-//! Source: Bullet (b3ContactSolver of the OpenCL pipeline's host reference), in the order of
-//! evaluation that the golden vectors were made with.
+//! Source: Bullet (b3ContactSolver of the OpenCL pipeline's host reference), in the golden vectors'
+//! order of evaluation.
 
 use super::arithmetic::inertia::{Inertia, Stored, Times};
 use super::arithmetic::number::{Format, Number};
@@ -23,7 +23,7 @@ pub(crate) struct Mass {
 }
 
 impl Mass {
-    /// The same in numbers of a format.
+    /// The mass properties in numbers of a format.
     pub(crate) fn rounded<F: Format>(&self) -> Self {
         let round = |number| Number::<F>::new(number).value();
         Self {
@@ -54,7 +54,7 @@ pub(crate) struct SolverParameters {
 }
 
 impl SolverParameters {
-    /// The same in numbers of a format.
+    /// The parameters in numbers of a format.
     pub(crate) fn rounded<F: Format>(&self) -> Self {
         let Self { time_step, drift, coefficient, friction } = *self;
         let [time_step, drift, coefficient, friction] = [time_step, drift, coefficient, friction]
@@ -126,7 +126,7 @@ impl<R: Format> Row<R> {
         Self { direction, moment_a, moment_b, jacobian: Number::new(-1.0) / denominator }
     }
 
-    /// The row as what changes is computed with it.
+    /// The row in the format of the changing values.
     #[inline]
     fn widened<U: Format>(&self) -> Row<U> {
         Row {
@@ -155,7 +155,7 @@ impl<U: Format> Row<U> {
     }
 }
 
-/// Two unit vectors across `n`.
+/// Two unit vectors at right angles to `n` and to each other.
 #[inline]
 fn tangents<R: Format>(n: Vec3<R>) -> [Vec3<R>; 2] {
     let zero = Number::new(0.0);

@@ -1,7 +1,7 @@
-//! The registers of one DMA channel and the side effects of reading and writing them.
+//! Registers of one DMA channel, and the effects of reads and writes.
 
 use super::Build;
-use super::faults::Faulty;
+use super::faults::FaultEffects;
 use crate::cast::{high, low, register};
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
@@ -16,7 +16,7 @@ use pgs_interface::record::BEAT_BYTES;
 /// Clocks of one tick of the delay timer.
 const DELAY_TICK: u64 = 125;
 
-/// What the engine is doing.
+/// The engine's current work.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Work {
     /// Nothing: stopped, idle, or never started.
@@ -72,10 +72,10 @@ pub(super) struct Channel {
     pub(super) in_packet: bool,
     /// The engine's clock; it may run a little behind the board's.
     pub(super) time: u64,
-    /// Beats of the packet that were moved, and descriptors that were completed.
+    /// Beats and descriptors of the packet that are done: moved, completed.
     pub(super) beats: u64,
     pub(super) descriptors: u32,
-    pub(super) faulty: Faulty,
+    pub(super) faulty: FaultEffects,
 }
 
 impl Channel {
@@ -99,16 +99,16 @@ impl Channel {
             time: 0,
             beats: 0,
             descriptors: 0,
-            faulty: Faulty::default(),
+            faulty: FaultEffects::default(),
         }
     }
 
-    /// Drops its work.
+    /// Drops the current work.
     pub(super) fn stop(&mut self) {
         self.work = Work::None;
     }
 
-    /// Whether it has no work.
+    /// Whether the engine has no work.
     pub(super) fn rests(&self) -> bool {
         matches!(self.work, Work::None)
     }
@@ -128,12 +128,12 @@ impl Channel {
         !works && self.faulty.late.is_empty() && !self.faulty.extra && !self.faulty.discards
     }
 
-    /// Whether it was told to stop and has not halted yet.
+    /// Whether RS was cleared and the channel has not halted yet.
     pub(super) fn stopping(&self) -> bool {
         matches!(self.transition, Some((_, Transition::Halt)))
     }
 
-    /// Puts off the transition under way.
+    /// Delays the change of Halted that is under way.
     pub(super) fn halt_later(&mut self, cycles: u64) {
         if let Some((at, _)) = &mut self.transition {
             *at = at.saturating_add(cycles);
@@ -205,13 +205,13 @@ impl Channel {
             _ if at == TAILDESC.offset => {
                 self.tail = set_low(self.tail, descriptor_mask);
                 if !wide {
-                    doorbell = self.ring(build, now, log);
+                    doorbell = self.ring_doorbell(build, now, log);
                 }
             }
             _ if at == TAILDESC_MSB.offset => {
                 if wide {
                     self.tail = set_high(self.tail);
-                    doorbell = self.ring(build, now, log);
+                    doorbell = self.ring_doorbell(build, now, log);
                 }
             }
             _ if at == ADDRESS.offset => self.address = set_low(self.address, u32::MAX),
@@ -256,7 +256,7 @@ impl Channel {
     }
 
     /// A doorbell in scatter-gather mode: starts or resumes the engine, or moves its pause point.
-    fn ring(&mut self, build: &Build, now: u64, log: &mut Log) -> bool {
+    fn ring_doorbell(&mut self, build: &Build, now: u64, log: &mut Log) -> bool {
         let (core, direction) = (build.core, self.direction);
         if self.halted || !dmacr::RS.is_set(self.control) {
             log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
@@ -278,7 +278,7 @@ impl Channel {
         let (core, direction) = (build.core, self.direction);
         let mask = u32::MAX >> (32 - build.length_width);
         if self.halted {
-            // A driver writes all ones, then 0, to learn the register's width.
+            // A driver writes all ones to learn the register's width, and 0 to undo that.
             self.length = value & mask;
             if value != u32::MAX && value != 0 {
                 log.violation(ViolationKind::DoorbellWhileHalted { core, direction });
@@ -347,14 +347,14 @@ impl Channel {
         };
         let late = self.faulty.late.iter().map(|(at, ..)| *at).min();
         let halt = self.transition.map(|(at, _)| at);
-        // A slow port moves its next beat only then.
+        // A slowed channel moves its next beat at its own time.
         let busy = matches!(self.work, Work::Descriptor(_) | Work::Direct { .. });
         let slow = (busy && self.faulty.slow > 0).then_some(self.time);
         [halt, self.delay_until, fetch, late, slow].into_iter().flatten().min()
     }
 
     pub(super) fn interrupt(&self) -> bool {
-        // Enables and status stand at the same bits of DMACR and DMASR.
+        // The enables of DMACR have the same bits as the interrupts of DMASR.
         self.latched & self.control & dmasr::IRQS != 0
     }
 
@@ -371,7 +371,7 @@ impl Channel {
         }
     }
 
-    /// A direct transfer has ended: one interrupt each, whatever the threshold.
+    /// A direct transfer has ended: it raises an interrupt whatever the threshold.
     pub(super) fn direct_done(&mut self) {
         self.latched |= dmasr::IOC_IRQ.mask();
         self.idle = true;

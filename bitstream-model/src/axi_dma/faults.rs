@@ -1,8 +1,8 @@
-//! Lets a channel's faults happen, and ends what they began.
+//! Applies the faults of a channel, and completes the effects that outlast a beat.
 
 use super::channel::{Channel, Work};
 use super::{Build, Surroundings};
-use crate::fault::{Due, FaultKind, Turn};
+use crate::fault::{Due, FaultKind, PacketPosition};
 use crate::stream::Stream;
 use pgs_interface::axi_dma::Direction;
 use pgs_interface::axi_dma::dmasr;
@@ -10,66 +10,66 @@ use pgs_interface::descriptor::status;
 use pgs_interface::record::Beat;
 use pgs_interface::register::Field;
 
-/// What faults have done to a channel, until its packet ends or its core is reset.
+/// Effects of faults on a channel, until its packet ends or its core is reset.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Faulty {
-    /// It moves nothing.
+pub(super) struct FaultEffects {
+    /// The channel moves no beat.
     pub(super) stalled: bool,
-    /// Clocks more for each beat.
+    /// Additional clocks for each beat.
     pub(super) slow: u32,
-    /// MM2S: the packet has ended on the stream; the rest of it is dropped.
+    /// MM2S: the packet has ended on the stream; its other beats are dropped.
     pub(super) cut: bool,
-    /// S2MM: the packet has ended in memory; the rest of it is dropped.
+    /// S2MM: the packet has ended in memory; its other beats are dropped.
     pub(super) discards: bool,
     /// A beat with TLAST is still to follow the packet.
     pub(super) extra: bool,
-    /// Statuses that are still on their way to memory: when each arrives, where, and what.
+    /// Status words on their way to memory: cycle of arrival, address of the descriptor, word.
     pub(super) late: Vec<(u64, u64, u32)>,
 }
 
-impl Faulty {
-    /// Whether nothing is wrong.
+impl FaultEffects {
+    /// Whether no fault has an effect on the channel.
     pub(super) fn none(&self) -> bool {
         let Self { stalled, slow, cut, discards, extra, late } = self;
         !(*stalled || *cut || *discards || *extra) && *slow == 0 && late.is_empty()
     }
 
-    /// Whether what a fault has begun comes before all else: a beat that is still to follow a packet
-    /// before the next packet, and so the end of one that is dropped.
+    /// Whether the effect of a fault holds the next packet back: a beat has to follow the previous
+    /// packet first, or the rest of a dropped packet has to arrive.
     pub(super) fn holds(&self, direction: Direction) -> bool {
         self.discards || self.extra && direction == Direction::Mm2s
     }
 }
 
-/// What becomes of the next beats.
+/// The fate of the next beats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Next {
-    /// So many may be moved.
+    /// This number of beats moves.
     Move(usize),
-    /// One, and the bits of this mask are inverted in its first word.
+    /// One beat moves, with the bits of this mask inverted in its first word.
     Corrupt(u32),
-    /// One, and the packet ends with it.
+    /// One beat moves, and the packet ends with it.
     Cut,
-    /// The engine rests until it is reset.
+    /// No beat moves until a reset.
     Rest,
-    /// The engine stops for now: the board as a whole is concerned.
+    /// The engine stops for now: the fault is one of the whole board.
     Board,
     /// The access fails with these bits of DMASR and of the descriptor's status.
     Fail(Field, Field),
 }
 
 impl Channel {
-    fn turn(&self, build: &Build) -> Turn {
+    fn packet_position(&self, build: &Build) -> PacketPosition {
         let begins = match self.work {
             Work::Descriptor(bd) => bd.moved == 0,
             Work::Direct { moved } => moved == 0,
             Work::None | Work::Fetch { .. } => true,
         };
         let (core, direction) = (build.core, self.direction);
-        Turn { core, direction, beats: self.beats, descriptors: self.descriptors, begins }
+        PacketPosition { core, direction, beats: self.beats, descriptors: self.descriptors, begins }
     }
 
-    /// What becomes of the next `n` beats.
+    /// The fate of the next `n` beats.
     pub(super) fn next_beats(
         &mut self,
         build: &Build,
@@ -82,7 +82,7 @@ impl Channel {
         if self.faulty.stalled {
             return Next::Rest;
         }
-        match with.faults.at_beats(&self.turn(build), n as u64) {
+        match with.faults.at_beats(&self.packet_position(build), n as u64) {
             Due::Nothing => Next::Move(n),
             Due::After(beats) => Next::Move(usize::try_from(beats).map_or(n, |beats| beats.min(n))),
             Due::Now(FaultKind::DmaIntErr) => Next::Fail(dmasr::DMA_INT_ERR, status::DMA_INT_ERR),
@@ -102,7 +102,7 @@ impl Channel {
         }
     }
 
-    /// What the fetch of a descriptor fails with.
+    /// The error bit with which the fetch of a descriptor fails, if it fails.
     pub(super) fn fetch_fault(
         &mut self,
         build: &Build,
@@ -111,28 +111,32 @@ impl Channel {
         if with.faults.none() {
             return None;
         }
-        match with.faults.at_fetch(&self.turn(build))? {
+        match with.faults.at_fetch(&self.packet_position(build))? {
             FaultKind::SgSlvErr => Some(dmasr::SG_SLV_ERR),
             FaultKind::SgDecErr => Some(dmasr::SG_DEC_ERR),
             _ => Some(dmasr::SG_INT_ERR),
         }
     }
 
-    /// What happens to the status of a descriptor.
+    /// The fault of the write of a descriptor's status, if one is due.
     pub(super) fn status_fault(
         &mut self,
         build: &Build,
         with: &mut Surroundings<'_>,
     ) -> Option<FaultKind> {
-        if with.faults.none() { None } else { with.faults.at_completion(&self.turn(build)) }
+        if with.faults.none() {
+            None
+        } else {
+            with.faults.at_completion(&self.packet_position(build))
+        }
     }
 
-    /// Whether the packet that ends here has its TLAST.
+    /// Whether the packet that ends here gets its TLAST.
     pub(super) fn ends_packet(&mut self, build: &Build, with: &mut Surroundings<'_>) -> bool {
         if with.faults.none() {
             return true;
         }
-        match with.faults.at_packet_end(&self.turn(build)) {
+        match with.faults.at_packet_end(&self.packet_position(build)) {
             None => true,
             fault => {
                 self.faulty.extra = fault == Some(FaultKind::LongPacket);
@@ -141,7 +145,7 @@ impl Channel {
         }
     }
 
-    /// Goes on with the effects of earlier faults; returns whether anything changed.
+    /// Completes effects of faults that are due; returns whether anything changed.
     pub(super) fn settle(
         &mut self,
         build: &Build,
@@ -150,8 +154,8 @@ impl Channel {
         with: &mut Surroundings<'_>,
     ) -> bool {
         let mut changed = false;
-        while let Some(place) = self.faulty.late.iter().position(|(at, ..)| *at <= now) {
-            let (_, address, word) = self.faulty.late.remove(place);
+        while let Some(index) = self.faulty.late.iter().position(|(at, ..)| *at <= now) {
+            let (_, address, word) = self.faulty.late.remove(index);
             self.put_status(build, address, word, with);
             changed = true;
         }
@@ -163,7 +167,7 @@ impl Channel {
                     stream.mark_last();
                     changed = true;
                 }
-                // There is no room for it in the chain, or behind LENGTH.
+                // The chain of descriptors, or LENGTH, has no room for the extra beat.
                 Direction::S2mm if self.is_full() => {
                     self.faulty.extra = false;
                     self.fail(build, dmasr::DMA_INT_ERR.mask());
@@ -180,7 +184,7 @@ impl Channel {
         changed
     }
 
-    /// Whether all room for a packet was used up.
+    /// Whether the packet has used up the room of its buffers.
     fn is_full(&self) -> bool {
         match self.work {
             Work::None => true,

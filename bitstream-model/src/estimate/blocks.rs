@@ -1,7 +1,7 @@
-//! This file counts block RAMs of 18 Kib by the shapes that they can take.
+//! Counts block RAMs of 18 Kib by the shapes that they can take.
 //!
 //! An array of rows is built of blocks side by side for its width and one after the other for its
-//! depth; what does not fill a block is lost. In true dual-port mode both ports read and write; a
+//! depth; the unused rest of a block is lost. In true dual-port mode both ports read and write; a
 //! block that is 36 bits wide has one port to read and one to write (simple dual port).
 //!
 //! Source: UG573, block RAM port widths; UG974, RAMB18E2.
@@ -44,14 +44,14 @@ impl BlockShape {
 pub struct ShapedBlocks {
     /// The shape.
     pub shape: BlockShape,
-    /// How many.
+    /// Number of blocks.
     pub blocks: u64,
 }
 
 impl ShapedBlocks {
-    /// The fewest blocks for an array, whichever shape that is.
+    /// The shape with the fewest blocks for an array.
     ///
-    /// `simple` says that one port to read and one to write are enough.
+    /// If `simple`, one port to read and one to write are enough.
     pub(crate) fn fewest(rows: u64, bits: u64, simple: bool) -> Self {
         let wide = simple.then_some(SIMPLE_DUAL_PORT);
         let [first, others @ ..] = TRUE_DUAL_PORT;

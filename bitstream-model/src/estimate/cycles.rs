@@ -1,17 +1,19 @@
-//! This file is the cycle formula of a step.
+//! The cycle formula of a step.
 //!
-//! `cycles = load + passes x (ceil(C / collisions per issue) x II + fill) + max(pose in, result out)`
+//! ```text
+//! cycles = load + passes x (ceil(C / collisions per issue) x II + fill)
+//!        + max(pose in, result out)
+//! ```
 //!
 //! A design that streams the collisions once has a formula of its own ([`window`](super::window)).
 //!
-//! Source: thesis Tables 6.4 and 6.8 (which the formula meets within 0.6 %); fill is this
-//! project's.
+//! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; fill is this project's.
 
 use super::traffic::{Records, StepTraffic};
 use super::window::{WindowCycles, WindowStep};
 use pgs_interface::profile::{Flow, Profile, Variant};
 
-/// How large a step is.
+/// Size of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepShape {
     /// Bodies B.
@@ -31,7 +33,7 @@ impl StepShape {
         Self { bodies, collisions, contact_iterations: 4, friction_iterations: 4 }
     }
 
-    /// Passes over the collisions; none without collisions.
+    /// Passes over the collisions; 0 without collisions.
     #[must_use]
     pub const fn passes(&self) -> u64 {
         if self.collisions == 0 {
@@ -47,14 +49,14 @@ impl StepShape {
 pub struct StepCycles {
     /// Velocities in; 0 where they come beside the passes.
     pub load: u64,
-    /// One pass over the collisions, without fill; all of them where they run side by side.
+    /// One pass over the collisions, without fill; all passes where they run side by side.
     pub pass: u64,
-    /// Fill of all passes together; where they run side by side, by how much the last is behind the
-    /// first if the order needs all of the delay lines, and its fill.
+    /// Fill of all passes together. Where they run side by side: the fill of the last pass, and the
+    /// cycles by which it is behind the first if the order needs the whole of the delay lines.
     pub fill: u64,
     /// Poses in; 0 where they come beside the passes.
     pub pose_in: u64,
-    /// Results out; likewise.
+    /// Results out; 0 where they leave beside the passes.
     pub result_out: u64,
     /// All together.
     pub total: u64,
@@ -99,13 +101,13 @@ impl StepCycles {
         Self { load, pass, fill, pose_in, result_out, total }
     }
 
-    /// Poses in or results out, whichever takes longer.
+    /// Poses in or results out, the longer of the two.
     #[must_use]
     pub fn integration(&self) -> u64 {
         self.pose_in.max(self.result_out)
     }
 
-    /// The time of that many cycles, s.
+    /// The time of the step at the profile's clock, s.
     #[must_use]
     pub fn seconds(&self, profile: &Profile) -> f64 {
         self.total as f64 / (f64::from(profile.clock_khz) * 1e3)
@@ -146,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn the_streamed_records_take_what_their_beats_take() {
+    fn the_streamed_records_take_the_cycles_of_their_beats() {
         let float = cycles(&FLOAT, Records::Streamed);
         assert_eq!(parts(&float), [19_440, 254_000, 2_680, 19_440, 38_880]);
         assert_eq!(float.total, 2_093_000);

@@ -1,9 +1,9 @@
 //! Cycles, memory bandwidth, ports and on-chip memory of a profile, by formula.
 //!
-//! What a step costs when nothing stalls: the emulated board counts the same cycles, plus stalls
-//! and waits; this module says them without running anything. Everything follows from the table of
-//! profiles ([`interface::profile`](pgs_interface::profile)); [`thesis`] holds what the thesis
-//! states, to be shown beside it.
+//! The formulas give the cost of a step without stalls and waits, and without a run. The emulated
+//! board counts the same cycles, plus stalls and waits. All figures follow from the table of
+//! profiles ([`interface::profile`](pgs_interface::profile)); [`thesis`] holds the figures of the
+//! thesis, for comparison.
 
 mod blocks;
 mod cycles;

@@ -1,6 +1,6 @@
-//! This file is the account of block RAM ports: which initiation interval the on-chip arrays allow.
+//! Block RAM ports: the initiation interval that the on-chip arrays allow.
 //!
-//! A block RAM has two ports, each of which reads or writes one row a clock. A collision reads the
+//! A block RAM has two ports; each reads or writes one row a clock. A collision reads the
 //! velocities of two bodies and writes both back; its accumulated impulses are read and written
 //! once. A read goes to one copy of an array, a write to every copy, so that copies help reads
 //! alone; a block RAM clock that is a multiple of the accelerator's (a *pump*) helps both.
@@ -15,17 +15,18 @@
 //! stays above 1 (thesis §5.5.3). The pump is a design assumption of this project that no synthesis
 //! has confirmed.
 //!
-//! Where the passes run side by side every unit has a memory of its own, in which it reads and writes
-//! the bodies of an entry, and into which the last uses of the pass before are written:
+//! Where the passes run side by side, every unit has a memory of its own. The unit reads and writes
+//! the bodies of an entry there, and the previous pass writes its last uses there:
 //!
 //! ```text
 //!   windowed  (2 + 2 + 2) x 1 / 4 = 2     windowed16  (2 + 2 + 2) x 2 / 4 = 3
 //! ```
 //!
-//! Considered instead: banks by body colour, so that the two bodies of a collision never share one;
-//! a bank then takes one read and one write a cycle and needs neither copy nor pump. It binds the
-//! colours to the order of the collisions, which the driver would have to find (2 banks are enough
-//! for some steps, piles need 5 to 6), and body memory that is divided unevenly.
+//! The alternative, not taken: banks by body colour, so that the two bodies of a collision never
+//! share a bank. A bank then takes one read and one write a cycle and needs neither copy nor pump.
+//! But the driver would have to find the colours (2 banks are enough for some steps, piles need 5
+//! to 6), the colours would bind the order of the collisions, and the banks would be filled
+//! unevenly.
 
 use super::cycles::StepShape;
 use super::schedule::Schedule;
@@ -54,7 +55,7 @@ pub enum OnChipArray {
 }
 
 impl OnChipArray {
-    /// Whether it has a row a body, and not a row a collision.
+    /// Whether the array has a row for each body, and not for each collision.
     #[must_use]
     pub const fn is_of_bodies(self) -> bool {
         matches!(self, Self::Velocities | Self::Inertia | Self::ShapeIndices)
@@ -74,7 +75,7 @@ impl OnChipArray {
     }
 }
 
-/// Where an array lies.
+/// The kind of memory that holds an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MemoryKind {
     /// Block RAM.
@@ -94,12 +95,12 @@ impl MemoryKind {
     }
 }
 
-/// Who uses the ports of one array during a pass.
+/// Use of the ports of one array during a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PortUse {
     /// The array.
     pub array: OnChipArray,
-    /// Where it lies.
+    /// Its kind of memory.
     pub memory: MemoryKind,
     /// Rows that a collision reads.
     pub reads: u32,
@@ -140,19 +141,19 @@ impl PortUse {
         Self { copies, pump, ..self }
     }
 
-    /// Which access has which port in which cycle, in an interval that the ports allow.
+    /// The access on each port in each cycle, in the shortest interval that the ports allow.
     #[must_use]
     pub fn schedule(&self) -> Schedule {
         Schedule::new(self)
     }
 }
 
-/// What is written while the velocities come in, against the ports that write it.
+/// Writes to an array of bodies while the velocities come in, against the ports that write them.
 ///
 /// Each record is one row of every array of bodies, in every copy. Block RAM writes a row on each
-/// of its ports, distributed RAM on one of them. Where that is too slow the array needs banks by
-/// body number: no more bits, and the passes lose nothing, because at worst all accesses of an
-/// issue meet in one bank, which has the ports of the undivided array.
+/// of its ports, distributed RAM on one of them. If that is too slow, the array needs banks by body
+/// number. Banks take no more bits, and the passes lose nothing: at worst all accesses of an issue
+/// go to one bank, which has the ports of the undivided array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LoadPorts {
     /// The array.
@@ -191,7 +192,7 @@ impl PortAccount {
             copies: memory.velocity_copies,
             pump: memory.pump,
         };
-        // Nothing else needs copies or a pump.
+        // No other array needs copies or a pump.
         let plain = velocities.with(1, 1);
         let once = |array| PortUse { array, reads: 1, writes: 1, ..plain };
         let mut arrays = match profile.flow {
@@ -225,13 +226,13 @@ impl PortAccount {
         self.by_ports().max(self.by_streams)
     }
 
-    /// The velocities' ports, which decide.
+    /// Use of the velocities' ports; they decide.
     #[must_use]
     pub fn velocities(&self) -> Option<&PortUse> {
         self.arrays.iter().find(|array| array.array == OnChipArray::Velocities)
     }
 
-    /// What the ports make of loading that many bodies, for each array of bodies.
+    /// The load of `bodies` bodies on the ports of each array of bodies.
     #[must_use]
     pub fn load(&self, variant: &Variant, bodies: u64) -> Vec<LoadPorts> {
         let step = StepShape::new(bodies, 0);
@@ -252,8 +253,8 @@ impl PortAccount {
     }
 }
 
-/// Cycles of the busiest stream for one issue, over as many issues as make whole groups. Where the
-/// passes run side by side an entry that is streamed once is issued several times.
+/// Cycles of the busiest stream for one issue, averaged over whole groups of beats. Where the
+/// passes run side by side, an entry is streamed once and issued several times.
 fn stream_interval(variant: &Variant) -> u32 {
     let profile = variant.profile;
     let issues = u32::try_from(profile.stripes.collisions.streams.len()).unwrap_or(1).max(1);

@@ -1,4 +1,4 @@
-//! This file is the account of on-chip memory: by array and copy, in bytes and in block RAMs.
+//! On-chip memory, by array and copy, in bytes and in block RAMs.
 //!
 //! Source: thesis §4.4.2 (24 bytes a body and 16 a collision; 4.0 MiB on the XCZU9EG).
 
@@ -20,15 +20,15 @@ const BITS_PER_BYTE: u32 = 8;
 pub struct ArrayUse {
     /// The array.
     pub array: OnChipArray,
-    /// Where it lies.
+    /// Its kind of memory.
     pub memory: MemoryKind,
     /// Rows: bodies or collisions.
     pub rows: u64,
     /// Bytes of a row.
     pub row_bytes: u32,
-    /// Copies; of a design whose passes run side by side, memories of as many units or passes.
+    /// Copies of the array. Where the passes run side by side: memories, one for each unit or pass.
     pub copies: u32,
-    /// Whether one port to read and one to write are enough for every issue.
+    /// Whether one read port and one write port are enough for every issue.
     pub simple: bool,
 }
 
@@ -45,7 +45,7 @@ impl ArrayUse {
         self.bytes().saturating_mul(BITS_PER_BYTE as u64).div_ceil(BLOCK_BITS)
     }
 
-    /// Blocks of all copies by the shapes of the block; nothing for distributed RAM.
+    /// Blocks of all copies by the shapes of the block; `None` for distributed RAM.
     #[must_use]
     pub fn shaped_blocks(&self) -> Option<ShapedBlocks> {
         let bits = u64::from(self.row_bytes * BITS_PER_BYTE);
@@ -60,15 +60,15 @@ impl ArrayUse {
 pub struct MemoryUse {
     /// Each array.
     pub arrays: Vec<ArrayUse>,
-    /// Block RAM that there is, bytes.
+    /// Block RAM of the device for these arrays, bytes.
     pub capacity: u64,
-    /// Bytes that the positions of all bodies would take beside them, in as many copies as the
-    /// velocities have.
+    /// Bytes that the positions of all bodies would take too, in as many copies as the velocities
+    /// have.
     pub positions: u64,
 }
 
 impl MemoryUse {
-    /// What that many bodies and collisions take in a variant of a profile.
+    /// On-chip memory of `bodies` bodies and `collisions` collisions in a variant of a profile.
     #[must_use]
     pub fn new(variant: &Variant, bodies: u64, collisions: u64) -> Self {
         let memory = variant.profile.memory;
@@ -128,7 +128,7 @@ impl MemoryUse {
         self.sum(ArrayUse::bytes)
     }
 
-    /// Block RAM used if the positions were kept as well, bytes (thesis §4.4.2).
+    /// Block RAM used if the positions were on chip too, bytes (thesis §4.4.2).
     #[must_use]
     pub fn with_positions(&self) -> u64 {
         self.block_ram().saturating_add(self.positions)
@@ -146,13 +146,14 @@ impl MemoryUse {
         self.sum(|array| array.shaped_blocks().map_or(0, |shaped| shaped.blocks))
     }
 
-    /// Whether it fits, by bytes: what the capacity registers say.
+    /// Whether the arrays fit by bytes, as the capacity registers count.
     #[must_use]
     pub fn fits(&self) -> bool {
         self.block_ram() <= self.capacity
     }
 
-    /// Collisions that fit beside that many bodies; what the counters hold, where none of them is kept.
+    /// Collisions that fit beside `bodies` bodies. In a design that keeps no impulses of all
+    /// collisions on chip, the pass counters are the limit.
     #[must_use]
     pub fn collisions_beside(variant: &Variant, bodies: u64) -> u64 {
         let memory = variant.profile.memory;

@@ -1,12 +1,11 @@
-//! This file lays the accesses of one issue out on the ports: cycle by cycle, who reads or writes
-//! where.
+//! Lays the accesses of one issue out on the ports, cycle by cycle.
 //!
-//! Reads of an issue and the write-backs of an earlier one meet in the same interval, once the
-//! pipeline is full; the table repeats every interval.
+//! Once the pipeline is full, the reads of an issue and the write-backs of an earlier issue share
+//! an interval; the table repeats every interval.
 
 use super::ports::{PORTS, PortUse};
 
-/// Reading or writing.
+/// The kind of an access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AccessKind {
     /// A row is read, from one copy.
@@ -18,11 +17,11 @@ pub enum AccessKind {
 /// One access to a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Access {
-    /// Reading or writing.
+    /// Read or write.
     pub kind: AccessKind,
     /// Collision of the issue.
     pub collision: u32,
-    /// Which row of that collision: body A, body B.
+    /// Row of that collision: 0 for body A, 1 for body B.
     pub row: u32,
 }
 
@@ -37,16 +36,16 @@ pub struct Slot {
     pub copy: u32,
     /// Port of that copy.
     pub port: u32,
-    /// Who has it.
+    /// The access on the port, if any.
     pub access: Option<Access>,
 }
 
-/// What one issue does on the ports of an array.
+/// Accesses of one issue on the ports of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Schedule {
     /// Cycles of the accelerator.
     pub interval: u32,
-    /// Every slot of them, by cycle, phase, copy and port.
+    /// Every slot, by cycle, phase, copy and port.
     pub slots: Vec<Slot>,
 }
 
@@ -88,7 +87,7 @@ mod tests {
     use crate::estimate::PortAccount;
     use pgs_interface::profile::{HALF, Inertia, PROFILES, Variant};
 
-    /// Counts from the slots alone, not from how they were filled.
+    /// Counts from the slots alone, independently of the code that fills them.
     #[test]
     fn every_read_has_one_port_and_every_write_one_in_each_copy() {
         for profile in PROFILES {
@@ -124,7 +123,7 @@ mod tests {
         }
     }
 
-    /// Or the wide shape of a block, one port each way, could not serve it.
+    /// Otherwise the wide shape of a block, one port each way, could not serve the array.
     #[test]
     fn a_simple_array_never_has_two_accesses_of_a_kind_at_once() {
         let mut simple = 0;

@@ -1,8 +1,8 @@
-//! This file is the time of a step under a memory bandwidth.
+//! Time of a step under a memory bandwidth.
 //!
-//! Each part of a step takes the longer of computing and moving: the velocities in, each pass, and
-//! the poses in with the results out. Fill is added, because nothing streams meanwhile. Where the
-//! passes run side by side everything streams beside them, and is in their part.
+//! Each part of a step takes the longer of computation and transfer: the velocities in, each pass,
+//! and the poses in with the results out. Fill is added, because nothing streams meanwhile. Where
+//! the passes run side by side, all records stream beside them and count in their part.
 
 use super::cycles::{StepCycles, StepShape};
 use super::ports::PortAccount;
@@ -10,7 +10,7 @@ use super::traffic::{Records, StepTraffic};
 use crate::config::Bandwidth;
 use pgs_interface::profile::{Flow, Variant};
 
-/// What limits a part of a step.
+/// The limit on the speed of a part of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PartLimit {
     /// The width of the streams.
@@ -40,7 +40,7 @@ pub struct PartTime {
     pub seconds: f64,
     /// Bytes that the part moves, in and out.
     pub bytes: u64,
-    /// What limits it.
+    /// The limit on its speed.
     pub limit: PartLimit,
 }
 
@@ -108,7 +108,8 @@ impl StepTime {
     }
 }
 
-/// What keeps the initiation interval from being shorter; ports, where streams do as well.
+/// The limit that keeps the initiation interval from being shorter; the pipeline's ports if streams
+/// and ports allow the same interval.
 fn interval_limit(variant: &Variant) -> PartLimit {
     let account = PortAccount::new(variant);
     if account.by_streams > account.by_ports() { PartLimit::Streams } else { PartLimit::Pipeline }
@@ -148,7 +149,7 @@ mod tests {
         }
     }
 
-    /// What the thesis' float design asks of the memory that it states, 16 GB/s (§5.4.2).
+    /// The demand of the thesis' float design on its memory of 16 GB/s (§5.4.2).
     #[test]
     fn a_pass_of_float_needs_15_4_gigabytes_a_second() {
         let pass = time(&FLOAT, Bandwidth::Unlimited).pass;

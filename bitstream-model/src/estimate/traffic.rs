@@ -1,8 +1,8 @@
-//! This file says what a step moves: bytes, padding and stream cycles of each array.
+//! Traffic of a step: bytes, padding and stream cycles of each array.
 //!
-//! An array of records goes out in groups of beats ([`stripe`](pgs_interface::stripe)); its
-//! streams run side by side, each a beat of 128 bits in `128 / width` cycles, and the busiest of
-//! them is what the array takes.
+//! An array of records goes out in groups of beats ([`stripe`](pgs_interface::stripe)). Its streams
+//! run side by side, and each takes `128 / width` cycles for a beat of 128 bits. The array takes
+//! the cycles of its busiest stream.
 
 use super::cycles::StepShape;
 use super::window;
@@ -20,7 +20,7 @@ const RELATIVE_NUMBERS: u32 = 24;
 /// Numbers of a world inverse inertia.
 const INERTIA_NUMBERS: u32 = 6;
 
-/// How records are counted.
+/// The way in which records are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Records {
     /// Without any padding, over the streams' widths together, as the thesis counts.
@@ -55,10 +55,10 @@ pub struct Transfer {
 }
 
 impl Transfer {
-    /// Records of that many rows, dealt out by `stripe` to streams of those widths.
+    /// Records of `rows` rows, dealt out by `stripe` to streams of `widths` bits.
     ///
-    /// `whole` records always travel together: what is missing is padding. Counts beyond 64 bits
-    /// saturate.
+    /// `whole` records always travel together; padding records fill the last of these sets up.
+    /// Counts beyond 64 bits saturate.
     #[must_use]
     pub fn streamed(
         records: u64,
@@ -98,7 +98,8 @@ impl Transfer {
         Self { bytes, padding: bytes.saturating_sub(useful), cycles }
     }
 
-    /// Records of that many numbers without padding, on streams of that total width.
+    /// Records of `numbers` numbers without padding, on streams with the sum of `widths` as their
+    /// width.
     #[must_use]
     pub fn packed(records: u64, numbers: u32, format: StreamFormat, widths: &[u32]) -> Self {
         let width: u64 = widths.iter().map(|width| u64::from(*width)).sum();
@@ -111,7 +112,7 @@ impl Transfer {
     }
 }
 
-/// Numbers of the records without padding: the thesis', with what it does not have beside them.
+/// Numbers of the records without padding: the thesis' records, with this project's additions.
 fn packed_numbers(variant: &Variant) -> RecordWords {
     let inertia = match variant.inertia {
         Inertia::Isotropic => 0,
@@ -124,14 +125,14 @@ fn packed_numbers(variant: &Variant) -> RecordWords {
     RecordWords { velocity: THESIS_WORDS.velocity + inertia, collision, ..THESIS_WORDS }
 }
 
-/// Everything that one step moves.
+/// Traffic of one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepTraffic {
     /// Velocities in.
     pub velocities: Transfer,
     /// Collisions in, once.
     pub collisions: Transfer,
-    /// How many times they stream in a step.
+    /// Number of times that the collisions stream in a step.
     pub collision_streams: u64,
     /// Poses in.
     pub poses: Transfer,
@@ -140,7 +141,7 @@ pub struct StepTraffic {
 }
 
 impl StepTraffic {
-    /// What a step moves in a variant of a profile.
+    /// The traffic of a step in a variant of a profile.
     #[must_use]
     pub fn new(variant: &Variant, records: Records, step: &StepShape) -> Self {
         let profile = variant.profile;
@@ -212,15 +213,15 @@ impl StepTraffic {
 /// High-performance ports between memory and logic: HP0 to HP3 (UG1085; the two HPC ports cost
 /// more).
 pub const HP_PORTS: usize = 4;
-/// Width of each of them, bits.
+/// Width of an HP port, bits.
 pub const HP_PORT_BITS: u32 = 128;
 
-/// What the collisions' streams of a profile ask of the memory while a pass runs.
+/// Demand of a profile's collision streams on the memory while a pass runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StreamDemand {
     /// Streams to the accelerator; each takes a port of its own.
     pub ports: usize,
-    /// Whether each stream is narrow enough for a port and there are ports for all.
+    /// Whether every stream gets a port, and none is wider than its port.
     pub fits: bool,
     /// Bytes per second.
     pub rate: f64,
@@ -319,7 +320,7 @@ mod tests {
                 let traffic = StepTraffic::new(&profile.default_variant(), records, &step);
                 let most = match profile.flow {
                     Flow::Passes => u64::MAX,
-                    // Once.
+                    // The collisions stream once.
                     Flow::Window(_) => u64::MAX / 8,
                 };
                 assert!(traffic.bytes() >= most, "{}", profile.name);

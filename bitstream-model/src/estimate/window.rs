@@ -1,17 +1,18 @@
-//! This file is the account of a design that streams the collisions once: cycles, units, on-chip memory.
+//! Cycles, units and on-chip memory of a design that streams the collisions once.
 //!
 //! ```text
 //! cycles = (C + (P - 1) x lag) x T + fill of the last pass + 2 x bodies without a collision
 //! ```
 //!
-//! C counts empty entries too, T are the [cycles of a slot](Window::slot_cycles), and the lag is by how
-//! many entries each pass is behind the one before. A constant lag of the longest span of a body +
-//! ceil(window / T) + 1 satisfies every rule when every pass has its turn. The emulated board counts
-//! what its scoreboard makes of an order, usually less: a unit takes another of its passes when one
-//! cannot go on. Load and integration run beside the passes; what comes after them are the bodies that
-//! are in no collision.
+//! C counts empty entries too. T is the [cycles of a slot](Window::slot_cycles). The lag is the
+//! number of entries by which each pass is behind the previous one. With a constant lag of the
+//! longest span of a body + ceil(window / T) + 1, every rule holds when the passes take turns. The
+//! emulated board counts the cycles of its scoreboard, usually fewer: when a pass cannot go on, its
+//! unit takes another one. Load and integration run beside the passes; only the bodies in no
+//! collision come after them.
 //!
-//! DSPs and lookup tables are extrapolated from the thesis' designs, which have one unit of each kind.
+//! DSPs and lookup tables are extrapolated from the thesis' designs, which have one unit of each
+//! kind.
 
 use super::cycles::StepShape;
 use super::ports::OnChipArray;
@@ -30,22 +31,24 @@ const IMPULSES: u32 = 4;
 pub struct WindowStep {
     /// Its size; empty entries count as collisions.
     pub shape: StepShape,
-    /// Entries by which each pass is behind the one before.
+    /// Entries by which each pass is behind the previous one.
     pub lag: u64,
     /// Bodies that move and are in no collision.
     pub untouched: u64,
 }
 
 impl WindowStep {
-    /// A step whose order needs all of the design's delay lines, in which no body is left out.
+    /// A step whose order needs the whole of the design's delay lines, with every body in a
+    /// collision.
     #[must_use]
     pub fn longest(design: &Window, shape: StepShape) -> Self {
         Self { shape, lag: design.lag.into(), untouched: 0 }
     }
 
-    /// The lag that an order with that longest span needs, at a pipeline of that depth.
+    /// The lag that an order needs in a pipeline of `depth`.
     ///
-    /// `span` counts entries from a body's first use to its last.
+    /// `span` counts entries from a body's first use to its last, for the body with the longest
+    /// span.
     #[must_use]
     pub fn lag_of(span: u64, depth: Depth, slot: u64) -> u64 {
         span.saturating_add(u64::from(depth.window).div_ceil(slot.max(1))).saturating_add(1)
@@ -59,7 +62,7 @@ pub struct WindowCycles {
     pub slot: u64,
     /// The first pass: all entries, one a slot.
     pub stream: u64,
-    /// By how much the last pass is behind the first.
+    /// Cycles by which the last pass is behind the first.
     pub behind: u64,
     /// Fill of the last pass.
     pub fill: u64,
@@ -67,9 +70,9 @@ pub struct WindowCycles {
     pub passes: u64,
     /// Velocities in, beside the passes.
     pub load: u64,
-    /// Poses in or results out, whichever takes longer, beside the passes.
+    /// Poses in or results out, the longer of the two, beside the passes.
     pub integration: u64,
-    /// Of load and integration what nothing runs beside: the bodies that are in no collision.
+    /// Load and integration of the bodies in no collision, after the passes.
     pub exposed: u64,
     /// All together.
     pub total: u64,
@@ -112,7 +115,7 @@ fn slot(variant: &Variant, design: &Window, shape: &StepShape) -> u64 {
         friction_units: design.friction_units.max(1),
         ..*design
     };
-    // More passes than the counters hold.
+    // The pass counters hold no more.
     let most = pgs_interface::control::ITERATIONS_MAX;
     let slot = units.slot_cycles(
         passes(shape.contact_iterations).min(most),
@@ -123,7 +126,7 @@ fn slot(variant: &Variant, design: &Window, shape: &StepShape) -> u64 {
     slot.into()
 }
 
-/// Issues of a unit for each entry that is streamed, with four passes of each kind.
+/// Issues of a unit for each streamed entry, with four passes of each kind.
 pub(crate) fn issues_per_entry(design: &Window) -> u32 {
     let StepShape { contact_iterations, friction_iterations, .. } = StepShape::new(0, 0);
     let of =
@@ -131,7 +134,7 @@ pub(crate) fn issues_per_entry(design: &Window) -> u32 {
     of(contact_iterations, design.contact_units).max(of(friction_iterations, design.friction_units))
 }
 
-/// An array of a design with a window: how many memories, rows and bytes of a row of each.
+/// An array of a design with a window: its memories, and the rows of each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct WindowArray {
     pub(crate) memories: u32,
@@ -139,7 +142,7 @@ pub(crate) struct WindowArray {
     pub(crate) row_bytes: u32,
 }
 
-/// What an array takes with four passes of each kind; `None` if the design does not have it.
+/// Size of an array with four passes of each kind; `None` if the design does not have it.
 pub(crate) fn array(variant: &Variant, design: &Window, array: OnChipArray) -> Option<WindowArray> {
     let StepShape { contact_iterations, friction_iterations, .. } = StepShape::new(0, 0);
     let passes = |iterations: u64| u32::try_from(iterations).unwrap_or(u32::MAX);
@@ -158,7 +161,8 @@ pub(crate) fn array(variant: &Variant, design: &Window, array: OnChipArray) -> O
     match array {
         OnChipArray::Velocities | OnChipArray::Inertia => places(six),
         OnChipArray::ShapeIndices => places(variant.profile.memory.shape_index_bytes),
-        // Behind every pass but the last contact pass, and what follows it.
+        // A contact line lies between two contact passes; a friction line leads into each friction
+        // pass.
         OnChipArray::ContactLines => line(contact.saturating_sub(1), RECORD_WORDS + IMPULSES),
         OnChipArray::FrictionLines => line(
             friction.saturating_sub(u32::from(contact == 0)),
@@ -168,19 +172,19 @@ pub(crate) fn array(variant: &Variant, design: &Window, array: OnChipArray) -> O
     }
 }
 
-/// Logic that a design with a window takes, percent of the device: an extrapolation from the thesis'
-/// design in the same arithmetic, which has one unit of each kind.
+/// Logic of a design with a window, percent of the device: an extrapolation from the thesis' design
+/// in the same arithmetic, which has one unit of each kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindowLogic {
     /// The design of the thesis.
     pub from: &'static Design,
-    /// Units of a kind; of the kind that has more.
+    /// Units of the kind that has more of them.
     pub units: u32,
     /// DSP48E.
     pub dsp: u32,
     /// Flip-flops.
     pub flip_flops: u32,
-    /// Lookup tables. Places, scoreboard and delay lines are not in it.
+    /// Lookup tables, without places, scoreboard and delay lines.
     pub lookup_tables: u32,
 }
 
@@ -204,7 +208,7 @@ impl WindowLogic {
         })
     }
 
-    /// Whether nothing takes more than there is.
+    /// Whether the design fits the device.
     #[must_use]
     pub fn fits(&self) -> bool {
         [self.dsp, self.flip_flops, self.lookup_tables].into_iter().all(|percent| percent <= 100)
@@ -221,8 +225,8 @@ mod tests {
         WindowCycles::new(&profile.default_variant(), step).expect("it has a window")
     }
 
-    /// By hand: (127,891 + 7 x 2,581) x 4 + 306 and (128,101 + 7 x 2,827) x 3 + 306, then two cycles
-    /// for each of 1,630 bodies.
+    /// By hand: (127,891 + 7 x 2,581) x 4 + 306 and (128,101 + 7 x 2,827) x 3 + 306, then two
+    /// cycles for each of 1,630 bodies.
     #[test]
     fn the_formula_is_entries_and_lags_by_slots() {
         let shape = |entries| StepShape::new(38_880, entries);
@@ -272,7 +276,7 @@ mod tests {
             assert_eq!(memory.block_ram(), lines + 8_192 * 6 * bytes, "{}", profile.name);
             let mib = memory.block_ram() as f64 / f64::from(1 << 20);
             assert!(mib <= most, "{mib} MiB");
-            // Whatever the scene.
+            // The memory does not depend on the scene.
             assert_eq!(memory, MemoryUse::new(&profile.default_variant(), 7, 7));
             assert!(memory.fits());
         }

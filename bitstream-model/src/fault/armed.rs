@@ -1,31 +1,30 @@
-//! This file keeps the faults that are still to come, and says to each part of the board when it is
-//! one's turn.
+//! Pending faults: each part of the board asks here at its occasions whether a fault is due.
 
 use super::{Fault, FaultKind, Place, Site, StepPhase, StepShape, When};
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::axi_dma::Direction;
 
-/// Where a channel stands in its packet.
+/// Position of a channel in its packet.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Turn {
+pub(crate) struct PacketPosition {
     pub(crate) core: usize,
     pub(crate) direction: Direction,
-    /// Beats of the packet that were moved.
+    /// Moved beats of the packet.
     pub(crate) beats: u64,
-    /// Descriptors of the packet that were completed.
+    /// Completed descriptors of the packet.
     pub(crate) descriptors: u32,
-    /// Whether the next beat is its descriptor's first.
+    /// Whether the next beat is the first of a descriptor.
     pub(crate) begins: bool,
 }
 
-/// What comes up in the next beats of a channel.
+/// The next fault of a channel within a number of beats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Due {
-    /// Nothing.
+    /// No fault.
     Nothing,
-    /// Something, after so many beats.
+    /// A fault after this number of beats.
     After(u64),
-    /// This, with the next beat.
+    /// This fault, with the next beat.
     Now(FaultKind),
 }
 
@@ -33,16 +32,16 @@ pub(crate) enum Due {
 #[derive(Debug)]
 struct Armed {
     fault: Fault,
-    /// How often it is still to happen.
+    /// Number of times that it is still to happen.
     left: u32,
-    /// Steps begun, of the accelerator and of each receiver, when it was injected.
+    /// Steps that the accelerator and each receiver had begun at the injection.
     starts: u64,
     received: [u64; DMA_COUNT_MAX],
-    /// The step that it happened in last, as the part that met it counts; it comes again in a later
-    /// one.
+    /// The step of its last happening, as the affected part counts steps. It happens again in a
+    /// later step.
     happened: Option<u64>,
-    /// Register accesses, stops, resets or edges since the injection.
-    passed: u64,
+    /// Occasions since the injection: register accesses, stops, resets or edges.
+    occasions: u64,
 }
 
 /// All faults that are still to come.
@@ -52,12 +51,12 @@ pub(crate) struct Faults {
     happened: u64,
     /// Starts of the accelerator.
     starts: u64,
-    /// How often each receiver was started: once a step, before the accelerator.
+    /// Starts of each receiver: one a step, before the accelerator's.
     received: [u64; DMA_COUNT_MAX],
     /// Packets that each channel has sent in this step.
     sent: [u32; DMA_COUNT_MAX],
     shape: StepShape,
-    /// What concerns the board as a whole and was met by one of its parts.
+    /// A fault of the whole board that is due, found by a channel.
     for_board: Option<FaultKind>,
 }
 
@@ -65,7 +64,7 @@ impl Faults {
     pub(crate) fn inject(&mut self, fault: Fault) {
         let (starts, received) = (self.starts, self.received);
         let left = fault.times;
-        self.armed.push(Armed { fault, left, starts, received, happened: None, passed: 0 });
+        self.armed.push(Armed { fault, left, starts, received, happened: None, occasions: 0 });
     }
 
     pub(crate) fn clear(&mut self) {
@@ -73,12 +72,12 @@ impl Faults {
         self.for_board = None;
     }
 
-    /// How many have happened.
+    /// Number of faults that have happened.
     pub(crate) fn happened(&self) -> u64 {
         self.happened
     }
 
-    /// Whether there is none: what a board without faults pays for them.
+    /// Whether no fault is pending. A board without faults pays for no other check.
     #[inline]
     pub(crate) fn none(&self) -> bool {
         self.armed.is_empty()
@@ -98,14 +97,14 @@ impl Faults {
         }
     }
 
-    /// A channel that rested was started.
+    /// A channel without work was started.
     pub(crate) fn channel_begins(&mut self, core: usize, direction: Direction) {
         if direction == Direction::S2mm {
             self.received[core] += 1;
         }
     }
 
-    /// The step that a part is in, as it counts: a receiver begins before the accelerator.
+    /// Number of the current step as a part counts it: a receiver begins before the accelerator.
     fn now(&self, channel: Option<(usize, Direction)>) -> u64 {
         match channel {
             Some((core, Direction::S2mm)) => self.received[core],
@@ -113,7 +112,7 @@ impl Faults {
         }
     }
 
-    /// What the packet carries that a channel is at.
+    /// The phase whose records the current packet of a channel carries.
     pub(crate) fn phase(&self, core: usize, direction: Direction) -> Option<StepPhase> {
         match direction {
             Direction::Mm2s => self.shape.phase(core, self.sent[core]),
@@ -121,8 +120,8 @@ impl Faults {
         }
     }
 
-    /// The first that `fits`, which has happened with that, in a channel if it was met by one.
-    fn take(
+    /// Lets the first fault happen that `fits`; `channel` is the affected channel, if any.
+    fn fire(
         &mut self,
         channel: Option<(usize, Direction)>,
         fits: impl Fn(&Self, &Armed) -> bool,
@@ -141,7 +140,7 @@ impl Faults {
         Some(kind)
     }
 
-    /// Whether a fault may happen in this step, as a channel counts steps if it would meet it.
+    /// Whether a fault may happen in the current step, as the affected part counts steps.
     fn in_step(&self, armed: &Armed, channel: Option<(usize, Direction)>) -> bool {
         let now = self.now(channel);
         let then = match channel {
@@ -152,8 +151,8 @@ impl Faults {
         again && armed.fault.step.is_none_or(|step| now - then == u64::from(step))
     }
 
-    fn fits(&self, armed: &Armed, turn: &Turn) -> bool {
-        let Turn { core, direction, .. } = *turn;
+    fn fits(&self, armed: &Armed, position: &PacketPosition) -> bool {
+        let PacketPosition { core, direction, .. } = *position;
         let place = match armed.fault.place {
             None => true,
             Some(place) => place == Place::Channel(core, direction),
@@ -176,32 +175,32 @@ impl Faults {
                 || matches!(fault.when, Some(When::Beat(_) | When::Descriptor(_))))
     }
 
-    /// After how many beats a fault comes up.
-    fn beats_until(&self, armed: &Armed, turn: &Turn) -> Option<u64> {
+    /// Number of beats before a fault is due in a channel.
+    fn beats_until(&self, armed: &Armed, position: &PacketPosition) -> Option<u64> {
         let board = Self::awaits_channel(&armed.fault);
-        if armed.fault.kind.site() != Site::Beat && !board || !self.fits(armed, turn) {
+        if armed.fault.kind.site() != Site::Beat && !board || !self.fits(armed, position) {
             return None;
         }
         match armed.fault.when {
             None => Some(0),
-            Some(When::Beat(beat)) => beat.checked_sub(turn.beats),
+            Some(When::Beat(beat)) => beat.checked_sub(position.beats),
             Some(When::Descriptor(number)) => {
-                (turn.begins && number == turn.descriptors).then_some(0)
+                (position.begins && number == position.descriptors).then_some(0)
             }
             Some(_) => None,
         }
     }
 
-    /// What comes up in the next `beats` beats of a channel.
-    pub(crate) fn at_beats(&mut self, turn: &Turn, beats: u64) -> Due {
-        let until = self.armed.iter().filter_map(|armed| self.beats_until(armed, turn)).min();
+    /// The next fault in the next `beats` beats of a channel.
+    pub(crate) fn at_beats(&mut self, position: &PacketPosition, beats: u64) -> Due {
+        let until = self.armed.iter().filter_map(|armed| self.beats_until(armed, position)).min();
         match until {
             Some(0) => {}
             Some(beats_until) if beats_until < beats => return Due::After(beats_until),
             _ => return Due::Nothing,
         }
-        let channel = Some((turn.core, turn.direction));
-        let kind = self.take(channel, |all, armed| all.beats_until(armed, turn) == Some(0));
+        let channel = Some((position.core, position.direction));
+        let kind = self.fire(channel, |all, armed| all.beats_until(armed, position) == Some(0));
         match kind {
             Some(kind) if kind.site() == Site::Board => {
                 self.for_board = Some(kind);
@@ -212,33 +211,33 @@ impl Faults {
         }
     }
 
-    /// What happens at a descriptor or at the end of a packet.
-    fn at(&mut self, turn: &Turn, site: Site) -> Option<FaultKind> {
-        self.take(Some((turn.core, turn.direction)), |all, armed| {
+    /// The fault that is due at a descriptor or at the end of a packet.
+    fn at_site(&mut self, position: &PacketPosition, site: Site) -> Option<FaultKind> {
+        self.fire(Some((position.core, position.direction)), |all, armed| {
             let when = match armed.fault.when {
-                Some(When::Descriptor(number)) => number == turn.descriptors,
+                Some(When::Descriptor(number)) => number == position.descriptors,
                 _ => true,
             };
-            armed.fault.kind.site() == site && when && all.fits(armed, turn)
+            armed.fault.kind.site() == site && when && all.fits(armed, position)
         })
     }
 
-    /// What happens to the fetch of a descriptor.
-    pub(crate) fn at_fetch(&mut self, turn: &Turn) -> Option<FaultKind> {
-        self.at(turn, Site::Fetch)
+    /// The fault of a descriptor's fetch, if one is due.
+    pub(crate) fn at_fetch(&mut self, position: &PacketPosition) -> Option<FaultKind> {
+        self.at_site(position, Site::Fetch)
     }
 
-    /// What happens to the write of a descriptor's status.
-    pub(crate) fn at_completion(&mut self, turn: &Turn) -> Option<FaultKind> {
-        self.at(turn, Site::Completion)
+    /// The fault of a status write to a descriptor, if one is due.
+    pub(crate) fn at_completion(&mut self, position: &PacketPosition) -> Option<FaultKind> {
+        self.at_site(position, Site::Completion)
     }
 
-    /// What happens to the end of a packet.
-    pub(crate) fn at_packet_end(&mut self, turn: &Turn) -> Option<FaultKind> {
-        self.at(turn, Site::PacketEnd)
+    /// The fault of a packet's end, if one is due.
+    pub(crate) fn at_packet_end(&mut self, position: &PacketPosition) -> Option<FaultKind> {
+        self.at_site(position, Site::PacketEnd)
     }
 
-    /// What happens on one of several like occasions, in a part that `fits` tells.
+    /// The fault that is due at a counted occasion (stop, reset or edge), in a part that `fits`.
     fn on_occasion(
         &mut self,
         site: Site,
@@ -249,36 +248,36 @@ impl Faults {
         }
         let here = |armed: &Armed| armed.fault.kind.site() == site && fits(armed.fault.place);
         let due = |armed: &Armed| match armed.fault.when {
-            Some(When::Occasion(number)) => armed.passed >= u64::from(number),
+            Some(When::Occasion(number)) => armed.occasions >= u64::from(number),
             _ => true,
         };
         let kind =
-            self.take(None, |all, armed| here(armed) && due(armed) && all.in_step(armed, None));
-        // Whatever happened on it: it was one.
+            self.fire(None, |all, armed| here(armed) && due(armed) && all.in_step(armed, None));
+        // The occasion counts, with a fault or without.
         for armed in self.armed.iter_mut().filter(|armed| here(armed)) {
-            armed.passed += 1;
+            armed.occasions += 1;
         }
         kind
     }
 
-    /// What happens as a channel is stopped.
+    /// The fault of a channel's stop, if one is due.
     pub(crate) fn at_halt(&mut self, core: usize, direction: Direction) -> Option<FaultKind> {
         let here = Place::Channel(core, direction);
         self.on_occasion(Site::Halt, |place| place.is_none_or(|place| place == here))
     }
 
-    /// What happens as a core or the accelerator is reset.
+    /// The fault of a reset of a core or of the accelerator, if one is due.
     pub(crate) fn at_reset(&mut self, here: Place) -> Option<FaultKind> {
         self.on_occasion(Site::Reset, |place| place.is_none_or(|place| place == here))
     }
 
-    /// What happens as the interrupt line rises.
+    /// The fault of a rising edge of the interrupt line, if one is due.
     pub(crate) fn at_edge(&mut self) -> Option<FaultKind> {
         self.on_occasion(Site::Edge, |_| true)
     }
 
-    /// What happens in the accelerator, if it is in that phase (in any, if none is said) and about to
-    /// take its records up to `records`.
+    /// The fault of the accelerator that is due in `phase` (in any phase for `None`) before record
+    /// `records`.
     pub(crate) fn in_accelerator(
         &mut self,
         phase: Option<StepPhase>,
@@ -287,13 +286,13 @@ impl Faults {
         if self.none() {
             return None;
         }
-        self.take(None, |all, armed| {
+        self.fire(None, |all, armed| {
             let fault = &armed.fault;
             let when = match fault.when {
                 Some(When::Beat(record)) => record < records,
                 _ => true,
             };
-            // It ends a step once, whatever the phase.
+            // This fault comes at the end of a step, in no phase.
             let at_the_end = fault.kind == FaultKind::NoDone;
             fault.kind.site() == Site::Accelerator
                 && !at_the_end
@@ -303,13 +302,13 @@ impl Faults {
         })
     }
 
-    /// Whether the accelerator says that it is done.
+    /// Whether a fault keeps the accelerator from setting `ap_done`.
     pub(crate) fn keeps_done(&mut self) -> bool {
         let kind = FaultKind::NoDone;
-        self.take(None, |all, armed| armed.fault.kind == kind && all.in_step(armed, None)).is_some()
+        self.fire(None, |all, armed| armed.fault.kind == kind && all.in_step(armed, None)).is_some()
     }
 
-    /// What happens to the board as a whole, at a register access if there is one now.
+    /// The fault of the whole board that is due; `access` if this is at a register access.
     pub(crate) fn of_board(&mut self, access: bool) -> Option<FaultKind> {
         if let Some(kind) = self.for_board.take() {
             return Some(kind);
@@ -323,16 +322,16 @@ impl Faults {
                 && !Self::awaits_channel(fault)
                 && all.in_step(armed, None)
         };
-        let kind = self.take(None, |all, armed| {
+        let kind = self.fire(None, |all, armed| {
             let due = match armed.fault.when {
-                Some(When::Access(number)) => access && armed.passed >= number,
+                Some(When::Access(number)) => access && armed.occasions >= number,
                 _ => true,
             };
             counts(all, armed) && due
         });
         if access {
             for armed in &mut self.armed {
-                armed.passed += u64::from(armed.fault.kind.site() == Site::Board);
+                armed.occasions += u64::from(armed.fault.kind.site() == Site::Board);
             }
         }
         kind
@@ -350,23 +349,28 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_comes_up_at_its_beat_once_and_again_in_the_next_step_if_it_says_so() {
+    fn a_fault_happens_once_at_its_beat_and_again_in_the_next_step_if_planned() {
         let mut faults = Faults::default();
         let stall = Fault::new(FaultKind::Stall)
             .on(1, Direction::Mm2s)
             .in_phase(StepPhase::Contact(1))
             .when(When::Beat(5));
         faults.inject(Fault { times: 2, ..stall });
-        let turn =
-            Turn { core: 1, direction: Direction::Mm2s, beats: 3, descriptors: 0, begins: false };
-        let at = |beats| Turn { beats, ..turn };
+        let position = PacketPosition {
+            core: 1,
+            direction: Direction::Mm2s,
+            beats: 3,
+            descriptors: 0,
+            begins: false,
+        };
+        let at = |beats| PacketPosition { beats, ..position };
         for _ in 0..2 {
             faults.step_begins(shape());
-            assert_eq!(faults.at_beats(&at(5), 9), Due::Nothing, "that is the load");
+            assert_eq!(faults.at_beats(&at(5), 9), Due::Nothing, "the packet of the load");
             faults.packet_ends(1, Direction::Mm2s);
             assert_eq!(faults.at_beats(&at(3), 2), Due::Nothing);
             assert_eq!(faults.at_beats(&at(3), 9), Due::After(2));
-            assert_eq!(faults.at_beats(&Turn { core: 2, ..at(5) }, 9), Due::Nothing);
+            assert_eq!(faults.at_beats(&PacketPosition { core: 2, ..at(5) }, 9), Due::Nothing);
             assert_eq!(faults.at_beats(&at(5), 4), Due::Now(FaultKind::Stall));
             assert_eq!(faults.at_beats(&at(5), 4), Due::Nothing);
         }
@@ -380,16 +384,21 @@ mod tests {
         let fault = Fault::new(FaultKind::Stall).on(3, Direction::S2mm);
         faults.inject(Fault { step: Some(2), ..fault });
         faults.inject(Fault { times: 2, ..Fault::new(FaultKind::ShortPacket) });
-        let turn =
-            Turn { core: 3, direction: Direction::S2mm, beats: 0, descriptors: 0, begins: true };
+        let position = PacketPosition {
+            core: 3,
+            direction: Direction::S2mm,
+            beats: 0,
+            descriptors: 0,
+            begins: true,
+        };
         faults.channel_begins(3, Direction::S2mm);
         faults.step_begins(shape());
-        assert_eq!(faults.at_beats(&turn, 1), Due::Now(FaultKind::ShortPacket));
-        assert_eq!(faults.at_beats(&turn, 1), Due::Nothing, "still the first step");
-        // The step failed, and is taken again.
+        assert_eq!(faults.at_beats(&position, 1), Due::Now(FaultKind::ShortPacket));
+        assert_eq!(faults.at_beats(&position, 1), Due::Nothing, "still the first step");
+        // The step failed, and the driver repeats it.
         faults.channel_begins(3, Direction::S2mm);
-        assert_eq!(faults.at_beats(&turn, 1), Due::Now(FaultKind::Stall));
-        assert_eq!(faults.at_beats(&turn, 1), Due::Now(FaultKind::ShortPacket));
+        assert_eq!(faults.at_beats(&position, 1), Due::Now(FaultKind::Stall));
+        assert_eq!(faults.at_beats(&position, 1), Due::Now(FaultKind::ShortPacket));
         assert!(faults.none());
     }
 

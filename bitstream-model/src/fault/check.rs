@@ -1,11 +1,11 @@
-//! This file refuses faults that can never happen as they say.
+//! Refuses faults that can never happen in their place, phase, step or occasion.
 
 use super::text::FaultError;
 use super::{Fault, FaultKind, Place, Site, StepPhase, When};
 use pgs_interface::axi_dma::Direction;
 
 impl Fault {
-    /// Whether it can happen at all where and when it says.
+    /// Checks that the fault can happen in its place, phase and step, and at its occasion.
     pub(super) fn check(&self) -> Result<(), FaultError> {
         let elsewhere = |found: String, expected| {
             Err(FaultError::Elsewhere { fault: self.kind.name(), found, expected })
@@ -47,7 +47,7 @@ impl Fault {
         let results = phase == StepPhase::Results;
         match (self.kind.site(), self.place) {
             (Site::Halt | Site::Reset | Site::Edge, _) => false,
-            // It is at the end of all phases.
+            // `no-done` comes at the end of all phases.
             (Site::Accelerator, _) => !results && self.kind != FaultKind::NoDone,
             (_, Some(Place::Channel(_, Direction::Mm2s))) => !results,
             (_, Some(Place::Channel(_, Direction::S2mm))) => results,
@@ -58,9 +58,9 @@ impl Fault {
     fn expected_phase(&self) -> &'static str {
         match self.kind.site() {
             Site::Halt | Site::Reset | Site::Edge => "it has n= or step=",
-            _ if self.kind == FaultKind::NoDone => "it is when all phases have ended",
-            Site::Accelerator => "the accelerator is through when the results are on their way",
-            _ => "MM2S is done before the results, S2MM has no other phase",
+            _ if self.kind == FaultKind::NoDone => "it comes after the last phase",
+            Site::Accelerator => "the accelerator has no work left in the results phase",
+            _ => "MM2S has no packet in the results phase, S2MM has no packet in another",
         }
     }
 
@@ -79,11 +79,11 @@ impl Fault {
         match self.kind.site() {
             Site::Beat => "it has beat= or bd=",
             Site::Fetch | Site::Completion => "it has bd=",
-            Site::Accelerator if self.kind == FaultKind::NoDone => "it is when all is done",
+            Site::Accelerator if self.kind == FaultKind::NoDone => "it comes after the last phase",
             Site::Accelerator => "it has beat=, the number of a record",
-            Site::Board => "it has beat= or bd= of a channel, or access= without one",
+            Site::Board => "it has beat= or bd= in a channel, or access= without a channel",
             Site::Halt | Site::Reset | Site::Edge => "it has n=",
-            Site::PacketEnd => "it is at the end of a packet",
+            Site::PacketEnd => "it comes at the end of a packet",
         }
     }
 }
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_can_never_happen_is_refused() {
+    fn faults_that_can_never_happen_are_refused() {
         for text in [
             "stall@dma1",
             "irq-drop@dma1.mm2s",

@@ -1,4 +1,4 @@
-//! Faults that the emulated board can be told to have: what, where, when, on one line.
+//! Planned faults of the emulated board. One line of text gives kind, place and time of each.
 //!
 //! ```text
 //! dma-dec-err@dma2.mm2s,phase=contact2,beat=17
@@ -6,11 +6,12 @@
 //! irq-drop,step=3
 //! ```
 //!
-//! `text.rs` reads and writes that line, `check.rs` refuses what cannot be, `random.rs` makes one from a seed, `shape.rs` knows a step's packets, `armed.rs` is what waits
-//! for its occasion while the board runs.
+//! `text.rs` reads and writes the line, `check.rs` refuses faults that cannot happen, `random.rs`
+//! makes a plan from a seed, `shape.rs` knows the packets of a step, and `armed.rs` holds the
+//! pending faults while the board runs.
 //!
-//! Unlike a [quirk](crate::Quirks), which lasts as long as the board, a fault happens as often as it
-//! says, once if it does not say. A reset ends what it did and does not forget what is still due.
+//! A [quirk](crate::Quirks) lasts as long as the board. A fault happens a number of times, once by
+//! default. A reset ends the effects of faults; the pending faults stay.
 
 mod armed;
 mod check;
@@ -23,11 +24,11 @@ use pgs_interface::control::ErrorCode;
 
 use crate::config::BoardConfig;
 
-pub(crate) use armed::{Due, Faults, Turn};
+pub(crate) use armed::{Due, Faults, PacketPosition};
 pub(crate) use shape::{StepShape, Streamed};
 pub use text::FaultError;
 
-/// When a reset ends that begins `now`, in clocks.
+/// The clock cycle at which a reset ends that begins `now`.
 pub(crate) fn end_of_reset(config: &BoardConfig, now: u64, fault: Option<FaultKind>) -> u64 {
     let end = now + config.delays.reset;
     match fault {
@@ -37,7 +38,7 @@ pub(crate) fn end_of_reset(config: &BoardConfig, now: u64, fault: Option<FaultKi
     }
 }
 
-/// What goes wrong.
+/// The kind of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FaultKind {
@@ -63,15 +64,15 @@ pub enum FaultKind {
     BdDecErr,
     /// A channel moves no more beats until its core is reset.
     Stall,
-    /// Each further beat of a packet takes so many clocks more.
+    /// Each further beat of a packet takes longer.
     Slow {
-        /// Clocks.
+        /// Additional clocks a beat.
         clocks: u32,
     },
     /// A packet ends with this beat; the rest of it is lost.
     ShortPacket,
-    /// A packet is followed by a beat more, which carries its TLAST; received, it is one more than its
-    /// buffers must have room for.
+    /// One more beat follows a packet and carries its TLAST. A receiver's buffers need not have
+    /// room for it.
     LongPacket,
     /// A packet has no TLAST.
     NoTlast,
@@ -84,43 +85,43 @@ pub enum FaultKind {
     IrqDrop,
     /// A rising edge of the interrupt line arrives late.
     IrqDelay {
-        /// How late, ns.
+        /// Delay, ns.
         ns: u64,
     },
     /// An interrupt without a source.
     IrqSpurious,
-    /// That many interrupts without a source, each as soon as the one before is let through.
+    /// Several interrupts without a source, each as soon as the previous one is let through.
     IrqStorm {
-        /// How many.
+        /// Number of interrupts.
         count: u32,
     },
     /// A descriptor's status arrives in memory late, after the interrupt.
     LateCmplted {
-        /// How late, ns.
+        /// Delay, ns.
         ns: u64,
     },
     /// A stopped channel shows Halted late.
     HaltDelay {
-        /// How late, ns.
+        /// Delay, ns.
         ns: u64,
     },
     /// A stopped channel never shows Halted.
     HaltNever,
     /// A reset takes longer.
     ResetSlow {
-        /// How much longer, ns.
+        /// Additional time, ns.
         ns: u64,
     },
     /// A reset never ends.
     ResetNever,
     /// The programmable logic is loaded anew, with another design.
     OtherBitstream {
-        /// What its IDENTIFICATION reads.
+        /// The value of its IDENTIFICATION register.
         identification: u32,
     },
     /// The accelerator gives up with a sticky error.
     AcceleratorError {
-        /// Which.
+        /// The error.
         code: ErrorCode,
     },
     /// The accelerator takes and sends nothing any more until it is reset.
@@ -131,7 +132,7 @@ pub enum FaultKind {
     PowerLost,
 }
 
-/// What a driver can make of a fault.
+/// The effect of a fault on a driver's step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Consequence {
     /// The step fails.
@@ -140,7 +141,7 @@ pub enum Consequence {
     Survivable,
 }
 
-/// Where a kind of fault strikes.
+/// The event at which a kind of fault happens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Site {
     /// As a beat is moved.
@@ -164,7 +165,7 @@ pub(crate) enum Site {
 }
 
 impl FaultKind {
-    /// What a driver can make of it.
+    /// The effect on a driver's step.
     #[must_use]
     pub const fn consequence(self) -> Consequence {
         match self.site() {
@@ -210,7 +211,7 @@ impl FaultKind {
     }
 }
 
-/// Which part a fault is in.
+/// The part of the board that a fault is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// A channel of a DMA.
@@ -221,7 +222,7 @@ pub enum Place {
     Accelerator,
 }
 
-/// A phase of a step: which packet of a channel, or what the accelerator is doing.
+/// A phase of a step: selects a packet of a channel, or a phase of the accelerator.
 ///
 /// Contact and friction passes count from 1. A design that streams the collisions once has one
 /// packet for all of them.
@@ -233,7 +234,7 @@ pub enum StepPhase {
     Contact(u32),
     /// A pass of the friction solver.
     Friction(u32),
-    /// Poses go in, and what was integrated comes out.
+    /// Poses go in, and the results of integrated bodies come out.
     Poses,
     /// Results come out.
     Results,
@@ -242,70 +243,70 @@ pub enum StepPhase {
 /// The occasion within the phase. Numbers count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum When {
-    /// That beat of the packet; of the accelerator, that record.
+    /// A beat of the packet; for the accelerator, a record.
     Beat(u64),
-    /// That descriptor of the packet.
+    /// A descriptor of the packet.
     Descriptor(u32),
-    /// That register access, from the injection on.
+    /// A register access, from the injection on.
     Access(u64),
-    /// That stop, reset or edge of the interrupt line, from the injection on.
+    /// A stop, reset or edge of the interrupt line, from the injection on.
     Occasion(u32),
 }
 
 /// A fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fault {
-    /// What.
+    /// The kind.
     pub kind: FaultKind,
-    /// Where; wherever it comes up first if not said.
+    /// The part of the board; for `None` the part that comes to such an occasion first.
     pub place: Option<Place>,
-    /// In which phase; in any if not said.
+    /// The phase; for `None` any phase.
     pub phase: Option<StepPhase>,
-    /// At which occasion; the first if not said.
+    /// The occasion; for `None` the first one.
     pub when: Option<When>,
-    /// In which step alone, counted from 1 at the injection; in whichever it comes up if not said.
+    /// The one step, counted from 1 at the injection; for `None` any step.
     pub step: Option<u32>,
-    /// How often, each time in another step.
+    /// Number of times, each in another step.
     pub times: u32,
 }
 
 impl Fault {
-    /// A fault that happens once, wherever and whenever it can.
+    /// A fault that happens once, at the first occasion in any part.
     #[must_use]
     pub const fn new(kind: FaultKind) -> Self {
         Self { kind, place: None, phase: None, when: None, step: None, times: 1 }
     }
 
-    /// The same in one channel.
+    /// The fault in one channel.
     #[must_use]
     pub const fn on(self, core: usize, direction: Direction) -> Self {
         self.at(Place::Channel(core, direction))
     }
 
-    /// The same in one part.
+    /// The fault in one part.
     #[must_use]
     pub const fn at(self, place: Place) -> Self {
         Self { place: Some(place), ..self }
     }
 
-    /// The same in one phase.
+    /// The fault in one phase.
     #[must_use]
     pub const fn in_phase(self, phase: StepPhase) -> Self {
         Self { phase: Some(phase), ..self }
     }
 
-    /// The same at one occasion.
+    /// The fault at one occasion.
     #[must_use]
     pub const fn when(self, when: When) -> Self {
         Self { when: Some(when), ..self }
     }
 }
 
-/// Faults that are injected together. Its text is one line: [`Display`](std::fmt::Display) writes
-/// it, [`FromStr`](std::str::FromStr) reads it.
+/// Faults that are injected together. The text of a plan is one line:
+/// [`Display`](std::fmt::Display) writes it, [`FromStr`](std::str::FromStr) reads it.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FaultPlan {
-    /// The faults; of several that are due at once the first happens first.
+    /// The faults. If several are due at once, the first of them happens first.
     pub faults: Vec<Fault>,
 }
 

@@ -1,4 +1,4 @@
-//! This file makes a fault from a seed.
+//! Random fault plans from a seed.
 
 use super::{Fault, FaultKind, FaultPlan, Place, Site, StepPhase, When};
 use crate::cast::{index, register};
@@ -18,7 +18,7 @@ impl Numbers {
     }
 
     fn below(&mut self, end: usize) -> usize {
-        // A slight preference for low numbers is of no matter here.
+        // The slight preference for low numbers does not matter here.
         index(self.next() % end.max(1) as u64)
     }
 
@@ -28,7 +28,8 @@ impl Numbers {
 }
 
 impl FaultPlan {
-    /// One to three faults of a board, in steps of so many passes; the same for the same seed.
+    /// One to three faults of a board, in steps of `contact` and `friction` passes. The same seed
+    /// gives the same plan.
     #[must_use]
     pub fn random(seed: u64, config: &BoardConfig, contact: u32, friction: u32) -> Self {
         let mut numbers = Numbers(seed);
@@ -105,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_seed_gives_the_same_plan_and_each_can_be_written_down() {
+    fn a_seed_gives_the_same_plan_and_every_plan_can_be_printed_and_parsed() {
         let config = BoardConfig::default();
         for seed in 0..2000 {
             let plan = FaultPlan::random(seed, &config, 4, 4);

@@ -1,9 +1,9 @@
-//! This file says which packet of a channel carries which phase of a step.
+//! Maps the packets of a channel to the phases of a step, and back.
 
 use super::StepPhase;
 use pgs_interface::address_map::DMA_COUNT_MAX;
 
-/// How often the collisions go in.
+/// How often the collisions are streamed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Streamed {
     /// Once for all passes.
@@ -13,19 +13,19 @@ pub(crate) enum Streamed {
     PerPass,
 }
 
-/// The packets of a step: which segments each channel has, and how many passes there are.
+/// The packets of a step: the segments of each channel, and the number of passes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StepShape {
     /// Per channel: velocities, collisions, poses.
     pub(crate) segments: [[bool; 3]; DMA_COUNT_MAX],
     pub(crate) contact: u32,
-    /// Contact and friction passes together; none without collisions.
+    /// Contact and friction passes together; 0 without collisions.
     pub(crate) passes: u32,
     pub(crate) streamed: Streamed,
 }
 
 impl StepShape {
-    /// How often the collisions go in.
+    /// Number of times that the collisions are streamed.
     fn rounds(&self) -> u32 {
         match self.streamed {
             Streamed::Once => self.passes.min(1),
@@ -33,7 +33,7 @@ impl StepShape {
         }
     }
 
-    /// What a packet of a channel carries.
+    /// The phase whose records a packet of a channel carries.
     pub(super) fn phase(&self, core: usize, packet: u32) -> Option<StepPhase> {
         let passes = (0..self.rounds()).map(|pass| match pass.checked_sub(self.contact) {
             // A step without contact passes, streamed once.
@@ -45,7 +45,7 @@ impl StepShape {
         all.find(|phase| self.packet(core, *phase) == Some(packet))
     }
 
-    /// Which packet of a channel carries a phase, from 0.
+    /// The number, from 0, of the packet of a channel that carries a phase.
     pub(super) fn packet(&self, core: usize, phase: StepPhase) -> Option<u32> {
         let [load, collisions, poses] = *self.segments.get(core)?;
         let before = u32::from(load);

@@ -1,4 +1,4 @@
-//! This file reads and writes a fault plan as one line.
+//! The text form of a fault plan: parses and prints one line.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,61 +8,61 @@ use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::axi_dma::Direction;
 use pgs_interface::control::ErrorCode;
 
-/// A line that is no fault plan.
+/// The error in a line that is not a fault plan.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FaultError {
-    /// No fault of that name.
+    /// No fault has this name.
     #[error("no fault is named {found:?}; expected one of {}", names())]
     Kind {
-        /// What was found.
+        /// The name in the line.
         found: String,
     },
-    /// No such place.
+    /// No place has this name.
     #[error(
         "no place is named {found:?}; expected dma0.mm2s to dma3.s2mm, dma0 to dma3, or accelerator"
     )]
     Place {
-        /// What was found.
+        /// The place in the line.
         found: String,
     },
-    /// No such key, or not `key=value`.
+    /// An unknown key, or not `key=value`.
     #[error("{found:?} is none of phase=, beat=, bd=, access=, n=, step=, times=")]
     Key {
-        /// What was found.
+        /// The part of the line.
         found: String,
     },
-    /// No such phase.
+    /// No phase has this name.
     #[error(
         "no phase is named {found:?}; expected load, contact1.., friction1.., poses or results"
     )]
     Phase {
-        /// What was found.
+        /// The phase in the line.
         found: String,
     },
-    /// Not a number, or not one that fits.
+    /// Not a number, or a number out of range.
     #[error("{what} is {found:?}, expected {expected}")]
     Number {
-        /// Which number.
+        /// The key or the fault that the number belongs to.
         what: String,
-        /// What was found.
+        /// The value in the line.
         found: String,
-        /// What would do.
+        /// The expected value.
         expected: &'static str,
     },
-    /// The fault cannot be there, or at such an occasion.
+    /// The fault cannot happen in this place, phase or step, or at this occasion.
     #[error("{fault} does not happen {found}; {expected}")]
     Elsewhere {
-        /// Which fault.
+        /// The fault's name.
         fault: &'static str,
-        /// Where it was said to.
+        /// The place, phase, step or occasion in the line.
         found: String,
-        /// Where it does.
+        /// The expected one.
         expected: &'static str,
     },
 }
 
-/// Name, and the value if there is one to write: default and kind of one of each.
+/// One of each kind, with the default of its value.
 const KINDS: [FaultKind; 29] = [
     FaultKind::DmaIntErr,
     FaultKind::DmaSlvErr,
@@ -105,14 +105,14 @@ fn names() -> String {
 }
 
 impl FaultKind {
-    /// One of every kind, with the values that a line means which gives none, and of every error of
-    /// the accelerator.
+    /// One fault of every kind, with the default of its value, and one for every error code of the
+    /// accelerator.
     pub fn all() -> impl Iterator<Item = Self> {
         let errors = ErrorCode::ALL.into_iter().map(|code| Self::AcceleratorError { code });
         KINDS.into_iter().chain(errors)
     }
 
-    /// Its name on a line.
+    /// The name in the text form.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -164,11 +164,11 @@ impl FaultKind {
         })
     }
 
-    /// The same kind with another value; `None` if it has none, or not this one.
+    /// The same kind with another value; `None` if the kind has no value, or refuses this one.
     fn with(self, value: u64) -> Option<Self> {
         let narrow = u32::try_from(value).ok();
         Some(match self {
-            // Nothing of each would change nothing.
+            // A value of 0 would have no effect.
             Self::Slow { .. } => Self::Slow { clocks: narrow.filter(|clocks| *clocks != 0)? },
             Self::Corrupt { .. } => Self::Corrupt { mask: narrow.filter(|mask| *mask != 0)? },
             Self::IrqStorm { .. } => Self::IrqStorm { count: narrow.filter(|count| *count != 0)? },
@@ -283,7 +283,7 @@ fn number<T: TryFrom<u64>>(what: &str, text: &str) -> Result<T, FaultError> {
     parsed.ok().and_then(|number| T::try_from(number).ok()).ok_or_else(|| FaultError::Number {
         what: what.to_owned(),
         found: text.to_owned(),
-        expected: "a whole number (decimal, or hexadecimal after 0x) that fits",
+        expected: "a whole number in range, decimal or hexadecimal after 0x",
     })
 }
 
@@ -312,7 +312,7 @@ fn kind(text: &str) -> Result<FaultKind, FaultError> {
         Some(value) => {
             let value = number(name, value)?;
             known.with(value).ok_or_else(|| {
-                wrong("no value where the fault has none; of clocks, masks and counts 1 to 0xFFFFFFFF")
+                wrong("no value, or 1 to 0xFFFFFFFF for a fault with clocks, a mask or a count")
             })
         }
     }
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_no_plan_says_what_would_be() {
+    fn the_error_for_a_wrong_line_names_the_expected_text() {
         for (text, part) in [
             ("stal", "no fault is named \"stal\"; expected one of dma-int-err"),
             ("stall@dma4.mm2s", "no place is named \"dma4.mm2s\""),
@@ -409,7 +409,7 @@ mod tests {
             ("stall,phase=contact0", "no phase is named \"contact0\""),
             ("stall,beat=x", "beat is \"x\", expected a whole number"),
             ("stall,often=3", "\"often=3\" is none of phase="),
-            ("stall=3", "stall is \"3\", expected no value where"),
+            ("stall=3", "stall is \"3\", expected no value"),
             ("corrupt=0", "corrupt is \"0\""),
             ("slow=0", "slow is \"0\""),
             ("slow=0x100000000", "slow is \"0x100000000\""),

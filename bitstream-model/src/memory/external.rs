@@ -1,7 +1,7 @@
-//! This file lets a board work on memory that it does not keep: that of a guest in an emulator, say.
+//! Lets a board work on external memory: a guest's memory in an emulator, for example.
 //!
-//! Nothing is moved here. The ranges that are granted are within the device's reach all the time,
-//! as on a real board, and who owns what is the driver's business alone.
+//! External buffers do not move on a hand-over. The device reaches the granted ranges all the time,
+//! as on a real board, and ownership is the driver's business alone.
 
 use std::fmt;
 use std::io;
@@ -10,12 +10,12 @@ use std::ops::Range;
 use crate::memory::Denied;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
-/// Physical memory that somebody else keeps. Addresses are bus addresses, inside a granted range.
+/// Physical memory outside the board. Addresses are bus addresses, inside a granted range.
 pub trait DeviceMemory: fmt::Debug + Send {
     /// Reads beats from a multiple of a beat.
     ///
     /// # Errors
-    /// Whatever keeps the memory from answering; the DMA sees a decode error.
+    /// Any reason why the memory cannot answer; the DMA sees a decode error.
     fn read_beats(&mut self, address: u64, to: &mut [Beat]) -> io::Result<()>;
 
     /// Writes beats to a multiple of a beat.
@@ -30,29 +30,29 @@ pub trait DeviceMemory: fmt::Debug + Send {
     /// As [`Self::read_beats`].
     fn read_words(&mut self, address: u64, to: &mut [u32]) -> io::Result<()>;
 
-    /// Writes the status word of a descriptor. Whoever sees it complete must see all beats that
-    /// were written before.
+    /// Writes the status word of a descriptor. A reader that sees the descriptor complete must see
+    /// all beats that were written before.
     ///
     /// # Errors
     /// As [`Self::read_beats`].
     fn write_word(&mut self, address: u64, value: u32) -> io::Result<()>;
 }
 
-/// Memory of somebody else's, and what of it the device may touch.
+/// Memory outside the board, and the ranges that the device may touch.
 #[derive(Debug)]
-pub(crate) struct Outside {
+pub(crate) struct ExternalMemory {
     memory: Box<dyn DeviceMemory>,
     granted: Vec<Range<u64>>,
-    /// Where beats stop over on their way.
+    /// Scratch space for beats between the memory and the device.
     beats: Vec<Beat>,
 }
 
-impl Outside {
+impl ExternalMemory {
     pub(crate) fn new(memory: Box<dyn DeviceMemory>, granted: Vec<Range<u64>>) -> Self {
         Self { memory, granted, beats: Vec::new() }
     }
 
-    /// Whether the device may touch those bytes.
+    /// Checks that the device may touch these bytes.
     pub(crate) fn check(&self, address: u64, bytes: u64) -> Result<(), Denied> {
         let range =
             self.granted.iter().find(|range| range.contains(&address)).ok_or(Denied::Unmapped)?;
@@ -69,7 +69,7 @@ impl Outside {
     pub(crate) fn read(&mut self, address: u64, count: usize) -> Result<&[Beat], Denied> {
         self.check(address, (count * BEAT_BYTES) as u64)?;
         let (memory, beats) = self.scratch(count);
-        memory.read_beats(address, beats).map_err(|error| silent(address, &error))?;
+        memory.read_beats(address, beats).map_err(|error| no_answer(address, &error))?;
         Ok(beats)
     }
 
@@ -82,22 +82,22 @@ impl Outside {
         self.check(address, (count * BEAT_BYTES) as u64)?;
         let (memory, beats) = self.scratch(count);
         fill(beats);
-        memory.write_beats(address, beats).map_err(|error| silent(address, &error))
+        memory.write_beats(address, beats).map_err(|error| no_answer(address, &error))
     }
 
     pub(crate) fn read_words(&mut self, address: u64, to: &mut [u32]) -> Result<(), Denied> {
         self.check(address, (to.len() * 4) as u64)?;
-        self.memory.read_words(address, to).map_err(|error| silent(address, &error))
+        self.memory.read_words(address, to).map_err(|error| no_answer(address, &error))
     }
 
     pub(crate) fn write_word(&mut self, address: u64, value: u32) -> Result<(), Denied> {
         self.check(address, 4)?;
-        self.memory.write_word(address, value).map_err(|error| silent(address, &error))
+        self.memory.write_word(address, value).map_err(|error| no_answer(address, &error))
     }
 }
 
-/// The cause goes to the log: a violation says what the driver did, and this is not its doing.
-fn silent(address: u64, error: &io::Error) -> Denied {
+/// Logs the cause: a violation reports the driver's mistakes, and this failure is none.
+fn no_answer(address: u64, error: &io::Error) -> Denied {
     log::error!("board: the memory at {address:#x} does not answer: {error}");
     Denied::NoAnswer
 }
@@ -146,36 +146,36 @@ mod tests {
         }
     }
 
-    fn outside() -> Outside {
-        Outside::new(Box::new(Few::default()), vec![0x1000..0x1040, 0x8000..0x8010])
+    fn external() -> ExternalMemory {
+        ExternalMemory::new(Box::new(Few::default()), vec![0x1000..0x1040, 0x8000..0x8010])
     }
 
     #[test]
-    fn what_is_written_is_read_back_through_both_views() {
-        let mut outside = outside();
-        outside.write(0x1000, 2, |beats| beats[1] = Beat([5, 6, 7, 8])).expect("granted");
-        outside.write_word(0x1014, 9).expect("granted");
-        assert_eq!(outside.read(0x1010, 1).expect("granted"), [Beat([5, 9, 7, 8])]);
+    fn written_beats_and_words_are_read_back_through_both_views() {
+        let mut external = external();
+        external.write(0x1000, 2, |beats| beats[1] = Beat([5, 6, 7, 8])).expect("granted");
+        external.write_word(0x1014, 9).expect("granted");
+        assert_eq!(external.read(0x1010, 1).expect("granted"), [Beat([5, 9, 7, 8])]);
         let mut words = [0; 2];
-        outside.read_words(0x1010, &mut words).expect("granted");
+        external.read_words(0x1010, &mut words).expect("granted");
         assert_eq!(words, [5, 9]);
     }
 
     #[test]
-    fn what_is_not_granted_is_never_touched() {
-        let mut outside = outside();
-        assert_eq!(outside.read(0x1030, 2).err(), Some(Denied::PastEnd));
-        assert_eq!(outside.read(0x1040, 1).err(), Some(Denied::Unmapped));
-        assert_eq!(outside.read(0xFF0, 1).err(), Some(Denied::Unmapped));
-        assert_eq!(outside.write_word(0x8010, 1).err(), Some(Denied::Unmapped));
-        let written = outside.write(0x1030, 2, |_| panic!("nothing to fill"));
+    fn memory_that_is_not_granted_is_never_touched() {
+        let mut external = external();
+        assert_eq!(external.read(0x1030, 2).err(), Some(Denied::PastEnd));
+        assert_eq!(external.read(0x1040, 1).err(), Some(Denied::Unmapped));
+        assert_eq!(external.read(0xFF0, 1).err(), Some(Denied::Unmapped));
+        assert_eq!(external.write_word(0x8010, 1).err(), Some(Denied::Unmapped));
+        let written = external.write(0x1030, 2, |_| panic!("nothing to fill"));
         assert_eq!(written.err(), Some(Denied::PastEnd));
     }
 
     #[test]
-    fn memory_that_does_not_answer_is_said_to() {
-        let mut outside = outside();
-        assert_eq!(outside.read(0x1010, 2).err(), Some(Denied::NoAnswer));
-        assert_eq!(outside.write(0x1020, 1, |_| ()).err(), Some(Denied::NoAnswer));
+    fn a_failing_memory_is_reported_as_no_answer() {
+        let mut external = external();
+        assert_eq!(external.read(0x1010, 2).err(), Some(Denied::NoAnswer));
+        assert_eq!(external.write(0x1020, 1, |_| ()).err(), Some(Denied::NoAnswer));
     }
 }

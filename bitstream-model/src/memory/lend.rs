@@ -1,22 +1,22 @@
-//! This file lends beats of several buffers at once: some to read, some to write.
+//! Borrows beats of several buffers at once, to read and to write.
 
-use super::{Content, DeviceAccess, Memory, Source, part};
+use super::{Content, DeviceAccess, Memory, Source, granted_range};
 use crate::cast::index;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
-/// Beats of several buffers: to be read, and to be written.
+/// Borrowed beats of several buffers: for reads, and for writes.
 pub(crate) type Lent<'a, const N: usize> = ([&'a [Beat]; N], [&'a mut [Beat]; N]);
 
 impl Memory {
-    /// Beats of `reads` and `writes`, each of which says where and how many: those that the device
-    /// may read, and others that it may write. Nothing if it may not do all of that, if what is
-    /// written overlaps, or if the memory is outside. The addresses are multiples of a beat.
+    /// Borrows beats for the device, each with its place and number: `reads` to read, `writes` to
+    /// write. `None` if the device may not do one of these accesses, if two writes overlap, or if
+    /// the memory is external. The addresses are multiples of a beat.
     pub(crate) fn lend<const N: usize>(
         &mut self,
         reads: [(Source, usize); N],
         writes: [(u64, usize); N],
     ) -> Option<Lent<'_, N>> {
-        if self.outside.is_some() {
+        if self.external.is_some() {
             return None;
         }
         let mut views: [&[Beat]; N] = [&[]; N];
@@ -30,7 +30,8 @@ impl Memory {
                 Content::Device(beats, DeviceAccess::Read, granted) => {
                     for (view, (from, count)) in views.iter_mut().zip(reads) {
                         if count > 0 && within(from.address) && from.grant == region.grant {
-                            *view = &beats[part(beats, *granted, from.address - start, count)?];
+                            *view = &beats
+                                [granted_range(beats, *granted, from.address - start, count)?];
                         }
                     }
                 }
@@ -60,7 +61,7 @@ mod tests {
     use super::*;
     use crate::config::quirks::Coherency;
 
-    /// A buffer of 8 beats, numbered from `first` on, that the device may access so.
+    /// A buffer of 8 beats, numbered from `first` on, with `granted` beats for the device.
     fn buffer(memory: &mut Memory, first: u32, access: DeviceAccess, granted: usize) -> u64 {
         let (address, _) = memory.allocate(8).expect("fits");
         let beats: Vec<Beat> = (first..first + 8).map(|number| Beat([number; 4])).collect();
@@ -87,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_may_not_be_accessed_is_not_lent() {
+    fn beats_that_the_device_may_not_access_are_not_lent() {
         let mut memory = Memory::new(40, Coherency::Coherent);
         let read = buffer(&mut memory, 0, DeviceAccess::Read, 8);
         let write = buffer(&mut memory, 100, DeviceAccess::Write, 6);
@@ -96,10 +97,10 @@ mod tests {
         let mut lends = |from, writes| memory.lend([from, (source, 0)], writes).is_some();
         assert!(lends((source, 8), [(write, 6), none]));
         assert!(!lends((source.further(1), 8), [(write, 6), none]), "past the end");
-        assert!(!lends((source, 8), [(write, 7), none]), "past what is granted");
+        assert!(!lends((source, 8), [(write, 7), none]), "past the granted beats");
         assert!(!lends((source, 8), [(write, 2), (write + 16, 2)]), "twice");
         assert!(!lends((source, 8), [(read, 1), none]), "to be read only");
-        assert!(!lends((source, 8), [(write + 16 * 8, 1), none]), "nobody's");
+        assert!(!lends((source, 8), [(write + 16 * 8, 1), none]), "in no buffer");
         memory.take_back(read).expect("it is there");
         memory
             .hand_over(read, vec![Beat::default(); 8].into(), 8, DeviceAccess::Read)

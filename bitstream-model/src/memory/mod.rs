@@ -1,11 +1,12 @@
-//! This file is the board's physical memory: who may touch what, checked on every access.
+//! The board's physical memory: every access of the device is checked against the owner of the
+//! memory.
 //!
-//! Memory for DMA is allocated in ranges. A range of beats belongs to the CPU or to the device. What
-//! the CPU owns is not here at all: handing a buffer over *moves* it into the board, so that an
-//! access of the device to a buffer of the CPU is a decode error by construction. Ranges of words
-//! (descriptors) are shared for good.
+//! Memory for DMA is allocated in ranges. A range of beats belongs to the CPU or to the device. The
+//! beats of a CPU's buffer are not here at all: handing a buffer over *moves* it into the board, so
+//! that an access of the device to a buffer of the CPU is a decode error by construction. Ranges of
+//! words (descriptors) are shared for good.
 //!
-//! A board can be built on memory outside instead (`outside.rs`); then it allocates none.
+//! A board can be built on external memory instead (`external.rs`); then it allocates none.
 
 pub(crate) mod external;
 mod lend;
@@ -14,13 +15,13 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use self::external::{DeviceMemory, Outside};
+use self::external::{DeviceMemory, ExternalMemory};
 use crate::cast::index;
 use crate::config::quirks::{Coherency, stale_from};
 use pgs_interface::address_map::{DDR_HIGH, DDR_LOW};
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
-/// What the device may do with a buffer.
+/// The device's right to a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeviceAccess {
     /// Read it (MM2S).
@@ -29,11 +30,11 @@ pub enum DeviceAccess {
     Write,
 }
 
-/// A request of the CPU that the memory cannot meet.
+/// A request of the CPU that the memory refuses.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MemoryError {
-    /// No room for the range.
+    /// The memory has no room for the range.
     #[error("no contiguous memory for {bytes} bytes below {limit:#x}")]
     Exhausted {
         /// Bytes asked for.
@@ -52,12 +53,12 @@ pub enum MemoryError {
     State {
         /// The address.
         address: u64,
-        /// What it is.
+        /// The state that the buffer is in.
         state: &'static str,
     },
 }
 
-/// Why the device may not touch an address.
+/// The reason why the device may not touch an address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Denied {
@@ -81,18 +82,19 @@ pub enum Denied {
     NoAnswer,
 }
 
-/// Beats in a buffer that the device reads. While it owns the buffer they stay as they are, so that
-/// beats of equal sources are equal: each hand-over makes sources of its own. The default is none's.
+/// Beats in a buffer that the device reads. They stay as they are while the device owns the buffer.
+/// Each hand-over makes new sources, so that beats of equal sources are equal. No buffer has the
+/// default source.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Source {
-    /// Where the first one is.
+    /// Address of the first beat.
     address: u64,
-    /// Which hand-over it was.
+    /// Number of the hand-over.
     grant: u64,
 }
 
 impl Source {
-    /// The same from so many beats further on.
+    /// The source that begins `beats` beats further on.
     pub(crate) fn further(self, beats: u64) -> Self {
         Self { address: self.address + beats * BEAT_BYTES as u64, ..self }
     }
@@ -101,7 +103,7 @@ impl Source {
 #[derive(Debug)]
 enum Content {
     Cpu,
-    /// Of which the device may touch the first beats only, so many.
+    /// A buffer of the device, and the number of its first beats that are granted.
     Device(Box<[Beat]>, DeviceAccess, usize),
     Words(Arc<[AtomicU32]>),
 }
@@ -112,16 +114,21 @@ struct Region {
     content: Content,
     /// The number of its last hand-over.
     grant: u64,
-    /// What the CPU's caches hold of it, where they do not agree with memory.
+    /// The buffer as the CPU's caches hold it, if they differ from memory.
     cached: Option<Box<[Beat]>>,
 }
 
-/// Ranges are kept apart by this much, so that running off an end meets nothing.
+/// Bytes between two ranges, so that an access past an end reaches no other range.
 const GUARD: u64 = 4096;
 
-/// Which beats of a buffer `count` of them are, from that offset in bytes on, if they are among the
-/// first `granted`.
-fn part(beats: &[Beat], granted: usize, offset: u64, count: usize) -> Option<Range<usize>> {
+/// The indices of `count` beats of a buffer from an offset in bytes on, if all of them are among
+/// the first `granted` beats.
+fn granted_range(
+    beats: &[Beat],
+    granted: usize,
+    offset: u64,
+    count: usize,
+) -> Option<Range<usize>> {
     let first = index(offset / BEAT_BYTES as u64);
     let end = first + count;
     (end <= beats.len().min(granted)).then_some(first..end)
@@ -130,28 +137,28 @@ fn part(beats: &[Beat], granted: usize, offset: u64, count: usize) -> Option<Ran
 /// Physical memory.
 #[derive(Debug)]
 pub(crate) struct Memory {
-    /// By their addresses.
+    /// Sorted by address.
     regions: Vec<(u64, Region)>,
-    /// What was never allocated, on both sides of 4 GiB.
+    /// Addresses that were never allocated, on both sides of 4 GiB.
     low: Range<u64>,
     high: Range<u64>,
-    /// Released ranges, guard included. They are reused only when nothing else is left, so that a
-    /// use after release meets no other buffer.
+    /// Released ranges, guard included. They are reused only when no other memory is left, so that
+    /// a use after release reaches no other buffer.
     released: Vec<Range<u64>>,
     address_limit: u64,
     next_is_high: bool,
     coherency: Coherency,
     /// Hand-overs so far.
     grants: u64,
-    /// Memory that is not kept here, instead of all ranges.
-    outside: Option<Outside>,
+    /// External memory, which replaces all ranges.
+    external: Option<ExternalMemory>,
 }
 
 impl Memory {
-    /// Memory for DMAs with addresses of that many bits.
+    /// Memory for DMAs with addresses of `address_width` bits.
     pub(crate) fn new(address_width: u32, coherency: Coherency) -> Self {
-        // The kernel and the rest of the system keep one gigabyte of each part, and not the same:
-        // a high address cut to 32 bits must not meet a buffer.
+        // The kernel and the rest of the system keep the first gigabyte of low and the last of
+        // high DDR: a high address cut to 32 bits must not reach a buffer.
         const SYSTEM: u64 = 1 << 30;
         Self {
             regions: Vec::new(),
@@ -162,12 +169,12 @@ impl Memory {
             next_is_high: false,
             coherency,
             grants: 0,
-            outside: None,
+            external: None,
         }
     }
 
-    /// Memory outside the board, of which the device may touch what is granted.
-    pub(crate) fn outside(memory: Box<dyn DeviceMemory>, granted: Vec<Range<u64>>) -> Self {
+    /// Memory outside the board; the device may touch the granted ranges only.
+    pub(crate) fn external(memory: Box<dyn DeviceMemory>, granted: Vec<Range<u64>>) -> Self {
         Self {
             regions: Vec::new(),
             low: 0..0,
@@ -177,29 +184,29 @@ impl Memory {
             next_is_high: false,
             coherency: Coherency::Coherent,
             grants: 0,
-            outside: Some(Outside::new(memory, granted)),
+            external: Some(ExternalMemory::new(memory, granted)),
         }
     }
 
-    fn place(&mut self, bytes: u64, content: Content) -> Result<u64, MemoryError> {
-        let take = bytes.next_multiple_of(GUARD) + GUARD;
+    fn insert(&mut self, bytes: u64, content: Content) -> Result<u64, MemoryError> {
+        let taken = bytes.next_multiple_of(GUARD) + GUARD;
         let limit = self.address_limit;
-        let fits = |part: &Range<u64>| part.end - part.start >= take && part.end <= limit;
-        // In turn from both sides of 4 GiB, so that no driver gets by on 32 bits by luck.
+        let fits = |free: &Range<u64>| free.end - free.start >= taken && free.end <= limit;
+        // In turn from both sides of 4 GiB, so that no driver works with 32 bits by luck.
         let use_high = if self.next_is_high { fits(&self.high) } else { !fits(&self.low) };
         self.next_is_high = !self.next_is_high;
-        let part = if use_high { &mut self.high } else { &mut self.low };
-        let part = if fits(part) {
-            part
+        let free = if use_high { &mut self.high } else { &mut self.low };
+        let free = if fits(free) {
+            free
         } else {
-            let released = self.released.iter_mut().find(|part| fits(part));
+            let released = self.released.iter_mut().find(|free| fits(free));
             released.ok_or(MemoryError::Exhausted { bytes, limit })?
         };
-        let address = part.start;
-        part.start += take;
-        let place = self.regions.partition_point(|(start, _)| *start < address);
+        let address = free.start;
+        free.start += taken;
+        let position = self.regions.partition_point(|(start, _)| *start < address);
         let region = Region { bytes, content, grant: 0, cached: None };
-        self.regions.insert(place, (address, region));
+        self.regions.insert(position, (address, region));
         Ok(address)
     }
 
@@ -208,7 +215,7 @@ impl Memory {
         if bytes > DDR_LOW.end {
             return Err(MemoryError::Exhausted { bytes, limit: self.address_limit });
         }
-        let address = self.place(bytes, Content::Cpu)?;
+        let address = self.insert(bytes, Content::Cpu)?;
         Ok((address, vec![Beat::default(); beats].into()))
     }
 
@@ -221,19 +228,19 @@ impl Memory {
             return Err(MemoryError::Exhausted { bytes, limit: self.address_limit });
         }
         let shared: Arc<[AtomicU32]> = (0..words).map(|_| AtomicU32::new(0)).collect();
-        let address = self.place(bytes, Content::Words(Arc::clone(&shared)))?;
+        let address = self.insert(bytes, Content::Words(Arc::clone(&shared)))?;
         Ok((address, shared))
     }
 
-    /// The place of the range that begins there.
-    fn begins_at(&self, address: u64) -> Result<usize, MemoryError> {
-        let place = self.regions.binary_search_by_key(&address, |(start, _)| *start);
-        place.map_err(|_| MemoryError::Unknown { address })
+    /// The index of the range that begins at `address`.
+    fn index_of_start(&self, address: u64) -> Result<usize, MemoryError> {
+        let position = self.regions.binary_search_by_key(&address, |(start, _)| *start);
+        position.map_err(|_| MemoryError::Unknown { address })
     }
 
     fn region_at(&mut self, address: u64) -> Result<&mut Region, MemoryError> {
-        let place = self.begins_at(address)?;
-        Ok(&mut self.regions[place].1)
+        let position = self.index_of_start(address)?;
+        Ok(&mut self.regions[position].1)
     }
 
     /// Gives the device the first `granted` beats of a buffer.
@@ -293,8 +300,8 @@ impl Memory {
     }
 
     pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
-        let place = self.begins_at(address)?;
-        let (_, region) = self.regions.remove(place);
+        let position = self.index_of_start(address)?;
+        let (_, region) = self.regions.remove(position);
         self.released.retain(|range| !range.is_empty());
         self.released.push(address..address + region.bytes.next_multiple_of(GUARD) + GUARD);
         Ok(())
@@ -302,15 +309,15 @@ impl Memory {
 
     /// The range that holds `address`, and the offset in it.
     fn find(&self, address: u64, bytes: u64) -> Result<(&Region, u64), Denied> {
-        let (place, offset) = self.place_of(address, bytes)?;
-        Ok((&self.regions[place].1, offset))
+        let (position, offset) = self.region_index(address, bytes)?;
+        Ok((&self.regions[position].1, offset))
     }
 
-    /// The place of that range, and the offset.
-    fn place_of(&self, address: u64, bytes: u64) -> Result<(usize, u64), Denied> {
+    /// The index of the range that holds `address`, and the offset in it.
+    fn region_index(&self, address: u64, bytes: u64) -> Result<(usize, u64), Denied> {
         let behind = self.regions.partition_point(|(start, _)| *start <= address);
-        let place = behind.checked_sub(1).ok_or(Denied::Unmapped)?;
-        let (start, region) = &self.regions[place];
+        let position = behind.checked_sub(1).ok_or(Denied::Unmapped)?;
+        let (start, region) = &self.regions[position];
         let offset = address - start;
         if offset >= region.bytes {
             return Err(Denied::Unmapped);
@@ -318,28 +325,28 @@ impl Memory {
         if bytes > region.bytes - offset {
             return Err(Denied::PastEnd);
         }
-        Ok((place, offset))
+        Ok((position, offset))
     }
 
     /// Beats that the device reads. The address is a multiple of a beat.
     pub(crate) fn beats(&mut self, address: u64, count: usize) -> Result<&[Beat], Denied> {
-        if let Some(ref mut outside) = self.outside {
-            return outside.read(address, count);
+        if let Some(ref mut external) = self.external {
+            return external.read(address, count);
         }
         self.owned(address, count).map(|(_, beats)| beats)
     }
 
-    /// Where beats are that the device reads, if they stay as they are while it owns them: memory
-    /// outside may change at any time. The address is a multiple of a beat.
+    /// The source of beats that the device reads; `None` in external memory, which may change at
+    /// any time. The address is a multiple of a beat.
     pub(crate) fn source(&self, address: u64, count: usize) -> Result<Option<Source>, Denied> {
-        if self.outside.is_some() {
+        if self.external.is_some() {
             return Ok(None);
         }
         let grant = self.owned(address, count).map(|(region, _)| region.grant)?;
         Ok(Some(Source { address, grant }))
     }
 
-    /// Beats of a source, if the device owns its buffer still.
+    /// Beats of a source, if the device still owns its buffer.
     pub(crate) fn view(&self, from: Source, count: usize) -> Option<&[Beat]> {
         let (region, beats) = self.owned(from.address, count).ok()?;
         (region.grant == from.grant).then_some(beats)
@@ -353,26 +360,26 @@ impl Memory {
             Content::Words(_) => Err(Denied::Kind),
             Content::Device(_, DeviceAccess::Write, _) => Err(Denied::Direction),
             Content::Device(beats, DeviceAccess::Read, granted) => {
-                let part = part(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
-                Ok((region, &beats[part]))
+                let range = granted_range(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
+                Ok((region, &beats[range]))
             }
         }
     }
 
     fn beats_mut(&mut self, address: u64, count: usize) -> Result<&mut [Beat], Denied> {
-        let (place, offset) = self.place_of(address, (count * BEAT_BYTES) as u64)?;
-        match &mut self.regions[place].1.content {
+        let (position, offset) = self.region_index(address, (count * BEAT_BYTES) as u64)?;
+        match &mut self.regions[position].1.content {
             Content::Cpu => Err(Denied::CpuOwned),
             Content::Words(_) => Err(Denied::Kind),
             Content::Device(_, DeviceAccess::Read, _) => Err(Denied::Direction),
             Content::Device(beats, DeviceAccess::Write, granted) => {
-                let part = part(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
-                Ok(&mut beats[part])
+                let range = granted_range(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
+                Ok(&mut beats[range])
             }
         }
     }
 
-    /// Whether the device may write those beats in a buffer that it owns.
+    /// Whether the device may write these beats in a buffer that it owns.
     pub(crate) fn may_write(&self, address: u64, count: usize) -> bool {
         let Ok((region, offset)) = self.find(address, (count * BEAT_BYTES) as u64) else {
             return false;
@@ -380,27 +387,27 @@ impl Memory {
         let Content::Device(beats, DeviceAccess::Write, granted) = &region.content else {
             return false;
         };
-        part(beats, *granted, offset, count).is_some()
+        granted_range(beats, *granted, offset, count).is_some()
     }
 
-    /// Whether the device may write those beats.
+    /// Checks that the device may write these beats.
     pub(crate) fn check_write(&mut self, address: u64, count: usize) -> Result<(), Denied> {
-        match &self.outside {
-            Some(outside) => outside.check(address, (count * BEAT_BYTES) as u64),
+        match &self.external {
+            Some(external) => external.check(address, (count * BEAT_BYTES) as u64),
             None => self.beats_mut(address, count).map(|_| ()),
         }
     }
 
-    /// Beats that the device writes: `fill` gives them, if the device may. The address is a multiple
-    /// of a beat.
+    /// Lets `fill` write beats for the device, if it may write them. The address is a multiple of a
+    /// beat.
     pub(crate) fn write(
         &mut self,
         address: u64,
         count: usize,
         fill: impl FnOnce(&mut [Beat]),
     ) -> Result<(), Denied> {
-        match &mut self.outside {
-            Some(outside) => outside.write(address, count, fill),
+        match &mut self.external {
+            Some(external) => external.write(address, count, fill),
             None => self.beats_mut(address, count).map(fill),
         }
     }
@@ -416,10 +423,10 @@ impl Memory {
         }
     }
 
-    /// Words of a descriptor that the device fetches. The address is a multiple of 4.
+    /// Fetches words of a descriptor for the device. The address is a multiple of 4.
     pub(crate) fn read_words(&mut self, address: u64, to: &mut [u32]) -> Result<(), Denied> {
-        if let Some(outside) = &mut self.outside {
-            return outside.read_words(address, to);
+        if let Some(external) = &mut self.external {
+            return external.read_words(address, to);
         }
         let words = self.words(address, to.len())?;
         for (to, from) in to.iter_mut().zip(words) {
@@ -428,10 +435,10 @@ impl Memory {
         Ok(())
     }
 
-    /// The word of a descriptor that the device updates. The address is a multiple of 4.
+    /// Updates a word of a descriptor for the device. The address is a multiple of 4.
     pub(crate) fn write_word(&mut self, address: u64, value: u32) -> Result<(), Denied> {
-        if let Some(outside) = &mut self.outside {
-            return outside.write_word(address, value);
+        if let Some(external) = &mut self.external {
+            return external.write_word(address, value);
         }
         self.words(address, 1)?[0].store(value, Ordering::Release);
         Ok(())
@@ -483,7 +490,7 @@ mod tests {
     fn released_memory_is_reused_when_nothing_else_is_left() {
         let mut memory = Memory::new(32, Coherency::Coherent);
         for _ in 0..100 {
-            let address = memory.place(64 << 20, Content::Cpu).expect("released ones are reused");
+            let address = memory.insert(64 << 20, Content::Cpu).expect("released ones are reused");
             memory.release(address).expect("it is there");
         }
     }
@@ -513,8 +520,8 @@ mod tests {
         assert_eq!(words[1].load(Ordering::Relaxed), 9);
     }
 
-    /// Hands beats of that value over, lets the device read them or write others, and returns what
-    /// the device has read and what the CPU finds afterwards.
+    /// Hands beats of `value` over, and lets the device read them or write others. Returns the
+    /// words that the device has read, and the words that the CPU finds afterwards.
     fn round(memory: &mut Memory, address: u64, value: u32, access: DeviceAccess) -> [Vec<u32>; 2] {
         let first = |beats: &[Beat]| beats.iter().map(|beat| beat.0[0]).collect::<Vec<_>>();
         let beats = vec![Beat([value; 4]); 8].into();
@@ -530,7 +537,7 @@ mod tests {
     }
 
     #[test]
-    fn stale_reads_are_those_of_the_hand_over_before_and_the_cpu_does_not_notice() {
+    fn stale_reads_return_the_previous_hand_over_and_the_cpu_does_not_notice() {
         let mut memory = Memory::new(40, Coherency::StaleReads { from_byte: 64 });
         let (address, _) = memory.allocate(8).expect("fits");
         let mut rounds = (1..=3).map(|v| round(&mut memory, address, v, DeviceAccess::Read));
@@ -540,7 +547,7 @@ mod tests {
     }
 
     #[test]
-    fn stale_writes_leave_the_cpu_with_what_it_handed_over() {
+    fn stale_writes_leave_the_cpu_with_the_beats_that_it_handed_over() {
         let mut memory = Memory::new(40, Coherency::StaleWrites { from_byte: 64 });
         let (address, _) = memory.allocate(8).expect("fits");
         let mut rounds =

@@ -1,23 +1,26 @@
-//! This file is a board's memory that lies in a file, where another process sees it too.
+//! A board's memory in a file that another process sees too.
 //!
-//! Whole system calls, no mapping: nothing here can be changed under a reference.
+//! This side reads and writes with system calls and maps nothing: no byte changes under a
+//! reference. The driver maps the file. So all its bytes are reserved: a page without room in the
+//! file system would end the driver with SIGBUS.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::ops::Range;
 use std::os::unix::fs::{FileExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 
 use nix::errno::Errno;
-use nix::fcntl::{Flock, FlockArg};
+use nix::fcntl::{FallocateFlags, Flock, FlockArg, fallocate};
 use thiserror::Error;
 
+use super::mark::{self, MARK_BYTES};
 use crate::memory::external::DeviceMemory;
 use pgs_interface::record::Beat;
 
-/// The least that is of any use, bytes.
+/// Shortest memory that is of any use, bytes.
 const LEAST: u64 = 1 << 16;
-/// A file has whole pages of the largest size that there is.
+/// Bytes of the largest page of any kernel; the memory has whole pages of this size.
 const PAGE: u64 = 1 << 16;
 
 /// Memory in a file.
@@ -30,28 +33,55 @@ pub struct MemoryFile {
     inode: u64,
 }
 
-/// Why a file cannot be a board's memory.
+/// The reason why a file cannot be a board's memory.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum MemoryFileError {
-    /// It cannot be opened, made, or measured.
+    /// The file cannot be opened, made, or measured.
     #[error("the memory {} cannot be {act}", path.display())]
     File {
-        /// What was tried.
+        /// The operation that failed: "opened", "locked", ...
         act: &'static str,
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Why.
+        /// The kernel's error.
         #[source]
         source: io::Error,
     },
-    /// It is no regular file.
-    #[error("the memory {} is no regular file: name another", path.display())]
+    /// The path is not a regular file.
+    #[error("the memory {} is not a regular file: name another", path.display())]
     NotRegular {
-        /// Which.
+        /// The path.
         path: PathBuf,
     },
-    /// It has a length that memory cannot have, or another than was asked for.
+    /// No board has made the file.
+    #[error(
+        "the memory {} has {found} bytes and not the mark of a file that a board has made: refusing \
+         to overwrite it; name another file, or remove it if it is not needed",
+        path.display()
+    )]
+    NotMade {
+        /// The file.
+        path: PathBuf,
+        /// Its length, bytes.
+        found: u64,
+    },
+    /// The file system has no room for the memory.
+    #[error(
+        "the memory {} of {bytes} bytes cannot be reserved: serve a smaller one, or name a file on \
+         another file system",
+        path.display()
+    )]
+    NoRoom {
+        /// The file.
+        path: PathBuf,
+        /// The memory's length, bytes.
+        bytes: u64,
+        /// The kernel's error.
+        #[source]
+        source: io::Error,
+    },
+    /// The memory cannot have this length, or the file's length differs from the wanted one.
     #[error(
         "the memory {} has {found} bytes, expected {}: remove it, or name another",
         path.display(),
@@ -61,27 +91,29 @@ pub enum MemoryFileError {
         }
     )]
     Length {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Its length, bytes.
+        /// The memory's length, bytes.
         found: u64,
-        /// What was asked for, if anything was.
+        /// The wanted length, if the caller wants one.
         wanted: Option<u64>,
     },
-    /// A driver is at work on it.
+    /// A driver uses the file.
     #[error("the memory {} is in use: end the driver that has it, or name another", path.display())]
     Busy {
-        /// Which file.
+        /// The file.
         path: PathBuf,
     },
 }
 
 impl MemoryFile {
-    /// Opens the file at `path`, or makes one of `wanted` bytes, for `default` if nothing is
-    /// wanted. Its first byte is at `base` on the bus.
+    /// Opens the file at `path`, or makes a file with a memory of `wanted` bytes, or of `default`
+    /// bytes if `wanted` is `None`. The memory's first byte is at `base` on the bus. An empty file
+    /// counts as a new one.
     ///
     /// # Errors
-    /// [`MemoryFileError`]; a file that is there keeps its length and its content.
+    /// [`MemoryFileError`]. An existing file then keeps its length and its content, and a new file
+    /// is removed.
     pub fn open(
         path: &Path,
         base: u64,
@@ -99,16 +131,10 @@ impl MemoryFile {
         if path.exists() && !path.is_file() {
             return Err(MemoryFileError::NotRegular { path: path_buf() });
         }
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(failed("opened"))?;
-        // Only to see that nobody has it: a driver holds the lock as long as it has the board.
+        let (file, made) = open_or_make(path)?;
+        // The lock excludes every driver: a driver holds it as long as it has the board.
         let file = match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
-            Ok(locked) => locked.unlock().map_err(|(_, errno)| failed("unlocked")(errno.into()))?,
+            Ok(locked) => locked,
             Err((_, Errno::EWOULDBLOCK)) => {
                 return Err(MemoryFileError::Busy { path: path_buf() });
             }
@@ -116,19 +142,29 @@ impl MemoryFile {
         };
         let metadata = file.metadata().map_err(failed("measured"))?;
         let bytes = match metadata.len() {
-            0 => {
-                file.set_len(new).map_err(failed("made"))?;
-                new
-            }
-            found if !fits(found) || wanted.is_some_and(|wanted| wanted != found) => {
-                return Err(length(found));
-            }
-            found => found,
+            0 => new,
+            found => mark::memory_bytes(&file)
+                .map_err(failed("read"))?
+                .ok_or_else(|| MemoryFileError::NotMade { path: path_buf(), found })?,
         };
+        if !fits(bytes) || wanted.is_some_and(|wanted| wanted != bytes) {
+            return Err(length(bytes));
+        }
+        // The mark first: an incomplete file is then known as ours.
+        let written = if metadata.len() == 0 { mark::write(&file, bytes) } else { Ok(()) };
+        if let Err(source) = written.and_then(|()| reserve(&file, bytes + MARK_BYTES)) {
+            if made {
+                fs::remove_file(path).map_err(failed("removed"))?;
+            } else if metadata.len() == 0 {
+                file.set_len(0).map_err(failed("emptied"))?;
+            }
+            return Err(MemoryFileError::NoRoom { path: path_buf(), bytes, source });
+        }
+        let file = file.unlock().map_err(|(_, errno)| failed("unlocked")(errno.into()))?;
         Ok(Self { file, base, bytes, inode: metadata.ino() })
     }
 
-    /// The addresses that it answers.
+    /// Bus addresses of the memory.
     #[must_use]
     pub fn addresses(&self) -> Range<u64> {
         self.base..self.base + self.bytes
@@ -140,8 +176,9 @@ impl MemoryFile {
         self.inode
     }
 
-    /// Where an address lies in the file. A write past the end would make the file longer.
-    fn place(&self, address: u64, bytes: usize) -> io::Result<u64> {
+    /// Offset of an address in the file. A range past the end is an error: a write there would make
+    /// the file longer.
+    fn offset(&self, address: u64, bytes: usize) -> io::Result<u64> {
         let place = address
             .checked_sub(self.base)
             .filter(|place| place.checked_add(bytes as u64).is_some_and(|end| end <= self.bytes));
@@ -153,12 +190,56 @@ impl MemoryFile {
     }
 
     fn read(&self, address: u64, to: &mut [u8]) -> io::Result<()> {
-        self.file.read_exact_at(to, self.place(address, to.len())?)
+        self.file.read_exact_at(to, self.offset(address, to.len())?)
     }
 
     fn write(&self, address: u64, from: &[u8]) -> io::Result<()> {
-        self.file.write_all_at(from, self.place(address, from.len())?)
+        self.file.write_all_at(from, self.offset(address, from.len())?)
     }
+}
+
+/// Opens the file or makes it; returns whether it was made.
+fn open_or_make(path: &Path) -> Result<(File, bool), MemoryFileError> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true);
+    let failed = |act| move |source| MemoryFileError::File { act, path: path.to_owned(), source };
+    match options.open(path) {
+        Ok(file) => Ok((file, false)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let made = options.create_new(true).open(path);
+            made.map(|file| (file, true)).map_err(failed("made"))
+        }
+        Err(error) => Err(failed("opened")(error)),
+    }
+}
+
+/// Reserves room in the file system for a file's first `bytes` bytes, and keeps their content.
+fn reserve(file: &File, bytes: u64) -> io::Result<()> {
+    let length = i64::try_from(bytes).map_err(|_| io::Error::from(Errno::EFBIG))?;
+    loop {
+        match fallocate(file, FallocateFlags::empty(), 0, length) {
+            Ok(()) => return Ok(()),
+            Err(Errno::EINTR) => {}
+            // Some file systems cannot reserve, for example NFS before 4.2.
+            Err(Errno::EOPNOTSUPP | Errno::ENOSYS) => return rewrite(file, bytes),
+            Err(errno) => return Err(errno.into()),
+        }
+    }
+}
+
+/// Writes a file's first bytes back unchanged, so that the file system allocates them.
+fn rewrite(file: &File, bytes: u64) -> io::Result<()> {
+    let mut piece = vec![0; 1 << 16];
+    let mut place = 0;
+    while place < bytes {
+        let rest = usize::try_from(bytes - place).unwrap_or(usize::MAX);
+        let length = piece.len().min(rest);
+        let piece = &mut piece[..length];
+        file.read_exact_at(piece, place)?;
+        file.write_all_at(piece, place)?;
+        place += length as u64;
+    }
+    file.sync_data()
 }
 
 impl DeviceMemory for MemoryFile {
@@ -174,10 +255,43 @@ impl DeviceMemory for MemoryFile {
         self.read(address, bytemuck::cast_slice_mut(to))
     }
 
-    /// The uppermost byte last: there stand the flags that say that a descriptor is complete.
+    /// Writes the uppermost byte last: it holds the flags that show that a descriptor is complete.
     fn write_word(&mut self, address: u64, value: u32) -> io::Result<()> {
         let bytes = value.to_le_bytes();
         self.write(address, &bytes[..3])?;
         self.write(address + 3, &bytes[3..])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sparse file of `bytes` bytes that begins with `begin`.
+    fn sparse(begin: &[u8], bytes: u64) -> (tempfile::TempDir, File) {
+        let folder = tempfile::tempdir().expect("a directory");
+        let mut options = OpenOptions::new();
+        let file = options.read(true).write(true).create_new(true);
+        let file = file.open(folder.path().join("sparse")).expect("made");
+        file.write_all_at(begin, 0).expect("written");
+        file.set_len(bytes).expect("a hole");
+        (folder, file)
+    }
+
+    #[test]
+    fn reserved_bytes_are_allocated_and_keep_their_content() {
+        const BYTES: u64 = (1 << 20) + 3;
+        for act in [reserve, rewrite] {
+            let (_folder, file) = sparse(b"mine", BYTES);
+            let given = || file.metadata().expect("measured").blocks() * 512;
+            assert!(given() < BYTES, "a hole");
+            act(&file, BYTES).expect("room");
+            assert!(given() >= BYTES, "{}", given());
+            let mut found = vec![1; 1 << 20];
+            file.read_exact_at(&mut found, 0).expect("read");
+            assert_eq!(&found[..4], b"mine");
+            assert!(found[4..].iter().all(|byte| *byte == 0));
+            assert_eq!(file.metadata().expect("measured").len(), BYTES);
+        }
     }
 }

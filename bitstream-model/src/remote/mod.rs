@@ -8,14 +8,20 @@
 //!   DMA buffers ---------------> the file <---------------------- DMA engines
 //! ```
 //!
-//! [`pgs_interface::message`] is what both sides share. This module is the board's side: it serves one
-//! driver after the other. One that vanishes leaves the board as it is, engines running, as a
-//! process that is killed leaves a real one.
+//! Both sides share [`pgs_interface::message`], [`mark`] and [`connect()`]. The rest is the board's
+//! side: it serves one driver after the other. A driver that vanishes leaves the board as it is,
+//! engines running, as a killed process leaves a real board.
 
+pub mod mark;
+
+mod connect;
+mod connection;
 mod memory_file;
+mod pending;
 mod server;
 mod visit;
 
+pub use connect::connect;
 pub use memory_file::{MemoryFile, MemoryFileError};
 pub use server::{ServeError, Server, Stopper};
 pub use visit::{Ended, Visit};

@@ -1,4 +1,4 @@
-//! This file lets a board serve drivers at a Unix socket, one after the other.
+//! Serves a board to drivers at a Unix socket, one driver after the other.
 
 use std::fs;
 use std::io;
@@ -9,50 +9,60 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
+use nix::errno::Errno;
 use thiserror::Error;
 
+use super::connect::connect;
 use super::memory_file::{MemoryFile, MemoryFileError};
-use super::visit::{Host, Visit};
+use super::pending::{Caller, PendingConnections};
+use super::visit::{Ended, Session, Visit};
 use crate::config::{BoardConfig, ConfigError};
 use crate::handle::EmulatedBoard;
+
+/// Time limit for another server at the same socket to accept a connection.
+const IN_USE_LIMIT: Duration = Duration::from_secs(1);
 
 /// Why a board cannot be served.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ServeError {
-    /// There is no such board.
+    /// The configuration is invalid.
     #[error("the board cannot be built")]
     Config(#[from] ConfigError),
-    /// It has no memory.
+    /// The board's memory cannot be opened.
     #[error(transparent)]
     Memory(#[from] MemoryFileError),
     /// Another board is served there.
-    #[error("a board is served at {} already: end that, or name another socket", path.display())]
+    #[error(
+        "a board is served at {} already: end that server, or name another socket",
+        path.display()
+    )]
     InUse {
         /// The socket.
         path: PathBuf,
     },
-    /// Something that is no socket lies there.
-    #[error("{} is no socket: remove it, or name another", path.display())]
+    /// The path exists and is not a socket.
+    #[error("{} is not a socket: remove it, or name another path", path.display())]
     NoSocket {
-        /// What.
+        /// The path.
         path: PathBuf,
     },
     /// The socket failed.
     #[error("the socket {} cannot be {act}", path.display())]
     Socket {
-        /// What was tried.
+        /// The operation that failed: "opened", "served", ...
         act: &'static str,
-        /// Which.
+        /// The socket.
         path: PathBuf,
-        /// Why.
+        /// The kernel's error.
         #[source]
         source: io::Error,
     },
 }
 
-/// Ends a server from elsewhere: another thread, a signal's handler thread.
+/// Stops a server from another thread, such as a signal handler's.
 #[derive(Debug, Clone)]
 pub struct Stopper(Arc<Stop>);
 
@@ -65,10 +75,10 @@ struct Stop {
 }
 
 impl Stopper {
-    /// Hangs up and lets [`Server::serve`] return.
+    /// Closes the driver's connection and makes [`Server::serve`] return.
     pub fn stop(&self) {
         self.0.asked.store(true, Ordering::SeqCst);
-        // What is shut down already needs it no more.
+        // An error means that the socket is shut down already.
         let _ = self.0.listener.shutdown(Shutdown::Both);
         let visitor = self.0.visitor.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(visitor) = &*visitor {
@@ -80,7 +90,7 @@ impl Stopper {
         self.0.asked.load(Ordering::SeqCst)
     }
 
-    /// Whom to hang up on.
+    /// Sets the driver's connection, which [`stop`](Self::stop) closes.
     fn set_visitor(&self, stream: Option<UnixStream>) {
         *self.0.visitor.lock().unwrap_or_else(PoisonError::into_inner) = stream;
     }
@@ -90,16 +100,16 @@ impl Stopper {
 #[derive(Debug)]
 pub struct Server {
     board: EmulatedBoard,
-    /// Inode and bus address.
+    /// Inode and bus address of the memory.
     memory: (u64, u64),
-    listener: UnixListener,
+    pending: PendingConnections,
     path: PathBuf,
     stopper: Stopper,
 }
 
 impl Server {
-    /// Builds a board on that memory and opens the socket, in place of one that a server which was
-    /// killed has left.
+    /// Builds a board on `memory` and opens the socket. It replaces the socket of a server that was
+    /// killed.
     ///
     /// # Errors
     /// [`ServeError`].
@@ -117,12 +127,16 @@ impl Server {
             if !metadata.file_type().is_socket() {
                 return Err(ServeError::NoSocket { path });
             }
-            match UnixStream::connect(socket) {
+            match connect(socket, IN_USE_LIMIT) {
                 Ok(_) => return Err(ServeError::InUse { path }),
-                Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
-                    fs::remove_file(socket).map_err(failed("replaced"))?;
-                }
-                Err(error) => return Err(failed("reached")(error)),
+                Err(error) => match error.raw_os_error().map(Errno::from_raw) {
+                    Some(Errno::ECONNREFUSED) => {
+                        fs::remove_file(socket).map_err(failed("replaced"))?;
+                    }
+                    // A server listens, and accepts no connection.
+                    Some(Errno::EAGAIN) => return Err(ServeError::InUse { path }),
+                    _ => return Err(failed("reached")(error)),
+                },
             }
         }
         let granted = memory.addresses();
@@ -135,7 +149,8 @@ impl Server {
             listener: UnixStream::from(OwnedFd::from(same)),
             visitor: Mutex::new(None),
         }));
-        Ok(Self { board, memory: identity, listener, path, stopper })
+        let pending = PendingConnections::new(listener).map_err(failed("shared"))?;
+        Ok(Self { board, memory: identity, pending, path, stopper })
     }
 
     /// The board, as its builder sees it.
@@ -144,43 +159,50 @@ impl Server {
         &self.board
     }
 
-    /// What ends it.
+    /// A handle that stops the server.
     #[must_use]
     pub fn stopper(&self) -> Stopper {
         self.stopper.clone()
     }
 
-    /// Serves one driver after the other until it is stopped; `visited` is told of each that left,
-    /// before the next is served.
+    /// Serves one driver after the other until [`Stopper::stop`]. Calls `visited` after each driver
+    /// has left, before it serves the next. A connection that comes while a driver has the board
+    /// does not count: its hello gets [`Status::Busy`](pgs_interface::message::Status::Busy).
     ///
     /// # Errors
-    /// [`ServeError::Socket`] if no driver can come any more.
+    /// [`ServeError::Socket`] if the socket accepts no more connections.
     pub fn serve(
         &mut self,
         mut visited: impl FnMut(&EmulatedBoard, Visit),
     ) -> Result<(), ServeError> {
+        let failed = |act, source| ServeError::Socket { act, path: self.path.clone(), source };
         while !self.stopper.is_asked() {
-            let stream = match self.listener.accept() {
-                Ok((stream, _)) => stream,
-                Err(_) if self.stopper.is_asked() => break,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                // It came and went.
-                Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
-                Err(source) => {
-                    return Err(ServeError::Socket {
-                        act: "served",
-                        path: self.path.clone(),
-                        source,
-                    });
+            if let Some(error) = self.pending.failure() {
+                return Err(failed("served", error));
+            }
+            let caller = match self.pending.caller() {
+                None => {
+                    self.pending.wait_for(None, None).map_err(|error| failed("served", error))?;
+                    continue;
                 }
+                Some(Caller::Ended(ended)) => Err(ended),
+                Some(Caller::Requesting(connection)) => match connection.stream() {
+                    Ok(stream) => {
+                        self.stopper.set_visitor(Some(stream));
+                        Ok(connection)
+                    }
+                    Err(error) => Err(Ended::Broken(error)),
+                },
             };
-            let failed =
-                |source| ServeError::Socket { act: "shared", path: self.path.clone(), source };
-            self.stopper.set_visitor(Some(stream.try_clone().map_err(failed)?));
             if self.stopper.is_asked() {
                 break;
             }
-            let visit = Host::new(&self.board, self.memory, stream).serve();
+            let visit = match caller {
+                Ok(connection) => {
+                    Session::new(&self.board, self.memory, connection, &mut self.pending).serve()
+                }
+                Err(ended) => Visit { requests: 0, ended, left_running: self.board.is_running() },
+            };
             self.stopper.set_visitor(None);
             visited(&self.board, visit);
         }

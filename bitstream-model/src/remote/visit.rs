@@ -1,18 +1,15 @@
-//! This file serves one driver, from its hello until it is gone.
+//! Serves one driver, from its hello until it is gone.
 
-use std::io::{self, ErrorKind, Read as _, Write as _};
-use std::os::unix::net::UnixStream;
-use std::time::Duration;
+use std::io::{self, ErrorKind};
+use std::time::{Duration, Instant};
 
+use super::connection::{Connection, Presence, TRANSFER_LIMIT, late};
+use super::pending::{FIRST_LIMIT, PendingConnections};
 use crate::handle::{CpuPort, EmulatedBoard};
-use pgs_interface::message::{
-    ANSWER_BYTES, Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION,
-};
+use pgs_interface::message::{Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION};
 
-/// How much virtual time passes between two looks whether the driver is still there.
+/// Virtual time between two checks whether the driver is still there.
 const SLICE: Duration = Duration::from_micros(20);
-/// How long the rest of a request that has begun may take, and an answer that nobody reads.
-const TRANSFER_LIMIT: Duration = Duration::from_secs(5);
 
 /// How a visit ended.
 #[derive(Debug)]
@@ -20,61 +17,66 @@ const TRANSFER_LIMIT: Duration = Duration::from_secs(5);
 pub enum Ended {
     /// The driver closed the socket, or was killed.
     Left,
-    /// It sent something that is no request.
+    /// It sent bytes that are not a request.
     Refused(RequestError),
-    /// The socket failed, or a request did not come to its end in time.
+    /// The socket failed, or a request was not complete in time.
     Broken(io::Error),
 }
 
-/// What one driver did.
+/// A driver's use of the board, from its hello until it was gone.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Visit {
-    /// Requests that were served.
+    /// Number of requests served.
     pub requests: u64,
-    /// How it ended.
+    /// The way in which it ended.
     pub ended: Ended,
     /// Whether the accelerator or a DMA engine was still at work when the driver was gone.
     pub left_running: bool,
 }
 
-/// A driver, and the board that it has.
+/// A driver's session with the board.
 #[derive(Debug)]
-pub(super) struct Host<'a> {
+pub(super) struct Session<'a> {
     board: &'a EmulatedBoard,
     port: CpuPort,
     /// Inode and bus address of the memory.
     memory: (u64, u64),
-    stream: UnixStream,
-    /// What has come of the next request.
-    request: [u8; REQUEST_BYTES],
-    filled: usize,
+    /// Whether the board has confirmed the driver's memory.
+    has_memory: bool,
+    connection: Connection,
+    pending: &'a mut PendingConnections,
 }
 
-/// Whether a driver waits for an answer, or is gone.
-enum Presence {
-    There,
-    Gone,
+impl Ended {
+    /// The end of a connection that failed with `error`.
+    pub(super) fn of(error: io::Error) -> Self {
+        match error.kind() {
+            ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => Self::Left,
+            _ => Self::Broken(error),
+        }
+    }
 }
 
-impl<'a> Host<'a> {
-    pub(super) fn new(board: &'a EmulatedBoard, memory: (u64, u64), stream: UnixStream) -> Self {
+impl<'a> Session<'a> {
+    pub(super) fn new(
+        board: &'a EmulatedBoard,
+        memory: (u64, u64),
+        connection: Connection,
+        pending: &'a mut PendingConnections,
+    ) -> Self {
         let port = board.cpu_port();
-        Self { board, port, memory, stream, request: [0; REQUEST_BYTES], filled: 0 }
+        Self { board, port, memory, has_memory: false, connection, pending }
     }
 
     /// Serves until the driver is gone.
     pub(super) fn serve(mut self) -> Visit {
         let mut requests = 0;
-        let ended = self.serve_all(&mut requests).unwrap_or_else(|error| match error.kind() {
-            ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => Ended::Left,
-            _ => Ended::Broken(error),
-        });
+        let ended = self.serve_all(&mut requests).unwrap_or_else(Ended::of);
         Visit { requests, ended, left_running: self.board.is_running() }
     }
 
     fn serve_all(&mut self, requests: &mut u64) -> io::Result<Ended> {
-        self.stream.set_write_timeout(Some(TRANSFER_LIMIT))?;
         while let Some(bytes) = self.next_request()? {
             let first = *requests == 0;
             let request = Request::decode(&bytes).and_then(|request| match request {
@@ -90,9 +92,8 @@ impl<'a> Host<'a> {
                 }
             };
             *requests += 1;
-            match self.serve_one(request)? {
-                Presence::There => {}
-                Presence::Gone => return Ok(Ended::Left),
+            if self.serve_one(request)? == Presence::Gone {
+                return Ok(Ended::Left);
             }
         }
         Ok(Ended::Left)
@@ -100,31 +101,27 @@ impl<'a> Host<'a> {
 
     /// The next request; `None` if the driver is gone.
     fn next_request(&mut self) -> io::Result<Option<[u8; REQUEST_BYTES]>> {
-        // A driver may take all the time of the world between two requests, but not inside one.
-        while self.filled < REQUEST_BYTES {
-            let limit = (self.filled > 0).then_some(TRANSFER_LIMIT);
-            if limit.is_some() {
-                self.stream.set_read_timeout(limit)?;
+        // A driver that has the memory may take any time between two requests, but not inside one.
+        let first = (!self.has_memory).then(|| Instant::now() + FIRST_LIMIT);
+        loop {
+            if let Some(request) = self.connection.take_request() {
+                return Ok(Some(request));
             }
-            let read = self.stream.read(&mut self.request[self.filled..]);
-            if limit.is_some() {
-                self.stream.set_read_timeout(None)?;
+            let until = self.connection.due().into_iter().chain(first).min();
+            if until.is_some_and(|until| until <= Instant::now()) {
+                return Err(match self.connection.due() {
+                    Some(_) => late("sent half a request and no more", TRANSFER_LIMIT),
+                    None => late("asked for no memory", FIRST_LIMIT),
+                });
             }
-            match read {
-                Ok(0) => return Ok(None),
-                Ok(read) => self.filled += read,
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
+            if self.check_presence(until)? == Presence::Gone {
+                return Ok(None);
             }
         }
-        self.filled = 0;
-        Ok(Some(self.request))
     }
 
     fn answer(&mut self, status: Status, value: u32, number: u64) -> io::Result<()> {
-        let bytes: [u8; ANSWER_BYTES] =
-            Answer { status, value, number, now: self.port.now() }.encode();
-        self.stream.write_all(&bytes)
+        self.connection.send(&Answer { status, value, number, now: self.port.now() }.encode())
     }
 
     fn serve_one(&mut self, request: Request) -> io::Result<Presence> {
@@ -134,13 +131,14 @@ impl<'a> Host<'a> {
                 let status = if version == VERSION { Status::Done } else { Status::OtherVersion };
                 self.answer(status, VERSION, 0)?;
                 if version != VERSION {
-                    // Whatever it says next means something else.
+                    // Its next requests would have another meaning.
                     return Ok(Presence::Gone);
                 }
             }
             Request::Memory { inode } => {
                 let (own, address) = self.memory;
-                let status = if inode == own { Status::Done } else { Status::OtherMemory };
+                self.has_memory = inode == own;
+                let status = if self.has_memory { Status::Done } else { Status::OtherMemory };
                 self.answer(status, 0, address)?;
             }
             Request::Read { address } => {
@@ -176,8 +174,8 @@ impl<'a> Host<'a> {
         Ok(Presence::There)
     }
 
-    /// Lets virtual time pass as long as the driver is there: one that is killed leaves the board
-    /// where it is then.
+    /// Lets virtual time pass as long as the driver is there. If the driver is killed, the board
+    /// stops at that time.
     fn pass(
         &mut self,
         time: Duration,
@@ -193,37 +191,22 @@ impl<'a> Host<'a> {
             if left.is_zero() {
                 return Ok(Passed::Time);
             }
-            if matches!(self.look()?, Presence::Gone) {
+            if self.check_presence(Some(Instant::now()))? == Presence::Gone {
                 return Ok(Passed::Gone);
             }
         }
     }
 
-    /// Whether the driver is still there.
-    fn look(&mut self) -> io::Result<Presence> {
-        if self.filled == REQUEST_BYTES {
-            return Ok(Presence::There);
-        }
-        self.stream.set_nonblocking(true)?;
-        let read = self.stream.read(&mut self.request[self.filled..]);
-        self.stream.set_nonblocking(false)?;
-        match read {
-            Ok(0) => Ok(Presence::Gone),
-            Ok(read) => {
-                self.filled += read;
-                Ok(Presence::There)
-            }
-            Err(error)
-                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
-            {
-                Ok(Presence::There)
-            }
-            Err(error) => Err(error),
-        }
+    /// Waits until the driver has sent bytes, or until the time `until`; returns whether it is
+    /// still there. Other drivers that send a request meanwhile get a refusal.
+    fn check_presence(&mut self, until: Option<Instant>) -> io::Result<Presence> {
+        let sent = self.pending.wait_for(Some(&self.connection), until)?;
+        self.pending.refuse_callers(self.port.now());
+        if sent { self.connection.read_available() } else { Ok(Presence::There) }
     }
 }
 
-/// What ended a stretch of virtual time.
+/// The reason why a stretch of virtual time ended.
 enum Passed {
     Time,
     Event(u32),

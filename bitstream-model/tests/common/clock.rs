@@ -1,12 +1,12 @@
-//! A windowed design cycle by cycle, from its rules alone: which cycle each entry issues in, when everything
-//! is there from the start.
+//! A windowed design cycle by cycle, from its rules alone: the cycle in which each entry issues if
+//! all records are there from the start.
 
 use pgs_interface::profile::Window;
 
 use super::scene::Step;
 use pgs_interface::record::live;
 
-/// What a design needs to be known of.
+/// The parameters of a design that decide its cycles.
 #[derive(Debug, Clone)]
 pub(crate) struct Clock {
     pub(crate) slot: u64,
@@ -22,7 +22,7 @@ pub(crate) struct Clock {
     pub(crate) leave_interval: u64,
 }
 
-/// What came of it.
+/// The counters of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Counted {
     pub(crate) cycles: u64,
@@ -30,19 +30,19 @@ pub(crate) struct Counted {
     pub(crate) hazards: u32,
 }
 
-/// A place as the rules speak of it.
+/// A place with the state that the rules need.
 #[derive(Debug, Clone, Copy, Default)]
 struct Held {
     taken: bool,
-    /// Passes that are over, and the cycle since which the last one is.
+    /// Passes that are over, and the cycle at which the last of them ended.
     over: usize,
     over_at: u64,
-    /// Its previous use in the pass that is not over.
+    /// Its previous use in the current pass.
     previous: Option<u64>,
 }
 
 impl Clock {
-    /// Runs a step with those index words, of `moving` bodies; `None` if it never ends.
+    /// Runs a step of `moving` bodies with the index words `words`; `None` if it never ends.
     pub(crate) fn run(&self, step: &Step, words: &[[u32; 2]], moving: usize) -> Option<Counted> {
         let passes = self.windows.len();
         let entries = if passes == 0 { 0 } else { words.len() };
@@ -113,7 +113,7 @@ impl Clock {
                 stalls += u64::from(late && idle);
             }
             let all_issued = issued.last().is_none_or(|last| last.len() == entries);
-            // What is left was in no collision.
+            // The remaining bodies were in no collision.
             if all_issued && came == left && left < moving && now >= leave_due {
                 came += 1;
                 left += 1;
@@ -127,8 +127,8 @@ impl Clock {
         None
     }
 
-    /// Whether everything but the unit is there for an entry, and whether a previous use of one of its
-    /// bodies in the same pass is under way.
+    /// Whether an entry can issue but for its unit and its hazards, and whether it has a hazard: a
+    /// previous use of one of its bodies in the same pass is under way.
     fn ready(
         &self,
         pass: usize,
@@ -156,7 +156,7 @@ impl Clock {
         (ready, conflict)
     }
 
-    /// Whether a unit has taken less than it can in an interval.
+    /// Whether the unit of a pass can take one more entry in this interval.
     fn unit_is_free(&self, pass: usize, now: u64, issued: &[Vec<u64>]) -> bool {
         let of_unit = issued.iter().zip(&self.units).filter(|(_, unit)| **unit == self.units[pass]);
         let recent = |issues: &Vec<u64>| {

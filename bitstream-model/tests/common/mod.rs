@@ -1,7 +1,7 @@
 //! A bare-metal host for the tests of the emulated board.
 //!
 //! It knows the board through register rows, record layouts and [`CpuPort`] alone, and shares no
-//! code with the driver: what it packs, it packs from the layout tables.
+//! code with the driver: it packs records from the layout tables.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -35,7 +35,7 @@ pub(crate) const fn microseconds(count: u64) -> Duration {
     Duration::from_micros(count)
 }
 
-/// A board, and what a host may touch of it.
+/// A board with both of its handles.
 #[derive(Debug)]
 pub(crate) struct Host {
     pub(crate) board: EmulatedBoard,
@@ -139,7 +139,7 @@ impl Host {
         self.reset_accelerator();
     }
 
-    /// A buffer with those beats that the device reads.
+    /// A buffer with `beats` that the device reads.
     pub(crate) fn readable(&self, beats: &[Beat]) -> u64 {
         let (address, mut buffer) = self.port.allocate(beats.len()).expect("there is room");
         buffer.copy_from_slice(beats);
@@ -147,7 +147,7 @@ impl Host {
         address
     }
 
-    /// A buffer of that many beats that the device writes.
+    /// A buffer of `beats` beats that the device writes.
     pub(crate) fn writable(&self, beats: usize) -> u64 {
         let (address, buffer) = self.port.allocate(beats).expect("there is room");
         self.port.hand_over(address, buffer, DeviceAccess::Write).expect("the CPU owns it");
@@ -166,7 +166,7 @@ impl Host {
     }
 }
 
-/// Beats that can be told apart.
+/// Beats that all differ.
 pub(crate) fn numbered(beats: u32) -> Vec<Beat> {
     (0..beats).map(|k| Beat([k, k ^ 0x5555_5555, !k, k.wrapping_mul(0x9E37_79B9)])).collect()
 }

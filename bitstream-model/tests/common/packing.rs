@@ -1,4 +1,4 @@
-//! How a step's input lies on the streams of any profile, and its output back: words, rows, beats,
+//! Packs a step's input for the streams of any profile, and unpacks its output: words, rows, beats,
 //! stripes, padding, written from the interface's tables.
 
 use half::f16;
@@ -131,7 +131,7 @@ pub(crate) fn pose_rows(format: StreamFormat, body: &Body) -> [Row; 2] {
 }
 
 impl Step {
-    /// What goes out on each stream of a profile.
+    /// The beats and packets on each stream of a profile.
     pub(crate) fn packed(&self, variant: &Variant) -> Vec<Lane> {
         let profile = variant.profile;
         let streams = profile.mm2s_widths.len();
@@ -168,7 +168,7 @@ impl Step {
             .collect()
     }
 
-    /// Cycles of the step on a profile when nothing stalls and nothing waits.
+    /// Cycles of the step on a profile without stalls and waits.
     pub(crate) fn cycles(&self, variant: &Variant) -> u64 {
         let profile = variant.profile;
         let lanes = self.packed(variant);
@@ -191,7 +191,7 @@ impl Step {
     }
 }
 
-/// Cycles of so many beats on streams of those widths.
+/// Cycles of the slowest stream, with the beats and the width of each.
 fn slowest(beats: &[usize], widths: &[u32]) -> u64 {
     let cycles =
         beats.iter().zip(widths).map(|(beats, width)| *beats as u64 * 128 / u64::from(*width));
@@ -207,8 +207,8 @@ pub(crate) fn result_beats(variant: &Variant, bodies: usize) -> Vec<usize> {
     dealt.iter().map(Vec::len).collect()
 }
 
-/// The bodies out of the result beats of all streams; shapes are not part of a result and read 0.
-/// What is left over is padding and must be zeros.
+/// The bodies from the result beats of all streams; shapes are not part of a result and read 0.
+/// The other beats are padding and must be zeros.
 pub(crate) fn unpack(variant: &Variant, streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
     let format = variant.numbers.poses;
     let mut next: Vec<_> = streams.iter().map(|stream| stream.iter()).collect();

@@ -45,8 +45,8 @@ pub(crate) const MOVING: u32 = 1;
 pub(crate) struct Step {
     /// Inverse mass, inverse inertia.
     pub(crate) shapes: Vec<[f32; 2]>,
-    /// World inverse inertia of each body (xx, yy, zz, xy, xz, yz); where there is none, its
-    /// shape's.
+    /// World inverse inertia of each body (xx, yy, zz, xy, xz, yz); its shape's if the list is
+    /// shorter.
     pub(crate) inertias: Vec<[f32; 6]>,
     pub(crate) bodies: Vec<Body>,
     pub(crate) collisions: Vec<Collision>,
@@ -89,7 +89,8 @@ impl Step {
         Self::new((0..count).map(body).collect(), Vec::new())
     }
 
-    /// What [`falling`](Self::falling) becomes: moved by v / 2, then 4 m/s faster downward.
+    /// The bodies of [`falling`](Self::falling) a step later: moved by v / 2, then 4 m/s faster
+    /// downward.
     pub(crate) fn fallen(count: u16) -> Vec<Body> {
         let body = |k: u16| {
             let k = f32::from(k);
@@ -103,7 +104,8 @@ impl Step {
         (0..count).map(body).collect()
     }
 
-    /// A static ground and `bodies` point masses on it, body k in collision k - 1 and so on round.
+    /// A static ground and `bodies` point masses on it, which collide with it in turn: body k in
+    /// collision k - 1.
     pub(crate) fn on_ground(bodies: u16, collisions: usize) -> Self {
         let ground = Body { shape: STATIC, position: [0.0, -1.0, 0.0], ..AT_REST };
         let mass = |k: u16| Body {
@@ -166,7 +168,7 @@ impl Step {
         })
     }
 
-    /// What goes out on each stream of `float`.
+    /// The beats and packets on each stream of `float`.
     pub(crate) fn lanes(&self) -> Vec<Lane> {
         self.packed(&FLOAT.default_variant())
     }
@@ -180,7 +182,7 @@ impl Step {
     }
 }
 
-/// What goes out on one stream: the segments, and which of them in which order, a packet each.
+/// One stream: its segments, and its packets as indices of segments.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Lane {
     pub(crate) segments: [Vec<Beat>; 3],
@@ -247,7 +249,7 @@ pub(crate) fn result_beats(bodies: usize) -> Vec<usize> {
     packing::result_beats(&FLOAT.default_variant(), bodies)
 }
 
-/// The bodies out of the result beats of the streams of `float`.
+/// The bodies from the result beats of the streams of `float`.
 pub(crate) fn unpack(streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
     packing::unpack(&FLOAT.default_variant(), streams, bodies)
 }

@@ -22,7 +22,7 @@ const SLOTS: usize = 64;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Failure {
     Deadline,
-    /// All results are there, and the accelerator does not say so.
+    /// All results have arrived, and the accelerator does not set `ap_done`.
     NotDone,
     Dma {
         core: usize,
@@ -33,7 +33,7 @@ pub(crate) enum Failure {
     Accelerator(u32, u32, u32),
 }
 
-/// What a step gave.
+/// Results and counters of a step.
 #[derive(Debug, Clone)]
 pub(crate) struct Outcome {
     pub(crate) bodies: Vec<Body>,
@@ -48,7 +48,7 @@ pub(crate) struct Outcome {
     pub(crate) sum_of_results: u32,
 }
 
-/// Buffers that the device has.
+/// Buffers that the device owns.
 #[derive(Debug, Default)]
 pub(crate) struct Flight {
     inputs: Vec<u64>,
@@ -58,12 +58,12 @@ pub(crate) struct Flight {
 }
 
 impl Flight {
-    /// Notes a buffer with input.
+    /// Adds a buffer with input.
     pub(crate) fn input(&mut self, address: u64) {
         self.inputs.push(address);
     }
 
-    /// The buffers with input, those of one stream after those of another.
+    /// The buffers with input, stream by stream.
     pub(crate) fn inputs(&self) -> &[u64] {
         &self.inputs
     }
@@ -120,7 +120,7 @@ impl Machine {
         longest - longest % BEAT_BYTES
     }
 
-    /// Queues result buffers of those beats.
+    /// Queues a result buffer of `beats[k]` beats on channel `k`.
     pub(crate) fn arm(&mut self, flight: &mut Flight, beats: &[usize]) {
         let piece = self.piece();
         for (ring, beats) in self.s2mm.iter_mut().zip(beats) {
@@ -181,7 +181,7 @@ impl Machine {
             if left.is_zero() {
                 return Err(Failure::Deadline);
             }
-            // Bounded, so that nothing depends on the interrupt alone.
+            // Bounded, so that a lost interrupt does not matter.
             let _ = host.port.wait_interrupt(left.min(microseconds(50)));
             for core in 0..host.cores() {
                 for direction in BOTH {
@@ -239,13 +239,13 @@ impl Machine {
         }
     }
 
-    /// A step with those beats on the streams instead of its own.
+    /// Runs a step with the streams `lanes` instead of its own.
     pub(crate) fn step_with(&mut self, step: &Step, lanes: &[Lane]) -> Result<Outcome, Failure> {
         let flight = self.drive(step, lanes)?;
         Ok(self.collect(&flight, step.bodies.len()))
     }
 
-    /// Takes a step as far as its results are in memory. What is computed of it, the board computes.
+    /// Runs a step until its results are in memory. The board alone computes.
     pub(crate) fn drive(&mut self, step: &Step, lanes: &[Lane]) -> Result<Flight, Failure> {
         step.write_arguments(&self.host);
         let mut flight = Flight::default();
@@ -262,7 +262,7 @@ impl Machine {
         }
     }
 
-    /// Whether the accelerator says that it is done: it may a few cycles after its results are in memory.
+    /// Whether the accelerator sets `ap_done`, which may come a few cycles after the results.
     fn is_done(&self) -> bool {
         (0..16).any(|_| {
             let done = ap_ctrl::DONE.is_set(self.host.control(control::AP_CTRL));
@@ -279,7 +279,7 @@ impl Machine {
             return self.step_with(step, &step.packed(&variant));
         }
         let packed = step.packed_once(&variant);
-        let outcome = self.step_with(&step.told(&packed.leave), &packed.lanes)?;
+        let outcome = self.step_with(&step.moving_in_order(&packed.leave), &packed.lanes)?;
         Ok(Outcome { bodies: step.restored(&packed.leave, &outcome.bodies), ..outcome })
     }
 }

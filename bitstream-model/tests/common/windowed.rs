@@ -1,5 +1,5 @@
-//! How a step lies on the streams of a design that streams the collisions once: places, marks, records in
-//! the order in which bodies come and go.
+//! Packs a step for a design that streams the collisions once: places, marks, records in the order
+//! in which bodies come and leave.
 
 use pgs_interface::profile::{Flow, Variant, Window};
 use pgs_interface::record::live;
@@ -15,7 +15,7 @@ pub(crate) struct Packed {
     pub(crate) leave: Vec<usize>,
 }
 
-/// The order of a step's bodies, and what the collisions say of them.
+/// The order of a step's bodies, and the index words of its collisions.
 #[derive(Debug, Clone)]
 pub(crate) struct Marked {
     /// Index words of every entry.
@@ -41,7 +41,7 @@ impl Step {
         self.shapes[self.bodies[body].shape as usize][0] != 0.0
     }
 
-    /// Without passes no collision is streamed.
+    /// Passes of the step; without passes no collision is streamed.
     fn passes(&self) -> usize {
         (self.iterations[0] + self.iterations[1]) as usize
     }
@@ -61,11 +61,12 @@ impl Step {
         spans
     }
 
-    /// For each entry the first one that cannot leave the last pass before it has entered the first.
+    /// For each entry n, the first entry that cannot leave the last pass before n has entered the
+    /// first pass.
     ///
-    /// An entry leaves a pass when the last use of both its bodies has, so that entry `n` at the door of
-    /// the first pass holds up, in the next one, the first entry with a body that is used from `n` on;
-    /// that one holds up the pass behind, and so on.
+    /// An entry leaves a pass when the last uses of both its bodies have left it. So an entry `n`
+    /// that waits for the first pass holds up, in the next pass, the first entry with a body that
+    /// is used from `n` on; that entry holds up the pass behind, and so on.
     fn holds_up(&self, spans: &[Option<[usize; 2]>]) -> Vec<usize> {
         let passes = self.passes();
         let last = |collision: &Collision, n: usize| {
@@ -87,9 +88,9 @@ impl Step {
         (0..lasts.len()).map(|n| (1..passes).fold(n, |n, _| held[n])).collect()
     }
 
-    /// Index words of every entry, and the bodies as they come and as they go.
+    /// Index words of every entry, and the bodies as they come and as they leave.
     ///
-    /// `None` where there are too few places for what is alive and for what has not left.
+    /// `None` if `slots` places are too few for the bodies that are alive or have not left yet.
     pub(crate) fn marked(&self, slots: u32) -> Option<Marked> {
         let spans = self.spans();
         let holds_up = self.holds_up(&spans);
@@ -140,7 +141,7 @@ impl Step {
         self.spans().into_iter().flatten().map(|[first, last]| last - first).max().unwrap_or(0)
     }
 
-    /// What goes out on each stream.
+    /// The beats and packets on each stream.
     pub(crate) fn packed_once(&self, variant: &Variant) -> Packed {
         let slots = design(variant).expect("it has a window").slots;
         let Marked { words, come, leave } = self.marked(slots).expect("there are places");
@@ -148,7 +149,7 @@ impl Step {
         Packed { lanes, leave }
     }
 
-    /// The streams for those index words and orders.
+    /// The streams for the index words `words` and the orders `come` and `leave`.
     pub(crate) fn lanes_of(
         &self,
         variant: &Variant,
@@ -192,18 +193,18 @@ impl Step {
             .collect()
     }
 
-    /// The step as the accelerator hears of it: the moving bodies, as they leave.
-    pub(crate) fn told(&self, leave: &[usize]) -> Self {
+    /// The step with the moving bodies alone, in the order in which they leave.
+    pub(crate) fn moving_in_order(&self, leave: &[usize]) -> Self {
         Self { bodies: leave.iter().map(|body| self.bodies[*body]).collect(), ..self.clone() }
     }
 
-    /// The step as the accelerator hears of it, and its streams, on any profile.
+    /// The step with the bodies that are streamed, and its streams, on any profile.
     pub(crate) fn on(&self, variant: &Variant) -> (Self, Vec<Lane>) {
         if design(variant).is_none() {
             return (self.clone(), self.packed(variant));
         }
         let packed = self.packed_once(variant);
-        (self.told(&packed.leave), packed.lanes)
+        (self.moving_in_order(&packed.leave), packed.lanes)
     }
 
     /// All bodies, from the results in the order in which they left.

@@ -117,7 +117,7 @@ fn pack_range<C: Collisions + ?Sized>(
             blocks.fold(Seen::NOTHING, |seen, block| {
                 let copies = &mut copies[..block.len()];
                 // All of a block are on their way while the first are copied.
-                block.clone().for_each(|index| collisions.soon(index));
+                block.clone().for_each(|index| collisions.prefetch(index));
                 for (to, index) in copies.iter_mut().zip(block) {
                     *to = collisions.collision(index);
                     ends.soon([to.body_a, to.body_b]);

@@ -275,8 +275,7 @@ prop_compose! {
 }
 
 proptest! {
-    // A failure would be written down with thousands of bodies.
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
+    #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
     fn several_threads_write_what_one_does(inputs in prop::collection::vec(any_input(), 1..4)) {

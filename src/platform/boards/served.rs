@@ -13,8 +13,9 @@ use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use bitstream_model::remote::{connect, mark};
 use pgs_interface::address_map;
 use pgs_interface::message::{
     ANSWER_BYTES, Answer, LONGEST_WAIT, MEMORY_SUFFIX, Request, Status, VERSION,
@@ -30,6 +31,9 @@ use crate::platform::{
 /// How long an answer may take. The board's process computes what the board does meanwhile, at most
 /// [`LONGEST_WAIT`] of its time.
 const ANSWER_LIMIT: Duration = Duration::from_secs(60);
+
+/// How long a board that nobody has may take to let a driver in, which is the answer to its hello.
+const HELLO_LIMIT: Duration = Duration::from_secs(10);
 
 /// The file that is a served board's memory, if nobody says otherwise.
 pub(crate) fn memory_beside(socket: &Path) -> PathBuf {
@@ -49,14 +53,29 @@ impl RemotePlatform {
     /// Connects to the board served at `socket`, whose memory is the file `memory`. No register is
     /// touched.
     pub(crate) fn open(socket: &Path, memory: &Path) -> Result<Self, PlatformError> {
-        let line = Line::connect(socket, ANSWER_LIMIT)?;
-        let error =
-            |act| move |source| PlatformError::File { act, path: memory.to_owned(), source };
+        Self::open_within(socket, memory, HELLO_LIMIT)
+    }
+
+    /// The same for a board that lets its driver in within `limit`.
+    fn open_within(socket: &Path, memory: &Path, limit: Duration) -> Result<Self, PlatformError> {
+        let line = Line::connect(socket, limit)?;
+        let error = |act| {
+            move |source| PlatformError::ServedMemory {
+                act,
+                memory: memory.to_owned(),
+                socket: socket.to_owned(),
+                source,
+            }
+        };
         let file = File::options().read(true).write(true).open(memory).map_err(error("open"))?;
         let lock = Arc::new(LockedFile::of_file(file, memory)?);
         let metadata = lock.file().metadata().map_err(error("measure"))?;
 
-        let hello = line.ask(Request::Hello { version: VERSION })?;
+        let hello = line.hello(limit)?;
+        if hello.status == Status::Busy {
+            return Err(PlatformError::ServerBusy { socket: socket.to_owned() });
+        }
+        line.set_limit(ANSWER_LIMIT)?;
         if hello.status != Status::Done || hello.value != VERSION {
             return Err(PlatformError::OtherServer {
                 socket: socket.to_owned(),
@@ -70,7 +89,15 @@ impl RemotePlatform {
             return Err(PlatformError::OtherMemory { socket, memory });
         }
         let name = memory.display().to_string();
-        let (address, bytes) = (placed.number, metadata.len());
+        let address = placed.number;
+        let marked = mark::memory_bytes(lock.file()).map_err(error("measure"))?;
+        let bytes = marked.ok_or_else(|| PlatformError::UnusableMemory {
+            region: name.clone(),
+            address,
+            bytes: metadata.len(),
+            reason: "it was changed since its board was served; end that `pgs serve`, remove the \
+                     file, and serve the board again",
+        })?;
         let length = usize::try_from(bytes).map_err(|_| PlatformError::UnusableMemory {
             region: name.clone(),
             address,
@@ -97,6 +124,8 @@ struct Line {
 /// What is known of the other side.
 struct State {
     stream: UnixStream,
+    /// How long an answer may take.
+    limit: Duration,
     /// The board's time at its last answer. A board that is lost has no time: there it is that of
     /// our waits, so that these end.
     now: Duration,
@@ -111,15 +140,33 @@ impl fmt::Debug for Line {
 
 impl Line {
     fn connect(socket: &Path, limit: Duration) -> Result<Self, PlatformError> {
-        let connected = UnixStream::connect(socket).and_then(|stream| {
-            stream.set_read_timeout(Some(limit))?;
-            stream.set_write_timeout(Some(limit))?;
-            Ok(stream)
-        });
-        let stream = connected
+        let stream = connect(socket, limit)
             .map_err(|source| PlatformError::NoServer { socket: socket.to_owned(), source })?;
-        let state = State { stream, now: Duration::ZERO, lost: None };
-        Ok(Self { socket: socket.to_owned(), state: Mutex::new(state) })
+        let state = State { stream, limit, now: Duration::ZERO, lost: None };
+        let line = Self { socket: socket.to_owned(), state: Mutex::new(state) };
+        line.set_limit(limit)?;
+        Ok(line)
+    }
+
+    /// Bounds every request and its answer from here on.
+    fn set_limit(&self, limit: Duration) -> Result<(), PlatformError> {
+        let mut state = self.state();
+        state.limit = limit;
+        let set = state.stream.set_write_timeout(Some(limit));
+        set.and_then(|()| state.stream.set_read_timeout(Some(limit)))
+            .map_err(|source| self.lost_to(Arc::new(source)))
+    }
+
+    /// The first request. A board that does not answer it is not lost: it was never had.
+    fn hello(&self, limit: Duration) -> Result<Answer, PlatformError> {
+        self.ask(Request::Hello { version: VERSION }).map_err(|error| match &error {
+            PlatformError::ServerLost { socket, source }
+                if source.kind() == io::ErrorKind::TimedOut =>
+            {
+                PlatformError::ServerSilent { socket: socket.clone(), limit }
+            }
+            _ => error,
+        })
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -131,7 +178,8 @@ impl Line {
     fn ask(&self, request: Request) -> Result<Answer, PlatformError> {
         let mut state = self.state();
         if state.lost.is_none() {
-            match exchange(&mut state.stream, request) {
+            let limit = state.limit;
+            match exchange(&mut state.stream, request, limit) {
                 Ok(answer) => {
                     // A clock that stands still or runs backwards would make waits endless.
                     let waited = match (request, answer.status) {
@@ -162,19 +210,29 @@ impl Line {
     }
 }
 
-/// Sends a request and reads its answer, in bounded time.
-fn exchange(stream: &mut UnixStream, request: Request) -> io::Result<Answer> {
-    stream.write_all(&request.encode())?;
-    let mut bytes = [0; ANSWER_BYTES];
-    stream.read_exact(&mut bytes).map_err(|error| match error.kind() {
-        io::ErrorKind::UnexpectedEof => closed(),
-        // What the kernel calls a read that has timed out.
-        io::ErrorKind::WouldBlock => {
-            let limit = stream.read_timeout().ok().flatten().unwrap_or_default();
-            io::Error::new(io::ErrorKind::TimedOut, format!("no answer within {limit:?}"))
-        }
+/// Sends a request and reads its answer, in bounded time: a part that comes late counts as late.
+fn exchange(stream: &mut UnixStream, request: Request, limit: Duration) -> io::Result<Answer> {
+    let until = Instant::now() + limit;
+    let late = || io::Error::new(io::ErrorKind::TimedOut, format!("no answer within {limit:?}"));
+    // What the kernel calls a transfer that has timed out.
+    let timed = |error: io::Error| match error.kind() {
+        io::ErrorKind::WouldBlock => late(),
         _ => error,
-    })?;
+    };
+    stream.write_all(&request.encode()).map_err(timed)?;
+    let mut bytes = [0; ANSWER_BYTES];
+    let mut filled = 0;
+    while filled < ANSWER_BYTES {
+        match stream.read(&mut bytes[filled..]) {
+            Ok(0) => return Err(closed()),
+            Ok(read) => filled += read,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(timed(error)),
+        }
+        if filled < ANSWER_BYTES && Instant::now() >= until {
+            return Err(late());
+        }
+    }
     let answer = Answer::decode(&bytes)
         .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
     if answer.status == Status::Refused {
@@ -323,5 +381,44 @@ mod tests {
         drop((window, platform));
         stream.read_to_end(&mut sent).expect("closed");
         assert_eq!(sent, Request::Unmask.encode());
+    }
+
+    /// A folder with a socket that somebody has bound, and with a file for the memory.
+    fn bound() -> (tempfile::TempDir, PathBuf, PathBuf, UnixListener) {
+        let folder = tempfile::tempdir().expect("a directory");
+        let (socket, memory) = (folder.path().join("board"), folder.path().join("memory"));
+        let listener = UnixListener::bind(&socket).expect("bound");
+        File::create(&memory).expect("made");
+        (folder, socket, memory, listener)
+    }
+
+    #[test]
+    fn a_server_that_does_not_answer_the_first_message_is_silent_and_not_lost() {
+        let (_folder, socket, memory, _listener) = bound();
+        let limit = Duration::from_millis(20);
+        let error = RemotePlatform::open_within(&socket, &memory, limit).expect_err("no answer");
+        assert!(matches!(&error, PlatformError::ServerSilent { socket: s, .. } if *s == socket));
+        assert!(error.to_string().contains("says nothing within 20ms"), "{error}");
+    }
+
+    #[test]
+    fn an_answer_that_comes_drop_by_drop_is_late() {
+        let (_folder, socket, _memory, listener) = bound();
+        let limit = Duration::from_millis(200);
+        let line = Line::connect(&socket, limit).expect("somebody listens");
+        let dripping = std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().expect("the driver");
+            // Each byte is in time, and the whole would take twelve limits.
+            let taken = |_: &usize| {
+                std::thread::park_timeout(limit / 2);
+                stream.write_all(&[0]).is_ok()
+            };
+            (0..ANSWER_BYTES).take_while(taken).count()
+        });
+        let error = line.ask(Request::Unmask).expect_err("late");
+        let PlatformError::ServerLost { source, .. } = &error else { panic!("{error}") };
+        assert_eq!(source.kind(), io::ErrorKind::TimedOut, "{source}");
+        drop(line);
+        assert!(dripping.join().expect("no panic") < ANSWER_BYTES);
     }
 }

@@ -95,7 +95,7 @@ fn command(at: usize, bytes: usize, access: Access) -> u64 {
     (at as u64) << 32 | bytes | direction << 2 | 1
 }
 
-fn synchronize(
+fn synchronise(
     (path, file): &(PathBuf, File),
     at: usize,
     bytes: usize,
@@ -224,8 +224,8 @@ impl Region for UDmaBuf {
     fn shared(&self, at: usize, words: usize) -> Result<SharedMemory, PlatformError> {
         if let Some(sync) = &self.sync {
             // No dirty line of an earlier use may be written back over the words.
-            synchronize(&sync.for_device, at, 4 * words, Access::Read)?;
-            synchronize(&sync.for_cpu, at, 4 * words, Access::Write)?;
+            synchronise(&sync.for_device, at, 4 * words, Access::Read)?;
+            synchronise(&sync.for_cpu, at, 4 * words, Access::Write)?;
         }
         Ok(SharedMemory::Mapped { mapping: Arc::clone(&self.words), at, words })
     }
@@ -238,7 +238,7 @@ impl Region for UDmaBuf {
         access: Access,
     ) -> Result<(), PlatformError> {
         match &self.sync {
-            Some(sync) if used > 0 => synchronize(&sync.for_device, at, used * BEAT_BYTES, access),
+            Some(sync) if used > 0 => synchronise(&sync.for_device, at, used * BEAT_BYTES, access),
             _ => Ok(()),
         }
     }
@@ -251,7 +251,7 @@ impl Region for UDmaBuf {
         access: Access,
     ) -> Result<(), PlatformError> {
         match &self.sync {
-            Some(sync) if used > 0 => synchronize(&sync.for_cpu, at, used * BEAT_BYTES, access),
+            Some(sync) if used > 0 => synchronise(&sync.for_cpu, at, used * BEAT_BYTES, access),
             _ => Ok(()),
         }
     }

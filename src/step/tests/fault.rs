@@ -1,4 +1,4 @@
-//! Each cause of a failed step is named as what it is, and what follows from it is not.
+//! Tests that the driver reports the cause of a failed step, not its effects.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -27,12 +27,12 @@ const fn receiver(core: usize) -> usize {
     2 * core + 1
 }
 
-/// A step that fails, after one that did not, and the one after it.
+/// The error of a failed step that stands between two good steps.
 fn failed(tampered: &Arc<Tampered>, accelerator: &mut Accelerator) -> Error {
     let (result, bodies) = step(accelerator, CUBES);
     let error = result.expect_err("tampered with");
     assert_eq!(bits(&bodies), bits(&scene(CUBES).0), "the bodies are as they were");
-    tampered.leave();
+    tampered.restore();
     error
 }
 
@@ -61,7 +61,7 @@ fn every_error_bit_of_a_channel_has_a_name() {
         for (direction, base) in [(Direction::Mm2s, 0), (Direction::S2mm, S2MM)] {
             let (_, tampered, mut accelerator) = Tampered::open();
             tampered.tamper(2, base + DMASR, Tamper::Set(bit));
-            // Where it stands from the start it is found once the step is over.
+            // A bit that is set from the start is found at the end of the step.
             let error = failed(&tampered, &mut accelerator);
             let fault = fault_of(&error);
             assert_eq!(fault.name(), name, "{fault}");
@@ -114,7 +114,7 @@ fn packets_that_are_too_short_too_long_or_without_an_end_are_told_apart() {
 
     let (_, tampered, mut accelerator) = Tampered::open();
     tampered.after_wait(|rings| rings.change(receiver(1), 0, |status| status & !RXEOF));
-    // More came than the buffers hold.
+    // The board sent more than the buffers hold.
     tampered.tamper(1, S2MM + DMASR, Tamper::Set(1 << 4));
     let error = failed(&tampered, &mut accelerator);
     assert!(matches!(fault_of(&error), Fault::LongPacket(at) if at.channel.core == 1), "{error:?}");
@@ -137,7 +137,7 @@ fn a_status_that_is_late_costs_no_step_and_is_told_once() {
     assert!(!accelerator.device.oddities.told(Anomaly::LateStatus));
     let mut looks = 0;
     let mut seen = 0;
-    // Hidden at the first look, back at the third.
+    // The driver does not see the bit at its first look; at the third look the bit is back.
     tampered.after_wait(move |rings| {
         looks += 1;
         let hide = looks == 1;
@@ -183,12 +183,12 @@ fn a_channel_that_is_behind_the_others_is_named_at_the_deadline() {
         board.inject(Injected::new(FaultKind::Stall).on(core, direction));
         let error = step(&mut accelerator, CUBES).0.expect_err("a channel that stalls");
         let fault = fault_of(&error);
-        let channel = fault.channel().expect("the one that is behind");
+        let channel = fault.channel().expect("the channel that is behind");
         assert_eq!((fault.name(), channel.core, channel.direction), ("deadline", core, side));
     }
 }
 
-/// What stands together, and what is said of it.
+/// Cases of several errors at once, with the message for each.
 #[test]
 fn the_cause_is_told_and_not_what_follows_from_it() {
     const ERROR: u32 = 0x180;
@@ -276,7 +276,7 @@ fn another_bitstream_is_found_at_the_fault_and_after_the_reset() {
             "{error:?}"
         );
         assert!(error.must_reopen() && !error.may_retry());
-        // Not even a reset is written to what answers now.
+        // The driver writes not even a reset to the other design.
         let before = board.counts().register_writes;
         assert!(matches!(step(&mut accelerator, CUBES).0, Err(Error::MustReopen)));
         drop(accelerator);
@@ -284,7 +284,7 @@ fn another_bitstream_is_found_at_the_fault_and_after_the_reset() {
     }
 }
 
-/// Where the channels were, another design has nothing.
+/// Where the channels were, the other design has nothing.
 #[test]
 fn another_bitstream_without_these_channels_is_not_a_board_that_is_gone() {
     let (_, tampered, mut accelerator) = Tampered::open();
@@ -295,7 +295,7 @@ fn another_bitstream_without_these_channels_is_not_a_board_that_is_gone() {
     tampered.tamper(CONTROL, 0x100, Tamper::Value(0x1234_5678));
     let error = failed(&tampered, &mut accelerator);
     assert!(error.must_reopen());
-    // The channels did not start: found by looking at them again.
+    // The channels did not start, and the driver found it when it read their registers again.
     assert_eq!(fault_of(&error).name(), "other-bitstream", "{error:?}");
 }
 
@@ -304,12 +304,12 @@ fn a_reset_that_never_ends_leaves_all_memory_to_the_engines() {
     for core in 0..4 {
         let (board, tampered, mut accelerator) = Tampered::open();
         step(&mut accelerator, CUBES).0.expect("a good step");
-        // Checked when everything is back with the CPU, which does not make it free.
+        // The check at the end reads the bit when the CPU owns all buffers again.
         tampered.tamper(core, 0, Tamper::Set(1 << 2));
         tampered.tamper(CONTROL, 0, Tamper::Clear(2));
         let error = step(&mut accelerator, CUBES).0.expect_err("never done");
         assert!(error.must_reopen(), "{error}");
-        assert_eq!(fault_of(&error).name(), "no-done", "the cause is still told");
+        assert_eq!(fault_of(&error).name(), "no-done", "the error still names the cause");
         let reset = error.diagnosis().expect("taken down").reset.as_deref();
         let reset = reset.expect("why it failed").to_string();
         assert!(reset.contains(&format!("dma{core} MM2S")) && reset.contains("reset"), "{reset}");
@@ -343,15 +343,15 @@ fn odd(cubes: u32, interrupts: u32) -> (Result<StepReport, Error>, Accelerator, 
 #[test]
 fn interrupts_without_a_reason_cost_no_step_and_are_told_once() {
     let (result, accelerator, _) = odd(CUBES, 1);
-    assert_eq!(result.expect("one is odd").interrupts, 2);
+    assert_eq!(result.expect("one spurious interrupt costs no step").interrupts, 2);
     let told = |accelerator: &Accelerator, oddity| accelerator.device.oddities.told(oddity);
     assert!(told(&accelerator, Anomaly::SpuriousInterrupt));
     assert!(!told(&accelerator, Anomaly::InterruptStorm));
 
-    // A step that takes longer than the storm is endured.
+    // A step that takes longer than the storm survives it.
     let (result, mut accelerator, tampered) = odd(2_000, 10_000);
     let accesses = |report: StepReport| report.register_reads + report.register_writes;
-    let during = accesses(result.expect("a storm is odd"));
+    let during = accesses(result.expect("a storm costs no step"));
     assert!(told(&accelerator, Anomaly::InterruptStorm));
     assert!(!told(&accelerator, Anomaly::LateStatus));
     // Eight status registers and a few more at each interrupt, and no thousand of them.
@@ -377,7 +377,7 @@ fn a_step_is_taken_again_if_it_may_be_and_gives_the_same_bits() {
     let (result, bodies) = again(&mut accelerator, 1);
     let (report, after) = (result.expect("taken again"), board.counts());
     assert_eq!(report.retries, 1);
-    // Of both attempts, and of the reset between them.
+    // The report counts both attempts, and the reset between them.
     assert_eq!(report.register_reads, after.register_reads - before.register_reads);
     assert_eq!(report.register_writes, after.register_writes - before.register_writes);
     assert!(report.register_reads + report.register_writes > 2 * 38);
@@ -399,7 +399,8 @@ fn a_diagnosis_holds_the_last_accesses_and_every_channel() {
     assert!(matches!(&error, Error::Step { aftermath: Aftermath::Ready, .. }));
     let diagnosis = error.diagnosis().expect("taken down");
     assert_eq!(diagnosis.accesses.len(), 64);
-    // The status that showed it is the last of the channel's that was read, or the acknowledgement.
+    // The last access to the channel is the status read that showed the error, or its
+    // acknowledgement.
     let accesses: Vec<_> = diagnosis.accesses.iter().map(ToString::to_string).collect();
     assert!(
         accesses.iter().any(|line| line.contains("dma2 MM2S DMASR") && line.contains("DMADecErr"))
@@ -414,7 +415,7 @@ fn a_diagnosis_holds_the_last_accesses_and_every_channel() {
     assert_eq!(diagnosis.phase, Phase::Load);
 }
 
-/// Without a board there is nothing to take down.
+/// Without a board there is no diagnosis.
 #[test]
 fn what_the_board_has_no_part_in_has_no_diagnosis() {
     let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");

@@ -1,5 +1,5 @@
-//! This file tests steps that nobody waits for, callers that panic, and boards side by side, on a
-//! board that goes dead at the first thing that the driver does wrong.
+//! Tests dropped and forgotten steps, callers that panic, and boards side by side. The board goes
+//! dead at the driver's first mistake.
 
 use std::cell::Cell;
 use std::mem::ManuallyDrop;
@@ -27,7 +27,8 @@ pub(crate) fn windowed() -> BoardConfig {
     BoardConfig { profile, ..BoardConfig::default() }
 }
 
-/// A whole step gives the bits of an undisturbed one, twice, and the driver did nothing wrong.
+/// Checks that two whole steps give the bits of undisturbed ones, and that the driver made no
+/// mistake.
 pub(crate) fn assert_works(board: &EmulatedBoard, accelerator: &mut Accelerator, after: &str) {
     for _ in 0..2 {
         let (mut bodies, collisions) = scene(CUBES);
@@ -39,7 +40,7 @@ pub(crate) fn assert_works(board: &EmulatedBoard, accelerator: &mut Accelerator,
     assert_eq!(board.violations(), [], "{after}");
 }
 
-/// Starts a step and lets the board work on it for so many clocks.
+/// Starts a step and lets the board work on it for `clocks` clocks.
 fn start<'a>(
     board: &EmulatedBoard,
     accelerator: &'a mut Accelerator,
@@ -83,7 +84,8 @@ fn a_step_dropped_at_any_moment_is_stopped_and_the_next_one_works() {
         let before = board.counts().cycles;
         drop(start(&board, &mut accelerator, clocks));
         let took = board.counts().cycles - before - clocks;
-        // The four resets and their looks, not the step's deadline: a tenth of a millisecond.
+        // The time of four resets and their polls, not the step's deadline: a tenth of a
+        // millisecond.
         assert!(took < u64::from(FLOAT.clock_khz) / 10, "{took} clocks to stop at {clocks}");
         assert_works(&board, &mut accelerator, &format!("dropped after {clocks} clocks"));
     }
@@ -122,13 +124,13 @@ fn a_step_that_was_forgotten_is_stopped_by_the_next_call() {
         let _forgotten = ManuallyDrop::new(start(&board, &mut accelerator, clocks));
         assert_works(&board, &mut accelerator, &after);
 
-        // The shapes are loaded into a board that stands still.
+        // The shapes are loaded into a board that has been stopped.
         let _forgotten = ManuallyDrop::new(start(&board, &mut accelerator, clocks));
         let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
         accelerator.set_shapes(&shapes).expect("shapes that fit");
         assert_works(&board, &mut accelerator, &after);
 
-        // Nobody calls any more; whoever opens the board next finds it stopped.
+        // The driver makes no further call. The next opening of the board stops it.
         let _forgotten = ManuallyDrop::new(start(&board, &mut accelerator, clocks));
         drop(accelerator);
         let moved = board.counts().beats_read + board.counts().beats_written;
@@ -159,7 +161,7 @@ fn results_are_not_put_into_other_bodies() {
     }
 }
 
-/// A caller's container that panics when it is asked for the last time that it allows.
+/// A caller's container that panics at the last call that it allows.
 #[derive(Debug)]
 pub(crate) struct Panicking<'a, T> {
     pub(crate) inner: T,
@@ -206,7 +208,7 @@ impl Collisions for Panicking<'_, Vec<Collision>> {
     }
 }
 
-/// The step of a small scene whose containers panic at the call of that number; whether they did.
+/// Runs a small scene whose containers panic at call number `call`. Returns whether they panicked.
 fn panics_at(accelerator: &mut Accelerator, call: u32, order: Option<Order>) -> bool {
     let left = AtomicU32::new(call);
     let (bodies, collisions) = scene(3);
@@ -247,7 +249,7 @@ fn a_panic_in_any_call_of_the_callers_containers_leaves_a_working_accelerator() 
             assert_eq!(bits(&bodies), bits(&expected), "call {call}");
             call += 1;
         }
-        // Each of four bodies and three collisions is looked at more than once.
+        // Packing reads each of the four bodies and three collisions more than once.
         assert!(call > 20, "{call} calls");
         assert_eq!(board.violations(), []);
     }
@@ -256,7 +258,7 @@ fn a_panic_in_any_call_of_the_callers_containers_leaves_a_working_accelerator() 
 #[test]
 fn whoever_opens_a_board_that_runs_stops_it_before_memory_is_touched() {
     let (board, mut accelerator) = open(BoardConfig::default());
-    // As after a SIGKILL: nobody waits for it, nobody takes anything back.
+    // As after a SIGKILL: the step is not waited for, and its buffers are not taken back.
     let _left = ManuallyDrop::new(start(&board, &mut accelerator, 1_000));
     assert!(board.is_running());
     let wired = BadlyWired::new(&board);
@@ -291,12 +293,12 @@ fn a_step_is_cancelled_while_the_board_stalls_and_changes_nothing() {
         let Error::Step { fault, aftermath, .. } = &error else { panic!("{error}") };
         assert!(matches!(**fault, Fault::Cancelled), "{fault}");
         assert_eq!(*aftermath, Aftermath::Ready);
-        // At the next look, of an hour.
+        // The cancellation takes effect at the next poll, which covers an hour.
         let took = board.cpu_port().now() - before;
         assert!(took < Duration::from_millis(u64::from(waits) * 10 + 5), "{took:?}");
         assert!(!board.is_running());
 
-        // It holds for the next step, which is not even begun.
+        // It also holds for the next step, which does not even start.
         let counts = board.counts();
         let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("still");
         let Error::Step { fault, aftermath, .. } = &error else { panic!("{error}") };
@@ -310,7 +312,7 @@ fn a_step_is_cancelled_while_the_board_stalls_and_changes_nothing() {
 
 #[test]
 fn a_step_that_may_be_cancelled_and_is_not_is_the_same_step() {
-    // One that takes more than one look: a slow pipeline.
+    // A slow pipeline, whose step takes more than one poll.
     let config = BoardConfig {
         profile: Profile::by_name("naive").expect("a profile"),
         bandwidth: Bandwidth::BytesPerSecond(100_000_000),
@@ -331,15 +333,16 @@ fn a_step_that_may_be_cancelled_and_is_not_is_the_same_step() {
         let accesses = report.register_reads + report.register_writes;
         (report.cycles, (report.cycles.work, report.interrupts, accesses, bits(&bodies)))
     });
-    let looks = u64::from(config.profile.clock_khz) * 10;
-    assert!(reports[0].0.total > 2 * looks, "{} cycles", reports[0].0.total);
+    let polls = u64::from(config.profile.clock_khz) * 10;
+    assert!(reports[0].0.total > 2 * polls, "{} cycles", reports[0].0.total);
     assert!(reports[0].1 == reports[1].1);
-    // The emulated board looks at its starving streams when a wait ends, too: a few clocks.
+    // The emulated board checks its starving streams at the end of a wait, too, which costs a few
+    // clocks.
     let differ = reports[0].0.total.abs_diff(reports[1].0.total);
     assert!(differ < 100, "{:?} and {:?}", reports[0].0, reports[1].0);
 }
 
-/// Steps of two scenes of its own size on its own board; the bits after each.
+/// Runs steps of two scenes of this accelerator's own size. Returns the bits after each.
 fn steps(cubes: u32, accelerator: &mut Accelerator) -> Vec<Vec<u32>> {
     let (mut bodies, collisions) = scene(cubes);
     let step = |_| {
@@ -355,7 +358,7 @@ fn steps(cubes: u32, accelerator: &mut Accelerator) -> Vec<Vec<u32>> {
 fn two_boards_in_one_process_do_not_know_of_each_other() {
     let alone = [7, 30].map(|cubes| steps(cubes, &mut open(BoardConfig::default()).1));
 
-    // Alternately, each in flight while the other works.
+    // The two boards alternate, each with a step in flight while the other works.
     let (left_board, mut left) = open(BoardConfig::default());
     let (right_board, mut right) = open(windowed());
     let right_alone = steps(30, &mut open(windowed()).1);

@@ -1,8 +1,9 @@
-//! Whole steps whose buffers lie in the memory of a real board, as far as files can be one.
+//! Tests whole steps whose buffers lie in the memory of a real board, as far as files can stand for
+//! one.
 //!
-//! The registers, the descriptors and the engines are the emulated board's. In between stand the
-//! pool, the region and the mapping of a real board: what the emulated engines read was taken from
-//! the file behind the mapping, and what they wrote is put there.
+//! The emulated board supplies the registers, the descriptors and the engines. Between it and the
+//! driver lie the pool, the region and the mapping of a real board: the emulated engines read from
+//! the file behind the mapping, and write to it.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -25,7 +26,7 @@ use crate::{Accelerator, Aftermath, Error, Fault, InputError, Outcome, Shape, St
 const BASE: u64 = 0x6000_0000;
 const BYTES: u64 = 1 << 20;
 
-/// A piece: where it lies in the real board's memory, how long it is, what the device does with it.
+/// A buffer: its address in the real board's memory, its length, and the device's access to it.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     real: u64,
@@ -38,7 +39,7 @@ struct Piece {
 struct Composed {
     engines: EmulatedPlatform,
     memory: HardwarePlatform,
-    /// What the device sees of the real memory.
+    /// The device's view of the real memory.
     physical: File,
     pieces: Mutex<BTreeMap<u64, Piece>>,
     /// The emulated board's own buffers while the CPU has the real ones.
@@ -193,7 +194,7 @@ fn steps_through_the_memory_of_a_real_board_give_the_same_bits() {
         }
         drop(accelerator);
         assert_eq!(board.violations(), []);
-        // Everything came back to the pool, in one piece.
+        // The pool has all its memory back, in one piece.
         let whole = usize::try_from(BYTES / 16).expect("fits");
         platform.memory.allocate(whole).expect("all of it is free");
     }
@@ -229,7 +230,7 @@ fn the_self_test_passes_through_the_memory_of_a_real_board_and_says_when_it_is_t
         assert_eq!(board.violations(), []);
         let whole = usize::try_from(BYTES / 16).expect("fits");
         platform.memory.allocate(whole).expect("all of it came back");
-        // Now there is none left.
+        // The pool is empty now.
         let report = check_found(found(&platform), None).expect("reachable");
         let echo = report.lines.iter().find(|line| line.name == "echo").expect("it");
         assert!(
@@ -245,7 +246,7 @@ fn memory_that_is_too_small_is_an_error_and_a_smaller_step_still_works() {
     let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
     let choice = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
     let platform = Arc::new(Composed::new(&board, &choice));
-    // What is left takes three cubes.
+    // The rest of the memory takes three cubes.
     platform.memory.allocate(usize::try_from((BYTES - 8192) / 16).expect("fits")).expect("room");
     let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
     let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
@@ -293,7 +294,7 @@ fn steps_prepared_through_the_memory_of_a_real_board_give_the_same_bits() {
             assert_eq!(bits(&bodies), undisturbed(now), "{choice:?}, {now} cubes before {next}");
             flight = started.expect("starts");
         }
-        // One in flight, and one in the other bank.
+        // One step in flight, and one in the other bank.
         drop(flight.prepare(&bodies, &collisions, &parameters).expect("there is room"));
         drop(flight);
         drop(accelerator);
@@ -305,7 +306,7 @@ fn steps_prepared_through_the_memory_of_a_real_board_give_the_same_bits() {
 
 #[test]
 fn memory_for_one_bank_takes_steps_that_are_not_prepared() {
-    // Room for a step of 40 cubes, and not for two.
+    // The memory takes one step of 40 cubes, and not two.
     let choice = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
     let (board, _platform, mut accelerator) = composed(&choice, BYTES - 16_384);
     let parameters = StepParameters::default();
@@ -341,7 +342,7 @@ fn memory_of_a_prepared_step_goes_to_one_that_cannot_do_without() {
     assert_eq!(board.violations(), []);
 }
 
-/// An open board with the memory of a real one, of which so much is in use.
+/// An open board with the memory of a real one, with `in_use` bytes taken.
 fn composed(choice: &MemoryChoice, in_use: u64) -> (EmulatedBoard, Arc<Composed>, Accelerator) {
     let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
     let platform = Arc::new(Composed::new(&board, choice));

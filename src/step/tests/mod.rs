@@ -1,4 +1,4 @@
-//! Whole steps on the emulated board, which goes dead at the first thing that the driver does wrong.
+//! Tests whole steps on the emulated board, which goes dead at the driver's first mistake.
 mod fault;
 mod life;
 mod memory;
@@ -18,7 +18,6 @@ use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, 
 use pgs_interface::control::ErrorCode;
 use pgs_interface::profile::PROFILES;
 
-use crate::Direction as Way;
 use crate::board::open::{BoardDescription, BoardKind, Found};
 use crate::platform::{
     Access, DmaMemory, EmulatedPlatform, Platform, PlatformError, RegisterWindow, SharedMemory,
@@ -73,7 +72,7 @@ pub(super) fn bits(bodies: &[Body]) -> Vec<u32> {
     bodies.iter().flat_map(numbers).map(f32::to_bits).collect()
 }
 
-/// One step of a fresh scene.
+/// Runs one step of a fresh scene.
 pub(super) fn step(
     accelerator: &mut Accelerator,
     cubes: u32,
@@ -105,7 +104,7 @@ fn a_step_stops_the_cubes_and_leaves_the_ground() {
     assert_eq!(board.violations(), []);
 }
 
-/// A step has megabytes, for which a line of a log has no use.
+/// A step has megabytes, which would flood a log.
 #[test]
 fn what_an_accelerator_prints_for_debugging_is_no_longer_after_a_longer_step() {
     let printed = |cubes| {
@@ -116,7 +115,7 @@ fn what_an_accelerator_prints_for_debugging_is_no_longer_after_a_longer_step() {
     let (short, long) = (printed(5), printed(500));
     assert!(short.contains("emulated") && short.contains("collisions: 5,"), "{short}");
     assert!(long.contains("collisions: 500,"), "{long}");
-    // Numbers have more digits there.
+    // The numbers of a large step have more digits.
     assert!(long.len() < short.len() + 100, "{} and {} characters", short.len(), long.len());
 }
 
@@ -191,7 +190,8 @@ fn bodies_without_collisions_and_collisions_without_passes_are_steps_too() {
     assert_eq!(bits(&bodies), before, "nothing solved, nothing integrated");
 }
 
-/// Sixteen bits round the pose of a cube at 2.2 m; that of the caller is not theirs to change.
+/// The stream's sixteen bits would round the pose of a cube at 2.2 m; the caller's own pose must
+/// stay.
 #[test]
 fn without_integration_every_profile_leaves_the_poses_as_they_are() {
     let parameters = StepParameters { integrate: false, ..StepParameters::default() };
@@ -209,7 +209,7 @@ fn without_integration_every_profile_leaves_the_poses_as_they_are() {
     }
 }
 
-/// The velocity in y with which a ball leaves a step that it enters with `speed`, where the distance of its
+/// The velocity in y of a ball after a step that it enters with `speed`. The distance of its
 /// contact with the ground stands for a velocity.
 fn after_contact(speed: f32, distance: f32) -> f32 {
     let (_, mut accelerator) = open(BoardConfig::default());
@@ -227,11 +227,11 @@ fn after_contact(speed: f32, distance: f32) -> f32 {
 #[test]
 fn a_distance_is_a_velocity_where_the_coefficient_is_the_time_step() {
     for (speed, distance, expected) in [
-        // Pushed apart at least so fast.
+        // Bodies part with at least this velocity.
         (0.0, -2.0, 2.0),
         (-7.0, -2.0, 2.0),
         (5.0, -2.0, 5.0),
-        // It may approach so fast, and no faster.
+        // Bodies may approach with this velocity, and not faster.
         (-7.0, 3.0, -3.0),
         (-2.5, 3.0, -2.5),
         (-7.0, 0.0, 0.0),
@@ -259,8 +259,8 @@ fn refused_input_reaches_no_register() {
     assert_eq!(bits(&bodies), as_before);
 }
 
-/// Provokes a fault in a step, and checks that it changes nothing and that the next step is as if
-/// it had not been.
+/// Injects a fault into a step. Checks that it changes nothing, and that the next step is
+/// undisturbed.
 fn survives(injected: Injected, seen: impl Fn(&Fault) -> bool) {
     let (board, mut accelerator) = open(BoardConfig::default());
     step(&mut accelerator, 20).0.expect("before the fault");
@@ -281,14 +281,6 @@ fn survives(injected: Injected, seen: impl Fn(&Fault) -> bool) {
     assert_eq!(board.violations(), [], "after {injected:?}");
 }
 
-/// The driver's word for a direction.
-fn way_of(direction: Direction) -> Way {
-    match direction {
-        Direction::Mm2s => Way::Mm2s,
-        Direction::S2mm => Way::S2mm,
-    }
-}
-
 const BOTH: [Direction; 2] = [Direction::Mm2s, Direction::S2mm];
 
 #[test]
@@ -297,7 +289,7 @@ fn a_decode_error_on_any_channel_is_told_by_name_and_survived() {
         for direction in BOTH {
             survives(Injected::new(FaultKind::DmaDecErr).on(core, direction), |fault| {
                 let Fault::DmaDecode(at) = fault else { return false };
-                (at.channel.core, at.channel.direction) == (core, way_of(direction))
+                (at.channel.core, at.channel.direction) == (core, direction)
                     && at.descriptor.is_some_and(|descriptor| descriptor.status.failed())
             });
         }
@@ -325,29 +317,30 @@ fn every_sticky_error_of_the_accelerator_is_decoded_and_survived() {
     }
 }
 
-/// The emulated board behind bad wiring.
+/// An emulated board behind bad wiring.
 #[derive(Debug)]
 pub(super) struct BadlyWired {
     inner: EmulatedPlatform,
     /// Interrupts never arrive.
-    deaf: AtomicBool,
-    /// Waits for the interrupt until the caller cancels in the middle of one; 0 for never.
+    interrupts_lost: AtomicBool,
+    /// The number of the wait for an interrupt in which the caller cancels; 0 for no wait.
     pub(super) cancel_at: AtomicU32,
     pub(super) cancellation: Cancellation,
-    /// Flips this bit of the first word of the next buffer that goes to, or comes from, the device.
-    flip_going: AtomicU32,
-    flip_coming: AtomicU32,
-    /// Every register write: region (the control block is 4), offset. Memory that is allocated or
-    /// handed over is region 5.
+    /// Flips this bit of the first word of the next buffer that goes to the device, or comes from
+    /// it.
+    flip_to_device: AtomicU32,
+    flip_from_device: AtomicU32,
+    /// Every register write: region (the control block is 4) and offset. An allocation of memory,
+    /// or its hand-over, counts as region 5.
     pub(super) writes: Writes,
 }
 
-/// The region that stands for memory.
+/// The region number that stands for memory.
 pub(super) const MEMORY: usize = 5;
 
 type Writes = Arc<Mutex<Vec<(usize, u32)>>>;
 
-/// A register region that notes what is written.
+/// A register region that records all writes.
 #[derive(Debug)]
 struct Noted {
     inner: Box<dyn RegisterWindow>,
@@ -378,11 +371,11 @@ impl BadlyWired {
     pub(super) fn new(board: &EmulatedBoard) -> Arc<Self> {
         Arc::new(Self {
             inner: EmulatedPlatform::new(board.cpu_port()),
-            deaf: AtomicBool::default(),
+            interrupts_lost: AtomicBool::default(),
             cancel_at: AtomicU32::default(),
             cancellation: Cancellation::new(),
-            flip_going: AtomicU32::default(),
-            flip_coming: AtomicU32::default(),
+            flip_to_device: AtomicU32::default(),
+            flip_from_device: AtomicU32::default(),
             writes: Writes::default(),
         })
     }
@@ -432,7 +425,7 @@ impl Platform for BadlyWired {
         access: Access,
     ) -> Result<(), PlatformError> {
         if access == Access::Read {
-            memory.beats_mut()[0].0[0] ^= self.flip_going.swap(0, Ordering::Relaxed);
+            memory.beats_mut()[0].0[0] ^= self.flip_to_device.swap(0, Ordering::Relaxed);
         }
         self.note_memory();
         self.inner.hand_over(address, memory, used, access)
@@ -440,7 +433,7 @@ impl Platform for BadlyWired {
 
     fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
         let mut memory = self.inner.take_back(address)?;
-        memory.beats_mut()[0].0[0] ^= self.flip_coming.swap(0, Ordering::Relaxed);
+        memory.beats_mut()[0].0[0] ^= self.flip_from_device.swap(0, Ordering::Relaxed);
         Ok(memory)
     }
 
@@ -464,7 +457,7 @@ impl Platform for BadlyWired {
                 self.cancellation.cancel();
             }
         }
-        if !self.deaf.load(Ordering::Relaxed) {
+        if !self.interrupts_lost.load(Ordering::Relaxed) {
             return self.inner.wait_interrupt(timeout);
         }
         self.inner.pause(timeout);
@@ -481,7 +474,7 @@ fn without_interrupts_steps_are_found_by_looking_and_soon_more_often() {
     let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
     let wired = BadlyWired::new(&board);
     let mut accelerator = wired.open();
-    wired.deaf.store(true, Ordering::Relaxed);
+    wired.interrupts_lost.store(true, Ordering::Relaxed);
     let mut times = Vec::new();
     for _ in 0..4 {
         let before = wired.now();
@@ -490,11 +483,11 @@ fn without_interrupts_steps_are_found_by_looking_and_soon_more_often() {
         assert_eq!(bits(&bodies), undisturbed(20));
         times.push(wired.now() - before);
     }
-    // At first one polling interval, then no longer relying on the interrupt.
+    // The first step takes one polling interval; later steps no longer rely on the interrupt.
     assert!(times[0] >= Duration::from_millis(10) && times[0] < Duration::from_millis(12));
     assert!(times[3] < Duration::from_millis(2), "{times:?}");
-    // The interrupt comes back: relied on again.
-    wired.deaf.store(false, Ordering::Relaxed);
+    // The interrupt comes back, and the driver relies on it again.
+    wired.interrupts_lost.store(false, Ordering::Relaxed);
     step(&mut accelerator, 20).0.expect("a step");
     let report = step(&mut accelerator, 20).0.expect("a step");
     assert_eq!((report.interrupts, report.register_reads + report.register_writes), (1, 38));
@@ -509,7 +502,8 @@ fn receivers_start_before_the_accelerator_and_it_before_the_senders() {
     step(&mut accelerator, 20).0.expect("the first step");
     wired.writes.lock().expect("unpoisoned").clear();
     step(&mut accelerator, 20).0.expect("a step");
-    // Low word, then the upper word, which starts; last the acknowledgement of the completion.
+    // The low word, then the upper word, which starts the engine; last the acknowledgement of the
+    // completion.
     let tails = |low, high| (0..4).flat_map(move |core| [(core, low), (core, high)]);
     let expected: Vec<_> =
         tails(0x40, 0x44).chain([(4, 0x00)]).chain(tails(0x10, 0x14)).chain([(3, 0x34)]).collect();
@@ -523,7 +517,9 @@ fn a_bit_that_flips_on_the_way_is_found_by_the_sums() {
     let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
     let wired = BadlyWired::new(&board);
     let mut accelerator = wired.open();
-    for (flip, way) in [(&wired.flip_going, Way::Mm2s), (&wired.flip_coming, Way::S2mm)] {
+    for (flip, way) in
+        [(&wired.flip_to_device, Direction::Mm2s), (&wired.flip_from_device, Direction::S2mm)]
+    {
         flip.store(1 << 4, Ordering::Relaxed);
         let (result, bodies) = step(&mut accelerator, 20);
         let error = result.expect_err("a flipped bit");

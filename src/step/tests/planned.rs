@@ -1,4 +1,4 @@
-//! Faults that the emulated board is told to have, and what the driver makes of them.
+//! Tests the driver's reaction to faults that the emulated board has by configuration.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use super::{bits, open, scene, step, undisturbed};
 use crate::board::anomalies::Anomaly;
 use crate::{ChannelState, Error, StepParameters};
 
-/// Each line with the name, the channel and the phase that are told.
+/// Each line names the fault, and the channel and the phase of the message.
 #[test]
 fn planned_faults_are_named_with_channel_and_phase() {
     let cases = [
@@ -123,7 +123,7 @@ fn a_board_that_is_lost_is_not_touched_any_more() {
     }
 }
 
-/// The chain of a larger step takes a larger ring, for which the channel must stop.
+/// The chain of a larger step needs a larger ring, and the channel must stop for it.
 #[test]
 fn a_channel_that_does_not_stop_for_its_new_ring_is_reset() {
     let config = BoardConfig { length_width: 8, ..BoardConfig::default() };
@@ -138,7 +138,7 @@ fn a_channel_that_does_not_stop_for_its_new_ring_is_reset() {
     assert_eq!(board.violations(), []);
 }
 
-/// The interval is twice what the step before took, and 10 ms at least.
+/// The polling interval is twice the time of the step before, and 10 ms at least.
 #[test]
 fn an_interrupt_that_is_dropped_costs_at_most_one_polling_interval() {
     for bandwidth in [Bandwidth::ZCU102_SUSTAINED, Bandwidth::BytesPerSecond(20_000_000)] {
@@ -154,19 +154,20 @@ fn an_interrupt_that_is_dropped_costs_at_most_one_polling_interval() {
             assert_eq!(bits(&bodies), undisturbed(300));
             port.now() - before
         };
-        // The channels are started with the first step.
+        // The first step also starts the channels.
         time_of(None);
         let took = time_of(None);
         let dropped = time_of(Some("irq-drop"));
         assert_eq!(board.faults(), 1);
         let interval = (2 * took).max(Duration::from_millis(10));
-        // All registers are read once more.
+        // The driver reads all registers once more.
         assert!(dropped > took && dropped < interval + Duration::from_micros(50), "{dropped:?}");
         assert!(time_of(None) < took + Duration::from_micros(50), "relied on again");
     }
 }
 
-/// The last channel is done late in the step, another one later still: what is polled for then has the deadline too.
+/// The last channel is done late in the step, and another one later still: polling for the other
+/// one has the deadline too.
 #[test]
 fn a_channel_that_is_slow_at_the_end_is_not_waited_for_beyond_the_deadline() {
     let (board, mut accelerator) = open(BoardConfig::default());

@@ -1,5 +1,5 @@
-//! This file tests steps that are packed while another is on the board, on a board that goes dead at
-//! the first thing that the driver does wrong.
+//! Tests steps that are packed while another is on the board. The board goes dead at the driver's
+//! first mistake.
 
 use std::mem::ManuallyDrop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,14 +15,14 @@ use crate::order::Order;
 use crate::{Accelerator, Collision, Error, InFlight, InputError, Prepared, Shape, StepParameters};
 
 pub(crate) const CUBES: u32 = 20;
-/// Of the other world.
+/// Number of cubes in the other world.
 pub(crate) const OTHER: u32 = 33;
 
 pub(crate) fn parameters() -> StepParameters {
     StepParameters::default()
 }
 
-/// Starts a step of so many cubes.
+/// Starts a step of `cubes` cubes.
 pub(crate) fn submit(accelerator: &mut Accelerator, cubes: u32) -> InFlight<'_> {
     let (bodies, collisions) = scene(cubes);
     accelerator.submit(&bodies, &collisions, &parameters()).expect("a step that starts")
@@ -33,14 +33,14 @@ pub(crate) fn prepare(flight: &mut InFlight<'_>, cubes: u32) -> Prepared {
     flight.prepare(&bodies, &collisions, &parameters()).expect("a step that can be packed")
 }
 
-/// The results of a step of so many cubes are those of an undisturbed one.
+/// Checks that a step of `cubes` cubes ends with the results of an undisturbed one.
 pub(crate) fn assert_ends(flight: InFlight<'_>, cubes: u32, what: &str) {
     let (mut bodies, _) = scene(cubes);
     flight.wait(&mut bodies).unwrap_or_else(|error| panic!("{what}: {error}"));
     assert_eq!(bits(&bodies), undisturbed(cubes), "{what}");
 }
 
-/// A prepared step starts and gives the results of an undisturbed one.
+/// Checks that a prepared step starts, and that its results equal an undisturbed step's.
 pub(crate) fn assert_starts(
     accelerator: &mut Accelerator,
     prepared: &Prepared,
@@ -60,8 +60,9 @@ fn refusal(started: Result<InFlight<'_>, Error>) -> InputError {
     }
 }
 
-/// Two worlds in turn, each with its own bodies, for so many steps; the bits of both at the end.
-fn in_turn(
+/// Steps two worlds in turn, each with its own bodies, `steps` times. Returns the bits of both at
+/// the end.
+fn alternate(
     accelerator: &mut Accelerator,
     sizes: [u32; 2],
     steps: usize,
@@ -104,7 +105,7 @@ fn worlds_in_turn_give_the_bits_that_each_gives_alone() {
                 bits(&bodies)
             });
             let (board, mut accelerator) = open(config);
-            let together = in_turn(&mut accelerator, [CUBES, OTHER], 4, order);
+            let together = alternate(&mut accelerator, [CUBES, OTHER], 4, order);
             assert!(together == alone, "{} {order:?}", config.profile.name);
             drop(accelerator);
             assert_eq!(board.violations(), []);
@@ -139,8 +140,8 @@ fn the_second_bank_has_no_memory_before_a_step_is_prepared() {
     assert_eq!(banks(&accelerator), [true, true]);
 }
 
-/// A step costs the same register accesses, whether it was prepared or not: one more if the number
-/// of collisions is another than before.
+/// A prepared step costs the same register accesses as any other: one more if the number of
+/// collisions differs from the step before.
 #[test]
 fn a_prepared_step_costs_39_accesses_and_preparing_none() {
     let (board, mut accelerator) = open(BoardConfig::default());
@@ -215,7 +216,7 @@ fn a_prepared_step_outlives_the_other_however_that_ends() {
             board.cpu_port().pause(Duration::from_nanos(clocks * 1_000_000 / 275_000));
             end(flight);
             assert_starts(&mut accelerator, &prepared, OTHER, name);
-            // And again: its records are still there.
+            // It starts once more: its records are still there.
             assert_starts(&mut accelerator, &prepared, OTHER, name);
             assert_works(&board, &mut accelerator, name);
         }
@@ -231,7 +232,7 @@ fn a_prepared_step_that_is_never_started_costs_nothing() {
         assert_ends(flight, CUBES, "the other");
         assert_works(&board, &mut accelerator, "not started");
     }
-    // With a step and a prepared one in the device's hands.
+    // The device holds the buffers of a step and of a prepared one.
     let mut flight = submit(&mut accelerator, CUBES);
     let _prepared = prepare(&mut flight, OTHER);
     let _forgotten = ManuallyDrop::new(flight);
@@ -244,18 +245,18 @@ fn a_prepared_step_that_is_never_started_costs_nothing() {
 fn records_that_are_gone_are_refused_by_name() {
     let (board, mut accelerator) = open(BoardConfig::default());
     let (_, mut another) = open(BoardConfig::default());
-    // Another was prepared in its place.
+    // Another step was prepared in its place.
     let mut flight = submit(&mut accelerator, CUBES);
     let replaced = prepare(&mut flight, 5);
     let prepared = prepare(&mut flight, OTHER);
     assert_ends(flight, CUBES, "the first");
     assert_eq!(refusal(accelerator.start(&replaced)), InputError::NotPrepared);
-    // It is not this accelerator's.
+    // It belongs to another accelerator.
     assert_eq!(refusal(another.start(&prepared)), InputError::NotPrepared);
     // It stays while steps that are not prepared come and go, before it is started.
     assert_works(&board, &mut accelerator, "in between");
     assert_starts(&mut accelerator, &prepared, OTHER, "in between");
-    // Now they take its place.
+    // After its start they take its place.
     assert_works(&board, &mut accelerator, "in its place");
     assert_eq!(refusal(accelerator.start(&prepared)), InputError::NotPrepared);
     assert_works(&board, &mut accelerator, "refused");
@@ -268,7 +269,7 @@ fn other_shapes_put_an_end_to_what_was_prepared() {
     let prepared = prepare(&mut flight, OTHER);
     assert_ends(flight, CUBES, "the first");
     let one = [Shape::isotropic(1.0, 0.4)];
-    // Refused ones change nothing.
+    // Refused shapes change nothing.
     accelerator.set_shapes(&[]).expect_err("no shapes");
     assert_starts(&mut accelerator, &prepared, OTHER, "the same shapes");
     accelerator.set_shapes(&one).expect("it fits");
@@ -288,14 +289,14 @@ fn input_that_is_refused_leaves_the_step_in_flight() {
     let error = flight.prepare(&bodies, &collisions, &parameters()).expect_err("no body 4");
     assert!(error.is_input());
     assert_ends(flight, CUBES, "the first");
-    // It was looked at on its way into the buffers.
+    // Packing found the error after it had begun to fill the buffers.
     assert_eq!(refusal(accelerator.start(&prepared)), InputError::NotPrepared);
     assert_eq!(board.violations(), []);
 }
 
 #[test]
 fn steps_of_any_size_are_prepared_beside_any_other() {
-    // Short descriptors, so that rings grow too.
+    // Short descriptors, so that the rings grow too.
     let (board, mut accelerator) = open(BoardConfig { length_width: 8, ..BoardConfig::default() });
     let sizes = [1, 40, 3, 2, 90, 1, 91, 7, 7, 120];
     let mut flight = submit(&mut accelerator, sizes[0]);
@@ -314,7 +315,7 @@ fn steps_of_any_size_are_prepared_beside_any_other() {
 
 #[test]
 fn a_step_with_nothing_to_stream_is_prepared_and_started() {
-    // Where only live bodies are kept, a static body alone is nothing.
+    // Where the board keeps only live bodies, a static body alone needs no work.
     let (board, mut accelerator) = open(windowed());
     let still = vec![scene(1).0[0]];
     let none: Vec<Collision> = Vec::new();
@@ -331,7 +332,7 @@ fn a_step_with_nothing_to_stream_is_prepared_and_started() {
     drop(accelerator);
     assert_eq!(board.violations(), []);
 
-    // Nothing in flight, something prepared, and nobody goes on.
+    // With no step in flight and one prepared, the caller stops.
     let (board, mut accelerator) = open(windowed());
     let mut flight = accelerator.submit(&still, &none, &parameters()).expect("starts");
     let _prepared = flight.prepare(&bodies, &collisions, &parameters()).expect("packed");

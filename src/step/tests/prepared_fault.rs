@@ -1,4 +1,4 @@
-//! This file tests prepared steps where something fails: the board, the results, the caller's code.
+//! Tests prepared steps where the board, the results or the caller's code fails.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::AtomicU32;
@@ -37,7 +37,7 @@ fn a_step_that_fails_on_the_board_leaves_the_prepared_one() {
         assert_eq!(bits(&bodies), bits(&scene(CUBES).0));
         assert_ends(started.expect("the board was reset"), OTHER, "after a fault");
 
-        // The prepared one fails, and is started again from the records that are there.
+        // The prepared step fails, and starts again from the records that are still in memory.
         let mut flight = submit(&mut accelerator, CUBES);
         let prepared = prepare(&mut flight, OTHER);
         assert_ends(flight, CUBES, "the first");
@@ -50,7 +50,8 @@ fn a_step_that_fails_on_the_board_leaves_the_prepared_one() {
     }
 }
 
-/// Wrong words are found when the next step is on the board, which is stopped and started again.
+/// The driver finds wrong words when the next step is on the board; it stops that step and starts
+/// it again.
 #[test]
 fn results_that_arrived_wrong_are_told_and_the_next_step_is_started_again() {
     for plan in ["corrupt=1@dma0.s2mm", "corrupt=1@dma0.mm2s,phase=contact2"] {
@@ -72,7 +73,7 @@ fn results_that_arrived_wrong_are_told_and_the_next_step_is_started_again() {
 fn results_that_are_not_finite_do_not_disturb_the_next_step() {
     let (board, mut accelerator) = open(BoardConfig::default());
     let (mut bodies, collisions) = scene(CUBES);
-    // Its position overflows when it is integrated.
+    // The position overflows in the integration.
     bodies[7].pose.position[0] = f32::MAX;
     bodies[7].velocity.linear[0] = f32::MAX;
     let before = bits(&bodies);
@@ -116,7 +117,7 @@ fn a_panic_in_any_call_while_preparing_leaves_the_step_in_flight() {
             }));
             flight.wait(&mut bodies).unwrap_or_else(|error| panic!("call {calls}: {error}"));
             assert_eq!(bits(&bodies), bits(&expected), "call {calls}");
-            // Either whole or not at all.
+            // The step commits all results or none.
             match accelerator.start(&kept) {
                 Ok(flight) => {
                     let (mut bodies, _) = scene(CUBES);
@@ -139,7 +140,7 @@ fn a_panic_in_any_call_while_preparing_leaves_the_step_in_flight() {
     }
 }
 
-/// Bodies that panic when results are stored, with the next step on the board.
+/// Bodies panic while results are stored, with the next step on the board.
 #[test]
 fn a_panic_while_results_are_stored_stops_the_next_step() {
     let (board, mut accelerator) = open(BoardConfig::default());
@@ -161,7 +162,7 @@ fn a_panic_while_results_are_stored_stops_the_next_step() {
         }
         reads += 1;
     }
-    // Each is stored; read are only those that never move.
+    // Every body is stored; only static ones are read.
     assert!(reads > CUBES, "{reads} calls");
     assert_works(&board, &mut accelerator, "panics");
 }

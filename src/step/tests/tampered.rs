@@ -1,5 +1,5 @@
-//! This file is the emulated board with somebody at its wires, for tests: what registers read, what is
-//! written to them, the words of the descriptors, and interrupts.
+//! The emulated board with a fault injector between it and the driver. Tests change register
+//! values, register writes, descriptor words and interrupts.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -16,43 +16,45 @@ use crate::platform::{
     Access, DmaMemory, EmulatedPlatform, Platform, PlatformError, RegisterWindow, SharedMemory,
 };
 
-/// The control block among the regions.
+/// The number of the control block among the regions.
 pub(crate) const CONTROL: usize = 4;
 
-/// What is done to a register as it is read.
+/// The change to a register's value when it is read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Tamper {
     /// These bits read 1.
     Set(u32),
     /// These bits read 0.
     Clear(u32),
-    /// It reads this.
+    /// The register reads this value.
     Value(u32),
     /// These bits read 0 the next time.
     ClearOnce(u32),
 }
 
-/// What is done to the descriptors each time when a wait for the interrupt is over.
+/// Changes the descriptors at the end of each wait for the interrupt.
 type Hook = Box<dyn FnMut(&Descriptors<'_>) + Send>;
 
-/// The wires.
+/// The state of the fault injector.
 #[derive(Default)]
 pub(crate) struct Wires {
     pub(crate) reads: BTreeMap<(usize, u32), Tamper>,
     pub(crate) after_wait: Option<Hook>,
     shared: Vec<Arc<[AtomicU32]>>,
-    /// Addresses of memory that was given back.
+    /// Addresses of memory that was freed.
     pub(crate) released: Vec<u64>,
-    /// Interrupts without a source that are still to come, each when the one before is let through.
+    /// Interrupts without a source that are still to come, each after the driver unmasks the one
+    /// before.
     pub(crate) storm: u32,
     masked: bool,
-    /// What a look at the clock takes.
-    pub(crate) look: Duration,
-    /// How long a wait for the interrupt takes at most, and finds none: as without one.
-    pub(crate) patience: Option<Duration>,
+    /// The time that a read of the clock takes.
+    pub(crate) clock_read: Duration,
+    /// The longest wait for the interrupt; it then ends without one.
+    pub(crate) wait_limit: Option<Duration>,
 }
 
-/// The rings of descriptors, in the order in which the driver makes them: MM2S and S2MM of each core.
+/// The rings of descriptors, in the order in which the driver makes them: MM2S and S2MM of each
+/// core.
 pub(crate) struct Descriptors<'a>(&'a [Arc<[AtomicU32]>]);
 
 impl Descriptors<'_> {
@@ -63,7 +65,7 @@ impl Descriptors<'_> {
     }
 }
 
-/// The emulated board behind these wires.
+/// The emulated board behind the fault injector.
 pub(crate) struct Tampered {
     inner: EmulatedPlatform,
     wires: Arc<Mutex<Wires>>,
@@ -80,7 +82,7 @@ fn lock(wires: &Mutex<Wires>) -> MutexGuard<'_, Wires> {
 }
 
 impl Tampered {
-    /// A default board, opened.
+    /// Opens a default board.
     pub(crate) fn open() -> (EmulatedBoard, Arc<Self>, Accelerator) {
         let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
         let inner = EmulatedPlatform::new(board.cpu_port());
@@ -103,18 +105,18 @@ impl Tampered {
         lock(&self.wires)
     }
 
-    /// Tampers with a register of a region.
+    /// Changes a register of a region from now on.
     pub(crate) fn tamper(&self, region: usize, at: u32, with: Tamper) {
         self.wires().reads.insert((region, at), with);
     }
 
-    /// Does this to the descriptors after every wait.
+    /// Runs `hook` on the descriptors after every wait.
     pub(crate) fn after_wait(&self, hook: impl FnMut(&Descriptors<'_>) + Send + 'static) {
         self.wires().after_wait = Some(Box::new(hook));
     }
 
-    /// Takes the hands off.
-    pub(crate) fn leave(&self) {
+    /// Ends all changes.
+    pub(crate) fn restore(&self) {
         let mut wires = self.wires();
         wires.reads.clear();
         wires.after_wait = None;
@@ -125,7 +127,7 @@ impl Tampered {
     }
 }
 
-/// A register region behind the wires.
+/// A register region behind the fault injector.
 struct Wired {
     inner: Box<dyn RegisterWindow>,
     region: usize,
@@ -204,7 +206,7 @@ impl Platform for Tampered {
     }
 
     fn now(&self) -> Duration {
-        self.inner.pause(self.wires().look);
+        self.inner.pause(self.wires().clock_read);
         self.inner.now()
     }
 
@@ -213,9 +215,9 @@ impl Platform for Tampered {
     }
 
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
-        let patience = self.wires().patience;
-        if let Some(patience) = patience {
-            self.inner.pause(patience.min(timeout));
+        let wait_limit = self.wires().wait_limit;
+        if let Some(wait_limit) = wait_limit {
+            self.inner.pause(wait_limit.min(timeout));
             return Ok(None);
         }
         let (masked, stormy) = {

@@ -1,5 +1,5 @@
-//! This file tests how a step waits: with interrupts that are late, missing or without end, clocks
-//! that are slow, callers that are slow, and what is said when a wait ends badly.
+//! Tests how a step waits: with late, missing or endless interrupts, with slow clocks and slow
+//! callers, and the errors when a wait ends badly.
 
 use std::time::Duration;
 
@@ -17,15 +17,15 @@ use crate::{Aftermath, Cancellation, Error, InputError, StepParameters};
 const DMASR: u32 = 0x04;
 const S2MM: u32 = 0x30;
 
-/// With a deadline far behind whatever happens.
-fn patient() -> StepParameters {
+/// Parameters with a deadline that no step here reaches.
+fn long_deadline() -> StepParameters {
     StepParameters { deadline: Some(Duration::from_secs(10)), ..StepParameters::default() }
 }
 
 #[test]
 fn a_look_that_takes_its_time_is_not_a_status_that_is_late() {
     let (board, tampered, mut accelerator) = Tampered::open();
-    tampered.wires().look = Duration::from_micros(20);
+    tampered.wires().clock_read = Duration::from_micros(20);
     let (result, bodies) = step(&mut accelerator, CUBES);
     result.expect("only slow");
     assert_eq!(bits(&bodies), undisturbed(CUBES));
@@ -40,10 +40,10 @@ fn a_platform_without_an_interrupt_lets_the_driver_look_though_it_may_be_cancell
         if let Some(cancellation) = cancellation {
             accelerator.set_cancellation(cancellation);
         }
-        tampered.wires().patience = Some(Duration::from_millis(1));
+        tampered.wires().wait_limit = Some(Duration::from_millis(1));
         let before = board.cpu_port().now();
         let (mut bodies, collisions) = scene(CUBES);
-        accelerator.step(&mut bodies, &collisions, &patient()).expect("found by looking");
+        accelerator.step(&mut bodies, &collisions, &long_deadline()).expect("found by looking");
         let took = board.cpu_port().now() - before;
         assert!(took < Duration::from_millis(2), "{took:?}");
     }
@@ -53,20 +53,20 @@ fn a_platform_without_an_interrupt_lets_the_driver_look_though_it_may_be_cancell
 fn what_the_caller_does_meanwhile_is_not_what_a_step_takes() {
     let (board, mut accelerator) = open(BoardConfig::default());
     let (mut bodies, collisions) = scene(CUBES);
-    let flight = accelerator.submit(&bodies, &collisions, &patient()).expect("it starts");
+    let flight = accelerator.submit(&bodies, &collisions, &long_deadline()).expect("it starts");
     board.cpu_port().pause(Duration::from_secs(1));
     flight.wait(&mut bodies).expect("long over");
 
     board.inject(Injected::new(FaultKind::IrqDrop));
     let before = board.cpu_port().now();
     let (mut bodies, collisions) = scene(CUBES);
-    accelerator.step(&mut bodies, &collisions, &patient()).expect("found by looking");
+    accelerator.step(&mut bodies, &collisions, &long_deadline()).expect("found by looking");
     let took = board.cpu_port().now() - before;
     assert!(accelerator.device.oddities.told(Anomaly::MissedInterrupt));
     assert!(took < Duration::from_millis(12), "{took:?}");
 }
 
-/// Found complete after the registers were read, and before the descriptors were.
+/// The step becomes complete between the driver's reads of registers and of descriptors.
 #[test]
 fn a_completion_that_was_not_seen_is_not_left_to_the_next_step() {
     let (board, tampered, mut accelerator) = Tampered::open();
@@ -82,7 +82,8 @@ fn a_completion_that_was_not_seen_is_not_left_to_the_next_step() {
     assert_eq!(board.violations(), []);
 }
 
-/// Their interrupt bit stands, as the error interrupt of a channel does until its reset.
+/// The interrupt bits of the channels stay set, as the error interrupt of a channel does until its
+/// reset.
 #[test]
 fn interrupts_that_end_nothing_are_a_storm_though_a_channel_asks_for_them() {
     let (board, tampered, mut accelerator) = Tampered::open();
@@ -96,7 +97,7 @@ fn interrupts_that_end_nothing_are_a_storm_though_a_channel_asks_for_them() {
     let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("it stalls");
     assert_eq!(fault_of(&error).name(), "deadline");
     assert!(accelerator.device.oddities.told(Anomaly::InterruptStorm));
-    // One more is taken after the reset.
+    // The driver takes one more after the reset.
     let taken = u32::MAX - tampered.wires().storm;
     assert!((16..=17).contains(&taken), "{taken}");
 }

@@ -1,5 +1,5 @@
-//! This file tests steps whose collisions are written one after the other, on a board that goes dead
-//! at the first thing that the driver does wrong.
+//! Tests steps whose collisions are written one after the other. The board goes dead at the
+//! driver's first mistake.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -24,7 +24,7 @@ fn push_all(collisions: &[Collision]) -> impl FnOnce(&mut Writer<'_>) {
     |records| collisions.iter().for_each(|it| records.push(it))
 }
 
-/// Packs a step with all collisions written.
+/// Packs a step, and writes all its collisions.
 fn write(
     accelerator: &mut Accelerator,
     bodies: &[Body],
@@ -40,7 +40,7 @@ fn refusal(written: Result<Prepared, Error>) -> InputError {
     }
 }
 
-/// The next step is as any other.
+/// Checks that the next step is undisturbed.
 fn assert_works(accelerator: &mut Accelerator, what: &str) {
     let (mut bodies, collisions) = scene(CUBES);
     accelerator.step(&mut bodies, &collisions, &parameters()).expect(what);
@@ -79,7 +79,7 @@ fn written_collisions_are_those_given_at_once() {
                 (count as u64, at_once.bytes_to_device, at_once.cycles, at_once.impulse_sum),
                 "{what}"
             );
-            // And once more.
+            // The step starts once more.
             let mut again = given.clone();
             accelerator.start(&written).expect(&what).wait(&mut again).expect(&what);
             assert_eq!(bits(&again), bits(&expected), "{what}");
@@ -103,7 +103,8 @@ fn what_is_refused_is_what_is_refused_at_once() {
         for spoil in wrong {
             let mut collisions = collisions.clone();
             spoil(&mut collisions[index]);
-            // Of several the first is told, and none of those behind is written.
+            // The driver names the first of several errors, and writes none of the collisions
+            // behind it.
             collisions.iter_mut().skip(index + 1).for_each(spoil);
             let expected = accelerator.step(&mut bodies.clone(), &collisions, &parameters());
             let expected = expected.expect_err("refused").to_string();
@@ -116,7 +117,7 @@ fn what_is_refused_is_what_is_refused_at_once() {
     let mut reached = false;
     let written = accelerator.write(&spoilt, 9, &parameters(), |_| reached = true);
     assert!(matches!(refusal(written), InputError::Orientation { body: 3, .. }));
-    assert!(!reached, "nobody is asked for collisions of such bodies");
+    assert!(!reached, "the narrow phase does not run after refused bodies");
     assert_works(&mut accelerator, "after refusals");
     drop(accelerator);
     assert_eq!(board.violations(), []);
@@ -135,7 +136,7 @@ fn nothing_is_written_beyond_what_was_announced() {
             assert_eq!(records.len(), announced);
         });
         assert_eq!(refusal(written), InputError::MoreThanAnnounced { announced });
-        // What is wrong before is told first.
+        // The driver names an earlier error first.
         let written = accelerator.write(&bodies, announced, &parameters(), |records| {
             let none = Collision { count: 0, ..collisions[0] };
             collisions.iter().for_each(|it| records.push(if announced == 45 { &none } else { it }));
@@ -222,14 +223,14 @@ fn a_written_step_makes_way_for_one_that_is_given_at_once() {
     assert_eq!(board.violations(), []);
 }
 
-/// Which bodies are static is known of each step by itself.
+/// Each step has its own set of static bodies.
 #[test]
 fn worlds_with_other_static_bodies_do_not_mix() {
     for name in ["float", "half"] {
         let profile = Profile::by_name(name).expect("a profile");
         let (board, mut accelerator) = open(BoardConfig { profile, ..BoardConfig::default() });
         let (left, collisions) = scene(40);
-        // What stands and what falls has changed places; sixteen bits do not hold these positions.
+        // Static and falling bodies have changed places; sixteen bits do not hold these positions.
         let mut right: Vec<Body> = left.iter().map(|body| Body { shape: 1, ..*body }).collect();
         for body in &mut right {
             body.pose.position = body.pose.position.map(|at| (at / 64.0) + 0.1);

@@ -1,4 +1,4 @@
-//! Ordering the collisions of a step against packing them in that order.
+//! The time of ordering a step's collisions, relative to packing them in that order.
 //!
 //! ```sh
 //! cargo bench --bench order
@@ -30,13 +30,13 @@ use zynq_pgs::bench::CollisionPacker;
 use zynq_pgs::order::{Checker, InputBuffers, IssueWindow, Order, OrderReport, Ordered, Orderer};
 use zynq_pgs::{Accelerator, BoardChoice, OpenOptions, StepParameters};
 
-/// Holds ordering the collisions of a step against packing them in that order.
+/// Compares ordering the collisions of a step with packing them in that order.
 #[derive(Debug, Parser)]
 #[command(name = "cargo bench --bench order --")]
 struct Options {
     #[command(flatten)]
     pile: Pile,
-    /// The order that is made, one without hazards
+    /// The order to make, one without hazards
     #[arg(long, value_enum, default_value_t = Sent::HazardFreeNearby)]
     order: Sent,
     #[command(flatten)]
@@ -90,7 +90,7 @@ impl Row {
     }
 }
 
-/// What is made, and what a step keeps for the next.
+/// The order, and the buffers that a step keeps for the next.
 struct Kept {
     order: Order,
     buffers: InputBuffers,
@@ -210,7 +210,7 @@ fn measure(
             black_box(as_given.pack(bodies, collisions, shapes));
         }),
     ];
-    // Once without looking, so that all memory is there.
+    // Once without measuring, so that all memory is allocated.
     medians(1, &mut contestants);
     let medians = medians(runs, &mut contestants);
     let [order, verify, pack, pack_as_given] = medians[..] else {

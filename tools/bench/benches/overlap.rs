@@ -1,4 +1,4 @@
-//! What is won by packing the next step while one is on the board, on the board's own clock.
+//! The gain of packing the next step while one is on the board, on the board's own clock.
 //!
 //! ```sh
 //! cargo bench --bench overlap
@@ -6,15 +6,16 @@
 //! cargo bench --bench overlap -- --pack-ms 3.5 --unpack-ms 0.5 --order as-given --json
 //! ```
 //!
-//! The emulated board's clock passes with register accesses and with waiting; it stands still while
-//! this host computes, which is not the host that a board has. So the time that packing takes there
-//! is given (`--pack-ms`, 7 ms for the thesis' step unless told otherwise), and the scene lets it pass
-//! on the board's clock while it is read. Storing the results takes as long for a byte, or
-//! `--unpack-ms`. The step is always the same, of a standing scene or of a folder: one after the other
-//! (serial), and each packed while the one before it is on the board (overlapped).
+//! The emulated board's clock advances with register accesses and waits; it stands still while this
+//! host computes, since a board has another host. So an option gives the time of packing there
+//! (`--pack-ms`, by default 7 ms for the thesis' step), and the scene lets this time pass on the
+//! board's clock while the driver reads it. Storing the results takes as long per byte, or
+//! `--unpack-ms`. The step is always the same, of a standing scene or of a folder. The steps run
+//! one after the other (serial), and each packed while the one before it is on the board
+//! (overlapped).
 //!
-//! Beside it the host times of this machine, medians of the steps without any time added: what a step
-//! costs besides packing, ordering and waiting.
+//! The output also has the host times of this machine, medians of steps without any time added: the
+//! cost of a step besides packing, ordering and waiting.
 
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
@@ -37,23 +38,23 @@ use zynq_pgs::{
     OpenOptions, Pose, StepParameters, StepReport, Velocity,
 };
 
-/// Holds steps that overlap against the longer of packing and the board, on the board's clock.
+/// Compares overlapping steps with the longer of packing and the board, on the board's clock.
 #[derive(Debug, Parser)]
 #[command(name = "cargo bench --bench overlap --")]
 struct Options {
     /// Cubes along each axis, standing; y is up
     #[arg(long, value_name = "NXxNYxNZ", default_value_t, conflicts_with = "input")]
     grid: Grid,
-    /// The step in this folder of arrays instead of a pile
+    /// Take the step from this folder of arrays instead of a pile
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
     /// Order in which the collisions are sent
     #[arg(long, value_enum, default_value_t = Sent::HazardFree)]
     order: Sent,
-    /// Time that packing a step takes on the board's processor, ms
+    /// Time of packing a step on the board's processor, ms
     #[arg(long, value_name = "MS", default_value = "7", value_parser = time)]
     pack_ms: Duration,
-    /// Time that storing the results takes there, ms [default: as long for a byte as packing]
+    /// Time of storing the results there, ms [default: as long per byte as packing]
     #[arg(long, value_name = "MS", value_parser = time)]
     unpack_ms: Option<Duration>,
     #[command(flatten)]
@@ -68,20 +69,20 @@ fn time(text: &str) -> Result<Duration, String> {
 /// Parts in which the host's time passes.
 const PIECES: u32 = 100;
 
-/// Bodies or collisions that are read and stored in so much of the board's time.
-struct Timed<'a, T: ?Sized> {
+/// Bodies or collisions that take `time` on the board's clock to read or store.
+struct TimedReads<'a, T: ?Sized> {
     inner: &'a T,
     port: &'a CpuPort,
     time: Duration,
     left: AtomicU32,
 }
 
-impl<'a, T: ?Sized> Timed<'a, T> {
+impl<'a, T: ?Sized> TimedReads<'a, T> {
     fn new(inner: &'a T, port: &'a CpuPort, time: Duration) -> Self {
         Self { inner, port, time, left: AtomicU32::new(PIECES) }
     }
 
-    /// Lets a piece of the time pass, `PIECES` times in the first `count` indices.
+    /// Lets a piece of the time pass, `PIECES` times over the first `count` indices.
     fn pass(&self, index: usize, count: usize) {
         let take = |left: u32| left.checked_sub(1);
         if index.is_multiple_of((count / PIECES as usize).max(1))
@@ -92,13 +93,13 @@ impl<'a, T: ?Sized> Timed<'a, T> {
     }
 }
 
-/// Bodies that are stored elsewhere than they are read: every step begins as the first.
-struct Elsewhere<'a> {
-    timed: Timed<'a, [Body]>,
+/// Bodies that are stored separately from their source: every step starts from the first state.
+struct SeparateOutput<'a> {
+    timed: TimedReads<'a, [Body]>,
     stored: Vec<Body>,
 }
 
-impl Bodies for Elsewhere<'_> {
+impl Bodies for SeparateOutput<'_> {
     fn len(&self) -> usize {
         self.timed.inner.len()
     }
@@ -113,7 +114,7 @@ impl Bodies for Elsewhere<'_> {
     }
 }
 
-impl Collisions for Timed<'_, [Collision]> {
+impl Collisions for TimedReads<'_, [Collision]> {
     fn len(&self) -> usize {
         self.inner.len()
     }
@@ -124,7 +125,7 @@ impl Collisions for Timed<'_, [Collision]> {
     }
 }
 
-/// A scene that is stepped, and the times that its host is said to take.
+/// A scene to step, and the assumed times of its host.
 struct Job<'a> {
     bodies: &'a [Body],
     collisions: &'a [Collision],
@@ -135,13 +136,13 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn bodies(&self) -> Elsewhere<'_> {
-        let timed = Timed::new(self.bodies, &self.port, self.unpack);
-        Elsewhere { timed, stored: self.bodies.to_vec() }
+    fn bodies(&self) -> SeparateOutput<'_> {
+        let timed = TimedReads::new(self.bodies, &self.port, self.unpack);
+        SeparateOutput { timed, stored: self.bodies.to_vec() }
     }
 
-    fn collisions(&self) -> Timed<'_, [Collision]> {
-        Timed::new(self.collisions, &self.port, self.pack)
+    fn collisions(&self) -> TimedReads<'_, [Collision]> {
+        TimedReads::new(self.collisions, &self.port, self.pack)
     }
 
     fn submit<'a>(
@@ -151,7 +152,8 @@ impl Job<'_> {
         accelerator.submit(&self.bodies(), &self.collisions(), &self.parameters)
     }
 
-    /// Steps one after the other; the time of each on the board's clock, and the reports.
+    /// Takes steps one after the other; returns the time of each on the board's clock, and the
+    /// reports.
     fn serial(
         &self,
         accelerator: &mut Accelerator,
@@ -166,8 +168,8 @@ impl Job<'_> {
         Ok(((self.port.now() - begun) / steps, reports))
     }
 
-    /// Each step packed while the one before it is on the board; from the start of the first to that
-    /// of the last.
+    /// Packs each step while the one before it is on the board; returns the time from the start of
+    /// the first step to that of the last.
     fn overlapped(
         &self,
         accelerator: &mut Accelerator,
@@ -189,7 +191,7 @@ impl Job<'_> {
 }
 
 /// Medians of host times, by phase.
-fn typical(reports: &[StepReport]) -> [(&'static str, Duration); 7] {
+fn median_phases(reports: &[StepReport]) -> [(&'static str, Duration); 7] {
     let of = |phase: fn(&HostTimes) -> Duration| {
         median(reports.iter().map(|report| phase(&report.host)).collect())
     };
@@ -234,7 +236,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         unpack: Duration::ZERO,
         port: emulated.cpu_port(),
     };
-    // Without the time of a host that is not this one; the first makes all memory.
+    // First without the assumed host times; the first step allocates all memory.
     job.serial(&mut accelerator, 1)?;
     let (_, plain) = job.serial(&mut accelerator, steps)?;
     let alone = plain.first().ok_or("a report of each step")?;
@@ -253,7 +255,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let longer = host.max(on_board);
     let ratio = each.as_secs_f64() / longer.as_secs_f64();
     let ms = milliseconds;
-    let times = typical(&plain);
+    let times = median_phases(&plain);
     if options.common.json {
         let host_ms: serde_json::Map<_, _> =
             times.iter().map(|(name, time)| ((*name).to_owned(), ms(*time).into())).collect();

@@ -1,4 +1,4 @@
-//! Packing and unpacking a step against `memcpy` of the same bytes.
+//! The time of packing and unpacking a step, relative to `memcpy` of the same bytes.
 //!
 //! ```sh
 //! cargo bench --bench pack
@@ -10,26 +10,28 @@
 //!
 //! The step is one of the thesis' cubes, standing on the ground, or the one in a folder of arrays
 //! (`--input`; or else `full_step186` of the folder that the environment variable `PGS_VECTORS`
-//! names). One thread does everything, if `--threads` does not say otherwise. Each thing is measured
-//! alone: it and a `memcpy` from warm memory to warm memory run in turn, several runs a stretch of which
-//! the first do not count, so that its own buffers are as warm as the caches can hold them. Given are the
-//! bytes written, medians, GB/s of these bytes, and the throughput as a part of that of `memcpy`.
+//! names). One thread does everything, unless `--threads` asks for more. Each item is measured
+//! alone: it and a `memcpy` from warm memory to warm memory run in turn. The first runs of a
+//! stretch do not count, so that the caches hold as much of the item's buffers as they can. The
+//! output has the bytes written, medians, GB/s of these bytes, and the throughput relative to that
+//! of `memcpy`.
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
-//! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the one that
-//!   is the default on a bitstream that does not wait, or `--order`, in the window of `float`
-//! - `bare, ...`: the same collisions read and as many bytes written to as many channels, in the same loops,
-//!   and nothing made of them: about the least that packing can take
+//! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the
+//!   one that is the default on a bitstream that does not wait, or `--order`, in the window of
+//!   `float`
+//! - `bare, ...`: the same collisions read and as many bytes written to as many channels, in the
+//!   same loops, and nothing made of them: about the least that packing can take
 //! - `step, ...`: bodies, then collisions
 //! - `checked, ...`: the same with the validation of everything on the way, as a step does it
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
 //! - `commit`: from there to the caller's bodies
 //!
-//! With `--threads` packing and unpacking are measured beside the same on one thread, too, in the same turns;
-//! `memcpy` stays on one, and so does all else, which is left out.
+//! With `--threads` packing and unpacking are also compared with one thread, in the same turns.
+//! `memcpy` and the other items use one thread only; the other items are left out.
 //!
-//! `--cpu-time` counts the time that the thread runs instead of the time that passes: where others
-//! want the cores too, these are far apart.
+//! `--cpu-time` measures the time of the running thread instead of the wall time, which is far
+//! longer on a busy machine.
 
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
@@ -53,36 +55,36 @@ use zynq_pgs::Collision;
 use zynq_pgs::bench::{StepPacker, Unpacker};
 use zynq_pgs::order::{Ordered, Schedule};
 
-/// Holds packing and unpacking against `memcpy` of the same bytes.
+/// Compares packing and unpacking with `memcpy` of the same bytes.
 #[derive(Debug, Parser)]
 #[command(name = "cargo bench --bench pack --")]
 struct Options {
     /// Cubes along each axis, standing; y is up
     #[arg(long, value_name = "NXxNYxNZ", conflicts_with = "input")]
     grid: Option<Grid>,
-    /// The step in this folder of arrays instead of a pile
+    /// Take the step from this folder of arrays instead of a pile
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
-    /// Threads that pack and unpack; more than one are held against one, too
+    /// Threads that pack and unpack; several are compared with one, too
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     threads: u16,
-    /// Time for which the thread runs, not that which passes
+    /// Measure the time of the running thread, not the wall time
     #[arg(long, conflicts_with = "threads")]
     cpu_time: bool,
-    /// Of this profile alone: float, half or mixed
+    /// Measure this profile only: float, half or mixed
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
-    /// The order of what is packed in order, one without hazards
+    /// The order for `in order`, one without hazards
     #[arg(long, value_enum, default_value_t = Sent::HazardFreeNearby)]
     order: Sent,
-    /// This thing alone
+    /// Measure this item only
     #[arg(long, value_enum)]
     thing: Option<Thing>,
     #[command(flatten)]
     common: Common,
 }
 
-/// The profiles whose formats differ.
+/// One profile for each set of formats.
 const MEASURED: [&Profile; 3] = [&FLOAT, &HALF, &MIXED];
 
 impl Options {
@@ -121,7 +123,7 @@ impl Options {
     }
 }
 
-/// What is measured.
+/// An item to measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Thing {
     Bodies,
@@ -138,7 +140,7 @@ enum Thing {
 }
 
 impl Thing {
-    /// Whether several threads do it.
+    /// Whether several threads share the work.
     const fn is_shared(self) -> bool {
         !matches!(self, Self::BareAsGiven | Self::BareInOrder | Self::Commit)
     }
@@ -160,7 +162,7 @@ impl Thing {
     }
 }
 
-/// One thing's bytes, its time and that of `memcpy`, and its time on one thread if there are several.
+/// An item's bytes, its time and that of `memcpy`, and its time on one thread if there are several.
 struct Row {
     profile: &'static Profile,
     thing: Thing,
@@ -275,7 +277,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Measures one thing beside `memcpy` of its bytes, all in memory of its own.
+/// Measures one item beside `memcpy` of its bytes, all in memory of its own.
 fn measure(
     profile: &'static Profile,
     thing: Thing,
@@ -358,7 +360,7 @@ fn measure(
     Ok(Row { profile, thing, bytes, time, copy, alone })
 }
 
-/// Packs that thing; nothing, if it is none that is packed.
+/// The packing run of an item; none if the item does not pack.
 fn packing<'a>(
     thing: Thing,
     packer: &'a mut StepPacker,

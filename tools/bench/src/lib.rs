@@ -1,8 +1,8 @@
-//! What the benchmarks share: medians of interleaved runs.
+//! Shared by the benchmarks: medians of interleaved runs.
 //!
 //! Times of one machine mean little on another, and on a busy machine little from one minute to the
-//! next. So the things that are compared run in turn, a run of each, and what is said is the ratio
-//! of their medians.
+//! next. So the compared items run in turn, one run of each, and the result is the ratio of their
+//! medians.
 //!
 //! ```sh
 //! cargo bench --bench speed      # the emulated board beside a solver on the CPU
@@ -21,17 +21,17 @@ use std::time::{Duration, Instant};
 
 use nix::time::{ClockId, clock_gettime};
 
-/// Something that is timed; its result is kept from being optimised away by the caller.
+/// A timed run; the caller keeps its result from being optimised away.
 pub type Run<'a> = Box<dyn FnMut() + 'a>;
 
-/// A variable of the environment; one that is blank counts as unset.
+/// Reads a variable of the environment; a blank one counts as unset.
 #[must_use]
 pub fn variable(name: &str) -> Option<OsString> {
     let blank = |text: &OsString| text.to_str().is_some_and(|text| text.trim().is_empty());
     std::env::var_os(name).filter(|text| !blank(text))
 }
 
-/// Runs all in turn, so many times each; the median time of each.
+/// Runs all in turn, `runs` times each; returns the median time of each.
 pub fn medians(runs: usize, contestants: &mut [Run<'_>]) -> Vec<Duration> {
     let mut times = vec![Vec::with_capacity(runs); contestants.len()];
     for _ in 0..runs {
@@ -44,12 +44,12 @@ pub fn medians(runs: usize, contestants: &mut [Run<'_>]) -> Vec<Duration> {
     times.into_iter().map(median).collect()
 }
 
-/// Which time is measured.
+/// The clock of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
-    /// That which passes.
+    /// Wall time.
     Wall,
-    /// That for which this thread runs. Where others want the cores too, these are far apart.
+    /// Time of the running thread. On a busy machine the wall time is far longer.
     Thread,
 }
 
@@ -59,23 +59,23 @@ impl Clock {
             Self::Wall => ClockId::CLOCK_MONOTONIC,
             Self::Thread => ClockId::CLOCK_THREAD_CPUTIME_ID,
         };
-        // Every Linux has both; a zero in its place would be taken for a time.
+        // Every Linux has both; a zero in its place would look like a time.
         Duration::from(clock_gettime(id).expect("a clock that every Linux has"))
     }
 }
 
-/// Runs of a stretch that are not measured: they bring into the caches what the others left outside. The
-/// last cache is slow to forget these, so that some runs pass until one takes no longer than the next.
+/// Unmeasured runs of a stretch: they load the caches. The last-level cache replaces old lines
+/// slowly, so that it takes some runs until one is as fast as the next.
 const WARMING: usize = 10;
-/// Runs of a stretch that are measured.
+/// Measured runs of a stretch.
 const MEASURED: usize = 3;
 /// Runs of a stretch.
 pub const STRETCH: usize = WARMING + MEASURED;
 
-/// Runs all in turn, in so many stretches each; the median time of each.
+/// Runs all in turn, in `stretches` stretches each; returns the median time of each.
 ///
-/// In a stretch one of them has the machine to itself: its memory is as warm as the caches can hold
-/// it, and of the others' nothing is left. Its first runs do not count.
+/// In a stretch, one run has the machine to itself: the caches hold as much of its memory as they
+/// can, and nothing of the others'. The first runs of a stretch do not count.
 pub fn warm_medians(stretches: usize, clock: Clock, contestants: &mut [Run<'_>]) -> Vec<Duration> {
     let mut times = vec![Vec::with_capacity(stretches * MEASURED); contestants.len()];
     for _ in 0..stretches {
@@ -91,7 +91,7 @@ pub fn warm_medians(stretches: usize, clock: Clock, contestants: &mut [Run<'_>])
     times.into_iter().map(median).collect()
 }
 
-/// The middle one, the later of two; zero of none.
+/// The median, the later of two middle values; zero without values.
 #[must_use]
 pub fn median(mut times: Vec<Duration>) -> Duration {
     times.sort_unstable();
@@ -104,7 +104,7 @@ pub fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-/// How long the first takes, in the time of the second.
+/// The ratio of the first time to the second.
 #[must_use]
 pub fn ratio(time: Duration, of: Duration) -> f64 {
     time.as_secs_f64() / of.as_secs_f64()
@@ -145,7 +145,7 @@ mod tests {
     fn both_clocks_run() {
         for clock in [Clock::Wall, Clock::Thread] {
             let begin = clock.now();
-            // Bounded: one that stands still fails the test instead of holding it.
+            // Bounded: a clock that stands still fails the test instead of hanging it.
             let _ = (0..100_000_000).find(|_| clock.now() != begin);
             assert!(clock.now() > begin);
         }

@@ -1,25 +1,25 @@
-//! This file holds the options that the benchmarks share.
+//! Options that the benchmarks share.
 
 use clap::{Args, ValueEnum};
 use scene::Grid;
 use zynq_pgs::order::Order;
 
-/// How it is measured and shown.
+/// How to measure, and how to show the result.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Common {
-    /// Runs of each of the things compared, in turn; medians are shown
+    /// Runs of each of the compared items, in turn; medians are shown
     #[arg(long, value_name = "N", default_value_t = 11, value_parser = clap::value_parser!(u16).range(1..))]
     runs: u16,
     /// One JSON document, for programs
     #[arg(long)]
     pub json: bool,
-    /// What cargo adds.
+    /// cargo adds this option.
     #[arg(long, hide = true)]
     bench: bool,
 }
 
 impl Common {
-    /// Runs of each.
+    /// The number of runs of each item.
     #[must_use]
     pub fn runs(&self) -> usize {
         self.runs.into()
@@ -41,7 +41,7 @@ pub struct Pile {
 }
 
 impl Pile {
-    /// Standing on the ground.
+    /// The pile stands on the ground.
     #[must_use]
     pub fn standing(grid: Grid, steps: u32) -> Self {
         Self { grid, drop: 0.0, steps }
@@ -53,23 +53,24 @@ impl Pile {
 pub enum Sent {
     /// As the step has them
     AsGiven,
-    /// Without hazards, swept through the scene
+    /// Without hazards, in a sweep through the scene
     HazardFree,
-    /// Without hazards, about where the step has them
+    /// Without hazards, near the order of the step
     HazardFreeNearby,
 }
 
 impl Sent {
-    /// As it is written on the command line.
+    /// The name on the command line.
     #[must_use]
     pub fn name(self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 
-    /// One without hazards, as the driver calls it.
+    /// The driver's order, if it is one without hazards.
     ///
     /// # Errors
-    /// If it is none, which to ask for.
+    ///
+    /// Names the orders without hazards if this is none.
     pub fn without_hazards(self) -> Result<Order, String> {
         match self {
             Self::AsGiven => Err("--order is hazard-free or hazard-free-nearby here".to_owned()),
@@ -77,7 +78,7 @@ impl Sent {
         }
     }
 
-    /// As the driver calls it.
+    /// The driver's order.
     #[must_use]
     pub const fn order(self) -> Order {
         match self {

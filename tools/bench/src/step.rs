@@ -1,5 +1,4 @@
-//! This file makes the step that is measured, of a folder of arrays or of a pile, and takes it on
-//! emulated boards.
+//! Makes the measured step, from a folder of arrays or a pile, and takes it on emulated boards.
 
 use std::error::Error;
 use std::path::Path;
@@ -15,22 +14,22 @@ use zynq_pgs::{
 
 use crate::options::Pile;
 
-/// Everything that one step takes.
+/// The input of one step.
 #[derive(Debug, Clone)]
 pub struct Step {
-    /// What it is.
+    /// Its name in the output.
     pub name: String,
     /// The shape table.
     pub shapes: Vec<Shape>,
     /// The bodies before the step.
     pub bodies: Vec<Body>,
-    /// The collisions, as they were found.
+    /// The collisions, in the order of detection.
     pub collisions: Vec<Collision>,
     /// The parameters.
     pub parameters: StepParameters,
 }
 
-/// Opens an emulated board; as many threads as that may take write the records and read the results.
+/// Opens an emulated board; packing and unpacking use as many threads as the board may.
 fn open(config: BoardConfig, shapes: &[Shape]) -> Result<Accelerator, Box<dyn Error>> {
     let board = BoardChoice::Emulated(EmulatedBoard::new(config)?.cpu_port());
     let pack_threads = Some(config.threads);
@@ -51,10 +50,11 @@ impl Step {
         Ok(Self { name, shapes, bodies, collisions, parameters })
     }
 
-    /// The last step of a pile: those before it are taken on the emulated board.
+    /// The last step of a pile; the steps before it are taken on the emulated board.
     ///
     /// # Errors
-    /// If there is no such pile, or a step fails.
+    ///
+    /// There is no such pile, or a step fails.
     pub fn of_pile(pile: &Pile, config: BoardConfig) -> Result<Self, Box<dyn Error>> {
         let Pile { grid, drop, steps } = *pile;
         let mut scene = Scene::new(&SceneOptions { grid, drop, ..Default::default() })?;
@@ -77,10 +77,11 @@ impl Step {
         })
     }
 
-    /// An order for a board of that build.
+    /// A schedule for a board of this build.
     ///
     /// # Errors
-    /// If there is no such order.
+    ///
+    /// There is no such order.
     pub fn schedule(&self, config: BoardConfig, order: Order) -> Result<Schedule, Box<dyn Error>> {
         let accelerator = open(config, &self.shapes)?;
         let window = IssueWindow::of(accelerator.capabilities(), &self.parameters)?;
@@ -89,10 +90,11 @@ impl Step {
         Ok(Orderer::new().order(&input, order, window)?.clone())
     }
 
-    /// The collisions in the order `hazard-free`, as a board of that build is sent them.
+    /// The collisions in the order `hazard-free`, as a board of this build gets them.
     ///
     /// # Errors
-    /// If there is no such order.
+    ///
+    /// There is no such order.
     pub fn in_order(&self, config: BoardConfig) -> Result<Vec<Collision>, Box<dyn Error>> {
         let schedule = self.schedule(config, Order::HazardFree)?;
         let entries = (0..schedule.len()).filter_map(|entry| schedule.get(entry));
@@ -100,7 +102,7 @@ impl Step {
     }
 }
 
-/// An emulated board that takes the same step again and again, in the order `hazard-free`.
+/// An emulated board that takes the same step repeatedly, in the order `hazard-free`.
 #[derive(Debug)]
 pub struct Emulated<'a> {
     step: &'a Step,
@@ -109,20 +111,21 @@ pub struct Emulated<'a> {
     bodies: Vec<Body>,
 }
 
-/// One step taken.
+/// The measures of one step.
 #[derive(Debug, Clone, Copy)]
 pub struct Taken {
-    /// What the driver says.
+    /// The driver's report.
     pub report: StepReport,
     /// Host time of the call.
     pub call: Duration,
 }
 
 impl<'a> Emulated<'a> {
-    /// A board of that build.
+    /// Opens a board of this build.
     ///
     /// # Errors
-    /// If it cannot be built.
+    ///
+    /// It cannot be built.
     pub fn new(step: &'a Step, config: BoardConfig) -> Result<Self, Box<dyn Error>> {
         let mut parameters = step.parameters;
         parameters.order = Some(Order::HazardFree);
@@ -133,7 +136,8 @@ impl<'a> Emulated<'a> {
     /// Takes the step from its start.
     ///
     /// # Errors
-    /// If the step fails.
+    ///
+    /// The step fails.
     pub fn take(&mut self) -> Result<Taken, Box<dyn Error>> {
         self.bodies.clone_from(&self.step.bodies);
         let begin = Instant::now();
@@ -142,7 +146,7 @@ impl<'a> Emulated<'a> {
         Ok(Taken { report, call: begin.elapsed() })
     }
 
-    /// The bodies as the last step left them.
+    /// The bodies after the last step.
     #[must_use]
     pub fn bodies(&self) -> &[Body] {
         &self.bodies

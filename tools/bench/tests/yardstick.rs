@@ -1,8 +1,8 @@
-//! The yardstick computes what Bullet computes: after every pass, and at the end of the step, no bit
-//! differs.
+//! The yardstick computes Bullet's results: no bit differs after any pass, nor at the end of the
+//! step.
 //!
 //! The small scenes are in `tests/golden`. With the environment variable `PGS_VECTORS` every folder
-//! below it is compared too, the thesis' step among them.
+//! below it is compared, too, with the thesis' step among them.
 
 use std::path::{Path, PathBuf};
 
@@ -45,7 +45,7 @@ fn the_state_after_a_step_is_that_of_bullet() {
         let step = Folder::load(&path).expect("a step");
         let Folder { shapes, bodies, collisions, parameters, .. } = &step;
         let mut yardstick = Yardstick::new(shapes, bodies, collisions, parameters);
-        // The second time it starts where the first did.
+        // The second time it starts from the same state.
         yardstick.solve();
         yardstick.solve();
         let found = yardstick.bodies();

@@ -1,8 +1,8 @@
-//! This file makes one number of the state of all bodies, to compare runs by.
+//! Computes a digest of the state of all bodies, to compare runs.
 
 use zynq_pgs::Body;
 
-/// Name of the algorithm, as it is printed beside every digest.
+/// Name of the algorithm, printed beside every digest.
 pub const ALGORITHM: &str = "fnv1a-64";
 
 const OFFSET_BASIS: u64 = 0xcbf2_9ce4_8422_2325;

@@ -1,13 +1,13 @@
-//! This file reads one step from a folder of arrays, and writes its results beside them.
+//! Reads one step from a folder of arrays, and writes its results beside them.
 //!
-//! One array a file: `params` (8) and `iterations` (2); per body `body_pos` (N, 3), `body_quat`
-//! (N, 4), `body_linvel`, `body_angvel` (N, 3), `body_inv_mass` (N), `body_inv_inertia` (N, 3);
-//! per collision `contact_bodies` (M, 2), `contact_npoints` (M), `contact_normal` (M, 3),
-//! `contact_points` (M, 4, 4). Everything is f32, or u32 for `iterations`, `contact_bodies` and
-//! `contact_npoints`. An array of no rows may have the shape (0,) and any type: that is what
+//! One array a file: `params` (8) and `iterations` (2); per body `body_pos` (N, 3), `body_quat` (N,
+//! 4), `body_linvel`, `body_angvel` (N, 3), `body_inv_mass` (N), `body_inv_inertia` (N, 3); per
+//! collision `contact_bodies` (M, 2), `contact_npoints` (M), `contact_normal` (M, 3),
+//! `contact_points` (M, 4, 4). The type is f32, except u32 for `iterations`, `contact_bodies` and
+//! `contact_npoints`. An array without rows may have the shape (0,) and any type, as
 //! `numpy.array([])` has.
 //!
-//! Only the files' form is checked here; the driver judges their values.
+//! This module checks the files' form only; the driver judges their values.
 
 use std::collections::HashMap;
 use std::io::{BufWriter, ErrorKind, Read, Write as _};
@@ -20,8 +20,8 @@ use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParame
 use crate::npy::{self, Dimensions, Element, NpyError, Problem};
 use crate::replace::{ReplaceError, Replacement};
 
-/// Parameters of the step but its iterations: (8). Time step, position drift, position coefficient,
-/// friction, angular damping, gravity x, y, z.
+/// Parameters of the step without its iterations: (8). Time step, position drift, position
+/// coefficient, friction, angular damping, gravity x, y, z.
 pub const PARAMS: &str = "params.npy";
 /// Contact and friction iterations: (2).
 pub const ITERATIONS: &str = "iterations.npy";
@@ -43,11 +43,11 @@ pub const COLLISION_BODIES: &str = "contact_bodies.npy";
 pub const COLLISION_COUNT: &str = "contact_npoints.npy";
 /// Unit normals, from B to A: (M, 3).
 pub const COLLISION_NORMAL: &str = "contact_normal.npy";
-/// Contact points: (M, 4, 4). x, y, z on B's surface, and the signed distance of A's, negative if they
-/// penetrate.
+/// Contact points: (M, 4, 4). x, y, z on B's surface, and the signed distance of A's surface,
+/// negative for penetration.
 pub const COLLISION_POINTS: &str = "contact_points.npy";
 
-/// More shapes than the board's table holds.
+/// The folder has more shapes than the board's table holds.
 #[derive(Debug, Error)]
 #[error(
     "{}: body {body} brings another mass or inertia, {found} different ones in all, and the board \
@@ -61,10 +61,10 @@ pub struct TooManyShapes {
     limit: usize,
 }
 
-/// What a folder holds.
+/// The step in a folder.
 #[derive(Debug)]
 pub struct Folder {
-    /// Where it is.
+    /// Its path.
     pub path: PathBuf,
     /// The bodies, with indices into `shapes`.
     pub bodies: Vec<Body>,
@@ -95,7 +95,7 @@ impl State {
     /// All four.
     pub const ALL: [Self; 4] = [Self::Position, Self::Orientation, Self::Linear, Self::Angular];
 
-    /// The array of a folder that holds it after the step.
+    /// The file of the property after the step.
     #[must_use]
     pub const fn file(self) -> &'static str {
         match self {
@@ -106,7 +106,7 @@ impl State {
         }
     }
 
-    /// Numbers a body.
+    /// Numbers per body.
     #[must_use]
     pub const fn width(self) -> usize {
         match self {
@@ -126,12 +126,12 @@ impl State {
     }
 }
 
-/// Linear and angular velocity of each body in turn, as `out_vel_*` hold them.
+/// The linear and angular velocity of each body in turn, the layout of `out_vel_*`.
 pub fn velocities(bodies: &[Body]) -> impl Iterator<Item = f32> {
     bodies.iter().flat_map(|body| body.velocity.linear.into_iter().chain(body.velocity.angular))
 }
 
-/// An array of rows: (`first`, N).
+/// The dimensions of an array of rows: (`first`, N).
 fn rows<T: Element, const N: usize>(
     read: impl Fn(&str, Dimensions) -> Result<(usize, Vec<T>), NpyError>,
     name: &str,
@@ -151,7 +151,8 @@ impl Folder {
     /// Reads every array of the step.
     ///
     /// # Errors
-    /// [`NpyError`] names the first file that is not there or not as expected.
+    ///
+    /// [`NpyError`] names the first file that is missing or not as expected.
     pub fn load(path: &Path) -> Result<Self, NpyError> {
         let problem = match std::fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => return Self::load_with(path, npy::open),
@@ -162,11 +163,12 @@ impl Folder {
         Err(NpyError { path: path.to_path_buf(), problem })
     }
 
-    /// Reads every array of the step from what `open` finds under the files' names: their content,
-    /// and its length in bytes.
+    /// Reads every array of the step from the streams that `open` returns for the files' names,
+    /// with their lengths in bytes.
     ///
     /// # Errors
-    /// As for [`load`](Self::load), and what `open` returns.
+    ///
+    /// As for [`load`](Self::load), and the errors of `open`.
     pub fn load_with<S: Read>(
         path: &Path,
         open: impl Fn(&Path) -> Result<(S, u64), Problem>,
@@ -225,9 +227,11 @@ impl Folder {
         Ok(Self { path, bodies, shapes, shape_bodies, collisions, parameters })
     }
 
-    /// Refuses more shapes than a table of `limit` entries holds, naming the body that is too much.
+    /// Refuses more shapes than a table of `limit` entries holds, and names the first body beyond
+    /// it.
     ///
     /// # Errors
+    ///
     /// [`TooManyShapes`].
     pub fn check_shapes(&self, limit: u32) -> Result<(), TooManyShapes> {
         let limit = usize::try_from(limit).unwrap_or(usize::MAX);
@@ -245,7 +249,8 @@ impl Folder {
 
 /// The distinct rows, the first body of each, and each body's row.
 ///
-/// Rows are equal if their bits are. The map is only asked, never walked: it decides no order.
+/// Rows are equal if their bits are. The map is used for look-ups only, so that it decides no
+/// order.
 fn distinct(
     inverse_masses: &[f32],
     inverse_inertias: &[[f32; 3]],
@@ -259,7 +264,8 @@ fn distinct(
         let index = known.entry([mass.to_bits(), x, y, z]).or_insert_with(|| {
             shapes.push(Shape { inverse_mass: *mass, inverse_inertia: *inertia });
             first_bodies.push(body);
-            // A table has far fewer entries; the excess is refused before the index is used.
+            // A table has far fewer entries; `check_shapes` refuses the excess before the index is
+            // used.
             u32::try_from(shapes.len() - 1).unwrap_or(u32::MAX)
         });
         shape_of.push(*index);
@@ -267,17 +273,18 @@ fn distinct(
     (shapes, first_bodies, shape_of)
 }
 
-/// Writes the state of all bodies as the four arrays of [`State`]; the folder is made if need be.
+/// Writes the state of all bodies as the four arrays of [`State`]; makes the folder if necessary.
 ///
-/// All four replace earlier ones together: after a failure the folder is as it was.
+/// All four replace earlier ones together: after a failure the folder is unchanged.
 ///
 /// # Errors
+///
 /// [`ReplaceError`]: a file or the folder cannot be written.
 pub fn write_results(path: &Path, bodies: &[Body]) -> Result<(), ReplaceError> {
     let made = first_missing(path);
     let written = write_into(path, bodies);
     if let (Err(_), Some(made)) = (&written, made) {
-        // Only what is empty goes.
+        // Removes empty folders only.
         for folder in path.ancestors().take_while(|folder| folder.starts_with(made)) {
             if std::fs::remove_dir(folder).is_err() {
                 break;
@@ -287,7 +294,7 @@ pub fn write_results(path: &Path, bodies: &[Body]) -> Result<(), ReplaceError> {
     written
 }
 
-/// The outermost of the folders on the way that are not there yet.
+/// The outermost missing folder on the path.
 fn first_missing(path: &Path) -> Option<&Path> {
     let ancestors = path.ancestors().filter(|folder| !folder.as_os_str().is_empty());
     ancestors.take_while(|folder| std::fs::symlink_metadata(folder).is_err()).last()

@@ -1,8 +1,8 @@
-//! One step as a folder of `.npy` arrays, as the command line tool reads it, and a digest of the
-//! state that it leaves.
+//! One step as a folder of `.npy` arrays, the input of the command line tool, and a digest of its
+//! result.
 //!
-//! A crate of its own, so that the loader can be driven without a process and a disk.
-//! [`replace`] is how every file of results is written.
+//! This is a crate of its own, so that a fuzzer can drive the loader without a process and a disk.
+//! [`replace`] writes every file of results.
 
 #![forbid(unsafe_code)]
 

@@ -1,9 +1,9 @@
-//! Replaces files as a whole: a failure leaves the earlier ones as they were.
+//! Replaces files as a whole: a failure leaves the earlier ones unchanged.
 //!
-//! Each file is written under a temporary name in its own folder. Only when all of them are complete, and
-//! on the disk, do they get their names, one after the other; if that fails, the earlier files get them
-//! back. A process that is killed in between leaves temporary files (`.pgs-...`), and every name with
-//! either its earlier or its new content.
+//! Each file is written under a temporary name in its own folder. Only after all of them are
+//! complete and on the disk do they get their names, one after the other. If a step of this fails,
+//! the earlier files get their names back. A process that is killed in between leaves temporary
+//! files (`.pgs-...`), and every name with either its earlier or its new content.
 
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io;
@@ -12,38 +12,40 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use thiserror::Error;
 
-/// A file that cannot be written, and why.
+/// A file that cannot be written, with the reason.
 #[derive(Debug, Error)]
 #[error("{} cannot be written", path.display())]
 pub struct ReplaceError {
     /// The file.
     pub path: PathBuf,
-    /// What the system says.
+    /// The system's error.
     #[source]
     pub source: io::Error,
 }
 
-/// Files that replace earlier ones together. Dropped, it leaves these as they are.
+/// Files that replace earlier ones together. Dropping it without a commit leaves the earlier files
+/// unchanged.
 #[derive(Debug, Default)]
 pub struct Replacement {
     files: Vec<Staged>,
 }
 
-/// A file that is complete and has not got its name yet.
+/// A complete file that does not have its name yet.
 #[derive(Debug)]
 struct Staged {
-    /// What it is to replace.
+    /// The file to replace.
     target: PathBuf,
-    /// Where it is until it has its name.
+    /// Its path until it has its name.
     temporary: Option<PathBuf>,
-    /// Where the earlier file is meanwhile.
+    /// The temporary path of the earlier file.
     earlier: Option<PathBuf>,
 }
 
-/// Replaces one file by what `write` writes.
+/// Replaces one file by the output of `write`.
 ///
 /// # Errors
-/// [`ReplaceError`]: the earlier file, if there is one, is as it was.
+///
+/// [`ReplaceError`]: the earlier file, if there is one, is unchanged.
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut File) -> io::Result<()>,
@@ -54,13 +56,14 @@ pub fn replace(
 }
 
 impl Replacement {
-    /// Writes what is to replace the file at `path`, or to be the first one there.
+    /// Writes the replacement of the file at `path`, or its first content.
     ///
-    /// A symbolic link stays one, and the file that it leads to is replaced. A device or a pipe cannot be
-    /// replaced: it gets what is written at once.
+    /// A symbolic link stays one, and the file that it leads to is replaced. A device or a pipe
+    /// cannot be replaced: it is written at once.
     ///
     /// # Errors
-    /// [`ReplaceError`]: the file cannot be written, or may not be. Nothing is replaced then.
+    ///
+    /// [`ReplaceError`]: the file cannot be written, or must not be. Nothing is replaced then.
     pub fn stage(
         &mut self,
         path: &Path,
@@ -81,20 +84,21 @@ impl Replacement {
             Destination::File(path, permissions) => (path, Some(permissions)),
         };
         let (mut file, temporary) = temporary(&target)?;
-        // From here on it is removed when something fails.
+        // From here on a failure removes the temporary file.
         self.files.push(Staged { target, temporary: Some(temporary.clone()), earlier: None });
         write(&mut file)?;
         if let Some(permissions) = permissions {
             fs::set_permissions(&temporary, permissions)?;
         }
-        // Some file systems say only here that there is no room.
+        // Some file systems report a full disk only here.
         file.sync_all()
     }
 
     /// Gives every file its name.
     ///
     /// # Errors
-    /// [`ReplaceError`]: a file cannot have its name. The earlier files have theirs then.
+    ///
+    /// [`ReplaceError`]: a file cannot get its name. The earlier files then have theirs.
     pub fn commit(mut self) -> Result<(), ReplaceError> {
         for at in 0..self.files.len() {
             if let Err(source) = self.files[at].take_name() {
@@ -103,7 +107,8 @@ impl Replacement {
                 return Err(ReplaceError { path, source });
             }
         }
-        // Names that are not on the disk yet are the earlier ones after a power failure, no worse.
+        // After a power failure, a name that is not on the disk yet leads to the earlier file,
+        // which is no worse.
         for staged in &self.files {
             let _ = File::open(folder_of(&staged.target)).and_then(|folder| folder.sync_all());
         }
@@ -112,11 +117,11 @@ impl Replacement {
 }
 
 impl Drop for Replacement {
-    /// Removes what is left under temporary names.
+    /// Removes temporary files.
     fn drop(&mut self) {
         for Staged { temporary, earlier, .. } in &self.files {
             for left in temporary.iter().chain(earlier) {
-                // It is no harm but a file too many.
+                // A leftover file does no harm.
                 let _ = fs::remove_file(left);
             }
         }
@@ -124,7 +129,7 @@ impl Drop for Replacement {
 }
 
 impl Staged {
-    /// Puts the new file in the place of the earlier one, which is kept beside it.
+    /// Puts the new file in the place of the earlier one, which is kept under another name.
     fn take_name(&mut self) -> io::Result<()> {
         let Some(temporary) = &self.temporary else { return Ok(()) };
         match fs::symlink_metadata(&self.target) {
@@ -148,36 +153,36 @@ impl Staged {
     /// Undoes [`take_name`](Self::take_name).
     fn give_name_back(&mut self) {
         if self.earlier.is_none() {
-            // There was no earlier file. The error that counts is the one that led here.
+            // There was no earlier file. The error that led here is reported.
             let _ = fs::remove_file(&self.target);
         }
         self.restore();
     }
 
-    /// Gives the earlier file its name again. Where this fails as well, the file stays under its temporary
+    /// Gives the earlier file its name again. If this fails as well, the file keeps its temporary
     /// name.
     fn restore(&mut self) {
         let Some(earlier) = self.earlier.take() else { return };
         if fs::rename(&earlier, &self.target).is_ok() {
-            // Of two names of one file this leaves both.
+            // If both are names of one file, both stay.
             let _ = fs::remove_file(&earlier);
         }
     }
 }
 
-/// Keeps a file under another name; as a second name where the file system has such, so that the first is
-/// never without a file.
+/// Keeps a file under another name. Where the file system has hard links it is a second name, so
+/// that the first always exists.
 fn keep(path: &Path) -> io::Result<PathBuf> {
     let kept = free_name(path);
     fs::hard_link(path, &kept).or_else(|_| fs::rename(path, &kept))?;
     Ok(kept)
 }
 
-/// What is written to.
+/// The target of a write.
 enum Destination {
-    /// A name that is free.
+    /// A free name.
     Nothing,
-    /// A regular file, where it really is.
+    /// A regular file, behind all links.
     File(PathBuf, Permissions),
     /// A device or a pipe.
     Stream(File),
@@ -189,7 +194,8 @@ fn destination(path: &Path) -> io::Result<Destination> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Destination::Nothing),
         Err(error) => return Err(error),
     };
-    // Fails where the file may not be written, as its folder alone would not; and on a folder.
+    // Fails on a folder, and where the file must not be written; the folder's rights alone would
+    // not tell.
     let file = OpenOptions::new().write(true).open(path)?;
     if !metadata.is_file() {
         return Ok(Destination::Stream(file));
@@ -197,19 +203,19 @@ fn destination(path: &Path) -> io::Result<Destination> {
     Ok(Destination::File(fs::canonicalize(path)?, metadata.permissions()))
 }
 
-/// Makes a file of another name in the folder of a file.
+/// Makes a new file in the folder of `beside`.
 fn temporary(beside: &Path) -> io::Result<(File, PathBuf)> {
     loop {
         let path = free_name(beside);
         match OpenOptions::new().write(true).create_new(true).open(&path) {
-            // Another process was faster.
+            // Another process took the name first.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             made => return Ok((made?, path)),
         }
     }
 }
 
-/// A name in the folder of a file that nothing has, not even what a killed process has left.
+/// A free name in the folder of `beside`, unused even by files of a killed process.
 fn free_name(beside: &Path) -> PathBuf {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     loop {
@@ -221,7 +227,7 @@ fn free_name(beside: &Path) -> PathBuf {
     }
 }
 
-/// The folder that a file is in.
+/// The folder of a file.
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -244,7 +250,7 @@ mod tests {
         folder
     }
 
-    /// Names and contents, in the order of the names; nothing for a folder.
+    /// Names and contents, by name; nothing for a folder.
     fn content(folder: &Path) -> Vec<(String, String)> {
         let entries = fs::read_dir(folder).expect("the folder").map(|entry| {
             let entry = entry.expect("an entry");

@@ -1,8 +1,3 @@
-//! This file hands the target `folders` to libFuzzer.
+//! The target `folders` for libFuzzer.
 #![no_main]
-
-libfuzzer_sys::fuzz_target!(|data: &[u8]| {
-    if let Some(target) = fuzz::targets::by_name("folders") {
-        (target.run)(data);
-    }
-});
+include!("run.rs");

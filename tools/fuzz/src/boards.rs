@@ -1,4 +1,4 @@
-//! This file chooses how a board is built.
+//! Chooses how a board is built.
 
 use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{Flow, HALF, Inertia, PROFILES, Variant};
@@ -6,8 +6,8 @@ use bitstream_model::{Bandwidth, BoardConfig, Delays, Hazards, Subnormals};
 
 use crate::input::Input;
 
-/// Every profile, with everything that can be chosen: formats, inertia, hazards, subnormals,
-/// bandwidth, widths, depths, delays. All of it goes together.
+/// Every profile, with every option: formats, inertia, hazards, subnormals, bandwidth, widths,
+/// depths, delays. Every combination is valid.
 pub fn any(input: &mut Input<'_>) -> BoardConfig {
     let Variant { profile, numbers, inertia } = variant(input);
     let switches = input.byte();
@@ -19,7 +19,7 @@ pub fn any(input: &mut Input<'_>) -> BoardConfig {
         numbers: Some(numbers),
         inertia,
         hazards: if unchecked { Hazards::Unchecked } else { Hazards::Interlocked },
-        // The profiles' own windows take an order without hazards hundreds of empty entries.
+        // In the profiles' own windows, an order without hazards needs hundreds of empty entries.
         window_slots: if on(1) && on(4) { None } else { Some(1 + input.below(24)) },
         subnormals: if on(2) { Subnormals::Flush } else { Subnormals::Keep },
         bandwidth: input.pick(&[

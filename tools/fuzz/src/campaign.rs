@@ -1,8 +1,9 @@
-//! This file runs a target many times, on as many threads as wished, under a watchdog.
+//! Runs a target many times, on several threads, under a watchdog.
 //!
-//! An execution that does not end cannot be ended: the campaign stops, and its thread is left behind
-//! until the program ends.
+//! An execution that hangs cannot be stopped: the campaign ends, and its thread runs on until the
+//! program ends.
 
+use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,20 +15,20 @@ use crate::random;
 use crate::tally::Tally;
 use crate::targets::Target;
 
-/// How often to run, and how.
+/// The number of executions, and their settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
     /// Executions.
     pub executions: u64,
-    /// Of the inputs.
+    /// Seed of the inputs.
     pub seed: u64,
-    /// Threads, at least one.
+    /// Threads, at least one; fewer where the system does not give them.
     pub threads: usize,
-    /// What an execution may take.
+    /// Time limit of an execution.
     pub limit: Duration,
 }
 
-/// What a target did.
+/// The result of a campaign.
 #[derive(Debug)]
 pub struct Summary {
     /// Its name.
@@ -36,35 +37,66 @@ pub struct Summary {
     pub executions: u64,
     /// Host time.
     pub time: Duration,
-    /// What they did.
+    /// Threads that ran them.
+    pub threads: Threads,
+    /// Counts over all executions.
     pub tally: Tally,
-    /// The first one that ended badly; none was begun after it.
+    /// The first execution that failed; none starts after it.
     pub finding: Option<Finding>,
 }
 
-/// Executions that a thread takes at once.
+/// The threads of a campaign.
+#[derive(Debug)]
+pub struct Threads {
+    /// How many ran executions.
+    pub ran: usize,
+    /// Why there were fewer than planned; `None` if all came.
+    pub refused: Option<io::Error>,
+    /// Whether a watchdog looked for hangs. The only thread of a program cannot be watched.
+    pub watched: bool,
+}
+
+impl Threads {
+    /// What is missing of the plan, in words; `None` if nothing is.
+    #[must_use]
+    pub fn missing(&self) -> Option<String> {
+        let error = self.refused.as_ref()?;
+        let watch = if self.watched { "" } else { ", and no watchdog for hangs" };
+        Some(format!("{} of the planned threads only{watch}: {error}", self.ran))
+    }
+}
+
+/// Starts a thread, or says why the system gives none.
+type Start = fn(Box<dyn FnOnce() + Send>) -> io::Result<()>;
+
+/// As the system does it. Nobody waits for the thread.
+fn start(work: Box<dyn FnOnce() + Send>) -> io::Result<()> {
+    thread::Builder::new().name("fuzz".to_owned()).spawn(work).map(drop)
+}
+
+/// Executions that a thread takes at a time.
 const BLOCK: u64 = 16;
-/// How often the watchdog looks.
-const LOOK: Duration = Duration::from_millis(200);
+/// Interval of the watchdog.
+const WATCH_INTERVAL: Duration = Duration::from_millis(200);
 /// No execution.
 const NOTHING: u64 = u64::MAX;
 
-/// What a thread is at.
+/// The state of a thread.
 #[derive(Debug)]
 struct At {
     /// The execution's number.
     number: AtomicU64,
-    /// When it began, ms since the campaign's start.
+    /// Its start, ms since the campaign's start.
     since: AtomicU64,
 }
 
-/// What the threads share.
+/// The threads' shared state.
 #[derive(Debug)]
 struct Shared {
     plan: Plan,
     target: &'static Target,
     start: Instant,
-    /// The next execution that nobody has.
+    /// The next execution that no thread has taken.
     next: AtomicU64,
     done: AtomicU64,
     stop: AtomicBool,
@@ -78,7 +110,7 @@ impl Shared {
         u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// What a thread does.
+    /// Takes and runs executions until none is left.
     fn work(&self, thread: usize) {
         let at = &self.at[thread];
         let mut input = Vec::new();
@@ -117,7 +149,7 @@ impl Shared {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    /// The execution that has taken too long, if there is one.
+    /// An execution beyond its time limit, if there is one.
     fn overdue(&self) -> Option<u64> {
         let now = self.milliseconds();
         let limit = u64::try_from(self.plan.limit.as_millis()).unwrap_or(u64::MAX);
@@ -129,8 +161,18 @@ impl Shared {
     }
 }
 
-/// Runs a target. `progress` hears from time to time how many executions have ended.
-pub fn run(target: &'static Target, plan: &Plan, mut progress: impl FnMut(u64)) -> Summary {
+/// Runs a target. `progress` gets the number of ended executions from time to time.
+pub fn run(target: &'static Target, plan: &Plan, progress: impl FnMut(u64)) -> Summary {
+    run_on(start, target, plan, progress)
+}
+
+/// The same on threads that come from `start`.
+fn run_on(
+    start: Start,
+    target: &'static Target,
+    plan: &Plan,
+    mut progress: impl FnMut(u64),
+) -> Summary {
     let threads = plan.threads.max(1);
     let at = || At { number: AtomicU64::new(NOTHING), since: AtomicU64::new(0) };
     let shared = Arc::new(Shared {
@@ -145,17 +187,29 @@ pub fn run(target: &'static Target, plan: &Plan, mut progress: impl FnMut(u64)) 
         found: Mutex::default(),
     });
     let (ended, end) = mpsc::channel::<()>();
-    for thread in 0..threads {
-        let (shared, ended) = (Arc::clone(&shared), ended.clone());
-        // Nobody listens any more once an execution has hung.
-        thread::spawn(move || {
+    let mut used = Threads { ran: 0, refused: None, watched: true };
+    while used.ran < threads {
+        let (shared, ended, thread) = (Arc::clone(&shared), ended.clone(), used.ran);
+        // After a hang nobody receives the result.
+        let work = move || {
             shared.work(thread);
             drop(ended);
-        });
+        };
+        match start(Box::new(work)) {
+            Ok(()) => used.ran += 1,
+            Err(error) => {
+                used.refused = Some(error);
+                break;
+            }
+        }
     }
     drop(ended);
+    if used.ran == 0 {
+        used = Threads { ran: 1, watched: false, ..used };
+        shared.work(0);
+    }
     // The channel closes when the last thread ends.
-    while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+    while end.recv_timeout(WATCH_INTERVAL) == Err(RecvTimeoutError::Timeout) {
         progress(shared.done.load(Ordering::Relaxed));
         if let Some(number) = shared.overdue() {
             let mut input = Vec::new();
@@ -171,6 +225,7 @@ pub fn run(target: &'static Target, plan: &Plan, mut progress: impl FnMut(u64)) 
         target: target.name,
         executions: shared.done.load(Ordering::Relaxed),
         time: shared.start.elapsed(),
+        threads: used,
         tally,
         finding: found.into_iter().next(),
     }
@@ -197,6 +252,34 @@ mod tests {
         assert_eq!((one.executions, four.executions), (1000, 1000));
         assert!(one.tally.beats > 0 && one.tally == four.tally);
         assert!(one.finding.is_none() && four.finding.is_none());
+    }
+
+    /// Gives two threads, then none, as a container's limit on processes does.
+    fn two(work: Box<dyn FnOnce() + Send>) -> io::Result<()> {
+        static GIVEN: AtomicU64 = AtomicU64::new(0);
+        match GIVEN.fetch_add(1, Ordering::Relaxed) {
+            0 | 1 => start(work),
+            _ => none(work),
+        }
+    }
+
+    fn none(_: Box<dyn FnOnce() + Send>) -> io::Result<()> {
+        Err(io::ErrorKind::WouldBlock.into())
+    }
+
+    #[test]
+    fn where_the_system_refuses_threads_fewer_run_everything_and_the_summary_says_so() {
+        static TARGET: Target =
+            Target { name: "counts", about: "", run: counts, longest: 9, share: 1 };
+        let all = run(&TARGET, &plan(1000, 4), |_| ());
+        assert!(all.threads.missing().is_none() && all.threads.ran == 4, "{:?}", all.threads);
+        for (start, ran, watched) in [(two as Start, 2, true), (none, 1, false)] {
+            let fewer = run_on(start, &TARGET, &plan(1000, 4), |_| ());
+            assert_eq!((fewer.executions, fewer.tally), (1000, all.tally));
+            assert_eq!((fewer.threads.ran, fewer.threads.watched), (ran, watched));
+            let missing = fewer.threads.missing().expect("threads are missing");
+            assert_eq!(missing.contains("no watchdog"), !watched, "{missing}");
+        }
     }
 
     fn fails(input: &[u8]) -> Tally {

@@ -1,4 +1,4 @@
-//! This file catches what an execution ends with, and keeps the input of one that ended badly.
+//! Catches the end of an execution, and saves the input of a failed one.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -15,12 +15,12 @@ use thiserror::Error;
 use crate::tally::Tally;
 use crate::targets::{self, Target};
 
-/// What went wrong.
+/// How an execution failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Ending {
-    /// The target panicked: what it said, and where.
+    /// The target panicked: the message and the place.
     Panic(String),
-    /// The execution took longer than this.
+    /// The execution took longer than this limit.
     Hang(Duration),
 }
 
@@ -33,7 +33,7 @@ impl fmt::Display for Ending {
     }
 }
 
-/// An execution that ended badly.
+/// A failed execution.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
     /// The target's name.
@@ -42,16 +42,16 @@ pub struct Finding {
     pub number: u64,
     /// Its input.
     pub input: Vec<u8>,
-    /// How it ended.
+    /// How it failed.
     pub ending: Ending,
 }
 
 thread_local! {
-    /// Whether panics of this thread are caught, and what the last one said.
+    /// Whether panics of this thread are caught, and the message of the last one.
     static CAUGHT: RefCell<Option<String>> = const { RefCell::new(None) };
 }
 
-/// Has panics that [`run`] catches noted and not printed.
+/// Records panics that [`run`] catches, instead of printing them.
 fn note_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -71,9 +71,10 @@ fn note_panics() {
     });
 }
 
-/// Runs a target on an input; what it says if it panics.
+/// Runs a target on an input.
 ///
 /// # Errors
+///
 /// The panic's message and place.
 pub fn run(target: &Target, input: &[u8]) -> Result<Tally, String> {
     note_panics();
@@ -83,7 +84,7 @@ pub fn run(target: &Target, input: &[u8]) -> Result<Tally, String> {
     ended.map_err(|_| message)
 }
 
-/// An input file that cannot be taken.
+/// An input file that cannot be used.
 #[derive(Debug, Error)]
 pub enum ReplayError {
     /// The file cannot be read.
@@ -91,11 +92,11 @@ pub enum ReplayError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         #[source]
         source: io::Error,
     },
-    /// It is not what [`Finding::save`] writes.
+    /// The file was not written by [`Finding::save`].
     #[error(
         "{}, line {line}: expected {expected}: give a file that a campaign has written",
         path.display()
@@ -105,7 +106,7 @@ pub enum ReplayError {
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// What should be there.
+        /// The expected content.
         expected: &'static str,
     },
 }
@@ -113,10 +114,11 @@ pub enum ReplayError {
 const BYTES_PER_LINE: usize = 32;
 
 impl Finding {
-    /// Writes the input into a file of the folder, which is made if need be; returns its path.
+    /// Writes the input into a file of the folder, which is made if necessary; returns its path.
     ///
     /// # Errors
-    /// Whatever keeps the file from being written.
+    ///
+    /// The file cannot be written.
     pub fn save(&self, folder: &Path) -> io::Result<PathBuf> {
         let mut text = format!("target {}\n", self.target);
         for line in self.ending.to_string().lines() {
@@ -133,10 +135,11 @@ impl Finding {
     }
 }
 
-/// Reads what [`Finding::save`] has written.
+/// Reads a file of [`Finding::save`].
 ///
 /// # Errors
-/// [`ReplayError`]: the file cannot be read, or is another kind of file.
+///
+/// [`ReplayError`]: the file cannot be read, or is of another kind.
 pub fn load(path: &Path) -> Result<(&'static Target, Vec<u8>), ReplayError> {
     let text = fs::read_to_string(path)
         .map_err(|source| ReplayError::Read { path: path.to_path_buf(), source })?;

@@ -1,18 +1,18 @@
-//! This file reads choices out of the bytes of an execution, from the front; where they have ended
-//! it reads zeros, which is the tamest choice everywhere.
+//! Reads choices from the front of an execution's bytes; after their end it reads zeros, which are
+//! the tamest choice everywhere.
 
-/// What is left of the bytes.
+/// The bytes that are left.
 #[derive(Debug, Clone)]
 pub struct Input<'a>(&'a [u8]);
 
 impl<'a> Input<'a> {
-    /// All of the bytes.
+    /// Starts with all of the bytes.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
         Self(bytes)
     }
 
-    /// Whether there is nothing left.
+    /// Whether no byte is left.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
@@ -20,13 +20,13 @@ impl<'a> Input<'a> {
 
     fn array<const N: usize>(&mut self) -> [u8; N] {
         let mut array = [0; N];
-        let taken = self.take(N);
+        let taken = self.bytes(N);
         array[..taken.len()].copy_from_slice(taken);
         array
     }
 
-    /// At most that many bytes as they are.
-    pub fn take(&mut self, most: usize) -> &'a [u8] {
+    /// At most `most` bytes, unchanged.
+    pub fn bytes(&mut self, most: usize) -> &'a [u8] {
         let (taken, left) = self.0.split_at(most.min(self.0.len()));
         self.0 = left;
         taken
@@ -53,7 +53,7 @@ impl<'a> Input<'a> {
         u64::from_le_bytes(self.array())
     }
 
-    /// A number below `end`, which is above 0; of one byte where that is enough.
+    /// A number below `end`, which is above 0; it uses one byte where that is enough.
     pub fn below(&mut self, end: u32) -> u32 {
         let raw = if end <= 256 { self.byte().into() } else { self.word() };
         raw.checked_rem(end).unwrap_or(0)
@@ -67,11 +67,11 @@ impl<'a> Input<'a> {
 
     /// True once in `rate` times.
     pub fn one_in(&mut self, rate: u32) -> bool {
-        // Never where the bytes have ended.
+        // Never after the end of the bytes.
         self.below(rate) == rate - 1
     }
 
-    /// One of the choices, of which there is at least one.
+    /// One of the choices; there must be at least one.
     pub fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.index(choices.len())]
     }
@@ -107,7 +107,7 @@ mod tests {
         assert!(input.is_empty());
         assert_eq!((input.long(), input.below(3), input.index(9)), (0, 0, 0));
         assert!(!input.one_in(2));
-        assert!(input.take(4).is_empty());
+        assert!(input.bytes(4).is_empty());
     }
 
     #[test]

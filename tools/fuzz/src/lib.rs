@@ -1,8 +1,8 @@
 //! Fuzz targets: the emulated board, the driver and the loader under random input.
 //!
-//! A target is a function of bytes that panics when it finds something. A [`campaign`] runs one on
-//! bytes made from a seed, on a stable toolchain; `fuzz_targets/` hands the same functions to
-//! libFuzzer, which needs a nightly one.
+//! A target is a function of bytes that panics when it finds something. A [`campaign`] runs it on
+//! bytes made from a seed, on a stable toolchain; `fuzz_targets/` passes the same functions to
+//! libFuzzer, which needs a nightly toolchain.
 //!
 //! ```
 //! let registers = fuzz::targets::by_name("registers").ok_or("no such target")?;
@@ -21,7 +21,7 @@ pub mod random;
 pub mod tally;
 pub mod targets;
 
-/// The bare-metal host of the emulated board's own tests: it packs a step from the interface's
-/// tables, and knows nothing of the driver.
+/// The bare-metal host of the emulated board's own tests. It packs a step from the interface's
+/// tables, independently of the driver.
 #[path = "../../../bitstream-model/tests/common/mod.rs"]
 mod host;

@@ -1,8 +1,8 @@
 //! Runs fuzz targets on inputs made from a seed. `--help` says how.
 #![forbid(unsafe_code)]
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program says what it does")]
+#![allow(clippy::print_stderr, reason = "a program says what it does")]
 
-use std::io::IsTerminal as _;
+use std::io::{self, IsTerminal as _, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::thread;
@@ -14,59 +14,78 @@ use fuzz::finding;
 use fuzz::targets::{self, Target};
 use serde_json::json;
 
-/// Runs fuzz targets on inputs that are made from a seed: the same ones on every machine and with
-/// every number of threads.
+/// Runs fuzz targets on inputs made from a seed: the same inputs on every machine and with every
+/// number of threads.
 ///
 /// A target that panics or hangs is a finding: its input is written into a file, and the exit code
 /// is 1.
 #[derive(Debug, Parser)]
 #[command(name = "fuzz", version)]
 struct Args {
-    /// The target, or `all`; `list` says which there are.
+    /// The target, or `all`; `list` shows the targets
     #[arg(default_value = "all")]
     target: String,
-    /// Executions; those of `all` are shared out, more to the targets that take less time.
+    /// Executions; `all` shares them out, more to the faster targets
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     executions: u64,
-    /// Of the inputs.
+    /// Seed of the inputs
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
-    /// Threads; as many as there are processors unless given.
+    /// Threads [default: one a processor]
     #[arg(long, value_name = "T")]
     threads: Option<usize>,
-    /// An execution that takes longer hangs, s.
+    /// Time after which an execution counts as hanging, s
     #[arg(long, value_name = "SECONDS", default_value_t = 20)]
     limit: u64,
-    /// Where inputs of findings are written.
+    /// Folder for the inputs of findings
     #[arg(long, value_name = "FOLDER", default_value = "target/fuzz-findings")]
     findings: PathBuf,
-    /// Runs the input of that file once, instead; a panic is not caught.
+    /// Run the input in this file once instead; a panic is not caught
     #[arg(long, value_name = "FILE")]
     replay: Option<PathBuf>,
-    /// Prints one JSON document instead of a table.
+    /// Print one JSON document instead of a table
     #[arg(long)]
     json: bool,
 }
 
-/// Wrong usage, or a file that cannot be read or written.
+/// Wrong usage, or a file or stdout that cannot be read or written.
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let mut out = io::stdout().lock();
+    let done = match Args::try_parse() {
+        Ok(args) => act(&args, &mut out),
+        Err(message) if message.use_stderr() => message.exit(),
+        // Help or the version.
+        Err(message) => write!(out, "{message}").map(|()| ExitCode::SUCCESS),
+    };
+    match done.and_then(|code| out.flush().map(|()| code)) {
+        Ok(code) => code,
+        // The reader of a pipe has seen enough.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: standard output cannot be written\n  because: {error}");
+            ExitCode::from(USAGE)
+        }
+    }
+}
+
+/// Does what the command line says; an error is one of stdout.
+fn act(args: &Args, out: &mut dyn Write) -> io::Result<ExitCode> {
     if args.target == "list" {
         for target in targets::ALL {
-            println!("{:<12} {}", target.name, target.about);
+            writeln!(out, "{:<12} {}", target.name, target.about)?;
         }
-        return ExitCode::SUCCESS;
+        return Ok(ExitCode::SUCCESS);
     }
     if let Some(path) = &args.replay {
         return match finding::load(path) {
             Ok((target, input)) => {
-                println!("{}: {} bytes", target.name, input.len());
-                println!("{:?}", (target.run)(&input));
-                ExitCode::SUCCESS
+                writeln!(out, "{}: {} bytes", target.name, input.len())?;
+                writeln!(out, "{:?}", (target.run)(&input))?;
+                Ok(ExitCode::SUCCESS)
             }
-            Err(error) => refuse(&error),
+            Err(error) => Ok(refuse(&error)),
         };
     }
     let chosen: Vec<&'static Target> = match targets::by_name(&args.target) {
@@ -79,10 +98,10 @@ fn main() -> ExitCode {
                 args.target,
                 names.join(", ")
             );
-            return ExitCode::from(USAGE);
+            return Ok(ExitCode::from(USAGE));
         }
     };
-    run(&args, &chosen)
+    run(args, &chosen, out)
 }
 
 fn refuse(error: &dyn std::error::Error) -> ExitCode {
@@ -93,7 +112,7 @@ fn refuse(error: &dyn std::error::Error) -> ExitCode {
     ExitCode::from(USAGE)
 }
 
-fn run(args: &Args, chosen: &[&'static Target]) -> ExitCode {
+fn run(args: &Args, chosen: &[&'static Target], out: &mut dyn Write) -> io::Result<ExitCode> {
     let threads = args
         .threads
         .unwrap_or_else(|| thread::available_parallelism().map_or(1, std::num::NonZero::get));
@@ -101,7 +120,7 @@ fn run(args: &Args, chosen: &[&'static Target]) -> ExitCode {
     let start = Instant::now();
     let mut summaries = Vec::new();
     if !args.json {
-        println!("seed {}, {threads} threads", args.seed);
+        writeln!(out, "seed {}, {threads} threads", args.seed)?;
     }
     for target in chosen {
         let plan = Plan {
@@ -120,7 +139,7 @@ fn run(args: &Args, chosen: &[&'static Target]) -> ExitCode {
             eprint!("\r{:60}\r", "");
         }
         if !args.json {
-            print_summary(&summary);
+            print_summary(&summary, out)?;
         }
         let hung = matches!(
             summary.finding,
@@ -128,31 +147,41 @@ fn run(args: &Args, chosen: &[&'static Target]) -> ExitCode {
         );
         summaries.push(summary);
         if hung {
-            // Its thread still takes a processor's time.
+            // Its thread still uses processor time.
             break;
         }
     }
-    finish(args, &summaries, threads, start.elapsed())
+    finish(args, &summaries, threads, start.elapsed(), out)
 }
 
-fn print_summary(summary: &Summary) {
-    let Summary { target, executions, time, tally, .. } = summary;
+fn print_summary(summary: &Summary, out: &mut dyn Write) -> io::Result<()> {
+    let Summary { target, executions, time, threads, tally, .. } = summary;
     let rate = *executions as f64 / time.as_secs_f64().max(1e-9);
-    println!(
+    writeln!(
+        out,
         "{target:<12} {executions:>10} executions in {:>7.1} s, {rate:>8.0} a second",
         time.as_secs_f64()
-    );
+    )?;
+    if let Some(missing) = threads.missing() {
+        writeln!(out, "{:<12} {missing}", "")?;
+    }
     let counts: Vec<String> = tally
         .entries()
         .iter()
         .filter(|(_, count)| *count > 0)
         .map(|(name, count)| format!("{count} {name}"))
         .collect();
-    println!("{:<12} {}", "", counts.join(", "));
+    writeln!(out, "{:<12} {}", "", counts.join(", "))
 }
 
-/// Writes the inputs of what was found, and the document or the last lines.
-fn finish(args: &Args, summaries: &[Summary], threads: usize, time: Duration) -> ExitCode {
+/// Writes the inputs of findings, and the document or the last lines.
+fn finish(
+    args: &Args,
+    summaries: &[Summary],
+    threads: usize,
+    time: Duration,
+    out: &mut dyn Write,
+) -> io::Result<ExitCode> {
     let mut code = ExitCode::SUCCESS;
     let mut documents = Vec::new();
     for summary in summaries {
@@ -160,6 +189,8 @@ fn finish(args: &Args, summaries: &[Summary], threads: usize, time: Duration) ->
             "target": summary.target,
             "executions": summary.executions,
             "seconds": summary.time.as_secs_f64(),
+            "threads": summary.threads.ran,
+            "watched": summary.threads.watched,
         });
         for (name, count) in summary.tally.entries() {
             document[name] = count.into();
@@ -175,11 +206,12 @@ fn finish(args: &Args, summaries: &[Summary], threads: usize, time: Duration) ->
                 }
             };
             if !args.json {
-                println!(
+                writeln!(
+                    out,
                     "FOUND in {}, execution {}: {}",
                     finding.target, finding.number, finding.ending
-                );
-                println!("  again: fuzz --replay {}", path.display());
+                )?;
+                writeln!(out, "  again: fuzz --replay {}", path.display())?;
             }
             document["finding"] = json!({
                 "execution": finding.number,
@@ -198,9 +230,9 @@ fn finish(args: &Args, summaries: &[Summary], threads: usize, time: Duration) ->
             "seconds": time.as_secs_f64(),
             "targets": documents,
         });
-        println!("{document:#}");
+        writeln!(out, "{document:#}")?;
     } else {
-        println!("{executions} executions in {:.1} s", time.as_secs_f64());
+        writeln!(out, "{executions} executions in {:.1} s", time.as_secs_f64())?;
     }
-    code
+    Ok(code)
 }

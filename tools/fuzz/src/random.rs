@@ -1,5 +1,5 @@
-//! This file makes the bytes of an execution: a function of seed, target and number alone, so that
-//! any execution can be repeated by itself, whatever the number of threads was.
+//! Makes the bytes of an execution: a function of seed, target and number alone, so that any
+//! execution can be repeated alone, independently of the number of threads.
 
 /// Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
 #[derive(Debug)]
@@ -14,9 +14,9 @@ impl SplitMix64 {
     }
 }
 
-/// Fills `bytes` with at most `longest` bytes for execution `number` of the target of that name.
+/// Fills `bytes` with at most `longest` bytes for execution `number` of the target `target`.
 ///
-/// One in eight inputs is mostly zeros, one in eight mostly ones, for what uniform bytes never hit.
+/// One in eight inputs is mostly zeros, one in eight mostly ones: uniform bytes never reach these.
 pub fn fill(bytes: &mut Vec<u8>, seed: u64, target: &str, number: u64, longest: usize) {
     // FNV-1a, so that targets do not share their inputs.
     let name = target.bytes().fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| {

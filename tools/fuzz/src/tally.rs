@@ -1,30 +1,30 @@
-//! This file counts what executions did, so that a campaign that did nothing shows.
+//! Counts what executions did, so that a campaign without effect shows.
 
 use std::ops::AddAssign;
 
 use bitstream_model::Counts;
 
-/// What was done, by one execution or by many.
+/// Counts of one execution or of many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tally {
-    /// Steps that were completed.
+    /// Completed steps.
     pub steps: u64,
-    /// Inputs that were refused, or ended with an error, as they should be.
+    /// Inputs that were rightly refused, or rightly ended with an error.
     pub refused: u64,
     /// Register accesses of the CPU.
     pub registers: u64,
-    /// Beats that the DMAs read and wrote, each checked against what they were granted.
+    /// Beats that the DMAs read and wrote, each checked against the grants.
     pub beats: u64,
-    /// Descriptors that were completed: fetched and written back, checked likewise.
+    /// Completed descriptors: fetched and written back, checked likewise.
     pub descriptors: u64,
-    /// Accesses outside what was granted, and other wrong-doings, recorded by the board.
+    /// Violations that the board recorded, such as accesses outside the grants.
     pub violations: u64,
-    /// Faults that the board had as it was told.
+    /// Injected faults that happened.
     pub faults: u64,
 }
 
 impl Tally {
-    /// Adds what happened on a board.
+    /// Adds a board's counts.
     pub fn add_board(&mut self, counts: &Counts) {
         self.registers += counts.register_reads + counts.register_writes;
         self.beats += counts.beats_read + counts.beats_written;

@@ -1,4 +1,4 @@
-//! Every target for a moment; the long run is the program's.
+//! Runs every target briefly; the program does the long runs.
 
 use std::time::Duration;
 

@@ -1,44 +1,45 @@
-//! Opens the board that the command line asks for, and says what it is.
+//! Opens the board of the command line, and describes it.
 
 use std::io::{self, Write};
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
-use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, FaultPlan, Hazards, Subnormals};
+use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::platform::{System, uio_listing};
 use zynq_pgs::{
     Accelerator, BoardChoice, BoardKind, DevMemWindows, Fault, InputError, MemoryChoice,
-    OpenOptions,
+    OpenOptions, StepParameters,
 };
 
-use crate::args::{BoardName, CommonArgs};
-use crate::build::described;
+use crate::common::{BoardName, CommonArgs};
 use crate::diagnosis;
 use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure};
-use crate::options::{BuildArgs, bandwidth_number, bandwidth_text};
-use crate::planned;
-use crate::verbs::facts::fact;
+use crate::options::bandwidth::{bandwidth_number, bandwidth_text};
+use crate::options::build::BuildArgs;
+use crate::options::build_text::described;
+use crate::options::planned::{Injected, PlannedArgs};
+use crate::output::facts::fact;
 
-/// What to do about bodies that the board's inertia is too simple for.
+/// Next step for bodies whose inertia is too general for the board.
 const WORLD_INERTIA: &str =
     "build the board with --inertia world (in a text for `pgs compare`: the word world)";
 
 /// An open board.
 #[derive(Debug)]
-pub(crate) struct Opened {
+pub(crate) struct OpenBoard {
     pub(crate) accelerator: Accelerator,
-    /// The emulated board, as its builder sees it; none for a real one.
+    /// The builder's handle of an emulated board; none for a real one.
     pub(crate) observer: Option<EmulatedBoard>,
-    /// The faults that it was told to have.
-    pub(crate) plan: Option<FaultPlan>,
-    /// Why this board and no other.
+    /// The faults that the emulated board was given.
+    injected: Option<Injected>,
+    /// Why this board was chosen.
     pub(crate) reason: String,
 }
 
-/// A kind of board, as it is written on the command line and in results.
+/// The name of a kind of board, on the command line and in results.
 pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
     match kind {
         BoardKind::Emulated => "emulated",
@@ -48,7 +49,7 @@ pub(crate) fn kind_text(kind: BoardKind) -> &'static str {
     }
 }
 
-/// Which kind of board a name on the command line means here, and why.
+/// The kind of board that a name on the command line means on this system, and why.
 pub(crate) fn choose(name: &BoardName, system: &System) -> (BoardKind, String) {
     let kind = match name {
         BoardName::Uio(_) => BoardKind::Uio,
@@ -60,9 +61,9 @@ pub(crate) fn choose(name: &BoardName, system: &System) -> (BoardKind, String) {
     (kind, "as asked for".to_owned())
 }
 
-/// Which kind of board there is, and why.
+/// The kind of board that this system has, and why.
 fn find_kind(system: &System) -> (BoardKind, String) {
-    // What cannot be read may be the board: the attempt to open it says what is wrong.
+    // A node that cannot be read may be the board: the attempt to open it names the obstacle.
     let unreadable = |error| (BoardKind::Uio, format!("UIO nodes cannot be listed: {error}"));
     let mut listing = match uio_listing(&system.uio) {
         Ok(listing) => listing,
@@ -80,61 +81,63 @@ fn find_kind(system: &System) -> (BoardKind, String) {
     }
 }
 
-/// Refuses a command that is about a board where there is none, and the emulated one would stand in.
+/// Refuses to stand an emulated board in for a missing real one, for commands that test a board.
 pub(crate) fn require(common: &CommonArgs) -> Result<(), Failure> {
     let (kind, reason) = choose(&common.board, &System::default());
     if kind != BoardKind::Emulated || common.board != BoardName::Auto {
         return Ok(());
     }
     Err(Failure::new(Cause::NoBoard, format!("there is no board: {reason}")).next(
-        "see with `pgs list` what there is, and name a node with --board uio:NODE; or take the \
+        "list the nodes with `pgs list`, and name a node with --board uio:NODE; or take the \
          emulated board with --board emulated",
     ))
 }
 
-/// A board that was chosen and not opened yet.
+/// A board that is chosen and not yet open.
 #[derive(Debug)]
-pub(crate) struct Chosen {
+pub(crate) struct ChosenBoard {
     pub(crate) kind: BoardKind,
     pub(crate) options: OpenOptions,
-    /// The emulated board, as its builder sees it; none for a real one.
+    /// The builder's handle of an emulated board; none for a real one.
     pub(crate) observer: Option<EmulatedBoard>,
-    /// Why this board and no other.
+    /// Why this board was chosen.
     pub(crate) reason: String,
 }
 
-/// Chooses a board. `given` is an option of the command line that only an emulated one has.
+/// Chooses a board. `given` is an option of the command line that only an emulated board has.
 pub(crate) fn find(
     common: &CommonArgs,
     config: BoardConfig,
     given: Option<&'static str>,
-) -> Result<Chosen, Failure> {
+) -> Result<ChosenBoard, Failure> {
     let CommonArgs { board: name, memory, memory_of_environment, manager, .. } = common;
     let (kind, reason) = choose(name, &System::default());
     let (board, observer) = if kind == BoardKind::Emulated {
         if *name == BoardName::Auto {
             log::warn!("{reason}: using the emulated board");
         }
-        // One that is asked for by name has nothing to do with what the environment says of real ones.
+        // `PGS_MEMORY` describes real boards; it does not matter to an emulated board asked for by
+        // name.
         let ignored = *memory_of_environment && *name == BoardName::Emulated;
         if *memory != MemoryChoice::Automatic && !ignored {
             let (option, next) = match memory_of_environment {
-                true => (MEMORY, "say which board is meant: --board emulated or --board uio"),
+                true => (MEMORY, "choose the board with --board emulated or --board uio"),
                 false => ("--memory", "leave out --memory, or add --board uio"),
             };
-            let error =
-                format!("{option} is for real boards, this one is emulated and has its own");
+            let error = format!(
+                "{option} is for real boards; this one is emulated and has memory of its own"
+            );
             return Err(Failure::input(error).next(next));
         }
         let emulated = EmulatedBoard::new(config).map_err(not_built)?;
         (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
     } else if let (BoardName::Socket(_), Some(option)) = (name, given) {
-        let error = format!("{option} says how to build an emulated board, this one is built");
+        let error = format!("{option} builds an emulated board, but this one is already built");
         return Err(Failure::input(error).next(format!("give {option} to its `pgs serve`")));
     } else if let BoardName::Socket(socket) = name {
         (BoardChoice::Served { socket: socket.clone() }, None)
     } else if let Some(option) = given {
-        let error = format!("{option} says how to build an emulated board, this one is real");
+        let error = format!("{option} builds an emulated board, but this one is real");
         return Err(
             Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
         );
@@ -154,10 +157,10 @@ pub(crate) fn find(
     };
     let manager = manager.clone();
     let options = OpenOptions { board, memory, manager, pack_threads, ..OpenOptions::default() };
-    Ok(Chosen { kind, options, observer, reason })
+    Ok(ChosenBoard { kind, options, observer, reason })
 }
 
-/// There is no such emulated board.
+/// The failure for a configuration that no emulated board has.
 pub(crate) fn not_built(error: ConfigError) -> Failure {
     let narrow = |numbers: &Numbers| {
         [numbers.collisions, numbers.bodies, numbers.poses]
@@ -178,13 +181,14 @@ pub(crate) fn not_built(error: ConfigError) -> Failure {
 }
 
 /// Opens a board.
-pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<Opened, Failure> {
-    let Chosen { options, observer, reason, .. } = find(common, build.config(), build.given())?;
+pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<OpenBoard, Failure> {
+    let ChosenBoard { options, observer, reason, .. } =
+        find(common, build.config(), build.board_option())?;
     let accelerator = Accelerator::open(options).map_err(unusable)?;
-    Ok(Opened { accelerator, observer, plan: None, reason })
+    Ok(OpenBoard { accelerator, observer, injected: None, reason })
 }
 
-/// There is no board, or none that can be opened.
+/// The failure for a board that is missing or cannot be opened.
 pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
     let general =
         || "see what there is with `pgs list`, or use the emulated board with --board emulated";
@@ -192,14 +196,14 @@ pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
     Failure::new(Cause::NoBoard, error).next(next)
 }
 
-/// Whether a step ended because Ctrl-C was pressed, and its channels are stopped.
+/// Whether Ctrl-C ended a step, with its channels stopped.
 pub(crate) fn is_cancelled(error: &zynq_pgs::Error) -> bool {
     matches!(error, zynq_pgs::Error::Step { fault, .. } if matches!(**fault, Fault::Cancelled))
         && !error.must_reopen()
 }
 
-impl Opened {
-    /// The failure that an error of the driver is.
+impl OpenBoard {
+    /// Makes a failure of an error of the driver.
     pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {
         if let zynq_pgs::Error::Input(input) = &error {
             let anisotropic = matches!(input, InputError::Anisotropic { .. });
@@ -212,7 +216,7 @@ impl Opened {
         let diverged = matches!(&error, zynq_pgs::Error::Step { fault, .. }
             if matches!(**fault, Fault::NotFinite { .. }));
         if diverged && self.observer.is_some() {
-            // The emulated board does not miscalculate: the numbers given were too large.
+            // The emulated board does not miscalculate: the input numbers are too large.
             return Failure::input(error).next(
                 "start from smaller velocities (run: a lower --drop, or --hazards interlocked), or \
                  take a shorter time step (solve: params.npy)",
@@ -230,10 +234,44 @@ impl Opened {
             false => format!("{next}; the emulated board saw this misuse:{seen}"),
         };
         let failure = diagnosis::hardware(error).next(next);
-        match planned::text(self) {
-            Some(line) => failure.planned(&line, planned::to_json(self)),
+        match &self.injected {
+            Some(injected) => failure.planned(&injected.text(), injected.to_json()),
             None => failure,
         }
+    }
+
+    /// Gives the board the faults of `planned`, effective from its first step.
+    pub(crate) fn inject(
+        &mut self,
+        planned: &PlannedArgs,
+        parameters: &StepParameters,
+    ) -> Result<(), Failure> {
+        if !planned.is_given() {
+            return Ok(());
+        }
+        let Some(board) = &self.observer else {
+            let next = match self.accelerator.board().kind {
+                BoardKind::Served => "leave out --fault, or give it to the board's `pgs serve`",
+                _ => "leave out --fault, or add --board emulated",
+            };
+            let error = "--fault is for an emulated board of this process";
+            return Err(Failure::input(error).next(next));
+        };
+        if let Some(plan) = planned.plan(&board.config(), parameters) {
+            board.inject(plan.clone());
+            self.injected = Some(Injected { plan, board: board.clone() });
+        }
+        Ok(())
+    }
+
+    /// The planned faults and the number that have happened, for people.
+    pub(crate) fn faults_text(&self) -> Option<String> {
+        self.injected.as_ref().map(Injected::text)
+    }
+
+    /// The same for programs; null without a plan.
+    pub(crate) fn faults_json(&self) -> Value {
+        self.injected.as_ref().map_or(Value::Null, Injected::to_json)
     }
 
     fn kind(&self) -> &'static str {
@@ -244,14 +282,14 @@ impl Opened {
         self.accelerator.capabilities().variant.profile.name
     }
 
-    /// The profile with its formats and inertia, as the bitstream says.
+    /// The profile with its formats and inertia, as the bitstream reports them.
     fn design(&self) -> String {
         let Variant { profile, numbers, inertia } = self.accelerator.capabilities().variant;
         let numbers = Some(numbers);
         described(&BoardConfig { profile, numbers, inertia, ..BoardConfig::default() })
     }
 
-    /// In lines of at most 100 columns: which board and why, which bitstream.
+    /// Prints in lines of at most 100 columns which board was opened, why, and its bitstream.
     pub(crate) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
         let can = self.accelerator.capabilities();
         fact(out, "board", &format!("{} ({})", self.kind(), self.reason))?;
@@ -312,7 +350,7 @@ impl Opened {
         })
     }
 
-    /// How the board is built, where it is emulated.
+    /// The configuration of an emulated board.
     pub(crate) fn config(&self) -> Option<BoardConfig> {
         self.observer.as_ref().map(EmulatedBoard::config)
     }

@@ -1,4 +1,4 @@
-//! This file says how far numbers deviate from others: the thesis' measure and ours.
+//! Measures how far results deviate from the original ones: the thesis' measure and ours.
 //!
 //! | measure | over | a component whose original is 0 |
 //! |---|---|---|
@@ -9,7 +9,7 @@
 use serde_json::{Value, json};
 use zynq_pgs::Body;
 
-/// Relative deviation up to which numbers count as the same.
+/// Relative deviation up to which two numbers count as the same.
 const ONE_PERCENT: f64 = 0.01;
 
 /// How new numbers deviate from the original ones, component by component.
@@ -19,15 +19,15 @@ pub(crate) struct Deviation {
     pub(crate) components: u64,
     /// Components whose original is 0.
     pub(crate) zeros: u64,
-    /// Those of them whose new value is not.
+    /// Components whose original is 0 and whose new value is not.
     pub(crate) zeros_moved: u64,
     /// Mean relative deviation where the original is not 0.
     pub(crate) mean: f64,
     /// Largest relative deviation where the original is not 0.
     pub(crate) largest: f64,
-    /// Components that deviate by less than 1 %, of those whose original is not 0.
+    /// Components whose original is not 0 and that deviate by less than 1 %.
     pub(crate) under: u64,
-    /// Components that differ by 1 % of the original at most, of all.
+    /// Components that differ by at most 1 % of the original, among all.
     pub(crate) within: u64,
     /// Mean absolute difference.
     pub(crate) mean_absolute: f64,
@@ -36,7 +36,7 @@ pub(crate) struct Deviation {
 }
 
 impl Deviation {
-    /// Compares pairs of an original number and a new one, both finite.
+    /// Compares pairs (original, new) of finite numbers.
     pub(crate) fn of(pairs: impl IntoIterator<Item = (f32, f32)>) -> Self {
         let mut found = Self::default();
         let (mut relative_sum, mut absolute_sum) = (0.0, 0.0);
@@ -45,7 +45,7 @@ impl Deviation {
             let difference = (f64::from(new) - original).abs();
             found.components += 1;
             absolute_sum += difference;
-            larger(&mut found.largest_absolute, difference);
+            raise_to(&mut found.largest_absolute, difference);
             if difference <= ONE_PERCENT * original.abs() {
                 found.within += 1;
             }
@@ -56,22 +56,22 @@ impl Deviation {
             }
             let relative = difference / original.abs();
             relative_sum += relative;
-            larger(&mut found.largest, relative);
+            raise_to(&mut found.largest, relative);
             found.under += u64::from(relative < ONE_PERCENT);
         }
-        found.mean = mean(relative_sum, found.others());
+        found.mean = mean(relative_sum, found.nonzero());
         found.mean_absolute = mean(absolute_sum, found.components);
         found
     }
 
     /// Components whose original is not 0.
-    fn others(&self) -> u64 {
+    fn nonzero(&self) -> u64 {
         self.components - self.zeros
     }
 
     /// Share of the components whose original is not 0 that deviate by less than 1 %.
     pub(crate) fn under_share(&self) -> f64 {
-        share(self.under, self.others())
+        share(self.under, self.nonzero())
     }
 
     /// Share of all components that are within 1 %.
@@ -95,7 +95,7 @@ impl Deviation {
     }
 }
 
-/// How two states of the same bodies differ, moving bodies only.
+/// The deviations between two states of the same bodies, for moving bodies only.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct StateDeviation {
     pub(crate) position: Deviation,
@@ -104,7 +104,7 @@ pub(crate) struct StateDeviation {
 }
 
 impl StateDeviation {
-    /// Compares `new` with `original`; `moving` says which of the bodies move.
+    /// Compares `new` with `original`; `moving` marks the moving bodies.
     pub(crate) fn of(original: &[Body], new: &[Body], moving: &[bool]) -> Self {
         let of = |field: fn(&Body) -> [f32; 3]| {
             Deviation::of(
@@ -120,8 +120,8 @@ impl StateDeviation {
     }
 }
 
-/// Share of the position components of the moving bodies that a step left where they were: at the
-/// bits that the board was sent, which are those of `carried`, what its streams make of a number.
+/// The share of the moving bodies' position components that a step did not change: the bits after
+/// the step equal the bits sent to the board. `carried` rounds a number as the board's streams do.
 pub(crate) fn unmoved_share(
     before: &[Body],
     after: &[Body],
@@ -146,18 +146,18 @@ fn pairs<'a>(
     a.iter().zip(b).zip(moving).filter_map(|(pair, moving)| moving.then_some(pair))
 }
 
-fn larger(most: &mut f64, value: f64) {
+fn raise_to(most: &mut f64, value: f64) {
     if value > *most {
         *most = value;
     }
 }
 
-/// 0 of none.
+/// The mean; 0 for an empty sum.
 fn mean(sum: f64, count: u64) -> f64 {
     if count == 0 { 0.0 } else { sum / count as f64 }
 }
 
-/// All of none.
+/// The share; 1 for an empty whole.
 pub(crate) fn share(part: u64, whole: u64) -> f64 {
     if whole == 0 { 1.0 } else { part as f64 / whole as f64 }
 }
@@ -237,7 +237,7 @@ mod tests {
         #[test]
         fn numbers_do_not_deviate_from_themselves(numbers in prop::collection::vec(-1e30_f32..1e30, 0..50)) {
             let d = Deviation::of(numbers.iter().map(|&number| (number, number)));
-            prop_assert_eq!((d.under, d.within, d.zeros_moved), (d.others(), d.components, 0));
+            prop_assert_eq!((d.under, d.within, d.zeros_moved), (d.nonzero(), d.components, 0));
             let sum = d.mean + d.largest + d.mean_absolute + d.largest_absolute;
             prop_assert_eq!(sum.to_bits(), 0.0_f64.to_bits());
         }

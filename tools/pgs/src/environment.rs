@@ -1,19 +1,19 @@
-//! Reads environment variables; one that is blank counts as unset.
+//! Reads environment variables; a blank one counts as unset.
 
 use std::ffi::OsString;
 
-/// The variable that names the board.
+/// Names the board.
 pub(crate) const BOARD: &str = "PGS_BOARD";
-/// The variable that names the DMA memory.
+/// Names the DMA memory.
 pub(crate) const MEMORY: &str = "PGS_MEMORY";
-/// The variable that names the FPGA manager.
+/// Names the FPGA manager.
 pub(crate) const MANAGER: &str = "PGS_MANAGER";
-/// The variable that says what is logged.
+/// Sets the filter of the log.
 pub(crate) const LOG: &str = "RUST_LOG";
-/// The variable that says whether the log has colours.
+/// Sets the colours of the log.
 pub(crate) const LOG_STYLE: &str = "RUST_LOG_STYLE";
 
-/// The text of a variable of this process.
+/// Reads a variable of this process.
 pub(crate) fn variable(name: &str) -> Option<OsString> {
     std::env::var_os(name).filter(|text| !is_blank(text))
 }

@@ -1,4 +1,4 @@
-//! This file says how a command ends: exit codes, and errors as a chain with the next step.
+//! Ends a command: exit codes, and errors as a chain with the next step.
 //!
 //! | code | meaning |
 //! |---|---|
@@ -16,15 +16,15 @@ use std::process::ExitCode;
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use crate::verbs::SCHEMA;
+use crate::output::SCHEMA;
 
-/// A command that ran.
+/// The outcome of a command that ran.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
     Done,
     /// A comparison found differences, or a check failed.
     Differs,
-    /// Ctrl-C ended it, and no channel runs.
+    /// Ctrl-C ended the command, and no channel runs.
     Interrupted,
 }
 
@@ -38,12 +38,12 @@ impl Verdict {
     }
 }
 
-/// Whose fault it is that a command did not run to its end.
+/// The cause of a failure, which decides the exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cause {
     /// The command line, or a file named on it.
     Input,
-    /// There is no board to be used.
+    /// No board can be used.
     NoBoard,
     /// The board failed.
     Hardware,
@@ -51,16 +51,16 @@ pub(crate) enum Cause {
     Output,
 }
 
-/// Why a command did not run to its end.
+/// The failure of a command.
 #[derive(Debug)]
 pub(crate) struct Failure {
     cause: Cause,
     error: Box<dyn Error + Send + Sync>,
-    /// Where the innermost message does not say what to do.
+    /// The next step, where the innermost message does not name it.
     next: Option<String>,
-    /// More of it, in lines.
+    /// Further lines for people.
     details: String,
-    /// What programs are told of it.
+    /// The document for programs.
     document: Option<Value>,
 }
 
@@ -74,13 +74,13 @@ impl Failure {
         Self::new(Cause::Input, error)
     }
 
-    /// Says what to do next.
+    /// Sets the next step.
     pub(crate) fn next(mut self, next: impl Into<String>) -> Self {
         self.next = Some(next.into());
         self
     }
 
-    /// Says something more about what to do next.
+    /// Adds to the next step.
     pub(crate) fn hint(self, hint: &str) -> Self {
         let next = match &self.next {
             Some(next) => format!("{next}; {hint}"),
@@ -89,14 +89,14 @@ impl Failure {
         self.next(next)
     }
 
-    /// Says more: in lines, and for programs.
+    /// Adds details: lines for people, and a document for programs.
     pub(crate) fn details(mut self, lines: String, document: Value) -> Self {
         self.details = lines;
         self.document = (!document.is_null()).then_some(document);
         self
     }
 
-    /// Says what was planned to go wrong: in lines, and for programs.
+    /// Adds the planned faults: a line for people, and a value for programs.
     pub(crate) fn planned(mut self, line: &str, faults: Value) -> Self {
         self.details.push_str(&format!("{line}\n"));
         if let Some(document) = &mut self.document {
@@ -105,15 +105,15 @@ impl Failure {
         self
     }
 
-    /// Says what it was about: which of two boards.
+    /// Puts a context, such as one of two boards, before the error.
     pub(crate) fn about(mut self, about: impl Into<String>) -> Self {
         self.error = Box::new(About { about: about.into(), source: self.error });
         self
     }
 
     fn is_closed_pipe(&self) -> bool {
-        let io = self.error.downcast_ref::<io::Error>();
-        self.cause == Cause::Output && io.is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)
+        let stdout = self.error.downcast_ref::<StdoutError>();
+        stdout.is_some_and(|error| error.0.kind() == io::ErrorKind::BrokenPipe)
     }
 
     /// The messages from the outermost to the innermost, one a line, and the next step.
@@ -130,21 +130,21 @@ impl Failure {
         text
     }
 
-    /// Writes what programs are told, if there is anything.
+    /// Writes the document for programs, if there is one.
     pub(crate) fn write_document(&self, out: &mut dyn Write) {
         if let Some(error) = &self.document {
             let document = json!({ "schema": SCHEMA, "error": error });
-            // If nobody can be told, the code still says it.
+            // With stdout closed, the exit code still tells the failure.
             let _ = writeln!(out, "{document:#}").and_then(|()| out.flush());
         }
     }
 
-    /// Says on `stderr` what went wrong.
+    /// Reports the failure on `stderr`.
     pub(crate) fn report(&self, stderr: &mut impl Write) -> ExitCode {
         if self.is_closed_pipe() {
             return ExitCode::SUCCESS;
         }
-        // If nobody can be told, the code still says it.
+        // With stderr closed, the exit code still tells the failure.
         let _ = writeln!(stderr, "{}", self.chain());
         let _ = write!(stderr, "{}", self.details);
         ExitCode::from(match self.cause {
@@ -155,7 +155,7 @@ impl Failure {
     }
 }
 
-/// What a failure was about, before what it was.
+/// An error behind its context.
 #[derive(Debug, Error)]
 #[error("{about}")]
 struct About {
@@ -163,22 +163,34 @@ struct About {
     source: Box<dyn Error + Send + Sync>,
 }
 
-/// Verbs write to stdout only; files have errors of their own.
+/// Stdout takes no more.
+#[derive(Debug, Error)]
+#[error("standard output cannot be written")]
+struct StdoutError(#[source] io::Error);
+
+/// Verbs write to stdout only; errors of files have types of their own.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
-        Self::new(Cause::Output, error)
+        Self::new(Cause::Output, StdoutError(error)).next("make room, or redirect it elsewhere")
     }
 }
 
-/// 0 for help and version, 2 for wrong usage.
-pub(crate) fn usage_code(message: &clap::Error) -> ExitCode {
-    ExitCode::from(if message.use_stderr() { 2 } else { 0 })
+/// Writes what the command line's parser has to say: help and version to stdout with code 0, a
+/// usage error to stderr with code 2.
+pub(crate) fn report_usage(message: &clap::Error) -> ExitCode {
+    let printed = message.print().and_then(|()| io::stdout().flush());
+    match printed {
+        // If nobody can be told of a usage error, the code still says it.
+        _ if message.use_stderr() => ExitCode::from(2),
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => Failure::from(error).report(&mut io::stderr().lock()),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::npy::{NpyError, Problem};
+    use step_folder::npy::{NpyError, Problem};
 
     #[test]
     fn a_chain_names_every_cause_once() {
@@ -225,6 +237,10 @@ mod tests {
         Failure::from(io::Error::from(io::ErrorKind::BrokenPipe)).report(&mut stderr);
         assert!(stderr.is_empty());
         Failure::from(io::Error::from(io::ErrorKind::StorageFull)).report(&mut stderr);
-        assert!(!stderr.is_empty());
+        let text = String::from_utf8(stderr).expect("text");
+        assert!(
+            text.starts_with("error: standard output cannot be written\n  because: "),
+            "{text}"
+        );
     }
 }

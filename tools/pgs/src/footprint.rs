@@ -1,22 +1,22 @@
-//! This file says how much memory a run took, beside what it must hold: the beats of one step, and the
-//! bodies and collisions of the scene.
+//! Holds the peak memory of a run against the least that it must store: the beats of one step, and
+//! the bodies and collisions of the scene.
 
 use bitstream_model::interface::profile::Variant;
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Collision, StepReport};
 
-/// What the largest step of a run must hold.
+/// The least memory that the largest step of a run needs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Footprint {
-    /// Buffers of the beats: each record once, however often it is streamed.
+    /// Bytes of the beats: each record once, however often it is streamed.
     beats: u64,
-    /// Bodies and collisions, as the scene keeps them.
+    /// Bytes of the bodies and collisions in the scene.
     scene: u64,
 }
 
 impl Footprint {
-    /// Takes note of a step.
-    pub(crate) fn see(&mut self, variant: &Variant, report: &StepReport) {
+    /// Includes a step.
+    pub(crate) fn include(&mut self, variant: &Variant, report: &StepReport) {
         let StepReport { bodies, collisions, empty, .. } = *report;
         let words = variant.words();
         let of_body = words.velocity + words.pose + words.result;
@@ -27,7 +27,7 @@ impl Footprint {
         self.scene = self.scene.max(scene);
     }
 
-    /// For people; nothing where the system does not say it.
+    /// For people; none if the system does not report the peak.
     pub(crate) fn text(&self) -> Option<String> {
         let mb = |bytes: u64| bytes as f64 / 1e6;
         let (peak, times) = (peak()?, self.times()?);
@@ -49,19 +49,19 @@ impl Footprint {
         })
     }
 
-    /// The peak, in what the run must hold.
+    /// The peak as a multiple of the needed memory.
     fn times(&self) -> Option<f64> {
         let held = self.beats + self.scene;
         if held == 0 { None } else { Some(peak()? as f64 / held as f64) }
     }
 }
 
-/// Most memory that this process has had so far, bytes.
+/// Peak memory of this process so far, bytes.
 fn peak() -> Option<u64> {
     peak_of(&std::fs::read_to_string("/proc/self/status").ok()?)
 }
 
-/// The line of `VmHWM` (proc(5)), in bytes.
+/// Parses the line `VmHWM` (proc(5)) into bytes.
 fn peak_of(status: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;

@@ -1,37 +1,38 @@
 //! Command line tool of the zynq-pgs driver: steps scenes and folders of arrays on a board, real
 //! or emulated.
 //!
-//! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to both. The exit codes are those of [`failure`].
+//! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to
+//! both. The exit codes are those of [`failure`].
 
 #![forbid(unsafe_code)]
 
-mod args;
 mod board;
-mod build;
-mod compare;
+mod bug_report;
+mod cli;
+mod common;
 mod deviation;
 mod diagnosis;
+mod difference;
 mod environment;
 mod failure;
 mod footprint;
 mod interrupt;
 mod loading;
-mod memory;
+mod narrow;
+mod numbers;
 mod options;
-mod ordering;
-mod origin;
-mod planned;
-mod scenes;
-mod sixteen;
-mod solver;
+mod output;
+mod step_input;
 mod verbs;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
+use std::sync::Arc;
 
-use step_folder::{folder, npy};
+use signal_hook::consts::SIGXFSZ;
+use signal_hook::flag;
 
-/// Has the log written to stderr: warnings, or what the environment asks for.
+/// Sends the log to stderr: warnings, unless the environment sets another filter.
 fn log_to_stderr() {
     let text = |name: &str, default: &str| {
         let found = environment::variable(name).map(|text| text.to_string_lossy().into_owned());
@@ -43,19 +44,26 @@ fn log_to_stderr() {
         .init();
 }
 
+/// Has a write past the limit on the size of files (`ulimit -f`) fail with an error that is told,
+/// where the system would end the program.
+fn survive_file_limit() {
+    // Nobody asks the flag: the write says it.
+    if let Err(error) = flag::register(SIGXFSZ, Arc::default()) {
+        log::warn!("a file that grows past the limit will end the program: {error}");
+    }
+}
+
 fn main() -> ExitCode {
     log_to_stderr();
-    let command = match args::parse(std::env::args_os(), |name| std::env::var_os(name)) {
+    survive_file_limit();
+    let command = match cli::parse(std::env::args_os(), |name| std::env::var_os(name)) {
         Ok(command) => command,
-        Err(message) => {
-            // Help goes to stdout with code 0, a usage error to stderr with code 2. Nobody is left
-            // to tell if either is closed.
-            let _ = message.print();
-            return failure::usage_code(&message);
-        }
+        Err(message) => return failure::report_usage(&message),
     };
     let mut out = io::stdout().lock();
-    let done = verbs::run(&command, &mut out)
+    let done = command
+        .verb
+        .run(&command.common, &mut out)
         .and_then(|verdict| out.flush().map(|()| verdict).map_err(failure::Failure::from));
     match done {
         Ok(verdict) => verdict.code(),

@@ -1,4 +1,4 @@
-//! This file builds the scene and holds its bodies and collisions.
+//! Builds the scene and holds its bodies and collisions.
 
 use pgs_support::float_env::standard;
 use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
@@ -16,14 +16,14 @@ const SPACING: f32 = 2.2;
 const STATIC_SHAPE: u32 = 0;
 const CUBE_SHAPE: u32 = 1;
 
-/// Which inverse inertia the cubes have.
+/// The inverse inertia of the cubes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Inertia {
-    /// What Bullet computes on registering the cube: 0.36761099 1/(kg m²), from the box enlarged
-    /// by its margin, with the full size where half of it is meant.
+    /// Bullet's value on registering the cube: 0.36761099 1/(kg m²). Bullet enlarges the box by its
+    /// margin, and takes the full size in place of half of it.
     #[default]
     Bullet,
-    /// What a cube of 1 kg and 2 m has: 1.5 1/(kg m²).
+    /// The value of a cube of 1 kg and 2 m: 1.5 1/(kg m²).
     Textbook,
 }
 
@@ -38,7 +38,7 @@ impl Inertia {
     }
 }
 
-/// What a scene is made of. The default is the thesis' scene, dropped from 5 m.
+/// The options of a scene. The default is the thesis' scene, dropped from 5 m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneOptions {
     /// Cubes along each axis.
@@ -57,12 +57,12 @@ impl Default for SceneOptions {
 
 /// Bodies above a plane: cubes of 1 kg, or [several shapes](Self::of_shapes).
 ///
-/// Body 0 is the ground: a static box whose top is the plane y = 0. The others follow, those along
-/// z next to each other, then those along y, then those along x.
+/// Body 0 is the ground: a static box whose top is the plane y = 0. The other bodies follow in the
+/// order of x, then y, then z, with z the fastest.
 #[derive(Debug)]
 pub struct Scene {
     shapes: Vec<Shape>,
-    /// What the shapes look like; nothing for the ground.
+    /// The geometry of each shape; none for the ground.
     geometries: Vec<Option<Geometry>>,
     bodies: Vec<Body>,
     collisions: Vec<Collision>,
@@ -98,7 +98,7 @@ impl Scene {
         Ok(Self::on_ground(&[cube], bodies))
     }
 
-    /// A scene of `bodies` on the ground, whose shapes are numbered from 1 in the order of `kinds`.
+    /// Puts `bodies` on the ground; their shapes are numbered from 1 in the order of `kinds`.
     pub(crate) fn on_ground(kinds: &[(Shape, Geometry)], bodies: Vec<Body>) -> Self {
         let ground = at_rest([0.0, -GROUND_HALF_EXTENT, 0.0], STATIC_SHAPE);
         Self {
@@ -110,13 +110,13 @@ impl Scene {
         }
     }
 
-    /// What the bodies of each shape look like; nothing for the ground.
+    /// The geometry of each shape; none for the ground.
     #[must_use]
     pub fn geometries(&self) -> &[Option<Geometry>] {
         &self.geometries
     }
 
-    /// The shape table: 0 is static, the others move.
+    /// The shape table: shape 0 is static, the others move.
     #[must_use]
     pub fn shapes(&self) -> &[Shape] {
         &self.shapes
@@ -128,41 +128,41 @@ impl Scene {
         &self.bodies
     }
 
-    /// The bodies, to be moved.
+    /// The bodies, mutable.
     #[must_use]
     pub fn bodies_mut(&mut self) -> &mut [Body] {
         &mut self.bodies
     }
 
-    /// The collisions that [`detect`](Self::detect) found last; none before.
+    /// The collisions of the last [`detect`](Self::detect); none before the first.
     #[must_use]
     pub fn collisions(&self) -> &[Collision] {
         &self.collisions
     }
 
-    /// How many of those are with the ground: the first ones.
+    /// The number of collisions with the ground, which come first.
     #[must_use]
     pub fn ground_pairs(&self) -> usize {
         self.collisions.partition_point(|collision| collision.body_a == GROUND)
     }
 
-    /// What a step takes: the bodies, and the collisions that [`detect`](Self::detect) found last.
+    /// The input of a step: the bodies, and the collisions of the last [`detect`](Self::detect).
     #[must_use]
     pub fn parts_mut(&mut self) -> (&mut [Body], &[Collision]) {
         (&mut self.bodies, &self.collisions)
     }
 
-    /// How many threads may find collisions, the caller's among them; no result depends on it. As long
-    /// as it is not said: as many as the machine has, up to eight.
+    /// Sets the number of threads for detection, the caller's included; no result depends on it.
+    /// The default is the machine's number, up to eight.
     pub fn set_threads(&mut self, threads: usize) {
         self.detector = Detector::with_threads(threads.max(1));
     }
 
-    /// Finds the collisions of the current poses, sorted by body A, then body B.
+    /// Detects the collisions of the current poses, sorted by body A, then body B.
     ///
-    /// Pairs up to [`MARGIN`](crate::MARGIN) apart are collisions too. The ground is always body A,
-    /// of two other bodies the one with the lower index is. A body whose pose is not finite collides with
-    /// nothing; a step refuses it.
+    /// Pairs up to [`MARGIN`](crate::MARGIN) apart are collisions, too. The ground is always body
+    /// A; of two other bodies, A has the lower index. A body whose pose is not finite collides with
+    /// nothing, and a step refuses it.
     pub fn detect(&mut self) -> &[Collision] {
         let Self { geometries, bodies, collisions, detector, .. } = self;
         standard(|| detector.detect(bodies, Geometries(geometries), collisions));
@@ -170,7 +170,7 @@ impl Scene {
     }
 }
 
-/// The drop, if a scene can start from it.
+/// Refuses a drop that no scene can start from.
 pub(crate) fn check_drop(drop: f32) -> Result<f32, SceneError> {
     match (0.0..=DROP_MAX).contains(&drop) {
         true => Ok(drop),
@@ -178,7 +178,7 @@ pub(crate) fn check_drop(drop: f32) -> Result<f32, SceneError> {
     }
 }
 
-/// A body that stands still, its axes along the world's.
+/// A body at rest, with its axes along the world's.
 pub(crate) fn at_rest(position: [f32; 3], shape: u32) -> Body {
     Body {
         pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
@@ -228,8 +228,8 @@ mod tests {
         }
     }
 
-    /// A cube of one layer lies on four of the next, except at the borders: along a side of n cubes
-    /// there are n neighbours with the same number and n - 1 with the next one.
+    /// A cube of one layer lies on four of the next, except at the borders: along a side of n
+    /// cubes, n neighbours have the same number and n - 1 have the next one.
     fn pairs_of_the_lattice(x: usize, y: usize, z: usize) -> usize {
         (y - 1) * (2 * x - 1) * (2 * z - 1)
     }

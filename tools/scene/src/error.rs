@@ -1,4 +1,4 @@
-//! This file holds what can be wrong with a request for a scene.
+//! The errors of building a scene.
 
 use zynq_pgs::ShapeError;
 
@@ -23,10 +23,10 @@ pub enum SceneError {
         found: u64,
         /// Most cubes along that axis.
         most: u16,
-        /// Why there are no more.
+        /// The reason for the limit.
         reason: &'static str,
     },
-    /// The height above the ground is not one that a scene can start from.
+    /// No scene can start from this height above the ground.
     #[error("expected a drop of 0 to {most} m, found {found} m")]
     Drop {
         /// Height asked for, m.
@@ -42,7 +42,7 @@ pub enum SceneError {
         /// Most spheres.
         most: u32,
     },
-    /// A body has sizes or a mass that no shape has.
+    /// The sizes or the mass of a body are out of range.
     #[error(transparent)]
     Shape(#[from] ShapeError),
 }

@@ -1,4 +1,4 @@
-//! This file says what a body looks like, and what mass properties follow from it.
+//! The geometry of a body, and the mass properties that follow from it.
 
 use zynq_pgs::{Shape, ShapeError};
 
@@ -17,9 +17,9 @@ pub enum Geometry {
         /// Radius, m.
         radius: f32,
     },
-    /// All points up to a radius away from a piece of the y axis.
+    /// All points within a radius of a segment on the y axis.
     Capsule {
-        /// Half the length of that piece, m.
+        /// Half the length of that segment, m.
         half_height: f32,
         /// Radius, m.
         radius: f32,
@@ -55,7 +55,7 @@ impl Geometry {
         }
     }
 
-    /// The mass properties of a solid body of `mass` kg, the same everywhere inside.
+    /// The mass properties of a solid, homogeneous body of `mass` kg.
     ///
     /// # Errors
     /// [`ShapeError`]: a size or the mass is not above 0, or so large or small that

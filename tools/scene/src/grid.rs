@@ -1,14 +1,14 @@
-//! This file says how many cubes a scene has along each axis.
+//! The number of cubes along each axis of a scene.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::SceneError;
 
-/// Number of cubes along each axis; y is up.
+/// The number of cubes along each axis; y is up.
 ///
-/// The limits keep the pile on the ground and every position within 2 mm of what was meant:
-/// 180 x 1000 x 180 at most.
+/// The limits keep the pile on the ground and every position within 2 mm of its exact value: at
+/// most 180 x 1000 x 180.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
     x: u16,
@@ -17,7 +17,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Most cubes along x and along z: 180 of them, 2.2 m apart, end at 396.8 m; the ground at 400 m.
+    /// Largest side along x and along z: 180 cubes, 2.2 m apart, end at 396.8 m; the ground ends at
+    /// 400 m.
     pub const SIDE_MAX: u16 = 180;
     /// Most layers: beyond 2,000 m an f32 carries a height in steps of 0.1 mm only.
     pub const LAYERS_MAX: u16 = 1000;
@@ -88,7 +89,7 @@ impl FromStr for Grid {
 
     fn from_str(text: &str) -> Result<Self, SceneError> {
         let syntax = || SceneError::GridSyntax { found: text.to_owned() };
-        // `parse` alone would take a plus sign.
+        // `parse` alone would accept a plus sign.
         let side = |part: &str| match part.bytes().all(|byte| byte.is_ascii_digit()) {
             true => part.parse::<u64>().map_err(|_| syntax()),
             false => Err(syntax()),

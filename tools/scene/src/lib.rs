@@ -17,22 +17,24 @@
 //! ```
 //!
 //! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes and capsules of several masses instead.
-//! [`Spheres`] is a pile that is no grid, for what depends on the order of collisions.
+//! [`Spheres`] is an irregular pile, for tests of the order of collisions.
 //!
 //! The bits of every result are the same on every architecture and with every number of threads:
 //! arithmetic is f32 in a written order, parry3d is built with `enhanced-determinism`, and neither
-//! threads nor what is kept from an earlier detection decide an order. Scenes are built, and collisions
-//! detected, in the standard floating-point environment, whatever the caller's is.
+//! threads nor state kept from an earlier detection decide an order. Building scenes and detecting
+//! collisions use the standard floating-point environment, whatever the caller's is.
 
 mod build;
 mod detect;
 mod error;
+#[cfg(test)]
+mod fixtures;
 mod geometry;
 mod grid;
 mod measure;
 mod random;
 mod rotation;
-mod several;
+mod shapes;
 mod spheres;
 
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
@@ -45,7 +47,8 @@ pub use measure::{
     kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,
     potential_energy,
 };
-pub use several::ShapesOptions;
+pub use random::SplitMix64;
+pub use shapes::ShapesOptions;
 pub use spheres::{RADII, SPHERES_MAX, Spheres};
 
 /// Index of the static ground among the bodies.

@@ -1,11 +1,15 @@
-//! This file draws numbers at random, the same for a seed on every machine.
+//! Generates random numbers, the same for a seed on every machine.
 
-/// Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
+/// A generator of random numbers.
+///
+/// Source: Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
 #[derive(Debug)]
-pub(crate) struct SplitMix64(u64);
+pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    pub(crate) const fn new(seed: u64) -> Self {
+    /// Starts the sequence of a seed.
+    #[must_use]
+    pub const fn new(seed: u64) -> Self {
         Self(seed)
     }
 
@@ -16,7 +20,13 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// One of eight.
+    /// A number below `end`; 0 if `end` is 0.
+    pub fn below(&mut self, end: usize) -> usize {
+        // The upper half of the product is below `end`.
+        usize::try_from((u128::from(self.next()) * end as u128) >> 64).unwrap_or(0)
+    }
+
+    /// From 0 to 7.
     pub(crate) fn below_eight(&mut self) -> u32 {
         #[allow(clippy::cast_possible_truncation, reason = "three bits")]
         let number = (self.next() >> 61) as u32;

@@ -1,4 +1,4 @@
-//! This file turns a unit quaternion into a rotation matrix.
+//! Converts a unit quaternion to a rotation matrix.
 
 /// Rows of the rotation matrix of the unit quaternion x, y, z, w: world = matrix * body.
 ///

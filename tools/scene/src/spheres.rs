@@ -1,10 +1,10 @@
-//! This file packs spheres of three sizes into a pile that is no grid.
+//! Packs spheres of three sizes into an irregular pile.
 //!
-//! Spheres begin at random places above a square floor with walls, sink, and push each other apart
-//! until they lie still: nothing but positions moves. What comes out is a pile as a collision
-//! detection would meet it: irregular, each sphere touching about six others.
+//! Spheres start at random places above a square floor with walls, sink, and push each other apart
+//! until they lie still; only positions change. The result is a pile as a collision detection would
+//! meet it: irregular, with about six contacts per sphere.
 //!
-//! Numbers are drawn by `SplitMix64` and every sum is f32 in a written order: a seed gives the same
+//! `SplitMix64` draws the numbers, and every sum is f32 in a written order: a seed gives the same
 //! bits everywhere.
 
 use pgs_support::float_env::standard;
@@ -16,17 +16,17 @@ use crate::{GROUND, GROUND_HALF_EXTENT, MARGIN, SceneError};
 
 /// Radii, m; every third sphere has the same one.
 pub const RADII: [f32; 3] = [0.5, 0.8, 1.2];
-/// Most spheres: the pile stays on the ground, and settles within a minute or so.
+/// Most spheres: the pile stays on the ground, and settles within about a minute.
 pub const SPHERES_MAX: u32 = 500_000;
 
 /// Edge of a cell: no two spheres that touch are more than one cell apart.
 const CELL: f32 = 2.0 * RADII[2] + MARGIN;
-/// How deep the spheres sink in a round, m, and for how many rounds after the fall.
+/// The depth by which the spheres sink in a round, m, and the number of such rounds after the fall.
 const SETTLING: [(f32, u32); 3] = [(0.05, 60), (0.01, 60), (0.0, 60)];
-/// How deep they sink in a round of the fall, m.
+/// The depth by which they sink in a round of the fall, m.
 const FALL: f32 = 0.3;
-/// Share of an overlap by which the upper of two spheres moves; the lower moves by the rest. Nearly
-/// everything, so that a pile does not sink into itself.
+/// Share of an overlap by which the upper of two spheres moves; the lower one moves by the rest.
+/// The share is nearly 1, so that a pile does not sink into itself.
 const UPPER: f32 = 0.8;
 
 /// A pile of spheres and its collisions; body 0 is the ground.
@@ -41,7 +41,8 @@ impl Spheres {
     /// Packs `count` spheres.
     ///
     /// # Errors
-    /// [`SceneError::Spheres`] if there are none, or more than [`SPHERES_MAX`].
+    ///
+    /// [`SceneError::Spheres`] if `count` is 0 or above [`SPHERES_MAX`].
     pub fn new(count: u32, seed: u64) -> Result<Self, SceneError> {
         if !(1..=SPHERES_MAX).contains(&count) {
             return Err(SceneError::Spheres { found: count, most: SPHERES_MAX });
@@ -64,7 +65,7 @@ impl Spheres {
         Self { shapes: [Shape::STATIC, small, middle, large], bodies, collisions }
     }
 
-    /// The shape table: 0 is static, then the three sizes.
+    /// The shape table: static, then the three sizes.
     #[must_use]
     pub fn shapes(&self) -> &[Shape] {
         &self.shapes
@@ -83,7 +84,7 @@ impl Spheres {
     }
 }
 
-/// Spheres by their index without the ground.
+/// Spheres, indexed without the ground.
 struct Pile {
     centres: Vec<[f32; 3]>,
     /// Edge of the floor, m.
@@ -97,11 +98,11 @@ fn radius(index: usize) -> f32 {
 }
 
 impl Pile {
-    /// Spheres at random places, so thinly that they hardly overlap.
+    /// Spheres at random places, so sparse that they hardly overlap.
     fn new(count: u32, seed: u64) -> Self {
         let mut random = SplitMix64::new(seed);
         let count = count as usize;
-        // Wide as twice its height when it has settled, and half as dense before.
+        // Twice as wide as high when settled, and half as dense before.
         let volume: f32 = (0..count).map(|k| 7.0 * radius(k) * radius(k) * radius(k)).sum();
         let side = cube_root(2.0 * volume).max(2.0 * CELL);
         let height = 2.0 * volume / (side * side);
@@ -114,7 +115,7 @@ impl Pile {
         Self { centres, side, height, cells: Cells::default() }
     }
 
-    /// Lets the spheres fall, and then lie still.
+    /// Lets the spheres fall, and then settle.
     fn settle(&mut self) {
         #[allow(
             clippy::cast_possible_truncation,
@@ -132,7 +133,8 @@ impl Pile {
         }
     }
 
-    /// Moves each two spheres that overlap until they touch, once, and all above the floor.
+    /// Once, moves each two overlapping spheres apart until they touch, and all spheres above the
+    /// floor.
     fn push_apart(&mut self) {
         let side = self.side;
         self.cells.sort(&self.centres, side);
@@ -160,7 +162,7 @@ impl Pile {
         }
     }
 
-    /// Everything that is within the margin.
+    /// All collisions within the margin.
     fn collisions(&mut self) -> Vec<Collision> {
         let mut found = Vec::new();
         let mut touch = |body_a, body_b, normal, point, distance| {
@@ -193,12 +195,12 @@ impl Pile {
     }
 }
 
-/// By Newton's method: std's is not the same on every machine.
+/// By Newton's method: std's cube root differs between machines.
 fn cube_root(number: f32) -> f32 {
     (0..64).fold(1.0, |root, _| (2.0 * root + number / (root * root)) / 3.0)
 }
 
-/// The unit vector from `b` to `a`, and their distance; upwards if they are at one place.
+/// The unit vector from `b` to `a`, and their distance; upwards if the points coincide.
 fn direction(a: [f32; 3], b: [f32; 3]) -> ([f32; 3], f32) {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let distance = ((x * x + y * y) + z * z).sqrt();
@@ -209,12 +211,12 @@ fn direction(a: [f32; 3], b: [f32; 3]) -> ([f32; 3], f32) {
     }
 }
 
-/// Spheres by the cell that their centre is in.
+/// Spheres sorted by the cell of their centre.
 #[derive(Debug, Default)]
 struct Cells {
-    /// Cells along x, y, z, with an empty one around.
+    /// Cells along x, y, z, with an empty layer around.
     size: [usize; 3],
-    /// Where each cell's spheres begin in `spheres`.
+    /// The beginning of each cell's spheres in `spheres`.
     starts: Vec<usize>,
     cell_of: Vec<usize>,
     spheres: Vec<usize>,
@@ -250,7 +252,7 @@ impl Cells {
         }
     }
 
-    /// Each two spheres of one cell or of neighbouring cells, once.
+    /// Visits each two spheres of the same or of neighbouring cells, once.
     fn pairs(&self, mut each: impl FnMut(usize, usize)) {
         let [_, height, depth] = self.size;
         let (column, sheet) = (depth, height * depth);
@@ -266,7 +268,7 @@ impl Cells {
                     each(*i, *j);
                 }
                 for offset in &later {
-                    // The cells around are empty: nothing is missed beyond the last.
+                    // The outer cells are empty, so that nothing beyond the last is missed.
                     let other = cell + offset;
                     if other + 1 < self.starts.len() {
                         for j in of(other) {

@@ -1,52 +1,31 @@
-//! Finding collisions allocates nothing once as many have been found, on no thread: neither where one
-//! is enough for them nor where several share the work.
+//! Collision detection allocates nothing once its buffers have grown to the scene, on any thread:
+//! with one thread, and with several that share the work.
 #![allow(unsafe_code, reason = "an allocator that counts is an unsafe trait")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[path = "../../../tests/common/counting_allocator.rs"]
+mod counting_allocator;
+
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use counting_allocator::CountingAllocator;
 use scene::{Scene, SceneOptions};
 
-/// Calls of all threads. There are none but detection's in this program: it is a test without a
-/// harness, which would have threads of its own.
+/// Counts the calls of all threads. Only detection's threads run in this program: it is a test
+/// without a harness, whose threads would count, too.
 static COUNTED: AtomicU64 = AtomicU64::new(0);
-
-/// The system's allocator, counting calls.
-struct Counting;
 
 fn count() {
     COUNTED.fetch_add(1, Ordering::Relaxed);
 }
 
-// SAFETY: every call goes to the system's allocator with the arguments as they came; counting
-// itself does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises about `layout` are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promises are passed on; `alloc` took the memory from `System`.
-        unsafe { System.realloc(pointer, layout, bytes) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: CountingAllocator = CountingAllocator(count);
 
-/// Steps of one way, and of all ways.
+/// Steps of one direction, and of all directions.
 const WAY: usize = 6;
 const STEPS: usize = 8 * WAY;
 
-/// How many collisions were found in each step, and how often memory was taken.
+/// The number of collisions in each step, and the number of allocations.
 fn detect(grid: &str, threads: usize) -> (Vec<usize>, Vec<u64>) {
     let grid = grid.parse().expect("a grid");
     let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
@@ -58,8 +37,8 @@ fn detect(grid: &str, threads: usize) -> (Vec<usize>, Vec<u64>) {
         let before = COUNTED.load(Ordering::Relaxed);
         found.push(scene.detect().len());
         counted.push(COUNTED.load(Ordering::Relaxed) - before);
-        // Everything moves, each second cube down into the others and up again: by more than pairs
-        // can be kept for.
+        // Everything moves, each second cube down into the others and up again: by more than the
+        // candidates allow.
         let way = if (step / WAY).is_multiple_of(2) { -0.0625 } else { 0.0625 };
         for (index, body) in scene.bodies_mut().iter_mut().enumerate().skip(1) {
             body.pose.position[1] += if index % 2 == 0 { way } else { 0.0 };

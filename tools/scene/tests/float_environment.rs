@@ -1,4 +1,5 @@
-//! However the caller's thread rounds, flushes or traps, a scene is the same, and so are its collisions.
+//! A scene and its collisions do not depend on the rounding, flushing or trapping of the caller's
+//! thread.
 #![allow(unsafe_code, reason = "Rust does not say what it computes in a foreign environment")]
 #![allow(clippy::print_stdout, reason = "what is skipped is said")]
 
@@ -7,7 +8,7 @@ use pgs_support::float_env::standard;
 use scene::{Scene, SceneOptions, ShapesOptions, Spheres};
 use zynq_pgs::{Body, Collision};
 
-/// Bodies and collisions of a pile of each kind, found by so many threads.
+/// The bodies and collisions of a pile of each kind, found with this many threads.
 fn piles(
     grid: &SceneOptions,
     shapes: &ShapesOptions,
@@ -15,7 +16,7 @@ fn piles(
 ) -> Vec<(Vec<Body>, Vec<Collision>)> {
     let cubes = Scene::new(grid).expect("a scene");
     let mut several = Scene::of_shapes(shapes).expect("a scene");
-    // So near to each other that they touch.
+    // Halves the distances, so that the bodies touch.
     let halve = |body: &mut Body| body.pose.position = body.pose.position.map(|x| 0.5 * x);
     standard(|| several.bodies_mut().iter_mut().skip(1).for_each(halve));
     let spheres = Spheres::new(50, 3).expect("few enough");
@@ -32,7 +33,7 @@ fn scenes_and_their_collisions_are_the_same_in_every_environment() {
     if environments().next().is_none() {
         println!("skipped: nothing is known of this processor's floating-point environment");
     }
-    // Several threads are started from about a thousand bodies on, and share from some thousands on.
+    // Several threads start from about a thousand bodies, and share the work from some thousands.
     let grid = "20x12x20".parse().expect("a grid");
     let cubes = SceneOptions { grid, drop: 0.013, ..SceneOptions::default() };
     let shapes = ShapesOptions { grid, drop: 0.0, seed: 5 };
@@ -43,7 +44,7 @@ fn scenes_and_their_collisions_are_the_same_in_every_environment() {
     for threads in [1, 2] {
         for (name, environment) in environments() {
             let work = || (piles(&cubes, &shapes, threads), Environment::current());
-            // SAFETY: all that is computed, `scene` computes.
+            // SAFETY: `scene` does all the floating-point work of `work`.
             let (found, left) = unsafe { under(environment, work) };
             assert_eq!(left, environment, "{name}");
             assert!(format!("{found:?}") == expected, "{name}, {threads} threads");

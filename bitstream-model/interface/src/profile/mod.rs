@@ -1,8 +1,8 @@
-//! The accelerator's builds as data: what a profile is, and what follows from it.
+//! The accelerator's builds as data: the profiles, their variants, and the sizes that follow.
 //!
-//! [`table`] has one entry a profile. A board reports its profile and what was chosen when it was
-//! built through the capability registers ([`control`](super::control)); driver, emulated board and
-//! the cycle and memory models all compute from the same entry.
+//! [`table`] has one entry a profile. A board reports its profile and the options of its build
+//! through the capability registers ([`control`](super::control)). The driver, the emulated board
+//! and the cycle and memory models all compute from the same entry.
 
 pub mod solver;
 pub mod table;
@@ -23,7 +23,7 @@ pub struct Depth {
     pub window: u32,
 }
 
-/// 32-bit words that a record takes on a stream; two sixteen-bit numbers are one.
+/// 32-bit words that a record takes on a stream; two sixteen-bit numbers make one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RecordWords {
     /// Velocity of a body.
@@ -67,19 +67,23 @@ pub enum Flow {
     /// One after the other: each streams all collisions, and the velocities of all bodies are on
     /// chip.
     Passes,
-    /// One behind the other while the collisions stream once. Velocities stream in as bodies come
-    /// alive, poses as they are done, and only what is alive is on chip.
+    /// One behind the other while the collisions stream once. The velocity of a body streams in
+    /// with its first use, its pose after its last, and only live bodies are on chip.
     Window(Window),
 }
 
-/// What a design that streams the collisions once is made of.
+/// Units, places and delay lines of a design that streams the collisions once.
 ///
-/// With P passes, entry n of pass k may issue when its predecessor in that pass has, when pass
-/// k - 1 has written back the last use of both its bodies, when both are written back by the entry
-/// before it in its own pass, and when there is room for it in the delay line behind pass k. A
-/// unit takes an issue every initiation interval, from its passes in turn, passing over one that
-/// cannot: when all of them can, every pass gets one entry in [`slot_cycles`](Self::slot_cycles).
-/// Pass k of a kind runs on unit k modulo their number.
+/// With P passes, entry n of pass k may issue when
+///
+/// - entry n - 1 has issued to pass k,
+/// - pass k - 1 has written back the last use of both its bodies,
+/// - the previous use of each of its bodies in pass k is written back, and
+/// - the delay line behind pass k has room for it.
+///
+/// A unit takes an issue every initiation interval, from its passes in turn, and passes over a pass
+/// that cannot issue. When all of them can, every pass gets one entry in
+/// [`slot_cycles`](Self::slot_cycles). Pass k of a kind runs on unit k modulo the number of units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Window {
     /// Units that run contact passes.
@@ -87,10 +91,10 @@ pub struct Window {
     /// Units that run friction passes.
     pub friction_units: u32,
     /// Places for live bodies over all units; place 0 stands for every static body. Each unit
-    /// keeps those in its passes in a memory of its share, at the place modulo its size.
+    /// keeps the bodies in its passes in a memory of its share, at the place modulo its size.
     pub slots: u32,
-    /// Collisions that wait between one pass and the next, at most: a body's first and last use
-    /// must be less than that apart.
+    /// Most collisions that wait between one pass and the next: a body's first and last use must
+    /// be less than this number apart.
     pub lag: u32,
 }
 
@@ -121,8 +125,8 @@ pub struct OnChipMemory {
     pub bytes: u32,
     /// Copies of the velocities. A read goes to one of them, a write to all.
     pub velocity_copies: u32,
-    /// Clock of the block RAM as a multiple of the accelerator's: a port serves as many accesses
-    /// each cycle.
+    /// Clock of the block RAM as a multiple of the accelerator's: a port serves this number of
+    /// accesses a cycle.
     pub pump: u32,
     /// Shape index of a body, bytes; kept in distributed RAM, not in the block RAM above. The
     /// thesis has one shape and needs none.
@@ -182,21 +186,21 @@ impl Profile {
         PROFILES.iter().copied().find(|profile| profile.id == id)
     }
 
-    /// The profile as it is built unless something else is chosen.
+    /// The profile with the default options of a build.
     #[must_use]
     pub const fn default_variant(&'static self) -> Variant {
         Variant { profile: self, numbers: self.numbers, inertia: Inertia::Isotropic }
     }
 }
 
-/// A profile with what was chosen when its bitstream was built.
+/// A profile with the options of a bitstream's build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Variant {
     /// The design.
     pub profile: &'static Profile,
     /// Its formats.
     pub numbers: Numbers,
-    /// How it knows inertia.
+    /// The form in which it takes the inertia of bodies.
     pub inertia: Inertia,
 }
 
@@ -224,7 +228,7 @@ impl Variant {
         }
     }
 
-    /// What the records take on the streams.
+    /// 32-bit words of the records on the streams.
     #[must_use]
     pub const fn words(&self) -> RecordWords {
         const fn words(rows: usize, format: StreamFormat) -> u32 {
@@ -241,8 +245,8 @@ impl Variant {
         }
     }
 
-    /// On-chip bytes that a body takes: all copies of its velocity, and its inertia. None in a design
-    /// that keeps what is alive: its memory is there whatever the scene.
+    /// On-chip bytes that a body takes: all copies of its velocity, and its inertia. 0 in a design
+    /// that keeps live bodies only: its memory does not depend on the scene.
     #[must_use]
     pub const fn bytes_per_body(&self) -> u32 {
         if let Flow::Window(_) = self.profile.flow {
@@ -257,8 +261,8 @@ impl Variant {
         velocities + inertia
     }
 
-    /// On-chip bytes that a collision takes: its accumulated impulses. None as
-    /// [above](Self::bytes_per_body).
+    /// On-chip bytes that a collision takes: its accumulated impulses. 0 in a design that keeps
+    /// live bodies only, as in [`bytes_per_body`](Self::bytes_per_body).
     #[must_use]
     pub const fn bytes_per_collision(&self) -> u32 {
         if let Flow::Window(_) = self.profile.flow {
@@ -267,7 +271,8 @@ impl Variant {
         FOUR * self.numbers.impulses.bytes()
     }
 
-    /// Largest number of bodies: what the profile says, and what an index can name.
+    /// Largest number of bodies: the profile's capacity, or the number that an index can name if
+    /// that is smaller.
     #[must_use]
     pub fn body_capacity(&self) -> u32 {
         if let Flow::Window(_) = self.profile.flow {

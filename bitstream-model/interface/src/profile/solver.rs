@@ -1,4 +1,4 @@
-//! This file holds the constants of the solver that are wired into the pipeline, as f32.
+//! Constants of the solver that are wired into the pipeline, as f32.
 
 /// A normal with a larger |z| takes its first tangent in the yz plane (Bullet).
 pub const TANGENT_Z: f32 = std::f32::consts::FRAC_1_SQRT_2;

@@ -1,7 +1,8 @@
-//! This file is the table of profiles.
+//! The table of profiles.
 //!
-//! The depths of every profile are those of a pipeline generated for this purpose at two cycles a
-//! collision and bit-exact with the vectors, until a better source exists; the thesis gives none.
+//! The thesis gives no pipeline depths. Until a better source exists, every profile has the depths
+//! of one pipeline that was generated for this purpose at two cycles a collision, and that is
+//! bit-exact with the vectors.
 
 use super::{Depth, Flow, Geometry, OnChipMemory, Profile, Window};
 use crate::number::{Numbers, StreamFormat};
@@ -17,12 +18,12 @@ const BLOCK_RAM: u32 = 4 << 20;
 const ONE_COPY: OnChipMemory =
     OnChipMemory { bytes: BLOCK_RAM, velocity_copies: 1, pump: 1, shape_index_bytes: 1 };
 
-/// One 32-bit stream each way, f32, bound by it (thesis §5.3).
+/// One 32-bit stream each way, f32, bound by that stream (thesis §5.3).
 ///
 /// The thesis' first design ran conversion, contact solver, friction solver and integration one
-/// after the other, with everything between them in DDR, and gives no figures for it. This one
-/// keeps the fused conversion, so that its driver is that of every profile: what it costs is a lower
-/// bound for the thesis' design.
+/// after the other, with everything between them in DDR; the thesis gives no figures for it. This
+/// profile keeps the fused conversion, so that it has the same driver as every other profile. Its
+/// cost is a lower bound for the thesis' design.
 pub const NAIVE: Profile = Profile {
     id: 2,
     name: "naive",
@@ -120,8 +121,8 @@ pub const MIXED: Profile = Profile {
     source: "this project",
 };
 
-/// Collisions on two streams, velocities and poses on one each, results on all four: what is
-/// needed at different times cannot wait for each other.
+/// Collisions on two streams, velocities and poses on one each, results on all four: records that
+/// are needed at different times do not wait for each other.
 const WINDOWED_STRIPES: Stripes = Stripes {
     collisions: Stripe { streams: &[0, 1], padded: false },
     velocities: Stripe { streams: &[2], padded: false },
@@ -154,7 +155,7 @@ pub const WINDOWED: Profile = Profile {
     source: "this project, after thesis §4.7",
 };
 
-/// As `windowed`, with sixteen-bit arithmetic, collisions and velocities in binary16, poses in f32.
+/// `windowed` with sixteen-bit arithmetic, collisions and velocities in binary16, poses in f32.
 /// This project's.
 pub const WINDOWED16: Profile = Profile {
     id: 6,

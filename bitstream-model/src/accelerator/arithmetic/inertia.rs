@@ -1,13 +1,13 @@
-//! This file is the inverse inertia of a body as the solver multiplies with it: one number, or a
-//! symmetric matrix about world axes.
+//! The inverse inertia of a body as a factor in the solver: one number, or a symmetric matrix
+//! about world axes.
 
 use super::number::{Format, Number};
 use super::vector::Vec3;
 
-/// Inverse inertia as it is stored: xx, yy, zz, xy, xz, yz. An isotropic one is the first alone.
+/// Inverse inertia as it is stored: xx, yy, zz, xy, xz, yz. An isotropic one uses the first alone.
 pub(crate) type Stored = [f32; 6];
 
-/// Which of the two a bitstream was built with.
+/// The form of inertia that a bitstream was built with.
 pub(crate) trait Inertia: Copy {
     /// The inverse inertia in numbers of a format.
     type In<F: Format>: Times<F>;
@@ -17,7 +17,7 @@ pub(crate) trait Inertia: Copy {
 pub(crate) trait Times<F: Format>: Copy {
     fn new(stored: &Stored) -> Self;
 
-    /// Its product with a moment.
+    /// The product with a moment.
     fn times(self, moment: Vec3<F>) -> Vec3<F>;
 }
 

@@ -1,5 +1,5 @@
-//! This file is the arithmetic of the pipeline: one rounding an operation, in f32 or in binary16,
-//! subnormals kept or flushed.
+//! Arithmetic of the pipeline: one rounding an operation, in f32 or in binary16, subnormals kept or
+//! flushed.
 //!
 //! A binary16 number is held as the f32 of the same value, and an operation is the f32 operation
 //! rounded once more. That is the correctly rounded binary16 operation: f32 has two bits more than
@@ -11,7 +11,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::sixteen::{self, SMALLEST_NORMAL};
 
-/// A format of the pipeline's numbers, and what becomes of subnormals in it.
+/// A format of the pipeline's numbers, with its treatment of subnormals.
 pub(crate) trait Format: Copy {
     /// The number of the format nearest to `value`; of two, the even one.
     fn round(value: f32) -> f32;
@@ -21,7 +21,7 @@ pub(crate) trait Format: Copy {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Single;
 
-/// Binary32 of which subnormals count as zero.
+/// Binary32 whose subnormals count as zero.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SingleFlushed;
 
@@ -29,12 +29,12 @@ pub(crate) struct SingleFlushed;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Half;
 
-/// Binary16 of which subnormals count as zero.
+/// Binary16 whose subnormals count as zero.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HalfFlushed;
 
-/// A value below `smallest` as a zero of its sign. Defined on the bits, because processors differ
-/// in when they look at a result.
+/// Replaces a value below `smallest` by a zero of its sign. It works on the bits, because
+/// processors differ in whether they flush before or after rounding.
 #[inline]
 fn flushed(value: f32, smallest: u32) -> f32 {
     const SIGN: u32 = 0x8000_0000;
@@ -92,7 +92,7 @@ impl<F: Format> Number<F> {
         self.0
     }
 
-    /// The same number in a format that holds all of this one's.
+    /// The same number in a format that holds every number of this format.
     #[inline]
     pub(crate) fn widened<W: Format>(self) -> Number<W> {
         Number::exact(self.0)
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn flush_looks_at_a_result_after_rounding() {
+    fn flush_decides_after_rounding() {
         // 0x00ff_ffff x 0.5 lies half way below the smallest normal number and rounds up to it.
         let product = flush(f32::from_bits(0x00FF_FFFF)) * flush(0.5);
         assert_eq!(bits(product), SMALLEST);

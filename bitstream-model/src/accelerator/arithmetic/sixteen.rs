@@ -1,10 +1,10 @@
-//! This file converts between f32 and the two sixteen-bit formats, on the bits.
+//! Conversions between f32 and the two sixteen-bit formats, on the bits.
 
 const SIGN: u32 = 0x8000_0000;
 const INFINITY: u32 = 0x7F80_0000;
 /// Mantissa bits that an f32 has beyond the ten of sixteen bits.
 const EXTRA_BITS: u32 = 13;
-/// From the exponent's bias in sixteen bits to that of an f32.
+/// The exponent's bias of an f32 less its bias in sixteen bits.
 const REBIAS: u32 = 127 - 15;
 
 const MANTISSA_BITS: u32 = 10;
@@ -16,8 +16,9 @@ pub(crate) const SMALLEST_NORMAL: u32 = (REBIAS + 1) << 23;
 /// 65520, half a step beyond binary16's largest number, as the bits of an f32.
 const TOO_LARGE: u32 = ((REBIAS + 30) << 23) | (MANTISSA << EXTRA_BITS) | (1 << (EXTRA_BITS - 1));
 
-/// The binary16 number nearest to `value`, of two the even one, as the f32 of the same value. What
-/// lies beyond 65504 by half a step or more is infinite; a NaN has no payload.
+/// The binary16 number nearest to `value`, as the f32 of the same value; a tie goes to the even
+/// number. A magnitude of half a step or more beyond 65504 becomes infinite. A NaN loses its
+/// payload.
 ///
 /// Every operation in binary16 ends here. Zeros and normal numbers take integer operations alone;
 /// the two branches are rarely taken.
@@ -27,7 +28,7 @@ pub(crate) fn round(value: f32) -> f32 {
     let sign = bits & SIGN;
     let magnitude = bits ^ sign;
     if magnitude.wrapping_sub(1) < SMALLEST_NORMAL - 1 {
-        // From one half to one f32 has the steps that binary16 has below 2^-14.
+        // Between one half and one the steps of f32 are the steps of binary16 below 2^-14.
         let subnormal = (f32::from_bits(magnitude) + 0.5) - 0.5;
         return f32::from_bits(sign | subnormal.to_bits());
     }
@@ -39,7 +40,7 @@ pub(crate) fn round(value: f32) -> f32 {
     f32::from_bits((bits + half + odd) & !((1 << EXTRA_BITS) - 1))
 }
 
-/// A binary16 word as a number. Without a branch, so that the compiler takes several at once.
+/// A binary16 word as a number. It has no branch, so that the compiler vectorises it.
 #[inline(always)]
 pub(crate) fn from_binary16(word: u32) -> f32 {
     const LARGEST: u32 = LARGEST_EXPONENT << MANTISSA_BITS;
@@ -79,8 +80,8 @@ pub(crate) fn from_thesis16(word: u32) -> f32 {
     f32::from_bits(((word & 0x8000) << 16) | magnitude)
 }
 
-/// The thesis16 word of a number: cut off, and stopped at both ends of the format. From 2^17 on
-/// and for NaN it is the largest word of the number's sign.
+/// The thesis16 word of a number: cut off, and saturated at both ends of the format. A magnitude
+/// of 2^17 or more and a NaN become the largest word of the number's sign.
 pub(crate) fn to_thesis16(value: f32) -> u32 {
     let bits = value.to_bits();
     let sign = (bits & SIGN) >> 16;

@@ -1,4 +1,4 @@
-//! This file is three-component arithmetic with its order of evaluation written out.
+//! Three-component arithmetic with its order of evaluation written out.
 //!
 //! Source: Bullet's host solver; sums associate to the left.
 
@@ -21,7 +21,7 @@ impl<F: Format> Vec3<F> {
         [self.0.value(), self.1.value(), self.2.value()]
     }
 
-    /// The same vector in a format that holds all numbers of this one's.
+    /// The same vector in a format that holds every number of this format.
     #[inline]
     pub(crate) fn widened<W: Format>(self) -> Vec3<W> {
         Vec3(self.0.widened(), self.1.widened(), self.2.widened())
@@ -37,7 +37,7 @@ impl<F: Format> Vec3<F> {
         Self(self.1 * b.2 - self.2 * b.1, self.2 * b.0 - self.0 * b.2, self.0 * b.1 - self.1 * b.0)
     }
 
-    /// One reciprocal of the length, three products.
+    /// The unit vector: one reciprocal of the length, three products.
     #[inline]
     pub(crate) fn unit(self) -> Self {
         self * (Number::new(1.0) / self.dot(self).sqrt())

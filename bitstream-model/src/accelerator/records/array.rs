@@ -1,4 +1,4 @@
-//! This file says how the records of an array lie in beats, and the beats on streams.
+//! Layout of an array: its records in beats, and its beats on streams.
 //!
 //! A row is a beat of 32-bit words, or half a beat of sixteen-bit words, in which case two records
 //! may share a beat.
@@ -17,7 +17,7 @@ pub(crate) struct Records {
     /// Rows of a record.
     pub(crate) rows: usize,
     pub(crate) count: usize,
-    /// Records come in as many together; padding records fill the last ones up.
+    /// Records of one issue. Padding records fill the last issue up.
     pub(crate) together: usize,
 }
 
@@ -48,12 +48,13 @@ impl Array {
         }
     }
 
-    /// Beats that belong to the first `records` records alone; after the last one, the padding too.
+    /// Beats that hold nothing but the first `records` records; for all records, with the padding.
     pub(crate) fn beats_of(&self, records: usize) -> usize {
         if records == self.records { self.beats } else { records * self.rows / self.rows_per_beat }
     }
 
-    /// Records that lie within the first `beats` beats, the last one with the padding behind it.
+    /// Records that lie within the first `beats` beats; the last one counts with the padding behind
+    /// it.
     pub(crate) fn records_in(&self, beats: usize) -> usize {
         if beats >= self.beats {
             self.records

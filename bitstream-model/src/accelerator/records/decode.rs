@@ -1,7 +1,7 @@
-//! This file decodes rows into records and encodes results, from the interface's layouts alone.
+//! Decodes rows into records and encodes results, from the interface's layouts alone.
 //!
-//! What a word means is looked up for every word; inlined where the format is known, the look-up is
-//! gone.
+//! Every word is decoded by a match on its format. Where the format is known, inlining removes the
+//! match.
 
 use super::array::Row;
 use crate::accelerator::arithmetic::sixteen;
@@ -12,7 +12,7 @@ use pgs_interface::record::{
     CONTACT_POINTS, LANES, WORD_LANE, collision, pose, relative, result, velocity,
 };
 
-/// A number in a word of that format.
+/// The number in a word of a format.
 #[inline(always)]
 pub(crate) fn number(format: StreamFormat, word: u32) -> f32 {
     match format {
@@ -22,7 +22,7 @@ pub(crate) fn number(format: StreamFormat, word: u32) -> f32 {
     }
 }
 
-/// The word of that format nearest to a number.
+/// The word of a format nearest to a number.
 #[inline(always)]
 fn word(format: StreamFormat, number: f32) -> u32 {
     match format {
@@ -75,7 +75,8 @@ impl Collision {
     /// +infinity are left out.
     #[inline(always)]
     pub(crate) fn relative(format: StreamFormat, rows: &[Row; relative::ROWS]) -> Self {
-        // All words alike, for the compiler to take several at once; those that are none are not used.
+        // One loop decodes all words, so that the compiler vectorises it; the words that hold an
+        // index are decoded for nothing.
         let mut numbers = [[0.0_f32; LANES]; relative::ROWS];
         for (to, word) in numbers.as_flattened_mut().iter_mut().zip(rows.as_flattened()) {
             *to = number(format, *word);

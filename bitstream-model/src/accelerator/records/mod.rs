@@ -1,4 +1,4 @@
-//! Records on the streams: where rows lie in beats, and beats on streams.
+//! Records on the streams: the place of rows in beats, and of beats on streams.
 
 pub(crate) mod array;
 pub(crate) mod decode;

@@ -1,11 +1,11 @@
-//! This file sends the results: rows into beats, beats onto streams, padding, TLAST.
+//! Sends the results: rows into beats, beats onto streams, padding, TLAST.
 
 use super::array::{Array, Row, beat_of};
 use super::striping::{PerStream, STREAMS_MAX};
 use crate::stream::Stream;
 use pgs_interface::record::{Beat, result};
 
-/// A result fills whole beats, two rows each at least.
+/// A result fills whole beats, even with two rows in a beat.
 const _: () = assert!(result::ROWS.is_multiple_of(2));
 
 /// The results while they are being sent.
@@ -24,7 +24,7 @@ impl Results {
         Self { array, done: 0, beats: 0, sent: [0; STREAMS_MAX] }
     }
 
-    /// Clock cycles that the streams take for what was sent.
+    /// Clock cycles that the streams take for the records sent so far.
     pub(crate) fn cycles(&self) -> u64 {
         self.array.cycles(self.done)
     }
@@ -34,7 +34,7 @@ impl Results {
         self.array.cycles(1)
     }
 
-    /// Records that the streams have space for, the last one with the padding behind it.
+    /// Records that the streams have space for; the last one counts with the padding behind it.
     pub(crate) fn room(&self, streams: &[Stream]) -> usize {
         let room = self.array.striping.contiguous(|k| self.sent[k] + streams[k].space());
         self.array.records_in(room) - self.done
@@ -59,7 +59,8 @@ impl Results {
         sum
     }
 
-    /// Sends `records` records, for which there must be room, whose beats on each stream these are.
+    /// Sends `records` records, for which there must be room; `rows` holds their beats on each
+    /// stream.
     pub(crate) fn send_rows(
         &mut self,
         records: usize,
@@ -77,7 +78,7 @@ impl Results {
         self.beats += records * result::ROWS;
     }
 
-    /// So many records have been sent, fewer than there are.
+    /// Counts `records` records as sent without sending them; the last record is not among them.
     pub(crate) fn pass(&mut self, records: usize) {
         self.done += records;
         self.beats += records * self.array.rows / self.array.rows_per_beat;

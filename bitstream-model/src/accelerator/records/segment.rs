@@ -1,5 +1,5 @@
-//! This file reads one segment of records from the streams: where the rows of the next record are,
-//! how many whole records have arrived, and whether TLAST comes where it must.
+//! Reads one segment of records from the streams: finds the rows of the next record, counts the
+//! whole records that have arrived, and checks that TLAST comes where it must.
 
 use super::array::{Array, Row, half_of};
 use super::striping::{PerStream, Places, STREAMS_MAX};
@@ -33,7 +33,7 @@ impl Segment {
         Self { array, done: 0, taken: [0; STREAMS_MAX] }
     }
 
-    /// Clock cycles that the streams take from the start of the segment to the next record.
+    /// Clock cycles that the streams take for the records that were read.
     pub(crate) fn cycles(&self) -> u64 {
         self.array.cycles(self.done)
     }
@@ -43,10 +43,10 @@ impl Segment {
         self.array.cycles(1)
     }
 
-    /// Whole records that have arrived and were not read.
+    /// Whole records that have arrived and were not read yet.
     pub(crate) fn available(&self, streams: &[Stream]) -> usize {
         let arrived = self.array.striping.contiguous(|k| self.taken[k] + streams[k].len());
-        // A record that has begun in a beat that was taken may still lack its end.
+        // A record may begin in a beat that was taken, and end in one that has not arrived.
         self.array.records_in(arrived).saturating_sub(self.done)
     }
 
@@ -55,7 +55,7 @@ impl Segment {
         self.array.packets.get(stream).copied().unwrap_or(0)
     }
 
-    /// Records that were not read, arrived or not.
+    /// Records that were not read yet, arrived or not.
     pub(crate) fn left(&self) -> usize {
         self.array.records - self.done
     }
@@ -86,11 +86,11 @@ impl Segment {
         Ok(())
     }
 
-    /// Checks that no packet has ended in the middle of the next record, of which the rest would
-    /// never come.
+    /// Checks that no packet has ended in the middle of the next record, whose rest would never
+    /// come.
     pub(crate) fn check_waiting(&self, streams: &[Stream]) -> Result<(), PacketError> {
         for (k, stream) in streams.iter().enumerate() {
-            // What comes behind the end of this packet is the next one.
+            // Beats behind the end of this packet belong to the next one.
             let left = self.beats_on(k) - self.taken[k];
             if let Some(last) = stream.next_last().filter(|last| last + 1 < left) {
                 let beat = register(self.taken[k] + last);
@@ -100,8 +100,9 @@ impl Segment {
         Ok(())
     }
 
-    /// Reads records that have arrived, from `ahead` places after the next one on, of which there
-    /// must be one, one after the other; they stay in the streams until [`advance`](Self::advance).
+    /// A reader of records that have arrived: it skips `ahead` records and reads the rest one
+    /// after the other. At least one must have arrived behind the skipped ones. All records stay
+    /// in the streams until [`advance`](Self::advance).
     pub(crate) fn reader<'a>(&'a self, ahead: usize, streams: &'a [Stream]) -> Reader<'a> {
         let first = (self.done + ahead) * self.array.rows;
         let places = self.array.striping.places(first / self.array.rows_per_beat);
@@ -112,7 +113,8 @@ impl Segment {
         reader
     }
 
-    /// The next `records` records have been read; returns the sum of all words that were taken.
+    /// Takes the next `records` records, which have been read, out of the streams. Returns the sum
+    /// of their words.
     pub(crate) fn advance(&mut self, records: usize, streams: &mut [Stream]) -> u32 {
         self.done += records;
         let after = self.array.striping.counts(self.array.beats_of(self.done));
@@ -133,7 +135,7 @@ impl Segment {
         beats
     }
 
-    /// The next `records` records have been read where they are.
+    /// Drops the next `records` records from the streams; the caller has read them in place.
     pub(crate) fn skip(&mut self, records: usize, streams: &mut [Stream]) {
         self.done += records;
         let after = self.array.striping.counts(self.array.beats_of(self.done));
@@ -143,7 +145,7 @@ impl Segment {
         self.taken = after;
     }
 
-    /// Lets the next `records` records, which have arrived, be in the streams themselves.
+    /// Copies the next `records` records, which have arrived, from memory into the streams.
     pub(crate) fn fetch(&self, records: usize, streams: &mut [Stream], memory: &Memory) {
         for (stream, beats) in streams.iter_mut().zip(self.beats_of_next(records)) {
             if stream.refers() {
@@ -163,7 +165,7 @@ pub(crate) struct Reader<'a> {
     segment: &'a Segment,
     streams: &'a [Stream],
     places: Places<'a>,
-    /// The second row of a beat of which the first has been read.
+    /// The second row of a beat whose first row has been read.
     left: Option<Row>,
 }
 
@@ -273,7 +275,7 @@ mod tests {
 
     #[test]
     fn the_last_record_waits_for_the_padding_behind_it() {
-        // Three and a half beats of a collision, as many of padding.
+        // Three and a half beats of a collision, three and a half of padding.
         let segment = collisions(&HALF, 1);
         assert_eq!(segment.available(&streams([3, 3, 0])), 0);
         let mut all = streams([3, 3, 1]);
@@ -302,7 +304,7 @@ mod tests {
         let longer = collisions(&FLOAT, 2);
         let early = PacketError { code: ErrorCode::TlastEarly, channel: 0, beat: 1 };
         assert_eq!(longer.check(1, &all), Err(early));
-        // Half a record, and none that could be checked.
+        // Half a record: no whole record to check.
         let mut cut = streams([1, 0, 0, 0]);
         cut[0].mark_last();
         assert_eq!(longer.available(&cut), 0);

@@ -1,5 +1,5 @@
-//! This file deals the beats of an array out to streams: which stream a beat is on, how many are on
-//! each, how long they take.
+//! Deals the beats of an array out to streams: the stream of each beat, the beats on each stream,
+//! and the cycles that they take.
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::{pose, result, velocity};
@@ -7,12 +7,12 @@ use pgs_interface::stripe::Stripe;
 
 use crate::config::{GROUP_MAX, beat_cycles};
 
-/// The most streams that a profile has.
+/// Most streams of a profile.
 pub(crate) const STREAMS_MAX: usize = DMA_COUNT_MAX;
 /// A count for each stream.
 pub(crate) type PerStream = [usize; STREAMS_MAX];
 
-/// Rows that come for a body at once, of its velocity as of its pose.
+/// Rows of a body's velocity record, and of its pose record.
 pub(crate) const ROWS_IN: usize = 2;
 /// Rows of a result.
 pub(crate) const ROWS_OUT: usize = 4;
@@ -26,7 +26,8 @@ pub(crate) struct Turns {
 }
 
 impl Turns {
-    /// Those of a stripe over all of the streams, if they take turns on it.
+    /// The turns of a stripe that gives each stream one beat after the other; `None` for any other
+    /// stripe.
     pub(crate) fn of(stripe: &Stripe, streams: usize) -> Option<Self> {
         let all = stripe.streams.iter().map(|stream| usize::from(*stream)).eq(0..streams);
         (all && !stripe.padded).then_some(Self { streams })
@@ -45,7 +46,7 @@ impl Turns {
         std::array::from_fn(|k| if k < streams { (beats + streams - 1 - k) / streams } else { 0 })
     }
 
-    /// How many beats in one piece, from the first one, there are when each stream has so many.
+    /// Beats from the first one on without a gap, where stream `k` has `on_stream(k)` beats.
     #[inline]
     pub(crate) fn contiguous(self, on_stream: impl Fn(usize) -> usize) -> usize {
         let missing = |k: usize| on_stream(k) * self.streams + k;
@@ -64,9 +65,9 @@ pub(crate) struct Striping {
     /// Beats of a group.
     group: usize,
     padded: bool,
-    /// For each beat of a group its stream, and how many of the group are on each stream before it.
+    /// Per beat of a group: its stream, and the beats of the group before it on each stream.
     place: [(u8, [u8; STREAMS_MAX]); GROUP_MAX],
-    /// For each stream which beats of a group it carries.
+    /// Per stream: the beats of a group that it carries.
     carried: [[u8; GROUP_MAX]; STREAMS_MAX],
     /// Beats of a group on each stream.
     share: [u8; STREAMS_MAX],
@@ -100,7 +101,7 @@ impl Striping {
         }
     }
 
-    /// Beats that go out for an array of that many: with the padding of the last group.
+    /// Beats with the padding of the last group, for an array of `beats` beats.
     pub(crate) fn padded(&self, beats: usize) -> usize {
         if self.padded { beats.next_multiple_of(self.group) } else { beats }
     }
@@ -118,12 +119,12 @@ impl Striping {
         std::array::from_fn(|k| groups * usize::from(self.share[k]) + usize::from(before[k]))
     }
 
-    /// How many beats in one piece, from the first one, there are when each stream has so many.
+    /// Beats from the first one on without a gap, where stream `k` has `on_stream(k)` beats.
     pub(crate) fn contiguous(&self, on_stream: impl Fn(usize) -> usize) -> usize {
         let mut beats = usize::MAX;
         for (k, share) in self.share.into_iter().enumerate() {
             if share > 0 {
-                // The first beat that this stream does not have.
+                // The first beat that this stream lacks.
                 let (have, share) = (on_stream(k), usize::from(share));
                 let missing = usize::from(self.carried[k][have % share]);
                 beats = beats.min(have / share * self.group + missing);
@@ -132,7 +133,7 @@ impl Striping {
         beats
     }
 
-    /// Clock cycles that the first `beats` beats take: what the busiest stream takes.
+    /// Clock cycles that the first `beats` beats take: the cycles of the busiest stream.
     pub(crate) fn cycles(&self, beats: usize) -> u64 {
         let mut cycles = 0;
         for (beats, width) in self.counts(beats).into_iter().zip(self.widths) {
@@ -144,7 +145,7 @@ impl Striping {
     }
 }
 
-/// Stream and number on it of one beat after the other.
+/// Walks over the beats of an array: the stream of each, and its number on that stream.
 #[derive(Debug, Clone)]
 pub(crate) struct Places<'a> {
     striping: &'a Striping,
@@ -154,7 +155,7 @@ pub(crate) struct Places<'a> {
 }
 
 impl Places<'_> {
-    /// The next beat's.
+    /// Stream and number of the next beat.
     #[inline(always)]
     pub(crate) fn take(&mut self) -> (usize, usize) {
         let (stream, before) = self.striping.place[self.at];

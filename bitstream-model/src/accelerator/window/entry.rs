@@ -1,4 +1,4 @@
-//! This file is one collision on its way through the passes, and what its index words say.
+//! A collision on its way through the passes, with the marks of its index words.
 
 use super::super::solver::Impulses;
 use crate::accelerator::records::decode::Collision;
@@ -17,7 +17,7 @@ pub(super) struct Use {
 }
 
 impl Use {
-    /// What an index word says; `None` for a place that is not there, a bit beyond the marks, or a
+    /// Decodes an index word; `None` for a place that does not exist, a bit beyond the marks, or a
     /// mark of a static body.
     fn of(word: u32, places: usize) -> Option<Self> {
         let of = Self {
@@ -76,12 +76,12 @@ impl Entry {
         Ok(entry)
     }
 
-    /// Whether it takes a slot and nothing else.
+    /// Whether the entry takes a slot and nothing else.
     pub(super) fn is_bubble(&self) -> bool {
         self.collision.count == 0
     }
 
-    /// Velocities that it takes from the stream.
+    /// Velocities that the entry takes from the stream.
     pub(super) fn births(&self) -> usize {
         self.uses.iter().filter(|of| of.first).count()
     }
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn words_that_mean_nothing_are_refused_and_those_of_a_bubble_are_not_read() {
+    fn invalid_index_words_are_refused_and_a_bubbles_words_are_not_read() {
         use ErrorCode::{BodyIndex, SelfCollision, StaticPair};
         for (words, code) in [
             ([100, 1], BodyIndex),

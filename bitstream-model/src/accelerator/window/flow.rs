@@ -1,15 +1,16 @@
-//! This file says which pass may issue its next entry when.
+//! Schedule of the passes: when each may issue its next entry.
 //!
 //! With w(k) the window of pass k, entry n can issue to pass k at the first cycle that is
 //!
-//! - not before entry n - 1 in the same pass,
-//! - w(k-1) or more after its own issue to pass k - 1, and after that of its bodies' last uses there,
-//! - w(k) or more after its bodies' previous uses in pass k (waiting for this is a hazard),
-//! - not before entry n - lag has issued to pass k + 1, when there is room behind pass k,
+//! - not before the issue of entry n - 1 to pass k,
+//! - w(k-1) or more after the issue of entry n to pass k - 1,
+//! - w(k-1) or more after the last uses of its bodies in pass k - 1,
+//! - w(k) or more after the previous uses of its bodies in pass k (waiting for this is a hazard),
+//! - not before the issue of entry n - lag to pass k + 1, which makes room behind pass k,
 //!
-//! and in which its unit is free: a unit takes as many entries in an initiation interval as enter
-//! together. Of two passes that can issue it takes the one that has waited longer since it last did.
-//! When all of them can, each issues an entry in every slot of T cycles.
+//! and in which the pass' unit is free. A unit takes `per_issue` entries in an initiation interval.
+//! If several of its passes can issue, the pass issues whose last issue lies furthest back. When
+//! all of them can, each issues an entry in every slot of T cycles.
 //!
 //! Pass 0 also needs the record, the velocities that come with it, and free places for them.
 
@@ -21,7 +22,7 @@ use super::place::{Leaving, Place};
 /// A cycle that never comes.
 pub(super) const NEVER: u64 = u64::MAX;
 
-/// What stays the same throughout a step.
+/// Parameters of the schedule that stay the same throughout a step.
 #[derive(Debug, Clone)]
 pub(super) struct Shape {
     /// Cycles in which every pass issues one entry.
@@ -29,7 +30,7 @@ pub(super) struct Shape {
     /// Cycles in which a unit takes `per_issue` entries.
     pub(super) interval: u64,
     pub(super) per_issue: usize,
-    /// Entries between one pass and the next, at most.
+    /// Most entries between one pass and the next.
     pub(super) lag: usize,
     pub(super) places: usize,
     pub(super) collisions: usize,
@@ -42,11 +43,11 @@ pub(super) struct Shape {
 /// One unit.
 #[derive(Debug, Clone)]
 struct Unit {
-    /// From when on it takes each of the next entries, the very next one first.
+    /// The cycles from which it can take its next entries, the earliest first.
     free: VecDeque<u64>,
 }
 
-/// What decides when an entry can issue.
+/// An entry about to issue: its bodies, and the cycle from which it can be read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Next {
     pub(super) uses: [Use; 2],
@@ -58,11 +59,12 @@ pub(super) struct Next {
 pub(super) struct Pass {
     /// Its next entry.
     pub(super) next: usize,
-    /// A slot after its previous one.
+    /// One slot after its previous issue.
     pub(super) due: u64,
     window: u64,
     unit: usize,
-    /// When the next entry can issue, as far as is known, if its unit is free.
+    /// The cycle at which the next entry can issue if its unit is free; [`NEVER`] while
+    /// something else has to happen first.
     pub(super) ready: u64,
     /// Whether the next entry has waited for a previous use in the same pass.
     pub(super) waited: bool,
@@ -74,7 +76,7 @@ pub(super) struct Flow {
     pub(super) shape: Shape,
     pub(super) passes: Vec<Pass>,
     units: Vec<Unit>,
-    /// What has issued to the first pass and not to the last, the oldest first.
+    /// Entries that have issued to the first pass and not to the last, the oldest first.
     entries: VecDeque<Entry>,
     pub(super) places: Vec<Place>,
     pub(super) leaving: VecDeque<Leaving>,
@@ -113,8 +115,8 @@ impl Flow {
         behind.is_none_or(|behind| self.passes[pass].next - behind.next < self.shape.lag)
     }
 
-    /// The cycle from which an entry of which everything has come can issue to a pass, if its unit is
-    /// free.
+    /// The cycle from which an entry whose records have all come can issue to a pass, if its unit
+    /// is free.
     pub(super) fn when(&mut self, pass: usize, entry: Next, now: u64) -> u64 {
         let mut at = entry.written.max(now);
         let mut written = 0;
@@ -134,8 +136,8 @@ impl Flow {
         at.max(written)
     }
 
-    /// Looks again at a pass behind the first one; something that it needs has changed.
-    pub(super) fn look(&mut self, pass: usize, now: u64) {
+    /// Computes again when a pass behind the first one can issue, after a change of its conditions.
+    pub(super) fn reschedule(&mut self, pass: usize, now: u64) {
         if pass == 0 || pass >= self.passes.len() {
             return;
         }
@@ -148,7 +150,7 @@ impl Flow {
         };
     }
 
-    /// When the unit of a pass takes its next entry.
+    /// The cycle from which the unit of a pass can take its next entry.
     pub(super) fn free(&self, pass: &Pass) -> u64 {
         self.units[pass.unit].free.front().copied().unwrap_or(0)
     }
@@ -167,7 +169,7 @@ impl Flow {
         (earliest.0.0, earliest.1)
     }
 
-    /// Where an entry is in the delay lines.
+    /// Index of an entry in the delay lines.
     fn at(&self, number: usize) -> usize {
         number - self.passes.last().map_or(0, |last| last.next)
     }
@@ -177,13 +179,13 @@ impl Flow {
         self.entries.push_back(entry);
     }
 
-    /// The next entry of a pass, which has issued to the first one, and the places.
+    /// The next entry of a pass, if it has issued to the first pass, and the places.
     pub(super) fn parts(&mut self, pass: usize) -> Option<(&mut Entry, &mut [Place])> {
         let at = self.at(self.passes[pass].next);
         Some((self.entries.get_mut(at)?, &mut self.places))
     }
 
-    /// The next entry of a pass issues at cycle `now`. Returns whether it had waited for a previous
+    /// Issues the next entry of a pass at cycle `now`. Returns whether it had waited for a previous
     /// use of a body in the same pass.
     pub(super) fn issue(&mut self, pass: usize, now: u64) -> bool {
         let written = now + self.passes[pass].window;

@@ -1,16 +1,16 @@
-//! The design that streams the collisions once: all passes run at the same time, each behind the one
-//! before it, and only the bodies that are alive are on chip.
+//! The design that streams the collisions once: all passes run at the same time, each behind the
+//! one before it, and only live bodies are on chip.
 //!
 //! ```text
 //! collisions -> pass 0 -> delay line -> pass 1 -> delay line -> ... -> pass P-1
-//! velocities ----^  first use                                            | last use
-//!                   places (velocity, mass, scoreboard) <-----------------+-> integration -> results
-//!                                                                    poses ------^
+//! velocities ----^ first use                                            | last use
+//!                  places (velocity, mass, scoreboard) <----------------+-> integration -> results
+//!                                                                   poses -----^
 //! ```
 //!
-//! `entry.rs` reads the marks of a record, `place.rs` is the table of live bodies with its scoreboard,
-//! `flow.rs` says which pass may issue when, `session.rs` works through what has arrived. `check.rs`
-//! says what cannot be built. What happens to one collision in one pass is that of every other design.
+//! `entry.rs` reads the marks of a record, `place.rs` is the table of live bodies with its
+//! scoreboard, `flow.rs` decides when each pass issues, and `session.rs` works through the records
+//! that have arrived. The arithmetic of one collision in one pass is the same as in every design.
 
 mod entry;
 mod flow;
@@ -58,7 +58,7 @@ impl Accelerator {
         );
         let windows: Vec<u64> =
             (0..self.passes()).map(|pass| self.depth(pass).window.into()).collect();
-        // The passes of a kind go round its units.
+        // The passes of a kind are dealt out to its units in turn.
         let contact = (0..self.arguments.contact_iterations).map(|k| k % design.contact_units);
         let friction = (0..self.arguments.friction_iterations)
             .map(|k| design.contact_units + k % design.friction_units);

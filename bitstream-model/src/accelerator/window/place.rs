@@ -1,4 +1,4 @@
-//! This file is the table of live bodies: what is kept of each, and since when it can be read.
+//! The table of live bodies: the state of each, and the cycle from which it can be read.
 
 use super::super::solver::{Mass, Velocity};
 
@@ -20,12 +20,12 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// A body that has just come in.
+    /// The place of a body whose velocity has just come in.
     pub(super) fn new(velocity: Velocity, mass: Mass) -> Self {
         Self { velocity, mass, occupied: true, alive: true, ..Self::default() }
     }
 
-    /// It was issued to pass `pass`, and is written back at cycle `ready`.
+    /// A use of the body was issued to pass `pass`; it is written back at cycle `ready`.
     pub(super) fn issued(&mut self, pass: usize, last: bool, ready: u64) {
         self.ready = ready;
         self.used = !last;

@@ -1,5 +1,5 @@
-//! This file works through what has arrived: it lets passes issue, bodies come alive and leave, cycle
-//! by cycle, until something is missing on a stream.
+//! Works through the records that have arrived: passes issue, bodies come alive and leave, cycle by
+//! cycle, until a record is missing on a stream.
 
 use super::super::solver::{Impulses, Mass, Velocity};
 use super::super::{Accelerator, Phase};
@@ -18,24 +18,24 @@ use pgs_interface::control::ErrorCode;
 use pgs_interface::number::Precision;
 use pgs_interface::profile::Inertia;
 
-/// Cycles for which the passes go on while a stream lacks something, before the streams are looked
-/// at again.
+/// Cycles for which the passes go on while a stream lacks a record, before the streams are read
+/// again.
 const GRACE: u64 = 16;
 
 /// One pass over one collision, in the formats of a bitstream.
-type Turn =
+type PassFn =
     fn(&mut Accelerator, u32, &decode::Collision, &[Mass; 2], &mut [Velocity; 2], &mut Impulses);
 
-/// What the first pass waits for.
+/// The condition that the first pass waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum First {
-    /// A time that is known, or nothing any more.
+    /// A known cycle, or nothing any more.
     Time,
     /// The collision, or a velocity that comes with it.
     Stream,
     /// A place that is still taken.
     Place,
-    /// Room behind it.
+    /// Room in the delay line behind it.
     Room,
 }
 
@@ -47,17 +47,18 @@ pub(in super::super) struct Windowed {
     velocities: Segment,
     poses: Segment,
     results: Results,
-    /// The entry that the first pass takes next, once it has come.
+    /// The entry that the first pass takes next, once its record has come.
     head: Option<Entry>,
     first: First,
     /// Bodies that have come alive, and that have left.
     born: usize,
     left: usize,
-    /// When the next body can leave for the integration, by the streams.
+    /// The cycle from which the streams let the next body leave for the integration.
     leave_due: u64,
-    /// Cycles between two bodies that leave, and between two that come and go at the end.
+    /// Cycles between two bodies that leave after a collision.
     leave_interval: u64,
-    pass_interval: u64,
+    /// Cycles between two bodies in no collision, which come and leave at the end.
+    idle_interval: u64,
 }
 
 impl Windowed {
@@ -69,7 +70,7 @@ impl Windowed {
         results: Results,
     ) -> Self {
         let leave_interval = poses.cycles_of_one().max(results.cycles_of_one());
-        let pass_interval = leave_interval.max(velocities.cycles_of_one());
+        let idle_interval = leave_interval.max(velocities.cycles_of_one());
         Self {
             flow,
             collisions,
@@ -82,7 +83,7 @@ impl Windowed {
             left: 0,
             leave_due: 0,
             leave_interval,
-            pass_interval,
+            idle_interval,
         }
     }
 
@@ -107,7 +108,7 @@ impl Windowed {
             if records > 0 {
                 segment.check(records, inputs)?;
             }
-            // It may wait for more records than have arrived.
+            // The step may wait for more records than have arrived.
             segment.check_waiting(inputs)?;
         }
         Ok(())
@@ -136,8 +137,8 @@ impl Windowed {
         self.left == self.bodies() && self.flow.issued_all()
     }
 
-    /// When the next body leaves if nothing is missing for it: one that was in use, or one that comes
-    /// and goes at the end.
+    /// The cycle at which the next body leaves if no record is missing for it: a body after its
+    /// last use, or at the end a body in no collision.
     fn leaves(&self) -> Option<u64> {
         match self.flow.leaving.front() {
             Some(leaving) => Some(leaving.ready.max(self.leave_due)),
@@ -148,13 +149,13 @@ impl Windowed {
         }
     }
 
-    /// Since when the first pass lacks something on a stream, if it does.
+    /// The cycle since which the first pass lacks a record on a stream, if it lacks one.
     fn first_lacks(&self) -> Option<u64> {
         let first = self.flow.passes.first().filter(|_| self.first == First::Stream)?;
         Some(self.flow.free(first))
     }
 
-    /// Whether everything is there for the next body that leaves.
+    /// Whether all records have arrived for the next body that leaves.
     fn may_leave(&self, there: &Arrived) -> bool {
         there.pose() && (!self.flow.leaving.is_empty() || there.velocities(1))
     }
@@ -166,7 +167,7 @@ struct Arrived {
     collisions: usize,
     velocities: usize,
     poses: usize,
-    /// Results that there is room for.
+    /// Results that the streams have room for.
     room: usize,
     collisions_taken: usize,
     velocities_taken: usize,
@@ -189,7 +190,7 @@ impl Arrived {
 }
 
 impl Accelerator {
-    /// Works for up to `limit` cycles on what has arrived.
+    /// Works for up to `limit` cycles on the records that have arrived.
     pub(in super::super) fn windowed(
         &mut self,
         limit: u64,
@@ -211,17 +212,17 @@ impl Accelerator {
     ) -> Result<bool, PacketError> {
         let mut there = window.arrived(inputs, outputs);
         window.check(&there, inputs)?;
-        let turn = self.turn();
+        let pass_fn = self.pass_fn();
         let start = self.clock;
         let (grace, end) = (start + limit.min(GRACE), start + limit);
         let mut now = start;
         let mut progressed = false;
-        self.look_first(window, &there, now, inputs)?;
+        self.reschedule_first(window, &there, now, inputs)?;
         while !window.finished() {
             let (issues, pass) = window.flow.earliest();
             let leaves = window.leaves();
             let leaving = leaves.filter(|at| window.may_leave(&there) && *at <= issues);
-            // When a stream begins to lack something.
+            // The cycle at which a stream begins to lack a record.
             let by_first = window.first_lacks();
             let by_leaving = leaves.filter(|_| !window.may_leave(&there));
             let lacking = by_first.into_iter().chain(by_leaving).min();
@@ -246,9 +247,9 @@ impl Accelerator {
             progressed = true;
             if leaving.is_some() {
                 self.leave(window, &mut there, now, inputs, outputs)?;
-                self.look_first(window, &there, now, inputs)?;
+                self.reschedule_first(window, &there, now, inputs)?;
             } else {
-                self.issue(window, &mut there, pass, now, turn, inputs)?;
+                self.issue(window, &mut there, pass, now, pass_fn, inputs)?;
             }
         }
         if window.finished() {
@@ -262,8 +263,9 @@ impl Accelerator {
         self.debt += now - start;
         Ok(progressed || now > start)
     }
-    /// Keeps account of the time in which the first pass had not issued for a slot, although its unit
-    /// was free.
+
+    /// Counts the cycles in which the first pass was due and its unit free, but it did not issue:
+    /// waits for a stream, or stalls.
     fn account(&mut self, window: &Windowed, there: &Arrived, from: u64, to: u64) {
         let starved = window.leaves().is_some_and(|at| at <= from) && !window.may_leave(there);
         let (blocked, first) = match window.flow.passes.first() {
@@ -281,8 +283,8 @@ impl Accelerator {
         }
     }
 
-    /// Looks again at the first pass; something that it needs has changed.
-    fn look_first(
+    /// Computes again when the first pass can issue, after a change of its conditions.
+    fn reschedule_first(
         &self,
         window: &mut Windowed,
         there: &Arrived,
@@ -331,14 +333,14 @@ impl Accelerator {
         Ok(())
     }
 
-    /// The next entry of a pass issues.
+    /// Issues the next entry of a pass.
     fn issue(
         &mut self,
         window: &mut Windowed,
         there: &mut Arrived,
         pass: usize,
         now: u64,
-        turn: Turn,
+        pass_fn: PassFn,
         inputs: &[Stream],
     ) -> Result<(), PacketError> {
         if let (0, Some(entry)) = (pass, window.head) {
@@ -357,20 +359,25 @@ impl Accelerator {
             }
             window.flow.push(entry);
         }
-        self.solve_entry(&mut window.flow, pass, turn)?;
+        self.solve_entry(&mut window.flow, pass, pass_fn)?;
         self.counters.hazards += u64::from(window.flow.issue(pass, now));
-        window.flow.look(pass + 1, now);
-        window.flow.look(pass, now);
+        window.flow.reschedule(pass + 1, now);
+        window.flow.reschedule(pass, now);
         if pass > 1 {
-            window.flow.look(pass - 1, now);
+            window.flow.reschedule(pass - 1, now);
         } else {
-            self.look_first(window, there, now, inputs)?;
+            self.reschedule_first(window, there, now, inputs)?;
         }
         Ok(())
     }
 
-    /// What a pass does to its next entry.
-    fn solve_entry(&mut self, flow: &mut Flow, pass: usize, turn: Turn) -> Result<(), PacketError> {
+    /// Solves the next entry of a pass.
+    fn solve_entry(
+        &mut self,
+        flow: &mut Flow,
+        pass: usize,
+        pass_fn: PassFn,
+    ) -> Result<(), PacketError> {
         let number = flow.passes[pass].next;
         let Some((entry, places)) = flow.parts(pass) else { return Ok(()) };
         if entry.is_bubble() {
@@ -383,7 +390,14 @@ impl Accelerator {
             return Err(PacketError { code: ErrorCode::StaticPair, channel: 0, beat });
         }
         let mut velocities = sides.map(|place| places[place].velocity);
-        turn(self, register(pass), &entry.collision, &masses, &mut velocities, &mut entry.impulses);
+        pass_fn(
+            self,
+            register(pass),
+            &entry.collision,
+            &masses,
+            &mut velocities,
+            &mut entry.impulses,
+        );
         for side in 0..2 {
             if masses[side].inverse_mass != 0.0 {
                 places[sides[side]].velocity = velocities[side];
@@ -392,7 +406,7 @@ impl Accelerator {
         Ok(())
     }
 
-    /// The next body leaves: one whose last pass is over, or one that was in no collision.
+    /// Lets the next body leave: a body whose last pass is over, or one in no collision.
     fn leave(
         &mut self,
         window: &mut Windowed,
@@ -413,7 +427,7 @@ impl Accelerator {
             )?;
             there.velocities_taken += 1;
             window.born += 1;
-            (body.velocity, self.mass(body.shape, body.inertia), window.pass_interval)
+            (body.velocity, self.mass(body.shape, body.inertia), window.idle_interval)
         };
         let format = self.variant.numbers.poses;
         let pose = decode::pose(format, &window.poses.reader(there.poses_taken, inputs).record());
@@ -426,25 +440,25 @@ impl Accelerator {
         Ok(())
     }
 
-    /// The arithmetic of this bitstream.
-    fn turn(&self) -> Turn {
+    /// The pass function in the formats of this bitstream.
+    fn pass_fn(&self) -> PassFn {
         match self.config.subnormals {
-            Subnormals::Keep => self.turn_in::<Single, Half>(),
-            Subnormals::Flush => self.turn_in::<SingleFlushed, HalfFlushed>(),
+            Subnormals::Keep => self.pass_fn_in::<Single, Half>(),
+            Subnormals::Flush => self.pass_fn_in::<SingleFlushed, HalfFlushed>(),
         }
     }
 
-    fn turn_in<S: Format, H: Format>(&self) -> Turn {
+    fn pass_fn_in<S: Format, H: Format>(&self) -> PassFn {
         let numbers = self.variant.numbers;
         match (numbers.updates, numbers.rows) {
-            // Rows that need more than the updates have: the configuration refuses them.
-            (Precision::Binary16, _) => self.turn_with::<H, H>(),
-            (Precision::F32, Precision::Binary16) => self.turn_with::<H, S>(),
-            (Precision::F32, Precision::F32) => self.turn_with::<S, S>(),
+            // The configuration refuses rows in a wider format than the updates.
+            (Precision::Binary16, _) => self.pass_fn_with::<H, H>(),
+            (Precision::F32, Precision::Binary16) => self.pass_fn_with::<H, S>(),
+            (Precision::F32, Precision::F32) => self.pass_fn_with::<S, S>(),
         }
     }
 
-    fn turn_with<R: Format, U: Format>(&self) -> Turn {
+    fn pass_fn_with<R: Format, U: Format>(&self) -> PassFn {
         match self.variant.inertia {
             Inertia::Isotropic => Self::compute::<R, U, Isotropic>,
             Inertia::World => Self::compute::<R, U, World>,

@@ -1,13 +1,13 @@
-//! This file counts the words of Tables 4.1 to 4.6, for any number of bodies and collisions.
+//! Counts the words of Tables 4.1 to 4.6, for any number of bodies and collisions.
 //!
-//! What goes into a solver is so many words a collision and so many a body; each table gives them
-//! before and after its reductions. Collisions are counted once, although a step streams them once
-//! a pass.
+//! The input of a solver is a number of words for each collision and each body; every table gives
+//! both numbers before and after its reductions. Collisions are counted once, although a step
+//! streams them once a pass.
 
 const WORD_BYTES: u64 = 4;
 const WORDS_PER_BEAT: u64 = 4;
 
-/// What the thesis prints in a row.
+/// The figures that the thesis prints in a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Printed {
     /// Words of one record, "per collision" or "per iteration".
@@ -23,13 +23,13 @@ pub struct Printed {
 /// A row: one state of the reduction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DataRow {
-    /// Which state.
+    /// Name of the state.
     pub name: &'static str,
     /// Words a collision that the total counts.
     pub per_collision: u32,
     /// Words a body that the total counts.
     pub per_body: u32,
-    /// What the thesis prints.
+    /// The figures that the thesis prints.
     pub printed: Printed,
 }
 
@@ -38,11 +38,11 @@ pub struct DataRow {
 pub struct DataTable {
     /// Number in the thesis.
     pub id: &'static str,
-    /// What it counts.
+    /// The data that it counts.
     pub title: &'static str,
     /// Its rows.
     pub rows: &'static [DataRow],
-    /// Where the thesis contradicts itself or leaves something out.
+    /// Contradictions and gaps of the thesis.
     pub remarks: &'static [&'static str],
 }
 

@@ -1,12 +1,12 @@
-//! This file recomputes Figure 2.6: a fall from rest, integrated explicitly.
+//! Recomputes Figure 2.6: a fall from rest, integrated explicitly.
 
 /// Acceleration of the example, m/s²: 500 m after 10 s.
 pub const ACCELERATION: f64 = 10.0;
 /// Its duration, s.
 pub const SECONDS: u32 = 10;
 
-/// Position after [`SECONDS`] by explicit Euler with so many steps a second, m: each step moves by
-/// the speed before it.
+/// Position after [`SECONDS`] by explicit Euler with `steps_per_second`, m: each step moves by the
+/// speed at its start.
 #[must_use]
 pub fn explicit(steps_per_second: u32) -> f64 {
     let dt = 1.0 / f64::from(steps_per_second.max(1));
@@ -18,7 +18,7 @@ pub fn explicit(steps_per_second: u32) -> f64 {
     position
 }
 
-/// The same in single precision, m.
+/// The position of [`explicit`] in single precision, m.
 #[must_use]
 pub fn explicit_single(steps_per_second: u16) -> f32 {
     let dt = 1.0 / f32::from(steps_per_second.max(1));
@@ -40,8 +40,8 @@ pub fn exact() -> f64 {
 mod tests {
     use super::*;
 
-    /// By hand: a dt² n (n - 1) / 2. The thesis prints 499.49 for what is 499.5: in single precision
-    /// it is 499.497, of which that is the beginning.
+    /// By hand: a dt² n (n - 1) / 2. The thesis prints 499.49 instead of 499.5: the position in
+    /// single precision is 499.497, cut off after two digits.
     #[test]
     fn the_fall_is_450_m_and_499_5_m_of_500() {
         assert!((explicit(1) - 450.0).abs() < 1e-9);

@@ -1,7 +1,7 @@
-//! What the thesis states, to be shown beside what follows from the profiles.
+//! Figures of the thesis, for comparison with the figures that follow from the profiles.
 //!
-//! [`data`] counts words as its Tables 4.1 to 4.6 do, for any scene; [`recorded`] holds what it
-//! measured or took from elsewhere, none of which is a figure of this project; [`euler`] recomputes
+//! [`data`] counts words as the thesis' Tables 4.1 to 4.6 do, for any scene. [`recorded`] holds the
+//! figures that the thesis measured or cites; this project has measured none. [`euler`] recomputes
 //! its Figure 2.6.
 
 pub mod data;
@@ -13,7 +13,7 @@ pub const BODIES: u64 = 38_880;
 /// Collisions of the thesis' step.
 pub const COLLISIONS: u64 = 127_000;
 
-/// Speed-up of a whole of which the share `p` is `s` times as fast (equation 6.5).
+/// Speed-up of a whole whose share `p` becomes `s` times as fast (equation 6.5).
 #[must_use]
 pub fn amdahl(p: f64, s: f64) -> f64 {
     1.0 / ((1.0 - p) + p / s)

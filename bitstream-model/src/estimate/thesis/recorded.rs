@@ -1,5 +1,5 @@
-//! This file holds the figures that the thesis reports of its designs and of other machines
-//! (§4.4.2, Tables 6.4 to 6.11, equation 6.5).
+//! Figures that the thesis reports of its designs and of other machines (§4.4.2, Tables 6.4 to
+//! 6.11, equation 6.5).
 
 use crate::config::Bandwidth;
 use pgs_interface::profile::{FLOAT, HALF, Profile};
@@ -30,8 +30,8 @@ pub const GPU: Platform = Platform {
 /// The CPU of Table 6.3.
 pub const CPU: Platform =
     Platform { name: "i7-3770", latency_ms: 53.01, watts: 133.0, joules: 7.05, design_watts: 77.0 };
-/// Bandwidth of the memory that the thesis reckons with (§5.4.2): what others had found the most to be.
-/// Its cycles contain no wait for memory.
+/// Memory bandwidth in the thesis' calculations (§5.4.2): the largest that others had measured. The
+/// thesis' cycles contain no wait for memory.
 pub const MEMORY_BANDWIDTH: Bandwidth = Bandwidth::BytesPerSecond(16_000_000_000);
 /// Power of the ZCU102 that the thesis calculates with, W: its maximum, not measured.
 pub const ZCU102_WATTS: f64 = 15.0;
@@ -47,7 +47,7 @@ pub struct Over {
     pub cpu: f64,
 }
 
-/// What the thesis reports of one of its designs.
+/// The figures that the thesis reports of one of its designs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Design {
     /// The profile that describes it.
@@ -72,7 +72,7 @@ pub struct Design {
     pub lookup_tables: u32,
     /// Block RAM of its arrays, MiB (§4.4.2).
     pub mebibytes: f64,
-    /// The same with the positions on chip, MiB.
+    /// Block RAM of its arrays with the positions on chip, MiB.
     pub mebibytes_with_positions: f64,
     /// Latency, ms.
     pub latency_ms: f64,
@@ -132,13 +132,13 @@ pub const HALF_DESIGN: Design = Design {
     whole_step: 1.48,
 };
 
-/// Both designs. The thesis reports nothing of its first one ([`NAIVE`]).
+/// Both designs. The thesis reports no figures of its first design ([`NAIVE`]).
 ///
 /// [`NAIVE`]: pgs_interface::profile::NAIVE
 pub const DESIGNS: [&Design; 2] = [&FLOAT_DESIGN, &HALF_DESIGN];
 
 impl Design {
-    /// What the thesis reports of the design that a profile describes.
+    /// The reported figures of the design that a profile describes.
     #[must_use]
     pub fn of(profile: &Profile) -> Option<&'static Self> {
         DESIGNS.into_iter().find(|design| design.profile.id == profile.id)
@@ -173,7 +173,7 @@ mod tests {
                 (CPU, design.speedup.cpu, design.energy.cpu),
             ] {
                 assert_near(platform.latency_ms / design.latency_ms, speedup, 0.01, "speed-up");
-                // From the joules as they are printed, two digits.
+                // The printed joules have two digits.
                 assert_near(platform.joules / design.joules, energy, 0.01, "energy");
                 assert_near(
                     platform.watts * platform.latency_ms / 1e3,

@@ -1,4 +1,4 @@
-//! This file plants mistakes with registers, addresses, lengths and the order of doorbells.
+//! Plants mistakes with registers, addresses, lengths and the order of doorbells.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use pgs_interface::descriptor::{CONTROL, control};
 
 use super::kinds::{Event, Mistake, Trouble};
 use super::planted::Planted;
-use super::{Bench, caught, clean, clean_in};
+use super::{Bench, assert_reported, clean, clean_in};
 use crate::axi_dma::{Descriptor, largest_piece, pieces};
 use crate::platform::{Access, BusAddress, CpuBuffer, Platform};
 
@@ -19,30 +19,32 @@ fn short_lengths() -> BoardConfig {
 
 #[test]
 fn mistake_01_length_width_assumed() {
-    // The collisions of 600 cubes take 19,200 bytes of a channel, more than 14 bits say.
+    // The collisions of 600 cubes take 19,200 bytes of a channel, more than 14 bits can express.
     let narrow = BoardConfig { length_width: 14, ..BoardConfig::default() };
-    caught(Mistake::LengthWidthAssumed, "does not fit 14 bits", |mistake| {
+    assert_reported(Mistake::LengthWidthAssumed, "does not fit 14 bits", |mistake| {
         clean(narrow, mistake, &[600])
     });
-    // Bitstream and cores that disagree are refused before there is a length.
+    // A bitstream and cores that disagree are refused before the first length is written.
     let quirks = Quirks { length_register: Some(14), ..Quirks::default() };
     let wrong = BoardConfig { quirks, ..BoardConfig::default() };
-    caught(Mistake::LengthWidthAssumed, "does not fit 14 bits", |mistake| {
-        match Bench::open(wrong, mistake, None) {
+    assert_reported(
+        Mistake::LengthWidthAssumed,
+        "does not fit 14 bits",
+        |mistake| match Bench::open(wrong, mistake, None) {
             Err(refused) => {
                 assert!(refused.contains("26") && refused.contains("14"), "{refused}");
                 Ok(())
             }
             Ok(mut bench) => bench.step(600).and_then(|_| bench.close()),
-        }
-    });
+        },
+    );
 }
 
 #[test]
 fn mistake_02_upper_half_written_first() {
     for length_width in [8, 26] {
         let config = BoardConfig { length_width, ..BoardConfig::default() };
-        caught(Mistake::UpperHalfFirst, "has length 0", |mistake| {
+        assert_reported(Mistake::UpperHalfFirst, "has length 0", |mistake| {
             clean_in(Some(Trouble::Preempted), config, mistake, &[9, 20, 9])
         });
     }
@@ -50,7 +52,7 @@ fn mistake_02_upper_half_written_first() {
 
 #[test]
 fn mistake_03_address_cut_to_32_bits() {
-    caught(Mistake::AddressCut, "no buffer is granted there", |mistake| {
+    assert_reported(Mistake::AddressCut, "no buffer is granted there", |mistake| {
         clean(BoardConfig::default(), mistake, &[9, 20])
     });
     // Memory that the cores do not reach is refused, not cut.
@@ -62,10 +64,11 @@ fn mistake_03_address_cut_to_32_bits() {
 
 #[test]
 fn mistake_04_current_descriptor_written_while_running() {
-    // Channels take long to halt. The second step needs longer rings: they are stopped for it.
+    // The channels halt slowly. The second step needs longer rings, and the driver stops the
+    // channels for it.
     let delays = Delays { halt: 100_000, ..Delays::default() };
     let config = BoardConfig { delays, ..short_lengths() };
-    caught(Mistake::HaltNotAwaited, "CURDESC written while not halted", |mistake| {
+    assert_reported(Mistake::HaltNotAwaited, "CURDESC written while not halted", |mistake| {
         clean(config, mistake, &[3, 90])
     });
 }
@@ -73,13 +76,13 @@ fn mistake_04_current_descriptor_written_while_running() {
 #[test]
 fn mistake_09_descriptor_used_again_uncleared() {
     for config in [BoardConfig::default(), short_lengths()] {
-        caught(Mistake::StatusNotCleared, "still has Cmplted set", |mistake| {
+        assert_reported(Mistake::StatusNotCleared, "still has Cmplted set", |mistake| {
             clean(config, mistake, &[20, 20, 20, 20])
         });
     }
 }
 
-/// The packet marks and the length that each piece of a packet is given.
+/// Checks the packet marks and the length of each piece of a packet.
 fn marks(words: &[u32], bytes: u64) -> Result<(), String> {
     let sum: u64 = words.iter().map(|word| u64::from(control::LENGTH.of(*word))).sum();
     if sum != bytes {
@@ -118,7 +121,7 @@ fn mistake_15_length_spills_into_the_packet_marks() {
         assert_eq!(whole.is_ok(), bytes < 1 << 26, "{whole:?}");
     }
     // On a board, in packets of several descriptors.
-    caught(Mistake::LengthSpills, "SOF and EOF do not pair", |mistake| {
+    assert_reported(Mistake::LengthSpills, "SOF and EOF do not pair", |mistake| {
         clean(short_lengths(), mistake, &[20])
     });
 }
@@ -133,7 +136,7 @@ fn some_address() -> BusAddress {
 
 #[test]
 fn mistake_16_receivers_started_after_senders() {
-    caught(Mistake::ReceiversLast, "dma0 MM2S was started before dma0 S2MM", |mistake| {
+    assert_reported(Mistake::ReceiversLast, "dma0 MM2S was started before dma0 S2MM", |mistake| {
         let mut bench = Bench::open(BoardConfig::default(), mistake, None)?;
         for cubes in [20, 9] {
             bench.planted.events();
@@ -145,7 +148,7 @@ fn mistake_16_receivers_started_after_senders() {
                         receivers |= 1 << core;
                     }
                     Event::Write(core, at, _) if at == TAILDESC.offset && core < 4 => {
-                        // All of them: results go to every channel.
+                        // All of the receivers: results go to every channel.
                         if let Some(late) = (0..4).find(|core| receivers & (1 << core) == 0) {
                             return Err(format!(
                                 "dma{core} MM2S was started before dma{late} S2MM"

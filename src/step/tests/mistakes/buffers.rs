@@ -1,4 +1,4 @@
-//! This file plants mistakes with the memory that driver and device pass to each other.
+//! Plants mistakes with the memory that driver and device pass to each other.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use pgs_interface::record::Beat;
 
 use super::kinds::{Mistake, Trouble};
 use super::planted::Planted;
-use super::{Bench, Verdict, caught, chain_of, clean, found};
+use super::{Bench, Verdict, assert_reported, chain_of, clean, found};
 use crate::board::bank::Bank;
 use crate::check::check_found;
 use crate::platform::{Access, CpuBuffer, DeviceBuffer, PlatformError};
@@ -17,11 +17,13 @@ use crate::{Outcome, StepParameters};
 #[test]
 fn mistake_13_caches_not_maintained() {
     for mistake in [Mistake::NotCleaned, Mistake::NotInvalidated] {
-        // Never silent: the sums of words tell, or what the accelerator makes of old beats. The same
-        // buffers with other contents.
-        caught(mistake, "", |mistake| clean(BoardConfig::default(), mistake, &[90, 20, 50]));
+        // Never silent: either the sums of words differ, or the accelerator refuses old beats. The
+        // sizes use the same buffers again, with other contents.
+        assert_reported(mistake, "", |mistake| {
+            clean(BoardConfig::default(), mistake, &[90, 20, 50])
+        });
         // The self-test finds it before the first step.
-        caught(mistake, "coherency", |mistake| {
+        assert_reported(mistake, "coherency", |mistake| {
             let planted = Planted::new(BoardConfig::default(), mistake, None);
             planted.opened();
             let report = check_found(found(&planted), None).map_err(|error| error.to_string())?;
@@ -34,7 +36,7 @@ fn mistake_13_caches_not_maintained() {
     }
 }
 
-/// A step whose received packets are a beat short must not be taken for a whole one.
+/// Checks that a step fails whose received packets are a beat short.
 fn short(mistake: Option<Mistake>, core: usize) -> Verdict {
     let trouble = Some(Trouble::ShortPacket(core));
     let mut bench = Bench::open(BoardConfig::default(), mistake, trouble)?;
@@ -44,7 +46,7 @@ fn short(mistake: Option<Mistake>, core: usize) -> Verdict {
     let text = chain_of(&error);
     assert!(text.contains(&format!("dma{core} S2MM")), "{text}");
     assert_eq!(bits(&bodies), bits(&scene(20).0));
-    bench.planted.calm();
+    bench.planted.end_trouble();
     bench.step(20)?;
     bench.close()
 }
@@ -52,21 +54,22 @@ fn short(mistake: Option<Mistake>, core: usize) -> Verdict {
 #[test]
 fn mistake_14_received_length_ignored() {
     for core in 0..4 {
-        caught(Mistake::LengthIgnored, "taken as whole", |mistake| short(mistake, core));
+        assert_reported(Mistake::LengthIgnored, "taken as whole", |mistake| short(mistake, core));
     }
 }
 
 #[test]
 fn mistake_17_buffer_used_again_after_a_time_out() {
-    caught(Mistake::NotReset, "the CPU owns the buffer", |mistake| {
+    assert_reported(Mistake::NotReset, "the CPU owns the buffer", |mistake| {
         let mut bench = Bench::open(BoardConfig::default(), mistake, None)?;
-        // No time at all: the engines are in the middle of it.
+        // The step has no time at all: the deadline passes while the engines work.
         let deadline = Some(Duration::from_nanos(1));
         let parameters = StepParameters { deadline, ..StepParameters::default() };
         let (result, bodies) = bench.step_with(900, &parameters);
         let error = result.expect_err("no time");
         assert_eq!(bits(&bodies), bits(&scene(900).0), "{error}");
-        // The same buffers, then others: those go back.
+        // The first size uses the same buffers; the second needs others, and the driver frees the
+        // first.
         for cubes in [900, 3000] {
             bench.step(cubes)?;
         }
@@ -74,10 +77,10 @@ fn mistake_17_buffer_used_again_after_a_time_out() {
     });
 }
 
-/// Whether a type implements a trait: the constant of its own comes before that of the trait.
+/// Whether a type implements a trait. The compiler prefers the type's own constant to the trait's.
 macro_rules! implements {
     ($type:ty: $($bound:tt)+) => {{
-        #[allow(dead_code, reason = "it is only looked at by the compiler")]
+        #[allow(dead_code, reason = "only the compiler reads it")]
         struct Probe<T: ?Sized>(std::marker::PhantomData<T>);
         #[allow(dead_code, reason = "where every type has the trait")]
         trait Otherwise {
@@ -92,10 +95,10 @@ macro_rules! implements {
     }};
 }
 
-/// The types keep this mistake from being written: there is nothing that a platform could do wrong.
+/// The types rule this mistake out: a platform has no way to make it.
 #[test]
 fn mistake_19_slices_of_a_buffer_that_the_device_writes() {
-    // What has slices is used up by handing over, and what is handed over has none.
+    // Handing over uses up the type that has slices, and the resulting type has none.
     let _: fn(CpuBuffer, usize, Access) -> Result<DeviceBuffer, PlatformError> =
         CpuBuffer::into_device;
     let _: fn(DeviceBuffer) -> Result<CpuBuffer, PlatformError> = DeviceBuffer::into_cpu;
@@ -106,7 +109,7 @@ fn mistake_19_slices_of_a_buffer_that_the_device_writes() {
         implements!(DeviceBuffer: std::ops::Deref),
     ];
     assert_eq!(ways, [false; 4], "copied or read through");
-    // What a worse type would be told as.
+    // The same checks on a worse type.
     let ways = [
         implements!(Vec<Beat>: Clone),
         implements!(Vec<Beat>: AsRef<[Beat]>),
@@ -114,7 +117,7 @@ fn mistake_19_slices_of_a_buffer_that_the_device_writes() {
         implements!(Vec<Beat>: std::ops::Deref),
     ];
     assert_eq!(ways, [true; 4]);
-    // The ports, which hold either, give no beat away while the device has them.
+    // A port holds either type, and gives no beat away while the device has the buffers.
     let mut bench = Bench::open(BoardConfig::default(), None, None).expect("a board that opens");
     bench.step(20).expect("a step");
     let device = &mut bench.accelerator.device;

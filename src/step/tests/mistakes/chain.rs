@@ -1,4 +1,4 @@
-//! This file finds the descriptors that a doorbell is about: from where the engine goes on to the tail.
+//! Finds the descriptors of a doorbell: from the place where the engine goes on to the tail.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use pgs_interface::descriptor::{
 };
 use pgs_interface::register::Field;
 
-/// Longer chains than any of these tests have.
+/// More descriptors than any chain in these tests.
 const LONGEST: usize = 100_000;
 
 /// A descriptor in the memory that driver and board share.
@@ -32,7 +32,7 @@ impl Bd {
         u64::from(self.get(low)) | (u64::from(self.get(high)) << 32)
     }
 
-    /// Where its data lies.
+    /// The address of its data.
     pub(crate) fn buffer(&self) -> u64 {
         self.pair(BUFFER, BUFFER_MSB)
     }
@@ -43,7 +43,7 @@ impl Bd {
         self.set(BUFFER_MSB, (address >> 32) as u32);
     }
 
-    /// How long its data is, bytes.
+    /// The length of its data, bytes.
     pub(crate) fn length(&self) -> u32 {
         control::LENGTH.of(self.get(CONTROL))
     }
@@ -77,7 +77,7 @@ impl Descriptors {
     }
 }
 
-/// Where one channel is in its ring.
+/// The position of one channel in its ring.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Place {
     current: u64,
@@ -92,17 +92,17 @@ fn put(value: &mut u64, high: bool, half: u32) {
 }
 
 impl Place {
-    /// Notes a write of CURDESC, or of its upper half.
+    /// Records a write of CURDESC, or of its upper half.
     pub(crate) fn starts_at(&mut self, high: bool, half: u32) {
         put(&mut self.current, high, half);
     }
 
-    /// Notes a write of TAILDESC, or of its upper half.
+    /// Records a write of TAILDESC, or of its upper half.
     pub(crate) fn ends_at(&mut self, high: bool, half: u32) {
         put(&mut self.tail, high, half);
     }
 
-    /// Follows the links from where the engine goes on to the tail.
+    /// Follows the links from the place where the engine goes on to the tail.
     pub(crate) fn follow(&mut self, descriptors: &Descriptors) {
         self.chain.clear();
         for _ in 0..LONGEST {

@@ -1,36 +1,36 @@
-//! This file lists what can be planted: mistakes of a driver, troubles of a board; and what is seen.
+//! Lists the mistakes of a driver, the troubles of a board, and the events between them.
 
 use bitstream_model::Direction;
 
 /// A channel: number of the core, direction.
 pub(crate) type ChannelId = (usize, Direction);
 
-/// What a worse driver would do.
+/// The mistake of a worse driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mistake {
-    /// Believes in 26 bits, whatever bitstream and cores say.
+    /// Believes in 26 bits, whatever bitstream and cores report.
     LengthWidthAssumed,
     /// Writes `TAILDESC_MSB` before TAILDESC.
     UpperHalfFirst,
     /// Cuts the addresses of buffers to 32 bits.
     AddressCut,
-    /// Takes a channel for halted as soon as it was told to stop.
+    /// Takes a channel for halted right after the request to stop.
     HaltNotAwaited,
-    /// Resets by MM2S, and takes it that S2MM goes on as before.
+    /// Resets through MM2S, and assumes that S2MM goes on as before.
     OneDirectionReset,
-    /// Has no deadlines: for it no time passes.
+    /// Has no deadlines: no time passes for it.
     NoDeadline,
-    /// Does not look at these bits of DMASR.
+    /// Ignores these bits of DMASR.
     StatusUnseen(u32),
-    /// Does not look at these bits of a descriptor's status.
+    /// Ignores these bits of a descriptor's status.
     DescriptorUnseen(u32),
-    /// Hands descriptors over as the board has left them.
+    /// Hands descriptors over with the board's status still in them.
     StatusNotCleared,
     /// Asks for an interrupt every fourth packet.
     ThresholdRaised,
-    /// Lets interrupts through before it acknowledges.
+    /// Unmasks interrupts before it acknowledges.
     UnmaskedFirst,
-    /// Does not look again after letting interrupts through.
+    /// Does not read the status again after unmasking interrupts.
     NoSecondLook,
     /// Takes an interrupt for the end of the step.
     InterruptBelieved,
@@ -58,18 +58,18 @@ pub(crate) enum Mistake {
     CpuBuffer(ChannelId),
 }
 
-/// What a board does.
+/// The trouble that a board makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Trouble {
     /// These bits of DMASR are set.
     Status(ChannelId, u32),
-    /// These bits are set in the last descriptor of a chain that is done.
+    /// These bits are set in the last descriptor of a complete chain.
     Descriptor(ChannelId, u32),
     /// Received packets are a beat short.
     ShortPacket(usize),
-    /// The second descriptor of a chain is stale: a descriptor error of the core's.
+    /// The second descriptor of a chain is stale, which is a descriptor error of the core.
     StaleDescriptor(ChannelId),
-    /// So many interrupts come for nothing.
+    /// This number of interrupts comes without a cause.
     Spurious(u32),
     /// Waits end as soon as all senders are idle, without an interrupt.
     SendersIdle,
@@ -87,17 +87,17 @@ pub(crate) enum Trouble {
     DoorbellLost(ChannelId),
 }
 
-/// What happened at the board's door.
+/// An event between driver and board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Event {
     Read(usize, u32),
     Write(usize, u32, u32),
     /// A wait began.
     Wait,
-    /// It ended with an interrupt.
+    /// The wait ended with an interrupt.
     Woke,
-    /// Interrupts are let through; the level of the line at that moment.
+    /// The driver unmasks interrupts; the level of the line at that moment.
     Unmask(bool),
-    /// A buffer is taken back; whether no engine runs.
+    /// The driver takes a buffer back; whether no engine runs.
     TakeBack(bool),
 }

@@ -2,8 +2,8 @@
 //! driver makes it.
 //!
 //! Every test runs one check twice: on the driver as it is, which must pass, and with the mistake
-//! planted between driver and board ([`planted`]), which must be reported. Without the second run
-//! nobody would know whether the check can fail.
+//! planted between driver and board ([`planted`]), which must be reported. The second run proves
+//! that the check can fail.
 //!
 //! | # | mistake | test | what reports it |
 //! |---|---|---|---|
@@ -13,12 +13,12 @@
 //! | 4 | CURDESC written while running | [`addresses`]`::mistake_04_current_descriptor_written_while_running` | the board |
 //! | 5 | one direction reset | [`waits`]`::mistake_05_reset_of_one_direction` | the board: a doorbell of a halted channel |
 //! | 6 | unbounded wait | [`waits`]`::mistake_06_unbounded_wait` | the board's clock, for each wait of a step |
-//! | 7 | only completion awaited | [`waits`]`::mistake_07_only_completion_awaited` | the time until the error is told |
+//! | 7 | only completion awaited | [`waits`]`::mistake_07_only_completion_awaited` | the time until the error is reported |
 //! | 8 | decode error missing from the mask | [`waits`]`::mistake_08_error_bit_missing_from_the_mask` | an error of either register taken as success, bit by bit |
 //! | 9 | descriptor used with Cmplted set | [`addresses`]`::mistake_09_descriptor_used_again_uncleared` | the board: a stale descriptor |
-//! | 10 | threshold above what is outstanding | [`waits`]`::mistake_10_threshold_above_the_packets` | steps that end without their interrupt |
+//! | 10 | threshold above the outstanding packets | [`waits`]`::mistake_10_threshold_above_the_packets` | steps that end without their interrupt |
 //! | 11 | UIO: unmasked before acknowledged, or no second look | [`waits`]`::mistake_11_unmasked_before_acknowledged_or_not_looked_at_again` | the level of the line, and the register accesses |
-//! | 12 | interrupt counted, not looked into | [`waits`]`::mistake_12_interrupt_taken_for_completion` | buffers taken back while engines run |
+//! | 12 | interrupt counted, status not read | [`waits`]`::mistake_12_interrupt_taken_for_completion` | buffers taken back while engines run |
 //! | 13 | caches not maintained | [`buffers`]`::mistake_13_caches_not_maintained` | the sums of words; the self-test |
 //! | 14 | received length ignored | [`buffers`]`::mistake_14_received_length_ignored` | a short packet that is taken as whole |
 //! | 15 | length spills into the packet marks | [`addresses`]`::mistake_15_length_spills_into_the_packet_marks` | the board: SOF and EOF that do not pair |
@@ -27,16 +27,16 @@
 //! | 18 | idle senders taken for the end | [`waits`]`::mistake_18_idle_senders_taken_for_the_end` | buffers taken back while engines run |
 //! | 19 | slices of a buffer that the device writes | [`buffers`]`::mistake_19_slices_of_a_buffer_that_the_device_writes` | the compiler, and the ports |
 //!
-//! Beside them [`confinement`] plants lengths and addresses that are off by one beat, buffers that
-//! were freed and buffers of the CPU.
+//! In addition [`confinement`] plants lengths and addresses that are off by one beat, freed buffers
+//! and buffers of the CPU.
 
 mod addresses;
 mod buffers;
 mod chain;
 mod confinement;
-mod door;
 mod kinds;
 mod planted;
+mod region;
 mod waits;
 
 use std::sync::Arc;
@@ -50,24 +50,29 @@ use crate::{Accelerator, Body, Error, Shape, StepParameters, StepReport};
 use kinds::{Mistake, Trouble};
 use planted::Planted;
 
-/// What a check says: what went wrong.
+/// The outcome of a check; the error tells the mistake.
 type Verdict = Result<(), String>;
 
-/// Runs a check on the driver as it is, and with a mistake planted, which must be told so: as what.
-fn caught(mistake: Mistake, told: &str, check: impl Fn(Option<Mistake>) -> Verdict) -> String {
+/// Runs a check on the driver as it is, and with a mistake planted. The second run must fail with a
+/// message that contains `message`.
+fn assert_reported(
+    mistake: Mistake,
+    message: &str,
+    check: impl Fn(Option<Mistake>) -> Verdict,
+) -> String {
     if let Err(found) = check(None) {
         panic!("the driver as it is: {found}");
     }
     match check(Some(mistake)) {
-        Ok(()) => panic!("{mistake:?} was planted, and nothing told"),
+        Ok(()) => panic!("{mistake:?} was planted, and nothing reported"),
         Err(found) => {
-            assert!(found.contains(told), "{mistake:?} was told as {found:?}");
+            assert!(found.contains(message), "{mistake:?} was reported as {found:?}");
             found
         }
     }
 }
 
-/// A driver and a board with what may stand between them.
+/// A driver and a board, with a mistake and a trouble between them.
 struct Bench {
     planted: Planted,
     accelerator: Accelerator,
@@ -108,7 +113,7 @@ impl Bench {
         (self.accelerator.step(&mut bodies, &collisions, parameters), bodies)
     }
 
-    /// One step that must be as if nothing stood between.
+    /// Runs one step, which must be undisturbed.
     fn step(&mut self, cubes: u32) -> Result<StepReport, String> {
         let (result, bodies) = self.step_with(cubes, &StepParameters::default());
         let report = result.map_err(|error| self.with_violations(&chain_of(&error)))?;
@@ -120,11 +125,11 @@ impl Bench {
 
     fn with_violations(&self, found: &str) -> String {
         let violations = self.planted.board().violations();
-        let told: Vec<_> = violations.iter().map(|violation| violation.kind.to_string()).collect();
-        format!("{found}; violations: {}", told.join(", "))
+        let kinds: Vec<_> = violations.iter().map(|violation| violation.kind.to_string()).collect();
+        format!("{found}; violations: {}", kinds.join(", "))
     }
 
-    /// Closes the board; nothing may have gone wrong.
+    /// Closes the board, and checks that nothing went wrong.
     fn close(self) -> Verdict {
         let Self { planted, accelerator } = self;
         drop(accelerator);
@@ -147,12 +152,12 @@ fn chain_of(error: &dyn std::error::Error) -> String {
     text
 }
 
-/// Whether steps of these sizes are as if nothing stood between driver and board.
+/// Whether steps of these sizes are undisturbed.
 fn clean(config: BoardConfig, mistake: Option<Mistake>, sizes: &[u32]) -> Verdict {
     clean_in(None, config, mistake, sizes)
 }
 
-/// The same in trouble that no step should feel.
+/// As [`clean`], with a trouble that no step should feel.
 fn clean_in(
     trouble: Option<Trouble>,
     config: BoardConfig,

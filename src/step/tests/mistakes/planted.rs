@@ -1,11 +1,11 @@
-//! This file stands between the driver and the board, and makes mistakes on the driver's behalf.
+//! Stands between the driver and the board, and makes mistakes on the driver's behalf.
 //!
 //! ```text
 //! driver -> [ mistake ] -> events, as the board sees them -> [ trouble ] -> emulated board
 //! ```
 //!
-//! A [`Mistake`] is what a worse driver would do; a [`Trouble`] is what a board does to any driver, so
-//! that the mistake shows.
+//! A [`Mistake`] is an error of a worse driver. A [`Trouble`] is an act of the board that makes the
+//! mistake show; it happens to every driver.
 
 use std::collections::BTreeMap;
 use std::panic::panic_any;
@@ -18,8 +18,8 @@ use pgs_interface::descriptor::{BUFFER_MSB, CONTROL, STATUS, control, status};
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
 use super::chain::{Bd, Descriptors, Place};
-use super::door::Door;
 use super::kinds::{ChannelId, Event, Mistake, Trouble};
+use super::region::PlantedRegion;
 use crate::platform::{
     Access, DmaMemory, EmulatedPlatform, Platform, PlatformError, RegisterWindow, SharedMemory,
 };
@@ -27,14 +27,14 @@ use crate::platform::{
 const BEAT: u32 = 16;
 /// The number of the control block among the register regions.
 pub(crate) const CONTROL_BLOCK: usize = 4;
-/// Waits, each up to a millisecond or to an interrupt, after which there is taken to be no end.
+/// Number of waits, each up to a millisecond or to an interrupt, that counts as endless.
 const ENDLESS: u32 = 20_000;
 
-/// Thrown where a wait has no end.
+/// The panic that ends an endless wait.
 #[derive(Debug)]
 pub(crate) struct Endless;
 
-/// What is planted, and what was seen.
+/// The planted mistake and trouble, and the events so far.
 #[derive(Debug, Default)]
 pub(crate) struct State {
     pub(crate) mistake: Option<Mistake>,
@@ -45,34 +45,34 @@ pub(crate) struct State {
     pub(crate) events: Vec<Event>,
     descriptors: Descriptors,
     pub(crate) places: BTreeMap<(usize, bool), Place>,
-    /// What each register last read or was written.
+    /// The last value that was read from each register, or written to it.
     pub(crate) last: BTreeMap<(usize, u32), u32>,
-    /// Writes that the mistake holds back.
+    /// Writes that the mistake delays.
     pub(crate) held: Vec<(usize, u32, u32)>,
-    /// Buffers: bytes; and what they held when they last went to the device.
+    /// Length of each buffer, bytes; and its contents when it last went to the device.
     buffers: BTreeMap<u64, u64>,
     sent: BTreeMap<u64, Box<[Beat]>>,
     freed: Vec<u64>,
     /// A buffer that stays with the CPU.
     kept: Option<u64>,
-    /// The last status of each descriptor that the device has used: by where it lies.
+    /// The last status of each descriptor that the device has used, by its address.
     used: Vec<(Bd, u32)>,
-    /// Channels whose state the driver only believes in: halted or not.
+    /// Channels whose state the driver only assumes: halted or not.
     pub(crate) believed: BTreeMap<(usize, bool), bool>,
-    /// Everything is told to be complete.
+    /// The driver sees every descriptor as complete.
     pub(crate) forged: bool,
-    /// It will be told when the driver has looked at the channels and looks at memory next: a
+    /// Completion is forged at the driver's next look at memory, after its look at the channels. A
     /// descriptor that the board has not fetched yet must not be complete.
     pub(crate) forge_due: bool,
-    /// Whether the last wait ended with an interrupt; whether it was let through since.
+    /// Whether the last wait ended with an interrupt; whether the driver unmasked it since.
     woke: bool,
     pub(crate) unmasked: bool,
     waits: u32,
-    /// The moment at which time stands still.
-    stands: Option<Duration>,
+    /// The moment at which the clock stops.
+    stopped_at: Option<Duration>,
     /// Whether the mistake found an occasion.
     planted: bool,
-    /// Channels that had a chain which ends with its buffer.
+    /// Channels with a chain that ended with its buffer.
     fitted: Vec<ChannelId>,
 }
 
@@ -98,31 +98,31 @@ impl Planted {
     }
 
     pub(crate) fn state(&self) -> MutexGuard<'_, State> {
-        // An endless wait is ended by a panic.
+        // A panic ends an endless wait.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The board, as its builder sees it.
+    /// The board under test.
     pub(crate) fn board(&self) -> &EmulatedBoard {
         &self.board
     }
 
-    /// Says that the board was opened: from now on resets are those of a recovery.
+    /// Marks the board as open: from now on a reset is part of a recovery.
     pub(crate) fn opened(&self) {
         let mut state = self.state();
         state.opened = true;
         state.events.clear();
         if state.mistake == Some(Mistake::NoDeadline) {
-            state.stands = Some(self.inner.now());
+            state.stopped_at = Some(self.inner.now());
         }
     }
 
     /// Ends the trouble.
-    pub(crate) fn calm(&self) {
+    pub(crate) fn end_trouble(&self) {
         self.state().trouble = None;
     }
 
-    /// What has happened since the last call.
+    /// The events since the last call.
     pub(crate) fn events(&self) -> Vec<Event> {
         std::mem::take(&mut self.state().events)
     }
@@ -156,13 +156,13 @@ impl Planted {
         })
     }
 
-    /// Ends a wait that has no end.
+    /// Counts a wait, and panics if there is no end.
     fn count_wait(&self) {
         let mut state = self.state();
         state.waits += 1;
         if state.waits > ENDLESS {
             state.waits = 0;
-            state.stands = None;
+            state.stopped_at = None;
             drop(state);
             panic_any(Endless);
         }
@@ -190,7 +190,7 @@ impl Planted {
         self.pass_on(state, held);
     }
 
-    /// What is done to descriptors when their doorbell rings.
+    /// Changes descriptors when their doorbell rings.
     pub(crate) fn ring(&self, state: &mut State, channel: ChannelId) {
         let key = (channel.0, channel.1 == Direction::S2mm);
         let place = state.places.entry(key).or_default();
@@ -202,12 +202,12 @@ impl Planted {
             let end = bd.buffer() + u64::from(bd.length());
             bytes(bd).is_some_and(|(base, bytes)| end == base + bytes)
         };
-        // Where a buffer's end is sent several times, the last.
+        // The last one, where a chain sends a buffer's end several times.
         let fitting = chain.iter().rfind(|bd| fits(bd));
         match state.mistake {
             Some(Mistake::AddressCut) => chain.iter().for_each(|bd| bd.set(BUFFER_MSB, 0)),
             Some(Mistake::LengthSpills) if channel.1 == Direction::Mm2s => {
-                // The first piece of the first packet that has several.
+                // The first piece of the first packet that has several pieces.
                 if let Some(piece) = chain.iter().find(|bd| !bd.has(control::EOF)) {
                     piece.mark(control::EOF);
                 }
@@ -252,7 +252,7 @@ impl Planted {
         }
     }
 
-    /// What the driver finds in memory when a wait has ended.
+    /// Changes the memory that the driver finds at the end of a wait.
     fn after_wait(&self, state: &mut State) {
         let State { mistake, trouble, places, .. } = state;
         let done = |bd: &Bd| status::CMPLTED.is_set(bd.status());
@@ -267,7 +267,7 @@ impl Planted {
             }
             Some(Trouble::ShortPacket(core)) => {
                 let last = chain_of((core, Direction::S2mm)).filter(|last| done(last));
-                // Once: what is short already stays so.
+                // Once: a short packet stays short.
                 let whole = |bd: &&Bd| status::TRANSFERRED.of(bd.status()) == bd.length();
                 if let Some(last) = last.filter(whole) {
                     last.set(STATUS, last.status() - BEAT);
@@ -286,7 +286,7 @@ impl Planted {
         }
     }
 
-    /// Tells the driver that everything is complete.
+    /// Shows the driver every descriptor as complete.
     pub(crate) fn forge(state: &mut State) {
         for ((_, receives), place) in &state.places {
             for bd in &place.chain {
@@ -301,12 +301,12 @@ impl Planted {
 impl Platform for Planted {
     fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
         let inner = self.inner.dma_window(core)?;
-        Ok(Box::new(Door::new(self, inner, core)))
+        Ok(Box::new(PlantedRegion::new(self, inner, core)))
     }
 
     fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
         let inner = self.inner.control_window()?;
-        Ok(Box::new(Door::new(self, inner, CONTROL_BLOCK)))
+        Ok(Box::new(PlantedRegion::new(self, inner, CONTROL_BLOCK)))
     }
 
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
@@ -315,7 +315,7 @@ impl Platform for Planted {
         let mut state = self.state();
         state.buffers.insert(address, bytes);
         if state.kept.is_none() {
-            // Not the driver's.
+            // This memory does not belong to the driver.
             state.kept = Some(self.inner.allocate(4096)?.0);
         }
         Ok((address, memory))
@@ -369,7 +369,7 @@ impl Platform for Planted {
     }
 
     fn now(&self) -> Duration {
-        self.state().stands.unwrap_or_else(|| self.inner.now())
+        self.state().stopped_at.unwrap_or_else(|| self.inner.now())
     }
 
     fn pause(&self, duration: Duration) {
@@ -398,7 +398,7 @@ impl Platform for Planted {
             while self.inner.now() < until && !self.at_rest(Direction::Mm2s) {
                 self.inner.pause(Duration::from_nanos(100));
             }
-            // Later waits are as ever.
+            // Later waits are undisturbed.
             state.trouble = None;
             None
         } else {

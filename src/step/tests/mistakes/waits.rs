@@ -1,5 +1,4 @@
-//! This file plants mistakes with waiting: for interrupts, for status bits, for resets, and for how
-//! long.
+//! Plants mistakes with waiting: for interrupts, for status bits, for resets, and with its limits.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -10,7 +9,7 @@ use pgs_interface::descriptor::status;
 
 use super::kinds::{ChannelId, Event, Mistake, Trouble};
 use super::planted::Endless;
-use super::{Bench, Verdict, bits, caught, chain_of, scene};
+use super::{Bench, Verdict, assert_reported, bits, chain_of, scene};
 use crate::StepParameters;
 
 const BOTH: [Direction; 2] = [Direction::Mm2s, Direction::S2mm];
@@ -26,20 +25,24 @@ const LONG: Duration = Duration::from_millis(30);
 
 #[test]
 fn mistake_05_reset_of_one_direction() {
-    caught(Mistake::OneDirectionReset, "TAILDESC or LENGTH written while halted", |mistake| {
-        let mut bench = Bench::open(BoardConfig::default(), mistake, None)?;
-        bench.step(20)?;
-        let (result, bodies) = bench.step_with(20, &within(NO_TIME));
-        let error = result.expect_err("no time");
-        assert!(error.may_retry(), "{error}");
-        assert_eq!(bits(&bodies), bits(&scene(20).0));
-        bench.step(20)?;
-        bench.step(9)?;
-        bench.close()
-    });
+    assert_reported(
+        Mistake::OneDirectionReset,
+        "TAILDESC or LENGTH written while halted",
+        |mistake| {
+            let mut bench = Bench::open(BoardConfig::default(), mistake, None)?;
+            bench.step(20)?;
+            let (result, bodies) = bench.step_with(20, &within(NO_TIME));
+            let error = result.expect_err("no time");
+            assert!(error.may_retry(), "{error}");
+            assert_eq!(bits(&bodies), bits(&scene(20).0));
+            bench.step(20)?;
+            bench.step(9)?;
+            bench.close()
+        },
+    );
 }
 
-/// A step in trouble ends: the error, and the board's time that it took.
+/// Checks that a step in trouble ends with an error, in time on the board's clock.
 fn ends(mistake: Option<Mistake>, trouble: Trouble, deadline: Duration) -> Verdict {
     let mut bench = Bench::open(BoardConfig::default(), mistake, Some(trouble))?;
     let before = bench.planted.time();
@@ -56,7 +59,7 @@ fn ends(mistake: Option<Mistake>, trouble: Trouble, deadline: Duration) -> Verdi
     if took > limit {
         return Err(format!("{took:?} where {limit:?} is the limit: {error}"));
     }
-    bench.planted.calm();
+    bench.planted.end_trouble();
     if error.must_reopen() {
         return Ok(());
     }
@@ -64,7 +67,7 @@ fn ends(mistake: Option<Mistake>, trouble: Trouble, deadline: Duration) -> Verdi
     Ok(())
 }
 
-/// A reset in trouble ends with an error.
+/// Checks that a reset in trouble ends with an error.
 fn reset_ends(mistake: Option<Mistake>, trouble: Trouble) -> Verdict {
     let mut bench = Bench::open(BoardConfig::default(), mistake, Some(trouble))?;
     let device = &mut bench.accelerator.device;
@@ -85,12 +88,14 @@ fn mistake_06_unbounded_wait() {
         Trouble::NeverRuns((3, Direction::Mm2s)),
         Trouble::NeverDone,
     ] {
-        caught(Mistake::NoDeadline, "no end after", |mistake| {
+        assert_reported(Mistake::NoDeadline, "no end after", |mistake| {
             ends(mistake, trouble, Duration::from_millis(20))
         });
     }
     for trouble in [Trouble::NeverOutOfReset(2), Trouble::AcceleratorInReset] {
-        caught(Mistake::NoDeadline, "no end after", |mistake| reset_ends(mistake, trouble));
+        assert_reported(Mistake::NoDeadline, "no end after", |mistake| {
+            reset_ends(mistake, trouble)
+        });
         // At the end of a step that had no time.
         ends(None, trouble, NO_TIME).expect("it ends");
     }
@@ -100,8 +105,9 @@ fn mistake_06_unbounded_wait() {
 fn mistake_07_only_completion_awaited() {
     let unseen = Mistake::StatusUnseen(dmasr::ERRORS | dmasr::ERR_IRQ.mask());
     for channel in [(0, Direction::Mm2s), (2, Direction::Mm2s), (3, Direction::S2mm)] {
-        caught(unseen, "only after", |mistake| {
-            // The board goes on after what is the trouble's doing, not the driver's.
+        assert_reported(unseen, "only after", |mistake| {
+            // The board goes on after the trouble's effects, because they are no mistake of the
+            // driver.
             let config = BoardConfig { strict: false, length_width: 8, ..BoardConfig::default() };
             let mut bench = Bench::open(config, mistake, Some(Trouble::StaleDescriptor(channel)))?;
             let before = bench.planted.time();
@@ -110,26 +116,26 @@ fn mistake_07_only_completion_awaited() {
             let took = bench.planted.time() - before;
             let error = chain_of(&result.expect_err("a descriptor error"));
             if took > LONG / 10 {
-                return Err(format!("{error}: told only after {took:?}"));
+                return Err(format!("{error}: reported only after {took:?}"));
             }
             let (core, direction) = channel;
             assert!(error.contains(&format!("dma{core} {direction}")), "{error}");
             assert!(error.contains("SGIntErr"), "{error}");
-            bench.planted.calm();
+            bench.planted.end_trouble();
             bench.step(90).map(drop)
         });
     }
 }
 
-/// An error that is told by one bit of a register or of a descriptor.
-fn told(mistake: Option<Mistake>, trouble: Trouble, channel: ChannelId, name: &str) -> Verdict {
+/// Checks that the driver reports an error that one bit of a register or descriptor shows.
+fn reported(mistake: Option<Mistake>, trouble: Trouble, channel: ChannelId, name: &str) -> Verdict {
     let mut bench = Bench::open(BoardConfig::default(), mistake, Some(trouble))?;
     let (result, bodies) = bench.step_with(9, &StepParameters::default());
     let Err(error) = result else { return Err("an error taken as success".to_owned()) };
     let (text, (core, direction)) = (chain_of(&error), channel);
     assert!(text.contains(&format!("dma{core} {direction}")) && text.contains(name), "{text}");
     assert_eq!(bits(&bodies), bits(&scene(9).0));
-    bench.planted.calm();
+    bench.planted.end_trouble();
     bench.step(9)?;
     bench.close()
 }
@@ -147,13 +153,13 @@ fn mistake_08_error_bit_missing_from_the_mask() {
     let descriptors = [status::DMA_INT_ERR, status::DMA_SLV_ERR, status::DMA_DEC_ERR];
     for channel in BOTH.map(|direction| (1, direction)) {
         for bit in registers {
-            caught(Mistake::StatusUnseen(bit.mask()), "taken as success", |mistake| {
-                told(mistake, Trouble::Status(channel, bit.mask()), channel, bit.name)
+            assert_reported(Mistake::StatusUnseen(bit.mask()), "taken as success", |mistake| {
+                reported(mistake, Trouble::Status(channel, bit.mask()), channel, bit.name)
             });
         }
         for bit in descriptors {
-            caught(Mistake::DescriptorUnseen(bit.mask()), "taken as success", |mistake| {
-                told(mistake, Trouble::Descriptor(channel, bit.mask()), channel, bit.name)
+            assert_reported(Mistake::DescriptorUnseen(bit.mask()), "taken as success", |mistake| {
+                reported(mistake, Trouble::Descriptor(channel, bit.mask()), channel, bit.name)
             });
         }
     }
@@ -161,7 +167,7 @@ fn mistake_08_error_bit_missing_from_the_mask() {
 
 #[test]
 fn mistake_10_threshold_above_the_packets() {
-    caught(Mistake::ThresholdRaised, "ended without its interrupt", |mistake| {
+    assert_reported(Mistake::ThresholdRaised, "ended without its interrupt", |mistake| {
         let mut bench = Bench::open(BoardConfig::default(), mistake, None)?;
         for cubes in [20, 9, 20, 20, 9] {
             let before = bench.planted.time();
@@ -175,9 +181,9 @@ fn mistake_10_threshold_above_the_packets() {
     });
 }
 
-/// What a UIO driver does to a wake-up: acknowledge, let through, look again.
+/// Checks the driver's answer to a wake-up: acknowledge, unmask, read the status again.
 fn wakes(mistake: Option<Mistake>) -> Verdict {
-    // The second interrupt is the step's; the first comes before there is anything to see.
+    // The second interrupt belongs to the step; the first comes before the board has done anything.
     let mut bench = Bench::open(BoardConfig::default(), mistake, Some(Trouble::Spurious(1)))?;
     let completion = (3, S2MM_OFFSET + DMASR.offset);
     for _ in 0..2 {
@@ -208,13 +214,13 @@ fn wakes(mistake: Option<Mistake>) -> Verdict {
 
 #[test]
 fn mistake_11_unmasked_before_acknowledged_or_not_looked_at_again() {
-    caught(Mistake::UnmaskedFirst, "let through while the line is high", wakes);
-    caught(Mistake::NoSecondLook, "no look between unmask and sleep", wakes);
+    assert_reported(Mistake::UnmaskedFirst, "let through while the line is high", wakes);
+    assert_reported(Mistake::NoSecondLook, "no look between unmask and sleep", wakes);
 }
 
-/// Steps whose waits end too early, and which must not take this for their end.
+/// Runs steps whose waits end too early, and which must not end with them.
 fn early(mistake: Option<Mistake>, trouble: Trouble) -> Verdict {
-    // A board that dies of what the mistake leads to would hide it.
+    // A strict board would die of the mistake's effects, and hide it.
     let config = BoardConfig { strict: false, ..BoardConfig::default() };
     let mut bench = Bench::open(config, mistake, Some(trouble))?;
     let stepped = bench.step(90);
@@ -223,7 +229,7 @@ fn early(mistake: Option<Mistake>, trouble: Trouble) -> Verdict {
         return Err("a buffer was taken back while an engine runs".to_owned());
     }
     stepped?;
-    // The trouble was there: more than one wait.
+    // The trouble was there: the step waited more than once.
     assert!(events.iter().filter(|event| **event == Event::Wait).count() > 1);
     bench.step(20)?;
     bench.close()
@@ -232,7 +238,7 @@ fn early(mistake: Option<Mistake>, trouble: Trouble) -> Verdict {
 #[test]
 fn mistake_12_interrupt_taken_for_completion() {
     for interrupts in [1, 3] {
-        caught(Mistake::InterruptBelieved, "taken back while an engine runs", |mistake| {
+        assert_reported(Mistake::InterruptBelieved, "taken back while an engine runs", |mistake| {
             early(mistake, Trouble::Spurious(interrupts))
         });
     }
@@ -240,7 +246,7 @@ fn mistake_12_interrupt_taken_for_completion() {
 
 #[test]
 fn mistake_18_idle_senders_taken_for_the_end() {
-    caught(Mistake::IdleBelieved, "taken back while an engine runs", |mistake| {
+    assert_reported(Mistake::IdleBelieved, "taken back while an engine runs", |mistake| {
         early(mistake, Trouble::SendersIdle)
     });
 }

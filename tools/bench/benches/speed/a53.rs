@@ -1,6 +1,6 @@
-//! This file computes what packing a step takes of a Cortex-A53, on paper: nothing was measured on one.
+//! Estimates the time of packing a step on a Cortex-A53, on paper: nothing is measured on one.
 //!
-//! The instructions are counted on this machine; clock and bandwidth are published, see
+//! Instructions are counted on this machine; clock and bandwidth are published figures, see
 //! `docs/a53-cost.md`.
 
 use std::time::Duration;
@@ -16,10 +16,10 @@ use crate::{Options, Outcome};
 
 /// The APU's clock on the ZCU102, Hz.
 const CLOCK: f64 = 1.2e9;
-/// Instructions a clock: the core issues two at most, and in order.
+/// Instructions per clock: the core is in-order and issues at most two.
 const PER_CLOCK: [f64; 2] = [1.0, 2.0];
-/// Bytes a second that a memcpy of 8 MB delivers on A53 cores of another chip, by how many take part
-/// (TI SPRADG0A, AM62P, `bw_mem 8M bcopy`).
+/// Bandwidth in bytes per second of a memcpy of 8 MB on A53 cores of another chip, by the number of
+/// cores (TI SPRADG0A, AM62P, `bw_mem 8M bcopy`).
 const COPIED: [(u32, f64); 3] = [(1, 1956.71e6), (2, 3122.66e6), (4, 3605.80e6)];
 
 fn seconds(time: f64) -> Duration {

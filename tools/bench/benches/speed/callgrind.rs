@@ -1,5 +1,5 @@
-//! This file has valgrind count instructions, of the yardstick and of packing, and does alone what a script
-//! counts: what noise hides.
+//! Counts instructions of the yardstick and of packing with valgrind, free of the noise of times;
+//! and runs a single item for tools that count.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -16,7 +16,7 @@ use zynq_pgs::bench::CollisionPacker;
 
 use crate::{Options, Outcome};
 
-/// The functions that are counted, and the passes that they are about.
+/// The counted functions, and the passes that they solve.
 const COUNTED: [(&str, Passes); 4] = [
     ("bench::yardstick::Yardstick::solve", |parameters| {
         parameters.contact_iterations + parameters.friction_iterations
@@ -26,24 +26,24 @@ const COUNTED: [(&str, Passes); 4] = [
     ("bench::yardstick::passes::friction", |parameters| parameters.friction_iterations),
 ];
 
-/// Of the passes of a step, some.
+/// Selects a number of passes from a step's parameters.
 type Passes = fn(&StepParameters) -> u32;
 
-/// The scene, where no folder is given: large enough that its borders hardly count.
+/// The scene without a folder: so large that its borders hardly count.
 const GRID: &str = "10x10x10";
 
-/// What is done alone, to be counted.
+/// An item to run alone, for a tool that counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Only {
     /// Solve the step with the yardstick
     Yardstick,
     /// Pack its collisions, as they are given
     Pack,
-    /// Take it on the emulated board of a profile
+    /// Take the step on the emulated board of a profile
     Emulated,
 }
 
-/// Does it, and says how many collisions and passes there were.
+/// Runs the item, and reports the number of collisions and passes.
 pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), Box<dyn Error>> {
     match (only, profile) {
         (Only::Yardstick, None) => {
@@ -56,12 +56,11 @@ pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), 
             black_box(packer.pack(&step.bodies, &step.collisions, &step.shapes));
         }
         (Only::Emulated, Some(profile)) => {
-            let profile =
-                Profile::by_name(profile).ok_or("--profile: there is none of that name")?;
+            let profile = Profile::by_name(profile).ok_or("--profile: no profile has this name")?;
             let config = BoardConfig { profile, threads: 1, ..BoardConfig::default() };
             Emulated::new(step, config)?.take()?;
         }
-        _ => return Err("--profile belongs to --only emulated, which wants one".into()),
+        _ => return Err("--only emulated needs a --profile, and nothing else takes one".into()),
     }
     let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
     println!(
@@ -71,7 +70,7 @@ pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), 
     Ok(())
 }
 
-/// Whether valgrind is; says so if not.
+/// Whether valgrind is installed; reports if not.
 pub(crate) fn is_there(section: &str) -> bool {
     let there = Command::new("valgrind").arg("--version").output().is_ok();
     if !there {
@@ -106,7 +105,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     }))
 }
 
-/// Instructions in a function, the iterations of the step and its collisions.
+/// Instructions of a function, with the iterations of the step and its collisions.
 pub(crate) fn count(
     options: &Options,
     only: Only,
@@ -133,7 +132,7 @@ pub(crate) fn count(
     let mut parameters = StepParameters::default();
     (parameters.contact_iterations, parameters.friction_iterations) = (contact, friction);
     let collected = log.lines().find_map(|line| line.split_once("Collected :"));
-    let (_, collected) = collected.ok_or("callgrind does not say what it collected")?;
+    let (_, collected) = collected.ok_or("callgrind does not report its counts")?;
     let instructions: f64 = collected.trim().parse()?;
     if instructions == 0.0 {
         return Err(format!("callgrind has not seen {function}").into());

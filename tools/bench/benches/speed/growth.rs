@@ -1,4 +1,4 @@
-//! This file measures how the time of a step grows with the scene.
+//! Measures how the time of a step grows with the scene.
 
 use std::time::Duration;
 
@@ -12,11 +12,11 @@ use serde_json::{Value, json};
 
 use crate::{Options, Outcome};
 
-/// Steps of the piles before the one that is measured.
+/// Steps of a pile before the measured one.
 const STEPS: u32 = 3;
 
 /// Piles and the designs that carry them: the on-chip memory of `windowed` holds the live bodies
-/// only. The longest pile is no thicker across than the thesis', so that bodies live as long.
+/// only. The longest pile is no thicker across than the thesis', so that its bodies live as long.
 const PILES: [(&str, &Profile); 6] = [
     ("10x10x10", &FLOAT),
     ("20x20x20", &FLOAT),
@@ -26,7 +26,7 @@ const PILES: [(&str, &Profile); 6] = [
     ("100x25x40", &WINDOWED),
 ];
 
-/// Each design's piles are held against that of so many cubes.
+/// Cubes of the pile that each design's piles are compared with.
 const FROM: u32 = 20 * 20 * 20;
 
 struct Row {
@@ -72,7 +72,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
             wait: median(times),
         })
         .collect();
-    let growth = [grown(&rows, FLOAT.name)?, grown(&rows, WINDOWED.name)?];
+    let growth = [growth_ratio(&rows, FLOAT.name)?, growth_ratio(&rows, WINDOWED.name)?];
     if !options.common.json {
         println!("Time of a step by the size of the scene, beats to results");
         println!("  profile       cubes  collisions         ms  ns a collision");
@@ -114,8 +114,9 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     Ok(json!({ "piles": rows, "growth": growth }))
 }
 
-/// How many times as long a collision takes in a design's largest pile, and how large that is.
-fn grown(rows: &[Row], profile: &'static str) -> Result<(&'static str, u32, f64), String> {
+/// The ratio of the time per collision in a design's largest pile to that in its smallest, and the
+/// size of the largest.
+fn growth_ratio(rows: &[Row], profile: &'static str) -> Result<(&'static str, u32, f64), String> {
     let missing = || format!("a pile of {FROM} cubes, and a larger one, for {profile}");
     let of = || rows.iter().filter(|row| row.profile == profile);
     let from = of().find(|row| row.cubes == FROM).ok_or_else(missing)?;

@@ -6,10 +6,10 @@
 //! cargo bench --bench speed -- --section old --old /usr/local/bin/pgs
 //! ```
 //!
-//! What is measured is a step of the thesis' cubes, standing on the ground and stepped on the
-//! emulated board, or the step in a folder of arrays (`--input`). The board takes it in the order
-//! without hazards, and so does the yardstick: a sequential scalar solver, see `bench::yardstick`.
-//! Both give the same bits, or nothing is printed.
+//! The measured step is of the thesis' cubes, standing on the ground and stepped on the emulated
+//! board, or is in a folder of arrays (`--input`). The board takes it in the order without hazards,
+//! and so does the yardstick: a sequential scalar solver, see `bench::yardstick`. Both must give
+//! the same bits, or the benchmark prints no figures.
 
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
@@ -31,28 +31,28 @@ use bitstream_model::BoardConfig;
 use clap::{Parser, ValueEnum};
 use serde_json::{Map, Value, json};
 
-/// Holds the emulated board against a solver on the CPU.
+/// Compares the emulated board with a solver on the CPU.
 #[derive(Debug, Parser)]
 #[command(name = "cargo bench --bench speed --")]
 struct Options {
-    /// What to measure [default: all but `old`]
+    /// Section to measure [default: all but `old`]
     #[arg(long, value_enum)]
     section: Vec<Section>,
-    /// Measure the step in this folder of arrays, not a pile's
+    /// Take the step from this folder of arrays instead of a pile
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
     #[command(flatten)]
     pile: Pile,
-    /// An older `pgs`, to run the thesis' scene beside this one
+    /// An older `pgs`, which runs the thesis' scene beside this one
     #[arg(long, value_name = "BINARY")]
     old: Option<PathBuf>,
     /// Steps of each run of the thesis' scene
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     run_steps: u32,
-    /// Only do this: for a tool that counts.
+    /// Run this item only, for a tool that counts.
     #[arg(long, value_enum, hide = true)]
     only: Option<callgrind::Only>,
-    /// On the emulated board of this profile
+    /// Use the emulated board of this profile
     #[arg(long, requires = "only", hide = true)]
     profile: Option<String>,
     #[command(flatten)]
@@ -61,13 +61,13 @@ struct Options {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Section {
-    /// The time of a step beside the yardstick, and the driver's share of it
+    /// Time of a step beside the yardstick, and the driver's share of it
     Solver,
-    /// The time of a step in each design, the long way and as it is taken
+    /// Time of a step in each design, without short cuts and by default
     Profiles,
     /// Instructions of the yardstick, counted by valgrind
     Instructions,
-    /// What packing takes of a Cortex-A53, on paper (docs/a53-cost.md)
+    /// Cost of packing on a Cortex-A53, on paper (docs/a53-cost.md)
     A53,
     /// Time per collision from small scenes to large ones
     Growth,
@@ -93,7 +93,7 @@ impl Options {
     }
 }
 
-/// What JSON says of a section; its text is printed as it comes.
+/// The JSON of a section; its text is printed during the measurement.
 type Outcome = Result<Value, Box<dyn Error>>;
 
 /// Measures a section.

@@ -1,4 +1,4 @@
-//! This file runs `pgs` as a process: peak memory, and its time beside that of an older one.
+//! Runs `pgs` as a process: its peak memory, and its time beside that of an older one.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::{Options, Outcome};
 
-/// Builds this repository's `pgs`; where it is.
+/// Builds this repository's `pgs`; returns its path.
 fn build() -> Result<PathBuf, Box<dyn Error>> {
     let cargo = bench::variable("CARGO").unwrap_or_else(|| "cargo".into());
     let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.toml");
@@ -28,7 +28,7 @@ fn build() -> Result<PathBuf, Box<dyn Error>> {
     binaries.next_back().ok_or_else(|| "cargo does not say where pgs is".into())
 }
 
-/// Peak memory of a run of the thesis' scene, beside what it must hold.
+/// Peak memory of a run of the thesis' scene, beside the least that it must store.
 pub(crate) fn memory(options: &Options) -> Outcome {
     let steps = options.run_steps.to_string();
     let output = Command::new(build()?)
@@ -77,7 +77,7 @@ fn run(binary: &Path, steps: &str) -> Result<(Duration, String), Box<dyn Error>>
     Ok((time, digest.ok_or(format!("{name} prints no digest"))?.to_owned()))
 }
 
-/// Runs of the thesis' scene by an older `pgs` and by this one, in turn.
+/// Runs the thesis' scene with an older `pgs` and with this one, in turn.
 pub(crate) fn old(options: &Options) -> Outcome {
     let old = options.old.as_ref().ok_or("--section old takes --old BINARY")?;
     let new = build()?;

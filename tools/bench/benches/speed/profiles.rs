@@ -1,4 +1,4 @@
-//! This file measures a step on the emulated board of every design, the long way and as it is taken.
+//! Measures a step on the emulated board of every design, without short cuts and by default.
 
 use std::error::Error;
 use std::time::Duration;
@@ -12,7 +12,8 @@ use step_folder::digest;
 
 use crate::{Options, Outcome};
 
-/// Ways of taking a step, which give the same bits: threads, and short cuts or not.
+/// Ways of computing a step, with the same bits: the number of threads, and whether the board takes its
+/// short cuts.
 const WAYS: [(&str, usize, bool); 3] =
     [("the long way", 1, false), ("1 thread", 1, true), ("2 threads", 2, true)];
 
@@ -23,7 +24,7 @@ struct Row {
     digest: u64,
 }
 
-/// Runs of each, at most: the long way takes a second and more in sixteen bits.
+/// Most runs of each way: without short cuts, a step in sixteen bits takes a second and more.
 const RUNS_MAX: usize = 3;
 
 pub(crate) fn measure(options: &Options) -> Outcome {
@@ -51,7 +52,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     Ok(json!({ "step": step.name, "profiles": rows }))
 }
 
-/// The ways of one design in turn.
+/// Measures the ways of one design in turn.
 fn row(step: &Step, profile: &'static Profile, runs: usize) -> Result<Row, Box<dyn Error>> {
     let mut boards = Vec::new();
     for (_, threads, shortcuts) in WAYS {
@@ -59,7 +60,7 @@ fn row(step: &Step, profile: &'static Profile, runs: usize) -> Result<Row, Box<d
         boards.push(Emulated::new(step, config)?);
     }
     let mut times = [const { Vec::new() }; WAYS.len()];
-    // Once without looking, so that all memory is there.
+    // The first run is not measured: it allocates all memory.
     for run in 0..=runs {
         for (board, times) in boards.iter_mut().zip(&mut times) {
             let taken = board.take()?;

@@ -1,4 +1,4 @@
-//! This file holds a step of the emulated board against the yardstick, and the driver's own share.
+//! Compares a step of the emulated board with the yardstick, and measures the driver's share.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use step_folder::digest;
 
 use crate::{Options, Outcome};
 
-/// Builds of the emulated board that must give the same bits.
+/// Builds of the emulated board with the same bits.
 fn variants() -> [(&'static str, BoardConfig); 3] {
     let with = |threads, lanes| BoardConfig { threads, lanes, ..BoardConfig::default() };
     [
@@ -26,7 +26,7 @@ fn variants() -> [(&'static str, BoardConfig); 3] {
 struct Measured {
     name: &'static str,
     wait: Duration,
-    /// Outside packing, ordering and waiting.
+    /// Time outside packing, ordering and waiting.
     rest: Duration,
     validate: Duration,
     start: Duration,
@@ -90,7 +90,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     }
     let mut copy: Vec<Record> = Vec::new();
     let (mut stages, mut copies) = (Vec::new(), Vec::new());
-    // Once without looking, so that all memory is there.
+    // The first run is not measured: it allocates all memory.
     for run in 0..=options.common.runs() {
         let solved = yardstick.solve();
         let begin = Instant::now();
@@ -127,7 +127,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     Ok(document(&step, &measure, &boards, expected))
 }
 
-/// Nanoseconds for each collision of each of so many passes.
+/// Nanoseconds per collision and pass.
 fn each(time: Duration, collisions: usize, passes: u32) -> f64 {
     time.as_secs_f64() * 1e9 / (collisions as f64 * f64::from(passes))
 }

@@ -1,4 +1,4 @@
-//! This file moves a body by one time step: position first, then gravity.
+//! Moves a body by one time step: position first, then gravity.
 
 use zynq_pgs::{Pose, StepParameters};
 

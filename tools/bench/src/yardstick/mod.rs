@@ -1,12 +1,11 @@
-//! This folder is the yardstick: what a CPU takes for the same step, solved one collision after the
-//! other.
+//! The yardstick: a CPU solver for the same step, one collision after the other.
 //!
-//! A sequential solver in scalar f32, written from the formulae and from nothing else: records in
-//! the order in which they are solved, one array of bodies, no lanes, no threads. It is meant to be
-//! as good as such a loop is. What does not change during a step is computed once: effective masses,
-//! biases, lever arms of friction and its directions, and whether spin is damped. Velocities, mass
-//! and inertia of a body are one piece of memory, and so is what a pass needs of a collision. The
-//! moments are computed in every pass, because reading them back takes longer.
+//! It is sequential, in scalar f32, and written from the formulae alone: records in solving order,
+//! one array of bodies, no lanes, no threads. It is meant to be as fast as such a loop can be.
+//! Values that do not change during a step are computed once: effective masses, biases, the
+//! directions and lever arms of friction, and whether spin is damped. Velocities, mass and inertia
+//! of a body are adjacent in memory, and so is everything that a pass needs of a collision. Every
+//! pass computes the moments again, because loading them takes longer.
 //!
 //! Its bits are Bullet's: see the tests.
 //!
@@ -25,7 +24,7 @@ use zynq_pgs::{Body, Collision, Pose, Shape, StepParameters, Velocity};
 
 use rows::{ContactRows, FrictionRows};
 
-/// One collision as it comes: 112 bytes.
+/// One collision as input: 112 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(C)]
 pub struct Record {
@@ -58,14 +57,14 @@ impl Record {
         }
     }
 
-    /// The points that there are.
+    /// The used points.
     #[inline]
     fn used(&self) -> &[[f32; 4]] {
         &self.points[..index(self.count).min(4)]
     }
 }
 
-/// What a collision reads and writes of a body.
+/// The part of a body that a collision reads and writes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(C, align(16))]
 struct Moving {
@@ -75,13 +74,13 @@ struct Moving {
     inverse_inertia: [f32; 3],
 }
 
-/// An index as memory takes it.
+/// Converts an index for memory.
 #[inline]
 const fn index(number: u32) -> usize {
     number as usize
 }
 
-/// Where the time of a step went.
+/// The time of a step by phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stages {
     /// Making constraint rows.
@@ -95,20 +94,20 @@ pub struct Stages {
 }
 
 impl Stages {
-    /// All passes.
+    /// Both kinds of passes.
     #[must_use]
     pub fn passes(&self) -> Duration {
         self.contact + self.friction
     }
 
-    /// All of the step.
+    /// The whole step.
     #[must_use]
     pub fn total(&self) -> Duration {
         self.rows + self.passes() + self.integration
     }
 }
 
-/// A solver with one step to solve, as often as wanted.
+/// A solver for one step, which can be solved repeatedly.
 #[derive(Debug)]
 pub struct Yardstick {
     parameters: StepParameters,
@@ -122,10 +121,11 @@ pub struct Yardstick {
 }
 
 impl Yardstick {
-    /// For a step whose collisions are solved in the order given.
+    /// Takes a step whose collisions are solved in the order given.
     ///
     /// # Panics
-    /// If a collision names a body, or a body a shape, that is not there.
+    ///
+    /// A collision names a missing body, or a body a missing shape.
     pub fn new<'a>(
         shapes: &[Shape],
         bodies: &[Body],
@@ -157,7 +157,7 @@ impl Yardstick {
         &self.records
     }
 
-    /// Solves the step from its start; the times do not include going back there.
+    /// Solves the step from its start; the times do not include the return to the start.
     ///
     /// Never inlined: tools that count find it by its name.
     #[inline(never)]
@@ -209,7 +209,7 @@ impl Yardstick {
             .extend(self.records.iter().map(|record| FrictionRows::new(record, pair(record))));
     }
 
-    /// The bodies as the last [`solve`](Self::solve) left them; none before.
+    /// The bodies after the last [`solve`](Self::solve); none before the first.
     #[must_use]
     pub fn bodies(&self) -> Vec<Body> {
         let states = self.poses.iter().zip(&self.bodies).zip(&self.shapes);

@@ -1,10 +1,10 @@
-//! This file solves collisions one after the other, once a pass.
+//! Solves the collisions one after the other, in passes.
 
 use super::rows::{ContactRows, FrictionRows};
 use super::vector::{Vec3, add, cross, dot, negate, scale, subtract, times};
 use super::{Moving, index};
 
-/// What a friction pass leaves of the spin about the normal, taken from one.
+/// 1 minus the factor by which a friction pass damps the spin about the normal.
 const SPIN_DAMPING: f32 = 0.1;
 
 /// A direction and the moments about it.
@@ -22,7 +22,7 @@ impl Row {
         Self { direction, moment_a: cross(arm_a, direction), moment_b }
     }
 
-    /// Relative velocity along it.
+    /// The relative velocity along it.
     #[inline]
     fn speed(&self, a: &Moving, b: &Moving) -> f32 {
         let of_a = dot(self.direction, a.linear) + dot(self.moment_a, a.angular);
@@ -74,7 +74,7 @@ pub(super) fn contact(rows: &mut [ContactRows], bodies: &mut [Moving]) {
     }
 }
 
-/// What friction may do at most, from the normal impulses of the contact passes.
+/// The limit of friction, from the normal impulses of the contact passes.
 #[inline(never)]
 pub(super) fn limits(friction: f32, contacts: &[ContactRows], rows: &mut [FrictionRows]) {
     for (contact, rows) in contacts.iter().zip(rows) {

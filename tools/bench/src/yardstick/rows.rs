@@ -1,14 +1,13 @@
-//! This file makes constraint rows of records: once a step, because positions, masses and normals do
-//! not change during it.
+//! Makes constraint rows of records: once a step, because positions, masses and normals do not
+//! change during it.
 
 use super::vector::{Vec3, add, cross, dot, negate, scale, subtract, tangents, times, unit};
 use super::{Moving, Record};
 
-/// Cosine above which two bodies lie one upon the other, so that their spin about the normal is
-/// damped.
+/// Cosine above which one body lies upon the other, so that their spin about the normal is damped.
 const SPIN_COSINE: f32 = 0.95;
 
-/// What the contact passes need of a collision.
+/// The contact passes' data of a collision.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C)]
 pub(super) struct ContactRows {
@@ -21,24 +20,24 @@ pub(super) struct ContactRows {
     pub(super) points: [Vec3; 4],
     /// Effective masses, negative.
     pub(super) jacobians: [f32; 4],
-    /// Speeds that would take away the penetration, m/s.
+    /// Speeds that remove the penetration, m/s.
     pub(super) biases: [f32; 4],
     /// Accumulated impulses, N s.
     pub(super) impulses: [f32; 4],
 }
 
-/// What the friction passes need of a collision.
+/// The friction passes' data of a collision.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C)]
 pub(super) struct FrictionRows {
     /// The normal from A to B.
     pub(super) normal: Vec3,
     pub(super) body_a: u32,
-    /// From the body to the centre of the points.
+    /// From the body's centre to the centre of the points.
     pub(super) arm_a: Vec3,
     pub(super) body_b: u32,
     pub(super) arm_b: Vec3,
-    /// Largest impulse, N s; known after the contact passes.
+    /// Largest impulse, N s; set after the contact passes.
     pub(super) limit: f32,
     pub(super) directions: [Vec3; 2],
     pub(super) jacobians: [f32; 2],
@@ -54,7 +53,8 @@ fn jacobian(a: &Moving, b: &Moving, moment_a: Vec3, moment_b: Vec3) -> f32 {
 }
 
 impl ContactRows {
-    /// Of a record; `drift` in m, `coefficient` the share taken away, `per_second` 1 / time step.
+    /// From a record; `drift` in m, `coefficient` the share of penetration to remove, `per_second`
+    /// 1 / time step.
     pub(super) fn new(
         record: &Record,
         [a, b]: [&Moving; 2],

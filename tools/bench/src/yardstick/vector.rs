@@ -1,4 +1,4 @@
-//! This file is the vector arithmetic of the formulae, each sum in their order.
+//! Vector arithmetic of the formulae, with every sum in their order.
 
 /// Three components.
 pub(super) type Vec3 = [f32; 3];
@@ -39,13 +39,13 @@ pub(super) fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Of length one.
+/// The vector scaled to length one.
 #[inline]
 pub(super) fn unit(a: Vec3) -> Vec3 {
     scale(a, 1.0 / dot(a, a).sqrt())
 }
 
-/// Two unit vectors across the unit vector `n`.
+/// Two unit vectors, orthogonal to the unit vector `n` and to each other.
 #[inline]
 pub(super) fn tangents(n: Vec3) -> [Vec3; 2] {
     // cos 45 degrees

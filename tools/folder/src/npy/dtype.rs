@@ -1,9 +1,9 @@
-//! Says how to make the wanted elements of an array whose elements are of another type.
+//! Advises how to convert an array whose elements have another type.
 
-/// The type of Python objects, which a file holds pickled.
+/// The type of Python objects, which a file stores pickled.
 pub(super) const OBJECT: &str = "|O";
 
-/// What to save in place of an array of `found`, as a header names it.
+/// The expression that converts an array of type `found`, as a header names it.
 pub(super) fn advice(found: &str, expected: &str) -> String {
     let convert = format!("save a.astype({expected:?})");
     if found.starts_with('[') {

@@ -1,13 +1,14 @@
-//! Tells what a file without the magic number of `.npy` is.
+//! Recognises files without the magic number of `.npy`.
 
 use super::Problem;
 
-/// Bytes of a file that are looked at.
+/// Bytes at the beginning of a file that decide.
 pub(super) const LOOKED_AT: usize = 10;
 
 const SAVE: &str = "write the array with numpy.save";
 
-/// What begins with these bytes, as many of the first [`LOOKED_AT`] as there are.
+/// The format that begins with these bytes, which are the first [`LOOKED_AT`] or all of a shorter
+/// file.
 pub(super) fn problem(begin: &[u8]) -> Problem {
     let (found, next) = match begin {
         [] => ("an empty file", SAVE),

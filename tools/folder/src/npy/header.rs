@@ -1,4 +1,4 @@
-//! Reads the Python dictionary that the header of a `.npy` file is.
+//! Parses the header of a `.npy` file, a Python dictionary.
 
 use super::Problem;
 
@@ -8,14 +8,14 @@ const DIMENSIONS_MAX: usize = 8;
 /// The three entries of a header.
 #[derive(Debug)]
 pub(super) struct Header {
-    /// The type of the elements; the list of the fields, as it is written, if they are records.
+    /// The type of the elements; for records, the list of fields as written.
     pub(super) descr: String,
     pub(super) fortran_order: bool,
     pub(super) shape: Vec<usize>,
 }
 
 impl Header {
-    /// Parses the Python dictionary that a header is.
+    /// Parses a header.
     pub(super) fn parse(bytes: &[u8]) -> Result<Self, Problem> {
         let text = std::str::from_utf8(bytes).map_err(|_| Problem::Header("text"))?;
         let mut scan = Scanner(text);
@@ -46,7 +46,7 @@ impl Header {
     }
 }
 
-/// What is left of the text.
+/// The rest of the text.
 struct Scanner<'a>(&'a str);
 
 impl<'a> Scanner<'a> {
@@ -74,12 +74,12 @@ impl<'a> Scanner<'a> {
         Ok(string)
     }
 
-    /// The name of a type, or a list of fields as it is written.
+    /// The name of a type, or a list of fields as written.
     fn descr(&mut self) -> Result<&'a str, Problem> {
         if self.0.trim_start().starts_with('[') { self.list() } else { self.string() }
     }
 
-    /// A list up to the bracket that closes it; brackets in quotes do not count.
+    /// A list up to its closing bracket; brackets in quotes do not count.
     fn list(&mut self) -> Result<&'a str, Problem> {
         let text = self.0.trim_start();
         let (mut depth, mut quote) = (0_usize, None);

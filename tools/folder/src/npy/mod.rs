@@ -1,18 +1,18 @@
 //! Reads and writes `.npy` arrays of f32 and u32.
 //!
-//! Little-endian, C order. Written is format 1.0, what `numpy.save` makes of such arrays; 2.0 and 3.0 are
-//! read as well, whose header length has four bytes.
+//! Little-endian, C order. It writes format 1.0, as `numpy.save` does for such arrays; it also
+//! reads 2.0 and 3.0, whose header length has four bytes.
 //!
 //! ```text
 //! 0        6     8        10              10 + header length
 //! \x93NUMPY 1 0  u16 LE   {'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }...\n  data
 //! ```
 //!
-//! A file is untrusted: the shape in its header is held against the expected shape, against what any
-//! board takes and against the file's length before memory is taken for it.
+//! A file is untrusted: the shape in its header is compared with the expected shape, with the limit
+//! of any board and with the file's length before memory is allocated for it.
 //!
-//! Written here because the crate `npyz` brings a parser generator and a type system for records,
-//! of which two element types are needed.
+//! The crate `npyz` would bring a parser generator and a type system for records; a step needs two
+//! element types only.
 //!
 //! Source: NEP 1, "A Simple File Format for `NumPy` Arrays".
 
@@ -37,11 +37,11 @@ use self::header::Header;
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Magic and version.
 const VERSION_END: usize = 8;
-/// Bytes before the header of what is written: magic, version, header length.
+/// Bytes before the header of a written file: magic, version, header length.
 const PREAMBLE: usize = 10;
 /// The data begins at a multiple of this.
 const ALIGNMENT: usize = 64;
-/// A longer header is that of no array here.
+/// No array of a step has a longer header.
 const HEADER_MAX: u32 = u16::MAX as u32;
 
 /// Bytes of an element.
@@ -54,9 +54,9 @@ pub const ROWS_MAX: usize = Window::COLLISIONS_MAX as usize;
 pub trait Element: Copy {
     /// The name in the header.
     const DESCR: &'static str;
-    /// The element of those bytes.
+    /// Decodes an element.
     fn from_le(bytes: [u8; 4]) -> Self;
-    /// The bytes of the element.
+    /// Encodes an element.
     fn to_le(self) -> [u8; 4];
 }
 
@@ -80,10 +80,10 @@ impl Element for u32 {
     }
 }
 
-/// A shape, written as `NumPy` writes it; a dimension that may have any length is `*`.
+/// A shape in `NumPy`'s notation; `*` is a dimension of any length.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Dimensions(
-    /// The length of each; `None` is any.
+    /// The length of each dimension; `None` is any.
     pub Vec<Option<usize>>,
 );
 
@@ -97,7 +97,8 @@ impl Dimensions {
                 .all(|(expected, found)| expected.is_none_or(|e| e == *found))
     }
 
-    /// Whether an array of no rows fits. `NumPy` gives it the shape (0,) where no row says how long it is.
+    /// Whether an array without rows fits. `NumPy` gives it the shape (0,), because no row tells
+    /// its length.
     fn may_be_empty(&self) -> bool {
         matches!(self.0.first(), Some(None | Some(0)))
     }
@@ -128,16 +129,18 @@ fn exactly(shape: &[usize]) -> Dimensions {
 /// Returns the length of its first dimension and its elements in C order.
 ///
 /// # Errors
-/// [`NpyError`]: no such file, not an array, or another one than expected.
+///
+/// [`NpyError`]: the file is missing, is no array, or is another array than expected.
 pub fn read<T: Element>(path: &Path, expected: &Dimensions) -> Result<(usize, Vec<T>), NpyError> {
     read_with(path, expected, open)
 }
 
-/// Reads an array as [`read`] does, from what `open` finds under its name: the content, header
-/// included, and its length in bytes.
+/// Reads an array as [`read`] does, from the stream that `open` returns for its name, with the
+/// length in bytes.
 ///
 /// # Errors
-/// As for [`read`], and what `open` returns.
+///
+/// As for [`read`], and the errors of `open`.
 pub fn read_with<T: Element, S: Read>(
     path: &Path,
     expected: &Dimensions,
@@ -168,9 +171,9 @@ pub fn read_row<T: Element>(
         .map_err(|problem| NpyError { path: path.to_path_buf(), problem })
 }
 
-/// Opens a regular file; with its length in bytes.
+/// Opens a regular file; returns it with its length in bytes.
 pub(crate) fn open(path: &Path) -> Result<(File, u64), Problem> {
-    // Asked for before opening, because opening a named pipe would wait for a writer.
+    // Checked before opening, because opening a named pipe would wait for a writer.
     let metadata = std::fs::metadata(path).map_err(Problem::Read)?;
     if !metadata.is_file() {
         return Err(Problem::NotAFile(kind(&metadata)));
@@ -179,7 +182,7 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64), Problem> {
     Ok((file, metadata.len()))
 }
 
-/// What there is in place of a regular file.
+/// The kind of a file that is not regular.
 pub(crate) fn kind(metadata: &Metadata) -> &'static str {
     let kind = metadata.file_type();
     if kind.is_dir() {
@@ -195,7 +198,7 @@ pub(crate) fn kind(metadata: &Metadata) -> &'static str {
     }
 }
 
-/// Reads an array of `length` bytes, header included, from `source`.
+/// Decodes an array of `length` bytes, header included, from `source`.
 fn decode<T: Element>(
     mut source: impl Read,
     length: u64,
@@ -205,7 +208,7 @@ fn decode<T: Element>(
     Ok((array.rows, elements_of(source, array.elements)?))
 }
 
-/// The next elements of a file, whose length has been looked at.
+/// Reads the next elements of a file, whose length is checked.
 fn elements_of<T: Element>(mut source: impl Read, count: usize) -> Result<Vec<T>, Problem> {
     let mut data = vec![0; count * ELEMENT_BYTES];
     source.read_exact(&mut data).map_err(Problem::Read)?;
@@ -213,17 +216,17 @@ fn elements_of<T: Element>(mut source: impl Read, count: usize) -> Result<Vec<T>
     Ok(elements.map(|bytes| T::from_le([bytes[0], bytes[1], bytes[2], bytes[3]])).collect())
 }
 
-/// An array whose header was read, and found to be what is expected.
+/// An array whose header was read and accepted.
 #[derive(Debug, Clone, Copy)]
 struct Array {
     /// The length of its first dimension.
     rows: usize,
-    /// How many there are; all of them are in the file.
+    /// The number of elements; the file has all of them.
     elements: usize,
 }
 
 impl Array {
-    /// Reads the header of a file of `length` bytes, up to where the data begins.
+    /// Reads the header of a file of `length` bytes; `source` is then at the beginning of the data.
     fn begin<T: Element>(
         source: &mut impl Read,
         length: u64,
@@ -232,7 +235,7 @@ impl Array {
         let (header, begin) = read_header(source)?;
         let Header { descr, fortran_order, shape } = header;
         let found = length.saturating_sub(begin);
-        // In an array of nothing nothing has a type; but objects are pickled even if there are none.
+        // The type of an array without elements does not matter; but objects are pickled even then.
         let empty = shape.contains(&0) && descr != dtype::OBJECT;
         if !empty && descr != T::DESCR {
             return Err(Problem::Type { expected: T::DESCR, found: descr });
@@ -245,7 +248,7 @@ impl Array {
         if rows > ROWS_MAX {
             return Err(Problem::TooManyRows { found: exactly(&shape) });
         }
-        // The order of one row or column is both.
+        // One row or one column has the same layout in both orders.
         if fortran_order && !empty && shape.len() > 1 {
             return Err(Problem::FortranOrder);
         }
@@ -263,7 +266,7 @@ impl Array {
     }
 }
 
-/// Reads a header, and where the data begins.
+/// Reads a header and the offset of the data.
 fn read_header(source: &mut impl Read) -> Result<(Header, u64), Problem> {
     let mut begin = [0; LOOKED_AT];
     let read = read_up_to(source, &mut begin)?;
@@ -298,7 +301,7 @@ fn read_header(source: &mut impl Read) -> Result<(Header, u64), Problem> {
     Ok((Header::parse(&header)?, preamble as u64 + u64::from(length)))
 }
 
-/// Reads until `into` is full or there is no more; how many bytes there were.
+/// Reads until `into` is full or the source ends; returns the number of bytes.
 fn read_up_to(source: &mut impl Read, into: &mut [u8]) -> Result<usize, Problem> {
     let mut read = 0;
     while read < into.len() {
@@ -312,10 +315,11 @@ fn read_up_to(source: &mut impl Read, into: &mut [u8]) -> Result<usize, Problem>
     Ok(read)
 }
 
-/// Writes an array into a file that is open.
+/// Writes an array into an open file.
 ///
 /// # Errors
-/// Whatever keeps the file from being written.
+///
+/// The file cannot be written.
 pub fn encode<T: Element>(
     file: &mut impl Write,
     shape: &[usize],

@@ -1,4 +1,4 @@
-//! What is wrong with a file of a folder, and what to do about it.
+//! The errors of a file in a folder, with the next step.
 
 use std::io;
 use std::path::PathBuf;
@@ -18,7 +18,7 @@ pub enum Problem {
     /// The system refuses to write it.
     #[error("cannot be written")]
     Write(#[source] io::Error),
-    /// A folder, a pipe, a device.
+    /// A folder, a pipe or a device in place of a file.
     #[error("expected a regular file, found {0}")]
     NotAFile(&'static str),
     /// A file, or nothing, in place of a folder.
@@ -27,12 +27,12 @@ pub enum Problem {
     /// Another format.
     #[error("expected a .npy file, found {found}: {next}")]
     NotNpy {
-        /// What the file is.
+        /// The format of the file.
         found: &'static str,
-        /// How to make an array of it.
+        /// How to convert it to an array.
         next: &'static str,
     },
-    /// A version of the format that nobody has described yet.
+    /// An unknown version of the format.
     #[error(
         "found version {major}.{minor} of the .npy format, known are 1.0, 2.0 and 3.0: write the \
          array anew with numpy.save"
@@ -43,7 +43,7 @@ pub enum Problem {
         /// The second number.
         minor: u8,
     },
-    /// A header that says something else than it should.
+    /// A malformed header.
     #[error("malformed .npy header, expected {0}: write the array anew with numpy.save")]
     Header(&'static str),
     /// Elements of another type.
@@ -52,20 +52,20 @@ pub enum Problem {
         dtype::advice(found, expected)
     )]
     Type {
-        /// The type, as `NumPy` names it.
+        /// The expected type, in `NumPy`'s notation.
         expected: &'static str,
-        /// What the header names.
+        /// The type in the header.
         found: String,
     },
-    /// Columns one after the other.
+    /// Fortran order: one column after the other.
     #[error("expected C order, found Fortran order: save numpy.ascontiguousarray(a)")]
     FortranOrder,
-    /// Another number of dimensions, or of other lengths.
+    /// A wrong number of dimensions, or a wrong length.
     #[error("expected shape {expected}, found {found}")]
     Shape {
         /// The shape that fits.
         expected: Dimensions,
-        /// That of the header.
+        /// The shape in the header.
         found: Dimensions,
     },
     /// More rows than any board takes.
@@ -75,7 +75,7 @@ pub enum Problem {
         limit = ROWS_MAX
     )]
     TooManyRows {
-        /// That of the header.
+        /// The shape in the header.
         found: Dimensions,
     },
     /// A file shorter than its shape.
@@ -85,9 +85,9 @@ pub enum Problem {
         missing = expected - u128::from(*found)
     )]
     TooShort {
-        /// That of the header.
+        /// The shape in the header.
         shape: Dimensions,
-        /// Bytes of data of that shape.
+        /// Bytes of data for this shape.
         expected: u128,
         /// Bytes of data in the file.
         found: u64,
@@ -99,22 +99,22 @@ pub enum Problem {
         extra = u128::from(*found) - expected
     )]
     TooLong {
-        /// That of the header.
+        /// The shape in the header.
         shape: Dimensions,
-        /// Bytes of data of that shape.
+        /// Bytes of data for this shape.
         expected: u128,
         /// Bytes of data in the file.
         found: u64,
     },
 }
 
-/// A file that cannot be taken, and why.
+/// A refused file, with the reason.
 #[derive(Debug, Error)]
 #[error("{}", path.display())]
 pub struct NpyError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The reason.
     #[source]
     pub problem: Problem,
 }

@@ -1,4 +1,4 @@
-//! What `.npy` files are read as, and how they are refused.
+//! Reading `.npy` files, and refusing them.
 
 use super::*;
 use proptest::prelude::*;
@@ -75,7 +75,7 @@ fn a_huge_shape_is_refused_before_memory_is_taken() {
     let most = header("'<f4'", "(1048576, 3)");
     let problem = decoded::<f32>(&with_header(&most, &[0; 12]), &rows(3));
     assert!(matches!(problem, Err(Problem::TooShort { found: 12, .. })), "{problem:?}");
-    // A product beyond 128 bits, where the caller expects that much.
+    // A product beyond 128 bits, where the caller expects this length.
     let huge = usize::MAX;
     let expected = Dimensions(vec![None, Some(huge), Some(huge), Some(huge)]);
     let shape = header("'<f4'", &format!("(1, {huge}, {huge}, {huge})"));
@@ -161,7 +161,7 @@ fn later_versions_are_read_and_unknown_ones_named() {
     }
     let problem = decoded::<f32>(&versioned([4, 0], length), &rows(3)).expect_err("unknown");
     assert!(problem.to_string().starts_with("found version 4.0 of the .npy format"));
-    // Nothing is taken for a header of four gigabytes.
+    // No memory is allocated for a header of four gigabytes.
     let problem = decoded::<f32>(&versioned([2, 0], [0xFF; 4]), &rows(3)).expect_err("long");
     assert!(matches!(problem, Problem::Header(_)), "{problem}");
 }
@@ -177,7 +177,7 @@ fn one_row_is_read_and_no_other() {
         let found: Vec<f32> = read_row(&path, &expected, row).expect("a row");
         assert_eq!(bits(&found), bits(&numbers[4 * row..][..4]));
     }
-    // The file is as long as it says, and nearly all of it a hole.
+    // The file is as long as its header claims, and nearly all of it is a hole.
     let header = header("'<f4'", "(255, 1048576, 6)");
     let sparse = std::fs::File::create(&path).expect("a file");
     let begin = with_header(&header, &[]);

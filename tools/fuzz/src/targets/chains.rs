@@ -1,5 +1,5 @@
-//! This file lets channels run on random descriptors, or on random direct transfers, in memory that
-//! watches; now and then beside a step that sends results.
+//! Runs channels on random descriptors, or on random direct transfers, in memory that checks every
+//! access; now and then beside a step that sends results.
 
 use bitstream_model::interface::axi_dma::{
     ADDRESS, ADDRESS_MSB, CURDESC, CURDESC_MSB, DMACR, LENGTH, TAILDESC, TAILDESC_MSB,
@@ -17,14 +17,14 @@ use crate::host::{BOTH, Host};
 use crate::input::Input;
 use crate::tally::Tally;
 
-/// Where the memory lies: on both sides of 4 GiB.
+/// Base addresses of the memory, below and above 4 GiB.
 const BASES: [u64; 2] = [0x4000_0000, 0x8_0000_0000];
-/// Bytes of each stretch; the middle half is granted.
+/// Bytes of each memory; the middle half is granted.
 const STRETCH: u64 = 4096;
 const GRANTED: u64 = STRETCH / 2;
-/// Descriptors of a chain, at most.
+/// Most descriptors of a chain.
 const CHAIN_MAX: u32 = 6;
-/// Beats of a descriptor, at most; mostly.
+/// Usual maximum of a descriptor's beats.
 const BEATS_MAX: u32 = 24;
 
 #[derive(Debug)]
@@ -71,7 +71,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
 }
 
 impl Scene<'_> {
-    /// Starts a step of falling bodies, whatever the streams will bring it.
+    /// Starts a step of falling bodies, whatever the streams bring.
     fn start_step(&mut self) {
         let host = &self.host;
         host.reset_all();
@@ -81,13 +81,13 @@ impl Scene<'_> {
         host.set_control(control::AP_CTRL, 1);
     }
 
-    /// An address, mostly granted and a multiple of `step`.
-    fn place(&mut self, step: u64) -> u64 {
+    /// An address, mostly in a grant and a multiple of `step`.
+    fn address_in_grant(&mut self, step: u64) -> u64 {
         let base = self.input.pick(&BASES);
         let inside = GRANTED / step;
         let offset = u64::from(self.input.short()) % inside * step;
         match self.input.below(32) {
-            // Before and behind what is granted.
+            // Before and behind the grant.
             0 => base + offset / 2,
             1 => base + STRETCH / 4 + GRANTED - step + offset / 64,
             2 => base + STRETCH / 4 + offset + u64::from(self.input.below(64)),
@@ -106,13 +106,13 @@ impl Scene<'_> {
 
     /// Writes a chain, runs the channel on it and moves the tail.
     fn chain(&mut self, core: usize, direction: Direction) {
-        let first = self.place(BYTES as u64);
+        let first = self.address_in_grant(BYTES as u64);
         let slots = 1 + self.input.below(CHAIN_MAX);
         let (mut at, mut tail) = (first, first);
         for slot in 0..slots {
             let next = match self.input.below(16) {
-                0 => self.place(BYTES as u64),
-                // On itself, and back to the first.
+                0 => self.address_in_grant(BYTES as u64),
+                // To itself, and back to the first.
                 1 => at,
                 2 => first,
                 _ => at.wrapping_add(BYTES as u64),
@@ -124,7 +124,7 @@ impl Scene<'_> {
                     (if sof { SOF } else { 0 }) | (if eof { EOF } else { 0 })
                 }
             };
-            let buffer = self.place(16);
+            let buffer = self.address_in_grant(16);
             let control = self.length() | flags;
             let status = if self.input.one_in(16) { self.input.word() } else { 0 };
             self.write_descriptor(at, next, buffer, control, status);
@@ -132,7 +132,7 @@ impl Scene<'_> {
             at = next;
         }
         if self.input.one_in(16) {
-            tail = self.place(BYTES as u64);
+            tail = self.address_in_grant(BYTES as u64);
         }
         let running = self.input.one_in(3);
         let host = &self.host;
@@ -176,10 +176,10 @@ impl Scene<'_> {
         }
     }
 
-    /// A direct transfer. One that still runs goes on from the new address, which is written in two
-    /// halves, for its own length.
+    /// Starts a direct transfer. A running one goes on from the new address, which is written in
+    /// two halves, with its own length.
     fn transfer(&mut self, core: usize, direction: Direction) {
-        let (address, length) = (self.place(16), self.length());
+        let (address, length) = (self.address_in_grant(16), self.length());
         let [low, high] = halves(address);
         self.highs.push(address >> 32 << 32);
         self.longest = self.longest.max(length);

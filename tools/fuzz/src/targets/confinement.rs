@@ -1,4 +1,4 @@
-//! This file takes random steps of the driver on a board that checks every access.
+//! Takes random steps of the driver on a board that checks every access.
 
 use bitstream_model::EmulatedBoard;
 use zynq_pgs::{
@@ -7,20 +7,20 @@ use zynq_pgs::{
 };
 
 use super::layout::{SeparateBodies, SeparateCollisions, StridedBodies, StridedCollisions};
-use super::scenes::{Scene, Spoilt, bits, parameters};
+use super::scenes::{InvalidValues, Scene, bits, parameters};
 use crate::boards;
 use crate::input::Input;
 use crate::tally::Tally;
 
-/// Steps of one execution, at most.
+/// Most steps of one execution.
 const STEPS_MAX: u32 = 24;
 
-/// How bodies and collisions are kept.
+/// The storage of bodies and collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Layout {
     Structures,
     Separate,
-    /// Records with so many words between them.
+    /// Records with this many words between them.
     Strided(usize),
 }
 
@@ -39,10 +39,10 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
         }
         if number == 0 || input.one_in(4) {
             let most = if input.one_in(64) { 40 } else { 8 };
-            scene = Scene::any(&mut input, most, most, Spoilt::Seldom);
+            scene = Scene::any(&mut input, most, most, InvalidValues::Sometimes);
             if accelerator.set_shapes(&scene.shapes).is_err() {
                 tally.refused += 1;
-                // Isotropic, whatever the board.
+                // Isotropic, which every board takes.
                 for shape in &mut scene.shapes {
                     shape.inverse_inertia = [shape.inverse_inertia[0]; 3];
                 }
@@ -58,7 +58,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     tally
 }
 
-/// A step; now and then the same one in another layout.
+/// Takes a step; sometimes also the same step in another layout.
 fn step(
     input: &mut Input<'_>,
     accelerator: &mut Accelerator,
@@ -66,7 +66,7 @@ fn step(
     tally: &mut Tally,
 ) {
     let passes = if input.one_in(64) { 12 } else { 3 };
-    let parameters = parameters(input, passes, Spoilt::Seldom);
+    let parameters = parameters(input, passes, InvalidValues::Sometimes);
     let first = layout(input);
     let again = input.one_in(4).then(|| layout(input));
     let (bodies, ended) = step_in(first, accelerator, scene, &parameters);
@@ -96,7 +96,7 @@ fn step(
     }
 }
 
-/// Nothing is wrong with the board: a step fails by its input alone.
+/// A sound board refuses a step by its input alone.
 fn check_refusal(error: &Error) {
     let by_input = match error {
         Error::Input(_) => true,

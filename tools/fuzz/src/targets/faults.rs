@@ -1,5 +1,5 @@
-//! This file has a board fail while the driver takes steps: every step ends in bounded time, with the
-//! bits of an undisturbed one or with an error that has changed nothing, and the next one works.
+//! Injects faults while the driver takes steps: every step ends in bounded time, with the bits of a
+//! step without faults or with an error that has changed nothing, and the next step works.
 
 use std::time::Duration;
 
@@ -8,19 +8,19 @@ use bitstream_model::{
 };
 use zynq_pgs::{Accelerator, BoardChoice, Body, Error, OpenOptions, StepParameters};
 
-use super::scenes::{Scene, Spoilt, bits, parameters};
+use super::scenes::{InvalidValues, Scene, bits, parameters};
 use crate::boards;
 use crate::input::Input;
 use crate::tally::Tally;
 
-/// What a step of these may take on the accelerator.
+/// Time limit of these steps on the accelerator.
 const DEADLINE: Duration = Duration::from_millis(5);
-/// What the driver may take beyond it, to stop and reset everything.
+/// Time that the driver may take beyond it, to stop and reset everything.
 const RECOVERY: Duration = Duration::from_millis(150);
 /// Steps with faults.
 const STEPS: u32 = 3;
 
-/// Pieces of a line that says a plan, in the right and in the wrong place.
+/// Fragments of a line with a plan, in the right and in the wrong place.
 const PIECES: [&str; 24] = [
     "dma-dec-err",
     "stall",
@@ -55,7 +55,7 @@ struct Run {
     accelerator: Accelerator,
     scene: Scene,
     parameters: StepParameters,
-    /// What the step gives.
+    /// The result of the step without faults.
     expected: Vec<u32>,
     tally: Tally,
 }
@@ -73,7 +73,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     let plan = if input.one_in(8) {
         open_faulty(&mut input, &board, &config)
     } else if let Some(mut run) = Run::new(&mut input, &board) {
-        let plan = run.go(&mut input, &config);
+        let plan = run.take_steps(&mut input, &config);
         tally = run.tally;
         plan
     } else {
@@ -81,8 +81,8 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
         FaultPlan::default()
     };
     for violation in board.violations() {
-        // A fault may halt a channel behind the driver's back. What must never be is an access
-        // outside what was granted.
+        // A fault may halt a channel without the driver. An access outside the grants must never
+        // happen.
         let behind_its_back = matches!(violation.kind, ViolationKind::DoorbellWhileHalted { .. });
         assert!(behind_its_back, "{plan}: {violation}");
     }
@@ -92,7 +92,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     tally
 }
 
-/// Whatever a line says, it is a plan or refused; a plan is read as it was written.
+/// Any line is a plan or is refused; a plan is read back as written.
 fn read_line(input: &mut Input<'_>) {
     let mut line = String::new();
     for _ in 0..input.below(12) {
@@ -124,7 +124,7 @@ fn plan(input: &mut Input<'_>, config: &BoardConfig) -> FaultPlan {
             fault.times = 1 + input.below(3);
         }
         if let FaultKind::Corrupt { mask } = &mut fault.kind {
-            // Never none of the bits.
+            // At least one bit.
             *mask = input.word() | 1 << input.below(32);
         }
     }
@@ -137,7 +137,7 @@ fn open(port: &CpuPort) -> Result<Accelerator, Error> {
     Accelerator::open(OpenOptions { board, ..OpenOptions::default() })
 }
 
-/// Opens a board that fails meanwhile: it opens or says why not, in bounded time.
+/// Opens a board with faults: it opens or reports why not, in bounded time.
 fn open_faulty(input: &mut Input<'_>, board: &EmulatedBoard, config: &BoardConfig) -> FaultPlan {
     let port = board.cpu_port();
     let plan = plan(input, config);
@@ -151,14 +151,15 @@ fn open_faulty(input: &mut Input<'_>, board: &EmulatedBoard, config: &BoardConfi
 }
 
 impl Run {
-    /// A board, and a step on it that nothing disturbs; none if that step fails by its input.
+    /// Opens a board, and takes a step on it without faults; none if that step fails by its input.
     fn new(input: &mut Input<'_>, board: &EmulatedBoard) -> Option<Self> {
         let port = board.cpu_port();
         let mut accelerator = open(&port).expect("nothing is wrong with the board");
-        let scene = Scene::any(input, 8, 8, Spoilt::Never);
+        let scene = Scene::any(input, 8, 8, InvalidValues::Never);
         accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
-        let mut parameters = parameters(input, 3, Spoilt::Never);
-        // With hazards, what a pipeline that does not wait computes depends on when beats come.
+        let mut parameters = parameters(input, 3, InvalidValues::Never);
+        // With hazards, the result of a pipeline that does not wait depends on the arrival of
+        // beats.
         parameters.order = None;
         parameters.deadline = Some(DEADLINE);
         let mut bodies = scene.bodies.clone();
@@ -171,8 +172,8 @@ impl Run {
         Some(Self { board, port, accelerator, scene, parameters, expected, tally })
     }
 
-    /// Steps with faults, and then without.
-    fn go(&mut self, input: &mut Input<'_>, config: &BoardConfig) -> FaultPlan {
+    /// Takes steps with faults, and then without.
+    fn take_steps(&mut self, input: &mut Input<'_>, config: &BoardConfig) -> FaultPlan {
         let plan = plan(input, config);
         self.under(input, &plan);
         plan
@@ -190,22 +191,22 @@ impl Run {
             if let Err(error) = ended {
                 assert!(!survivable, "{plan}: {error:?}");
                 if error.must_reopen() {
-                    return self.after_all(plan);
+                    return self.check_lost(plan);
                 }
             }
         }
         self.board.clear_faults();
-        // What had begun and not shown may still end a step, and is reset then.
+        // A fault that began unnoticed may still end a step, which then resets it.
         if let Err(error) = self.step(plan) {
             assert!(!survivable, "{plan}: {error:?}");
             if error.must_reopen() {
-                return self.after_all(plan);
+                return self.check_lost(plan);
             }
             self.step(plan).unwrap_or_else(|error| panic!("{plan}: no fault is left: {error:?}"));
         }
     }
 
-    /// A step that ends in time, with the right bits or with none.
+    /// Takes a step, which must end in time, with the right bits or with none.
     fn step(&mut self, plan: &FaultPlan) -> Result<(), Error> {
         let mut bodies: Vec<Body> = self.scene.bodies.clone();
         let begin = self.port.now();
@@ -222,7 +223,7 @@ impl Run {
                     let corrupt = plan.faults.iter().filter(corrupt).map(|fault| fault.times);
                     assert!(
                         corrupt.sum::<u32>() > 1,
-                        "{plan}: not the bits of an undisturbed step"
+                        "{plan}: not the bits of a step without faults"
                     );
                 }
                 Ok(())
@@ -236,8 +237,8 @@ impl Run {
         }
     }
 
-    /// An accelerator that has to be opened again says so to every call, and touches nothing.
-    fn after_all(&mut self, plan: &FaultPlan) {
+    /// An accelerator that must be opened again reports it in every call, and touches nothing.
+    fn check_lost(&mut self, plan: &FaultPlan) {
         let before = self.board.counts();
         let again = self.step(plan).expect_err("it was given up");
         assert!(matches!(again, Error::MustReopen), "{plan}: {again:?}");

@@ -1,4 +1,4 @@
-//! This file gives the loader folders of arrays that are nearly right.
+//! Gives the loader folders of nearly correct arrays.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -13,7 +13,7 @@ use step_folder::npy::{self, Problem};
 use crate::input::Input;
 use crate::tally::Tally;
 
-/// Shapes that a board's table holds.
+/// Size of a board's shape table.
 const SHAPES: u32 = 64;
 
 /// Name, type and row of each array; `true` for one row a body, or a collision, or none of both.
@@ -31,11 +31,12 @@ const FILES: [(&str, Kind, &[usize]); 12] = [
     (COLLISION_NORMAL, Kind::Numbers, &[3]),
     (COLLISION_POINTS, Kind::Numbers, &[4, 4]),
 ];
-/// The files before these have no row a body, and those before these no row a collision.
+/// Files before `FIRST_OF_BODIES` have no rows of bodies; files before the other have no rows of
+/// collisions.
 const FIRST_OF_BODIES: usize = 2;
 const FIRST_OF_COLLISIONS: usize = 8;
 
-/// Of which type an array is.
+/// The type of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// f32.
@@ -44,7 +45,7 @@ enum Kind {
     Counts,
 }
 
-/// A file as it should be, and as it is.
+/// A correct file, and its altered bytes.
 #[derive(Debug)]
 struct Array {
     name: &'static str,
@@ -68,11 +69,11 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
             array(&mut input, name, *kind, &[rows.as_slice(), row].concat())
         })
         .collect();
-    let spoilt = input.one_in(2) || input.one_in(2);
-    if spoilt {
+    let damaged = input.one_in(2) || input.one_in(2);
+    if damaged {
         for _ in 0..1 + input.below(3) {
             let file = input.index(files.len());
-            spoil(&mut input, &mut files[file].file);
+            damage(&mut input, &mut files[file].file);
         }
     }
 
@@ -85,8 +86,8 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     match Folder::load_with(Path::new("folder"), open) {
         Ok(folder) => {
             let _ = folder.check_shapes(SHAPES);
-            if spoilt {
-                // Whatever it took, it took whole.
+            if damaged {
+                // A loaded step is complete.
                 assert!(
                     folder.bodies.iter().all(|b| folder.shapes.get(b.shape as usize).is_some())
                 );
@@ -97,8 +98,8 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
             tally.steps += 1;
         }
         Err(error) => {
-            assert!(spoilt, "{error}: {:?}", error.problem);
-            // Its text is for people.
+            assert!(damaged, "{error}: {:?}", error.problem);
+            // The error has a text for people.
             assert!(!error.to_string().is_empty() && !error.problem.to_string().is_empty());
             tally.refused += 1;
         }
@@ -118,7 +119,7 @@ fn array(input: &mut Input<'_>, name: &'static str, kind: Kind, shape: &[usize])
     Array { name, words, file }
 }
 
-/// What the loader took is what the files say, bit for bit.
+/// A loaded step equals the files bit for bit.
 fn check(folder: &Folder, files: &[Array]) {
     let bits = |numbers: &[f32]| numbers.iter().map(|number| number.to_bits()).collect::<Vec<_>>();
     let file = |name: &str| {
@@ -162,7 +163,7 @@ fn check(folder: &Folder, files: &[Array]) {
     assert_eq!(vec![of.contact_iterations, of.friction_iterations], file(ITERATIONS));
 }
 
-/// Words of a header, in the right and in the wrong place.
+/// Fragments of a header, in the right and in the wrong place.
 const WORDS: [&[u8]; 15] = [
     b"{",
     b"}",
@@ -181,7 +182,7 @@ const WORDS: [&[u8]; 15] = [
     b"\xC3",
 ];
 
-fn spoil(input: &mut Input<'_>, file: &mut Vec<u8>) {
+fn damage(input: &mut Input<'_>, file: &mut Vec<u8>) {
     // Mostly in the header.
     let end = if input.one_in(4) { file.len() } else { file.len().min(90) };
     if end == 0 {
@@ -203,7 +204,7 @@ fn spoil(input: &mut Input<'_>, file: &mut Vec<u8>) {
             let word = input.pick(&WORDS);
             file.splice(at..at, word.iter().copied());
         }
-        5 => file.extend_from_slice(input.take(9)),
+        5 => file.extend_from_slice(input.bytes(9)),
         6 => file[at] ^= 1 << input.below(8),
         _ => file[at] = input.byte(),
     }

@@ -1,12 +1,12 @@
-//! This file keeps bodies and collisions in one array of numbers each, as an engine with records of
-//! its own would: fields anywhere in a record, and words between them that nobody may change.
+//! Keeps bodies and collisions in one array of numbers each, as an engine with records of its own
+//! does: fields anywhere in a record, and words between them that nobody may change.
 
 use pgs_support::chunks::Chunks;
 use zynq_pgs::{Bodies, Body, CONTACT_POINTS, Collision, Collisions, Contact, Pose, Velocity};
 
-/// What lies between the fields.
+/// The words between the fields.
 const CANARY: f32 = -7.25;
-/// Numbers of a body: position, orientation, both velocities. Its shape is another array's.
+/// Numbers of a body: position, orientation, both velocities. Its shape is in another array.
 const BODY: usize = 13;
 /// Numbers of a collision: normal and contact points.
 const COLLISION: usize = 3 + 4 * CONTACT_POINTS;
@@ -22,7 +22,7 @@ struct Records {
 }
 
 impl Records {
-    /// Records with `gap` more words than `fields`, of which some lie before the fields.
+    /// Makes records with `gap` words more than `fields`; some of them lie before the fields.
     fn new(count: usize, fields: usize, gap: usize) -> Self {
         let stride = fields + gap;
         Self { numbers: vec![CANARY; count * stride], stride, offset: gap / 2 }
@@ -69,7 +69,7 @@ impl StridedBodies {
         strided
     }
 
-    /// The bodies; what lies between them must be as it was.
+    /// The bodies; the words between them must be unchanged.
     pub(super) fn bodies(&self) -> Vec<Body> {
         self.records.check_gaps(BODY);
         (0..self.len()).map(|index| self.body(index)).collect()

@@ -17,13 +17,13 @@ use crate::tally::Tally;
 pub struct Target {
     /// Its name.
     pub name: &'static str,
-    /// What it drives, and what it holds against it.
+    /// The code under test, and the property to check.
     pub about: &'static str,
     /// One execution.
     pub run: fn(&[u8]) -> Tally,
     /// Bytes of an input, at most.
     pub longest: usize,
-    /// How many executions it gets beside the others.
+    /// Its share of executions, relative to the other targets.
     pub share: u32,
 }
 
@@ -31,32 +31,32 @@ pub struct Target {
 pub const ALL: &[Target] = &[
     Target {
         name: "registers",
-        about: "random register accesses, buffers and waits on the emulated board: who owns what is \
-                kept, what the device may only read stays as it is, and time goes on",
+        about: "random register accesses, buffers and waits on the emulated board: owners keep their \
+                buffers, read-only buffers stay unchanged, and time goes on",
         run: registers::run,
         longest: 256,
         share: 280,
     },
     Target {
         name: "chains",
-        about: "random descriptors and direct transfers on memory that watches: no access outside \
-                what was granted, and none that no descriptor asked for",
+        about: "random descriptors and direct transfers on memory that checks every access: no access \
+                outside the grants, and none without a request",
         run: chains::run,
         longest: 512,
         share: 24,
     },
     Target {
         name: "packets",
-        about: "spoilt steps of every profile: the accelerator is done, says why not, or waits; after \
-                a reset the step that was meant has the bits of a fresh board",
+        about: "damaged steps of every profile: the accelerator ends, reports an error, or waits; after \
+                a reset the undamaged step has the bits of a fresh board",
         run: packets::run,
         longest: 192,
         share: 4,
     },
     Target {
         name: "folders",
-        about: "spoilt folders of arrays: the loader takes them or says what is wrong, and what it \
-                takes is what the files say",
+        about: "damaged folders of arrays: the loader takes them or names the error, and a loaded step \
+                equals the files",
         run: folders::run,
         longest: 256,
         share: 88,
@@ -64,22 +64,22 @@ pub const ALL: &[Target] = &[
     Target {
         name: "confinement",
         about: "random steps of the driver on every profile: no access outside the buffers of the \
-                step, bodies untouched where it is refused, the same bits in every layout",
+                step, a refused step changes no body, every layout has the same bits",
         run: confinement::run,
         longest: 768,
         share: 4,
     },
     Target {
         name: "faults",
-        about: "faults of the board under the driver's steps: each ends in time with the bits of an \
-                undisturbed one or an error that changed nothing, and the next one works",
+        about: "faults of the board during the driver's steps: each ends in time with the bits of a step \
+                without faults, or with an error that changed nothing, and the next one works",
         run: faults::run,
         longest: 320,
         share: 1,
     },
 ];
 
-/// The target of that name.
+/// The target with this name.
 #[must_use]
 pub fn by_name(name: &str) -> Option<&'static Target> {
     ALL.iter().find(|target| target.name == name)

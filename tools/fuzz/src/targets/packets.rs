@@ -1,4 +1,4 @@
-//! This file sends steps that are spoilt on their way to the accelerator.
+//! Sends steps with damaged packets and arguments to the accelerator.
 
 use bitstream_model::interface::control;
 use bitstream_model::interface::record::Beat;
@@ -19,26 +19,26 @@ const ENOUGH: u64 = 2_000;
 pub(super) fn run(bytes: &[u8]) -> Tally {
     let mut input = Input::new(bytes);
     let config = boards::any(&mut input);
-    // What has to be moved is not many beats, but with 8-bit lengths it is many descriptors.
+    // The steps have few beats; but with 8-bit lengths they would need many descriptors.
     let config = BoardConfig { length_width: config.length_width.max(11), ..config };
     let step = step(&mut input);
     let mut machine = Machine::with_slots(config, 24);
     let variant = machine.host.variant();
     let (told, mut lanes) = step.on(&variant);
     told.write_arguments(&machine.host);
-    let spoilt = spoil(&mut input, &machine.host, &mut lanes);
+    let damaged = damage(&mut input, &machine.host, &mut lanes);
 
     let mut flight = Flight::default();
     machine.arm(&mut flight, &result_beats(&variant, told.bodies.len()));
     machine.start();
     machine.send(&mut flight, &lanes);
-    let ended = machine.wait(&flight, microseconds(if spoilt { 60 } else { ENOUGH }));
+    let ended = machine.wait(&flight, microseconds(if damaged { 60 } else { ENOUGH }));
     let mut tally = Tally::default();
     match ended {
         Ok(()) => tally.steps += 1,
-        Err(Failure::Accelerator(..) | Failure::Deadline) if spoilt => tally.refused += 1,
-        Err(Failure::Dma { errors, .. }) if spoilt && errors != 0 => tally.refused += 1,
-        Err(failure) => panic!("nothing was spoilt, and the step ended with {failure:?}"),
+        Err(Failure::Accelerator(..) | Failure::Deadline) if damaged => tally.refused += 1,
+        Err(Failure::Dma { errors, .. }) if damaged && errors != 0 => tally.refused += 1,
+        Err(failure) => panic!("nothing was damaged, and the step ended with {failure:?}"),
     }
     machine.host.assert_no_violation();
     if input.one_in(4) {
@@ -51,7 +51,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     tally
 }
 
-/// After a reset the step gives what it gives on a fresh board.
+/// After a reset a step gives the same result as on a fresh board.
 fn check_next(machine: &mut Machine, step: &Step) {
     let config = machine.host.board.config();
     let fresh = BoardConfig { delays: Delays::default(), ..config };
@@ -92,9 +92,9 @@ fn step(input: &mut Input<'_>) -> Step {
     Step { iterations: [input.below(3), input.below(3)], ..Step::new(bodies, collisions) }
 }
 
-/// Spoils arguments and packets; whether anything was.
-fn spoil(input: &mut Input<'_>, host: &Host, lanes: &mut [Lane]) -> bool {
-    let mut spoilt = false;
+/// Damages arguments and packets; returns whether anything was damaged.
+fn damage(input: &mut Input<'_>, host: &Host, lanes: &mut [Lane]) -> bool {
+    let mut damaged = false;
     if input.one_in(8) {
         let register = input.pick(&[
             control::BODIES,
@@ -106,14 +106,14 @@ fn spoil(input: &mut Input<'_>, host: &Host, lanes: &mut [Lane]) -> bool {
             control::FRICTION,
         ]);
         host.set_control(register, input.telling_word());
-        spoilt = true;
+        damaged = true;
     }
     for _ in 0..input.below(5) {
         let lane = input.index(lanes.len());
         let Lane { segments, packets } = &mut lanes[lane];
         let beats = &mut segments[input.index(3)];
         let at = input.index(beats.len() + 1);
-        spoilt = true;
+        damaged = true;
         match input.below(8) {
             0 if at < beats.len() => {
                 beats.remove(at);
@@ -146,5 +146,5 @@ fn spoil(input: &mut Input<'_>, host: &Host, lanes: &mut [Lane]) -> bool {
     for Lane { segments, packets } in lanes {
         packets.retain(|segment| !segments[*segment].is_empty());
     }
-    spoilt
+    damaged
 }

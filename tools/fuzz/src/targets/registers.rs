@@ -1,4 +1,4 @@
-//! This file lets a program of random accesses run against the registers and the memory of a board.
+//! Runs a program of random accesses against the registers and the memory of a board.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -17,16 +17,16 @@ use crate::host::{BOTH, Host, microseconds};
 use crate::input::Input;
 use crate::tally::Tally;
 
-/// Buffers that a program may have at once.
+/// Most buffers of a program at a time.
 const BUFFERS_MAX: usize = 16;
-/// Most of the time that passes at once, µs.
+/// Longest pause, µs.
 const PAUSE_MAX: u32 = 60;
 
-/// Who has a buffer.
+/// The owner of a buffer.
 #[derive(Debug)]
 enum Owner {
     Cpu(Box<[Beat]>),
-    /// With what it held, for those that the device may only read.
+    /// The device, with the content of a buffer that the device may only read.
     Device(DeviceAccess, Box<[Beat]>),
 }
 
@@ -51,7 +51,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     let scatter_gather = !input.one_in(3);
     let host = Host::new(BoardConfig { scatter_gather, strict: false, ..config });
     let mut program = Program { input, host, buffers: Vec::new(), rings: Vec::new() };
-    program.furnish();
+    program.prepare_work();
     while !program.input.is_empty() {
         program.act();
     }
@@ -59,8 +59,8 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
 }
 
 impl Program<'_> {
-    /// Something for the channels to read and to write from the start.
-    fn furnish(&mut self) {
+    /// Prepares work for the channels, to read and to write from the start.
+    fn prepare_work(&mut self) {
         self.allocate_ring();
         self.allocate_ring();
         for access in [DeviceAccess::Read, DeviceAccess::Write] {
@@ -123,7 +123,7 @@ impl Program<'_> {
         (self.core(), self.input.pick(&BOTH))
     }
 
-    /// Any address, mostly of a register.
+    /// An address, mostly of a register.
     fn address(&mut self) -> u64 {
         match self.input.below(8) {
             0..=3 => {
@@ -139,18 +139,18 @@ impl Program<'_> {
         }
     }
 
-    /// Any value, often of an address in a buffer or a ring.
+    /// A value, often an address in a buffer or a ring.
     fn value(&mut self) -> u32 {
         if self.input.one_in(3) {
-            let [low, high] = halves(self.place());
+            let [low, high] = halves(self.address_near_buffer());
             self.input.pick(&[low, high])
         } else {
             self.input.telling_word()
         }
     }
 
-    /// An address in or near what was allocated.
-    fn place(&mut self) -> u64 {
+    /// An address in or near an allocation.
+    fn address_near_buffer(&mut self) -> u64 {
         let known: Vec<u64> = self
             .buffers
             .iter()
@@ -160,7 +160,7 @@ impl Program<'_> {
         let Some(last) = known.len().checked_sub(1) else { return self.input.long() };
         let base = known[self.input.index(last + 1)];
         let offset = u64::from(self.input.byte()) * self.input.pick(&[0, 0, 0, 16]);
-        // Now and then off the grid, and before the buffer.
+        // Sometimes unaligned, and before the buffer.
         match self.input.below(16) {
             0 => base.wrapping_sub(offset),
             1 => base.wrapping_add(offset / 16),
@@ -175,7 +175,7 @@ impl Program<'_> {
         self.host.write(core, direction, register, value);
     }
 
-    /// Lets a channel run on a ring, as far as the ring's descriptors let it.
+    /// Starts a channel on a ring, if the ring's descriptors allow it.
     fn start_channel(&mut self) {
         let (core, direction) = self.channel();
         let Some(last) = self.rings.len().checked_sub(1) else { return };
@@ -184,7 +184,7 @@ impl Program<'_> {
         let (base, words) = (*base, Arc::clone(words));
         for slot in 0..words.len() / WORDS {
             let [low, high] = halves(base + ((slot + 1) * BYTES) as u64);
-            let buffer = halves(self.place());
+            let buffer = halves(self.address_near_buffer());
             let length = 16 * (1 + self.input.below(40));
             let flags = match self.input.below(4) {
                 0 => self.input.below(64) << 26,
@@ -209,10 +209,10 @@ impl Program<'_> {
         self.host.write(core, direction, tail_high, high);
     }
 
-    /// A direct transfer.
+    /// Starts a direct transfer.
     fn transfer(&mut self) {
         let (core, direction) = self.channel();
-        let [low, high] = halves(self.place());
+        let [low, high] = halves(self.address_near_buffer());
         let [address, address_high, length] = [6, 7, 8].map(|k| CHANNEL_REGISTERS[k]);
         self.host.write(core, direction, DMACR, 0x0001_7001);
         self.host.pause(1);
@@ -288,11 +288,11 @@ impl Program<'_> {
 
     fn take_back(&mut self) {
         let Some(which) = self.buffer() else { return };
-        self.take(which);
+        self.reclaim(which);
     }
 
-    /// Takes a buffer back; whether the device may have written it is held against what it holds.
-    fn take(&mut self, which: usize) {
+    /// Takes a buffer back; if the device must not have written it, checks its content.
+    fn reclaim(&mut self, which: usize) {
         let buffer = &mut self.buffers[which];
         let taken = self.host.port.take_back(buffer.address);
         match &buffer.owner {
@@ -316,10 +316,10 @@ impl Program<'_> {
         assert!(matches!(port.take_back(buffer.address), Err(MemoryError::Unknown { .. })));
     }
 
-    /// What must hold, whatever the program did.
+    /// Checks the invariants after any program.
     fn end(mut self) -> Tally {
         for which in 0..self.buffers.len() {
-            self.take(which);
+            self.reclaim(which);
         }
         let host = &self.host;
         let before = host.port.now();

@@ -1,12 +1,11 @@
-//! This file makes small scenes and parameters for the driver: mostly what it takes, now and then
-//! what it must refuse.
+//! Makes small scenes and parameters for the driver: mostly valid, sometimes invalid ones.
 
 use zynq_pgs::order::{Order, Ties};
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 
 use crate::input::Input;
 
-/// What a step is given.
+/// The input of a step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scene {
     pub(super) shapes: Vec<Shape>,
@@ -14,33 +13,38 @@ pub(super) struct Scene {
     pub(super) collisions: Vec<Collision>,
 }
 
-/// Whether a scene may hold what is refused.
+/// Whether a scene may hold invalid values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Spoilt {
+pub(super) enum InvalidValues {
     Never,
-    /// Now and then.
-    Seldom,
+    /// Sometimes.
+    Sometimes,
 }
 
-/// Turns by nothing, and by a third and a quarter of a turn.
+/// No turn, a third of a turn, and a quarter.
 const ORIENTATIONS: [[f32; 4]; 3] =
     [[0.0, 0.0, 0.0, 1.0], [0.5, 0.5, 0.5, 0.5], [0.0, 0.6, 0.0, 0.8]];
 const NORMALS: [[f32; 3]; 4] =
     [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [0.0, 0.0, 1.0]];
 
 impl Scene {
-    /// At most `bodies` bodies and `collisions` collisions.
-    pub(super) fn any(input: &mut Input<'_>, bodies: u32, collisions: u32, spoilt: Spoilt) -> Self {
+    /// A scene of at most `bodies` bodies and `collisions` collisions.
+    pub(super) fn any(
+        input: &mut Input<'_>,
+        bodies: u32,
+        collisions: u32,
+        invalid: InvalidValues,
+    ) -> Self {
         let mut shapes = vec![Shape::STATIC];
         for _ in 0..=input.below(3) {
             let inertia = input.pick(&[1.5, 0.5, 3.0]);
             let mut shape = Shape::isotropic(input.pick(&[1.0, 0.5, 4.0]), inertia);
-            if spoilt == Spoilt::Seldom && input.one_in(16) {
+            if invalid == InvalidValues::Sometimes && input.one_in(16) {
                 shape.inverse_inertia[1] *= 2.0;
             }
             shapes.push(shape);
         }
-        let wild = |input: &mut Input<'_>| spoilt == Spoilt::Seldom && input.one_in(200);
+        let wild = |input: &mut Input<'_>| invalid == InvalidValues::Sometimes && input.one_in(200);
         let bodies: Vec<Body> =
             (0..input.below(bodies + 1)).map(|k| body(input, k, &shapes, wild)).collect();
         let count = u32::try_from(bodies.len()).expect("a few");
@@ -72,7 +76,7 @@ fn body(
     shapes: &[Shape],
     wild: impl Fn(&mut Input<'_>) -> bool,
 ) -> Body {
-    // The first one is mostly the ground.
+    // The first body is mostly the ground.
     let shape = match index {
         0 if !input.one_in(4) => 0,
         _ => 1 + input.below(u32::try_from(shapes.len()).expect("a few") - 1),
@@ -132,7 +136,11 @@ fn collision(
 }
 
 /// Parameters; at most `passes` iterations of each solver.
-pub(super) fn parameters(input: &mut Input<'_>, passes: u32, spoilt: Spoilt) -> StepParameters {
+pub(super) fn parameters(
+    input: &mut Input<'_>,
+    passes: u32,
+    invalid: InvalidValues,
+) -> StepParameters {
     let mut parameters = StepParameters::default();
     parameters.time_step = input.pick(&[1.0 / 60.0, 1.0 / 240.0, 0.125]);
     parameters.contact_iterations = input.below(passes + 1);
@@ -155,7 +163,7 @@ pub(super) fn parameters(input: &mut Input<'_>, passes: u32, spoilt: Spoilt) -> 
             Order::BodyByBody(Ties::LowestIndex),
         ]));
     }
-    if spoilt == Spoilt::Seldom && input.one_in(100) {
+    if invalid == InvalidValues::Sometimes && input.one_in(100) {
         let value = f32::from_bits(input.word());
         match input.below(5) {
             0 => parameters.time_step = value,

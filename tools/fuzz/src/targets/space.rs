@@ -1,8 +1,8 @@
-//! This file is memory that watches who touches it, independently of the board.
+//! Memory that checks every access, independently of the board.
 //!
-//! The board keeps a record of grants itself; this is a second one. Whatever the device reads or
-//! writes must lie in a granted range, and must have been asked for: by a descriptor that it fetched
-//! from this memory, or by a direct transfer that was [announced](Space::announce).
+//! The board keeps a record of grants; this is a second one. The device may read or write only in a
+//! granted range, and only what a descriptor or a direct transfer asked for: a descriptor that it
+//! fetched from this memory, or a direct transfer that was [announced](Space::announce).
 
 use std::io;
 use std::ops::Range;
@@ -14,33 +14,33 @@ use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
 /// Words of a beat.
 const LANES: usize = BEAT_BYTES / 4;
-/// What nobody may change.
+/// The value of words that nobody may change.
 const CANARY: u32 = 0xC0DE_CAFE;
 
-/// One stretch of memory, of which parts are granted.
+/// One range of memory, partly granted.
 #[derive(Debug)]
 struct Stretch {
     base: u64,
     words: Vec<u32>,
 }
 
-/// What is watched.
+/// The checked state.
 #[derive(Debug)]
 pub(super) struct State {
     stretches: Vec<Stretch>,
     granted: Vec<Range<u64>>,
-    /// Data that was asked for.
-    asked: Vec<Range<u64>>,
-    /// Descriptors that were fetched.
+    /// Requested data.
+    requested: Vec<Range<u64>>,
+    /// Fetched descriptors.
     fetched: Vec<u64>,
 }
 
-/// Memory that watches; clones are the same memory.
+/// Memory that checks every access; clones share it.
 #[derive(Debug, Clone)]
 pub(super) struct Space(Arc<Mutex<State>>);
 
 impl Space {
-    /// Stretches at those addresses, of so many bytes each, of which the middle half is granted.
+    /// Ranges of `bytes` bytes at these addresses, with the middle half of each granted.
     pub(super) fn new(bases: &[u64], bytes: u64) -> Self {
         let words = usize::try_from(bytes / 4).expect("a small memory");
         let stretch = |base: &u64| Stretch { base: *base, words: vec![CANARY; words] };
@@ -48,7 +48,7 @@ impl Space {
         Self(Arc::new(Mutex::new(State {
             stretches: bases.iter().map(stretch).collect(),
             granted: bases.iter().map(granted).collect(),
-            asked: Vec::new(),
+            requested: Vec::new(),
             fetched: Vec::new(),
         })))
     }
@@ -62,9 +62,9 @@ impl Space {
         self.state().granted.clone()
     }
 
-    /// A direct transfer may touch those bytes from now on.
+    /// Allows a direct transfer to access these bytes.
     pub(super) fn announce(&self, address: u64, bytes: u32) {
-        self.state().ask(address, bytes);
+        self.state().request(address, bytes);
     }
 
     /// The CPU's store to a granted word.
@@ -89,12 +89,12 @@ impl Space {
 }
 
 impl State {
-    fn ask(&mut self, address: u64, bytes: u32) {
-        // The engines have no byte lanes: whole beats.
+    fn request(&mut self, address: u64, bytes: u32) {
+        // The engines have no byte lanes: they access whole beats.
         let beat = BEAT_BYTES as u64;
         let start = address & !(beat - 1);
         let end = start.saturating_add(u64::from(bytes).next_multiple_of(beat));
-        self.asked.push(start..end);
+        self.requested.push(start..end);
     }
 
     fn check_granted(&self, address: u64, bytes: u64) {
@@ -104,15 +104,14 @@ impl State {
         assert!(self.granted.iter().any(inside), "{bytes} bytes at {address:#x} were not granted");
     }
 
-    /// Whether somebody asked for those bytes: transfers of one buffer after the other may be one
-    /// access.
-    fn check_asked(&self, address: u64, beats: usize) {
+    /// Whether these bytes were requested; one access may span the transfers of adjacent buffers.
+    fn check_requested(&self, address: u64, beats: usize) {
         let step = BEAT_BYTES as u64;
         let mut at = address;
         for _ in 0..beats {
             assert!(
-                self.asked.iter().any(|range| range.contains(&at)),
-                "nobody asked for the beat at {at:#x}"
+                self.requested.iter().any(|range| range.contains(&at)),
+                "no transfer requested the beat at {at:#x}"
             );
             at += step;
         }
@@ -131,7 +130,7 @@ impl DeviceMemory for Space {
     fn read_beats(&mut self, address: u64, to: &mut [Beat]) -> io::Result<()> {
         let mut state = self.state();
         state.check_granted(address, (to.len() * BEAT_BYTES) as u64);
-        state.check_asked(address, to.len());
+        state.check_requested(address, to.len());
         let mut at = address;
         for word in to.iter_mut().flat_map(|beat| &mut beat.0) {
             *word = *state.word(at);
@@ -143,7 +142,7 @@ impl DeviceMemory for Space {
     fn write_beats(&mut self, address: u64, from: &[Beat]) -> io::Result<()> {
         let mut state = self.state();
         state.check_granted(address, (from.len() * BEAT_BYTES) as u64);
-        state.check_asked(address, from.len());
+        state.check_requested(address, from.len());
         let mut at = address;
         for word in from.iter().flat_map(|beat: &Beat| -> [u32; LANES] { beat.0 }) {
             *state.word(at) = word;
@@ -163,9 +162,9 @@ impl DeviceMemory for Space {
         }
         let buffer = u64::from(to[BUFFER]);
         let bytes = control::LENGTH.of(to[CONTROL]);
-        // Engines with addresses of 32 bits leave out the upper half.
-        state.ask(buffer, bytes);
-        state.ask(buffer | (u64::from(to[BUFFER_MSB]) << 32), bytes);
+        // Engines with addresses of 32 bits ignore the upper half.
+        state.request(buffer, bytes);
+        state.request(buffer | (u64::from(to[BUFFER_MSB]) << 32), bytes);
         state.fetched.push(address);
         Ok(())
     }
@@ -204,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "nobody asked for the beat at 0x1220")]
+    #[should_panic(expected = "no transfer requested the beat at 0x1220")]
     fn a_beat_more_than_the_descriptor_says_is_found() {
         let mut space = Space::new(&[0x1000], 0x400);
         descriptor(&mut space, 0x1100, 0x1200, 32);

@@ -1,8 +1,8 @@
-//! This file reaches a guest's memory: a file that QEMU shares (`memory-backend-file`, share=on).
+//! Accesses a guest's memory: a file that QEMU shares (`memory-backend-file`, share=on).
 //!
-//! Byte 0 of the file is physical address 0. Whole system calls, no mapping: nothing here can be
-//! changed under a reference. What the guest may look at while it is written, a word, is written so
-//! that it is complete once its last byte is there.
+//! Byte 0 of the file is physical address 0. Whole system calls access it, and nothing maps it, so
+//! that no reference can change under the guest's writes. A word that the guest may read during a
+//! write is complete once its last byte is there.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -42,7 +42,7 @@ impl GuestFile {
         Ok(GuestPage { memory: self.clone(), address })
     }
 
-    /// A write past the end would make the file longer than the guest's memory.
+    /// A write past the end would extend the guest's memory.
     fn check(&self, address: u64, bytes: usize) -> io::Result<()> {
         if address.checked_add(bytes as u64).is_some_and(|end| end <= self.bytes) {
             return Ok(());
@@ -70,7 +70,7 @@ impl GuestFile {
         Ok(u32::from_le_bytes(bytes))
     }
 
-    /// The uppermost byte last: there stand the flags that say that a descriptor is complete.
+    /// Writes the uppermost byte last: it holds the flags that complete a descriptor.
     fn store(&self, address: u64, value: u32) -> io::Result<()> {
         let bytes = value.to_le_bytes();
         self.write(address, &bytes[..3])?;

@@ -1,11 +1,11 @@
-//! This file reads the one aarch64 instruction that touched a register: which, where, what.
+//! Decodes the aarch64 instruction that touched a register: its direction, its address, its data.
 //!
-//! A volatile access to a 32-bit register is one load or store of a W register. Whatever else
-//! touches a register of the board is an error: 32 bits at a time is what an AXI-Lite slave takes.
+//! A volatile access to a 32-bit register is one load or store of a W register. Any other access to
+//! a register of the board is an error, because an AXI-Lite slave takes 32 bits at a time.
 //!
 //! Source: Arm ARM, C4.1 (Loads and Stores), A64 encodings of LDR, STR, LDUR, STUR, LDAR, STLR.
 
-/// General registers as the kernel gives them: X0 to X30, then SP.
+/// The general registers in the kernel's order: X0 to X30, then SP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Registers {
     /// X0 to X30.
@@ -14,20 +14,20 @@ pub struct Registers {
     pub sp: u64,
 }
 
-/// What an instruction does.
+/// The access of an instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryAccess {
-    /// The virtual address that it touches.
+    /// Its virtual address.
     pub address: u64,
     /// Whether it stores.
     pub store: bool,
     /// Number of the W register; 31 is the zero register.
     pub register: u8,
-    /// Base register and what it holds afterwards, if the instruction moves it.
+    /// Base register and its new value, if the instruction changes it.
     pub write_back: Option<(u8, u64)>,
 }
 
-/// The register number that means zero as data and SP as base.
+/// The register number of zero as data and of SP as base.
 const ZERO_OR_SP: u8 = 31;
 
 impl Registers {
@@ -39,14 +39,14 @@ impl Registers {
         self.x.get(usize::from(number)).copied().unwrap_or(0)
     }
 
-    /// What a store stores.
+    /// The stored value.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a W register is the low half")]
     pub fn stored(&self, access: &MemoryAccess) -> u32 {
         self.data(access.register) as u32
     }
 
-    /// Takes note that the access was made; `loaded` is what a load found.
+    /// Updates the registers after the access; `loaded` is the result of a load.
     pub fn complete(&mut self, access: &MemoryAccess, loaded: u32) {
         match self.x.get_mut(usize::from(access.register)) {
             Some(x) if !access.store => *x = u64::from(loaded),
@@ -64,7 +64,7 @@ impl Registers {
     }
 }
 
-/// The instruction at `pc`, of the aligned pair around it.
+/// The instruction at `pc`, from the aligned pair around it.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "one of the two")]
 pub const fn of_pair(pair: u64, pc: u64) -> u32 {
@@ -80,7 +80,7 @@ fn number(word: u32, low: u32) -> u8 {
     bits(word, low, 5) as u8
 }
 
-/// A 9-bit offset with its sign, as what is added modulo 2^64.
+/// A signed 9-bit offset, as an addend modulo 2^64.
 fn signed9(word: u32) -> u64 {
     let value = u64::from(bits(word, 12, 9));
     if value & 0x100 == 0 { value } else { value.wrapping_sub(0x200) }
@@ -111,7 +111,7 @@ pub fn decode(word: u32, registers: &Registers) -> Option<MemoryAccess> {
         }
         _ => {}
     }
-    // The rest of the group: bits 23:22 say load or store, 21 and 11:10 say how it is addressed.
+    // The rest of the group: bits 23:22 are the direction, 21 and 11:10 the addressing mode.
     let store = match word & 0xFFC0_0000 {
         0xB840_0000 => false,
         0xB800_0000 => true,

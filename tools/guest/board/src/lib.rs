@@ -12,8 +12,8 @@
 //!    +--- /dev/uioN <--- GIC <--- SPI 89 <------------------ qtest ---+
 //! ```
 //!
-//! The driver is unmodified: it opens UIO nodes, maps them, and makes volatile accesses. What this
-//! shows, and what not, is said in `README.md`.
+//! The driver is unmodified: it opens UIO nodes, maps them, and makes volatile accesses.
+//! `README.md` tells what this proves, and what it does not.
 
 pub mod guest_file;
 pub mod instruction;

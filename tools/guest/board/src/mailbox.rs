@@ -1,4 +1,4 @@
-//! This file passes register accesses from the guest to the host, through a page that both see.
+//! Passes register accesses from the guest to the host, through a shared page.
 //!
 //! ```text
 //! 0x00 MARK      host    the host is there
@@ -11,8 +11,8 @@
 //! 0x44 RESULT    host    what was read
 //! ```
 //!
-//! Numbers are compared with the one number that is expected, so that a word seen half written is
-//! one that is not there yet.
+//! Each end compares a number with the one that it expects, so that a half-written word counts as
+//! not written yet.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -36,10 +36,10 @@ const RESULT: u32 = 0x44;
 const READ: u32 = 1;
 const WRITE: u32 = 2;
 
-/// Looks at a word before the processor is given to somebody else between two looks.
+/// Reads of a word before the thread yields the processor between two reads.
 const EAGER_LOOKS: u32 = 1000;
 
-/// The page, word by word; each access is one aligned access, in program order with the others.
+/// The words of the page. Each access is one aligned access, in program order with the others.
 pub trait Words {
     /// Why an access may fail.
     type Error: std::error::Error + Send + Sync + 'static;
@@ -57,7 +57,7 @@ pub trait Words {
     fn store(&mut self, at: u32, value: u32) -> Result<(), Self::Error>;
 }
 
-/// One access to a register.
+/// An access to a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
     /// A read.
@@ -69,7 +69,7 @@ pub enum Access {
     Write {
         /// Physical address.
         address: u64,
-        /// What is written.
+        /// The value.
         value: u32,
     },
 }
@@ -90,23 +90,23 @@ pub enum MailboxError<E: std::error::Error + 'static> {
     /// The page cannot be reached.
     #[error("the mailbox cannot be reached")]
     Page(#[source] E),
-    /// Nobody serves.
+    /// No host serves the page.
     #[error(
         "expected the mark {MARK_VALUE:#010x} in the mailbox, found {found:#010x} after {limit:?}: \
          is guest-board running, with this page as --mailbox?"
     )]
     NoHost {
-        /// What stands there.
+        /// The value of MARK.
         found: u32,
-        /// How long it was waited.
+        /// The time limit.
         limit: Duration,
     },
     /// No answer in time.
     #[error("no answer to the {access} within {limit:?}: does guest-board still run?")]
     NoAnswer {
-        /// What was asked.
+        /// The request.
         access: Access,
-        /// How long it was waited.
+        /// The time limit.
         limit: Duration,
     },
     /// A request that is neither a read nor a write.
@@ -114,12 +114,12 @@ pub enum MailboxError<E: std::error::Error + 'static> {
     UnknownAction {
         /// Number of the request.
         request: u32,
-        /// What stands there.
+        /// The value of ACTION.
         found: u32,
     },
 }
 
-/// The guest's side.
+/// The guest's end.
 #[derive(Debug)]
 pub struct Client<W> {
     words: W,
@@ -128,17 +128,18 @@ pub struct Client<W> {
 }
 
 impl<W: Words> Client<W> {
-    /// Waits until a host serves; `limit` holds for this and for every answer.
+    /// Waits until a host serves; `limit` bounds this wait and the wait for every answer.
     ///
     /// # Errors
-    /// [`MailboxError::NoHost`] if none does in time.
+    ///
+    /// [`MailboxError::NoHost`] if no host serves in time.
     pub fn open(words: W, limit: Duration) -> Result<Self, MailboxError<W::Error>> {
         let mut client = Self { words, last: 0, limit };
         let mut found = 0;
         if !client.wait(MARK, MARK_VALUE, &mut found)? {
             return Err(MailboxError::NoHost { found, limit });
         }
-        // Whoever came before may have left without waiting for its answer.
+        // An earlier client may have left before its answer.
         client.last = client.load(REQUEST)?;
         Ok(client)
     }
@@ -151,7 +152,7 @@ impl<W: Words> Client<W> {
         self.words.store(at, value).map_err(MailboxError::Page)
     }
 
-    /// Waits until the word at `at` is `wanted`; false if it is not in time.
+    /// Waits until the word at `at` is `wanted`; false after the time limit.
     fn wait(&self, at: u32, wanted: u32, found: &mut u32) -> Result<bool, MailboxError<W::Error>> {
         let started = Instant::now();
         loop {
@@ -169,11 +170,12 @@ impl<W: Words> Client<W> {
         }
     }
 
-    /// Makes one access; the value read, or 0 for a write.
+    /// Makes one access; returns the value read, or 0 for a write.
     ///
     /// # Errors
+    ///
     /// [`MailboxError::NoAnswer`] if the host does not answer in time.
-    pub fn ask(&mut self, access: Access) -> Result<u32, MailboxError<W::Error>> {
+    pub fn request(&mut self, access: Access) -> Result<u32, MailboxError<W::Error>> {
         let (action, address, value) = match access {
             Access::Read { address } => (READ, address, 0),
             Access::Write { address, value } => (WRITE, address, value),
@@ -198,7 +200,7 @@ pub(crate) const fn halves(address: u64) -> [u32; 2] {
     [address as u32, (address >> 32) as u32]
 }
 
-/// The host's side.
+/// The host's end.
 #[derive(Debug)]
 pub struct Desk<W> {
     words: W,
@@ -206,9 +208,10 @@ pub struct Desk<W> {
 }
 
 impl<W: Words> Desk<W> {
-    /// Says that the host serves.
+    /// Marks the page as served.
     ///
     /// # Errors
+    ///
     /// The page cannot be reached.
     pub fn open(words: W) -> Result<Self, MailboxError<W::Error>> {
         let mut desk = Self { last: words.load(REQUEST).map_err(MailboxError::Page)?, words };
@@ -221,7 +224,7 @@ impl<W: Words> Desk<W> {
     ///
     /// # Errors
     /// [`MailboxError::UnknownAction`], or the page cannot be reached.
-    pub fn take(&self) -> Result<Option<Access>, MailboxError<W::Error>> {
+    pub fn next_request(&self) -> Result<Option<Access>, MailboxError<W::Error>> {
         let load = |at| self.words.load(at).map_err(MailboxError::Page);
         let request = self.last.wrapping_add(1);
         if load(REQUEST)? != request {
@@ -235,9 +238,10 @@ impl<W: Words> Desk<W> {
         }
     }
 
-    /// Answers the request that was taken.
+    /// Answers the last request.
     ///
     /// # Errors
+    ///
     /// The page cannot be reached.
     pub fn answer(&mut self, result: u32) -> Result<(), MailboxError<W::Error>> {
         self.last = self.last.wrapping_add(1);
@@ -283,7 +287,7 @@ mod tests {
         let mut seen = Vec::new();
         let started = Instant::now();
         while seen.len() < count && started.elapsed() < LIMIT {
-            if let Some(access) = desk.take().expect("understood") {
+            if let Some(access) = desk.next_request().expect("understood") {
                 seen.push(access);
                 let Access::Read { address } = access else {
                     desk.answer(0).expect("a page");
@@ -298,7 +302,7 @@ mod tests {
     #[test]
     fn every_request_is_served_once_and_in_order() {
         let page = Page::new();
-        // Numbers that wrap while it runs.
+        // Request numbers wrap around during the test.
         (&page).store(REQUEST, u32::MAX - 2).expect("a page");
         std::thread::scope(|scope| {
             let host = scope.spawn(|| serve(&page, 6));
@@ -308,7 +312,7 @@ mod tests {
                 let read = Access::Read { address: 0x8_A004_0100 + client };
                 let write = Access::Write { address: 0xA000_0000, value: u32::MAX };
                 for access in [read, write, read] {
-                    let result = guest.ask(access).expect("answered");
+                    let result = guest.request(access).expect("answered");
                     let wanted = if access == write { 0 } else { 0xA004_0101 + client };
                     assert_eq!(u64::from(result), wanted);
                     expected.push(access);
@@ -325,7 +329,7 @@ mod tests {
         assert!(error.contains("found 0x00000000") && error.contains("guest-board"), "{error}");
         let _desk = Desk::open(&page).expect("a page");
         let mut guest = Client::open(&page, Duration::ZERO).expect("a host");
-        let error = guest.ask(Access::Read { address: 0x10 }).expect_err("it is silent");
+        let error = guest.request(Access::Read { address: 0x10 }).expect_err("it is silent");
         assert!(matches!(error, MailboxError::NoAnswer { .. }), "{error}");
     }
 
@@ -334,9 +338,12 @@ mod tests {
         let page = Page::new();
         (&page).store(REQUEST, 7).expect("a page");
         let desk = Desk::open(&page).expect("a page");
-        assert_eq!(desk.take().expect("nothing"), None);
+        assert_eq!(desk.next_request().expect("nothing"), None);
         (&page).store(ACTION, 3).expect("a page");
         (&page).store(REQUEST, 8).expect("a page");
-        assert!(matches!(desk.take(), Err(MailboxError::UnknownAction { request: 8, found: 3 })));
+        assert!(matches!(
+            desk.next_request(),
+            Err(MailboxError::UnknownAction { request: 8, found: 3 })
+        ));
     }
 }

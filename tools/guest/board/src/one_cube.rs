@@ -1,8 +1,8 @@
-//! This file is a driver of two pages for one step: a cube on the ground, solved to Bullet's bits.
+//! A minimal driver for one step: a cube on the ground, solved to Bullet's bits.
 //!
-//! It shares nothing with the driver but the interface module, so that a guest and its board can be
-//! tried out by themselves. Along the way it looks at what plain memory in place of registers would
-//! get wrong: bits that clear when read, when written 1, or by themselves.
+//! It shares only the interface module with the driver, so that it can test a guest and its board
+//! alone. On the way it checks register bits that plain memory would get wrong: bits that clear
+//! when read, when written 1, or by themselves.
 
 use std::fmt;
 use std::time::Duration;
@@ -18,9 +18,9 @@ use bitstream_model::interface::register::Register;
 
 use crate::mailbox::halves;
 
-/// The machine that the step runs on. Memory is addressed by bytes from its begin.
+/// The machine that the step runs on. Memory is addressed by bytes from its beginning.
 pub trait Machine {
-    /// Why it may fail.
+    /// Its error.
     type Error;
 
     /// Reads a register.
@@ -45,50 +45,53 @@ pub trait Machine {
     /// # Errors
     /// The machine's.
     fn load(&mut self, at: u64, beats: &mut [Beat]) -> Result<(), Self::Error>;
-    /// Waits for the interrupt, which masks it; whether it came.
+    /// Waits for the interrupt, which masks it; returns whether it came.
     ///
     /// # Errors
+    ///
     /// The machine's.
     fn wait_interrupt(&mut self, timeout: Duration) -> Result<bool, Self::Error>;
-    /// Lets the next interrupt through.
+    /// Unmasks the interrupt.
     ///
     /// # Errors
+    ///
     /// The machine's.
     fn unmask_interrupt(&mut self) -> Result<(), Self::Error>;
 }
 
-/// Why the step did not do what it should.
+/// Why the step failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError<E> {
     /// The machine failed.
     #[error("the machine failed")]
     Machine(#[from] E),
-    /// A register or a result is not what it should be.
+    /// A register or a result has a wrong value.
     #[error("expected {expected}, found {found}")]
     Unexpected {
-        /// What should have been.
+        /// The expected value.
         expected: String,
-        /// What was.
+        /// The value found.
         found: String,
     },
 }
 
-/// What the step did.
+/// The result of the step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Done {
-    /// Interrupts until the results were there.
+    /// Interrupts until the results arrived.
     pub interrupts: u32,
-    /// Clock cycles of the step, as the accelerator counts them.
+    /// Clock cycles of the step, as counted by the accelerator.
     pub cycles: u32,
 }
 
 const CORES: usize = DMA_COUNT_MAX;
-/// Looks at a register after which every state that changes by time alone must have changed.
+/// Reads of a register within which every state that changes by time alone must change.
 const LOOKS: usize = 1000;
 const PASSES: usize = 8;
-/// Segments of the memory: data of stream k, its descriptors, its results, theirs; then stream k + 1.
+/// Segments of the memory: data of stream k, its descriptors, its results, their descriptors; then
+/// stream k + 1.
 const STREAM_BYTES: u64 = 0x1000;
 const DESCRIPTORS: u64 = 0x400;
 const RESULTS: u64 = 0xC00;
@@ -144,7 +147,7 @@ const ARGUMENTS: [(Register, u32); 13] = [
 /// Inverse mass and inverse inertia: the ground's, the cube's.
 const SHAPES: [[u32; 2]; 2] = [[0, 0], [0x3F80_0000, 0x3EBC_3782]];
 
-/// A channel: which core, which direction.
+/// A channel: its core and its direction.
 #[derive(Clone, Copy)]
 struct Channel {
     core: usize,
@@ -179,12 +182,12 @@ fn stream(core: usize) -> u64 {
     STREAM_BYTES * core as u64
 }
 
-/// The beats of a segment that go out on one stream.
+/// The beats of a segment on one stream.
 fn striped(beats: &[[u32; 4]], core: usize) -> Vec<Beat> {
     beats.iter().skip(core).step_by(CORES).copied().map(Beat).collect()
 }
 
-/// A descriptor as four beats.
+/// A descriptor in four beats.
 fn descriptor(next: u64, buffer: u64, control: u32) -> [Beat; 4] {
     let ([next, next_high], [buffer, buffer_high]) = (halves(next), halves(buffer));
     [
@@ -202,7 +205,8 @@ fn length(beats: usize) -> u32 {
 /// Runs one step, whose interrupt must come within `patience`.
 ///
 /// # Errors
-/// [`StepError`]: the machine failed, or something is not as it should be.
+///
+/// [`StepError`]: the machine failed, or a value is wrong.
 pub fn run<M: Machine>(machine: &mut M, patience: Duration) -> Result<Done, StepError<M::Error>> {
     let identity = machine.read(at(control::IDENTIFICATION))?;
     expect("the accelerator", control::IDENTIFICATION_VALUE, identity)?;
@@ -250,8 +254,8 @@ fn expect<E>(what: &str, expected: u32, found: u32) -> Result<(), StepError<E>> 
     Err(StepError::Unexpected { expected, found: format!("{found:#010x}") })
 }
 
-/// Looks at a register until it says so.
-fn until<M: Machine>(
+/// Reads a register until its value is as expected.
+fn poll_until<M: Machine>(
     machine: &mut M,
     address: u64,
     what: impl fmt::Display,
@@ -272,17 +276,18 @@ fn reset<M: Machine>(machine: &mut M) -> Result<(), StepError<M::Error>> {
         machine.write(channel.at(DMACR), dmacr::RESET.mask())?;
     }
     for channel in Channel::all() {
-        until(machine, channel.at(DMACR), format_args!("{channel} out of reset"), |value| {
+        poll_until(machine, channel.at(DMACR), format_args!("{channel} out of reset"), |value| {
             !dmacr::RESET.is_set(value)
         })?;
     }
     machine.write(at(control::RESET), control::reset::RESET.mask())?;
-    until(machine, at(control::RESET), "the accelerator out of reset", |value| {
+    poll_until(machine, at(control::RESET), "the accelerator out of reset", |value| {
         !control::reset::RESET.is_set(value)
     })
 }
 
-/// Writes data and descriptors of a stream; where the last descriptors are: sent, received.
+/// Writes data and descriptors of a stream; returns the addresses of its last descriptors, of data
+/// and of results.
 fn lay_out<M: Machine>(machine: &mut M, core: usize) -> Result<[u64; 2], StepError<M::Error>> {
     let base = stream(core);
     let bus = machine.memory() + base;
@@ -322,12 +327,12 @@ fn start<M: Machine>(
     let [low, high] = halves(first);
     machine.write(channel.at(CURDESC), low)?;
     machine.write(channel.at(CURDESC_MSB), high)?;
-    // The last result beat is on the last stream: its completion is the step's.
+    // The last result beat is on the last stream: its completion ends the step.
     let completion = channel.results && channel.core + 1 == CORES;
     let control = dmacr::IRQ_THRESHOLD.put(dmacr::RS.mask(), 1);
     let control = dmacr::IOC_IRQ_EN.put(control, u32::from(completion));
     machine.write(channel.at(DMACR), control)?;
-    until(machine, channel.at(DMASR), format_args!("{channel} running"), |value| {
+    poll_until(machine, channel.at(DMASR), format_args!("{channel} running"), |value| {
         !dmasr::HALTED.is_set(value)
     })
 }
@@ -345,7 +350,7 @@ fn write_arguments<M: Machine>(machine: &mut M) -> Result<(), StepError<M::Error
     Ok(())
 }
 
-/// Waits for the interrupt, acknowledges it, and sees that it stays away.
+/// Waits for the interrupt, acknowledges it, and checks that it does not return.
 fn finish<M: Machine>(machine: &mut M, patience: Duration) -> Result<u32, StepError<M::Error>> {
     let completion = Channel { core: CORES - 1, results: true }.at(DMASR);
     if !machine.wait_interrupt(patience)? {
@@ -358,7 +363,7 @@ fn finish<M: Machine>(machine: &mut M, patience: Duration) -> Result<u32, StepEr
     let status = machine.read(completion)?;
     expect("IOC_Irq once it was acknowledged", 0, dmasr::IOC_IRQ.of(status))?;
     machine.unmask_interrupt()?;
-    // The line is level-sensitive: it would come again at once.
+    // The line is level-sensitive: an unacknowledged interrupt would return at once.
     let again = machine.wait_interrupt(Duration::from_millis(5))?;
     expect("interrupts after the acknowledged one", 0, again.into())?;
     Ok(1)

@@ -1,7 +1,7 @@
-//! This file drives an interrupt line of a guest through QEMU's qtest socket.
+//! Drives an interrupt line of a guest through QEMU's qtest socket.
 //!
 //! `set_irq_in PATH NAME NUMBER LEVEL` sets an input of a device; QEMU answers `OK`. Lines that
-//! begin with `IRQ` are notices and no answers.
+//! begin with `IRQ` are notices, not answers.
 //!
 //! Source: QEMU `softmmu/qtest.c`.
 
@@ -14,7 +14,7 @@ use crate::server::Line;
 
 /// The interrupt controller of QEMU's xlnx-zcu102.
 const GIC: &str = "/machine/soc/gic";
-/// How long QEMU may take to answer.
+/// Time limit of QEMU's answer.
 const ANSWER_LIMIT: Duration = Duration::from_secs(20);
 
 /// An interrupt line of the guest, over a qtest socket.
@@ -30,10 +30,11 @@ fn other(text: String) -> io::Error {
 }
 
 impl QtestLine {
-    /// Connects to a socket that QEMU makes within `limit`; the line is SPI `spi`.
+    /// Connects to a socket that QEMU creates within `limit`; the line is SPI `spi`.
     ///
     /// # Errors
-    /// No QEMU there in time, or it does not take the line.
+    ///
+    /// QEMU does not create the socket in time, or does not accept the line.
     pub fn connect(path: &Path, spi: u32, limit: Duration) -> io::Result<Self> {
         let started = Instant::now();
         let stream = loop {
@@ -78,7 +79,7 @@ impl Line for QtestLine {
         self.stream.set_nonblocking(false)?;
         match found {
             Ok((ended, length)) => {
-                // Nothing was asked: what comes are notices, which nobody needs.
+                // Nothing was asked: these lines are notices, which are dropped.
                 self.answers.consume(length);
                 Ok(!ended)
             }
@@ -95,7 +96,7 @@ mod tests {
 
     use super::*;
 
-    /// A socket behind which somebody gives those answers, one to each line; then closes.
+    /// A socket whose server gives these answers, one to each line, and then closes.
     fn with_qemu(
         answers: &'static [&'static str],
         act: impl FnOnce(io::Result<QtestLine>),

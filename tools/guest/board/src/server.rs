@@ -1,8 +1,8 @@
-//! This file lets an emulated board serve a guest: register accesses, memory, interrupt, time.
+//! Serves a guest with an emulated board: register accesses, memory, interrupt, time.
 //!
-//! The board's time is virtual. Here it follows the host's clock: as much as has passed since the
-//! last look, but not more than a slice at once; what the host cannot keep up with is dropped. The
-//! board is then slow, as seen by the guest, and never anything else.
+//! The board's virtual time follows the host's clock: by the time since the last iteration, but at
+//! most one slice at once. Time that the host cannot keep up with is dropped. The board is then
+//! slow, as seen by the guest, and never anything else.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -12,20 +12,21 @@ use bitstream_model::{CpuPort, EmulatedBoard};
 use crate::guest_file::GuestPage;
 use crate::mailbox::{Access, Desk, MailboxError};
 
-/// The longest stretch of virtual time between two looks at the mailbox.
+/// Longest virtual time between two reads of the mailbox.
 const SLICE: Duration = Duration::from_micros(50);
-/// How long after an access the next one is awaited without giving the processor away.
+/// Time after an access during which the next one is polled for without yielding the processor.
 const EAGER: Duration = Duration::from_millis(2);
-/// How long the processor is given away otherwise.
+/// Sleep between two polls afterwards.
 const NAP: Duration = Duration::from_micros(50);
-/// Looks between two questions whether the guest still runs.
+/// Polls between two checks that the guest still runs.
 const LOOKS: u32 = 256;
 
 /// The interrupt line into the guest.
 pub trait Line {
-    /// Sets its level.
+    /// Sets the line's level.
     ///
     /// # Errors
+    ///
     /// The guest cannot be reached.
     fn set(&mut self, level: bool) -> io::Result<()>;
 
@@ -46,15 +47,15 @@ pub enum ServeError {
     /// The line failed.
     #[error("the interrupt line of the guest cannot be set")]
     Line(#[source] io::Error),
-    /// The guest took too long.
+    /// The guest ran longer than its limit.
     #[error("the guest still runs after {limit:?}: give a larger --limit if it should")]
     Limit {
-        /// How long it was given.
+        /// The limit.
         limit: Duration,
     },
 }
 
-/// What was served.
+/// Counts of a served guest.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Served {
@@ -62,7 +63,7 @@ pub struct Served {
     pub reads: u64,
     /// Register writes.
     pub writes: u64,
-    /// Times that the interrupt line rose.
+    /// Rising edges of the interrupt line.
     pub raised: u64,
 }
 
@@ -75,14 +76,15 @@ pub struct Server<L> {
     line: L,
     level: bool,
     served: Served,
-    /// Until when the board has run, on the host's clock.
+    /// The host's time up to which the board has run.
     run_until: Instant,
 }
 
 impl<L: Line> Server<L> {
-    /// Serves requests in that page; the line is low.
+    /// Serves the requests in a page; the line starts low.
     ///
     /// # Errors
+    ///
     /// The page cannot be reached.
     pub fn new(board: EmulatedBoard, page: GuestPage, line: L) -> Result<Self, ServeError> {
         Ok(Self {
@@ -99,13 +101,14 @@ impl<L: Line> Server<L> {
     /// Serves until the guest has ended.
     ///
     /// # Errors
+    ///
     /// [`ServeError`], at the latest after `limit`.
     pub fn serve(&mut self, limit: Duration) -> Result<Served, ServeError> {
         let started = Instant::now();
         let mut last_access = started;
         let mut looks = 0_u32;
         loop {
-            if let Some(access) = self.desk.take()? {
+            if let Some(access) = self.desk.next_request()? {
                 self.serve_one(access)?;
                 last_access = Instant::now();
             } else if last_access.elapsed() > EAGER {
@@ -140,7 +143,7 @@ impl<L: Line> Server<L> {
             }
         };
         log::trace!("{access} -> {result:#010x}");
-        // Before the answer: an interrupt that was acknowledged must be gone when the guest goes on.
+        // Before the answer: an acknowledged interrupt must be gone when the guest goes on.
         self.pass_level_on()?;
         self.desk.answer(result)?;
         Ok(())

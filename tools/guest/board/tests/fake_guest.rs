@@ -1,5 +1,5 @@
-//! A whole step between a server and a guest that is a thread: memory is a file, registers go
-//! through the mailbox, the interrupt is a flag.
+//! A whole step between a server and a guest that is a thread: a file is the memory, the mailbox
+//! carries the registers, and a flag is the interrupt.
 
 use std::io;
 use std::sync::{Arc, Condvar, Mutex};
@@ -17,7 +17,7 @@ const MAILBOX: u64 = 0x10_0000;
 const BUFFERS: u64 = 0x11_0000;
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// The line, the kernel that masks it, and whether the guest runs.
+/// The line, the kernel's mask of it, and whether the guest runs.
 #[derive(Debug, Default)]
 struct Kernel {
     level: bool,
@@ -66,11 +66,11 @@ impl Machine for Guest {
     type Error = GuestError;
 
     fn read(&mut self, address: u64) -> Result<u32, GuestError> {
-        Ok(self.registers.ask(Access::Read { address })?)
+        Ok(self.registers.request(Access::Read { address })?)
     }
 
     fn write(&mut self, address: u64, value: u32) -> Result<(), GuestError> {
-        self.registers.ask(Access::Write { address, value })?;
+        self.registers.request(Access::Write { address, value })?;
         Ok(())
     }
 
@@ -103,7 +103,7 @@ impl Machine for Guest {
     }
 }
 
-/// Ends the guest, also when its test panics, so that the server ends too.
+/// Ends the guest, even when its test panics, so that the server ends too.
 struct Ending(Wire);
 
 impl Drop for Ending {
@@ -112,7 +112,7 @@ impl Drop for Ending {
     }
 }
 
-/// Runs a guest whose buffers begin at `base` against a board that was granted the buffers.
+/// Runs a guest whose buffers begin at `base` against a board with a grant of the buffers.
 fn with_guest<T>(base: u64, run: impl FnOnce(&mut Guest) -> T) -> (T, Served, EmulatedBoard) {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
     file.as_file().set_len(GUEST_BYTES).expect("resized");
@@ -137,7 +137,7 @@ fn with_guest<T>(base: u64, run: impl FnOnce(&mut Guest) -> T) -> (T, Served, Em
 
 #[test]
 fn a_whole_step_in_shared_memory_ends_in_bullets_bits() {
-    // Twice: what the first step left in registers and memory must not matter.
+    // Twice: the first step's remains in registers and memory must not matter.
     let (done, served, board) =
         with_guest(BUFFERS, |guest| [one_cube::run(guest, LIMIT), one_cube::run(guest, LIMIT)]);
     for done in done {
@@ -155,7 +155,7 @@ fn a_whole_step_in_shared_memory_ends_in_bullets_bits() {
 
 #[test]
 fn memory_that_was_not_granted_is_a_violation_and_not_touched() {
-    // All four streams lie before what was granted.
+    // All four streams lie before the grant.
     let (done, _, board) = with_guest(BUFFERS - 0x4000, |guest| {
         // A strict board is dead after a violation: no interrupt comes.
         let done = one_cube::run(guest, Duration::from_millis(100));

@@ -1,4 +1,4 @@
-//! This file checks what needs no transfer: names, addresses, bounds, memory.
+//! Checks without a transfer: names, addresses, bounds, memory.
 
 use zynq_pgs::PlatformError;
 use zynq_pgs::interface::address_map::{MEMORY_BASE, MEMORY_BYTES, UIO_MEMORY_NODE};
@@ -10,10 +10,10 @@ use crate::transfer::pattern;
 
 /// The UIO node of the engine's channel.
 pub(crate) const ZDMA_NODE: &str = "zdma";
-/// Where the device tree says that the channel lies.
+/// Address and length of the channel in the device tree.
 const CHANNEL: (u64, u64) = (0xFD50_0000, 0x1000);
 
-/// Nodes and maps are found where the device tree puts them; what is not there is said to be not.
+/// Nodes and maps are found at the addresses of the device tree; a missing one is reported missing.
 pub(crate) fn nodes_by_name() -> Outcome {
     let device = UioDevice::open(ZDMA_NODE)?;
     let registers = device.window("channel")?;
@@ -56,7 +56,7 @@ pub(crate) fn nodes_by_name() -> Outcome {
     Ok(format!("{} at {:#x}, memory at {:#x}", device.node().device, CHANNEL.0, MEMORY_BASE))
 }
 
-/// Nothing outside of a region can be reached, nothing between its words or beats.
+/// No access reaches outside a region, or between its words or beats.
 pub(crate) fn confined() -> Outcome {
     let device = UioDevice::open(ZDMA_NODE)?;
     let mut registers = device.window("channel")?;
@@ -85,7 +85,7 @@ pub(crate) fn confined() -> Outcome {
     Ok(format!("{refused} accesses refused, the last word and beats allowed"))
 }
 
-/// What is written to the memory is read from it, from its first beat to its last.
+/// Memory holds written data, from its first beat to its last.
 pub(crate) fn memory() -> Outcome {
     let mut memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
     let beats = 4097;
@@ -106,7 +106,7 @@ pub(crate) fn memory() -> Outcome {
 mod tests {
     use super::*;
 
-    /// The guest is built from other files than this program: they have to agree.
+    /// The guest is built from other files than this program; they must agree.
     #[test]
     fn the_guests_device_tree_has_the_memory_of_the_interface() {
         let tree = include_str!("../../zcu102.dts");

@@ -1,5 +1,5 @@
-//! This file drives one channel of the ZDMA, the DMA engine of the processing system, in simple
-//! mode: one transfer, told in registers.
+//! Drives one channel of the ZDMA, the DMA engine of the processing system, in simple mode: one
+//! transfer, described in registers.
 //!
 //! Source: UG1087 (register reference), modules GDMA and ADMA; UG1085, "DMA controller".
 
@@ -31,28 +31,28 @@ const DONE: u32 = 1 << 10;
 const HARMLESS: u32 = DONE | 1 << 4 | 1 << 5;
 /// All bits of `ISR`.
 const ALL: u32 = 0xFFF;
-/// `CTRL0` after reset: reads and writes, from registers, ahead of need.
+/// `CTRL0` after reset: reads and writes, from registers, with prefetching.
 const SIMPLE_MODE: u32 = 0x80;
 /// `DATA_ATTR` after reset: incrementing bursts of 16.
 const BURSTS: u32 = 0x0483_D20F;
 /// `CTRL2`: begin.
 const ENABLE: u32 = 1;
 
-/// What the engine did instead of a transfer.
+/// Why a transfer failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum EngineError {
-    /// The platform code refused.
+    /// The platform code refused it.
     #[error(transparent)]
     Platform(#[from] PlatformError),
     /// The engine reports an error.
     #[error("expected DMA done in ISR, found {isr:#05x}")]
     Status { isr: u32 },
-    /// It reports nothing.
+    /// The engine reports nothing in time.
     #[error("no DMA done within {limit:?}")]
     Late { limit: Duration },
 }
 
-/// A channel, and the memory that it may touch.
+/// A channel, and the memory for its transfers.
 #[derive(Debug)]
 pub(crate) struct Engine {
     pub(crate) device: UioDevice,
@@ -61,7 +61,7 @@ pub(crate) struct Engine {
 }
 
 impl Engine {
-    /// Opens both UIO nodes and stops what may be left of an earlier user.
+    /// Opens both UIO nodes and stops a transfer that an earlier user may have left.
     pub(crate) fn open(node: &str, memory: &str) -> Result<Self, EngineError> {
         let memory = ReservedMemory::open(memory)?;
         let device = UioDevice::open(node)?;
@@ -74,18 +74,18 @@ impl Engine {
         this.registers.read32(SOURCE_COUNT)?;
         this.registers.read32(DESTINATION_COUNT)?;
         this.device.unmask()?;
-        // One that was pending comes now.
+        // A pending interrupt comes now.
         this.device.wait_interrupt(Duration::from_millis(20))?;
         this.device.unmask()?;
         Ok(this)
     }
 
-    /// The engine's interrupt reaches the processor.
+    /// Lets the engine's interrupt reach the processor.
     pub(crate) fn enable_interrupt(&mut self) -> Result<(), PlatformError> {
         self.registers.write32(IEN, DONE)
     }
 
-    /// It does not.
+    /// Keeps the engine's interrupt from the processor.
     pub(crate) fn disable_interrupt(&mut self) -> Result<(), PlatformError> {
         self.registers.write32(IDS, ALL)
     }
@@ -112,7 +112,7 @@ impl Engine {
         Ok(isr & DONE != 0)
     }
 
-    /// Looks until the transfer is done.
+    /// Polls until the transfer is done.
     pub(crate) fn poll_done(&self, limit: Duration) -> Result<(), EngineError> {
         let begin = Instant::now();
         loop {
@@ -127,7 +127,7 @@ impl Engine {
         }
     }
 
-    /// Takes the interrupt back, in the engine.
+    /// Clears the interrupt in the engine.
     pub(crate) fn acknowledge(&mut self) -> Result<(), PlatformError> {
         self.registers.write32(ISR, ALL)
     }

@@ -1,5 +1,5 @@
-//! Drives a DMA engine that this project did not write through the driver's own platform code:
-//! UIO nodes found by name, registers and reserved memory mapped, interrupts waited for.
+//! Drives a foreign DMA engine through the driver's own platform code: UIO nodes found by name,
+//! registers and reserved memory mapped, interrupts waited for.
 //!
 //! Made for the guest of `tools/scripts/kernel-test.sh`; prints a line `ok ...` or `FAIL ...` for
 //! each check.
@@ -12,7 +12,7 @@ mod transfer;
 use std::error::Error;
 use std::process::ExitCode;
 
-/// What a check found: something to be shown, or why it failed.
+/// The outcome of a check: a detail to print, or the reason of its failure.
 pub(crate) type Outcome = Result<String, Box<dyn Error>>;
 
 /// A check and its name.

@@ -1,4 +1,4 @@
-//! This file checks transfers: data, bounds of what was written, interrupts and the lack of them.
+//! Checks transfers: data, bounds of the written range, interrupts and their absence.
 
 use std::error::Error;
 use std::time::{Duration, Instant};
@@ -10,16 +10,16 @@ use crate::Outcome;
 use crate::checks::ZDMA_NODE;
 use crate::engine::Engine;
 
-/// Longest wait for an interrupt that has to come.
+/// Longest wait for an expected interrupt.
 const LIMIT: Duration = Duration::from_secs(5);
-/// How long an interrupt is waited for that must not come.
+/// Wait that must pass without an interrupt.
 const QUIET: Duration = Duration::from_millis(100);
 /// Beats of the largest transfer: 1 MiB.
 const LARGEST: usize = (1 << 20) / BEAT_BYTES;
-/// What stands before and after the destination, and has to stay.
+/// The content before and after the destination, which must stay.
 const GUARD: Beat = Beat([0xFEED_BEEF, 0x0BAD_CAFE, 0x5555_AAAA, 0x1234_5678]);
 
-/// Beats of which no two are alike, other ones for every seed.
+/// Beats that are all different, and differ for every seed.
 pub(crate) fn pattern(beats: usize, seed: u32) -> Vec<Beat> {
     let mut state = seed.wrapping_mul(2_654_435_761) | 1;
     let mut next = || {
@@ -31,7 +31,7 @@ pub(crate) fn pattern(beats: usize, seed: u32) -> Vec<Beat> {
     (0..beats).map(|_| Beat([next(), next(), next(), next()])).collect()
 }
 
-/// A transfer that was prepared: source filled, destination spoiled, guards around it.
+/// A prepared transfer: source filled, destination overwritten, guards around it.
 struct Transfer {
     data: Vec<Beat>,
     from: u64,
@@ -39,7 +39,7 @@ struct Transfer {
 }
 
 impl Transfer {
-    /// Source in the lower half of the memory, destination in the upper, moved by the seed.
+    /// Source in the lower half of the memory, destination in the upper, shifted by the seed.
     fn prepare(engine: &mut Engine, beats: usize, seed: u32) -> Result<Self, Box<dyn Error>> {
         let half = engine.memory.bytes() / 2;
         let beat = BEAT_BYTES as u64;
@@ -80,7 +80,7 @@ impl Transfer {
     }
 }
 
-/// One transfer that is ended by its interrupt: its count, and how long it took.
+/// Makes a transfer that ends with its interrupt; returns the count of interrupts and the time.
 fn by_interrupt(
     engine: &mut Engine,
     beats: usize,
@@ -123,10 +123,10 @@ pub(crate) fn sizes() -> Outcome {
     Ok(format!("{done} transfers of 16 B to 1 MiB, the slowest {slowest:?}"))
 }
 
-/// Many transfers, short and long ones in turn; every one is compared, none may fail.
+/// Many transfers, short and long ones in turn; every one is compared, and none may fail.
 pub(crate) fn thousand() -> Outcome {
     const TRANSFERS: u32 = 1000;
-    /// Each may have taken a whole wait.
+    /// Failed transfers that are reported; each may have taken a whole wait.
     const ERRORS_SHOWN: usize = 5;
     let mut engine = open()?;
     engine.enable_interrupt()?;
@@ -162,7 +162,7 @@ pub(crate) fn thousand() -> Outcome {
     Ok(format!("0 errors, {bytes} bytes, one interrupt each"))
 }
 
-/// No interrupt comes, the wait ends in time, polling finds the transfer done; afterwards
+/// No interrupt comes, the wait ends in time, and polling finds the transfer done; afterwards
 /// interrupts work again.
 fn survive(engine: &mut Engine, seed: u32) -> Result<(), Box<dyn Error>> {
     let transfer = Transfer::prepare(engine, 256, seed)?;
@@ -181,7 +181,7 @@ fn survive(engine: &mut Engine, seed: u32) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The engine keeps its interrupt to itself.
+/// The interrupt is disabled in the engine.
 pub(crate) fn suppressed_in_engine() -> Outcome {
     let mut engine = open()?;
     for seed in 1..=5 {
@@ -193,7 +193,7 @@ pub(crate) fn suppressed_in_engine() -> Outcome {
     Ok("5 transfers found done by polling, then one by interrupt".to_owned())
 }
 
-/// The engine raises it, and the kernel keeps it back.
+/// The engine raises the interrupt, and the kernel masks it.
 pub(crate) fn masked_in_kernel() -> Outcome {
     let mut engine = open()?;
     engine.enable_interrupt()?;
@@ -203,7 +203,7 @@ pub(crate) fn masked_in_kernel() -> Outcome {
     }
     engine.device.unmask()?;
     if engine.device.wait_interrupt(QUIET)?.is_some() {
-        // A controller may have latched the edge; it must be no more than one.
+        // A controller may have latched the edge; at most one interrupt may come.
         engine.device.unmask()?;
         if engine.device.wait_interrupt(QUIET)?.is_some() {
             return Err("interrupts without a cause".into());
@@ -214,7 +214,8 @@ pub(crate) fn masked_in_kernel() -> Outcome {
     Ok("5 transfers found done by polling, then one by interrupt".to_owned())
 }
 
-/// The line is a level: let through before it is acknowledged in the engine, it comes again.
+/// The line is a level: an interrupt that is unmasked before its acknowledgement in the engine
+/// comes again.
 pub(crate) fn not_acknowledged() -> Outcome {
     let mut engine = open()?;
     engine.enable_interrupt()?;

@@ -1,4 +1,4 @@
-//! Why a bitstream could not be loaded, whose fault it is and what to do.
+//! The errors of loading a bitstream: who is at fault, and the next step.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,17 @@ use thiserror::Error;
 use zynq_pgs::PlatformError;
 
 use super::format::Advice;
-use crate::failure::Cause;
+
+/// The party at fault when loading fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AtFault {
+    /// The command line, or a file named on it.
+    Caller,
+    /// The kernel: its configuration, other programs, rights.
+    System,
+    /// The programmable logic, which did not take the bitstream.
+    Logic,
+}
 
 /// Why loading was refused or failed.
 #[derive(Debug, Error)]
@@ -48,10 +58,10 @@ pub(crate) enum LoadError {
         "the UIO node {node:?} (/dev/{device}) is there already, from another overlay or from the base tree"
     )]
     NodePresent { node: String, device: String },
-    /// A file of the kernel's.
+    /// A file of the kernel.
     #[error("cannot use {}", path.display())]
     Attribute { path: PathBuf, source: io::Error },
-    /// The bitstream could not be put where the kernel looks for it.
+    /// The bitstream could not be copied to the kernel's firmware folder.
     #[error("cannot copy the bitstream to {}", path.display())]
     Copy { path: PathBuf, bytes: u64, source: io::Error },
     #[error(transparent)]
@@ -70,7 +80,7 @@ pub(crate) enum LoadError {
     NoNode,
 }
 
-/// Overlays, each with what it says of itself.
+/// Lists overlays with their status.
 fn listed(overlays: &[(PathBuf, String)]) -> String {
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let each = overlays.iter().map(|(path, status)| format!("{:?} ({status})", name(path)));
@@ -92,23 +102,23 @@ impl LoadError {
         Self::Attribute { path: path.to_owned(), source }
     }
 
-    /// Whose fault it is.
-    pub(crate) fn cause(&self) -> Cause {
+    /// The party at fault.
+    pub(crate) fn at_fault(&self) -> AtFault {
         match self {
             Self::Unreadable { .. }
             | Self::Bitstream { .. }
             | Self::Overlay { .. }
             | Self::Name { .. }
-            | Self::Unasked => Cause::Input,
+            | Self::Unasked => AtFault::Caller,
             Self::Refused { source, .. } if source.kind() == io::ErrorKind::NotFound => {
-                Cause::NoBoard
+                AtFault::System
             }
-            Self::Refused { .. } | Self::NotOperating { .. } => Cause::Hardware,
-            _ => Cause::NoBoard,
+            Self::Refused { .. } | Self::NotOperating { .. } => AtFault::Logic,
+            _ => AtFault::System,
         }
     }
 
-    /// What to do.
+    /// The next step.
     pub(crate) fn next(&self) -> String {
         match self {
             Self::Unreadable { path, source } => unreadable(path, source),
@@ -189,7 +199,7 @@ impl LoadError {
     }
 }
 
-/// A file of the caller's cannot be read.
+/// The next step after a file of the caller that cannot be read.
 fn unreadable(path: &Path, source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::NotFound => format!(
@@ -199,11 +209,11 @@ fn unreadable(path: &Path, source: &io::Error) -> String {
         io::ErrorKind::PermissionDenied => {
             format!("run the command as root, or let it read {}", path.display())
         }
-        _ => format!("is the disk or network whole that holds {}?", path.display()),
+        _ => format!("check the disk or network that holds {}", path.display()),
     }
 }
 
-/// A file of the kernel's cannot be used.
+/// The next step after a file of the kernel that cannot be used.
 fn attribute(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::PermissionDenied => {
@@ -218,7 +228,7 @@ fn attribute(source: &io::Error) -> &'static str {
     }
 }
 
-/// The bitstream cannot be put where the kernel looks for it.
+/// The next step after a bitstream that cannot be copied to the kernel's firmware folder.
 fn copy(path: &Path, bytes: u64, source: &io::Error) -> String {
     let folder = path.parent().unwrap_or(path).display();
     let elsewhere = "name the folder of the file to the kernel, which looks there first: printf %s \
@@ -239,7 +249,7 @@ fn copy(path: &Path, bytes: u64, source: &io::Error) -> String {
     }
 }
 
-/// The manager did not take the bitstream.
+/// The next step after a bitstream that the manager refused.
 fn refused(firmware: &str, source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::NotFound => format!(

@@ -1,4 +1,4 @@
-//! Puts a bitstream where the kernel looks for it.
+//! Puts a bitstream where the kernel looks for firmware.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use super::LoadError;
 use super::system::{System, read};
 
-/// Where the kernel looks for firmware, last.
+/// The folder that the kernel searches last.
 const FOLDER: &str = "lib/firmware";
-/// Names the folder where it looks first; empty if there is none.
+/// Names the folder that the kernel searches first; empty if there is none.
 const FIRST_FOLDER: &str = "sys/module/firmware_class/parameters/path";
 /// The longest name that the manager takes: its buffer has 255 bytes with the terminator.
 const NAME_BYTES_MAX: usize = 254;
 
-/// A bitstream in a firmware folder of the kernel's. A copy goes when this does.
+/// A bitstream in a firmware folder of the kernel. Dropping it removes a copy.
 #[derive(Debug)]
 pub(super) struct Firmware {
     name: String,
@@ -21,8 +21,8 @@ pub(super) struct Firmware {
 }
 
 impl Firmware {
-    /// Names the file if it lies below a firmware folder, else copies it to the one that is looked
-    /// into first.
+    /// Names the file if it lies below a firmware folder; otherwise copies it to the folder
+    /// searched first.
     pub(super) fn provide(system: &dyn System, bitstream: &Path) -> Result<Self, LoadError> {
         let first = read(&system.path(FIRST_FOLDER)).unwrap_or_default();
         let first = Some(first.trim_start_matches('/')).filter(|path| !path.is_empty());
@@ -35,7 +35,7 @@ impl Firmware {
             let below = fs::canonicalize(folder).ok();
             let name = below.as_ref().and_then(|below| real.strip_prefix(below).ok());
             let Some(name) = name else { continue };
-            // Another file of that name, where the kernel looks before.
+            // A file of the same name in a folder searched earlier hides this one.
             if !folders[..place].iter().any(|before| before.join(name).exists()) {
                 return Ok(Self { name: kernel_name(name)?, copy: None });
             }
@@ -50,7 +50,7 @@ impl Firmware {
         Ok(Self { name, copy: Some(copy) })
     }
 
-    /// What the manager is to be told.
+    /// The name for the manager.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -69,7 +69,7 @@ impl Drop for Firmware {
     }
 }
 
-/// The name as the manager reads it: it copies it unchecked, and cuts a line end off.
+/// The name as the manager reads it: the manager copies it unchecked, and cuts off a line end.
 fn kernel_name(path: &Path) -> Result<String, LoadError> {
     let refuse =
         |reason| Err(LoadError::Name { name: path.to_string_lossy().into_owned(), reason });

@@ -1,4 +1,4 @@
-//! Tells a file's format from its first KiB, before the kernel is given it.
+//! Recognises a file's format by its first KiB, before the kernel gets it.
 
 use std::fs::{self, File};
 use std::io::Read as _;
@@ -6,40 +6,41 @@ use std::path::Path;
 
 use super::LoadError;
 
-/// As far as the first word of a bitstream is looked for.
+/// Bytes that are searched for the sync word of a bitstream.
 const HEAD_BYTES: usize = 1024;
-/// The sync word of a bitstream, as bootgen turns it for the processor.
+/// The sync word of a bitstream, as bootgen byte-swaps it for the processor.
 const SYNC: [u8; 4] = [0x66, 0x55, 0x99, 0xAA];
 /// The sync word as Vivado writes it, for a configuration port.
 const SYNC_UNTURNED: [u8; 4] = [0xAA, 0x99, 0x55, 0x66];
-/// The beginning of Vivado's header: nine bytes, a one, and the field of the design's name.
+/// The beginning of Vivado's header: nine bytes, a one, and the tag of the design's name.
 const BIT_HEADER: [u8; 14] = *b"\x00\x09\x0f\xf0\x0f\xf0\x0f\xf0\x0f\xf0\x00\x00\x01a";
 /// First bytes of every compiled device tree.
 const DEVICE_TREE: [u8; 4] = [0xD0, 0x0D, 0xFE, 0xED];
-/// The length of a compiled device tree is in its second word.
+/// The second word of a compiled device tree is its length.
 const TREE_LENGTH: std::ops::Range<usize> = 4..8;
 
-/// Where a format begins, what it is, and what to do with it where a bitstream is expected.
+/// Offset and bytes of a format's signature, the name of the format, and the advice if a bitstream
+/// is expected.
 type Signature = (usize, &'static [u8], &'static str, Advice);
 
-/// What to do with a file that is no bitstream.
+/// The next step for a file that is no bitstream.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Advice {
-    /// Convert it by bootgen.
+    /// Convert it with bootgen.
     Bootgen,
-    /// Turn the bytes of every word.
+    /// Swap the bytes of every word.
     Turn,
-    /// Take out what is packed in it.
+    /// Unpack it.
     Unpack,
-    /// It is loaded when the board starts.
+    /// Put it on the boot medium: it is loaded when the board starts.
     BootImage,
-    /// It is for another chip.
+    /// Get a bitstream for this chip.
     OtherChip,
-    /// Give it as the overlay.
+    /// Pass it as the overlay.
     Overlay,
-    /// Get the file itself.
+    /// Fetch the file itself.
     Fetch,
-    /// See how the files are made.
+    /// Read how the files are made.
     Readme,
 }
 
@@ -79,11 +80,11 @@ impl Advice {
     }
 }
 
-/// Formats that are taken for bitstreams, by their first bytes.
+/// Formats that are mistaken for bitstreams, by their first bytes.
 const SIGNATURES: &[Signature] = &[
     (0, &BIT_HEADER, "Vivado's .bit", Advice::Bootgen),
     (0, &DEVICE_TREE, "a compiled device tree", Advice::Overlay),
-    // Headers of images for the boot loader, which have a turned sync word, too.
+    // Headers of boot images also hold a byte-swapped sync word.
     (0x24, b"XNLX", "a boot image", Advice::BootImage),
     (0x14, b"XNLX", "a programmable device image (.pdi) of a Versal", Advice::OtherChip),
     (0, b"\x7fELF", "a program", Advice::Readme),
@@ -105,7 +106,7 @@ const SIGNATURES: &[Signature] = &[
     (0, b"<HTML", "a web page", Advice::Fetch),
 ];
 
-/// What a file is that is no bitstream for the kernel; `None` if it is one.
+/// The format of a file that the kernel does not take as a bitstream; `None` if it takes it.
 fn other_format(head: &[u8]) -> Option<(&'static str, Advice)> {
     if head.is_empty() {
         return Some(("an empty file", Advice::Fetch));
@@ -128,7 +129,7 @@ fn other_format(head: &[u8]) -> Option<(&'static str, Advice)> {
 /// A bitstream for a configuration port, without a header.
 const UNTURNED: &str = "a bitstream whose bytes are not turned (sync word AA 99 55 66)";
 
-/// Whether all of it is UTF-8 as people write it; the last character may be cut off.
+/// Whether all of it is printable UTF-8; the last character may be cut off.
 fn is_text(head: &[u8]) -> bool {
     let text = match std::str::from_utf8(head) {
         Ok(text) => text,
@@ -140,7 +141,7 @@ fn is_text(head: &[u8]) -> bool {
     !text.is_empty() && text.chars().all(|c| !c.is_control() || c.is_ascii_whitespace())
 }
 
-/// The length of a file that can be given to the kernel; looks at nothing in it.
+/// The length of a file that the kernel can read; the content is not checked.
 pub(super) fn length(path: &Path) -> Result<u64, LoadError> {
     let meta = fs::metadata(path).map_err(|source| LoadError::unreadable(path, source))?;
     if !meta.is_file() {
@@ -150,7 +151,7 @@ pub(super) fn length(path: &Path) -> Result<u64, LoadError> {
     Ok(meta.len())
 }
 
-/// Refuses a file that is no bitstream as the kernel takes it.
+/// Refuses a file that the kernel does not take as a bitstream.
 pub(super) fn require_bitstream(path: &Path) -> Result<(), LoadError> {
     let mut head = Vec::new();
     File::open(path)
@@ -162,7 +163,7 @@ pub(super) fn require_bitstream(path: &Path) -> Result<(), LoadError> {
     }
 }
 
-/// Refuses what is no compiled device tree, or is cut off.
+/// Refuses a file that is no compiled device tree, or is truncated.
 pub(super) fn require_overlay(path: &Path, tree: &[u8]) -> Result<(), LoadError> {
     let wrong =
         |found: &str| Err(LoadError::Overlay { path: path.to_owned(), found: found.to_owned() });
@@ -193,7 +194,7 @@ mod tests {
         other_format(head).map(|(what, _)| what)
     }
 
-    /// Bytes with others at a place.
+    /// Zeros with `bytes` at offset `at`.
     fn with(at: usize, bytes: &[u8]) -> Vec<u8> {
         let mut head = vec![0; HEAD_BYTES];
         head[at..at + bytes.len()].copy_from_slice(bytes);
@@ -207,7 +208,7 @@ mod tests {
             assert_eq!(found(&with(at, &SYNC_UNTURNED)), Some(UNTURNED), "{at}");
         }
         assert_eq!(found(&SYNC), None, "a short one");
-        // The word that comes first is the sync word.
+        // The first sync word decides.
         let both = |first: [u8; 4], then: [u8; 4]| found(&[first, [0; 4], then].concat());
         assert_eq!(both(SYNC, SYNC_UNTURNED), None);
         assert_eq!(both(SYNC_UNTURNED, SYNC), Some(UNTURNED));
@@ -221,7 +222,7 @@ mod tests {
         let mut bit = BIT_HEADER.to_vec();
         bit.extend(b"\x00\x10design_1;UserID");
         bit.extend(SYNC_UNTURNED);
-        // A header may be followed by turned words, too.
+        // Byte-swapped words may follow a header, too.
         let mut turned_bit = BIT_HEADER.to_vec();
         turned_bit.extend(SYNC);
         let image = |at| with(at, &[&SYNC[..], b"XNLX"].concat());

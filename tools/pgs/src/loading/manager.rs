@@ -1,4 +1,4 @@
-//! Has the kernel's FPGA manager program the logic.
+//! Programs the logic through the kernel's FPGA manager.
 
 use std::io;
 
@@ -18,7 +18,7 @@ pub(super) struct Manager {
 }
 
 impl Manager {
-    /// The manager of choice; by itself the logic's own.
+    /// The chosen manager; by default the manager of the programmable logic.
     pub(super) fn find(
         system: &dyn System,
         choice: &ManagerChoice,
@@ -35,7 +35,7 @@ impl Manager {
         if !directory.join("firmware").exists() {
             return Err(LoadError::NoFirmwareFile { manager, directory });
         }
-        // The oldest vendor kernels have no flags, and load full bitstreams.
+        // The oldest vendor kernels have no flags, and load full bitstreams only.
         let has_flags = directory.join("flags").exists();
         if partial && !has_flags {
             return Err(LoadError::NoFlags { manager, directory });
@@ -43,12 +43,12 @@ impl Manager {
         Ok(Self { found, has_flags })
     }
 
-    /// `fpga0`.
+    /// The device's name, as `fpga0`.
     pub(super) fn id(&self) -> &str {
         &self.found.device
     }
 
-    /// What the driver calls itself.
+    /// The driver's name.
     pub(super) fn name(&self) -> &str {
         &self.found.name
     }
@@ -57,7 +57,7 @@ impl Manager {
         Ok(self.found.state()?)
     }
 
-    /// Programs the logic and waits for it; the state afterwards, which is "operating".
+    /// Programs the logic and waits for it; returns the state afterwards, "operating".
     pub(super) fn program(
         &self,
         system: &dyn System,
@@ -72,7 +72,7 @@ impl Manager {
                 .write(&path, flags.as_bytes())
                 .map_err(|source| LoadError::attribute(&path, source))?;
         }
-        // The kernel answers this write when the logic is programmed, or when that failed.
+        // The kernel answers this write when programming has ended or failed.
         let path = attribute("firmware");
         if let Err(source) = system.write(&path, firmware.as_bytes()) {
             let unwritable = [io::ErrorKind::PermissionDenied, io::ErrorKind::ReadOnlyFilesystem];
@@ -91,7 +91,7 @@ impl Manager {
         Ok(state)
     }
 
-    /// What else the manager says of a failure.
+    /// Further details that the manager reports of a failure.
     fn detail(&self) -> String {
         match read(&self.found.directory.join("status")) {
             Ok(status) if !status.is_empty() => format!(" ({})", status.replace('\n', ", ")),

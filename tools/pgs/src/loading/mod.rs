@@ -1,4 +1,4 @@
-//! Loads a bitstream through the kernel: everything is looked at first, so that a refusal leaves the
+//! Loads a bitstream through the kernel. All checks come first, so that a refusal leaves the
 //! board as it was.
 //!
 //! ```text
@@ -6,7 +6,8 @@
 //!       -> fpga_manager -> state? -> overlay -> status? -> UIO node?
 //! ```
 //!
-//! Who opens a node between the second look for users and the write to the manager is not seen.
+//! A program that opens a node between the second look for users and the write to the manager goes
+//! unnoticed.
 //!
 //! Source: linux-xlnx, `drivers/fpga/fpga-mgr.c` (attributes `flags`, `firmware`, `state`) and
 //! `drivers/of/configfs.c` (`overlays/<name>/{dtbo,status}`); mainline has neither.
@@ -32,47 +33,47 @@ use bitstream_model::interface::address_map::{
 use zynq_pgs::platform::{UioListing, uio_listing};
 use zynq_pgs::{ManagerChoice, UioNode};
 
-pub(crate) use error::LoadError;
+pub(crate) use error::{AtFault, LoadError};
 pub(crate) use system::{Linux, System};
 
 use firmware::Firmware;
 use manager::Manager;
 use overlay::Overlays;
 
-/// The state of a manager whose logic runs.
+/// The manager's state while its logic runs.
 const OPERATING: &str = "operating";
 
-/// What to load.
+/// A bitstream to load.
 #[derive(Debug, Clone)]
 pub(crate) struct Request {
     pub(crate) bitstream: PathBuf,
     pub(crate) overlay: Option<PathBuf>,
     pub(crate) partial: bool,
     pub(crate) manager: ManagerChoice,
-    /// Whether overlays and drivers of others, bound to the logic, are no obstacle.
+    /// Whether to load although overlays and drivers of others are bound to the logic.
     pub(crate) replace_others: bool,
 }
 
-/// What was loaded.
+/// A loaded bitstream.
 #[derive(Debug, Clone)]
 pub(crate) struct Loaded {
     pub(crate) bytes: u64,
-    /// What the manager was told to load, below the kernel's firmware folder.
+    /// The firmware name given to the manager, relative to the kernel's firmware folder.
     pub(crate) firmware: String,
-    /// Whether that was a copy, which is gone again.
+    /// Whether the file was copied for loading; the copy is removed.
     pub(crate) copied: bool,
     pub(crate) manager: String,
     pub(crate) manager_name: String,
     pub(crate) state_before: String,
     pub(crate) state: String,
     pub(crate) time: Duration,
-    /// Name of the overlay that was applied.
+    /// Name of the applied overlay.
     pub(crate) overlay: Option<&'static str>,
     /// The UIO nodes of the logic, by number.
     pub(crate) nodes: Vec<UioNode>,
 }
 
-/// Loads a bitstream, and applies an overlay if one is asked for.
+/// Loads a bitstream, and applies an overlay if the request names one.
 pub(crate) fn load(system: &dyn System, request: &Request) -> Result<Loaded, LoadError> {
     let bytes = format::length(&request.bitstream)?;
     let tree = request.overlay.as_deref();
@@ -102,7 +103,7 @@ pub(crate) fn load(system: &dyn System, request: &Request) -> Result<Loaded, Loa
 
     let state_before = manager.state()?;
     let firmware = Firmware::provide(system, &request.bitstream)?;
-    // Copying a bitstream takes long enough for a program to start.
+    // Copying a bitstream takes long enough for another program to start.
     users::refuse_if_open(system, &nodes(system)?)?;
     let start = Instant::now();
     let state = manager.program(system, firmware.name(), request.partial)?;
@@ -138,14 +139,14 @@ fn nodes(system: &dyn System) -> Result<UioListing, LoadError> {
     Ok(uio_listing(&system.path("sys/class/uio"))?)
 }
 
-/// Whether a node is one of the accelerator's, or of its memory, by its name.
+/// Whether a node is the accelerator or its memory, by its name.
 fn is_ours(node: &UioNode) -> bool {
     let rest = node.name.strip_prefix(UIO_NODE);
     rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
 }
 
-/// Whether a node has registers of the accelerator, by its name or where they are; its memory is in
-/// the base tree.
+/// Whether a node has registers of the accelerator, by its name or its addresses. The memory does
+/// not count: its node is in the base tree.
 fn is_accelerator(node: &UioNode) -> bool {
     let end = CONTROL_BASE + u64::from(CONTROL_BYTES);
     let there = |address: u64| (DMA_BASE..end).contains(&address);

@@ -1,4 +1,4 @@
-//! Finds overlays, and drivers of the kernel, that are bound to the logic which a bitstream replaces.
+//! Finds overlays and kernel drivers that are bound to the logic which a bitstream replaces.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,12 +9,12 @@ use super::LoadError;
 use super::overlay::{self, NAME};
 use super::system::{System, read};
 
-/// The kernel's devices with an address.
+/// Devices of the kernel, named by address.
 const DEVICES: &str = "sys/bus/platform/devices";
-/// Drivers that hand a device to programs, of which `users` knows.
+/// Drivers that hand a device to programs; `users` checks these.
 const UIO_DRIVERS: [&str; 2] = ["uio_pdrv_genirq", "uio_dmem_genirq"];
 
-/// Refuses if an overlay that is not ours is applied, or a driver of the kernel is bound to the logic.
+/// Refuses if an overlay of another name is applied, or a kernel driver is bound to the logic.
 pub(super) fn refuse_if_bound(system: &dyn System) -> Result<(), LoadError> {
     let overlays = overlays(system)?;
     if !overlays.is_empty() {
@@ -27,10 +27,10 @@ pub(super) fn refuse_if_bound(system: &dyn System) -> Result<(), LoadError> {
     Ok(())
 }
 
-/// Overlays of other names that are applied, or may be, and what each says of itself.
+/// Overlays of other names that are or may be applied, with their status.
 fn overlays(system: &dyn System) -> Result<Vec<(PathBuf, String)>, LoadError> {
     let Ok(directory) = overlay::interface(system) else {
-        log::info!("there is no interface for overlays: whether one is applied is not known");
+        log::info!("without an interface for overlays, an applied one does not show");
         return Ok(Vec::new());
     };
     let entries = fs::read_dir(&directory);
@@ -42,7 +42,7 @@ fn overlays(system: &dyn System) -> Result<Vec<(PathBuf, String)>, LoadError> {
         }
         let status = read(&path.join("status"));
         let status = status.unwrap_or_else(|error| format!("its status cannot be read: {error}"));
-        // One that was made, and into which no tree was written, binds nothing.
+        // An overlay directory without a tree binds nothing.
         if status != "unapplied" {
             others.push((path, status));
         }
@@ -51,11 +51,11 @@ fn overlays(system: &dyn System) -> Result<Vec<(PathBuf, String)>, LoadError> {
     Ok(others)
 }
 
-/// Drivers that are bound to devices of the logic, and to which.
+/// Drivers bound to devices of the logic, with the devices.
 fn drivers(devices: &Path) -> Vec<String> {
     let Ok(entries) = fs::read_dir(devices) else { return Vec::new() };
     let bound = |path: PathBuf| {
-        // `a0000000.dma`: the address of its first register.
+        // `a0000000.dma` begins with the address of the device's first register.
         let id = path.file_name()?.to_str()?.to_owned();
         let (address, _) = id.split_once('.')?;
         let address = u64::from_str_radix(address, 16).ok()?;

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use super::LoadError;
 use super::system::{System, read};
 
-/// Where configfs usually is; the second is where the vendor's fpgautil mounts it.
+/// Usual mount points of configfs; the vendor's fpgautil uses the second.
 const MOUNTS: [&str; 2] = ["sys/kernel/config", "configfs"];
-/// Where the overlays are, below it.
+/// The overlays' folder in configfs.
 const OVERLAYS: &str = "device-tree/overlays";
-/// The name of ours.
+/// The name of this project's overlay.
 pub(super) const NAME: &str = "pgs";
 
-/// The directory of the overlays.
+/// The folder of the overlays.
 pub(super) fn interface(system: &dyn System) -> Result<PathBuf, LoadError> {
     let usual = MOUNTS.map(|mount| system.path(mount));
     let elsewhere = mounts(&read(&system.path("proc/mounts")).unwrap_or_default())
@@ -23,7 +23,7 @@ pub(super) fn interface(system: &dyn System) -> Result<PathBuf, LoadError> {
         return Ok(overlays);
     }
     let searched = usual[0].clone();
-    // A mounted configfs has the entries of some subsystem.
+    // A mounted configfs has an entry for each subsystem.
     let entries = searched.read_dir().is_ok_and(|mut entries| entries.next().is_some());
     let mounted = entries || !elsewhere.is_empty();
     let reason = match mounted {
@@ -33,7 +33,7 @@ pub(super) fn interface(system: &dyn System) -> Result<PathBuf, LoadError> {
     Err(LoadError::NoOverlays { searched, reason, mounted })
 }
 
-/// Where configfs is mounted, by the kernel's table of mounts; below the root.
+/// Mount points of configfs in the kernel's table of mounts, relative to the root.
 fn mounts(table: &str) -> impl Iterator<Item = &str> {
     table.lines().filter_map(|line| {
         let mut words = line.split_ascii_whitespace().skip(1);
@@ -42,14 +42,14 @@ fn mounts(table: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// The place for an overlay that is not there yet.
+/// The folder of an overlay that does not exist yet.
 #[derive(Debug)]
 pub(super) struct Overlays {
     directory: PathBuf,
 }
 
 impl Overlays {
-    /// Finds the interface; refuses if the overlay is applied already.
+    /// Finds the folder; refuses if the overlay is applied already.
     pub(super) fn find(system: &dyn System) -> Result<Self, LoadError> {
         let directory = interface(system)?.join(NAME);
         if directory.exists() {
@@ -59,12 +59,13 @@ impl Overlays {
         Ok(Self { directory })
     }
 
-    /// Applies a compiled overlay; its name.
+    /// Applies a compiled overlay; returns its name.
     pub(super) fn apply(self, system: &dyn System, tree: &[u8]) -> Result<&'static str, LoadError> {
         system
             .make_directory(&self.directory)
             .map_err(|source| LoadError::attribute(&self.directory, source))?;
-        // The kernel applies it when the file is closed, and tells of failure in the status only.
+        // The kernel applies the overlay when the file is closed, and reports a failure in the
+        // status only.
         let written = system.write(&self.directory.join("dtbo"), tree);
         let status = read(&self.directory.join("status")).unwrap_or_else(|error| error.to_string());
         if written.is_ok() && status == "applied" {

@@ -1,4 +1,4 @@
-//! This file is what loading does to the system; a test puts a kernel of its own in its place.
+//! Everything that loading does to the system; tests replace it with a kernel of their own.
 
 use std::fmt::Debug;
 use std::fs::{self, OpenOptions};
@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 
 /// The files of a Linux system.
 pub(crate) trait System: Debug {
-    /// Where a path, without its leading slash, really is.
+    /// Resolves a path without its leading slash.
     fn path(&self, path: &str) -> PathBuf;
 
-    /// Writes an attribute of the kernel's, in one piece; it has to be there.
+    /// Writes an existing attribute of the kernel in one piece.
     fn write(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = OpenOptions::new().write(true).truncate(true).open(path)?;
-        // The kernel acts on each write: a second one would be another value.
+        // The kernel acts on each write: a second write would set another value.
         let written = file.write(bytes)?;
         if written != bytes.len() {
             return Err(io::Error::new(
@@ -24,28 +24,28 @@ pub(crate) trait System: Debug {
         file.flush()
     }
 
-    /// Makes a directory, which may stand for an object of the kernel's.
+    /// Makes a folder, which may create an object of the kernel.
     fn make_directory(&self, path: &Path) -> io::Result<()> {
         fs::create_dir(path)
     }
 
-    /// Removes such a directory; the kernel's attributes in it do not count.
+    /// Removes such a folder; attributes of the kernel in it do not keep it.
     fn remove_directory(&self, path: &Path) -> io::Result<()> {
         fs::remove_dir(path)
     }
 
-    /// Copies a file to where none is.
+    /// Copies a file to a path that does not exist yet.
     fn copy(&self, from: &Path, to: &Path) -> io::Result<()> {
         let mut source = fs::File::open(from)?;
         let mut target = OpenOptions::new().write(true).create_new(true).open(to)?;
         io::copy(&mut source, &mut target).and_then(|_| target.sync_all()).inspect_err(|_| {
-            // Half a file is worse than none; the error that counts is the first.
+            // Half a file is worse than none; the first error is reported.
             let _ = fs::remove_file(to);
         })
     }
 }
 
-/// This system, or the files of one below a directory.
+/// This system, or the files of one below a folder.
 #[derive(Debug, Clone)]
 pub(crate) struct Linux {
     pub(crate) root: PathBuf,
@@ -57,7 +57,7 @@ impl System for Linux {
     }
 }
 
-/// An attribute's text.
+/// Reads an attribute's text.
 pub(super) fn read(path: &Path) -> io::Result<String> {
     fs::read_to_string(path).map(|text| text.trim().to_owned())
 }

@@ -1,4 +1,4 @@
-//! Finds the programs that may be using the logic: that have a UIO node of it, or `/dev/mem`, open or
+//! Finds programs that may use the logic: programs with a UIO node of it, or `/dev/mem`, open or
 //! mapped.
 
 use std::fs;
@@ -11,30 +11,30 @@ use zynq_pgs::platform::{UioListing, UnreadableNode};
 use super::system::{System, read};
 use super::{LoadError, is_ours};
 
-/// Through it every register is reached past the nodes.
+/// Reaches every register without a UIO node.
 const ALL_MEMORY: &str = "dev/mem";
-/// Its number.
+/// Device number of `/dev/mem`.
 const ALL_MEMORY_NUMBER: &str = "1:1";
 
-/// A device file through which the logic is reached.
+/// A device file that reaches the logic.
 #[derive(Debug)]
 struct Device {
-    /// Where it is, below whatever root: a program in a chroot has it below another.
+    /// Its path, independent of a root: a program in a chroot has it below another one.
     path: PathBuf,
-    /// Its number, as sysfs writes it, under whatever path it is opened.
+    /// Its device number, as sysfs writes it: the same under every path.
     number: Option<String>,
-    /// How a message names it.
+    /// Its name in a message.
     text: String,
 }
 
-/// Refuses if a program has a node of the logic, or all memory.
+/// Refuses if a program has a node of the logic, or all memory, open.
 pub(super) fn refuse_if_open(system: &dyn System, listing: &UioListing) -> Result<(), LoadError> {
     let device = |device: &str, name: &str| {
         let path = Path::new("dev").join(device);
         let number = read(&system.path("sys/class/uio").join(device).join("dev")).ok();
         Device { text: format!("/{} ({name})", path.display()), path, number }
     };
-    // What a node shows that cannot be read is not known: the logic, perhaps.
+    // A node that cannot be read may show the logic.
     let unreadable =
         listing.unreadable.iter().map(|UnreadableNode { device: id, name, .. }| {
             device(id, &name.as_ref().map_or_else(|| "unreadable".to_owned(), |n| format!("{n:?}")))
@@ -54,22 +54,22 @@ pub(super) fn refuse_if_open(system: &dyn System, listing: &UioListing) -> Resul
     Err(LoadError::InUse { users: of_it.collect::<Vec<_>>().join(", "), device })
 }
 
-/// A process, and what it has.
+/// A process and its files.
 #[derive(Debug)]
 struct User<'a> {
     device: &'a str,
     text: String,
 }
 
-/// A file that a process has.
+/// A file of a process.
 #[derive(Debug)]
-struct Held {
+struct HeldFile {
     path: PathBuf,
     number: Option<String>,
 }
 
-impl Held {
-    /// By what the kernel shows of it, which it marks if the name is gone.
+impl HeldFile {
+    /// Reads the kernel's link to the file, which is marked if the name is deleted.
     fn new(shown: &Path, number: Option<String>) -> Self {
         let text = shown.to_string_lossy();
         Self { path: text.strip_suffix(" (deleted)").unwrap_or(&text).into(), number }
@@ -83,7 +83,8 @@ impl Held {
     }
 }
 
-/// Processes that have one of the devices, by device and number; what ends meanwhile does not count.
+/// Processes that hold one of the devices, with the device and the process id; a process that ends
+/// meanwhile is left out.
 fn users<'a>(proc: &Path, devices: &'a [Device]) -> Result<Vec<User<'a>>, LoadError> {
     let entries = match fs::read_dir(proc) {
         Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -108,36 +109,36 @@ fn users<'a>(proc: &Path, devices: &'a [Device]) -> Result<Vec<User<'a>>, LoadEr
         }
     }
     if hidden > 0 {
-        log::warn!("what {hidden} processes of others have open is not known");
+        log::warn!("{hidden} processes of other users hide their open files");
     }
     users.sort_unstable_by_key(|(place, id, _)| (*place, *id));
     Ok(users.into_iter().map(|(.., user)| user).collect())
 }
 
 /// Adds the files that a process has open.
-fn add_open(process: &Path, files: &mut Vec<Held>) -> io::Result<()> {
+fn add_open(process: &Path, files: &mut Vec<HeldFile>) -> io::Result<()> {
     for file in fs::read_dir(process.join("fd"))?.filter_map(Result::ok) {
         let Ok(shown) = fs::read_link(file.path()) else { continue };
         let meta = fs::metadata(file.path()).ok();
         let meta = meta.filter(|meta| meta.file_type().is_char_device());
-        files.push(Held::new(&shown, meta.map(|meta| number_text(meta.rdev()))));
+        files.push(HeldFile::new(&shown, meta.map(|meta| number_text(meta.rdev()))));
     }
     Ok(())
 }
 
-/// The number of a device as sysfs writes it, from the C library's.
+/// Writes a device number of the C library as sysfs does.
 fn number_text(number: u64) -> String {
     let major = ((number >> 32) & !0xFFF) | ((number >> 8) & 0xFFF);
     let minor = ((number >> 12) & 0xFFFF_FF00) | (number & 0xFF);
     format!("{major}:{minor}")
 }
 
-/// Adds the files that it has mapped: a mapping stays when its file is closed.
-fn add_mapped(process: &Path, files: &mut Vec<Held>) -> io::Result<()> {
-    // Addresses, rights, offset, device, inode, and the file if there is one.
+/// Adds the files that a process has mapped: a mapping outlives the open file.
+fn add_mapped(process: &Path, files: &mut Vec<HeldFile>) -> io::Result<()> {
+    // Columns: addresses, rights, offset, device, inode, and the file if there is one.
     let file = |line: &str| line.split_ascii_whitespace().nth(5).map(PathBuf::from);
     let maps = fs::read_to_string(process.join("maps"))?;
-    files.extend(maps.lines().filter_map(file).map(|path| Held::new(&path, None)));
+    files.extend(maps.lines().filter_map(file).map(|path| HeldFile::new(&path, None)));
     Ok(())
 }
 
@@ -153,7 +154,7 @@ mod tests {
             text: String::new(),
         };
         let held = |path: &str, number: Option<&str>| {
-            Held::new(Path::new(path), number.map(str::to_owned))
+            HeldFile::new(Path::new(path), number.map(str::to_owned))
         };
         for (path, found) in [
             ("/dev/uio3", true),

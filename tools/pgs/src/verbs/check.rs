@@ -7,11 +7,11 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
 
-use super::SCHEMA;
-use crate::args::CommonArgs;
-use crate::board::{self, Chosen};
+use crate::board::{self, ChosenBoard};
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
-use crate::options::BuildArgs;
+use crate::options::build::BuildArgs;
+use crate::output::SCHEMA;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -23,18 +23,19 @@ Examples:
 Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
 3 if there is no board. The emulated board is tested only if --board or PGS_BOARD asks for it.";
 
-/// Test a board: identity, reset, DMA, data both ways, coherency, interrupt; what to do if it fails.
+/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt; a failure
+/// names the next step.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CheckArgs {
-    /// Build the emulated board wrongly, to see what the test says
+    /// Build the emulated board with a defect, to see how the test reports it
     #[arg(long, value_enum, value_name = "QUIRK", help_heading = "Emulated board")]
     quirk: Option<QuirkName>,
     #[command(flatten)]
     build: BuildArgs,
 }
 
-/// A way to build the emulated board wrongly.
+/// A defect of the emulated board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum QuirkName {
     /// Another design's identification
@@ -58,7 +59,7 @@ enum QuirkName {
 }
 
 impl QuirkName {
-    /// From here on buffers are stale: an offset to be found in the report.
+    /// Offset in the report from which buffers are stale.
     const STALE_FROM: usize = 0x400;
 
     fn quirks(self) -> Quirks {
@@ -85,9 +86,9 @@ impl CheckArgs {
         BoardConfig { quirks, ..self.build.config() }
     }
 
-    /// The first option that only an emulated board has.
-    fn given(&self) -> Option<&'static str> {
-        self.quirk.map(|_| "--quirk").or(self.build.given())
+    /// The first given option that only an emulated board has.
+    fn board_option(&self) -> Option<&'static str> {
+        self.quirk.map(|_| "--quirk").or(self.build.board_option())
     }
 }
 
@@ -98,7 +99,8 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     board::require(common)?;
-    let Chosen { kind, options, reason, .. } = board::find(common, args.config(), args.given())?;
+    let ChosenBoard { kind, options, reason, .. } =
+        board::find(common, args.config(), args.board_option())?;
     let report = check(options).map_err(board::unusable)?;
     let kind = board::kind_text(kind);
     if common.json {

@@ -1,4 +1,4 @@
-//! The verb `load`: a bitstream into the logic, and an overlay into the device tree.
+//! The verb `load`: loads a bitstream into the logic, and an overlay into the device tree.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -6,38 +6,39 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::SCHEMA;
-use super::milliseconds;
-use crate::args::CommonArgs;
-use crate::failure::{Failure, Verdict};
-use crate::loading::{self, Linux, LoadError, Request};
+use crate::common::CommonArgs;
+use crate::failure::{Cause, Failure, Verdict};
+use crate::loading::{self, AtFault, Linux, LoadError, Request};
+use crate::output::SCHEMA;
+use crate::output::milliseconds;
 
 const EXAMPLES: &str = "\
 Examples:
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs load zynq-pgs.bit.bin
   pgs load --json /lib/firmware/xilinx/zynq-pgs/zynq-pgs.bit.bin
-  pgs load zynq-pgs.bit.bin --manager fpga1    where several FPGA managers may be the ZynqMP's
+  pgs load zynq-pgs.bit.bin --manager fpga1    if several FPGA managers may be the ZynqMP's
 
-Needs root and the vendor's kernel. A file outside the kernel's firmware folders is copied there while
-it is loaded. Refused while a program has a UIO node of the logic or /dev/mem open; and, unless
---replace-others is given, while another overlay is applied or a driver is bound to the logic.
-Remove the overlay by rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
+Needs root and the vendor's kernel. A file outside the kernel's firmware folders is copied there
+during loading. The command refuses to load while a program has a UIO node of the logic or /dev/mem
+open. Without --replace-others it also refuses while another overlay is applied or a driver is
+bound to the logic. Remove the overlay by rmdir /sys/kernel/config/device-tree/overlays/pgs; see
+device-tree/README.md.";
 
 /// Load a bitstream into the board through the kernel's FPGA manager.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct LoadArgs {
-    /// Bitstream, as bootgen makes it (.bit.bin).
+    /// Bitstream in bootgen's format (.bit.bin).
     file: PathBuf,
-    /// Compiled overlay to apply once the bitstream is there.
+    /// Compiled overlay, applied after the bitstream is loaded.
     #[arg(long, value_name = "DTBO")]
     overlay: Option<PathBuf>,
     /// The bitstream is a partial one.
     #[arg(long)]
     partial: bool,
-    /// Load although other overlays, or drivers of the kernel, are bound to the logic: they stay, and
-    /// what they do next with the new logic is not known.
+    /// Load although other overlays or kernel drivers are bound to the logic. They stay bound, and
+    /// their behaviour with the new logic is unknown.
     #[arg(long)]
     replace_others: bool,
     /// Directory that holds the system's files, for tests.
@@ -48,7 +49,12 @@ pub(crate) struct LoadArgs {
 impl From<LoadError> for Failure {
     fn from(error: LoadError) -> Self {
         let next = error.next();
-        Self::new(error.cause(), error).next(next)
+        let cause = match error.at_fault() {
+            AtFault::Caller => Cause::Input,
+            AtFault::System => Cause::NoBoard,
+            AtFault::Logic => Cause::Hardware,
+        };
+        Self::new(cause, error).next(next)
     }
 }
 

@@ -2,104 +2,65 @@
 
 pub(crate) mod check;
 pub(crate) mod compare;
-pub(crate) mod facts;
 pub(crate) mod faults;
 pub(crate) mod formats;
 pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
 pub(crate) mod order;
-mod progress;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;
-pub(crate) mod table;
 
 use std::io::Write;
-use std::time::Duration;
 
-use serde_json::{Value, json};
-use zynq_pgs::{Limit, StepReport};
+use clap::Subcommand;
 
-use crate::args::{Command, Verb};
+use self::check::CheckArgs;
+use self::compare::CompareArgs;
+use self::faults::FaultsArgs;
+use self::formats::FormatsArgs;
+use self::list::ListArgs;
+use self::load::LoadArgs;
+use self::model::ModelArgs;
+use self::order::OrderArgs;
+use self::run::RunArgs;
+use self::serve::ServeArgs;
+use self::solve::SolveArgs;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 
-/// Number of the JSON documents' layout; it grows when a key changes its meaning or goes.
-pub(crate) const SCHEMA: u32 = 1;
+/// A verb and its options.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum Verb {
+    Run(RunArgs),
+    Solve(SolveArgs),
+    Compare(CompareArgs),
+    Formats(FormatsArgs),
+    Model(ModelArgs),
+    Order(OrderArgs),
+    List(ListArgs),
+    Load(LoadArgs),
+    Serve(ServeArgs),
+    Check(CheckArgs),
+    Faults(FaultsArgs),
+}
 
-/// Runs the command and writes its results to `out`.
-pub(crate) fn run(command: &Command, out: &mut dyn Write) -> Result<Verdict, Failure> {
-    match &command.verb {
-        Verb::Run(args) => run::run(args, &command.common, out),
-        Verb::Compare(args) => compare::run(args, &command.common, out),
-        Verb::Formats(args) => formats::run(args, &command.common, out),
-        Verb::Solve(args) => solve::run(args, &command.common, out),
-        Verb::Model(args) => model::run(args, &command.common, out),
-        Verb::Order(args) => order::run(args, &command.common, out),
-        Verb::List(args) => list::run(args, &command.common, out),
-        Verb::Serve(args) => serve::run(args, &command.common, out),
-        Verb::Load(args) => load::run(args, &command.common, out),
-        Verb::Faults(args) => faults::run(args, &command.common, out),
-        Verb::Check(args) => check::run(args, &command.common, out),
+impl Verb {
+    /// Runs the verb and writes its results to `out`.
+    pub(crate) fn run(&self, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict, Failure> {
+        match self {
+            Self::Run(args) => run::run(args, common, out),
+            Self::Solve(args) => solve::run(args, common, out),
+            Self::Compare(args) => compare::run(args, common, out),
+            Self::Formats(args) => formats::run(args, common, out),
+            Self::Model(args) => model::run(args, common, out),
+            Self::Order(args) => order::run(args, common, out),
+            Self::List(args) => list::run(args, common, out),
+            Self::Load(args) => load::run(args, common, out),
+            Self::Serve(args) => serve::run(args, common, out),
+            Self::Check(args) => check::run(args, common, out),
+            Self::Faults(args) => faults::run(args, common, out),
+        }
     }
-}
-
-/// A time in milliseconds.
-pub(crate) fn milliseconds(duration: Duration) -> f64 {
-    duration.as_secs_f64() * 1e3
-}
-
-/// The name of a limit.
-pub(crate) fn limit_text(limit: Limit) -> &'static str {
-    match limit {
-        Limit::Pipeline => "pipeline",
-        Limit::Hazards => "hazards",
-        Limit::Streams => "streams",
-        Limit::Unknown => "unknown",
-        _ => "other",
-    }
-}
-
-/// A step's report for programs.
-fn report_json(report: &StepReport) -> Value {
-    let StepReport { cycles, host, saturated, .. } = report;
-    // What is not known is null; the key beside it says why.
-    let known = |saturated: bool, count: u64| (!saturated).then_some(count);
-    json!({
-        "bodies": report.bodies,
-        "collisions": report.collisions,
-        "order": crate::ordering::to_json(report),
-        "passes": report.passes,
-        "impulse_sum_n_s": report.impulse_sum,
-        "impulse_sum_saturated": saturated.impulse_sum,
-        "cycles": {
-            "total": cycles.total,
-            "formula": known(saturated.work, cycles.work),
-            "formula_saturated": saturated.work,
-            "stalls": known(saturated.stalls(), cycles.stalls),
-            "waits": known(saturated.waits, cycles.waits),
-            "waits_saturated": saturated.waits,
-        },
-        "modelled_ms": milliseconds(report.modelled_time()),
-        "limit": limit_text(report.limit()),
-        "hazards": known(saturated.hazards, report.hazards),
-        "hazards_saturated": saturated.hazards,
-        "bytes_to_device": report.bytes_to_device,
-        "bytes_from_device": report.bytes_from_device,
-        "register_reads": report.register_reads,
-        "register_writes": report.register_writes,
-        "doorbells": report.doorbells,
-        "interrupts": report.interrupts,
-        "descriptors": report.descriptors,
-        "retries": report.retries,
-        "host_ms": {
-            "validate": milliseconds(host.validate),
-            "order": milliseconds(host.order),
-            "pack": milliseconds(host.pack),
-            "start": milliseconds(host.start),
-            "wait": milliseconds(host.wait),
-            "unpack": milliseconds(host.unpack),
-            "commit": milliseconds(host.commit),
-        },
-    })
 }

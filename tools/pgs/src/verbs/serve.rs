@@ -1,4 +1,4 @@
-//! The verb `serve`: an emulated board as a process of its own.
+//! The verb `serve`: runs an emulated board as a process of its own.
 
 use std::fs;
 use std::io::{self, Write};
@@ -7,20 +7,20 @@ use std::path::PathBuf;
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::interface::message::MEMORY_SUFFIX;
-use bitstream_model::remote::{Ended, MemoryFile, ServeError, Server, Visit};
+use bitstream_model::remote::{Ended, MemoryFile, MemoryFileError, ServeError, Server, Visit};
 use clap::Args;
 use serde_json::json;
 use zynq_pgs::{MemoryChoice, StepParameters};
 
-use super::SCHEMA;
-use super::table::grouped;
-use crate::args::{BoardName, CommonArgs};
 use crate::board::not_built;
-use crate::build::described;
+use crate::common::{BoardName, CommonArgs};
 use crate::failure::{Cause, Failure, Verdict};
 use crate::interrupt;
-use crate::options::BuildArgs;
-use crate::planned::PlannedArgs;
+use crate::numbers::grouped;
+use crate::options::build::BuildArgs;
+use crate::options::build_text::described;
+use crate::options::planned::PlannedArgs;
+use crate::output::SCHEMA;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -29,19 +29,20 @@ Examples:
   pgs serve --socket /tmp/board --memory file:/dev/shm/board --profile half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
 
-One driver at a time has the board. One that is killed leaves it as it is, engines running; the next
-one resets it. Ctrl-C ends it and removes the socket; the memory's file stays.";
+One driver at a time has the board; a connection that says nothing for 5 s is closed. A killed
+driver leaves the engines running, and the next driver resets them. Ctrl-C ends the server and
+removes the socket; the memory's file stays.";
 
 /// Serve an emulated board to drivers in other processes: registers at a Unix socket, memory in a
 /// file.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ServeArgs {
-    /// Unix socket to make. The memory is the file of that name and ".memory", unless --memory
-    /// names another.
+    /// Unix socket to create. The memory is the file with ".memory" appended to this name, unless
+    /// --memory names another.
     #[arg(long, value_name = "PATH")]
     pub(crate) socket: PathBuf,
-    /// Length of the memory, MiB [default: that of the file, 64 if there is none yet]
+    /// Length of the memory, MiB [default: that of the file; 64 for a new file]
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024))]
     memory_mib: Option<u64>,
     #[command(flatten)]
@@ -50,7 +51,7 @@ pub(crate) struct ServeArgs {
     planned: PlannedArgs,
 }
 
-/// What was served so far.
+/// Counts over all drivers.
 #[derive(Default)]
 struct Tally {
     drivers: u64,
@@ -81,13 +82,12 @@ pub(crate) fn run(
             return Err(Failure::input(error).next("write --memory file:PATH, or leave it out"));
         }
     };
-    // What a driver does wrong is told, and is not the end of the board for the next one.
+    // A driver's mistake is reported, and the board goes on to serve the next driver.
     let config = BoardConfig { strict: false, ..args.build.config() };
     let planned = args.planned.plan(&config, &StepParameters::default());
     let wanted = args.memory_mib.map(|mib| mib << 20);
     let made = !path.exists();
-    let memory =
-        MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(Failure::input)?;
+    let memory = MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(no_memory)?;
     let addresses = memory.addresses();
     let mut server = Server::bind(config, memory, &args.socket).map_err(|error| {
         let removed = if made { fs::remove_file(&path) } else { Ok(()) };
@@ -96,6 +96,10 @@ pub(crate) fn run(
         }
         match error {
             ServeError::Config(error) => not_built(error),
+            error @ ServeError::Socket { .. } => Failure::input(error).next(
+                "name a socket with --socket whose folder is there and may be written to, and whose \
+                 path has at most 107 bytes",
+            ),
             error => Failure::input(error),
         }
     })?;
@@ -119,7 +123,7 @@ pub(crate) fn run(
     let mut tally = Tally::default();
     let mut written = Ok(());
     let served = server.serve(|board, visit| {
-        // Somebody looked whether a board is served here.
+        // A visit without requests only tested whether a board is served here.
         if visit.requests == 0 && matches!(visit.ended, Ended::Left) {
             return;
         }
@@ -163,11 +167,24 @@ pub(crate) fn run(
     Ok(Verdict::Done)
 }
 
+/// There is no memory for the board.
+fn no_memory(error: MemoryFileError) -> Failure {
+    let no_room = matches!(error, MemoryFileError::NoRoom { .. });
+    let failure = Failure::input(error);
+    match no_room {
+        true => failure.next(
+            "give a smaller --memory-mib, make room, or name another file with --memory file:PATH; \
+             a container's /dev/shm is as large as its --shm-size says",
+        ),
+        false => failure,
+    }
+}
+
 fn at(number: u64) -> usize {
     usize::try_from(number).unwrap_or(usize::MAX)
 }
 
-/// One driver that is gone.
+/// Reports a driver that has left.
 fn line(out: &mut dyn Write, number: u64, visit: &Visit) -> io::Result<()> {
     let Visit { requests, ended, left_running, .. } = visit;
     write!(out, "driver {number:<3} {} requests, ", grouped(*requests))?;

@@ -1,4 +1,4 @@
-//! The verb `solve`: one step from a folder of arrays, and its comparison with expected arrays.
+//! The verb `solve`: takes one step from a folder of arrays, and compares it with expected arrays.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -8,24 +8,25 @@ use scene::kinetic_energy;
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Capabilities, StepParameters, StepReport};
 
-use super::SCHEMA;
-use super::facts::fact;
-use super::table::{Bound, grouped};
-use super::{limit_text, milliseconds};
-use crate::args::CommonArgs;
 use crate::board;
-use crate::compare::{self, Difference};
-use crate::diagnosis::FaultArgs;
+use crate::bug_report::FaultArgs;
+use crate::common::CommonArgs;
+use crate::difference::{self, Difference};
 use crate::failure::{Failure, Verdict};
-use crate::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use crate::interrupt::Interrupt;
-use crate::npy::{self, Dimensions};
-use crate::options::{BuildArgs, DeadlineArgs};
-use crate::ordering::{self, OrderingArgs};
-use crate::origin;
-use crate::planned::{self, PlannedArgs};
-use crate::solver::SolverArgs;
+use crate::numbers::{Bound, grouped};
+use crate::options::build::BuildArgs;
+use crate::options::ordering::OrderingArgs;
+use crate::options::planned::PlannedArgs;
+use crate::options::solver::{DeadlineArgs, SolverArgs};
+use crate::output::SCHEMA;
+use crate::output::facts::fact;
+use crate::output::order;
+use crate::output::{limit_text, milliseconds};
+use crate::step_input;
 use step_folder::digest;
+use step_folder::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
+use step_folder::npy::{self, Dimensions};
 
 const VELOCITIES_CONTACT: &str = "out_vel_contact.npy";
 const VELOCITIES_FRICTION: &str = "out_vel_friction.npy";
@@ -38,7 +39,8 @@ Examples:
   pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
   pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
 
-The folder holds one .npy array a property, in C order; metres, kilograms, seconds, radians, world frame:
+The folder holds one .npy array a property, in C order; metres, kilograms, seconds, radians, world
+frame:
 
   params            (8) <f4        time step, position drift, position coefficient, friction, angular
                                    damping, gravity x, y, z
@@ -53,18 +55,18 @@ The folder holds one .npy array a property, in C order; metres, kilograms, secon
   contact_npoints   (M) <u4        contact points of each collision, 1 to 4
   contact_normal    (M, 3) <f4     unit normal, which points from B to A
   contact_points    (M, 4, 4) <f4  x, y, z of a point on B's surface, and its signed distance d from A,
-                                   whose surface is at point + d * normal: negative is penetration.
-                                   Of the four only the first contact_npoints are read
+                                   whose surface is at point + d * normal; negative for penetration.
+                                   Only the first contact_npoints of the four are read
 
-A step needs at least one body. One without collisions has contact arrays of M = 0; an array without rows may
-also have shape (0,) and any type, as numpy.array([]) has. With position drift 0 and a position coefficient
-equal to the time step a distance is a velocity in m/s: the point is pushed apart at least as fast as a negative
-one says, and may approach as fast as a positive one says.
+A step needs at least one body. One without collisions has contact arrays of M = 0; an array
+without rows may also have shape (0,) and any type, as numpy.array([]) has. With position drift 0
+and a position coefficient equal to the time step, a distance is a velocity in m/s: a negative one
+is the least speed of separation, and a positive one the greatest speed of approach.
 
---no-integrate leaves the rest of a step to whoever calls: forces and gravity, damping, gyroscopic terms,
-motion. Poses come back as they were.
+--no-integrate leaves the rest of a step to the caller: forces and gravity, damping, gyroscopic
+terms, motion. Poses stay unchanged.
 
---out replaces earlier results together: where one cannot be written all stay as they were.";
+--out replaces earlier results together: if one cannot be written, all stay unchanged.";
 
 /// Take one step from a folder of arrays.
 #[derive(Debug, Clone, Args)]
@@ -73,17 +75,18 @@ pub(crate) struct SolveArgs {
     /// Folder of .npy arrays.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Write the results as arrays to this folder: `out_pos`, `out_quat`, `out_linvel`, `out_angvel`.
+    /// Write the results as arrays to this folder: `out_pos`, `out_quat`, `out_linvel`,
+    /// `out_angvel`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Compare bit by bit with the folder's own results; exit code 1 on a difference. With
-    /// --no-integrate, with the velocities after that many iterations.
+    /// Compare bit by bit with the expected results in the folder; exit code 1 on a difference.
+    /// With --no-integrate, compare with the velocities after that many iterations.
     #[arg(long)]
     compare: bool,
     /// Print the digest of the final state alone.
     #[arg(long, conflicts_with = "json")]
     digest: bool,
-    /// Stop after the solver: poses stay, velocities are undamped and without gravity.
+    /// Stop after the solver: poses stay, velocities are without damping and gravity.
     #[arg(long)]
     no_integrate: bool,
     #[command(flatten)]
@@ -101,14 +104,14 @@ pub(crate) struct SolveArgs {
 }
 
 impl SolveArgs {
-    /// The folder's parameters, with what the command line says otherwise, but for the order.
+    /// The folder's parameters, overridden by the command line; the order is not set yet.
     fn parameters(&self, folder: &StepParameters) -> StepParameters {
         let mut parameters = *folder;
         parameters.integrate = !self.no_integrate;
         self.faults.apply(self.deadline.apply(self.solver.apply(parameters)))
     }
 
-    /// The same with the order that a board is to be sent.
+    /// Sets the order in which the board gets the collisions.
     fn ordered(&self, parameters: StepParameters, capabilities: &Capabilities) -> StepParameters {
         match self.compare {
             true => self.ordering.apply_to_compare(parameters, capabilities),
@@ -127,7 +130,7 @@ struct Expected {
 enum Kind {
     /// One property.
     State(State),
-    /// Linear and angular velocities in turn.
+    /// Linear and angular velocities alternate.
     Velocities,
 }
 
@@ -137,7 +140,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let mut folder = origin::load(&args.folder)?;
+    let mut folder = step_input::load(&args.folder)?;
     let parameters = args.parameters(&folder.parameters);
     let expected = match args.compare {
         true => expected(&folder, &parameters)?,
@@ -148,7 +151,7 @@ pub(crate) fn run(
         .check_shapes(opened.accelerator.capabilities().shape_capacity)
         .map_err(Failure::input)?;
     let parameters = args.ordered(parameters, opened.accelerator.capabilities());
-    args.planned.inject(&mut opened, &parameters)?;
+    opened.inject(&args.planned, &parameters)?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
@@ -162,24 +165,24 @@ pub(crate) fn run(
         Ok(report) => report,
         Err(error) if board::is_cancelled(&error) => return Ok(Verdict::Interrupted),
         Err(error) if error.is_input() => {
-            return Err(Failure::input(origin::locate(error, &folder)));
+            return Err(Failure::input(step_input::locate(error, &folder)));
         }
         Err(error) => return Err(args.faults.failure(&opened, &parameters, error)),
     };
     if let Some(path) = &args.out {
         folder::write_results(path, &bodies).map_err(|error| {
             Failure::input(error).next(format!(
-                "make room, or give another folder with --out; {} is as it was before",
+                "make room, or give another folder with --out; {} is unchanged",
                 path.display()
             ))
         })?;
     }
 
     let beside_bullet = match args.compare {
-        true => ordering::beside_bullet(&report, opened.accelerator.capabilities()),
+        true => order::beside_bullet(&report, opened.accelerator.capabilities()),
         false => None,
     };
-    let solved = Solved {
+    let solved = StepResult {
         parameters,
         beside_bullet,
         report,
@@ -192,14 +195,14 @@ pub(crate) fn run(
         let mut document = solved.to_json();
         document["folder"] = args.folder.display().to_string().into();
         document["board"] = opened.to_json();
-        document["faults"] = planned::to_json(&opened);
+        document["faults"] = opened.faults_json();
         document["equal"] = args.compare.then_some(equal).into();
         writeln!(out, "{document:#}")?;
     } else if args.digest {
         writeln!(out, "{} {}", digest::ALGORITHM, solved.digest)?;
     } else {
         opened.print(out)?;
-        if let Some(faults) = planned::text(&opened) {
+        if let Some(faults) = opened.faults_text() {
             writeln!(out, "{faults}")?;
         }
         solved.print(out)?;
@@ -237,7 +240,7 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
         (VELOCITIES_FRICTION, own.friction_iterations, friction)
     } else {
         let error = format!(
-            "nothing to compare with: there are no expected results after {contact} contact and \
+            "there are no expected results after {contact} contact and \
              {friction} friction iterations {} integration",
             if parameters.integrate { "and the" } else { "without" },
         );
@@ -255,7 +258,7 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
     let size = |n: u32| usize::try_from(n).unwrap_or(usize::MAX);
     let shape = Dimensions(vec![Some(size(passes)), Some(n), Some(6)]);
     let values = npy::read_row::<f32>(&path, &shape, size(pass) - 1).map_err(Failure::input)?;
-    compare::check(&path, &values).map_err(Failure::input)?;
+    difference::check(&path, &values).map_err(Failure::input)?;
     let velocities =
         Expected { name: format!("{name}[{}]", pass - 1), values, kind: Kind::Velocities };
     Ok(vec![
@@ -265,12 +268,12 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
     ])
 }
 
-/// The array in `file`, which that property must equal after the step.
+/// Reads the array in `file`, which the property must equal after the step.
 fn state(folder: &Folder, file: &str, property: State) -> Result<Expected, Failure> {
     let path = &folder.path.join(file);
     let shape = Dimensions(vec![Some(folder.bodies.len()), Some(property.width())]);
     let (_, values) = npy::read::<f32>(path, &shape).map_err(Failure::input)?;
-    compare::check(path, &values).map_err(Failure::input)?;
+    difference::check(path, &values).map_err(Failure::input)?;
     Ok(Expected { name: file.to_owned(), values, kind: Kind::State(property) })
 }
 
@@ -278,16 +281,16 @@ fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
     expected
         .iter()
         .map(|Expected { name, values, kind }| match kind {
-            Kind::State(property) => compare::compare(name, property.of(bodies), values),
-            Kind::Velocities => compare::compare(name, folder::velocities(bodies), values),
+            Kind::State(property) => difference::compare(name, property.of(bodies), values),
+            Kind::Velocities => difference::compare(name, folder::velocities(bodies), values),
         })
         .collect()
 }
 
-/// What there is to tell.
-struct Solved {
+/// The result of the step.
+struct StepResult {
     parameters: StepParameters,
-    /// How the order relates to Bullet's, where that is compared with.
+    /// How the order relates to Bullet's, if the results are compared.
     beside_bullet: Option<&'static str>,
     report: StepReport,
     /// Before and after the step, J.
@@ -296,8 +299,8 @@ struct Solved {
     differences: Vec<Difference>,
 }
 
-impl Solved {
-    /// Share of the collisions that met a hazard, over all passes.
+impl StepResult {
+    /// Share of the collisions with a hazard, over all passes.
     fn hazard_share(&self) -> f64 {
         let issued = self.report.collisions * u64::from(self.report.passes);
         if issued == 0 { 0.0 } else { self.report.hazards as f64 / issued as f64 }
@@ -315,8 +318,8 @@ impl Solved {
             self.parameters.friction_iterations,
             if self.parameters.integrate { "integrated" } else { "not integrated" },
         )?;
-        let mut order = ordering::text(report);
-        if let Some(text) = self.beside_bullet.map(str::to_owned).or(ordering::reason(report)) {
+        let mut order = order::text(report);
+        if let Some(text) = self.beside_bullet.map(str::to_owned).or(order::reason(report)) {
             order += &format!(" ({text})");
         }
         fact(out, "order", &order)?;
@@ -379,7 +382,7 @@ impl Solved {
                     "array": difference.array,
                     "values": difference.values,
                     "differing": difference.differing,
-                    // Infinite differences are null: JSON has no other word.
+                    // An infinite difference is null: JSON cannot express it.
                     "largest": difference.largest,
                     "first": difference.first,
                 })
@@ -393,7 +396,7 @@ impl Solved {
                 "friction_iterations": self.parameters.friction_iterations,
                 "integrate": self.parameters.integrate,
             },
-            "step": super::report_json(&self.report),
+            "step": crate::output::report_json(&self.report),
             "hazard_share": (!self.report.saturated.hazards).then(|| self.hazard_share()),
             "kinetic_energy_before_j": self.energy[0],
             "kinetic_energy_j": self.energy[1],

@@ -1,4 +1,4 @@
-//! What the tests of the command line share: running it, and folders of arrays to break.
+//! Shared by the tests of the command line: running it, and folders of arrays to break.
 
 #![allow(dead_code, reason = "not every test uses every helper")]
 
@@ -7,12 +7,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
 
+use serde_json::Value;
 use tempfile::TempDir;
 
 /// Where the data of the golden arrays begins: `.npy` pads its header to 128 bytes here.
 pub(crate) const DATA: usize = 128;
 
-/// A variable of the environment; one that is blank counts as unset.
+/// Reads a variable of the environment; a blank one counts as unset.
 pub(crate) fn variable(name: &str) -> Option<String> {
     let text = std::env::var_os(name)?.into_string().expect("a variable in UTF-8");
     Some(text).filter(|text| !text.trim().is_empty())
@@ -20,7 +21,7 @@ pub(crate) fn variable(name: &str) -> Option<String> {
 
 /// The command, on the emulated board and with errors only in its log.
 ///
-/// A command built for another processor is started by the program that `PGS_TEST_RUNNER` names.
+/// `PGS_TEST_RUNNER` names the program that starts a command built for another processor.
 pub(crate) fn pgs() -> Command {
     let runner = variable("PGS_TEST_RUNNER").unwrap_or_default();
     let mut words = runner.split_whitespace().chain([env!("CARGO_BIN_EXE_pgs")]);
@@ -30,31 +31,31 @@ pub(crate) fn pgs() -> Command {
     command
 }
 
-/// A process that does not outlive the test, however that ends.
+/// A process that ends with the test, even when the test panics.
 #[derive(Debug)]
 pub(crate) struct Tied(pub(crate) Child);
 
 impl Drop for Tied {
     fn drop(&mut self) {
-        // One that has ended needs it no more.
+        // An ended process ignores it.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// Asks a process to end, with that signal.
+/// Sends a signal to a process.
 pub(crate) fn signal(which: &str, process: u32) {
     let kill = Command::new("kill").args([which, &process.to_string()]).status();
     assert!(kill.expect("kill runs").success());
 }
 
-/// Says what a test skips, past the harness, which keeps what passing tests print.
+/// Reports a skipped test on stderr, past the harness, which captures the output of passing tests.
 pub(crate) fn skipped(what: &str) {
-    // If nobody can be told, the test is no worse for it.
+    // With stderr closed, the report is lost and the test goes on.
     let _ = writeln!(std::io::stderr(), "skipped: {what}");
 }
 
-/// What a command did: its code, stdout and stderr.
+/// The outcome of a command: its code, stdout and stderr.
 pub(crate) struct Ran {
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
@@ -76,12 +77,35 @@ pub(crate) fn run<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item =
     pgs().args(arguments).output().expect("the command starts").into()
 }
 
+impl Ran {
+    /// Parses stdout.
+    pub(crate) fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).expect("one JSON document and nothing else")
+    }
+}
+
+/// A number in a document.
+pub(crate) fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// Asserts that a number in a document differs from `expected` by at most `tolerance`.
+pub(crate) fn near(value: &Value, expected: f64, tolerance: f64) {
+    let found = number(value);
+    assert!((found - expected).abs() <= tolerance, "{found}, expected {expected}");
+}
+
+/// A path as an argument.
+pub(crate) fn text(path: &Path) -> &str {
+    path.to_str().expect("a path in UTF-8")
+}
+
 /// A folder of golden arrays.
 pub(crate) fn golden(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden").join(name)
 }
 
-/// A copy of a golden folder, to be changed.
+/// A copy of a golden folder, for a test to change.
 pub(crate) fn copy(name: &str) -> TempDir {
     let copy = tempfile::tempdir().expect("a temporary folder");
     for entry in fs::read_dir(golden(name)).expect("the golden folder") {
@@ -100,7 +124,7 @@ pub(crate) fn patch(folder: &TempDir, file: &str, index: usize, bytes: [u8; 4]) 
     fs::write(path, content).expect("the array");
 }
 
-/// Writes an array with `data` repeated to that shape.
+/// Writes an array that repeats `data` up to its shape.
 pub(crate) fn write(folder: &TempDir, file: &str, descr: &str, shape: &[usize], data: &[[u8; 4]]) {
     let dimensions: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let mut header =

@@ -1,20 +1,20 @@
-//! This file puts a box along the world's axes around a body.
+//! Axis-aligned bounds of a body.
 
 use zynq_pgs::Body;
 
 use super::MARGIN;
 use crate::{Geometry, rotation};
 
-/// What rounding may take away from a gap between two boxes, m; the narrow phase decides.
+/// Allowance for rounding in the gap between two boxes, m; the narrow phase decides.
 const SLACK: f32 = 1e-3;
 
 /// Largest gap between the boxes of two bodies that are a pair, m.
 pub(super) const GAP: f32 = MARGIN + SLACK;
 
-/// Share of a number that rounding may change a sum of such numbers by, and more.
+/// An upper bound of the relative rounding error of a sum.
 const ROUNDING: f32 = 1e-5;
 
-/// The box around a body.
+/// The axis-aligned box around a body.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
     /// Centre of mass, m.
@@ -24,10 +24,10 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Those of a body that takes no part.
+    /// The bounds of a body that takes no part.
     pub(super) const NONE: Self = Self { centre: [f32::NAN; 3], reach: [f32::NAN; 3] };
 
-    /// The box around a body; none if its pose is not finite.
+    /// The bounds of a body; NaN if its pose is not finite.
     pub(super) fn of(body: &Body, geometry: Geometry) -> Self {
         let centre = body.pose.position;
         let rows = rotation::matrix(body.pose.orientation);
@@ -45,12 +45,12 @@ impl Bounds {
     }
 
     /// Whether the body takes part.
-    pub(super) fn exist(&self) -> bool {
-        // All are finite, or none is.
+    pub(super) fn takes_part(&self) -> bool {
+        // All components are finite, or none is.
         !self.reach[0].is_nan()
     }
 
-    /// Whether two boxes are not farther apart than `gap` m; no if a body takes no part.
+    /// Whether two boxes are at most `gap` m apart; false if a body takes no part.
     #[inline]
     pub(super) fn near(&self, other: &Self, gap: f32) -> bool {
         (0..3).all(|axis| {
@@ -59,7 +59,7 @@ impl Bounds {
         })
     }
 
-    /// Whether the body is surely too high to touch the ground.
+    /// Whether the body is certainly too high to touch the ground.
     pub(super) fn off_the_ground(&self) -> bool {
         let (centre, reach) = (self.centre[1], self.reach[1]);
         centre - reach > GAP + (centre.abs() + reach) * ROUNDING
@@ -69,14 +69,10 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use zynq_pgs::{Pose, Velocity};
 
     use super::super::ground;
     use super::*;
-
-    fn body(position: [f32; 3], orientation: [f32; 4]) -> Body {
-        Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
-    }
+    use crate::fixtures::body;
 
     #[test]
     fn what_is_not_finite_takes_no_part() {
@@ -85,11 +81,11 @@ mod tests {
             let place = [0.0, value, 0.0];
             for body in [body(place, level), body([0.0; 3], [0.0, 0.0, value, 1.0])] {
                 let bounds = Bounds::of(&body, Geometry::CUBE);
-                assert!(!bounds.exist(), "{body:?}");
+                assert!(!bounds.takes_part(), "{body:?}");
                 assert!(!bounds.near(&bounds, f32::INFINITY) && !bounds.off_the_ground());
             }
         }
-        assert!(Bounds::of(&body([1e30; 3], level), Geometry::CUBE).exist());
+        assert!(Bounds::of(&body([1e30; 3], level), Geometry::CUBE).takes_part());
     }
 
     proptest! {

@@ -1,10 +1,10 @@
-//! This file finds the pairs of bodies that may touch, and keeps them from one time to the next.
+//! Finds the pairs of bodies that may touch, and keeps them from one detection to the next.
 //!
-//! What is searched for are bodies up to [`SKIN`] farther apart than a pair may be. As long as no two
-//! bodies have come nearer to each other by more than that, every pair is among the candidates found
-//! then: nothing is searched, and each candidate is looked at once. How far two bodies can have come
-//! is known without looking at pairs: each has moved by something between the least and the most that
-//! any has, and of a pile that falls as a whole these are the same.
+//! The search finds candidates: bodies up to [`SKIN`] farther apart than a pair may be. As long as
+//! no two bodies have approached each other by more than that, every pair is among the candidates,
+//! and detection only tests each candidate. A bound on the approach needs no look at pairs: every
+//! body has moved by something between the least and the greatest movement of all bodies, and these
+//! are equal for a pile that falls as a whole.
 
 use pgs_support::Crew;
 
@@ -12,45 +12,45 @@ use super::bounds::{Bounds, GAP};
 use super::cells::{Cells, GAP_MAX};
 use super::shares;
 
-/// How much farther apart than a pair candidates may be, m.
+/// Extra distance of candidates beyond that of a pair, m.
 const SKIN: f32 = 0.35;
-/// Up to where candidates are kept: the rest is for rounding.
+/// Approach up to which candidates are kept; the remainder is for rounding.
 const KEPT: f32 = SKIN - 1e-3;
-/// Up to where bodies may have moved, m: rounding of that is far below what is left for it.
+/// Movement up to which candidates are kept, m: its rounding is far below that remainder.
 const WAY: f32 = 100.0;
 
 const _: () = assert!(GAP + SKIN <= GAP_MAX, "candidates are in neighbouring cells");
 
-/// Fewest bodies to be searched for which a further thread pays.
+/// Smallest number of bodies for which a further thread speeds up the search.
 const SEARCHED_PER_THREAD: usize = 2048;
 
-/// By how much bodies have moved and grown, along each axis.
+/// The range of the bodies' movement and growth, along each axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Drift {
-    /// The lower ends, least of all, m.
+    /// The least movement of all lower ends, m.
     low: [f32; 3],
-    /// The upper ends, most of all, m.
+    /// The greatest movement of all upper ends, m.
     high: [f32; 3],
-    /// Whether all that take part did before.
+    /// Whether every body that takes part did so before.
     same: bool,
 }
 
 impl Drift {
-    /// That of no bodies.
+    /// The drift of no bodies.
     pub(super) const NONE: Self =
         Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], same: true };
 
-    /// Takes in a body that had other bounds.
+    /// Includes a body with its earlier bounds.
     #[inline]
-    pub(super) fn add(&mut self, then: &Bounds, now: &Bounds) {
-        if !now.exist() {
-            // Its pairs are none: it is near to nothing.
+    pub(super) fn add(&mut self, before: &Bounds, now: &Bounds) {
+        if !now.takes_part() {
+            // It has no pairs, since it is near to nothing.
             return;
         }
-        self.same &= then.exist();
+        self.same &= before.takes_part();
         for axis in 0..3 {
-            let way = now.centre[axis] - then.centre[axis];
-            let growth = now.reach[axis] - then.reach[axis];
+            let way = now.centre[axis] - before.centre[axis];
+            let growth = now.reach[axis] - before.reach[axis];
             let growth = if growth > 0.0 { growth } else { 0.0 };
             let (low, high) = (way - growth, way + growth);
             self.low[axis] = if low < self.low[axis] { low } else { self.low[axis] };
@@ -58,8 +58,8 @@ impl Drift {
         }
     }
 
-    /// That of these bodies and those.
-    pub(super) fn and(mut self, other: &Self) -> Self {
+    /// The drift of both sets of bodies.
+    pub(super) fn union(mut self, other: &Self) -> Self {
         for axis in 0..3 {
             self.low[axis] = self.low[axis].min(other.low[axis]);
             self.high[axis] = self.high[axis].max(other.high[axis]);
@@ -68,9 +68,9 @@ impl Drift {
         self
     }
 
-    /// Whether no two have come nearer than candidates are kept for.
-    fn is_small(&self) -> bool {
-        // Of no bodies the difference is below all; that of infinities is NaN.
+    /// Whether no two bodies have approached by more than the candidates allow.
+    fn keeps_candidates(&self) -> bool {
+        // The difference is below the limit without bodies, and NaN with infinities.
         let axis = |axis: usize| {
             let (low, high) = (self.low[axis], self.high[axis]);
             low > high || low >= -WAY && high <= WAY && high - low <= KEPT
@@ -82,53 +82,54 @@ impl Drift {
 /// The broad phase.
 #[derive(Debug, Default)]
 pub(super) struct Broad {
-    /// Where the bodies were when they were searched.
-    then: Vec<Bounds>,
+    /// The bounds at the time of the search.
+    searched: Vec<Bounds>,
     candidates: Vec<(u32, u32)>,
     cells: Cells,
-    /// What each thread has found, as the cells have it.
+    /// The pairs that each thread found, in the order of the cells.
     found: Vec<Vec<(u32, u32)>>,
-    /// Where the candidates of each body end.
+    /// The end of each body's candidates.
     ends: Vec<usize>,
-    /// How often bodies were searched.
+    /// The number of searches.
     #[cfg(test)]
     pub(super) searches: u64,
 }
 
 impl Broad {
-    /// Where each of so many bodies was when they were searched.
-    pub(super) fn then(&mut self, bodies: usize) -> &[Bounds] {
-        if self.then.len() != bodies {
-            // Of other bodies nothing is known, so that they will be searched.
-            self.then.clear();
-            self.then.resize(bodies, Bounds::NONE);
+    /// The bounds of each body at the time of the search.
+    pub(super) fn searched_bounds(&mut self, bodies: usize) -> &[Bounds] {
+        if self.searched.len() != bodies {
+            // Other bodies have no known bounds, so they are searched.
+            self.searched.clear();
+            self.searched.resize(bodies, Bounds::NONE);
             self.candidates.clear();
         }
-        &self.then
+        &self.searched
     }
 
-    /// Pairs among which are all whose boxes are not farther apart than [`GAP`], lower index first,
-    /// sorted; `drift` is how far the bodies have moved from [where they were](Self::then).
+    /// Candidates, which include all pairs of boxes at most [`GAP`] apart; lower index first,
+    /// sorted. `drift` is the bodies' movement since [the search](Self::searched_bounds).
     pub(super) fn candidates(
         &mut self,
         bounds: &[Bounds],
         drift: &Drift,
         crew: &mut Crew,
     ) -> &[(u32, u32)] {
-        if !drift.is_small() {
+        if !drift.keeps_candidates() {
             self.search(bounds, crew);
         }
         &self.candidates
     }
 
-    /// Finds the candidates anew.
+    /// Searches for candidates.
     fn search(&mut self, bounds: &[Bounds], crew: &mut Crew) {
         #[cfg(test)]
         {
             self.searches += 1;
         }
-        // Until there are candidates, no bodies are known: a panic leaves nothing half done.
-        self.then.clear();
+        // No bounds count as known until the candidates are complete: a panic leaves no half-done
+        // state.
+        self.searched.clear();
         self.candidates.clear();
         self.cells.sort(bounds);
         let (cells, bodies) = (&self.cells, self.cells.len());
@@ -141,14 +142,14 @@ impl Broad {
         });
         let found = self.found.get(..count).unwrap_or_default();
         sort(found, &mut self.ends, bounds.len(), &mut self.candidates);
-        self.then.extend_from_slice(bounds);
+        self.searched.extend_from_slice(bounds);
     }
 }
 
-/// Writes the pairs that were found, sorted.
+/// Writes the found pairs, sorted.
 ///
-/// By their lower body they are counted into place: that one has few partners, which are sorted
-/// among themselves.
+/// A counting sort places them by their lower body. Each lower body has few partners, which are
+/// sorted one by one.
 fn sort(
     found: &[Vec<(u32, u32)>],
     ends: &mut Vec<usize>,
@@ -162,7 +163,7 @@ fn sort(
     }
     let mut begin = 0;
     for end in &mut *ends {
-        // Until its pairs are in place, where the next one goes.
+        // Holds the place of the body's next pair until all pairs are placed.
         begin += std::mem::replace(end, begin);
     }
     pairs.clear();
@@ -179,7 +180,7 @@ fn sort(
     }
 }
 
-/// Sorts the pairs of one body, which in a pile are few.
+/// Sorts the pairs of one body, which are few in a pile.
 fn sort_few(pairs: &mut [(u32, u32)]) {
     const FEW: usize = 24;
     if pairs.len() > FEW {
@@ -203,7 +204,7 @@ mod tests {
 
     use super::*;
 
-    /// What happens to a body from one step to the next.
+    /// A change of a body from one step to the next.
     #[derive(Debug, Clone, Copy)]
     enum Event {
         Rest,
@@ -225,7 +226,7 @@ mod tests {
         ]
     }
 
-    /// The broad phase as it is used, with what it keeps.
+    /// The broad phase under test, with its kept candidates.
     #[derive(Default)]
     struct Kept {
         broad: Broad,
@@ -235,8 +236,8 @@ mod tests {
     impl Kept {
         fn pairs(&mut self, bounds: &[Bounds]) -> Vec<(u32, u32)> {
             let mut drift = Drift::NONE;
-            for (then, now) in self.broad.then(bounds.len()).iter().zip(bounds) {
-                drift.add(then, now);
+            for (before, now) in self.broad.searched_bounds(bounds.len()).iter().zip(bounds) {
+                drift.add(before, now);
             }
             let near = |&&(a, b): &&(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
             let candidates = self.broad.candidates(bounds, &drift, &mut self.crew);
@@ -259,7 +260,7 @@ mod tests {
             bodies in prop::collection::vec(
                 (prop::array::uniform3(-6.0_f32..6.0), prop::array::uniform3(0.2_f32..1.73)), 0..40
             ),
-            // How all of them fall, and in some steps what happens to each.
+            // The fall of all bodies, and in some steps a change of each.
             steps in prop::collection::vec(
                 (prop::array::uniform3(-0.5_f32..0.5), prop::collection::vec(event(), 0..50)), 1..20
             ),
@@ -271,7 +272,7 @@ mod tests {
                 for body in &mut bounds {
                     body.centre = std::array::from_fn(|axis| body.centre[axis] + fall[axis]);
                 }
-                // More than there are bodies appear, fewer leave as many.
+                // An event past the last body can add one; bodies without an event stay.
                 for (index, event) in events.into_iter().enumerate() {
                     if index + 1 >= bounds.len() {
                         if let Event::Jump(centre) = event {
@@ -288,7 +289,7 @@ mod tests {
                         Event::Jump(centre) => *body = Bounds { centre, reach: [1.0; 3] },
                         Event::Vanish if index % 2 == 0 => *body = Bounds::NONE,
                         Event::Vanish => bounds.truncate(index + 1),
-                        Event::Turn(reach) if body.exist() => body.reach = reach,
+                        Event::Turn(reach) if body.takes_part() => body.reach = reach,
                         Event::Turn(_) => {}
                     }
                 }
@@ -297,7 +298,7 @@ mod tests {
         }
     }
 
-    /// Bodies in a row, not quite touching.
+    /// Bodies in a row that do not quite touch.
     fn row(bodies: u8) -> Vec<Bounds> {
         let at = |k: u8| Bounds { centre: [2.1 * f32::from(k), 0.0, 0.0], reach: [1.0; 3] };
         std::iter::once(Bounds::NONE).chain((0..bodies).map(at)).collect()
@@ -317,7 +318,7 @@ mod tests {
         bounds[7].centre[1] += 0.5;
         assert_eq!(kept.pairs(&bounds), [(7, 8)]);
         assert_eq!(kept.broad.searches, 2, "more than the skin");
-        // Farther than where rounding is of no account.
+        // Beyond the distance for which rounding is negligible.
         bounds.iter_mut().for_each(|body| body.centre[1] -= 2.0 * WAY);
         assert_eq!(kept.pairs(&bounds), [(7, 8)]);
         assert_eq!(kept.broad.searches, 3);

@@ -1,36 +1,36 @@
-//! This file finds the bodies that are near each other.
+//! Finds near bodies with a grid of cells.
 //!
-//! Space is cut into cells as wide as the largest two bodies are apart at most when they are near, so
-//! that partners of a body have their centres in its own cell or one of the 26 around it. The cells
-//! are not stored: the bodies are sorted by their cell (x, then y, then z), and each body looks
-//! forward only, at the rest of its own row of cells along z and at four neighbouring rows. In each
-//! of the five the partners are a range of the sorted bodies that moves forward as the body does.
+//! The cells are as wide as the greatest distance of two near bodies' centres, so that all partners
+//! of a body have their centres in its own cell or one of the 26 around it. The cells are not
+//! stored: the bodies are sorted by their cell (x, then y, then z), and each body searches forward
+//! only, in the rest of its own row of cells along z and in four neighbouring rows. In each of the
+//! five, the partners are a range of the sorted bodies that moves forward as the body does.
 //!
-//! Of bodies sorted before, those that have stayed in their cell still are; only the others are sorted
-//! anew and merged with them.
+//! In a second sort, bodies that stayed in their cell keep their order; only the others are sorted
+//! and merged.
 
 use std::ops::Range;
 
 use super::bounds::Bounds;
 
-/// Width of a cell, m: above the diagonal of a cube (3.4641 m) and [`GAP_MAX`]. No body of any scene is
-/// larger.
+/// Width of a cell, m: above the diagonal of a cube (3.4641 m) and [`GAP_MAX`]. No body of any
+/// scene is larger.
 const CELL: f32 = 3.85;
 
-/// Largest gap between two boxes for which the cells are wide enough, m.
+/// Largest gap between two boxes that the cells allow, m.
 pub(super) const GAP_MAX: f32 = 0.38;
 
-/// Cells on either side of the origin. Beyond it bodies share the outermost cell, which costs time but
-/// loses no pair. 20 bits, less the neighbours' 1.
+/// Cells on either side of the origin: 20 bits, minus 1 for the neighbours. Bodies beyond share the
+/// outermost cell, which costs time and loses no pair.
 const CELLS: f32 = 1_048_574.0;
 
 /// Bits of a cell's number along one axis.
 const BITS: u32 = 21;
 
-/// The cell of a body that takes no part: no cell has this number.
+/// The cell of a body that takes no part; no real cell has this number.
 const NOWHERE: u64 = u64::MAX;
 
-/// A body in its cell.
+/// A body and its cell.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     /// Numbers of the cell along x, y and z, 21 bits each.
@@ -47,7 +47,7 @@ pub(super) struct Cells {
     numbers: Vec<u64>,
     /// Cells and bodies, sorted.
     order: Vec<(u64, u32)>,
-    /// Those that are not where they were.
+    /// Bodies that have left their cell.
     strays: Vec<(u64, u32)>,
     entries: Vec<Entry>,
 }
@@ -76,18 +76,18 @@ impl Cells {
         }));
     }
 
-    /// How many bodies take part.
+    /// The number of bodies that take part.
     pub(super) fn len(&self) -> usize {
         self.entries.len()
     }
 
-    /// Adds to `found` the pairs, lower index first, of bodies not farther apart than `gap` m, of
-    /// which the first in the order of the cells is in `range`.
+    /// Adds to `found` the pairs of bodies at most `gap` m apart, lower index first, whose first
+    /// body in the order of the cells lies in `range`.
     pub(super) fn find(&self, range: Range<usize>, gap: f32, found: &mut Vec<(u32, u32)>) {
         debug_assert!(gap <= GAP_MAX, "partners are in neighbouring cells");
         let entries = &*self.entries;
         let Some(first) = entries[range.clone()].first() else { return };
-        // The own row and those after it, as steps in x and y.
+        // The own row and the rows after it, as steps in x and y.
         for (dx, dy) in [(0, 0), (0, 1), (1, -1), (1, 0), (1, 1)] {
             let row = (dx << (2 * BITS)) + (dy << BITS);
             // No field overflows: see `CELLS`.
@@ -102,7 +102,7 @@ impl Cells {
                 while end < entries.len() && entries[end].cell <= cell + 1 {
                     end += 1;
                 }
-                // In the own row each pair is seen from its first body only.
+                // In the own row, each pair is found from its first body only.
                 let from = if row == 0 { position + 1 } else { start };
                 for other in &entries[from..end] {
                     if own.bounds.near(&other.bounds, gap) {
@@ -115,12 +115,12 @@ impl Cells {
     }
 }
 
-/// Puts sorted `strays` into the sorted `order`; no two are equal.
+/// Merges the sorted `strays` into the sorted `order`; no two entries are equal.
 fn merge(order: &mut Vec<(u64, u32)>, strays: &[(u64, u32)]) {
     let mut kept = order.len();
     order.extend_from_slice(strays);
     let mut place = order.len();
-    // From the end: what is moved has left its place free.
+    // From the end, where each move frees the place for the next.
     for &stray in strays.iter().rev() {
         while kept > 0 && order[kept - 1] > stray {
             (kept, place) = (kept - 1, place - 1);
@@ -131,18 +131,18 @@ fn merge(order: &mut Vec<(u64, u32)>, strays: &[(u64, u32)]) {
     }
 }
 
-/// Number of the cell in which the centre lies.
+/// The cell of a centre.
 fn cell(bounds: &Bounds) -> u64 {
-    if !bounds.exist() {
+    if !bounds.takes_part() {
         return NOWHERE;
     }
     let [x, y, z] = bounds.centre.map(cell_number);
     x << (2 * BITS) | y << BITS | z
 }
 
-/// Number of the cell in which a coordinate lies; it grows with the coordinate.
+/// The cell of a coordinate along one axis; it grows with the coordinate.
 fn cell_number(coordinate: f32) -> u64 {
-    // Never NaN, and the sign of a zero does not matter here.
+    // Never NaN; the sign of a zero does not matter here.
     let cell = (coordinate / CELL).floor().clamp(-CELLS, CELLS);
     #[allow(
         clippy::cast_possible_truncation,

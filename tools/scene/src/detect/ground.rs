@@ -1,10 +1,10 @@
-//! This file finds where a body touches the ground.
+//! Finds the contacts of a body with the ground.
 //!
-//! The ground is taken as the plane y = 0, not as the box of 400 m half extent that it is: relative
-//! to the centre of that box an f32 carries the height of a corner in steps of 0.03 mm, while from
-//! the plane it is the corner's own y. Boxes touch it with the corners of the face that looks down
-//! most, to which the three lowest corners always belong; spheres with their lowest point, capsules
-//! with the lowest point of either end.
+//! The ground is treated as the plane y = 0, not as its box of 400 m half extent: relative to the
+//! box's centre, an f32 carries the height of a corner in steps of 0.03 mm; from the plane it is
+//! the corner's own y. A box touches with the corners of its most downward face, which always has
+//! the three lowest corners; a sphere with its lowest point, a capsule with the lowest point of
+//! each end.
 
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
 
@@ -14,7 +14,7 @@ use crate::{GROUND, Geometry, rotation};
 /// From the body (B) down to the ground (A).
 const NORMAL: [f32; 3] = [0.0, -1.0, 0.0];
 
-/// The contact points of a body while they are found.
+/// The contact points of a body, as they are collected.
 #[derive(Default)]
 struct Points {
     contacts: [Contact; CONTACT_POINTS],
@@ -22,9 +22,9 @@ struct Points {
 }
 
 impl Points {
-    /// Takes a point that is near enough; a body has four at most.
+    /// Adds a point that is near enough; a body has at most four.
     fn offer(&mut self, point: [f32; 3]) {
-        // Written so that a NaN is no contact.
+        // In this form a NaN is no contact.
         if point[1] <= MARGIN && point.iter().all(|value| value.is_finite()) {
             self.contacts[self.count] = Contact { point, distance: point[1] };
             self.count += 1;
@@ -32,7 +32,7 @@ impl Points {
     }
 }
 
-/// The collision of the body of index `index` with the ground, if there is one.
+/// The collision of body `index` with the ground, if there is one.
 pub(super) fn collide(index: u32, body: &Body, geometry: Geometry) -> Option<Collision> {
     let centre = body.pose.position;
     let mut points = Points::default();
@@ -53,12 +53,12 @@ pub(super) fn collide(index: u32, body: &Body, geometry: Geometry) -> Option<Col
     Some(Collision { body_a: GROUND, body_b: index, normal: NORMAL, count, contacts })
 }
 
-/// Offers the corners of the face of a box that looks down most.
+/// Offers the corners of the box's most downward face.
 fn offer_face(body: &Body, half_extents: [f32; 3], points: &mut Points) {
     let centre = body.pose.position;
     let rows = rotation::matrix(body.pose.orientation);
 
-    // The body axis along which the faces are farthest apart in height, of equals the first.
+    // The body axis whose two faces differ most in height; the first one in a tie.
     let height = |axis: usize| rows[1][axis].abs() * half_extents[axis];
     let mut axis = 0;
     for other in 1..3 {
@@ -86,17 +86,12 @@ fn offer_face(body: &Body, half_extents: [f32; 3], points: &mut Points) {
 #[cfg(test)]
 #[allow(clippy::float_cmp, reason = "the normal is a constant")]
 mod tests {
-    use zynq_pgs::{Pose, Velocity};
-
     use super::*;
+    use crate::fixtures::body as cube;
 
     /// The collision of a cube.
     fn collide(index: u32, body: &Body) -> Option<Collision> {
         super::collide(index, body, Geometry::CUBE)
-    }
-
-    fn cube(position: [f32; 3], orientation: [f32; 4]) -> Body {
-        Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
     }
 
     #[test]
@@ -125,7 +120,7 @@ mod tests {
         let (sin, cos) = (0.382_683_43, 0.923_879_5);
         let edge = collide(1, &cube([0.0, 1.414, 0.0], [0.0, 0.0, sin, cos])).expect("edge");
         assert_eq!(edge.count, 2);
-        // The diagonal of the cube upright: 54.7356 degrees about (1, 0, -1)/sqrt 2.
+        // The cube stands on a corner: 54.7356 degrees about (1, 0, -1)/sqrt 2.
         let (sin, cos) = (0.459_700_85, 0.888_073_85);
         let half = 0.5_f32.sqrt();
         let upright = [sin * half, 0.0, -sin * half, cos];
@@ -192,7 +187,7 @@ mod tests {
         let flat = cube([0.0, 0.245, 0.0], [0.0, 0.0, 0.0, 1.0]);
         let found = super::collide(1, &flat, slab).expect("contact");
         assert_eq!(found.count, 4);
-        // Turned by half a degree about z, which lowers one end by 9 mm: all four are near.
+        // Half a degree about z lowers one end by 9 mm: all four corners are near.
         let tilted = cube([0.0, 0.25, 0.0], [0.0, 0.0, 0.004_363_3, 0.999_990_5]);
         let found = super::collide(1, &tilted, slab).expect("contact");
         assert_eq!(found.count, 4);

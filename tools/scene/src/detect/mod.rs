@@ -1,8 +1,8 @@
-//! This file detects the collisions of a scene: ground, broad phase, narrow phase.
+//! Detects the collisions of a scene: ground, broad phase, narrow phase.
 //!
-//! Bodies and pairs are shared out among threads in ranges, whose results are joined in their order;
-//! the narrow phase looks at each pair by itself. What is kept from one time to the next changes what
-//! is computed, not what comes out. So neither threads nor earlier poses change anything but the time.
+//! Threads share bodies and pairs in ranges, and their results are joined in order; the narrow
+//! phase handles each pair by itself. State kept from one detection to the next changes the work,
+//! not the result. So neither threads nor earlier poses change anything but the time.
 
 mod bounds;
 mod boxes;
@@ -30,30 +30,30 @@ use crate::Geometry;
 /// Distance up to which two bodies collide, m (Bullet's contact threshold).
 pub const MARGIN: f32 = 0.02;
 
-/// Fewest bodies to be placed, and fewest candidates, for which a further thread pays.
+/// Smallest number of bodies to place, or of candidates, for which a further thread saves time.
 const PLACED_PER_THREAD: usize = 4096;
 const PAIRS_PER_THREAD: usize = 4096;
-/// Most threads that are taken unasked: what is left on the calling thread, such as the sorting of
-/// candidates, gives more of them little to do.
+/// Largest default number of threads: the work that stays on the calling thread, such as sorting
+/// candidates, leaves little to more of them.
 const THREADS_UNASKED: usize = 8;
-/// Fewest bodies for which threads are started.
+/// Smallest number of bodies for which threads are started.
 const BODIES_FOR_THREADS: usize = 1024;
 
-/// What bodies look like, by their index into the shape table; nothing for the ground.
+/// The geometry of bodies, by index into the shape table; none for the ground.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Geometries<'a>(pub(crate) &'a [Option<Geometry>]);
 
 impl Geometries<'_> {
-    /// What a body looks like; `None` if it touches nothing but as the ground.
+    /// The geometry of a body; `None` if it touches nothing but as the ground.
     fn of(self, body: &Body) -> Option<Geometry> {
         self.0.get(usize::try_from(body.shape).ok()?).copied().flatten()
     }
 }
 
-/// Finds collisions, keeping its threads and buffers from one time to the next.
+/// Detects collisions, and keeps its threads and buffers from one detection to the next.
 #[derive(Debug)]
 pub(crate) struct Detector {
-    /// Threads that it may take.
+    /// The limit on threads.
     threads: usize,
     crew: Crew,
     bounds: Vec<Bounds>,
@@ -61,8 +61,8 @@ pub(crate) struct Detector {
     workers: Vec<Worker>,
 }
 
-/// What one share of the work needs. Aligned so that no two threads write to the same pair of cache
-/// lines.
+/// The buffers of one share of the work, aligned so that no two threads write to the same pair of
+/// cache lines.
 #[derive(Debug)]
 #[repr(align(128))]
 struct Worker {
@@ -88,7 +88,7 @@ impl Default for Detector {
 }
 
 impl Detector {
-    /// May take so many threads, of which one is the caller's.
+    /// Limits the threads; the caller's is one of them.
     pub(crate) fn with_threads(threads: usize) -> Self {
         Self {
             threads,
@@ -109,11 +109,11 @@ impl Detector {
     ) {
         if self.crew.threads() < self.threads && bodies.len() >= BODIES_FOR_THREADS {
             self.crew = Crew::new("scene", self.threads - 1);
-            // Not again where the system gives no more.
+            // No further attempts once the system gives no more threads.
             self.threads = self.crew.threads();
         }
         self.workers.resize_with(self.crew.threads(), Worker::default);
-        let drift = self.place(bodies, geometries);
+        let drift = self.compute_bounds(bodies, geometries);
         collisions.clear();
         for worker in &self.workers {
             collisions.extend_from_slice(&worker.ground);
@@ -126,7 +126,7 @@ impl Detector {
         for worker in &mut *workers {
             worker.found.clear();
         }
-        // The first share is added where it belongs.
+        // The first share is added in place.
         if let [first, ..] = workers {
             std::mem::swap(&mut first.found, collisions);
         }
@@ -141,12 +141,12 @@ impl Detector {
         }
     }
 
-    /// Puts bounds around all bodies and finds those that touch the ground; says how far they have
-    /// moved since they were searched for pairs.
-    fn place(&mut self, bodies: &[Body], geometries: Geometries<'_>) -> Drift {
+    /// Computes the bounds of all bodies and collides them with the ground; returns their drift
+    /// since the last search.
+    fn compute_bounds(&mut self, bodies: &[Body], geometries: Geometries<'_>) -> Drift {
         let Self { crew, bounds, broad, workers, .. } = self;
         bounds.resize(bodies.len(), Bounds::NONE);
-        let then = broad.then(bodies.len());
+        let searched = broad.searched_bounds(bodies.len());
         let (count, share) = shares(bodies.len(), crew, PLACED_PER_THREAD);
         for worker in &mut *workers {
             worker.drift = Drift::NONE;
@@ -155,30 +155,30 @@ impl Detector {
         let work = (0..).step_by(share).zip(bounds.chunks_mut(share)).zip(&mut workers[..count]);
         crew.each(work, |((first, bounds), worker)| {
             let range = first..first + bounds.len();
-            let placed = (first..).zip(&bodies[range.clone()]).zip(&then[range]).zip(bounds);
-            for (((index, body), then), bounds) in placed {
-                *bounds = worker.place(index, body, geometries.of(body), then);
+            let placed = (first..).zip(&bodies[range.clone()]).zip(&searched[range]).zip(bounds);
+            for (((index, body), before), bounds) in placed {
+                *bounds = worker.place(index, body, geometries.of(body), before);
             }
         });
-        workers.iter().fold(Drift::NONE, |drift, worker| drift.and(&worker.drift))
+        workers.iter().fold(Drift::NONE, |drift, worker| drift.union(&worker.drift))
     }
 }
 
 impl Worker {
-    /// The bounds of a body, whose collision with the ground is added if there is one.
+    /// Computes the bounds of a body, and adds its collision with the ground if there is one.
     #[inline]
     fn place(
         &mut self,
         index: usize,
         body: &Body,
         geometry: Option<Geometry>,
-        then: &Bounds,
+        before: &Bounds,
     ) -> Bounds {
         let (Some(geometry), Ok(number @ 1..)) = (geometry, u32::try_from(index)) else {
             return Bounds::NONE;
         };
         let bounds = Bounds::of(body, geometry);
-        self.drift.add(then, &bounds);
+        self.drift.add(before, &bounds);
         if !bounds.off_the_ground() {
             self.ground.extend(ground::collide(number, body, geometry));
         }
@@ -199,8 +199,7 @@ impl Worker {
     }
 }
 
-/// Into how many shares so many things are cut, and how many are in each: one for each thread, but
-/// no small ones.
+/// The number of shares and the size of each: one share per thread, none smaller than `least`.
 fn shares(things: usize, crew: &Crew, least: usize) -> (usize, usize) {
     let count = crew.threads().min(things / least).max(1);
     (count, things.div_ceil(count).max(1))
@@ -208,25 +207,19 @@ fn shares(things: usize, crew: &Crew, least: usize) -> (usize, usize) {
 
 #[cfg(test)]
 mod tests {
-    use zynq_pgs::{Pose, Velocity};
-
     use super::*;
+    use crate::fixtures::{LEVEL, bits, body, digest};
 
     const CUBES: Geometries<'static> = Geometries(&[None, Some(Geometry::CUBE)]);
 
-    /// A heap of cubes in all orientations, as deep in each other as a pile never is.
+    /// Cubes in all orientations, deeper inside each other than in any pile.
     fn heap(cubes: u32) -> Vec<Body> {
         let mut state = 1_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             f32::from(u16::try_from(state >> 16).expect("16 bits")) / 65_536.0
         };
-        let body = |position, orientation| Body {
-            pose: Pose { position, orientation },
-            velocity: Velocity::default(),
-            shape: 1,
-        };
-        let mut bodies = vec![body([0.0, -400.0, 0.0], [0.0, 0.0, 0.0, 1.0])];
+        let mut bodies = vec![body([0.0, -400.0, 0.0], LEVEL)];
         for _ in 0..cubes {
             let position = [random() * 60.0, random() * 20.0, random() * 60.0];
             let q = [random() - 0.5, random() - 0.5, random() - 0.5, random() + 0.1];
@@ -234,19 +227,6 @@ mod tests {
             bodies.push(body(position, q.map(|value| value / length)));
         }
         bodies
-    }
-
-    pub(super) fn bits(collisions: &[Collision]) -> Vec<u32> {
-        let mut bits = Vec::new();
-        for c in collisions {
-            bits.extend([c.body_a, c.body_b, c.count]);
-            bits.extend(c.normal.map(f32::to_bits));
-            for contact in c.contacts {
-                bits.extend(contact.point.map(f32::to_bits));
-                bits.push(contact.distance.to_bits());
-            }
-        }
-        bits
     }
 
     #[test]
@@ -292,8 +272,8 @@ mod tests {
         }
     }
 
-    /// Cubes by twos, half of them on the ground: no cube touches another, some of the partners are near
-    /// enough to be candidates, and all others are far.
+    /// Cubes in pairs, half of them on the ground: no cube touches another one, some partners are
+    /// near enough to be candidates, and all others are far.
     fn couples(count: u16) -> Vec<Body> {
         let mut bodies = heap(0);
         for couple in 0..count {
@@ -301,11 +281,7 @@ mod tests {
             let y = if couple % 2 == 0 { 1.0 } else { 1.1 };
             let way = if couple % 4 < 2 { 2.1 } else { 2.6 };
             for x in [x, x + way] {
-                bodies.push(Body {
-                    pose: Pose { position: [x, y, z], orientation: [0.0, 0.0, 0.0, 1.0] },
-                    velocity: Velocity::default(),
-                    shape: 1,
-                });
+                bodies.push(body([x, y, z], LEVEL));
             }
         }
         bodies
@@ -314,10 +290,10 @@ mod tests {
     #[test]
     fn what_moves_in_one_share_alone_is_found_in_kept_candidates_and_anew() {
         let start = couples(6300);
-        // Of two and of three shares these are in the last.
+        // With two and with three shares, these bodies are in the last one.
         let moved = start.len() - 4000..start.len();
-        // Where they are in each step: nearer to their partners by less than candidates are kept for,
-        // then by more, which those meet that were none; on the ground and off it.
+        // Offsets in each step: towards the partners by less than the candidates allow, then by
+        // more, which makes pairs of earlier non-candidates; on the ground and above it.
         let ways =
             [[0.0, 0.0], [-0.15, 0.0], [-0.15, -0.1], [-0.65, -0.1], [-0.6, 0.1], [0.0, 0.0]];
         let steps = ways.map(|[x, y]| {
@@ -354,12 +330,7 @@ mod tests {
     fn the_bits_are_the_same_in_every_build_and_on_every_architecture() {
         let mut collisions = Vec::new();
         Detector::default().detect(&heap(4000), CUBES, &mut collisions);
-        // FNV-1a, 64 bits, over the words.
-        let mut digest = 0xCBF2_9CE4_8422_2325_u64;
-        for word in bits(&collisions) {
-            digest = (digest ^ u64::from(word)).wrapping_mul(0x0100_0000_01B3);
-        }
-        assert_eq!(format!("{digest:016x}"), "7d5f4d8395f1ff8a");
+        assert_eq!(digest(bits(&collisions)), "7d5f4d8395f1ff8a");
     }
 
     #[test]

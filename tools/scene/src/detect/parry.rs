@@ -1,8 +1,8 @@
-//! This file asks parry3d where two bodies touch that are not both boxes, or that boxes' own arithmetic
-//! leaves to it.
+//! Asks parry3d for the contacts of pairs that are not both boxes, and of boxes that the lanes
+//! leave to it.
 //!
-//! parry computes the contact manifold in the frame of its first shape, which is our body A. Its normal
-//! points from A to B, ours from B to A; its distances mean the same.
+//! parry computes the contact manifold in the frame of its first shape, which is our body A. Its
+//! normal points from A to B, ours from B to A; its distances mean the same.
 
 use parry3d::math::{Pose, Rotation, Vector};
 use parry3d::query::details::contact_manifold_cuboid_cuboid;
@@ -14,14 +14,14 @@ use super::MARGIN;
 use super::points::MOST;
 use crate::Geometry;
 
-/// Points nearer to each other than this are one, m². Pieces of a line are cut off in equal points
-/// where only one is left.
+/// Squared distance below which two points are the same, m². Clipping can reduce a line to one
+/// point, which parry returns twice.
 const SAME_POINT: f32 = 1e-8;
 
-/// What rounding may make of two equal distances, m.
+/// Allowance for rounding between two equal distances, m.
 const SAME_DEPTH: f32 = 1e-4;
 
-/// Where two bodies touch, each in its own frame.
+/// The contact of two bodies, each in its own frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place {
     pub(super) on_a: [f32; 3],
@@ -29,7 +29,7 @@ pub(super) struct Place {
     pub(super) distance: f32,
 }
 
-/// parry, with its buffer.
+/// parry and its buffer.
 #[derive(Debug)]
 pub(super) struct Parry {
     manifold: ContactManifold<(), ()>,
@@ -43,8 +43,8 @@ impl Default for Parry {
 }
 
 impl Parry {
-    /// Where two bodies of these geometries touch, and the unit vector along which they do, from A to B
-    /// in the frame of A. `None` if parry does not know the pair.
+    /// The contact points of two bodies with these geometries, and the unit vector from A to B
+    /// along which they touch, in the frame of A. `None` if parry does not know the pair.
     pub(super) fn ask(
         &mut self,
         [a, b]: [&Body; 2],
@@ -57,7 +57,7 @@ impl Parry {
             let same = |other: &Place| {
                 Vector::from_array(other.on_b).distance_squared(point.local_p2) < SAME_POINT
             };
-            // Written so that a NaN is no contact.
+            // In this form a NaN is no contact.
             let near = point.dist <= MARGIN && point.dist.is_finite() && point.local_p2.is_finite();
             let known = curved && self.places[..count].iter().any(same);
             if near && !known && count < MOST {
@@ -72,9 +72,9 @@ impl Parry {
         Some((self.manifold.local_n1.to_array(), &self.places[..count]))
     }
 
-    /// Has parry compute the manifold of two geometries; whether one has a curved side.
+    /// Has parry compute the manifold of two geometries; returns whether one has a curved side.
     fn parry(&mut self, b_in_a: &Pose, a: Geometry, b: Geometry) -> Option<bool> {
-        // Without points and normals of an earlier pair parry starts afresh, so that a result
+        // Without points and normals of an earlier pair, parry starts afresh, so that a result
         // depends on the two poses alone.
         let manifold = &mut self.manifold;
         manifold.clear();
@@ -92,8 +92,8 @@ impl Parry {
             })
         })
         .ok()?;
-        // To the points of two features parry adds the nearest one, last and without a feature.
-        // Where a capsule lies flat that is any point of a line whose ends are there already.
+        // parry adds the nearest point to the points of two features, last and without a feature.
+        // For a flat-lying capsule that is any point of a line whose ends are already there.
         let is_spare = match &self.manifold.points[..] {
             [others @ .., nearest] => {
                 nearest.fid1 == PackedFeatureId::UNKNOWN
@@ -108,7 +108,7 @@ impl Parry {
     }
 }
 
-/// Hands parry's shape of that geometry to `then`.
+/// Passes parry's shape of a geometry to `then`.
 fn with_shape<R>(geometry: Geometry, then: impl FnOnce(&dyn Shape) -> R) -> R {
     match geometry {
         Geometry::Box { half_extents } => then(&Cuboid::new(Vector::from_array(half_extents))),

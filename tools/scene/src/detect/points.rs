@@ -1,19 +1,18 @@
-//! This file gathers the points at which two bodies touch, before four of them are chosen, of a pair in
-//! each lane.
+//! Collects the contact points of two bodies before four of them are chosen, for one pair in each
+//! lane.
 
 use zynq_pgs::CONTACT_POINTS;
 
 use super::MARGIN;
 use super::lanes::{Mask, Numbers, Vector};
 
-/// Points that two faces have in common at most: four corners of each, and each edge of one with each
-/// of the other.
+/// Most points of two faces: four corners of each, and each edge of one with each of the other.
 pub(super) const MOST: usize = 4 + 4 + 16;
 
-/// A point of some of the pairs.
+/// One point of each pair.
 #[derive(Clone, Copy)]
 pub(super) struct Slot<N: Numbers> {
-    /// Of which pairs it is one.
+    /// The pairs that have it.
     pub(super) taken: N::Mask,
     pub(super) on_a: Vector<N>,
     pub(super) on_b: Vector<N>,
@@ -21,7 +20,7 @@ pub(super) struct Slot<N: Numbers> {
 }
 
 impl<N: Numbers> Slot<N> {
-    /// This point for the pairs in the mask, and the other for the rest.
+    /// Selects this point for the pairs in the mask, and the other elsewhere.
     #[inline(always)]
     pub(super) fn or(&self, mask: N::Mask, other: &Self) -> Self {
         Self {
@@ -33,15 +32,15 @@ impl<N: Numbers> Slot<N> {
     }
 }
 
-/// Points near enough, of each pair in the order in which they were found and without gaps.
+/// Near enough points, for each pair in the order of discovery and without gaps.
 pub(super) struct Points<N: Numbers> {
-    /// Beyond the count none is taken.
+    /// Slots beyond the count are unused.
     slots: [Slot<N>; MOST],
     count: usize,
 }
 
 impl<N: Numbers> Points<N> {
-    /// None, whatever number `any` is.
+    /// No points; `any` serves only as proof of the instructions.
     pub(super) fn none(any: N) -> Self {
         let (zero, nowhere) = (any.all(0.0), Vector::all(any, [0.0; 3]));
         let taken = zero.above(zero);
@@ -57,23 +56,23 @@ impl<N: Numbers> Points<N> {
         self.count = 0;
     }
 
-    /// Those that some pair has.
+    /// The slots that some pair uses.
     pub(super) fn slots(&self) -> &[Slot<N>] {
         &self.slots[..self.count]
     }
 
-    /// The first ones, and of which pairs there are more.
+    /// The first slots, and the pairs that have more points.
     #[inline(always)]
     pub(super) fn first(&self) -> ([Slot<N>; CONTACT_POINTS], N::Mask) {
         let [a, b, c, d, fifth, ..] = &self.slots;
         ([*a, *b, *c, *d], fifth.taken)
     }
 
-    /// Takes a point of those pairs of which it is near enough; of more than two faces can have, the
-    /// first.
+    /// Adds a point for the pairs in which it is near enough; points beyond the most of two faces
+    /// are dropped.
     #[inline(always)]
     pub(super) fn take(&mut self, pairs: N::Mask, on_a: Vector<N>, on_b: Vector<N>, distance: N) {
-        // Written so that a NaN is no contact.
+        // In this form a NaN is no contact.
         let near = distance.all(MARGIN).at_least(distance);
         let finite = distance.all(f32::INFINITY).above(distance.abs()).and(on_b.is_finite());
         let taken = pairs.and(near).and(finite);
@@ -83,7 +82,7 @@ impl<N: Numbers> Points<N> {
             if left.bits() == 0 {
                 break;
             }
-            // Those to which this slot is the next one.
+            // The pairs whose next slot is this one.
             let free = left.without(slot.taken);
             left = left.and(slot.taken);
             if free.bits() != 0 {

@@ -1,27 +1,27 @@
-//! This file chooses four of many contact points, of a pair in each lane.
+//! Chooses four of many contact points, for one pair in each lane.
 //!
 //! The rule, every tie going to the lowest index:
+//!
 //! 1. the deepest point;
 //! 2. the point farthest from the first;
 //! 3. the point that spans the largest triangle with the first two;
 //! 4. the point that adds the largest area to that triangle.
 //!
-//! A choice that would add nothing (a point that is there already, all points on a line) is not
-//! made, so that the result may have fewer points. Every computation is f32 in the order written.
+//! A choice that adds nothing (a repeated point, or all points on a line) is not made, so that the
+//! result may have fewer points. Every computation is f32 in the order written.
 
 use zynq_pgs::CONTACT_POINTS;
 
 use super::lanes::{Mask, Numbers, Vector};
 use super::points::{Points, Slot};
 
-/// Area below which two spans count as the same, m²: a hundred steps of an f32 at the size of a
-/// cube.
+/// Area below which two spans count as equal, m²: a hundred steps of an f32 at the size of a cube.
 const NO_AREA: f32 = 1e-5;
 
-/// The points chosen, in the order of the choice; a pair has those in which it is taken.
+/// The chosen points, in the order of choice; a pair has the points in which it is marked.
 pub(super) type Chosen<N> = [Slot<N>; CONTACT_POINTS];
 
-/// Chooses.
+/// Chooses the points.
 ///
 /// `normal` is the unit normal of the plane in which the points lie on A. Up to four points are all
 /// kept, in their order.
@@ -37,7 +37,7 @@ pub(super) fn reduce<N: Numbers>(points: &Points<N>, normal: Vector<N>) -> Chose
     result
 }
 
-/// Four of each pair in the mask, by the rule.
+/// Chooses four points of each pair in the mask, by the rule.
 #[inline(always)]
 fn choose<N: Numbers>(slots: &[Slot<N>], normal: Vector<N>, pairs: N::Mask) -> Chosen<N> {
     let (zero, one) = (normal.x.all(0.0), normal.x.all(1.0));
@@ -69,7 +69,7 @@ fn choose<N: Numbers>(slots: &[Slot<N>], normal: Vector<N>, pairs: N::Mask) -> C
     );
     let pairs_of_three = pairs_of_two.without(some.at_least(span));
 
-    // Outside of an edge the area has the opposite sign of the triangle's.
+    // Outside of an edge, the area has the opposite sign of the triangle's.
     let side = area(normal, first.on_a, second.on_a, third.on_a);
     let side = one.or(side.above(zero), -one);
     let (fourth, added) = largest(
@@ -95,7 +95,7 @@ fn choose<N: Numbers>(slots: &[Slot<N>], normal: Vector<N>, pairs: N::Mask) -> C
     ]
 }
 
-/// Of each pair the point of the largest measure and that measure; of equals the first.
+/// For each pair, the point of the largest measure and that measure; the first one in a tie.
 #[inline(always)]
 fn largest<N: Numbers>(
     slots: &[Slot<N>],
@@ -115,7 +115,7 @@ fn largest<N: Numbers>(
     (best, most)
 }
 
-/// Twice the area of a triangle, of that sign that it has seen along the normal.
+/// Twice the area of a triangle, with its sign as seen along the normal.
 #[inline(always)]
 fn area<N: Numbers>(normal: Vector<N>, a: Vector<N>, b: Vector<N>, c: Vector<N>) -> N {
     normal.dot(b.minus(a).cross(c.minus(a)))
@@ -136,7 +136,7 @@ mod tests {
 
     const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
-    /// A point, and how far it is from the other body.
+    /// A point, and its distance from the other body.
     #[derive(Debug, Clone, Copy)]
     struct Candidate {
         point: [f32; 3],
@@ -147,7 +147,7 @@ mod tests {
         points.iter().map(|&[x, z]| Candidate { point: [x, 0.0, z], distance: 0.0 }).collect()
     }
 
-    /// The choice among the candidates of one lane, beside others of which it must know nothing.
+    /// Chooses among the candidates of one lane, next to other lanes that must not affect it.
     struct Choose<'a>(&'a [Candidate], &'a mut Vec<Vec<usize>>);
 
     impl Work for Choose<'_> {
@@ -163,7 +163,7 @@ mod tests {
             for own in 0..L::WIDTH {
                 points.clear();
                 for lane in 0..L::WIDTH {
-                    // The others have other points, and some of them fewer.
+                    // The other lanes have other points, and some have fewer.
                     let skipped = if lane == own { 0 } else { lane + 1 };
                     let candidates = self.0.iter().cycle().skip(skipped);
                     let count = self.0.len().saturating_sub(skipped / 2);

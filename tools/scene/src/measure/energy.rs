@@ -31,8 +31,8 @@ pub fn kinetic_energy_parts(bodies: &[Body], shapes: &[Shape]) -> KineticEnergy 
 
 /// Kinetic energy of the velocities that moved the bodies in the last step, J, by kind.
 ///
-/// A step moves a body by v dt and adds g dt to v afterwards. Without this addition a body at rest
-/// has no energy.
+/// A step moves a body by v dt and then adds g dt to v. Without this addition a body at rest has no
+/// energy.
 #[must_use]
 pub fn kinetic_energy_before_gravity(
     bodies: &[Body],
@@ -40,11 +40,11 @@ pub fn kinetic_energy_before_gravity(
     gravity: [f32; 3],
     time_step: f32,
 ) -> KineticEnergy {
-    // The product as the step rounds it.
+    // The product, rounded as in the step.
     kinetic_energy_less(gravity.map(|g| f64::from(g * time_step)), bodies, shapes)
 }
 
-/// Kinetic energy where each linear velocity is less by `addition`, m/s.
+/// Kinetic energy with `addition` subtracted from each linear velocity, m/s.
 fn kinetic_energy_less(addition: [f64; 3], bodies: &[Body], shapes: &[Shape]) -> KineticEnergy {
     let mut energy = KineticEnergy::default();
     for (body, shape) in moving(bodies, shapes) {

@@ -1,4 +1,4 @@
-//! This file measures a scene: what the tables of the command line tool show.
+//! Measures a scene for the tables of the command line tool.
 //!
 //! Sums are f64, in the order of the bodies. A body whose shape is not in `shapes` is left out; a
 //! step refuses it.
@@ -18,7 +18,7 @@ pub use penetration::{Penetration, carry_along, penetration};
 
 use crate::GROUND;
 
-/// Number of collisions in which the ground takes part.
+/// Number of collisions with the ground.
 #[must_use]
 pub fn ground_pairs(collisions: &[Collision]) -> usize {
     collisions.iter().filter(|c| c.body_a == GROUND || c.body_b == GROUND).count()
@@ -35,7 +35,7 @@ fn moving<'a>(
     })
 }
 
-/// 1 / inverse, or 0 for what does not move or turn and so carries no energy and no momentum.
+/// 1 / inverse; 0 for a body that does not move or turn, and so has no energy and no momentum.
 fn inverted(inverse: f32) -> f64 {
     if inverse == 0.0 { 0.0 } else { 1.0 / f64::from(inverse) }
 }
@@ -52,12 +52,12 @@ fn rotation([x, y, z, w]: [f32; 4]) -> [[f64; 3]; 3] {
     ]
 }
 
-/// A vector of the body in world axes.
+/// Transforms a vector from body to world axes.
 fn to_world(rows: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     rows.map(|row| dot(row, v))
 }
 
-/// A vector of the world in body axes.
+/// Transforms a vector from world to body axes.
 fn to_body(rows: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| (rows[0][k] * v[0] + rows[1][k] * v[1]) + rows[2][k] * v[2])
 }

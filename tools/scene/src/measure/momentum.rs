@@ -1,4 +1,4 @@
-//! This file measures the momentum of a scene.
+//! Measures the momentum of a scene.
 
 use zynq_pgs::{Body, Shape};
 
@@ -9,7 +9,7 @@ use super::{cross, inverted, moving, rotation, to_body, to_world};
 pub struct Momentum {
     /// N s.
     pub linear: [f64; 3],
-    /// About the origin, N m s: of the bodies' motion and of their spin.
+    /// About the origin, N m s: from the bodies' motion and their spin.
     pub angular: [f64; 3],
 }
 

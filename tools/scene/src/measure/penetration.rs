@@ -1,17 +1,17 @@
-//! This file measures how deep bodies are in each other.
+//! Measures the penetration of bodies.
 
 use zynq_pgs::{Body, CONTACT_POINTS, Collision};
 
 use super::{dot, rotation, to_body, to_world};
 
-/// How deep bodies are in each other, over the contact points with a negative distance.
+/// Penetration depths over the contact points with a negative distance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Penetration {
     /// Contact points, penetrating or not.
     pub contacts: u64,
-    /// Those with a negative distance.
+    /// Contact points with a negative distance.
     pub penetrating: u64,
-    /// Mean depth of those, m; 0 if there are none.
+    /// Mean depth of these, m; 0 if there are none.
     pub mean: f64,
     /// Largest depth, m; 0 if there is none.
     pub largest: f64,
@@ -45,11 +45,11 @@ fn used(collision: &Collision) -> usize {
     usize::try_from(collision.count).map_or(CONTACT_POINTS, |count| count.min(CONTACT_POINTS))
 }
 
-/// The same contacts after their bodies have moved: each point goes along with the body that it
-/// lies on, and the distance is measured along the old normal.
+/// Moves contacts along with their bodies: each point follows the body that it lies on, and the
+/// distance is measured along the old normal.
 ///
-/// For a step whose shapes are not known, so that collisions cannot be detected anew. Collisions of
-/// bodies that are not there stay as they are.
+/// This serves a step without the shapes' geometry, for which collisions cannot be detected again.
+/// A collision of a missing body stays as it is.
 #[must_use]
 pub fn carry_along(collisions: &[Collision], before: &[Body], after: &[Body]) -> Vec<Collision> {
     let along = |body: u32, point: [f64; 3]| {
@@ -87,17 +87,14 @@ pub fn carry_along(collisions: &[Collision], before: &[Body], after: &[Body]) ->
 
 #[cfg(test)]
 mod tests {
-    use zynq_pgs::{Contact, Pose, Velocity};
+    use zynq_pgs::Contact;
 
     use super::*;
+    use crate::fixtures::{LEVEL, body};
 
     fn collision(distances: [f32; 4], count: u32) -> Collision {
         let contacts = distances.map(|distance| Contact { point: [0.0, 1.0, 2.0], distance });
         Collision { body_a: 0, body_b: 1, normal: [0.0, -1.0, 0.0], count, contacts }
-    }
-
-    fn body(position: [f32; 3], orientation: [f32; 4]) -> Body {
-        Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 0 }
     }
 
     #[test]
@@ -109,13 +106,12 @@ mod tests {
         let expected = Penetration { contacts: 6, penetrating: 2, mean: 0.5, largest: 0.75 };
         assert_eq!(found, expected);
         assert_eq!(penetration(&[]), Penetration::default());
-        // A count that no collision may have is cut off.
+        // A count above the maximum is cut off.
         assert_eq!(penetration(&[collision([-1.0; 4], 9)]).contacts, 4);
     }
 
     #[test]
     fn contacts_go_along_with_their_bodies() {
-        const LEVEL: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
         // B lies on A, half a metre deep; then it is lifted by a quarter of a metre.
         let before = [body([0.0; 3], LEVEL), body([0.0, 2.0, 0.0], LEVEL)];
         let mut after = before;

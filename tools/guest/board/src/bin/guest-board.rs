@@ -1,4 +1,4 @@
-//! Plays the programmable logic of a guest in QEMU: an emulated board on the guest's memory.
+//! Runs an emulated board as the programmable logic of a guest in QEMU, on the guest's memory.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command line tool")]
 
 use std::error::Error;
@@ -14,19 +14,19 @@ use guest_board::guest_file::GuestFile;
 use guest_board::qtest::QtestLine;
 use guest_board::server::{ServeError, Server};
 
-/// How long QEMU may take to make its socket.
+/// Time within which QEMU must create its socket.
 const START_LIMIT: Duration = Duration::from_secs(30);
 
-/// Plays the programmable logic of a guest in QEMU until the guest ends.
+/// Runs an emulated board as the programmable logic of a guest in QEMU, until the guest ends.
 ///
 /// QEMU is started with `-object memory-backend-file,id=ddr,size=SIZE,mem-path=FILE,share=on
 /// -machine memory-backend=ddr -accel tcg -qtest unix:SOCKET,server=on,wait=off`.
 ///
-/// Exit codes: 0 served and the driver did nothing wrong; 1 it did, or the guest could not be
-/// served; 2 wrong usage.
+/// Exit codes: 0 the driver made no mistake; 1 it did, or the guest could not be served; 2 wrong
+/// usage.
 #[derive(Debug, Parser)]
 struct Args {
-    /// The file behind the guest's memory; its byte 0 is physical address 0.
+    /// File behind the guest's memory; its byte 0 is physical address 0
     #[arg(long, value_name = "FILE")]
     memory: PathBuf,
     /// QEMU's qtest socket.
@@ -35,14 +35,14 @@ struct Args {
     /// Physical address of the mailbox page.
     #[arg(long, value_name = "ADDRESS", value_parser = number)]
     mailbox: u64,
-    /// Memory that the device may touch; may be given more than once [default: the memory that the
-    /// interface reserves]
+    /// Memory that the device may access; can be repeated [default: the memory that the interface
+    /// reserves]
     #[arg(long, value_name = "ADDRESS+BYTES", value_parser = range)]
     grant: Vec<Range<u64>>,
-    /// The interrupt, as the device tree counts (SPI).
+    /// The interrupt (SPI), as the device tree counts
     #[arg(long, value_name = "NUMBER", default_value_t = INTERRUPT_SPI)]
     spi: u32,
-    /// How long the guest may run, seconds.
+    /// Time limit of the guest, seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 600)]
     limit: u64,
 }
@@ -80,7 +80,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let limit = Duration::from_secs(args.limit);
-    // QEMU answers once its machine is made: the memory is there then.
+    // QEMU answers once its machine exists, and with it the memory.
     let line = QtestLine::connect(&args.qtest, args.spi, limit.min(START_LIMIT))
         .map_err(|error| format!("{}: {error}", args.qtest.display()))?;
     let memory = GuestFile::open(&args.memory)

@@ -1,4 +1,4 @@
-//! Runs a program in a guest so that its accesses to the board's registers go to the host.
+//! Runs a program in a guest, and forwards its accesses to the board's registers to the host.
 #![allow(clippy::print_stderr, reason = "a command line tool")]
 
 use std::process::ExitCode;
@@ -18,7 +18,7 @@ fn main() -> ExitCode {
             eprintln!("  because {error}");
             cause = error.source();
         }
-        // As a shell says that a command could not be run.
+        // The shell's code for a command that cannot be run.
         ExitCode::from(126)
     };
     match program.split_first() {

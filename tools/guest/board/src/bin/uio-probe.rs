@@ -1,5 +1,5 @@
-//! Runs one step on the board behind UIO nodes, without the driver: a guest and its board tried out
-//! by themselves.
+//! Runs one step on the board behind UIO nodes, without the driver: a test of a guest and its board
+//! alone.
 #![allow(clippy::print_stdout, reason = "a command line tool")]
 
 use std::process::ExitCode;
@@ -13,7 +13,7 @@ use guest_board::one_cube::{self, Machine};
 use zynq_pgs::PlatformError;
 use zynq_pgs::platform::{ReservedMemory, UioDevice, UioWindow};
 
-/// How long the step may take.
+/// Time limit of the step.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 struct Board {
@@ -33,13 +33,13 @@ impl Board {
         Ok(Self { dmas: dmas?, control, memory, device })
     }
 
-    /// The window and the offset in it.
+    /// The window of an address, and the offset in it.
     fn place(&mut self, address: u64) -> (&mut UioWindow, u32) {
         let dma = self.dmas.iter_mut().enumerate().find_map(|(core, window)| {
             let offset = u32::try_from(address.checked_sub(dma_base(core))?).ok()?;
             (offset < DMA_BYTES).then_some((window, offset))
         });
-        // What is nowhere is refused by the window.
+        // The window refuses an offset outside of it.
         let offset = address.checked_sub(CONTROL_BASE).and_then(|at| u32::try_from(at).ok());
         dma.unwrap_or((&mut self.control, offset.unwrap_or(u32::MAX)))
     }

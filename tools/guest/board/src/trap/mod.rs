@@ -1,8 +1,8 @@
-//! This folder runs a program so that its accesses to a board's registers go to the host.
+//! Runs a program and forwards its accesses to a board's registers to the host.
 //!
-//! The program is traced. Where it maps a register region of a UIO node, the mapping is made without
-//! rights; each access then stops the program, and is made by the host in its place. The program is
-//! not changed, and sees neither.
+//! The program is traced. Its mappings of a register region of a UIO node are made without rights;
+//! each access then stops the program, and the host makes it in its place. The program is unchanged
+//! and notices none of this.
 
 mod regions;
 #[cfg(all(target_arch = "aarch64", target_os = "linux"))]

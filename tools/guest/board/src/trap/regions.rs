@@ -1,4 +1,4 @@
-//! This file knows which virtual addresses of the traced program stand for which registers.
+//! Maps virtual addresses of the traced program to registers.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// The nodes of the accelerator among those of a system, whose device files lie in `dev`.
+    /// The accelerator's nodes in a system, whose device files lie in `dev`.
     #[must_use]
     pub fn of_the_board(nodes: &[UioNode], dev: &Path) -> Vec<Self> {
         let ours = |node: &&UioNode| {
@@ -50,13 +50,13 @@ struct Region {
 pub struct Regions(Vec<Region>);
 
 impl Regions {
-    /// Takes note of a mapping.
+    /// Adds a mapping.
     pub fn add(&mut self, start: u64, bytes: u64, physical: u64) {
         self.remove(start, bytes);
         self.0.push(Region { start, end: start.saturating_add(bytes), physical });
     }
 
-    /// Takes note that a range is mapped no more, or otherwise.
+    /// Removes a range that is unmapped, or mapped to something else.
     pub fn remove(&mut self, start: u64, bytes: u64) {
         let end = start.saturating_add(bytes);
         let mut kept = Vec::new();
@@ -70,7 +70,7 @@ impl Regions {
         self.0 = kept;
     }
 
-    /// Whether a range touches a region.
+    /// Whether a range overlaps a region.
     #[must_use]
     pub fn touch(&self, start: u64, bytes: u64) -> bool {
         let end = start.saturating_add(bytes);

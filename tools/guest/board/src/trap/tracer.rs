@@ -1,7 +1,7 @@
-//! This file is the tracer: it stops a program at system calls and at accesses to registers.
+//! The tracer: stops a program at system calls and at accesses to registers.
 //!
 //! Source: ptrace(2); Linux `arch/arm64/kernel/ptrace.c` (arguments of a system call can be changed
-//! where it enters).
+//! at its entry).
 
 use std::collections::HashMap;
 use std::ffi::OsString;
@@ -24,12 +24,12 @@ use super::{Node, Regions};
 use crate::instruction::{self, Registers};
 use crate::mailbox::{self, Access, Client, MailboxError};
 
-/// How long the host may take for an answer.
+/// Time limit of the host's answer.
 const LIMIT: Duration = Duration::from_secs(30);
 /// The register that carries the number of a system call.
 const SYSCALL: usize = 8;
 
-/// What was passed on.
+/// Counts of forwarded accesses.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Counts {
@@ -37,11 +37,11 @@ pub struct Counts {
     pub reads: u64,
     /// Writes of registers.
     pub writes: u64,
-    /// Register regions that were mapped.
+    /// Mapped register regions.
     pub regions: u64,
 }
 
-/// Why a program cannot be traced on.
+/// Why tracing a program failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TraceError {
@@ -54,25 +54,25 @@ pub enum TraceError {
     /// The kernel.
     #[error("cannot {act}")]
     Kernel {
-        /// What was tried.
+        /// The attempted action.
         act: &'static str,
-        /// Why not.
+        /// The reason.
         #[source]
         source: Errno,
     },
     /// The program cannot be started.
     #[error("cannot start {program:?}")]
     Start {
-        /// Which.
+        /// The program.
         program: OsString,
-        /// Why not.
+        /// The reason.
         #[source]
         source: std::io::Error,
     },
-    /// There is nothing to trap.
+    /// The system has no board to forward to.
     #[error("expected a UIO node of the accelerator, found none: is this the guest's device tree?")]
     NoNode,
-    /// A register was touched otherwise than by a load or store of 32 bits.
+    /// An access to a register other than a 32-bit load or store.
     #[error(
         "expected a 32-bit load or store, found instruction {instruction:#010x} at {pc:#x}, which \
          touches the registers at {address:#x}: nothing else may reach an AXI-Lite slave"
@@ -80,17 +80,17 @@ pub enum TraceError {
     NotARegisterAccess {
         /// The instruction.
         instruction: u32,
-        /// Where it stands.
+        /// Its address.
         pc: u64,
-        /// What it touched, as the kernel gives it in the signal's place.
+        /// The accessed address, as the kernel reports it for the signal.
         address: u64,
     },
-    /// The program maps registers in a way that is not passed on.
-    #[error("{what} of the register mapping at {address:#x} is not passed on by this tracer")]
+    /// A mapping of registers that cannot be forwarded.
+    #[error("{what} of the register mapping at {address:#x} is not supported by this tracer")]
     NotPassedOn {
-        /// What was tried.
+        /// The mapping.
         what: &'static str,
-        /// Where.
+        /// Its address.
         address: u64,
     },
 }
@@ -99,7 +99,7 @@ fn kernel(act: &'static str) -> impl FnOnce(Errno) -> TraceError {
     move |source| TraceError::Kernel { act, source }
 }
 
-/// Asks to be traced, and becomes the program. Returns only if that fails.
+/// Asks to be traced, and executes the program. Returns only if that fails.
 #[must_use]
 pub fn become_traced(program: &[OsString]) -> TraceError {
     if let Err(errno) = ptrace::traceme() {
@@ -110,11 +110,12 @@ pub fn become_traced(program: &[OsString]) -> TraceError {
     TraceError::Start { program: name.clone(), source }
 }
 
-/// Runs a program, and passes its register accesses on; its exit code, and what was passed on.
+/// Runs a program, and forwards its register accesses; returns its exit code and the counts.
 ///
-/// The time that the program takes is not bounded, as in a shell.
+/// The program's time is not bounded, as in a shell.
 ///
 /// # Errors
+///
 /// [`TraceError`]; the program is killed then.
 pub fn run(program: &[OsString]) -> Result<(u8, Counts), TraceError> {
     let system = System::default();
@@ -138,7 +139,7 @@ pub fn run(program: &[OsString]) -> Result<(u8, Counts), TraceError> {
         .map_err(|_| TraceError::Kernel { act: "name the process", source: Errno::ERANGE })?;
     let traced = trace(child, nodes, page_bytes, host);
     if traced.is_err() {
-        // It may have ended by itself.
+        // The program may have ended by itself.
         let _ = kill(child, Signal::SIGKILL);
     }
     traced
@@ -151,7 +152,7 @@ fn trace(
     page_bytes: u64,
     host: Client<UioWindow>,
 ) -> Result<(u8, Counts), TraceError> {
-    // The program's first stop is the end of its exec; a failed one ends it before.
+    // The program's first stop is the end of its exec; a failed exec ends it before.
     match waitpid(child, None).map_err(kernel("wait for the program"))? {
         WaitStatus::Stopped(..) => {}
         WaitStatus::Exited(_, code) => return Ok((exit_code(code), Counts::default())),
@@ -170,16 +171,16 @@ fn exit_code(code: i32) -> u8 {
     u8::try_from(code).unwrap_or(u8::MAX)
 }
 
-/// A system call that a thread is in.
+/// A thread's system call.
 #[derive(Debug, Clone, Copy)]
 enum Call {
-    /// One that does not matter here.
+    /// Any other call.
     Other,
     /// A mapping of registers.
     Map { bytes: u64, physical: u64, rights: u64 },
-    /// Another mapping, which may come to lie over registers.
+    /// Another mapping, which may replace one of registers.
     MapOther { bytes: u64 },
-    /// The end of a mapping.
+    /// An unmapping.
     Unmap { start: u64, bytes: u64 },
 }
 
@@ -189,7 +190,7 @@ struct Tracer {
     page_bytes: u64,
     host: Client<UioWindow>,
     regions: Regions,
-    /// What call each thread is in.
+    /// The current call of each thread.
     threads: HashMap<Pid, Option<Call>>,
     counts: Counts,
 }
@@ -212,7 +213,7 @@ impl Tracer {
                     self.register_access(pid).map(|made| (pid, signal(made)))
                 }
                 WaitStatus::Stopped(pid, signal) => {
-                    // A new thread begins with a stop of the trace's own.
+                    // A new thread begins with a stop of its own.
                     let new = self.threads.insert(pid, None).is_none();
                     Ok((pid, (!new || signal != Signal::SIGSTOP).then_some(signal)))
                 }
@@ -224,12 +225,12 @@ impl Tracer {
                 _ => continue,
             };
             let (thread, signal) = match stopped {
-                // Another thread has ended the program meanwhile: the next wait says so.
+                // Another thread has ended the program: the next wait reports it.
                 Err(TraceError::Kernel { source: Errno::ESRCH, .. }) => continue,
                 stopped => stopped?,
             };
             match ptrace::syscall(thread, signal) {
-                // It was killed meanwhile: the next wait says so.
+                // It was killed: the next wait reports it.
                 Ok(()) | Err(Errno::ESRCH) => {}
                 Err(errno) => return Err(kernel("let the program run")(errno)),
             }
@@ -259,7 +260,7 @@ impl Tracer {
                     return Ok(Call::MapOther { bytes: second });
                 };
                 let call = Call::Map { bytes: second, physical, rights: third };
-                // Rights: none.
+                // No rights.
                 registers.regs[2] = 0;
                 ptrace::setregs(thread, *registers).map_err(kernel("write registers"))?;
                 Ok(call)
@@ -286,7 +287,7 @@ impl Tracer {
         let failed = result > u64::MAX - 4095;
         match call {
             Call::Map { bytes, physical, rights } => {
-                // The program finds its arguments as they were.
+                // Restores the program's arguments.
                 registers.regs[2] = rights;
                 ptrace::setregs(thread, *registers).map_err(kernel("write registers"))?;
                 if !failed {
@@ -306,18 +307,19 @@ impl Tracer {
         Ok(())
     }
 
-    /// Physical address and length of the registers that a file shows at an offset, if it does.
+    /// Physical address and length of the registers at an offset of a file, if the file is a
+    /// board's node.
     fn registers_behind(&self, thread: Pid, file: u64, offset: u64) -> Option<(u64, u64)> {
         let file = i32::try_from(file).ok().filter(|file| *file >= 0)?;
         let path: PathBuf = fs::read_link(format!("/proc/{thread}/fd/{file}")).ok()?;
         self.nodes.iter().find(|node| node.path == path)?.map_at(offset, self.page_bytes)
     }
 
-    /// A thread touched what it may not: makes the access if it is one to a register.
+    /// Handles a segmentation fault: makes the access if it is one to a register.
     fn register_access(&mut self, thread: Pid) -> Result<bool, TraceError> {
         let mut registers = ptrace::getregs(thread).map_err(kernel("read registers"))?;
         let pc = registers.pc;
-        // Two instructions are read at once: never those behind the end of the program's last page.
+        // Reads two instructions at once, never beyond the program's last page.
         let place = usize::try_from(pc & !7).map(std::ptr::without_provenance_mut);
         let Ok(place) = place else { return Ok(false) };
         let pair = match ptrace::read(thread, place) {
@@ -338,7 +340,7 @@ impl Tracer {
             self.counts.reads += 1;
             Access::Read { address }
         };
-        let loaded = self.host.ask(request)?;
+        let loaded = self.host.request(request)?;
         general.complete(&access, loaded);
         (registers.regs, registers.sp) = (general.x, general.sp);
         registers.pc = pc.wrapping_add(4);
@@ -346,7 +348,7 @@ impl Tracer {
         Ok(true)
     }
 
-    /// An instruction that is not passed on: an error if a base register points to registers.
+    /// An instruction that cannot be forwarded is an error if a base register points to registers.
     fn foreign(&self, instruction: u32, at: &user_regs_struct) -> Result<bool, TraceError> {
         let base = usize::try_from((instruction >> 5) & 31).unwrap_or_default();
         let address = at.regs.get(base).copied().unwrap_or(at.sp);

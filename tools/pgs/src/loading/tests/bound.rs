@@ -1,10 +1,11 @@
-//! Who else uses the logic, by what it is and not by its name, and which manager programs it.
+//! Other users of the logic are recognised by what they are and not by their names; and the manager
+//! that programs the logic.
 
 use super::*;
 
 #[test]
 fn a_node_in_the_logic_counts_whatever_its_name() {
-    // Each window of the logic, and under no name of ours.
+    // Each window of the logic, under a foreign name.
     for (name, address) in [
         ("pgs@a0000000", 0xA000_0000),
         ("another-design", 0x8000_0000),
@@ -42,7 +43,7 @@ fn a_node_that_cannot_be_read_may_be_of_the_logic_and_hides_no_other() {
 fn a_device_file_in_another_place_is_the_same_device() {
     let kernel = FakeKernel::vendor();
     kernel.add_region(3, "design", "registers", 0xA000_0000);
-    // /dev/null in the part of the node: 1:3 is its number.
+    // /dev/null stands for the node: 1:3 is its number.
     kernel.file("sys/class/uio/uio3/dev", "1:3");
     kernel.add_process(17, "contained", "/dev/null");
     let error = kernel.load(&kernel.installed(), false).expect_err("in use");
@@ -55,7 +56,7 @@ fn a_device_file_in_another_place_is_the_same_device() {
     assert_refused(&kernel, &error, "process 18 (jailed)", "stop");
 }
 
-/// An overlay in configfs, with what it says of itself.
+/// Adds an overlay with its status to configfs.
 fn add_overlay(kernel: &FakeKernel, mount: &str, name: &str, status: &str) {
     let overlay = format!("{mount}/device-tree/overlays/{name}");
     kernel.file(&format!("{overlay}/status"), status);
@@ -72,7 +73,7 @@ fn logic_under_another_overlay_is_not_replaced_unless_that_is_asked_for() {
         let kernel = FakeKernel::vendor();
         kernel.remove("sys/kernel/config/device-tree");
         kernel.file("proc/mounts", mounts);
-        // Made and never filled, and ours.
+        // An overlay that was never filled, and our own.
         add_overlay(&kernel, mount, "empty", "unapplied");
         add_overlay(&kernel, mount, "pgs", "applied");
         kernel.load(&kernel.installed(), false).expect("no obstacle");
@@ -122,7 +123,7 @@ fn a_driver_of_the_kernel_that_is_bound_to_the_logic_keeps_it() {
     load(&kernel, &request).expect("asked for");
 }
 
-/// The manager `fpga<number>`.
+/// Adds the manager `fpga<number>`.
 fn add_manager(kernel: &FakeKernel, number: u32, name: &str) {
     for (file, text) in [("name", name), ("state", "operating"), ("flags", "0"), ("firmware", "")] {
         kernel.file(&format!("sys/class/fpga_manager/fpga{number}/{file}"), text);
@@ -162,6 +163,6 @@ fn the_bitstream_goes_to_the_logics_own_manager_by_its_name() {
     let error = load(&kernel, &to(ManagerChoice::Device("fpga7".to_owned()))).expect_err("absent");
     assert_refused(&kernel, &error, "no FPGA manager \"fpga7\" (found: fpga0", "pgs list");
     let error = load(&kernel, &to(ManagerChoice::Unasked)).expect_err("none");
-    assert_eq!(error.cause(), Cause::Input);
+    assert_eq!(error.at_fault(), AtFault::Caller);
     assert_eq!(kernel.written(), []);
 }

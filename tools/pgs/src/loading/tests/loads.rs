@@ -1,4 +1,4 @@
-//! What is loaded, how, and what is said if the kernel fails.
+//! Loading a bitstream and an overlay, and the errors if the kernel fails.
 
 use std::os::unix::fs::symlink;
 
@@ -27,7 +27,7 @@ fn an_installed_bitstream_is_loaded_by_its_name_and_the_overlay_follows() {
 fn a_bitstream_from_elsewhere_is_copied_while_it_is_loaded() {
     let kernel = FakeKernel::vendor();
     let file = kernel.elsewhere();
-    // The fake loads only what it finds under the name.
+    // The fake kernel loads only a file that it finds under the name.
     let loaded = kernel.load(&file, false).expect("loaded");
     assert!(loaded.copied);
     let left = fs::read_dir(kernel.path("lib/firmware")).expect("the folder").count();
@@ -74,7 +74,7 @@ fn a_state_that_is_not_operating_is_a_hardware_failure_and_ends_it() {
         kernel.state_after.set(state);
         kernel.file("sys/class/fpga_manager/fpga0/status", "reconfig CRC error");
         let error = kernel.load(&kernel.installed(), true).expect_err("failed");
-        assert_eq!(error.cause(), Cause::Hardware);
+        assert_eq!(error.at_fault(), AtFault::Logic);
         let text = error.to_string();
         assert!(text.contains(message) && text.contains("(reconfig CRC error)"), "{text}");
         assert_eq!(kernel.written().len(), 2, "no overlay on logic that does not run");
@@ -86,7 +86,7 @@ fn an_overlay_that_the_kernel_drops_is_removed_and_said() {
     let kernel = FakeKernel::vendor();
     kernel.status_after.set("unapplied");
     let error = kernel.load(&kernel.installed(), true).expect_err("not applied");
-    assert_eq!(error.cause(), Cause::NoBoard);
+    assert_eq!(error.at_fault(), AtFault::System);
     assert!(error.to_string().contains("found \"unapplied\""), "{error}");
     assert!(!kernel.path(&format!("{OVERLAYS}/pgs")).exists());
 
@@ -106,7 +106,7 @@ fn the_folder_that_the_kernel_looks_into_first_is_a_firmware_folder() {
     assert_eq!((loaded.firmware.as_str(), loaded.copied), ("zynq-pgs.bit.bin", false));
     let loaded = kernel.load(&kernel.elsewhere(), false).expect("loaded");
     assert!(loaded.copied, "into that folder, where the kernel finds it");
-    // The kernel would take another file of that name.
+    // The kernel would load another file of the same name.
     let hidden = kernel.bytes("lib/firmware/zynq-pgs.bit.bin", BITSTREAM);
     kernel.bytes("data/firmware/zynq-pgs.bit.bin", b"another");
     assert!(kernel.load(&hidden, false).expect("loaded").copied);

@@ -1,4 +1,4 @@
-//! Loading on a kernel made of files, which reacts to what is written as the vendor's does.
+//! Tests loading on a kernel made of files, which reacts to writes as the vendor's does.
 
 mod bound;
 mod loads;
@@ -13,15 +13,14 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use super::*;
-use crate::failure::Cause;
 
-/// A bitstream as bootgen makes it, in short.
+/// A short bitstream in bootgen's format.
 const BITSTREAM: &[u8] = b"\xff\xff\xff\xff\x66\x55\x99\xaa a bitstream";
 /// A compiled device tree of sixteen bytes.
 const TREE: &[u8] = b"\xd0\x0d\xfe\xed\0\0\0\x10the rest";
 const OVERLAYS: &str = "sys/kernel/config/device-tree/overlays";
 
-/// What is loaded by itself.
+/// Loads a bitstream alone.
 fn request(bitstream: &Path) -> Request {
     Request {
         bitstream: bitstream.to_owned(),
@@ -36,15 +35,15 @@ fn request(bitstream: &Path) -> Request {
 #[derive(Debug)]
 struct FakeKernel {
     root: TempDir,
-    /// Every write: the path below the root, and what.
+    /// Every write: the path below the root, and the bytes.
     writes: RefCell<Vec<(String, Vec<u8>)>>,
-    /// The state after programming; the write itself fails if it is an error.
+    /// The state after programming; if it is an error, the write fails, too.
     state_after: Cell<&'static str>,
     status_after: Cell<&'static str>,
     denied: Cell<&'static str>,
     /// Whether a UIO driver binds to the overlay's node.
     binds: Cell<bool>,
-    /// What a program opens while the bitstream is copied.
+    /// A device that a program opens while the bitstream is copied.
     opened_meanwhile: Cell<Option<&'static str>>,
 }
 
@@ -97,7 +96,7 @@ impl FakeKernel {
         self.file(&format!("sys/class/uio/uio{number}/name"), name);
     }
 
-    /// A node with a region of that name at that address.
+    /// Adds a node with one region.
     fn add_region(&self, number: u32, name: &str, region: &str, address: u64) {
         self.add_node(number, name);
         let address = format!("{address:#x}");
@@ -108,7 +107,7 @@ impl FakeKernel {
         }
     }
 
-    /// A process that has a file open.
+    /// Adds a process that has a file open.
     fn add_process(&self, id: u32, comm: &str, open: &str) {
         self.file(&format!("proc/{id}/comm"), comm);
         let files = self.path(&format!("proc/{id}/fd"));
@@ -116,7 +115,7 @@ impl FakeKernel {
         symlink(open, files.join("7")).expect("linked");
     }
 
-    /// Loads a bitstream, with an overlay or without.
+    /// Loads a bitstream, with or without an overlay.
     fn load(&self, bitstream: &Path, overlay: bool) -> Result<Loaded, LoadError> {
         let tree = self.bytes("home/zynq-pgs.dtbo", TREE);
         load(self, &Request { overlay: overlay.then_some(tree), ..request(bitstream) })
@@ -182,7 +181,7 @@ impl System for FakeKernel {
     }
 
     fn remove_directory(&self, path: &Path) -> io::Result<()> {
-        // Attributes of the kernel's are no obstacle.
+        // Attributes of the kernel are no obstacle.
         fs::remove_dir_all(path)
     }
 
@@ -199,10 +198,11 @@ fn pair(path: &str, text: &str) -> (String, String) {
     (path.to_owned(), text.to_owned())
 }
 
-/// Asserts that nothing was touched, and that cause, message and next step are as expected.
+/// Asserts that nothing was changed, and that the party at fault, the message and the next step are
+/// as expected.
 fn assert_refused(kernel: &FakeKernel, error: &LoadError, message: &str, next: &str) {
     assert_eq!(kernel.written(), [], "{error}");
-    assert_eq!(error.cause(), Cause::NoBoard, "{error}");
+    assert_eq!(error.at_fault(), AtFault::System, "{error}");
     assert!(error.to_string().contains(message), "{error}");
     assert!(error.next().contains(next), "{}", error.next());
 }

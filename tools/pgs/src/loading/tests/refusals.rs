@@ -1,4 +1,4 @@
-//! What is refused before anything is written.
+//! Refusals before anything is written.
 
 use super::*;
 
@@ -37,7 +37,7 @@ fn a_node_that_a_program_has_open_keeps_the_bitstream() {
 fn all_memory_that_a_program_has_open_keeps_the_bitstream() {
     let kernel = FakeKernel::vendor();
     let file = kernel.installed();
-    // Also where there is no node yet.
+    // Even where no node exists yet.
     kernel.add_process(4711, "peek", "/dev/mem");
     let error = kernel.load(&file, false).expect_err("in use");
     assert_refused(&kernel, &error, "/dev/mem is open in process 4711 (peek)", "stop");
@@ -91,7 +91,7 @@ fn without_rights_the_path_and_root_are_named() {
         kernel.denied.set(denied);
         let file = kernel.elsewhere();
         let error = kernel.load(&file, true).expect_err("denied");
-        assert_eq!(error.cause(), Cause::NoBoard);
+        assert_eq!(error.at_fault(), AtFault::System);
         assert!(error.to_string().contains(path), "{error}");
         assert!(error.next().contains("root"), "{}", error.next());
         let state = fs::read_to_string(kernel.path("sys/class/fpga_manager/fpga0/state"));
@@ -148,13 +148,13 @@ fn files_of_another_kind_are_wrong_input() {
         (kernel.path("absent"), "cannot read"),
     ] {
         let error = kernel.load(&bitstream, false).expect_err("wrong");
-        assert_eq!(error.cause(), Cause::Input, "{error}");
+        assert_eq!(error.at_fault(), AtFault::Caller, "{error}");
         assert!(error.to_string().contains(found), "{error}");
     }
     let overlay = Some(kernel.file("zynq-pgs.dtso", "/dts-v1/;"));
     let request = Request { overlay, ..request(&kernel.installed()) };
     let error = load(&kernel, &request).expect_err("a source");
-    assert_eq!(error.cause(), Cause::Input, "{error}");
+    assert_eq!(error.at_fault(), AtFault::Caller, "{error}");
     assert!(error.next().contains("dtc -@"), "{}", error.next());
     assert_eq!(kernel.written(), []);
 }
@@ -169,11 +169,11 @@ fn what_the_kernel_would_misread_is_refused_before_anything_is_written() {
         ("x.bit.bin.gz", b"\x1f\x8b\x08", "gzip", "unpack"),
         ("zeros", &[0; 2000], "no sync word", "README"),
     ] {
-        // Where the kernel finds it, too.
+        // Also in the kernel's own folder.
         for folder in ["home", "lib/firmware"] {
             let file = kernel.bytes(&format!("{folder}/{name}"), bytes);
             let error = kernel.load(&file, true).expect_err("wrong");
-            assert_eq!(error.cause(), Cause::Input, "{error}");
+            assert_eq!(error.at_fault(), AtFault::Caller, "{error}");
             assert!(error.to_string().contains(message), "{error}");
             assert!(error.next().contains(next), "{}", error.next());
         }

@@ -1,30 +1,29 @@
-//! The verb `compare`: two boards step the same start, each on its own way, and what becomes of it.
+//! The verb `compare`: steps two boards from the same start, independently, and measures how far
+//! they diverge.
 
-mod lane;
 mod show;
+mod side;
+mod spec;
 
-use std::fmt;
 use std::io::Write;
 use std::path::PathBuf;
-use std::str::FromStr;
-use std::thread;
 
 use clap::Args;
+use pgs_support::Crew;
 use serde_json::{Value, json};
 use zynq_pgs::StepParameters;
 
-use self::lane::{Lane, Measured, World};
-use super::SCHEMA;
-use super::progress::progress_bar;
-use crate::args::{BoardName, CommonArgs};
+use self::side::{Measured, Side, World};
+use self::spec::SideSpec;
+use crate::common::{BoardName, CommonArgs};
 use crate::deviation::StateDeviation;
 use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
-use crate::options::{BuildArgs, DeadlineArgs};
-use crate::ordering::{OrderName, OrderingArgs};
-use crate::origin;
-use crate::scenes::SceneArgs;
-use crate::solver::SolverArgs;
+use crate::options::scenes::SceneArgs;
+use crate::options::solver::{DeadlineArgs, SolverArgs};
+use crate::output::SCHEMA;
+use crate::output::progress::progress_bar;
+use crate::step_input;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -34,38 +33,39 @@ Examples:
   pgs compare half,thesis16 half,binary16 --steps 300 --every 10 --json
   pgs compare float,world mixed,world --scene shapes --grid 8x8x8
 
-A and B are builds of the emulated board: a profile, and what is not as usual, after commas. Words
-are binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocked, unchecked, keep,
-flush, isotropic, world; the rest is window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
-length-width=BITS and address-width=BITS. The order in which a board is sent the collisions is one of
-auto, as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest,
-colours. Without one a board that waits on hazards takes the collisions as given, so that two such
-boards solve them in one order. Each board finds its own collisions.
+A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
+change is a word: binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocked,
+unchecked, keep, flush, isotropic, world; or window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
+length-width=BITS and address-width=BITS. The order of a board's collisions is one of auto,
+as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest,
+colours. Without an order, a board that waits on hazards takes the collisions as given, so that two
+such boards solve them in the same order. Each board detects its own collisions.
 
 Only moving bodies are compared; A is the original. Relative deviations are |B - A| / |A| of each
-component (thesis eq. 4.1); where A's component is 0 they leave it out. A velocity is within 1 % if it
-differs by 1 % of A's at most: 0 only with 0. Momenta are shown by their length, and B-A is that of
-the difference; angular momentum is about the origin, potential energy from y = 0. Unmoved is the
-share of position components that the step left at the bits that the board was sent. Penetration is
-that of the state after the step: of a scene, of all contacts found then; of a folder, whose shapes
-are not known, of the step's own contacts, carried along with their bodies.
+component (thesis eq. 4.1) and leave out components where A is 0. A velocity is within 1 % if it
+differs from A's by at most 1 % of A's; with 0 only 0 agrees. Momenta are shown by their length,
+and B-A is the length of the difference; angular momentum is about the origin, potential energy
+from y = 0. Unmoved is the share of position components whose bits the step did not change from the
+ones sent to the board. Penetration is measured after the step: in a scene over all contacts
+detected then; in a folder, which has no geometry, over the step's own contacts, carried along with
+their bodies.
 
-A board whose step fails stops there and the other goes on. Exit code 0 if every step was taken, 1
-if one failed.";
+If a step fails on one board, this board stops and the other goes on. Exit code 0 if every step was
+taken, 1 if one failed.";
 
-/// Rows of the table, if not said otherwise.
+/// Default rows of the table.
 const ROWS: u32 = 10;
 
-/// Step the same start on two boards and show how far they come apart.
+/// Step two boards from the same start and show how far they diverge.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CompareArgs {
-    /// Build of the board that is the original.
+    /// Build of the original board.
     #[arg(value_name = "A")]
-    a: Side,
-    /// Build of the board that is compared with it.
+    a: SideSpec,
+    /// Build of the board compared with it.
     #[arg(value_name = "B")]
-    b: Side,
+    b: SideSpec,
     /// Take one step from this folder of .npy arrays instead of a scene.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "steps", "every"])]
     input: Option<PathBuf>,
@@ -87,52 +87,13 @@ pub(crate) struct CompareArgs {
     deadline: DeadlineArgs,
 }
 
-/// What one side of a comparison is: how its board is built, and in which order it is sent the
-/// collisions.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Side {
-    pub(super) build: BuildArgs,
-    pub(super) ordering: OrderingArgs,
-}
-
-impl FromStr for Side {
-    type Err = String;
-
-    /// A word of the order may stand anywhere behind the profile.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut order = None;
-        let mut rest = Vec::new();
-        for (place, word) in text.split(',').enumerate() {
-            match OrderName::of_word(word) {
-                Some(_) if order.is_some() => return Err("order is given twice".to_owned()),
-                Some(name) if place > 0 => order = Some(name),
-                _ => rest.push(word),
-            }
-        }
-        let build = rest.join(",").parse().map_err(|error| {
-            format!("{error}; orders of the collisions are {}", OrderName::all())
-        })?;
-        Ok(Self { build, ordering: OrderingArgs { order, verify: false } })
-    }
-}
-
-impl fmt::Display for Side {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.build)?;
-        match self.ordering.order {
-            Some(order) => write!(f, ",{}", order.text()),
-            None => Ok(()),
-        }
-    }
-}
-
 /// A step on both boards.
 struct Row {
-    /// 0 is the common start.
+    /// 0 is the start, before any step.
     step: u32,
     a: Option<Measured>,
     b: Option<Measured>,
-    /// If both took the step.
+    /// Present if both boards took the step.
     deviation: Option<StateDeviation>,
 }
 
@@ -147,7 +108,7 @@ impl Row {
         })
     }
 
-    /// B less A.
+    /// B minus A.
     fn difference(&self) -> Value {
         let (Some(a), Some(b), Some(state)) = (&self.a, &self.b, &self.deviation) else {
             return Value::Null;
@@ -182,17 +143,17 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     if !matches!(common.board, BoardName::Auto | BoardName::Emulated) {
-        let error = "`pgs compare` builds both boards itself, a real one is as its bitstream is";
+        let error = "`pgs compare` builds both boards itself and cannot use a real one";
         return Err(Failure::input(error).next("leave out --board (and PGS_BOARD)"));
     }
-    let folder = args.input.as_deref().map(origin::load).transpose()?;
+    let folder = args.input.as_deref().map(step_input::load).transpose()?;
     let parameters = match &folder {
         Some(folder) => folder.parameters,
         None => StepParameters::default(),
     };
     let mut parameters = args.deadline.apply(args.solver.apply(parameters));
     parameters.verify_order |= args.verify;
-    let open = |name, side: Side| {
+    let open = |name, spec: SideSpec| {
         let world = |opened: &_| match &folder {
             Some(folder) => {
                 let capacity = board_shapes(opened);
@@ -200,49 +161,53 @@ pub(crate) fn run(
                 Ok(World::Folder { folder, bodies: folder.bodies.clone() })
             }
             None => {
-                args.scene.check_size(opened)?;
-                args.scene.build(&side.build).map(Box::new).map(World::Scene)
+                args.scene.check_size(opened.accelerator.capabilities())?;
+                args.scene.build(&spec.build).map(Box::new).map(World::Scene)
             }
         };
-        Lane::open(name, side, common, world, parameters.gravity)
+        Side::open(name, spec, common, world, parameters.gravity)
     };
-    let mut lanes = (open("A", args.a)?, open("B", args.b)?);
+    let mut sides = (open("A", args.a)?, open("B", args.b)?);
 
     let steps = if folder.is_some() { 1 } else { args.steps };
     let every = args.every.unwrap_or(steps.div_ceil(ROWS));
-    let moving = lanes.0.world.moving();
+    let moving = sides.0.world.moving();
     let interrupt = Interrupt::install();
     let progress = progress_bar(steps);
-    let (a, b) = both(&mut lanes, |lane| Some(lane.start()));
+    let mut crew = Crew::new("compare", 1);
+    if let Some(error) = crew.refused() {
+        log::warn!("no thread of its own for board B, which takes its steps after A: {error}");
+    }
+    let (a, b) = both(&mut crew, &mut sides, |side| Some(side.start()));
     let mut last = Row { step: 0, a, b, deviation: None };
     let mut documents = vec![last.to_json()];
     let mut done = 0;
     while done < steps && !interrupt.is_set() {
         done += 1;
-        let (a, b) = both(&mut lanes, |lane| lane.step(done, &parameters));
+        let (a, b) = both(&mut crew, &mut sides, |side| side.step(done, &parameters));
         if done == 1 && a.is_none() && b.is_none() {
-            // Nothing to be compared, and nothing that one build does better than the other.
-            let Lane { name, side, failed, .. } = &mut lanes.0;
+            // Both builds fail at once: nothing can be compared.
+            let Side { name, spec, failed, .. } = &mut sides.0;
             if let Some(failed) = failed.take() {
-                return Err(failed.failure.about(format!("board {name} ({side}), and B as well")));
+                return Err(failed.failure.about(format!("board {name} ({spec}), and B as well")));
             }
         }
         if done == 1 && !common.json {
-            // Only now: what is refused prints nothing but the refusal.
-            progress.suspend(|| show::head(args, &lanes, steps, &last, out))?;
+            // The heading waits for the first step: a refused scene prints only the refusal.
+            progress.suspend(|| show::head(args, &sides, steps, &last, out))?;
         }
         progress.inc(1);
-        let fails = [&lanes.0, &lanes.1].map(|lane| &lane.failed);
+        let fails = [&sides.0, &sides.1].map(|side| &side.failed);
         let fails_now = fails.iter().any(|f| f.as_ref().is_some_and(|f| f.step == done));
         let all_failed = fails.iter().all(|failed| failed.is_some());
         let deviation = (a.is_some() && b.is_some())
-            .then(|| StateDeviation::of(lanes.0.world.bodies(), lanes.1.world.bodies(), &moving));
+            .then(|| StateDeviation::of(sides.0.world.bodies(), sides.1.world.bodies(), &moving));
         let row = Row { step: done, a, b, deviation };
         if done == 1 || done % every == 0 || done == steps || fails_now {
             if common.json {
                 documents.push(row.to_json());
             } else {
-                progress.suspend(|| show::row(&row, &lanes, out))?;
+                progress.suspend(|| show::row(&row, &sides, out))?;
                 out.flush()?;
             }
         }
@@ -253,7 +218,7 @@ pub(crate) fn run(
     }
     progress.finish_and_clear();
 
-    let failed = lanes.0.failed.is_some() || lanes.1.failed.is_some();
+    let failed = sides.0.failed.is_some() || sides.1.failed.is_some();
     let complete = done == steps && !failed;
     if common.json {
         let mut config = match &args.input {
@@ -272,13 +237,13 @@ pub(crate) fn run(
             "verb": "compare",
             "config": config,
             "complete": complete,
-            "a": lanes.0.to_json(),
-            "b": lanes.1.to_json(),
+            "a": sides.0.to_json(),
+            "b": sides.1.to_json(),
             "rows": documents,
         });
         writeln!(out, "{document:#}")?;
     } else {
-        show::end(&last, &lanes, out)?;
+        show::end(&last, &sides, out)?;
         if !failed && !complete {
             writeln!(out, "interrupted after {done} of {steps} steps")?;
         }
@@ -292,48 +257,19 @@ pub(crate) fn run(
     })
 }
 
-fn board_shapes(opened: &crate::board::Opened) -> u32 {
+fn board_shapes(opened: &crate::board::OpenBoard) -> u32 {
     opened.accelerator.capabilities().shape_capacity
 }
 
-/// Does the same with both boards, side by side.
-fn both<'a, R: Send>(
-    lanes: &mut (Lane<'a>, Lane<'a>),
-    act: impl Fn(&mut Lane<'a>) -> R + Sync,
-) -> (R, R) {
-    let (a, b) = (&mut lanes.0, &mut lanes.1);
-    thread::scope(|scope| {
-        let other = scope.spawn(|| act(b));
-        let one = act(a);
-        match other.join() {
-            Ok(other) => (one, other),
-            // A panic goes on as it would have without a thread.
-            Err(panic) => std::panic::resume_unwind(panic),
-        }
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_side_is_written_as_it_is_read() {
-        for text in [
-            "float",
-            "half,thesis16,f32,unchecked",
-            "float,unchecked,hazard-free",
-            "mixed,body-by-body-oldest",
-            "float,auto",
-        ] {
-            assert_eq!(text.parse::<Side>().expect(text).to_string(), text);
-        }
-        let side: Side = "float,order=as-given,unchecked".parse().expect("the same");
-        assert_eq!(side.to_string(), "float,unchecked,as-given");
-        let error = "float,sorted".parse::<Side>().expect_err("no such word");
-        assert!(error.contains("sorted") && error.contains("colours"), "{error}");
-        let error = "float,colours,as-given".parse::<Side>().expect_err("two orders");
-        assert_eq!(error, "order is given twice");
-        "hazard-free".parse::<Side>().expect_err("no profile");
-    }
+/// Does the same with both boards: in parallel, or one after the other where there is no second
+/// thread.
+fn both<'a>(
+    crew: &mut Crew,
+    sides: &mut (Side<'a>, Side<'a>),
+    act: impl Fn(&mut Side<'a>) -> Option<Measured> + Sync,
+) -> (Option<Measured>, Option<Measured>) {
+    let mut measured = (None, None);
+    let shares = [(&mut sides.0, &mut measured.0), (&mut sides.1, &mut measured.1)];
+    crew.each(shares.into_iter(), |(side, to)| *to = act(side));
+    measured
 }

@@ -1,13 +1,14 @@
-//! This file shows a comparison to people: a table while it goes, and the last step in words.
+//! Prints a comparison for people: a table row by row, then the last step in words.
 
 use std::io::{self, Write};
 
 use scene::Penetration;
 
-use super::lane::{Lane, Measured};
+use super::side::{Measured, Side};
 use super::{CompareArgs, Row, vector};
 use crate::deviation::Deviation;
-use crate::verbs::table::{Column, grouped, heading, line, number, signed};
+use crate::numbers::{grouped, number, signed};
+use crate::output::table::{Column, heading, line};
 use step_folder::digest;
 
 const COLUMNS: [Column; 17] = [
@@ -32,16 +33,16 @@ const COLUMNS: [Column; 17] = [
 
 const NOTHING: &str = "-";
 
-/// What is compared, and the names of the columns.
+/// The two builds, the scene, and the names of the columns.
 pub(super) fn head(
     args: &CompareArgs,
-    lanes: &(Lane<'_>, Lane<'_>),
+    sides: &(Side<'_>, Side<'_>),
     steps: u32,
     start: &Row,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    for lane in [&lanes.0, &lanes.1] {
-        writeln!(out, "{}          {}", lane.name, lane.side)?;
+    for side in [&sides.0, &sides.1] {
+        writeln!(out, "{}          {}", side.name, side.spec)?;
     }
     match &args.input {
         Some(path) => writeln!(out, "input      {}, one step", path.display())?,
@@ -55,15 +56,15 @@ pub(super) fn head(
     out.flush()
 }
 
-/// A, B, and B less A.
-pub(super) fn row(row: &Row, lanes: &(Lane<'_>, Lane<'_>), out: &mut dyn Write) -> io::Result<()> {
+/// Rows for A, for B, and for B minus A.
+pub(super) fn row(row: &Row, sides: &(Side<'_>, Side<'_>), out: &mut dyn Write) -> io::Result<()> {
     let step = row.step.to_string();
     let mut first = step.as_str();
-    for (lane, measured) in [(&lanes.0, &row.a), (&lanes.1, &row.b)] {
+    for (side, measured) in [(&sides.0, &row.a), (&sides.1, &row.b)] {
         match measured {
-            Some(measured) => line(out, &COLUMNS, cells(first, lane.name, measured))?,
+            Some(measured) => line(out, &COLUMNS, cells(first, side.name, measured))?,
             None => {
-                writeln!(out, "{first:>5} {:>5} failed in step {}", lane.name, failed_in(lane))?;
+                writeln!(out, "{first:>5} {:>5} failed in step {}", side.name, failed_in(side))?;
             }
         }
         first = "";
@@ -94,8 +95,8 @@ pub(super) fn row(row: &Row, lanes: &(Lane<'_>, Lane<'_>), out: &mut dyn Write) 
     line(out, &COLUMNS, difference)
 }
 
-fn failed_in(lane: &Lane<'_>) -> u32 {
-    lane.failed.as_ref().map_or(0, |failed| failed.step)
+fn failed_in(side: &Side<'_>) -> u32 {
+    side.failed.as_ref().map_or(0, |failed| failed.step)
 }
 
 /// The cells of one board, without the deviations.
@@ -115,8 +116,8 @@ fn cells(step: &str, name: &str, measured: &Measured) -> [String; 10] {
     ]
 }
 
-/// The last step in words, and how it ended.
-pub(super) fn end(row: &Row, lanes: &(Lane<'_>, Lane<'_>), out: &mut dyn Write) -> io::Result<()> {
+/// The last step in words, and the end of the comparison.
+pub(super) fn end(row: &Row, sides: &(Side<'_>, Side<'_>), out: &mut dyn Write) -> io::Result<()> {
     writeln!(out)?;
     if let Some(state) = &row.deviation {
         let words = |name: &str, unit: &str, deviation: &Deviation| {
@@ -141,12 +142,12 @@ pub(super) fn end(row: &Row, lanes: &(Lane<'_>, Lane<'_>), out: &mut dyn Write) 
         writeln!(out, "{}", words("linear", "m/s", &state.linear))?;
         writeln!(out, "{}", words("spin", "rad/s", &state.angular))?;
     }
-    for (lane, measured) in [(&lanes.0, &row.a), (&lanes.1, &row.b)] {
+    for (side, measured) in [(&sides.0, &row.a), (&sides.1, &row.b)] {
         if let Some(Measured { kinetic, momentum, penetration, .. }) = measured {
             writeln!(
                 out,
                 "{}          {:.3} J translational, {:.3} J rotational; {} N s, {} N m s; {}",
-                lane.name,
+                side.name,
                 kinetic.translational,
                 kinetic.rotational,
                 three(momentum.linear),
@@ -155,14 +156,14 @@ pub(super) fn end(row: &Row, lanes: &(Lane<'_>, Lane<'_>), out: &mut dyn Write) 
             )?;
         }
     }
-    for lane in [&lanes.0, &lanes.1] {
-        match &lane.failed {
+    for side in [&sides.0, &sides.1] {
+        match &side.failed {
             None => {
-                let (name, digest) = (lane.name, lane.digest());
+                let (name, digest) = (side.name, side.digest());
                 writeln!(out, "digest {name}   {} {digest}", digest::ALGORITHM)?;
             }
             Some(failed) => {
-                writeln!(out, "{} ({}) failed in step {}", lane.name, lane.side, failed.step)?;
+                writeln!(out, "{} ({}) failed in step {}", side.name, side.spec, failed.step)?;
                 writeln!(out, "{}", failed.failure.chain())?;
             }
         }

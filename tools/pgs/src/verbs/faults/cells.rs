@@ -1,4 +1,4 @@
-//! This file lists the cells: each kind of fault at each place where it can be.
+//! Lists the cells of the fault table: each kind of fault at each possible place.
 
 use bitstream_model::{
     Direction, Fault, FaultKind, FaultPlan, PacketCount, Place, StepPhase, When,
@@ -11,11 +11,12 @@ use super::trial::Bench;
 #[derive(Debug, Clone)]
 pub(super) struct Cell {
     pub(super) kind: FaultKind,
-    /// The phase that it happens in; none if it does not depend on one.
+    /// The phase of the fault; none if the kind does not depend on a phase.
     pub(super) phase: Option<StepPhase>,
     pub(super) plan: FaultPlan,
     pub(super) expected: Expected,
-    /// Whether the step with the fault is of the larger scene, for which channels must be stopped.
+    /// Whether the fault belongs to the step of the larger scene, in which channels must be
+    /// stopped.
     pub(super) larger: bool,
 }
 
@@ -24,7 +25,7 @@ impl Cell {
         self.phase.map_or_else(|| "any".to_owned(), |phase| phase.to_string())
     }
 
-    /// The channel that it is in.
+    /// The channel of the fault.
     pub(super) fn channel(&self) -> Option<(usize, Direction)> {
         match self.plan.faults.last()?.place {
             Some(Place::Channel(core, direction)) => Some((core, direction)),
@@ -47,14 +48,14 @@ impl Cell {
     }
 }
 
-/// Combinations that there are not, and how many cells they would be.
+/// Impossible combinations of a kind and a phase, and the number of cells that they would be.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Impossible {
     pub(super) what: &'static str,
     pub(super) cells: usize,
 }
 
-/// First, middle and last of so many, each once.
+/// The first, the middle and the last of `count` positions, each once.
 fn positions(count: u64) -> Vec<u64> {
     let last = count.saturating_sub(1);
     let mut all = vec![0, last / 2, last];
@@ -62,9 +63,9 @@ fn positions(count: u64) -> Vec<u64> {
     all
 }
 
-/// Phases that stand for all of their kind: of the passes the first, one in the middle and the last
-/// contact pass, the first and the last friction pass.
-fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
+/// Phases that represent all others of their kind: the first, the middle and the last contact pass,
+/// and the first and the last friction pass.
+fn is_tried(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
     match phase {
         StepPhase::Load | StepPhase::Poses | StepPhase::Results => true,
         StepPhase::Contact(pass) => [1, contact.div_ceil(2), contact].contains(&pass),
@@ -72,8 +73,8 @@ fn shown(phase: StepPhase, [contact, friction]: [u32; 2]) -> bool {
     }
 }
 
-/// The same kind, where it costs time with so much that no step ends before it is felt.
-fn felt(kind: FaultKind) -> FaultKind {
+/// The kind, with a delay so long that the step cannot end before the delay shows.
+fn with_long_delay(kind: FaultKind) -> FaultKind {
     match kind {
         FaultKind::Slow { .. } => FaultKind::Slow { clocks: 10_000 },
         FaultKind::LateCmplted { .. } => FaultKind::LateCmplted { ns: 3_000_000 },
@@ -81,25 +82,25 @@ fn felt(kind: FaultKind) -> FaultKind {
     }
 }
 
-/// Where a kind of fault can be.
-enum Where {
+/// The places where a kind of fault can happen.
+enum Site {
     /// At each beat of a packet.
     Beats,
     /// At each descriptor of a packet.
     Descriptors,
     /// At the end of a packet.
     Ends,
-    /// As each channel is stopped.
+    /// When a channel is stopped.
     Stops,
-    /// As each core, and the accelerator, is reset after a fault.
+    /// When a core, or the accelerator, is reset after a fault.
     Resets,
     /// In each phase of the accelerator.
     Accelerator,
-    /// Once.
+    /// Once a step.
     Once,
 }
 
-fn place_of(kind: FaultKind) -> Where {
+fn site_of(kind: FaultKind) -> Site {
     use FaultKind as K;
     match kind {
         K::DmaIntErr
@@ -112,7 +113,7 @@ fn place_of(kind: FaultKind) -> Where {
         | K::OtherBitstream { .. }
         | K::PowerLost
         | K::IrqSpurious
-        | K::IrqStorm { .. } => Where::Beats,
+        | K::IrqStorm { .. } => Site::Beats,
         K::SgIntErr
         | K::SgSlvErr
         | K::SgDecErr
@@ -120,28 +121,28 @@ fn place_of(kind: FaultKind) -> Where {
         | K::BdIntErr
         | K::BdSlvErr
         | K::BdDecErr
-        | K::LateCmplted { .. } => Where::Descriptors,
-        K::LongPacket | K::NoTlast => Where::Ends,
-        K::HaltDelay { .. } | K::HaltNever => Where::Stops,
-        K::ResetSlow { .. } | K::ResetNever => Where::Resets,
-        K::AcceleratorError { .. } | K::AcceleratorHang => Where::Accelerator,
-        _ => Where::Once,
+        | K::LateCmplted { .. } => Site::Descriptors,
+        K::LongPacket | K::NoTlast => Site::Ends,
+        K::HaltDelay { .. } | K::HaltNever => Site::Stops,
+        K::ResetSlow { .. } | K::ResetNever => Site::Resets,
+        K::AcceleratorError { .. } | K::AcceleratorHang => Site::Accelerator,
+        _ => Site::Once,
     }
 }
 
-/// All cells of a board, and what there cannot be.
+/// All cells of a board, and the impossible combinations.
 pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
     let packets: Vec<_> = bench
         .packets
         .iter()
-        .filter(|packet| packet.phase.is_some_and(|phase| shown(phase, bench.iterations())))
+        .filter(|packet| packet.phase.is_some_and(|phase| is_tried(phase, bench.iterations())))
         .collect();
     let mut cells = Vec::new();
     let mut at_last = 0;
     let mut kinds = 0;
-    for kind in FaultKind::all().map(felt) {
-        match place_of(kind) {
-            Where::Beats => {
+    for kind in FaultKind::all().map(with_long_delay) {
+        match site_of(kind) {
+            Site::Beats => {
                 kinds += 3;
                 for packet in &packets {
                     let mut beats = positions(packet.beats);
@@ -152,7 +153,7 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
                     cells.extend(beats.into_iter().map(|beat| at(kind, packet, When::Beat(beat))));
                 }
             }
-            Where::Descriptors => {
+            Site::Descriptors => {
                 kinds += 3;
                 for packet in &packets {
                     let numbers = positions(packet.descriptors.into());
@@ -162,18 +163,18 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
                     );
                 }
             }
-            Where::Ends => {
+            Site::Ends => {
                 kinds += 1;
                 cells.extend(packets.iter().map(|packet| Cell::new(on(kind, packet), false)));
             }
-            Where::Stops => {
+            Site::Stops => {
                 for (core, direction) in channels(&bench.packets) {
                     cells.push(Cell::new(Fault::new(kind).on(core, direction), true));
                 }
             }
-            Where::Resets => cells.extend(resets(kind, bench)),
-            Where::Accelerator => cells.extend(in_accelerator(kind, bench)),
-            Where::Once => cells.push(Cell::new(Fault::new(kind), false)),
+            Site::Resets => cells.extend(resets(kind, bench)),
+            Site::Accelerator => cells.extend(in_accelerator(kind, bench)),
+            Site::Once => cells.push(Cell::new(Fault::new(kind), false)),
         }
     }
     let senders = channels(&bench.packets).filter(|(_, way)| *way == Direction::Mm2s).count();
@@ -184,7 +185,7 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
     phases.dedup();
     let impossible = vec![
         Impossible {
-            what: "S2MM outside the results: it moves nothing then",
+            what: "S2MM outside the results: it moves nothing there",
             cells: kinds * phases.len() * receivers,
         },
         Impossible {
@@ -208,7 +209,7 @@ fn at(kind: FaultKind, packet: &PacketCount, when: When) -> Cell {
     Cell::new(on(kind, packet).when(when), false)
 }
 
-/// Every channel that has packets, once.
+/// Every channel with packets, once.
 fn channels(packets: &[PacketCount]) -> impl Iterator<Item = (usize, Direction)> {
     let mut all: Vec<_> = packets.iter().map(|packet| (packet.core, packet.direction)).collect();
     all.sort_by_key(|(core, direction)| (*core, *direction == Direction::S2mm));
@@ -216,7 +217,7 @@ fn channels(packets: &[PacketCount]) -> impl Iterator<Item = (usize, Direction)>
     all.into_iter()
 }
 
-/// A reset follows a fault: a stall, here.
+/// A reset needs a fault before it: here a stall.
 fn resets(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
     let stall = Fault::new(FaultKind::Stall).on(0, Direction::S2mm);
     let cores = (0..bench.config.profile.mm2s_widths.len()).map(Place::Core);
@@ -233,13 +234,13 @@ fn resets(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
 fn in_accelerator(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
     let mut phases: Vec<StepPhase> = Vec::new();
     for phase in bench.packets.iter().filter_map(|packet| packet.phase) {
-        let shown = phase != StepPhase::Results && shown(phase, bench.iterations());
-        if shown && !phases.contains(&phase) {
+        let tried = phase != StepPhase::Results && is_tried(phase, bench.iterations());
+        if tried && !phases.contains(&phase) {
             phases.push(phase);
         }
     }
     if bench.streams_once() {
-        // It is in all of its phases at once.
+        // The fault acts in all phases at once.
         return vec![Cell::new(Fault::new(kind), false)];
     }
     phases
@@ -264,13 +265,13 @@ mod tests {
 
     #[test]
     fn passes_stand_for_those_between_them() {
-        let shown = |phase| shown(phase, [4, 4]);
+        let tried = |phase| is_tried(phase, [4, 4]);
         assert_eq!(
-            [1, 2, 3, 4].map(|pass| shown(StepPhase::Contact(pass))),
+            [1, 2, 3, 4].map(|pass| tried(StepPhase::Contact(pass))),
             [true, true, false, true]
         );
         assert_eq!(
-            [1, 2, 3, 4].map(|pass| shown(StepPhase::Friction(pass))),
+            [1, 2, 3, 4].map(|pass| tried(StepPhase::Friction(pass))),
             [true, false, false, true]
         );
     }

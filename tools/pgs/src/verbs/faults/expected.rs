@@ -1,25 +1,25 @@
-//! This file says what a driver must make of each fault.
+//! Defines the driver's expected reaction to each fault.
 
 use bitstream_model::interface::control::ErrorCode;
 use bitstream_model::{Consequence, Direction, FaultKind};
 use zynq_pgs::Aftermath;
 
-/// What must come of a fault.
+/// The expected outcome of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Expected {
-    /// The step succeeds, with the bits of an undisturbed one.
+    /// The step succeeds, with the bits of a step without faults.
     SameBits,
     /// The step fails.
     Fails {
-        /// The cause that is named.
+        /// The name of the cause in the error.
         cause: &'static str,
-        /// The channel that is named with it, if it is one that a driver can know.
+        /// The channel in the error, if a driver can know it.
         channel: Option<(usize, Direction)>,
         aftermath: Aftermath,
     },
 }
 
-/// What must come of a fault in a channel, if it is in one.
+/// The expected outcome of a fault, in a channel if it has one.
 pub(super) fn expected(kind: FaultKind, channel: Option<(usize, Direction)>) -> Expected {
     use FaultKind as K;
     if kind.consequence() == Consequence::Survivable && !matches!(kind, K::ResetSlow { .. }) {
@@ -43,19 +43,19 @@ pub(super) fn expected(kind: FaultKind, channel: Option<(usize, Direction)>) -> 
         K::ShortPacket if received => here("short-packet"),
         K::LongPacket if received => here("long-packet"),
         K::NoTlast if received => here("no-tlast"),
-        // It is the accelerator that notices, and it says on which stream.
+        // The accelerator detects it and reports the stream.
         K::ShortPacket => here("accelerator-tlast-early"),
         K::LongPacket | K::NoTlast => here("accelerator-tlast-missing"),
-        // A sum does not say in which of its words.
+        // A checksum does not locate the word.
         K::Corrupt { .. } => anywhere("checksum"),
         K::AcceleratorError { code } => anywhere(name(code)),
         K::NoDone => anywhere("no-done"),
         K::OtherBitstream { .. } => lost("other-bitstream"),
         K::PowerLost => lost("gone"),
         K::ResetNever => lost("deadline"),
-        // The stall before the reset, the hang: all that shows is that nothing comes.
+        // The stall before the reset, and the hang, show only as silence.
         K::Stall | K::AcceleratorHang | K::ResetSlow { .. } => anywhere("deadline"),
-        // A kind that nobody has said anything of yet passes nowhere.
+        // A kind without an expectation passes nowhere.
         _ => anywhere("unknown"),
     }
 }

@@ -1,5 +1,6 @@
-//! The verb `faults`: every fault that the emulated board can have, at every channel and in every phase
-//! of a step, and whether the driver names it, keeps the caller's data and works on.
+//! The verb `faults`: injects every fault of the emulated board, in every channel and in every
+//! phase of a step. Checks that the driver names the fault, keeps the caller's data and goes on
+//! working.
 
 mod cells;
 mod expected;
@@ -8,51 +9,52 @@ mod trial;
 
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bitstream_model::interface::profile::{PROFILES, Profile};
 use clap::Args;
 use indicatif::ProgressBar;
+use pgs_support::Crew;
 use serde_json::{Value, json};
 
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
-use self::trial::{Bench, Verified};
-use super::SCHEMA;
-use super::progress::progress_bar;
-use crate::args::CommonArgs;
+use self::trial::{Bench, CellResult};
+use crate::common::CommonArgs;
 use crate::environment;
 use crate::failure::{Failure, Verdict};
+use crate::output::SCHEMA;
+use crate::output::progress::progress_bar;
 
 const EXAMPLES: &str = "\
 Examples:
   pgs faults                      every profile
   pgs faults --profile float
-  pgs faults --list               what each cell injects, without trying it
+  pgs faults --list               the fault of each cell, without trying it
   pgs faults --json > faults.json
   pgs run --grid 3x3x3 --steps 2 --fault 'stall@dma1.mm2s,phase=contact2,beat=5'
 
-A cell is one fault at one place. It passes if the fault happened; a fatal one was named rightly, with
-its channel, before the deadline of the step, and changed no body; a survivable one changed no bit of
-the result, and was felt: the step took longer, or more interrupts came; and the next step gives the bits of an undisturbed one, or, where the board is lost, every
-call says so.";
+A cell is one fault at one place. It passes if the fault happened, and
+
+  a fatal fault    was named correctly, with its channel, before the deadline, and changed no body
+  a survivable one changed no bit of the result, and had an effect: a longer step or more interrupts
+  the next step    gives the bits of a step without faults, or every call reports a lost board";
 
 /// Try every fault at every place of a step.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FaultsArgs {
-    /// One profile instead of all.
-    #[arg(long, value_name = "PROFILE", value_parser = crate::options::profile())]
+    /// Try this profile only.
+    #[arg(long, value_name = "PROFILE", value_parser = crate::options::build::profile())]
     profile: Option<&'static Profile>,
-    /// Print what each cell injects, and try none.
+    /// Print the fault of each cell, and try none.
     #[arg(long)]
     list: bool,
 }
 
-/// What became of the cells of a profile.
-struct Tried {
+/// The results of a profile's cells.
+struct ProfileResults {
     profile: &'static Profile,
-    cells: Vec<(Cell, Verified)>,
+    cells: Vec<(Cell, CellResult)>,
     impossible: Vec<Impossible>,
 }
 
@@ -63,7 +65,7 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     if environment::variable(environment::LOG).is_none() {
-        // Thousands of faults, and the driver warns of each.
+        // The driver would warn of each of thousands of faults.
         log::set_max_level(log::LevelFilter::Off);
     }
     let profiles: Vec<_> = match args.profile {
@@ -81,7 +83,7 @@ pub(crate) fn run(
             continue;
         }
         let cells = try_all(&bench, cells);
-        all.push(Tried { profile, cells, impossible });
+        all.push(ProfileResults { profile, cells, impossible });
     }
     if args.list {
         return Ok(Verdict::Done);
@@ -95,46 +97,30 @@ pub(crate) fn run(
     Ok(if failed { Verdict::Differs } else { Verdict::Done })
 }
 
-/// Tries cells on all processors; in their order, whoever was first.
-fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, Verified)> {
+/// Tries the cells on all processors, or on as many as the system gives threads for; the results are
+/// in the order of the cells.
+fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, CellResult)> {
     let bar: ProgressBar = progress_bar(u32::try_from(cells.len()).unwrap_or(u32::MAX));
     bar.set_message(bench.config.profile.name);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut found = Vec::new();
-        while let Some((place, cell)) = take(&next, &cells) {
-            // A panic is what fails everywhere, not what ends the table.
-            let tried = catch_unwind(AssertUnwindSafe(|| trial::run(bench, cell)));
-            found.push((place, tried.unwrap_or_default()));
-            bar.inc(1);
-        }
-        found
-    };
-    let found: Vec<(usize, Verified)> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
+    let mut crew = Crew::new("faults", threads - 1);
+    // A cell without a result has passed nothing.
+    let mut all = vec![CellResult::default(); cells.len()];
+    crew.each(cells.iter().zip(&mut all), |(cell, to)| {
+        // A panic fails the cell and does not end the table.
+        let tried = catch_unwind(AssertUnwindSafe(|| trial::run(bench, cell)));
+        *to = tried.unwrap_or_default();
+        bar.inc(1);
     });
     bar.finish_and_clear();
-    // What is missing has passed nothing.
-    let mut all = vec![Verified::default(); cells.len()];
-    for (place, verified) in found {
-        all[place] = verified;
-    }
     cells.into_iter().zip(all).collect()
 }
 
-/// The next cell that nobody has taken.
-fn take<'a>(next: &AtomicUsize, cells: &'a [Cell]) -> Option<(usize, &'a Cell)> {
-    let place = next.fetch_add(1, Ordering::Relaxed);
-    cells.get(place).map(|cell| (place, cell))
-}
-
-fn to_json(all: &[Tried]) -> Value {
+fn to_json(all: &[ProfileResults]) -> Value {
     let profiles: Vec<_> = all
         .iter()
         .map(|tried| {
-            let Tried { profile, cells, impossible } = tried;
+            let ProfileResults { profile, cells, impossible } = tried;
             let tally = Tally::of(cells.iter());
             json!({
                 "profile": profile.name,
@@ -150,7 +136,7 @@ fn to_json(all: &[Tried]) -> Value {
                     "passed": found.passed(),
                     "cause": found.cause,
                     "elapsed_ms": found.elapsed.as_secs_f64() * 1e3,
-                    "wrong": found.wrong(),
+                    "wrong": found.failed_checks(),
                 })).collect::<Vec<_>>(),
             })
         })

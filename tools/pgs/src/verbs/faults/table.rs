@@ -1,14 +1,15 @@
-//! This file prints what came of the cells: a row a kind of fault.
+//! Prints the results of the cells: one row for each kind of fault.
 
 use std::io::{self, Write};
 
 use serde_json::{Value, json};
 
-use super::Tried;
+use super::ProfileResults;
 use super::cells::Cell;
 use super::expected::Expected;
-use super::trial::Verified;
-use crate::verbs::table::{Column, grouped, heading, line};
+use super::trial::CellResult;
+use crate::numbers::grouped;
+use crate::output::table::{Column, heading, line};
 
 const COLUMNS: [Column; 9] = [
     Column { name: "fault", unit: "", width: 18 },
@@ -22,7 +23,7 @@ const COLUMNS: [Column; 9] = [
     Column { name: "slowest", unit: "ms", width: 8 },
 ];
 
-/// How many cells came out right, by what was looked at.
+/// The number of cells that passed each check.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tally {
     tried: u64,
@@ -36,7 +37,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    pub(super) fn of<'a>(cells: impl Iterator<Item = &'a (Cell, Verified)>) -> Self {
+    pub(super) fn of<'a>(cells: impl Iterator<Item = &'a (Cell, CellResult)>) -> Self {
         let mut all = Self::default();
         for (_, found) in cells {
             all.tried += 1;
@@ -79,8 +80,9 @@ impl Tally {
     }
 }
 
-/// A row a kind, all profiles together; then profiles, phases, what there cannot be, and what failed.
-pub(super) fn print(all: &[Tried], out: &mut dyn Write) -> io::Result<()> {
+/// Prints a row for each kind over all profiles; then profiles, phases, impossible combinations,
+/// and failures.
+pub(super) fn print(all: &[ProfileResults], out: &mut dyn Write) -> io::Result<()> {
     let cells = || all.iter().flat_map(|tried| &tried.cells);
     heading(out, &COLUMNS)?;
     let mut kinds: Vec<&str> = Vec::new();
@@ -98,7 +100,7 @@ pub(super) fn print(all: &[Tried], out: &mut dyn Write) -> io::Result<()> {
     line(out, &COLUMNS, Tally::of(cells()).cells("all", ""))?;
 
     writeln!(out)?;
-    for Tried { profile, cells, .. } in all {
+    for ProfileResults { profile, cells, .. } in all {
         let Tally { tried, passed, .. } = Tally::of(cells.iter());
         writeln!(
             out,
@@ -126,14 +128,14 @@ pub(super) fn print(all: &[Tried], out: &mut dyn Write) -> io::Result<()> {
         let what = these.map(|impossible| impossible.what).next().unwrap_or_default();
         writeln!(out, "not tried: {what} ({} cells)", grouped(count as u64))?;
     }
-    for Tried { profile, cells, .. } in all {
+    for ProfileResults { profile, cells, .. } in all {
         for (cell, found) in cells.iter().filter(|(_, found)| !found.passed()) {
             writeln!(
                 out,
                 "FAILED {} '{}': {}; cause {}, expected {:?}",
                 profile.name,
                 cell.plan,
-                found.wrong().join(", "),
+                found.failed_checks().join(", "),
                 found.cause.unwrap_or("none"),
                 cell.expected,
             )?;

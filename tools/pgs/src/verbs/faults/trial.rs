@@ -1,4 +1,4 @@
-//! This file tries one cell: an undisturbed step, a step with the fault, and the next one.
+//! Tries one cell: a step without faults, a step with the fault, and the step after it.
 
 use std::time::Duration;
 
@@ -14,67 +14,67 @@ use super::expected::Expected;
 use crate::board;
 use crate::failure::Failure;
 
-/// Time on the board's clock that a step has, what it takes to look at all registers when that is
-/// over, and what the reset of all parts may take on top.
+/// Limits on the board's clock: for a step, for reading all registers after a timeout, and for the
+/// reset of all parts.
 const DEADLINE: Duration = Duration::from_millis(100);
 const LOOKING: Duration = Duration::from_micros(100);
 const RECOVERY: Duration = Duration::from_millis(60);
-/// Length registers so narrow that packets take several descriptors.
+/// Length registers so narrow that a packet needs several descriptors.
 const LENGTH_WIDTH: u32 = 8;
-/// FIFOs so short that a channel is not a whole step ahead of the accelerator.
+/// FIFOs so short that a channel cannot run ahead of the accelerator by a whole step.
 const FIFO_BEATS: usize = 16;
-/// Steps until cubes that fall from 0.05 m lie on each other.
+/// Steps until cubes dropped from 0.05 m lie on each other.
 const SETTLING: u32 = 12;
 
-/// A state to step from.
+/// The start of a trial's step.
 #[derive(Debug)]
 struct State {
     shapes: Vec<Shape>,
     bodies: Vec<Body>,
     collisions: Vec<Collision>,
-    /// The bits after an undisturbed step, and what that takes on the board's clock.
+    /// The bits after a step without faults, and the step's time on the board's clock.
     after: Vec<[u32; 13]>,
     takes: Duration,
 }
 
-/// What all cells of a profile have in common.
+/// The setting of all cells of a profile.
 #[derive(Debug)]
 pub(super) struct Bench {
     pub(super) config: BoardConfig,
-    /// The packets of the smaller step.
+    /// Packets of the smaller step.
     pub(super) packets: Vec<PacketCount>,
     small: State,
     large: State,
     parameters: StepParameters,
 }
 
-/// What came of a cell.
+/// The results of a cell.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Verified {
-    /// The cause that was named; none if the step succeeded.
+pub(super) struct CellResult {
+    /// The cause in the error; none if the step succeeded.
     pub(super) cause: Option<&'static str>,
-    /// Whether the fault happened, and nothing else that is wrong.
+    /// Whether the fault happened, and no other violation.
     pub(super) happened: bool,
-    /// Whether the right cause was named, in the right phase and channel; or rightly none, and the
-    /// fault was felt.
+    /// Whether the error names the right cause, phase and channel; or, without an expected error,
+    /// the fault had its effect.
     pub(super) named: bool,
-    /// Whether the bodies are as before, or as after an undisturbed step.
+    /// Whether the bodies are as before the step, or as after a step without faults.
     pub(super) bodies: bool,
-    /// Whether the error came in time.
+    /// Whether the error came within its time limit.
     pub(super) in_time: bool,
-    /// Whether the next step is as if nothing had been, or every call says that the board is lost.
+    /// Whether the next step is undisturbed, or every call reports that the board is lost.
     pub(super) next: bool,
-    /// Time on the board's clock from the start to the end of the step.
+    /// Time of the step on the board's clock.
     pub(super) elapsed: Duration,
 }
 
-impl Verified {
+impl CellResult {
     pub(super) fn passed(&self) -> bool {
-        self.wrong().is_empty()
+        self.failed_checks().is_empty()
     }
 
-    /// What did not come out right.
-    pub(super) fn wrong(&self) -> Vec<&'static str> {
+    /// The checks that failed.
+    pub(super) fn failed_checks(&self) -> Vec<&'static str> {
         let all = [
             (self.happened, "happened"),
             (self.named, "named"),
@@ -101,7 +101,7 @@ fn bits(bodies: &[Body]) -> Vec<[u32; 13]> {
         .collect()
 }
 
-/// A board, and the driver on it.
+/// An emulated board, and the driver on it.
 fn open(config: BoardConfig, shapes: &[Shape]) -> Result<(EmulatedBoard, Accelerator), Failure> {
     let emulated = EmulatedBoard::new(config).map_err(Failure::input)?;
     let accelerator = reopen(&emulated).map_err(board::unusable);
@@ -116,7 +116,7 @@ fn reopen(board: &EmulatedBoard) -> Result<Accelerator, Error> {
 }
 
 impl State {
-    /// A pile of cubes, some steps after it was dropped, on a board without faults.
+    /// A pile of cubes some steps after its drop, on a board without faults.
     fn settled(side: u16, config: BoardConfig) -> Result<Self, Failure> {
         let grid = Grid::new(side, side, side).map_err(Failure::input)?;
         let options = SceneOptions { grid, drop: 0.05, ..SceneOptions::default() };
@@ -132,7 +132,7 @@ impl State {
         let mut after = Vec::new();
         let collisions = scene.collisions().to_vec();
         let (port, mut takes) = (emulated.cpu_port(), Duration::ZERO);
-        // The second has its channels running.
+        // From the second step on the channels are running.
         for _ in 0..2 {
             after = scene.bodies().to_vec();
             let begin = port.now();
@@ -150,7 +150,7 @@ impl State {
 }
 
 impl Bench {
-    /// A board of a profile, with a pile of 27 and one of 64 cubes.
+    /// The setting of a profile, with a pile of 27 cubes and one of 64.
     pub(super) fn new(profile: &'static Profile) -> Result<Self, Failure> {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
         let length_width = LENGTH_WIDTH;
@@ -175,8 +175,8 @@ impl Bench {
 }
 
 /// Tries a cell.
-pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
-    let mut found = Verified::default();
+pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
+    let mut found = CellResult::default();
     let Ok((board, mut accelerator)) = open(bench.config, &bench.small.shapes) else {
         return found;
     };
@@ -197,7 +197,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
         && board.faults() == cell.plan.faults.len() as u64
         && board.violations().is_empty();
     found.cause = result.as_ref().err().and_then(Error::fault).map(zynq_pgs::Fault::name);
-    // The step itself ends by its deadline; what follows is the reset.
+    // The deadline ends the step itself; the reset follows.
     let until_error = result.as_ref().err().and_then(Error::diagnosis).map(|seen| seen.elapsed);
     found.in_time = until_error.is_none_or(|time| time <= DEADLINE + LOOKING)
         && found.elapsed <= DEADLINE + RECOVERY;
@@ -212,7 +212,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
             let lost = aftermath == Aftermath::MustReopen;
             found.named = found.cause == Some(cause)
                 && (channel.is_none() || channel == channel_of(error))
-                && shown(cell, error)
+                && locates_fault(cell, error)
                 && error.must_reopen() == lost
                 && error.may_retry() != lost;
             found.bodies = bodies == bits(&state.bodies);
@@ -221,7 +221,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
         (Ok(_) | Err(_), _) => false,
     };
     if lost {
-        found.next = says_lost(&mut accelerator, small, &mut step);
+        found.next = reports_lost(&mut accelerator, small, &mut step);
         drop(accelerator);
         found.next &= reopen(&board).is_err();
         return found;
@@ -229,9 +229,9 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> Verified {
     let (next, bodies) = step(&mut accelerator, small);
     if let (Ok(report), true) = (&next, cell.expected == Expected::SameBits) {
         found.named = match cell.kind {
-            // A single one can stand in for the real one, which then never comes.
+            // A single spurious interrupt can replace the real one, which then never comes.
             FaultKind::IrqSpurious => true,
-            // A storm at the end of a step goes on in the next.
+            // A storm at the end of a step goes on in the next step.
             FaultKind::IrqStorm { .. } => interrupts + report.interrupts > 2,
             _ => found.elapsed > state.takes,
         };
@@ -250,11 +250,11 @@ fn channel_of(error: &Error) -> Option<(usize, Direction)> {
     Some((name.core, direction))
 }
 
-/// Whether the diagnosis shows the channel that the fault was in where it was: an error in its phase,
-/// a stall with bytes that were not moved.
+/// Whether the diagnosis shows the fault in its channel: an error in its phase, a stall with
+/// missing bytes.
 ///
-/// What the accelerator notices it notices when the channel may be ahead by what the FIFOs hold.
-fn shown(cell: &Cell, error: &Error) -> bool {
+/// When the accelerator detects a fault, its channel may be ahead by the content of the FIFOs.
+fn locates_fault(cell: &Cell, error: &Error) -> bool {
     let Some((core, direction)) = cell.channel() else { return true };
     let same_way = |way| (way == zynq_pgs::Direction::S2mm) == (direction == Direction::S2mm);
     let states = error.diagnosis().map(|diagnosis| &diagnosis.channels);
@@ -282,8 +282,8 @@ fn shown(cell: &Cell, error: &Error) -> bool {
     }
 }
 
-/// Whether every call says that the board must be opened again.
-fn says_lost(
+/// Whether every call reports that the board must be opened again.
+fn reports_lost(
     accelerator: &mut Accelerator,
     state: &State,
     step: &mut impl FnMut(

@@ -1,4 +1,4 @@
-//! The verb `formats`: how large the numbers of a step are, and what sixteen bits leave of them.
+//! The verb `formats`: measures the sizes of a step's numbers, and their errors in 16-bit formats.
 
 mod numbers;
 mod tally;
@@ -12,40 +12,42 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use self::numbers::{AS_STREAMED, EACH_ONCE, Numbers, SUMS, numbers};
 use self::tally::{Loss, Sizes};
-use super::SCHEMA;
-use super::progress::progress_bar;
-use super::table::{Column, grouped, heading, line, number};
-use crate::args::CommonArgs;
 use crate::board;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
-use crate::folder::Folder;
 use crate::interrupt::Interrupt;
-use crate::options::{BuildArgs, DeadlineArgs};
-use crate::origin;
-use crate::scenes::SceneArgs;
-use crate::sixteen::Sixteen;
+use crate::narrow::NarrowFormat;
+use crate::numbers::{grouped, number};
+use crate::options::build::BuildArgs;
+use crate::options::scenes::SceneArgs;
+use crate::options::solver::DeadlineArgs;
+use crate::output::SCHEMA;
+use crate::output::progress::progress_bar;
+use crate::output::table::{Column, heading, line};
+use crate::step_input;
+use step_folder::folder::Folder;
 
 const EXAMPLES: &str = "\
 Examples:
   pgs formats --input vectors/full_step186
   pgs formats --grid 10x10x10 --step 70 --json
 
-The numbers are those that a step streams to the board; contact points that are not used, indices and
-counts are left out. \"as streamed\" has the positions of both bodies with every collision, \"each once\"
-only with the bodies. What is relative is less the position of body A, a static body standing where
-the other one is, as the profile mixed streams it, and in neither sum.
+The numbers are the ones that a step streams to the board, without unused contact points, indices
+and counts. \"as streamed\" has the positions of both bodies with every collision, \"each once\" only
+with the bodies. Relative numbers have the position of body A subtracted, as the profile mixed
+streams them; a static body counts as being at the other one's position. They are in neither sum.
 
-Relative errors are |read back - number| / |number|; zeros are left out of them, and of the share
-below 3e-5. The driver refuses a number that a format cannot carry.";
+Relative errors are |read back - number| / |number|. Zeros have none, and are not in the share
+below 3e-5 either. The driver refuses a number that a format cannot carry.";
 
-/// Show how large the numbers of a step are, and the errors of 16-bit formats on them.
+/// Show the sizes of a step's numbers, and their errors in 16-bit formats.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FormatsArgs {
-    /// The step in this folder of .npy arrays instead of one of a scene.
+    /// Take the step from this folder of .npy arrays instead of a scene.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "BuildArgs", "step"])]
     input: Option<PathBuf>,
-    /// Which step of the scene; those before it are taken first.
+    /// Step of the scene whose numbers are measured; the steps before it are taken first.
     #[arg(long, value_name = "N", default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..))]
     step: u32,
     #[command(flatten)]
@@ -56,7 +58,7 @@ pub(crate) struct FormatsArgs {
     build: BuildArgs,
 }
 
-/// What a step is given.
+/// The input of a step.
 struct Step {
     bodies: Vec<Body>,
     shapes: Vec<Shape>,
@@ -71,7 +73,7 @@ pub(crate) fn run(
 ) -> Result<Verdict, Failure> {
     let Step { bodies, shapes, collisions } = match &args.input {
         Some(path) => {
-            let Folder { bodies, shapes, collisions, .. } = origin::load(path)?;
+            let Folder { bodies, shapes, collisions, .. } = step_input::load(path)?;
             Step { bodies, shapes, collisions }
         }
         None => match stepped(args, common)? {
@@ -122,10 +124,10 @@ pub(crate) fn run(
     Ok(Verdict::Done)
 }
 
-/// The scene's step; nothing if Ctrl-C came before it.
+/// The scene before its measured step; none if Ctrl-C ended the run before it.
 fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Failure> {
     let mut opened = board::open(common, &args.build)?;
-    args.scene.check_size(&opened)?;
+    args.scene.check_size(opened.accelerator.capabilities())?;
     let mut scene = args.scene.build(&args.build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let parameters = args.deadline.apply(StepParameters::default());
@@ -159,7 +161,7 @@ fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Fail
 
 fn described<'a>(values: impl Iterator<Item = &'a f32> + Clone) -> Value {
     let mut value = Sizes::of(values.clone()).to_json();
-    for format in Sixteen::ALL {
+    for format in NarrowFormat::ALL {
         value["formats"][format.name()] = Loss::of(format, values.clone()).to_json();
     }
     value
@@ -209,11 +211,11 @@ fn print(
         let range = format!("1e{exponent} .. 1e{}", exponent + 1);
         writeln!(out, "  {range:<14} {:>11} {:>9.4} %", grouped(count), percent(count))?;
     }
-    for format in Sixteen::ALL {
+    for format in NarrowFormat::ALL {
         let refused = Loss::of(format, streamed()).refused;
         if refused > 0 {
             let name = format.name();
-            writeln!(out, "{} of them are beyond what {name} carries", grouped(refused))?;
+            writeln!(out, "{} of them are out of range for {name}", grouped(refused))?;
         }
     }
     Ok(())
@@ -229,7 +231,7 @@ fn cells<'a>(name: &str, values: impl Iterator<Item = &'a f32> + Clone) -> Vec<S
         size(sizes.largest),
         number(sizes.small_share() * 100.0),
     ];
-    for format in Sixteen::ALL {
+    for format in NarrowFormat::ALL {
         let loss = Loss::of(format, values.clone());
         cells.push(number(loss.mean() * 100.0));
         cells.push(number(loss.under_share() * 100.0));

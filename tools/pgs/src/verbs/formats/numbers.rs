@@ -1,34 +1,35 @@
-//! This file gathers the numbers of a step, kind by kind.
+//! Collects the numbers of a step by kind.
 
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Shape};
 
-/// Of which sums numbers are a part.
+/// The sums that include a kind of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Part {
-    /// Of both.
+pub(super) enum Membership {
+    /// In both sums.
     Given,
-    /// Streamed with every collision, though the bodies have them already.
+    /// Streamed with every collision, although the bodies have these numbers already.
     Repeated,
-    /// Of none: streamed by another profile.
+    /// In no sum: only another profile streams these numbers.
     Relative,
 }
 
 /// A sum over kinds of numbers.
 pub(super) struct Sum {
     pub(super) name: &'static str,
-    /// Whether a part is in it.
-    pub(super) has: fn(Part) -> bool,
+    /// Whether the sum includes a part.
+    pub(super) has: fn(Membership) -> bool,
 }
 
-/// What a step streams, with the positions of both bodies in every collision.
-pub(super) const AS_STREAMED: Sum = Sum { name: "as streamed", has: |part| part != Part::Relative };
-/// Every number that a step is given.
-pub(super) const EACH_ONCE: Sum = Sum { name: "each once", has: |part| part == Part::Given };
-/// Both.
+/// The numbers that a step streams, with the positions of both bodies in every collision.
+pub(super) const AS_STREAMED: Sum =
+    Sum { name: "as streamed", has: |part| part != Membership::Relative };
+/// Every input number of a step, once.
+pub(super) const EACH_ONCE: Sum = Sum { name: "each once", has: |part| part == Membership::Given };
+/// Both sums.
 pub(super) const SUMS: [Sum; 2] = [AS_STREAMED, EACH_ONCE];
 
 impl Sum {
-    /// The numbers in it.
+    /// The numbers of the sum.
     pub(super) fn of<'a>(&self, kinds: &'a [Numbers]) -> impl Iterator<Item = &'a f32> + Clone {
         let has = self.has;
         kinds.iter().filter(move |kind| has(kind.part)).flat_map(|kind| &kind.values)
@@ -38,7 +39,7 @@ impl Sum {
 /// The numbers of one kind.
 pub(super) struct Numbers {
     pub(super) name: &'static str,
-    pub(super) part: Part,
+    pub(super) part: Membership,
     pub(super) values: Vec<f32>,
 }
 
@@ -46,7 +47,7 @@ pub(super) struct Numbers {
 pub(super) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision]) -> Vec<Numbers> {
     let of_bodies = |name, field: fn(&Body) -> &[f32]| Numbers {
         name,
-        part: Part::Given,
+        part: Membership::Given,
         values: bodies.iter().flat_map(field).copied().collect(),
     };
     let position = |body: u32| {
@@ -58,7 +59,7 @@ pub(super) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision
         let shape = body.and_then(|body| shapes.get(usize::try_from(body.shape).ok()?));
         shape.is_some_and(|shape| shape.inverse_mass == 0.0)
     };
-    // A static body stands where the other one is.
+    // A static body is placed at the position of the other one.
     let seen_from = |body, other| position(if is_static(body) { other } else { body });
     let used = |collision: &Collision| {
         let count = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS);
@@ -75,27 +76,27 @@ pub(super) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision
     vec![
         of_bodies("velocity", |body| &body.velocity.linear),
         of_bodies("spin", |body| &body.velocity.angular),
-        of_pairs("normal", Part::Given, &|c| c.normal.to_vec()),
-        of_pairs("positions of A and B", Part::Repeated, &|c| {
+        of_pairs("normal", Membership::Given, &|c| c.normal.to_vec()),
+        of_pairs("positions of A and B", Membership::Repeated, &|c| {
             [position(c.body_a), position(c.body_b)].concat()
         }),
-        of_pairs("contact points", Part::Given, &|c| points(c, &|point| point)),
-        of_pairs("distances", Part::Given, &|c| {
+        of_pairs("contact points", Membership::Given, &|c| points(c, &|point| point)),
+        of_pairs("distances", Membership::Given, &|c| {
             c.contacts[..used(c)].iter().map(|contact| contact.distance).collect()
         }),
         of_bodies("position", |body| &body.pose.position),
         of_bodies("orientation", |body| &body.pose.orientation),
-        of_pairs("relative: B - A", Part::Relative, &|c| {
-            less(seen_from(c.body_b, c.body_a), seen_from(c.body_a, c.body_b)).to_vec()
+        of_pairs("relative: B - A", Membership::Relative, &|c| {
+            subtract(seen_from(c.body_b, c.body_a), seen_from(c.body_a, c.body_b)).to_vec()
         }),
-        of_pairs("relative: points - A", Part::Relative, &|c| {
-            points(c, &|point| less(point, seen_from(c.body_a, c.body_b)))
+        of_pairs("relative: points - A", Membership::Relative, &|c| {
+            points(c, &|point| subtract(point, seen_from(c.body_a, c.body_b)))
         }),
     ]
 }
 
 /// a - b.
-fn less(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+fn subtract(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
@@ -122,11 +123,11 @@ mod tests {
         assert_eq!(of("positions of A and B"), [1.0, 0.0, 0.0, 3.0, 0.0, 0.0]);
         assert_eq!(of("relative: B - A"), [2.0, 0.0, 0.0]);
         assert_eq!(of("relative: points - A")[..3], [0.5, 0.5, 0.0]);
-        // 13 a body, 3 + 6 + 2 x 4 the collision.
+        // 13 numbers a body, 3 + 6 + 2 x 4 for the collision.
         assert_eq!(AS_STREAMED.of(&kinds).count(), 2 * 13 + 17);
         assert_eq!(EACH_ONCE.of(&kinds).count(), 2 * 13 + 11);
 
-        // A static A stands where B is.
+        // A static A is placed at B.
         let mut bodies = bodies;
         bodies[1].shape = 1;
         let shapes = [Shape::STATIC, Shape::isotropic(1.0, 1.0)];

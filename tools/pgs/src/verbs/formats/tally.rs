@@ -1,23 +1,23 @@
-//! This file counts numbers: by their size, and by what a 16-bit format leaves of them.
+//! Counts numbers by size, and by their error in a 16-bit format.
 
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
 use crate::deviation::share;
-use crate::sixteen::Sixteen;
+use crate::narrow::NarrowFormat;
 
-/// What numbers below this are counted by: thesis16 has none, but for 2^-15 = 3.05e-5.
+/// Numbers below this count as small: thesis16 has none of them but 2^-15 = 3.05e-5.
 const SMALL: f32 = 3e-5;
-/// An error up to which a number counts as the same.
+/// Largest error with which a number counts as the same.
 const ONE_PERCENT: f64 = 0.01;
 
-/// What a format leaves of numbers.
+/// The errors of a format.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Loss {
     numbers: u64,
     zeros: u64,
-    /// Numbers that it cannot carry.
+    /// Numbers outside the format's range.
     pub(super) refused: u64,
     relative_sum: f64,
     under: u64,
@@ -25,7 +25,7 @@ pub(super) struct Loss {
 }
 
 impl Loss {
-    pub(super) fn of<'a>(format: Sixteen, values: impl Iterator<Item = &'a f32>) -> Self {
+    pub(super) fn of<'a>(format: NarrowFormat, values: impl Iterator<Item = &'a f32>) -> Self {
         let mut loss = Self::default();
         for &value in values {
             loss.numbers += 1;
@@ -48,7 +48,7 @@ impl Loss {
         loss
     }
 
-    /// Numbers that have a relative error.
+    /// Numbers with a relative error.
     fn counted(&self) -> u64 {
         self.numbers - self.zeros - self.refused
     }
@@ -58,7 +58,7 @@ impl Loss {
         if self.counted() == 0 { 0.0 } else { self.relative_sum / self.counted() as f64 }
     }
 
-    /// Share of the numbers with an error that is below 1 %.
+    /// Share of the counted numbers whose error is below 1 %.
     pub(super) fn under_share(&self) -> f64 {
         share(self.under, self.counted())
     }
@@ -73,16 +73,16 @@ impl Loss {
     }
 }
 
-/// How large numbers are.
+/// The sizes of numbers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Sizes {
     pub(super) numbers: u64,
     pub(super) zeros: u64,
-    /// Without zeros.
+    /// Small numbers without zeros.
     small: u64,
     pub(super) smallest: Option<f32>,
     pub(super) largest: Option<f32>,
-    /// By the exponent of ten; zeros are in none.
+    /// Numbers by their exponent of ten, without zeros.
     pub(super) decades: BTreeMap<i32, u64>,
 }
 
@@ -107,7 +107,7 @@ impl Sizes {
         sizes
     }
 
-    /// Share of the small numbers in those that are not 0.
+    /// Share of small numbers among all but zeros.
     pub(super) fn small_share(&self) -> f64 {
         let others = self.numbers - self.zeros;
         if others == 0 { 0.0 } else { self.small as f64 / others as f64 }
@@ -130,7 +130,7 @@ impl Sizes {
     }
 }
 
-/// The exponent of ten of a magnitude above 0, as it is printed: exact where a logarithm rounds.
+/// The printed exponent of ten of a magnitude above 0: exact where a logarithm rounds.
 fn decade(size: f32) -> i32 {
     let text = format!("{size:e}");
     text.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0)
@@ -160,13 +160,13 @@ mod tests {
 
     #[test]
     fn losses_leave_zeros_out_of_what_is_relative() {
-        // 100.03 is read back as 100.0, 0 as 2^-15, 1e5 not at all.
+        // 100.03 is read back as 100.0, 0 as 2^-15; 1e5 is refused.
         let values = [0.0, 1.0, 100.03, 1e5];
-        let loss = Loss::of(Sixteen::Thesis16, values.iter());
+        let loss = Loss::of(NarrowFormat::Thesis16, values.iter());
         assert_eq!((loss.numbers, loss.zeros, loss.refused, loss.under), (4, 1, 1, 2));
         assert!((loss.mean() - 0.03 / 100.03 / 2.0).abs() < 1e-7, "{loss:?}");
         assert!((loss.largest_absolute - 0.03).abs() < 1e-5, "{loss:?}");
-        let zero = Loss::of(Sixteen::Thesis16, [0.0].iter());
+        let zero = Loss::of(NarrowFormat::Thesis16, [0.0].iter());
         assert!((zero.largest_absolute - 2.0_f64.powi(-15)).abs() < 1e-12);
         assert!((zero.under_share() - 1.0).abs() < 1e-12);
     }

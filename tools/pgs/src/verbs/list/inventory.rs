@@ -1,4 +1,4 @@
-//! Says of each device whether it can be used, as what, and what keeps it from being used.
+//! Describes each device: its use, its option, and the obstacle to its use.
 
 use std::error::Error as _;
 
@@ -11,7 +11,7 @@ use zynq_pgs::platform::{
 };
 use zynq_pgs::{PlatformError, UioNode};
 
-/// An error with its causes and the next step, in one line.
+/// An error with its causes and next step, in one line.
 pub(super) fn explained(error: &PlatformError) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
@@ -29,16 +29,17 @@ pub(super) fn explained(error: &PlatformError) -> String {
 #[derive(Debug)]
 pub(super) struct Node {
     pub(super) node: UioNode,
-    /// Why it is not used by itself; none if it is, as far as that shows without mapping it.
+    /// The obstacle to its use by default; none if it is usable, as far as a look without mapping
+    /// tells.
     pub(super) obstacle: Option<String>,
-    /// How it is used all the same: the options and their values.
+    /// The option that uses the node under its own name, and the option's value.
     uses: Option<(&'static str, String)>,
 }
 
 impl Node {
     pub(super) fn new(node: UioNode, system: &System) -> Self {
         let (role, uses) = role(&node);
-        // Another device is none of ours to open.
+        // Other devices are not opened.
         let closed = match role.is_none() || uses.is_some() {
             true => try_device(&system.dev.join(&node.device)).err(),
             false => None,
@@ -79,7 +80,7 @@ fn part_text(part: NodePart) -> &'static str {
     }
 }
 
-/// Why a node is not one that is looked for, and the option that takes it.
+/// The reason why a node is not used by default, and the option that uses it.
 fn role(node: &UioNode) -> (Option<String>, Option<(&'static str, String)>) {
     let name = &node.name;
     let uio_name = |name: &str| format!("give it `linux,uio-name = {name:?}` in the device tree");
@@ -134,7 +135,7 @@ pub(super) fn unreadable_json(node: &UnreadableNode) -> Value {
 #[derive(Debug)]
 pub(super) struct Buffer {
     pub(super) name: String,
-    /// The best way to use it: `None` if there is none.
+    /// The best value of `--memory` for it; `None` if it cannot be used.
     pub(super) memory: Option<String>,
     pub(super) obstacle: Option<String>,
 }
@@ -161,7 +162,7 @@ impl Buffer {
     }
 }
 
-/// What an FPGA manager says of its logic.
+/// The state that an FPGA manager reports of its logic.
 pub(super) fn state(manager: &FpgaManager) -> String {
     manager.state().unwrap_or_else(|error| explained(&error))
 }

@@ -1,4 +1,4 @@
-//! This file holds `mixed` against `float`: what the first design beyond the thesis gains.
+//! Compares `mixed` with `float`: the gain of the first design beyond the thesis.
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::thesis::recorded::FLOAT_DESIGN;
@@ -9,7 +9,7 @@ use super::ports::PUMP;
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib};
 
-/// The table, if `mixed` was asked for.
+/// The table, if `mixed` is among the profiles.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     let mixed = scene.variants.iter().find(|variant| variant.profile.id == MIXED.id);
     mixed.map(|mixed| against_float(scene, mixed)).into_iter().collect()

@@ -1,4 +1,4 @@
-//! This file has the comparison with GPU and CPU: Tables 6.5 to 6.7 and 6.9 to 6.11, equation 6.5.
+//! Compares with GPU and CPU: Tables 6.5 to 6.7 and 6.9 to 6.11, equation 6.5.
 //!
 //! Times and powers of other machines are the thesis'; only the accelerator's time is ours, and it
 //! is modelled.
@@ -21,7 +21,7 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 fn platforms() -> Table {
     let mut table = Table::new(
         "platforms",
-        "What the thesis records of GPU, CPU and board (T6.5, T6.9)",
+        "The thesis' records of GPU, CPU and board (T6.5, T6.9)",
         &[
             ("platform", "platform"),
             ("ms", "ms"),
@@ -61,7 +61,7 @@ fn platforms() -> Table {
     table
 }
 
-/// What follows from one latency.
+/// The figures that follow from one latency.
 struct Outcome {
     ms: f64,
 }
@@ -73,7 +73,7 @@ impl Outcome {
     fn speedup(&self, platform: &Platform) -> f64 {
         platform.latency_ms / self.ms
     }
-    /// From the joules of both as they are, not as they are printed.
+    /// Computes with both energies unrounded, not with the printed ones.
     fn energy(&self, platform: &Platform) -> f64 {
         platform.watts * platform.latency_ms / 1e3 / self.joules()
     }
@@ -84,12 +84,12 @@ impl Outcome {
 
 /// A figure of the thesis' comparison.
 struct Figure {
-    /// Table of the thesis.
+    /// The thesis' table.
     table: fn(&Design) -> &'static str,
     name: &'static str,
-    /// What the thesis prints.
+    /// The printed figure.
     printed: fn(&Design) -> f64,
-    /// How it follows from a latency; or from the thesis' powers alone.
+    /// How to compute the figure: from a latency, or from the thesis' powers alone.
     of: Source,
 }
 
@@ -199,7 +199,7 @@ fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
     let printed = design.map(figure.printed);
     let (recomputed, ours, kind) = match figure.of {
         Source::Powers(found) => {
-            // Nothing of it is ours.
+            // Every figure of the row is the thesis'.
             if design.is_none() {
                 return;
             }

@@ -1,4 +1,4 @@
-//! This file has Tables 4.1 to 4.6: words in and out, before and after each reduction.
+//! Tables 4.1 to 4.6: words in and out, before and after each reduction.
 
 use bitstream_model::estimate::thesis::data::{DataTable, TABLES};
 use bitstream_model::estimate::{Records, StepTraffic};

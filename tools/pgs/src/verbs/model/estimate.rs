@@ -1,4 +1,4 @@
-//! This file is each profile's estimate for programs.
+//! Each profile's estimate for programs.
 
 use bitstream_model::estimate::thesis::recorded::Design;
 use bitstream_model::estimate::{
@@ -8,7 +8,7 @@ use bitstream_model::interface::profile::Variant;
 use serde_json::{Value, json};
 
 use super::scene::Scene;
-use crate::options::bandwidth_number;
+use crate::options::bandwidth::bandwidth_number;
 
 pub(super) fn profiles(scene: &Scene) -> Vec<Value> {
     scene.variants.iter().map(|variant| profile(scene, variant)).collect()

@@ -1,4 +1,4 @@
-//! This file has Figure 2.6: a fall of ten seconds by explicit Euler.
+//! Figure 2.6: a fall of ten seconds by explicit Euler.
 
 use bitstream_model::estimate::thesis::euler::{exact, explicit, explicit_single};
 
@@ -31,7 +31,7 @@ pub(super) fn tables() -> Vec<Table> {
             Kind::Exact.cell(),
         ]);
     }
-    table.note("a dt² n (n - 1) / 2 is 499.500 m for dt = 1/100 s; the thesis prints the beginning of what single \
-         precision makes of it.");
+    table.note("a dt² n (n - 1) / 2 is 499.500 m for dt = 1/100 s; the thesis prints the first digits of the \
+         single-precision result.");
     vec![table]
 }

@@ -1,4 +1,4 @@
-//! This file has the tables of on-chip memory, logic and streams.
+//! The tables of on-chip memory, logic and streams.
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::thesis::recorded::Design;
@@ -155,8 +155,8 @@ fn blocks(scene: &Scene) -> Table {
         ]);
     }
     table.note(
-        "Arrays only: FIFOs of streams and cores come on top. The thesis' shares are what its \
-         synthesis reported.",
+        "Arrays only: FIFOs of streams and cores come on top. The thesis' shares are from its \
+         synthesis report.",
     );
     table
 }
@@ -197,7 +197,7 @@ fn logic(scene: &Scene) -> Table {
     table
 }
 
-/// Stream widths against the ports, and the rate asked for against the memory.
+/// Stream widths against the ports, and required bandwidth against the memory's.
 pub(super) fn streams(scene: &Scene) -> Vec<Table> {
     let mut table = Table::new(
         "streams",

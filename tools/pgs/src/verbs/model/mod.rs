@@ -1,5 +1,5 @@
-//! The verb `model`: what a step costs by formula, and every table of the thesis beside it, without
-//! running anything.
+//! The verb `model`: computes the cost of a step by formula, beside every table of the thesis,
+//! without running anything.
 
 mod beyond;
 mod comparison;
@@ -23,10 +23,10 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::table::grouped;
-use crate::args::CommonArgs;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
-use crate::options::bandwidth;
+use crate::numbers::grouped;
+use crate::options::bandwidth::bandwidth;
 use report::Table;
 use scene::Scene;
 
@@ -37,16 +37,16 @@ Examples:
   pgs model --section step,ports --bandwidth 8.5 --json
   pgs model --markdown > tables.md
 
-Every row says what it is: exact (counted), modelled (by formula: a step that stalls on hazards
-takes longer), recorded (a figure of the thesis) or open (nobody knows). Nothing here was measured.";
+The kind of every row is exact (counted), modelled (by formula: a step that stalls on hazards takes
+longer), recorded (a figure of the thesis) or open (unknown). No figure was measured.";
 
-/// Number of this verb's JSON layout: 2 since it holds several profiles and the tables.
+/// Version of this verb's JSON layout: 2 since it holds several profiles and the tables.
 const SCHEMA: u32 = 2;
 
-/// Every profile, on the command line.
+/// The name of all profiles on the command line.
 const ALL: &str = "all";
 
-/// Show what a step costs by formula, beside every table of the thesis.
+/// Show the cost of a step by formula, beside every table of the thesis.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ModelArgs {
@@ -59,14 +59,14 @@ pub(crate) struct ModelArgs {
     /// Profile of the bitstream
     #[arg(long, value_name = "NAME", default_value = ALL, value_parser = names())]
     profile: String,
-    /// Profiles with the world inertia of every body, streamed and kept on chip
+    /// Take the profiles with the world inertia of every body, streamed and kept on chip
     #[arg(long)]
     world_inertia: bool,
-    /// Memory bandwidth in GB/s, or "unlimited", of the table of times [default: unlimited, 17.07, 16
-    /// and 12.8 in turn]
+    /// Memory bandwidth of the table of times in GB/s, or "unlimited" [default: unlimited, 17.07,
+    /// 16 and 12.8 in turn]
     #[arg(long, value_name = "GBPS", value_parser = bandwidth)]
     bandwidth: Option<Bandwidth>,
-    /// Which tables [default: all]
+    /// Tables to show [default: all]
     #[arg(long, value_name = "SECTION", value_delimiter = ',')]
     section: Vec<Section>,
     /// Print Markdown instead of text
@@ -139,7 +139,7 @@ impl ModelArgs {
         }
     }
 
-    /// The sections `mixed` and `windowed` are about profiles that must have been asked for.
+    /// Refuses the sections `mixed` and `windowed` without their profiles.
     fn check(&self, json: bool) -> Result<(), Failure> {
         if json && self.markdown {
             return Err(Failure::input("--json and --markdown exclude each other")
@@ -222,7 +222,7 @@ pub(crate) fn run(
     Ok(Verdict::Done)
 }
 
-/// What stands above the tables, line by line.
+/// The lines above the tables.
 fn head(args: &ModelArgs, scene: &Scene) -> Vec<String> {
     let step = &scene.step;
     let mut lines = vec![format!(

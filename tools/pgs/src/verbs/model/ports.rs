@@ -1,12 +1,12 @@
-//! This file has the tables of the block RAM ports: which initiation interval they allow, and who
-//! has which port when.
+//! The tables of the block RAM ports: the initiation interval that they allow, and the schedule of
+//! each port.
 
 use bitstream_model::estimate::{Access, AccessKind, PortAccount, PortUse, Slot};
 
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, yes_or_no};
 
-/// What a pump asks of the device, and what of it is known.
+/// The pump's demands on the device, and what is known of them.
 pub(super) const PUMP: &str = "The pump, block RAM at twice the accelerator's clock (500 or 550 MHz), is \
     a design assumption and was not synthesised. A global clock tree may run at 775 MHz (DS925 1.29, \
     clock buffers, speed grade -2, 0.85 V); the limit of the block RAM itself in DS925 was not \
@@ -19,7 +19,7 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 fn arrays(scene: &Scene) -> Table {
     let mut table = Table::new(
         "ports",
-        "On-chip accesses of one issue: what the ports allow",
+        "On-chip accesses of one issue, and the limit of the ports",
         &[
             ("profile", "profile"),
             ("array", "array"),
@@ -85,12 +85,12 @@ fn intervals(scene: &Scene) -> Table {
     table
 }
 
-/// An access, as `read A`, with the number of its collision where several are issued together.
+/// An access, as `read A`, with the number of its collision if several are issued together.
 fn access(ports: &PortUse, access: &Access) -> String {
     let verb = match (access.kind, access.row) {
         (AccessKind::Read, _) => "read",
         (AccessKind::Write, 0 | 1) => "write",
-        // From the unit before.
+        // Forwarded from the unit before.
         (AccessKind::Write, _) => "take",
     };
     let body = match (ports.array, access.row % 2) {
@@ -108,7 +108,7 @@ fn access(ports: &PortUse, access: &Access) -> String {
 fn schedule(scene: &Scene) -> Table {
     let mut table = Table::new(
         "schedule",
-        "Who has which port in which cycle of the interval",
+        "Schedule of the ports, by cycle of the interval",
         &[
             ("profile", "profile"),
             ("array", "array"),
@@ -145,9 +145,9 @@ fn schedule(scene: &Scene) -> Table {
         }
     }
     table.note(
-        "Clock counts the block RAM's clocks within a cycle. Writes are those of an issue that \
+        "Clock counts the block RAM's clocks within a cycle. Writes belong to an issue that \
          entered the pipeline earlier. Take: the last use of a body in the pass before, written into \
-         the memory of the unit that has the next one; two of them at once are the most.",
+         the memory of the next unit; at most two happen at once.",
     );
     table
 }
@@ -189,8 +189,8 @@ fn alternatives(scene: &Scene) -> Table {
     table.note(PUMP);
     table.note(
         "Considered instead: banks by body colour, one read and one write a cycle each, without copy \
-         or pump. The two bodies of a collision must then never share a bank, which the order of the \
-         collisions has to see to.",
+         or pump. The order of the collisions must then keep the two bodies of a collision in \
+         different banks.",
     );
     table
 }

@@ -1,16 +1,16 @@
-//! This file lays tables out, for a terminal and as Markdown.
+//! Lays tables out, for a terminal and as Markdown.
 
 use std::io::{self, Write};
 
-use super::super::table::grouped;
 use super::report::{Cell, Table};
+use crate::numbers::grouped;
 
-/// Notes are broken before this column.
+/// Column before which notes are broken.
 const WIDTH: usize = 100;
 
 fn shown(cell: &Cell) -> String {
     match cell {
-        // A share of nothing.
+        // A share of nothing is not finite.
         Cell::Number(value, _) | Cell::Difference(value) | Cell::Share(value)
             if !value.is_finite() =>
         {
@@ -31,13 +31,13 @@ fn shown(cell: &Cell) -> String {
     }
 }
 
-/// Columns of words stand at the left, columns with a number in them at the right.
+/// Whether a column is flush right: columns with a number are, columns of words are not.
 fn at_right(table: &Table, column: usize) -> bool {
     let number = |cell: &Cell| !matches!(cell, Cell::Text(_) | Cell::Missing);
     table.rows.iter().any(|row| number(&row[column]))
 }
 
-/// Lines of a note, none longer than the terminal unless a word is.
+/// Breaks a note into lines of at most the terminal's width; a longer word stays whole.
 fn wrapped(note: &str) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in note.split_whitespace() {

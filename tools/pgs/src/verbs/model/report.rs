@@ -1,17 +1,17 @@
-//! This file is what the verb shows: tables of typed cells, laid out by `render`.
+//! The model's tables: typed cells, laid out by `render`.
 
 use serde_json::{Map, Value, json};
 
-/// Where a row's figures come from.
+/// The origin of a row's figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Counted.
     Exact,
-    /// Computed from a cycle, memory or bandwidth model.
+    /// Computed by a cycle, memory or bandwidth model.
     Modelled,
     /// Taken from the thesis.
     Recorded,
-    /// Not known.
+    /// Unknown.
     Open,
 }
 
@@ -26,18 +26,18 @@ impl Kind {
     }
 }
 
-/// What stands in one place of a table.
+/// The content of a table's cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Cell {
     Text(String),
     Whole(u64),
-    /// A number, shown with so many digits behind the point.
+    /// A number, and its digits behind the point.
     Number(f64, usize),
-    /// Percent, shown with its sign.
+    /// Percent with its sign.
     Difference(f64),
     /// Percent.
     Share(f64),
-    /// Not known, or of another scene.
+    /// Unknown, or of another scene.
     Missing,
 }
 
@@ -56,14 +56,14 @@ impl Cell {
     }
 }
 
-/// A column: its key in JSON, and its heading.
+/// A column: its JSON key, and its heading.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Column {
     pub(super) key: &'static str,
     pub(super) head: &'static str,
 }
 
-/// A table with what has to be said about it.
+/// A table with its notes.
 #[derive(Debug, Clone)]
 pub(super) struct Table {
     pub(super) id: &'static str,

@@ -1,4 +1,4 @@
-//! This file is what was asked for: a step, profiles, bandwidths.
+//! The input of the model: a step, profiles, bandwidths.
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::{StepShape, thesis};
@@ -6,7 +6,7 @@ use bitstream_model::interface::profile::Variant;
 
 use super::report::Cell;
 
-/// What the tables are about.
+/// The subject of the tables.
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
     pub(super) step: StepShape,
@@ -15,18 +15,18 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Whether it is the step of the thesis, so that its figures can be held against ours.
+    /// Whether the step is the thesis', so that its figures can be compared with ours.
     pub(super) fn is_thesis_step(&self) -> bool {
         self.step == StepShape::new(thesis::BODIES, thesis::COLLISIONS)
     }
 
-    /// By how much ours is off the thesis', percent.
+    /// The deviation of our figure from the thesis', percent.
     pub(super) fn difference(&self, ours: f64, thesis: f64) -> Cell {
         if self.is_thesis_step() { difference(ours, thesis) } else { Cell::Missing }
     }
 }
 
-/// By how much a figure is off another one, percent.
+/// The deviation of a figure from another one, percent.
 pub(super) fn difference(ours: f64, theirs: f64) -> Cell {
     Cell::Difference((ours / theirs - 1.0) * 100.0)
 }
@@ -35,7 +35,7 @@ pub(super) fn mib(bytes: u64) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 
-/// MiB with the two digits that the thesis prints: what rounds to them is the same figure.
+/// MiB with the two digits that the thesis prints: figures that round to the same digits are equal.
 pub(super) fn printed_mib(bytes: u64) -> f64 {
     (mib(bytes) * 100.0).round() / 100.0
 }

@@ -1,4 +1,4 @@
-//! This file has the tables of cycles and time of a step.
+//! The tables of a step's cycles and times.
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::thesis::recorded::{Design, MEMORY_BANDWIDTH};
@@ -8,7 +8,7 @@ use bitstream_model::interface::profile::{Inertia, Variant};
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, difference, mib, yes_or_no};
 use super::window::has_window;
-use crate::options::bandwidth_text;
+use crate::options::bandwidth::bandwidth_text;
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     vec![cycles(scene), times(scene), world_inertia(scene)]
@@ -58,8 +58,9 @@ fn cycles(scene: &Scene) -> Table {
     ));
     if scene.variants.iter().any(|variant| has_window(&variant.profile.flow)) {
         table.note(
-            "Where the collisions stream once all passes run side by side: one pass is all of them, fill \
-             is by how much the last is behind the first. Load and integration run beside them.",
+            "Where the collisions stream once, all passes run in parallel: \"one pass\" has the cycles of all \
+             passes, and \"fill\" is the lag of the last pass behind the first. Load and integration run in \
+             parallel, too.",
         );
     }
     table.note(
@@ -93,7 +94,7 @@ fn times(scene: &Scene) -> Table {
         for records in Records::ALL {
             for bandwidth in &scene.bandwidths {
                 let time = StepTime::new(variant, records, &scene.step, *bandwidth);
-                // The thesis' cycles contain no wait for memory, and it states a bandwidth.
+                // The thesis' cycles contain no memory waits, and it states a bandwidth.
                 let stated = [Bandwidth::Unlimited, MEMORY_BANDWIDTH];
                 let design = design.filter(|_| stated.contains(bandwidth));
                 table.row([

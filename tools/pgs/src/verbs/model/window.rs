@@ -1,4 +1,4 @@
-//! This file shows the designs that stream the collisions once: cycles, bytes, memory, logic.
+//! Shows the designs that stream the collisions once: cycles, bytes, memory, logic.
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::{
@@ -9,12 +9,12 @@ use bitstream_model::interface::profile::{FLOAT, Flow, Variant, Window};
 use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, yes_or_no};
 
-/// Whether a profile is one of them.
+/// Whether a profile streams the collisions once.
 pub(super) fn has_window(flow: &Flow) -> bool {
     matches!(flow, Flow::Window(_))
 }
 
-/// The tables, if one of these designs was asked for.
+/// The tables, if one of these designs is among the profiles.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     let designs: Vec<(&Variant, &Window)> = scene
         .variants
@@ -76,10 +76,10 @@ fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
         ));
     }
     table.note(
-        "Slot: cycles in which every pass issues one entry. Load and integration run beside the \
-         passes; after them come the bodies that are in no collision, two cycles each. The formula \
-         gives every pass its turn; the emulated board counts what a scoreboard makes of an order, which \
-         is usually less: a unit takes another pass when one cannot go on.",
+        "Slot: cycles in which every pass issues one entry. Load and integration run in parallel to the \
+         passes; bodies without a collision follow, two cycles each. In the formula the passes take \
+         turns. The emulated board has a scoreboard, which usually needs fewer cycles: a unit takes up \
+         another pass when one has to wait.",
     );
     table
 }
@@ -127,7 +127,7 @@ fn gains(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
         ]);
     }
     table.note(
-        "Memory on chip does not depend on the scene: delay lines and places are there whatever it is.",
+        "Memory on chip does not depend on the scene: delay lines and places have a fixed size.",
     );
     table
 }
@@ -163,17 +163,17 @@ fn logic(designs: &[(&Variant, &Window)]) -> Table {
         table.note(if logic.fits() {
             format!(
                 "{}: {left} % of the lookup tables are left for places, scoreboard, delay lines and \
-                 DMAs, of which nothing is counted here. Whether that is enough, and whether it \
-                 closes timing, only a synthesis can say.",
+                 DMAs, which this table does not count. Only a synthesis can tell whether that is \
+                 enough, and whether it closes timing.",
                 variant.profile.name
             )
         } else {
-            format!("{}: more than there is. It does not fit.", variant.profile.name)
+            format!("{}: more than the device has. It does not fit.", variant.profile.name)
         });
     }
     table.note(
-        "An extrapolation, nothing was synthesised: the thesis' design in the same arithmetic has one \
-         unit of each kind, and everything it takes is multiplied by the units.",
+        "An extrapolation, without a synthesis: the thesis' design in the same arithmetic has one unit of \
+         each kind, and its logic is multiplied by the number of units.",
     );
     table
 }

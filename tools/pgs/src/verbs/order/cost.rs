@@ -1,10 +1,10 @@
-//! This file takes the time that making an order takes on the host.
+//! Measures the host time of making an order.
 
 use std::time::Instant;
 
 use zynq_pgs::order::{OrderError, OrderInput};
 
-/// The median of so many runs after one to warm up, ns a collision.
+/// The median of `runs` runs after one warm-up run, ns a collision.
 pub(super) fn per_collision(
     input: &OrderInput<'_>,
     runs: u32,

@@ -1,6 +1,6 @@
-//! This file writes how many bodies are alive in each slot, as a table or as a picture.
+//! Writes the number of live bodies in each slot, as a table or as a picture.
 //!
-//! The picture shows the most of each of a few hundred ranges of slots, on a logarithmic axis:
+//! The picture shows the maximum of each of a few hundred ranges of slots, on a logarithmic axis:
 //! orders differ by two powers of ten.
 
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use super::rows::Measured;
 use super::source::Source;
 use crate::failure::{Cause, Failure};
 
-/// A file that is a table or a picture by its extension.
+/// Parses the path of a table or a picture, which its extension tells apart.
 pub(super) fn path(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match is_picture(&path) {
@@ -31,7 +31,7 @@ fn is_picture(path: &Path) -> Option<bool> {
     }
 }
 
-/// A curve and the name of its order.
+/// The live bodies in each slot of one order.
 struct Curve {
     name: String,
     alive: Vec<u32>,
@@ -58,7 +58,7 @@ pub(super) fn write(
     })
 }
 
-/// One line a slot, one column an order; nothing where an order has no such slot.
+/// One line a slot, one column an order; empty where an order has no such slot.
 fn table(curves: &[Curve]) -> String {
     let mut text = "slot".to_owned();
     for curve in curves {
@@ -82,11 +82,11 @@ fn table(curves: &[Curve]) -> String {
 
 const WIDTH: usize = 800;
 const HEIGHT: f64 = 400.0;
-/// Space at the left and below, where the numbers are.
+/// Space for the numbers at the left and below.
 const MARGIN: f64 = 50.0;
-/// Space at the right, where the names are.
+/// Space for the names at the right.
 const NAMES: f64 = 190.0;
-/// Colours that people who see few can tell apart (Okabe and Ito).
+/// Colours that colour-blind people can tell apart (Okabe and Ito).
 const COLOURS: [&str; 8] =
     ["#000000", "#999999", "#56B4E9", "#E69F00", "#F0E442", "#D55E00", "#CC79A7", "#009E73"];
 
@@ -98,7 +98,7 @@ fn picture(curves: &[Curve], window: IssueWindow) -> String {
     while 10_u32.checked_pow(decades).is_some_and(|power| power < most) {
         decades += 1;
     }
-    // A whole number of decades up; one body is the lowest line.
+    // A whole number of decades; the lowest line is one body.
     let y = |alive: u32| {
         let up = f64::from(alive.max(1)).log10() / f64::from(decades);
         20.0 + HEIGHT * (1.0 - up)
@@ -175,7 +175,7 @@ mod tests {
             assert!(text.contains(level), "{level}");
         }
         assert!(!text.contains(">1000<"));
-        // 30 of two decades: log10(30) / 2 = 0.7386 up from the bottom at 420.
+        // 30 on two decades: log10(30) / 2 = 0.7386 up from the bottom at 420.
         assert!(text.contains("849.0,124.6"), "{text}");
     }
 

@@ -1,5 +1,6 @@
-//! This file measures every order of the collisions at every depth.
+//! Measures every order of the collisions at every depth.
 
+use scene::SplitMix64;
 use zynq_pgs::order::{
     Checker, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer, Schedule, Ties,
     colour_count,
@@ -8,7 +9,7 @@ use zynq_pgs::order::{
 use super::cost;
 use super::source::Source;
 
-/// Where the random order comes from; any number does.
+/// Seed of the random order; any number does.
 const SEED: u64 = 20_260_101;
 
 /// An order at a depth.
@@ -16,23 +17,23 @@ pub(super) struct Row {
     pub(super) order: String,
     pub(super) depth: u32,
     pub(super) report: OrderReport,
-    /// What making the order costs, ns a collision; not if it is not made here.
+    /// Host time of making the order, ns a collision; none if the order is given.
     pub(super) host_ns: Option<f64>,
 }
 
-/// Everything that was measured.
+/// All measurements.
 pub(super) struct Measured {
     pub(super) rows: Vec<Row>,
     /// Schedules at the last depth, by the name of their order.
     pub(super) last: Vec<(String, Schedule)>,
-    /// What verifying the hazard-free schedule of the last depth costs, ns a collision.
+    /// Host time of verifying the hazard-free schedule of the last depth, ns a collision.
     pub(super) verify_ns: f64,
 }
 
-/// Where an order comes from.
+/// The origin of an order.
 enum Kind {
     Made(Order),
-    /// The same at every depth, made elsewhere.
+    /// A given order, the same at every depth.
     Fixed(Schedule),
 }
 
@@ -54,7 +55,7 @@ pub(super) fn measure(
             match &kind {
                 Kind::Fixed(fixed) => schedule.clone_from(fixed),
                 Kind::Made(order) => {
-                    // Only the orders without hazards depend on the depth.
+                    // Only orders without hazards depend on the depth.
                     if place == 0 || order.is_hazard_free() {
                         let cost = || orderer.order(&input, *order, window).map(|_| ());
                         host_ns = Some(cost::per_collision(&input, runs, cost)?);
@@ -73,7 +74,7 @@ pub(super) fn measure(
     Ok(Measured { rows, last, verify_ns })
 }
 
-/// What verifying a schedule costs; it must be right.
+/// Measures the verification of a schedule, which must pass.
 fn verified(
     schedule: &Schedule,
     input: &OrderInput<'_>,
@@ -105,21 +106,12 @@ fn kinds(source: &Source) -> Result<Vec<(String, Kind)>, OrderError> {
     Ok(kinds)
 }
 
-/// Fisher and Yates' shuffle with numbers of `SplitMix64`.
+/// Fisher and Yates' shuffle.
 fn shuffled(count: usize) -> Vec<u32> {
-    let mut state = SEED;
-    let mut random = |below: usize| {
-        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        let z = u128::from(z ^ (z >> 31));
-        // The upper half of the product is below `below`.
-        usize::try_from((z * below as u128) >> 64).unwrap_or(0)
-    };
+    let mut random = SplitMix64::new(SEED);
     let mut order: Vec<u32> = (0..).take(count).collect();
     for k in (1..count).rev() {
-        order.swap(k, random(k + 1));
+        order.swap(k, random.below(k + 1));
     }
     order
 }

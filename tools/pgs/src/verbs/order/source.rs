@@ -1,4 +1,5 @@
-//! This file gets the collisions that are ordered: from a folder, a pile of spheres or of cubes.
+//! Loads or makes the collisions to be ordered: from a folder, a pile of spheres or a pile of
+//! cubes.
 
 use std::path::Path;
 
@@ -7,15 +8,15 @@ use zynq_pgs::order::{InputBuffers, OrderInput};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use super::OrderArgs;
-use crate::args::CommonArgs;
 use crate::board;
+use crate::common::CommonArgs;
 use crate::failure::Failure;
-use crate::folder::Folder;
-use crate::npy::{self, Dimensions};
-use crate::options::BuildArgs;
-use crate::origin;
+use crate::options::build::BuildArgs;
+use crate::step_input;
+use step_folder::folder::Folder;
+use step_folder::npy::{self, Dimensions};
 
-/// The order in which Bullet's GPU takes the collisions, if the folder has it.
+/// The order of the collisions on Bullet's GPU, if the folder has it.
 const GPU_ORDER: &str = "gpu_order.npy";
 
 /// Collisions to be ordered.
@@ -27,7 +28,7 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// Gets what the command line asks for.
+    /// Loads or makes the collisions that the command line asks for.
     pub(super) fn load(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
         if let Some(path) = &args.input {
             return Self::folder(path);
@@ -59,7 +60,7 @@ impl Source {
     }
 
     fn folder(path: &Path) -> Result<Self, Failure> {
-        let folder = origin::load(path)?;
+        let folder = step_input::load(path)?;
         let gpu_order = gpu_order(&path.join(GPU_ORDER), folder.collisions.len())?;
         let Folder { bodies, collisions, shapes, .. } = folder;
         Ok(Self::new(path.display().to_string(), &bodies, &collisions, &shapes, gpu_order))
@@ -105,7 +106,7 @@ impl Source {
         self.input().moving.iter().filter(|moving| **moving).count()
     }
 
-    /// Collisions that a moving body takes part in, on average.
+    /// Average number of collisions of a moving body.
     pub(super) fn touches(&self) -> f64 {
         let input = self.input();
         let uses = input.pairs.iter().flatten().filter(|body| {
@@ -116,9 +117,9 @@ impl Source {
     }
 }
 
-/// A permutation of `count` collisions, if there is such a file.
+/// Reads a permutation of `count` collisions, if the file exists.
 fn gpu_order(path: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure> {
-    // A name that cannot be looked up is told when the file is opened.
+    // Opening the file reports a name that cannot be looked up.
     if matches!(path.try_exists(), Ok(false)) {
         return Ok(None);
     }

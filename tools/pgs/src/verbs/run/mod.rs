@@ -1,4 +1,4 @@
-//! The verb `run`: steps a scene, shows what every step cost, and sums it up.
+//! The verb `run`: steps a scene, shows the cost of every step, and sums up.
 
 mod row;
 mod summary;
@@ -12,21 +12,24 @@ use zynq_pgs::{BoardKind, StepParameters, StepReport};
 
 use self::row::{ALL_COLUMNS, Row, columns, step};
 use self::summary::{Summary, Totals};
-use super::SCHEMA;
-use super::facts::fact;
-use super::progress::progress_bar;
-use super::table::{grouped, heading, line};
-use crate::args::CommonArgs;
-use crate::board::{self, Opened};
-use crate::diagnosis::FaultArgs;
+use crate::board::{self, OpenBoard};
+use crate::bug_report::FaultArgs;
+use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::footprint::Footprint;
 use crate::interrupt::Interrupt;
-use crate::options::{BuildArgs, DeadlineArgs, bandwidth_text};
-use crate::ordering::{self, OrderingArgs};
-use crate::planned::{self, PlannedArgs};
-use crate::scenes::SceneArgs;
-use crate::solver::{SolverArgs, time_step_text};
+use crate::numbers::grouped;
+use crate::options::bandwidth::bandwidth_text;
+use crate::options::build::BuildArgs;
+use crate::options::ordering::OrderingArgs;
+use crate::options::planned::PlannedArgs;
+use crate::options::scenes::SceneArgs;
+use crate::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
+use crate::output::SCHEMA;
+use crate::output::facts::fact;
+use crate::output::order;
+use crate::output::progress::progress_bar;
+use crate::output::table::{heading, line};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -35,26 +38,26 @@ Examples:
   pgs run --contact-iterations 4 --friction-iterations 4 --drop 5     the thesis' passes
   pgs run --grid 10x10x10 --steps 600 --report-every 30
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
-  pgs run --hazards unchecked --order as-given   the same as the thesis orders: piles gain energy
+  pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes --inertia world --grid 8x8x8
   pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
-  pgs run --retries 2 --report fault.json        try a failed step again; keep all about the fault
+  pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
-The grid, the cubes and the solver's constants are the thesis'. The drop is a choice: the thesis names
-no height. So are 10 + 10 iterations: with the thesis' 4 + 4 a pile of 30 layers sinks 0.2 m into
-itself and bounces.
+The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
+thesis names no height. So are 10 + 10 iterations: with the thesis' 4 + 4 a pile of 30 layers sinks
+0.2 m into itself and bounces.
 
-Columns: step; pairs of bodies in contact; deepest penetration of the contacts that the step is given;
-kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the step
-on the board, which is modelled where the board is emulated; time of this machine.";
+Columns: step; pairs of bodies in contact; deepest penetration in the contacts given to the step;
+kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the
+step on the board, modelled for an emulated board; time of this machine.";
 
-/// Rows of the table, if not said otherwise.
+/// Default rows of the table.
 const ROWS: u32 = 15;
-/// Contact and friction iterations of a step, if not said otherwise: enough to carry 30 layers.
+/// Default contact and friction iterations of a step: enough to carry 30 layers.
 const ITERATIONS: u32 = 10;
 
 /// Step a pile dropped on the ground.
@@ -69,7 +72,7 @@ pub(crate) struct RunArgs {
     /// Show every N-th step [default: a fifteenth of the steps]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     report_every: Option<u32>,
-    /// Show every column, 170 characters a line.
+    /// Show every column, in lines of 170 characters.
     #[arg(long)]
     wide: bool,
     #[command(flatten)]
@@ -95,21 +98,21 @@ impl RunArgs {
         self.faults.apply(self.ordering.apply(parameters))
     }
 
-    /// Whether a step has a row of its own.
+    /// Whether the table shows this step.
     fn is_shown(&self, step: u32) -> bool {
         let every = self.report_every.unwrap_or(self.steps.div_ceil(ROWS));
         step == 1 || step.is_multiple_of(every) || step == self.steps
     }
 }
 
-/// What a run has come to so far.
+/// The course of a run so far.
 #[derive(Default)]
 struct Course {
     done: u32,
     retries: u64,
     totals: Totals,
     footprint: Footprint,
-    orders: ordering::OrdersSent,
+    orders: order::OrdersSent,
     /// With `--json`, the document of every step.
     documents: Vec<Value>,
     last: Option<Row>,
@@ -122,13 +125,13 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     let mut opened = board::open(common, &args.build)?;
-    args.scene.check_size(&opened)?;
+    args.scene.check_size(opened.accelerator.capabilities())?;
     let mut scene = args.scene.build(&args.build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let parameters = args.parameters();
-    args.planned.inject(&mut opened, &parameters)?;
+    opened.inject(&args.planned, &parameters)?;
 
     let course = take_steps(args, common, &parameters, &mut opened, &mut scene, &interrupt, out)?;
     let complete = course.done == args.steps;
@@ -146,7 +149,7 @@ fn take_steps(
     args: &RunArgs,
     common: &CommonArgs,
     parameters: &StepParameters,
-    opened: &mut Opened,
+    opened: &mut OpenBoard,
     scene: &mut Scene,
     interrupt: &Interrupt,
     out: &mut dyn Write,
@@ -160,11 +163,11 @@ fn take_steps(
         let Some(row) = row else { break };
         course.done += 1;
         course.retries += u64::from(row.report.retries);
-        course.totals.see(&row);
-        course.footprint.see(&variant, &row.report);
-        course.orders.see(row.report.order);
+        course.totals.add(&row);
+        course.footprint.include(&variant, &row.report);
+        course.orders.count(row.report.order);
         if course.done == 1 && !common.json {
-            // Only now: a scene that is refused prints nothing but the refusal.
+            // The heading waits for the first step: a refused scene prints only the refusal.
             progress.suspend(|| print_heading(args, opened, &row.report, out))?;
         }
         progress.inc(1);
@@ -184,20 +187,20 @@ fn take_steps(
 }
 
 /// Whether the times of the board are modelled.
-fn is_emulated(opened: &Opened) -> bool {
+fn is_emulated(opened: &OpenBoard) -> bool {
     matches!(opened.accelerator.board().kind, BoardKind::Emulated | BoardKind::Served)
 }
 
-/// Which board, which scene, the first step's order, and the names of the columns.
+/// The board, the scene, the first step's order, and the names of the columns.
 fn print_heading(
     args: &RunArgs,
-    opened: &Opened,
+    opened: &OpenBoard,
     first: &StepReport,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     opened.print(out)?;
     fact(out, "scene", &args.scene.text())?;
-    fact(out, "order", &ordering::with_reason(first))?;
+    fact(out, "order", &order::with_reason(first))?;
     writeln!(out)?;
     match args.wide {
         true => heading(out, &ALL_COLUMNS)?,
@@ -206,16 +209,16 @@ fn print_heading(
     out.flush()
 }
 
-/// What is known of the run as a whole; nothing before the first step.
+/// The summary of the run; none before the first step.
 fn summary<'a>(
     args: &RunArgs,
     parameters: &'a StepParameters,
-    opened: &Opened,
+    opened: &OpenBoard,
     scene: &mut Scene,
     course: &'a Course,
 ) -> Option<Summary<'a>> {
     let last = course.last.as_ref()?;
-    let facts = summary::Board {
+    let facts = summary::BoardFacts {
         profile: opened.accelerator.capabilities().variant.profile,
         is_emulated: is_emulated(opened),
         bandwidth: opened.config().map(|config| bandwidth_text(config.bandwidth)),
@@ -227,7 +230,7 @@ fn summary<'a>(
 fn print_end(
     args: &RunArgs,
     parameters: &StepParameters,
-    opened: &Opened,
+    opened: &OpenBoard,
     scene: &mut Scene,
     course: &Course,
     out: &mut dyn Write,
@@ -237,7 +240,7 @@ fn print_end(
     if *done != args.steps {
         writeln!(out, "interrupted after {done} of {} steps", args.steps)?;
     }
-    if let Some(faults) = planned::text(opened) {
+    if let Some(faults) = opened.faults_text() {
         writeln!(out, "{faults}")?;
     }
     if *retries > 0 {
@@ -258,7 +261,7 @@ fn print_end(
 fn document(
     args: &RunArgs,
     parameters: &StepParameters,
-    opened: &Opened,
+    opened: &OpenBoard,
     scene: &mut Scene,
     mut course: Course,
     complete: bool,
@@ -280,7 +283,7 @@ fn document(
         "complete": complete,
         "steps": steps,
         "summary": summary.map(|summary| summary.to_json()),
-        "faults": planned::to_json(opened),
+        "faults": opened.faults_json(),
         "memory": course.footprint.to_json(),
         "digest": { "algorithm": digest::ALGORITHM, "value": digest },
     })

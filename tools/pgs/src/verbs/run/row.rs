@@ -7,24 +7,25 @@ use serde_json::Value;
 use zynq_pgs::{Accelerator, StepParameters, StepReport};
 
 use crate::board::is_cancelled;
-use crate::verbs::table::{Bound, Column, grouped};
-use crate::verbs::{limit_text, milliseconds, report_json};
+use crate::numbers::{Bound, grouped};
+use crate::output::table::Column;
+use crate::output::{limit_text, milliseconds, report_json};
 
-/// What one step did.
+/// The measures of one step.
 pub(super) struct Row {
     pub(super) step: u32,
     pub(super) ground_pairs: usize,
-    /// Deepest penetration of the contacts that the step was given, m.
+    /// Deepest penetration in the contacts given to the step, m.
     pub(super) deepest: f64,
     /// Kinetic energy after the step, J.
     pub(super) kinetic_energy: f64,
-    /// The same without what gravity added last, J: nothing for a pile at rest.
+    /// Kinetic energy without gravity's last addition, J: 0 for a pile at rest.
     pub(super) before_gravity: f64,
     pub(super) detect: Duration,
     pub(super) report: StepReport,
 }
 
-/// The columns that a person reads. The times of an emulated board are modelled.
+/// The default columns. The times of an emulated board are modelled.
 pub(super) const fn columns(is_emulated: bool) -> [Column; 6] {
     let (board, host) = if is_emulated { ("modelled", "emulated") } else { ("board", "host") };
     [
@@ -60,7 +61,7 @@ pub(super) const ALL_COLUMNS: [Column; 18] = [
 ];
 
 impl Row {
-    /// Time of the host for the whole step, the emulation of the board included.
+    /// Host time of the whole step, with the emulation of the board.
     pub(super) fn host(&self) -> Duration {
         let host = &self.report.host;
         let around = host.validate + host.order + host.pack + host.start;
@@ -120,7 +121,7 @@ impl Row {
     }
 }
 
-/// Detects collisions and takes one step; nothing if Ctrl-C ended it.
+/// Detects collisions and takes one step; none if Ctrl-C ended it.
 pub(super) fn step(
     number: u32,
     parameters: &StepParameters,

@@ -1,5 +1,5 @@
-//! Sums up a run: what was simulated, how long the board takes beside the thesis' figures, what
-//! limits it, and whether the pile is at rest.
+//! Sums up a run: the simulated time, the board's time beside the thesis' figures, its limit, and
+//! whether the pile is at rest.
 
 use std::io::{self, Write};
 use std::time::Duration;
@@ -12,13 +12,13 @@ use zynq_pgs::interface::profile::Profile;
 use zynq_pgs::{Limit, StepParameters};
 
 use super::row::Row;
-use crate::solver::time_step_text;
-use crate::verbs::facts::fact;
-use crate::verbs::table::grouped;
-use crate::verbs::{limit_text, milliseconds};
+use crate::numbers::grouped;
+use crate::options::solver::time_step_text;
+use crate::output::facts::fact;
+use crate::output::{limit_text, milliseconds};
 
-/// A pile is at rest if its bodies move no faster than this on average (root of the mean of v²,
-/// weighted by mass, turning included), m/s.
+/// Average speed up to which a pile is at rest (root mean square, weighted by mass, rotation
+/// included), m/s.
 const REST: f64 = 0.05;
 
 /// Sums over the steps of a run.
@@ -34,12 +34,12 @@ pub(super) struct Totals {
     cycles: u64,
     stalls: u64,
     waits: u64,
-    /// How many steps each limit held back.
+    /// The number of steps that each limit held back.
     limits: Vec<(Limit, u32)>,
     host: HostSums,
 }
 
-/// Host time by what it was spent on.
+/// Host time by activity.
 #[derive(Debug, Default)]
 struct HostSums {
     all: Duration,
@@ -51,8 +51,8 @@ struct HostSums {
 }
 
 impl Totals {
-    /// Takes a step into account.
-    pub(super) fn see(&mut self, row: &Row) {
+    /// Adds a step.
+    pub(super) fn add(&mut self, row: &Row) {
         let report = &row.report;
         self.steps += 1;
         self.collisions_most = self.collisions_most.max(report.collisions);
@@ -78,7 +78,7 @@ impl Totals {
         self.host.unpack += host.unpack + host.commit;
     }
 
-    /// The limit of most steps, and how many they are.
+    /// The limit of most steps, and their number.
     fn limit(&self) -> Option<(Limit, u32)> {
         self.limits.iter().copied().max_by_key(|(_, steps)| *steps)
     }
@@ -88,7 +88,7 @@ impl Totals {
         milliseconds(self.modelled) / f64::from(self.steps.max(1))
     }
 
-    /// Mean time of a pass over the collisions, what surrounds the passes included, ms.
+    /// Mean time of a pass over the collisions, with a share of the time around the passes, ms.
     fn per_pass(&self) -> Option<f64> {
         (self.passes > 0).then(|| self.mean() / f64::from(self.passes))
     }
@@ -99,13 +99,13 @@ impl Totals {
     }
 }
 
-/// What the thesis has beside a run.
+/// The thesis' figures beside a run.
 #[derive(Debug, Clone, Copy)]
 struct Thesis {
     design: &'static recorded::Design,
     /// Cycles of one of its passes.
     pass: u64,
-    /// Its time for as many passes, ms.
+    /// The thesis' time for the run's number of passes, ms.
     same_passes_ms: f64,
 }
 
@@ -113,7 +113,7 @@ struct Thesis {
 const THESIS_PASSES: u32 = 8;
 
 impl Thesis {
-    fn beside(profile: &Profile, passes: u32) -> Self {
+    fn for_run(profile: &Profile, passes: u32) -> Self {
         let half = recorded::HALF_DESIGN.profile.name == profile.name;
         let design = if half { &recorded::HALF_DESIGN } else { &recorded::FLOAT_DESIGN };
         let shape = StepShape::new(thesis::BODIES, thesis::COLLISIONS);
@@ -144,18 +144,18 @@ impl Thesis {
     }
 }
 
-/// How the pile stands at the end.
+/// The state of the pile at the end.
 #[derive(Debug, Clone, Copy)]
-struct End {
-    /// Without what gravity added last, J.
+struct FinalState {
+    /// Kinetic energy without gravity's last addition, J.
     kinetic_energy: f64,
-    /// Speed that all bodies together have this energy at, m/s.
+    /// The common speed of all bodies at this energy, m/s.
     speed: f64,
-    /// m.
+    /// Deepest penetration, m.
     deepest: f64,
 }
 
-impl End {
+impl FinalState {
     fn of(scene: &mut Scene, last: &Row) -> Self {
         scene.detect();
         let deepest = penetration(scene.collisions()).largest;
@@ -182,38 +182,38 @@ impl End {
 
 /// The board of a run.
 #[derive(Debug)]
-pub(super) struct Board {
+pub(super) struct BoardFacts {
     pub(super) profile: &'static Profile,
     /// Whether its times are modelled.
     pub(super) is_emulated: bool,
-    /// Its memory bandwidth, where that is known.
+    /// Its memory bandwidth, if known.
     pub(super) bandwidth: Option<String>,
 }
 
-/// What there is to tell of a run.
+/// The summary of a run.
 pub(super) struct Summary<'a> {
     totals: &'a Totals,
     parameters: &'a StepParameters,
-    board: Board,
+    board: BoardFacts,
     /// Whether the scene is the thesis' cubes.
     cubes: bool,
-    end: End,
+    end: FinalState,
 }
 
 impl<'a> Summary<'a> {
-    /// Measures how the scene stands after its last step.
+    /// Measures the scene after its last step.
     pub(super) fn new(
         totals: &'a Totals,
         parameters: &'a StepParameters,
-        board: Board,
+        board: BoardFacts,
         cubes: bool,
         (scene, last): (&mut Scene, &Row),
     ) -> Self {
-        Self { totals, parameters, board, cubes, end: End::of(scene, last) }
+        Self { totals, parameters, board, cubes, end: FinalState::of(scene, last) }
     }
 
     fn thesis(&self) -> Option<Thesis> {
-        self.cubes.then(|| Thesis::beside(self.board.profile, self.totals.passes))
+        self.cubes.then(|| Thesis::for_run(self.board.profile, self.totals.passes))
     }
 
     /// For people.
@@ -347,17 +347,17 @@ mod tests {
     /// 254,000 cycles a pass at 275 MHz are 0.9236 ms; 190,500 at 250 MHz are 0.762 ms.
     #[test]
     fn the_thesis_is_shown_for_as_many_passes() {
-        let ms = |profile, passes| Thesis::beside(profile, passes).same_passes_ms;
+        let ms = |profile, passes| Thesis::for_run(profile, passes).same_passes_ms;
         assert!((ms(&FLOAT, 8) - 7.49).abs() < 1e-9);
         assert!((ms(&FLOAT, 20) - (7.49 + 12.0 * 0.923_636)).abs() < 1e-3);
         assert!((ms(&HALF, 9) - (6.23 + 0.762)).abs() < 1e-3);
         assert!((ms(&MIXED, 8) - 7.49).abs() < 1e-9, "it has no design of its own there");
-        let text = Thesis::beside(&FLOAT, 8).text(8);
+        let text = Thesis::for_run(&FLOAT, 8).text(8);
         assert!(
             text.ends_with("float design 7.49 ms, GTX 980 13.64 ms, i7-3770 53.01 ms"),
             "{text}"
         );
-        let text = Thesis::beside(&FLOAT, 20).text(20);
+        let text = Thesis::for_run(&FLOAT, 20).text(20);
         assert!(text.ends_with("; 20 passes are 18.57 ms by its 254,000 cycles a pass"), "{text}");
     }
 }

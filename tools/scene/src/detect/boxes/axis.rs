@@ -1,10 +1,10 @@
-//! This file finds the axis along which two boxes are farthest apart: the six normals of their faces,
-//! and the nine directions across an edge of each.
+//! Finds the axis of the largest separation of two boxes: among the six face normals, and the nine
+//! directions across an edge of each.
 
 use super::super::lanes::{Mask, Numbers, Rotation, Vector};
 use super::{Placed, Touch};
 
-/// Where two boxes are farthest apart.
+/// A separation, and its axis.
 #[derive(Debug, Clone, Copy)]
 struct Separation<N> {
     distance: N,
@@ -16,7 +16,7 @@ impl<N: Numbers> Separation<N> {
         Self { distance: any.all(f32::MIN), direction: Vector::all(any, [0.0; 3]) }
     }
 
-    /// The farther one; of equals the first.
+    /// The larger separation; the first one in a tie.
     #[inline(always)]
     fn keep_larger(&mut self, distance: N, direction: Vector<N>) {
         self.keep(distance.above(self.distance), distance, direction);
@@ -50,8 +50,9 @@ pub(super) fn find<N: Numbers>(placed: &Placed<N>, margin: f32) -> Touch<N> {
     Touch { axis, apart, unknown }
 }
 
-/// Along the normals of one box; the other is turned by `rotation` and moved by `translation` in its
-/// frame. Also whether they are apart along more than one.
+/// The largest separation along the normals of one box; the other box is turned by `rotation` and
+/// moved by `translation` in its frame. Also tells whether the boxes are apart along more than one
+/// normal.
 #[inline(always)]
 fn faces<N: Numbers>(
     own: Vector<N>,
@@ -65,7 +66,7 @@ fn faces<N: Numbers>(
     let mut best = Separation::none(zero);
     let mut once = zero.above(zero);
     let mut twice = once;
-    // The normals that look at the other box.
+    // The normals that point to the other box.
     let normals = [
         Vector { x: signs.x, y: zero, z: zero },
         Vector { x: zero, y: signs.y, z: zero },
@@ -84,7 +85,7 @@ fn faces<N: Numbers>(
     (best, twice)
 }
 
-/// Along the directions that are across an edge of each.
+/// The largest separation along the directions across an edge of each.
 #[inline(always)]
 fn edges<N: Numbers>(placed: &Placed<N>) -> Separation<N> {
     let Placed { half_a, half_b, b_in_a, a_in_b, translation } = *placed;
@@ -105,7 +106,7 @@ fn edges<N: Numbers>(placed: &Placed<N>) -> Separation<N> {
             let towards = a_in_b.turn(direction.negated());
             let on_b = b_in_a.turn(half_b.with_signs(towards)).plus(translation);
             let distance = on_b.minus(on_a).dot(direction);
-            // What is parallel to an edge of A has no direction across it.
+            // An edge that is parallel to an edge of A has no direction across it.
             let some = length.above(zero.all(f32::EPSILON));
             best.keep(distance.above(best.distance).and(some), distance, direction);
         }
@@ -113,7 +114,7 @@ fn edges<N: Numbers>(placed: &Placed<N>) -> Separation<N> {
     best
 }
 
-/// Two unit vectors across a unit vector and each other.
+/// Two unit vectors, orthogonal to a unit vector and to each other.
 #[inline(always)]
 pub(super) fn basis<N: Numbers>(direction: Vector<N>) -> [Vector<N>; 2] {
     let Vector { x, y, z } = direction;
@@ -127,7 +128,7 @@ pub(super) fn basis<N: Numbers>(direction: Vector<N>) -> [Vector<N>; 2] {
     ]
 }
 
-/// Along which axis the magnitude is the largest, of equals the first, and the sign there.
+/// The axis of the largest component, the first one in a tie, and the component's sign.
 #[derive(Clone, Copy)]
 pub(super) struct Steepest<N: Numbers> {
     pub(super) along_x: N::Mask,

@@ -1,20 +1,20 @@
-//! This file finds the points at which two faces touch: the corners of one within the other, and where
-//! their edges cross, all seen along an axis.
+//! Finds the contact points of two faces: the corners of one inside the other, and the crossings of
+//! their edges, all projected along an axis.
 
 use super::super::lanes::{Mask, Numbers, Vector, mask};
 use super::super::points::Points;
 use super::Placed;
 use super::axis::{Steepest, basis, steepest};
 
-/// A number within so many steps of another is the same.
+/// Numbers within this many representable steps are equal.
 const SAME_STEPS: u32 = 4;
-/// Share of a number that is more than those steps.
+/// A relative difference larger than these steps.
 const NEARLY: f32 = 1e-5;
 
-/// Four corners, one after the other.
+/// The four corners of a face, in order around it.
 type Corners<N> = [Vector<N>; 4];
 
-/// A corner as it is seen along the axis.
+/// A corner, projected along the axis.
 #[derive(Clone, Copy)]
 struct Seen<N> {
     u: N,
@@ -46,7 +46,7 @@ fn see<N: Numbers>(corners: &Corners<N>, [u, v]: [Vector<N>; 2]) -> [Seen<N>; 4]
     ]
 }
 
-/// The corners of the face of a box that looks in a direction.
+/// The corners of the box's face that points in a direction.
 #[inline(always)]
 fn face<N: Numbers>(half: Vector<N>, direction: Vector<N>) -> Corners<N> {
     let at = steepest(direction);
@@ -60,8 +60,8 @@ fn face<N: Numbers>(half: Vector<N>, direction: Vector<N>) -> Corners<N> {
     ]
 }
 
-/// A corner of a face: along x the corners go round by y and then z, along y by x and z, along z by y
-/// and x.
+/// A corner of a face: along x the corners go round by y and then z, along y by x and z, along z by
+/// y and x.
 #[inline(always)]
 fn corner<N: Numbers>(
     at: &Steepest<N>,
@@ -75,8 +75,8 @@ fn corner<N: Numbers>(
     along_x.or(at.along_x, along_z.or(at.along_z, along_y))
 }
 
-/// Takes each point at which the faces of two boxes touch that look along `axis`, a unit vector
-/// from A to B in the frame of A, of the pairs in the mask.
+/// Collects the contact points of the two faces that point along `axis`, a unit vector from A to B
+/// in the frame of A, for the pairs in the mask.
 #[inline(always)]
 pub(super) fn points<N: Numbers>(
     placed: &Placed<N>,
@@ -93,7 +93,7 @@ pub(super) fn points<N: Numbers>(
     let (seen_a, seen_b) = (see(&of_a, basis), see(&of_b, basis));
     let epsilon = axis.x.all(f32::EPSILON);
 
-    // Corners of A, onto the face of B.
+    // Projects corners of A onto the face of B.
     let normal = normal(&of_b);
     let slope = normal.dot(axis);
     let some = slope.abs().above(epsilon).and(pairs);
@@ -104,7 +104,7 @@ pub(super) fn points<N: Numbers>(
             points.take(some.without(outside(seen, &seen_b)), corner, on_b, distance);
         }
     }
-    // Corners of B, onto the face of A.
+    // Projects corners of B onto the face of A.
     let normal = self::normal(&of_a);
     let slope = -normal.dot(axis);
     let some = slope.abs().above(epsilon).and(pairs);
@@ -118,20 +118,20 @@ pub(super) fn points<N: Numbers>(
     cross(&of_a, &of_b, [&seen_a, &seen_b], axis, pairs, points);
 }
 
-/// Across a face.
+/// The normal of a face.
 #[inline(always)]
 fn normal<N: Numbers>(corners: &Corners<N>) -> Vector<N> {
     corners[2].minus(corners[1]).cross(corners[0].minus(corners[1]))
 }
 
-/// On which side of an edge a point lies.
+/// The side of an edge on which a point lies.
 #[inline(always)]
 fn side<N: Numbers>(point: Seen<N>, from: Seen<N>, to: Seen<N>) -> N {
     let (edge, way) = (to.minus(from), point.minus(from));
     edge.u * way.v - edge.v * way.u
 }
 
-/// Whether a point lies outside of the corners, not on their border.
+/// Whether a point lies outside of the corners; points on the border do not.
 #[inline(always)]
 fn outside<N: Numbers>(point: Seen<N>, corners: &[Seen<N>; 4]) -> N::Mask {
     let zero = point.u.all(0.0);
@@ -146,7 +146,7 @@ fn outside<N: Numbers>(point: Seen<N>, corners: &[Seen<N>; 4]) -> N::Mask {
     outside
 }
 
-/// Takes the points in which each edge of B crosses those of A.
+/// Collects the crossings of each edge of B with the edges of A.
 #[inline(always)]
 fn cross<N: Numbers>(
     of_a: &Corners<N>,
@@ -179,7 +179,7 @@ fn cross<N: Numbers>(
             if crossing.bits() == 0 {
                 continue;
             }
-            // Parallel, up to rounding, can only be what is nearly so.
+            // Only nearly parallel edges can be parallel up to rounding.
             let nearly = (ae * ae.all(NEARLY)).at_least(determinant).and(crossing);
             if nearly.bits() != 0 {
                 crossing = crossing.without(same(ae, bb));
@@ -191,8 +191,8 @@ fn cross<N: Numbers>(
     }
 }
 
-/// Whether two numbers, neither negative, are a few steps apart at most.
-// Hardly ever asked.
+/// Whether two numbers, neither negative, are at most a few steps apart.
+// Rarely needed.
 #[inline(never)]
 fn same<N: Numbers>(a: N, b: N) -> N::Mask {
     let steps =

@@ -1,10 +1,11 @@
-//! This folder finds where two boxes touch, with the bits of parry3d's and in less of its time.
+//! Computes where two boxes touch, with parry3d's bits in less time.
 //!
-//! Nearly all pairs of a pile are boxes. parry computes their manifold in `contact_manifold_cuboid_cuboid`
-//! pair by pair, one axis and one point at a time; here the same operations are done of a pair in each
-//! lane, in the same order, so that not a bit differs: see the tests, which compare. What parry keeps for
-//! its own callers (features, manifolds of earlier steps) is left away. Where two boxes are apart along
-//! two normals of one at once, which pairs of a pile hardly ever are, parry is asked.
+//! Nearly all pairs of a pile are boxes. parry computes their manifold in
+//! `contact_manifold_cuboid_cuboid` pair by pair, one axis and one point at a time. This module
+//! does the same operations in the same order for one pair in each lane, so that every bit is the
+//! same; the tests compare. Data that parry keeps for its own callers (features, manifolds of
+//! earlier steps) is left out. parry itself handles boxes that are apart along two normals of one
+//! box at once, which is rare in a pile.
 
 mod axis;
 mod clip;
@@ -24,18 +25,18 @@ pub(super) struct Placed<N> {
     pub(super) translation: Vector<N>,
 }
 
-/// What two boxes have in common.
+/// The contact of two boxes.
 #[derive(Clone, Copy)]
 pub(super) struct Touch<N: Numbers> {
-    /// They touch along this unit vector from A to B, in the frame of A.
+    /// Unit vector from A to B along which they touch, in the frame of A.
     pub(super) axis: Vector<N>,
-    /// They do not: they are farther apart than the margin.
+    /// The pairs that are farther apart than the margin.
     pub(super) apart: N::Mask,
-    /// parry must say it.
+    /// The pairs that only parry can decide.
     pub(super) unknown: N::Mask,
 }
 
-/// Where the boxes of some pairs touch, of which the points are taken, on B too in the frame of A.
+/// Collects the contact points of some pairs; points on B are in the frame of A, too.
 #[inline(always)]
 pub(super) fn touch<N: Numbers>(
     placed: &Placed<N>,
@@ -51,7 +52,7 @@ pub(super) fn touch<N: Numbers>(
 }
 
 impl<N: Numbers> Placed<N> {
-    /// Points of the frame of A in that of B.
+    /// Transforms points from the frame of A to that of B.
     #[inline(always)]
     pub(super) fn in_b(&self, point: Vector<N>) -> Vector<N> {
         self.a_in_b.turn(point.minus(self.translation))
@@ -69,14 +70,14 @@ mod tests {
     use super::*;
     use crate::random::SplitMix64;
 
-    /// Two boxes: where B is in the frame of A, and their half extents.
+    /// Two boxes: the pose of B in the frame of A, and their half extents.
     type Pair = (Pose, [f32; 3], [f32; 3]);
 
     /// Bits of an axis and of points.
     type Manifold = (Vec<u32>, Vec<u32>);
 
-    /// The bits of everything that parry computes of two boxes: the axis and the points, near enough or
-    /// not.
+    /// The bits of parry's manifold of two boxes, the axis and the points, whether or not they are
+    /// near enough.
     fn by_parry((b_in_a, half_a, half_b): Pair) -> Option<Manifold> {
         let boxes = [half_a, half_b].map(|half| Cuboid::new(Vec3::from_array(half)));
         let mut manifold = ContactManifold::<(), ()>::new();
@@ -92,16 +93,16 @@ mod tests {
         Some((manifold.local_n1.to_array().map(f32::to_bits).to_vec(), points.collect()))
     }
 
-    /// What lanes find of a pair.
+    /// The result of the lanes for a pair.
     #[derive(Debug, Clone, PartialEq)]
     enum Found {
         Apart,
         Touching(Manifold),
-        /// parry is to be asked.
+        /// parry must decide.
         Unknown,
     }
 
-    /// Computes pairs, as many at once as there are lanes.
+    /// Computes pairs, one in each lane at a time.
     struct Compute<'a>(&'a [Pair], &'a mut Vec<Found>);
 
     impl Work for Compute<'_> {
@@ -167,8 +168,8 @@ mod tests {
         Found::Touching((bits(touch.axis).to_vec(), numbers))
     }
 
-    /// How pairs lie: at random, stacked and tilted by little, turned about the vertical only, along the
-    /// axes, and on edges.
+    /// A pair in one of several positions: random, stacked and slightly tilted, turned about the
+    /// vertical only, along the axes, and on edges.
     fn pair(random: &mut SplitMix64, kind: u32) -> Pair {
         let mut sign = || random.sign();
         let tilt = match kind {
@@ -200,7 +201,7 @@ mod tests {
     fn not_a_bit_differs_from_what_parry_computes() {
         let mut random = SplitMix64::new(7);
         for kind in 0..5 {
-            // No multiple of the lanes, so that some stay empty.
+            // Not a multiple of the lanes, so that some stay empty.
             let pairs: Vec<Pair> = (0..4001).map(|_| pair(&mut random, kind)).collect();
             let (mut portable, mut widest) = (Vec::new(), Vec::new());
             Portable.run(Compute(&pairs, &mut portable));
@@ -214,7 +215,7 @@ mod tests {
                 match found {
                     Found::Touching(found) => {
                         touching += 1;
-                        // parry has no axis where it has no point at all.
+                        // parry has no axis for a pair without points.
                         let none = expected.is_none() && found.1.is_empty();
                         assert!(none || expected == Some(found), "{pair:?}");
                     }

@@ -1,4 +1,4 @@
-//! This file is the eight lanes of AVX2.
+//! The eight lanes of AVX2.
 
 #![allow(unsafe_code, reason = "instructions beyond those of the target are asked for")]
 
@@ -7,7 +7,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::{Lanes, Mask, Numbers, Row, Work};
 
-/// AVX2, which the processor has.
+/// Proof that the processor has AVX2.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Avx2(());
 
@@ -20,13 +20,13 @@ pub(in super::super) struct Eight(__m256);
 pub(in super::super) struct EightMask(__m256);
 
 impl Avx2 {
-    /// Where the processor has it.
+    /// A value if the processor has AVX2.
     pub(in super::super) fn found() -> Option<Self> {
         std::arch::is_x86_feature_detected!("avx2").then_some(Self(()))
     }
 }
 
-/// Operations of numbers and masks, each a function of such with AVX2 enabled.
+/// Defines operations on numbers and masks, each a function with AVX2 enabled.
 macro_rules! operations {
     ($($(#[$meta:meta])* $name:ident $(($other:ident))? -> $result:ident = $function:path;)*) => {$(
         $(#[$meta])*
@@ -80,7 +80,7 @@ impl Numbers for Eight {
 
     #[inline(always)]
     fn of_row(self, row: &Row) -> Self {
-        // There is a number, and with it AVX2.
+        // A number exists, so AVX2 does.
         Avx2(()).load(row)
     }
 

@@ -1,7 +1,7 @@
-//! This folder is the lanes of a processor: numbers side by side, each with the bits of an f32 that is
-//! computed alone, one rounding an operation.
+//! The lanes of a processor: numbers side by side, each with the bits of an f32 that is computed
+//! alone, with one rounding per operation.
 //!
-//! Numbers are made of numbers, and the first ones by a value of a [`Lanes`] type, which there is only
+//! Numbers are made from numbers. A value of a [`Lanes`] type makes the first ones, and exists only
 //! where the processor has its instructions.
 
 #[cfg(target_arch = "x86_64")]
@@ -16,10 +16,10 @@ pub(super) use avx2::Avx2;
 pub(super) use portable::Portable;
 pub(super) use vector::{Rotation, Vector};
 
-/// Most lanes that there are.
+/// The largest width of all lanes.
 pub(super) const LANES_MAX: usize = 8;
 
-/// Numbers in memory; those beyond the lanes are left alone.
+/// Numbers in memory; a narrower processor uses the first ones only.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(32))]
 pub(super) struct Row(pub(super) [f32; LANES_MAX]);
@@ -33,53 +33,53 @@ pub(super) trait Numbers:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// Yes or no in each lane.
+    /// A truth value in each lane.
     type Mask: Mask;
 
-    /// This number in each lane, whatever is in them now.
+    /// The given number in each lane; `self` serves only as proof of the instructions.
     fn all(self, number: f32) -> Self;
 
-    /// What the lanes hold.
+    /// Stores the lanes.
     fn row(self) -> Row;
 
-    /// The numbers of a row, whatever is in the lanes now.
+    /// Loads the numbers of a row; `self` serves only as proof of the instructions.
     fn of_row(self, row: &Row) -> Self;
 
     fn sqrt(self) -> Self;
 
-    /// Without its sign.
+    /// The absolute value.
     fn abs(self) -> Self;
 
-    /// With the sign of another number, that of a zero too.
+    /// The magnitude of this number with the sign of another one, also of a zero.
     fn with_sign(self, other: Self) -> Self;
 
-    /// Whether it is larger; no beside a NaN.
+    /// Whether it is larger; false for a NaN.
     fn above(self, other: Self) -> Self::Mask;
 
-    /// Whether it is larger or the same; no beside a NaN.
+    /// Whether it is larger or equal; false for a NaN.
     fn at_least(self, other: Self) -> Self::Mask;
 
-    /// Whether it is the same, as both zeros are; no beside a NaN.
+    /// Whether it is equal, as both zeros are; false for a NaN.
     fn is(self, other: Self) -> Self::Mask;
 
-    /// These where the mask says yes, and `other` elsewhere.
+    /// Selects these lanes where the mask is set, and `other` elsewhere.
     fn or(self, mask: Self::Mask, other: Self) -> Self;
 }
 
-/// Yes or no in each lane.
+/// A truth value in each lane.
 pub(super) trait Mask: Copy {
     fn and(self, other: Self) -> Self;
 
     fn either(self, other: Self) -> Self;
 
-    /// This one where the other says no.
+    /// Set where `self` is set and `other` is not.
     fn without(self, other: Self) -> Self;
 
-    /// A bit for each lane, the first in bit 0.
+    /// One bit per lane, lane 0 in bit 0.
     fn bits(self) -> u32;
 }
 
-/// Yes in the lanes of these bits, whatever number `any` is.
+/// A mask with these bits set; `any` serves only as proof of the instructions.
 #[inline(always)]
 pub(super) fn mask<N: Numbers>(any: N, bits: u32) -> N::Mask {
     let mut row = Row::default();
@@ -89,7 +89,7 @@ pub(super) fn mask<N: Numbers>(any: N, bits: u32) -> N::Mask {
     any.of_row(&row).above(any.all(0.0))
 }
 
-/// What runs with lanes.
+/// Code that is generic over lanes.
 pub(super) trait Work {
     fn with<L: Lanes>(self, lanes: L);
 }
@@ -97,17 +97,17 @@ pub(super) trait Work {
 /// The lanes of a processor.
 pub(super) trait Lanes: Copy {
     type Numbers: Numbers;
-    /// How many there are.
+    /// The number of lanes.
     const WIDTH: usize;
 
-    /// Runs something with these instructions enabled.
+    /// Runs code with these instructions enabled.
     fn run<W: Work>(self, work: W);
 
-    /// The numbers of a row.
+    /// Loads the numbers of a row.
     fn load(self, row: &Row) -> Self::Numbers;
 }
 
-/// Runs something with the widest lanes that the processor has.
+/// Runs code with the widest lanes of the processor.
 pub(super) fn run<W: Work>(work: W) {
     #[cfg(target_arch = "x86_64")]
     if let Some(lanes) = Avx2::found() {
@@ -134,7 +134,7 @@ mod tests {
         16_777_216.0,
     ];
 
-    /// Every operation on every two samples, in every lane.
+    /// Tests every operation on every two samples, in every lane.
     struct Check;
 
     impl Work for Check {
@@ -151,8 +151,8 @@ mod tests {
         }
     }
 
-    /// The bits of a number, of any NaN the same ones: their sign differs from one processor to the
-    /// next.
+    /// The bits of a number; the same bits for every NaN, since its sign differs between
+    /// processors.
     fn bits(number: f32) -> u32 {
         if number.is_nan() { f32::NAN.to_bits() } else { number.to_bits() }
     }

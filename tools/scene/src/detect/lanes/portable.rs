@@ -1,4 +1,4 @@
-//! This file is the four lanes that every processor of the target has.
+//! The four lanes that every processor of the target has.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -6,7 +6,7 @@ use wide::{CmpEq, CmpGe, CmpGt, f32x4};
 
 use super::{Lanes, Mask, Numbers, Row, Work};
 
-/// What the target has.
+/// The lanes of the target.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Portable;
 

@@ -1,5 +1,4 @@
-//! This file is the arithmetic of vectors and rotations in lanes: each lane rounds as glam's scalar
-//! arithmetic would.
+//! Vectors and rotations in lanes: each lane rounds as glam's scalar arithmetic does.
 
 use super::{Mask, Numbers, Row};
 
@@ -12,19 +11,19 @@ pub(in super::super) struct Vector<N> {
 }
 
 impl<N: Numbers> Vector<N> {
-    /// The same one in each lane, whatever number `any` is.
+    /// The same vector in each lane; `any` serves only as proof of the instructions.
     #[inline(always)]
     pub(in super::super) fn all(any: N, [x, y, z]: [f32; 3]) -> Self {
         Self { x: any.all(x), y: any.all(y), z: any.all(z) }
     }
 
-    /// What the lanes hold along x, y and z.
+    /// The lanes of x, y and z.
     #[inline(always)]
     pub(in super::super) fn rows(self) -> [Row; 3] {
         [self.x.row(), self.y.row(), self.z.row()]
     }
 
-    /// Along x, y and z.
+    /// The components x, y and z.
     #[inline(always)]
     pub(in super::super) fn parts(self) -> [N; 3] {
         [self.x, self.y, self.z]
@@ -45,7 +44,7 @@ impl<N: Numbers> Vector<N> {
         Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
     }
 
-    /// The opposite signs, those of zeros too.
+    /// The negated vector, zeros included.
     #[inline(always)]
     pub(in super::super) fn negated(self) -> Self {
         Self { x: -self.x, y: -self.y, z: -self.z }
@@ -65,7 +64,7 @@ impl<N: Numbers> Vector<N> {
         }
     }
 
-    /// These magnitudes, the signs of the other.
+    /// These magnitudes with the signs of the other vector.
     #[inline(always)]
     pub(in super::super) fn with_signs(self, other: Self) -> Self {
         Self {
@@ -75,7 +74,7 @@ impl<N: Numbers> Vector<N> {
         }
     }
 
-    /// This one where the mask says yes, and the other elsewhere.
+    /// Selects this vector where the mask is set, and the other elsewhere.
     #[inline(always)]
     pub(in super::super) fn or(self, mask: N::Mask, other: Self) -> Self {
         Self {
@@ -85,7 +84,7 @@ impl<N: Numbers> Vector<N> {
         }
     }
 
-    /// Whether all of it is finite.
+    /// Whether every component is finite.
     #[inline(always)]
     pub(in super::super) fn is_finite(self) -> N::Mask {
         let infinite = self.x.all(f32::INFINITY);
@@ -98,25 +97,25 @@ impl<N: Numbers> Vector<N> {
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Rotation<N> {
     axis: Vector<N>,
-    /// w² less the square of the axis, and twice w.
+    /// w² minus the square of the axis, and twice w.
     along: N,
     across: N,
 }
 
 impl<N: Numbers> Rotation<N> {
-    /// By x, y, z and w.
+    /// From x, y, z and w.
     #[inline(always)]
     pub(in super::super) fn new(axis: Vector<N>, w: N) -> Self {
         Self { axis, along: w * w - axis.dot(axis), across: w * w.all(2.0) }
     }
 
-    /// The other way round.
+    /// The inverse rotation.
     #[inline(always)]
     pub(in super::super) fn inverse(self) -> Self {
         Self { axis: self.axis.negated(), ..self }
     }
 
-    /// A vector, turned.
+    /// Rotates a vector.
     #[inline(always)]
     pub(in super::super) fn turn(self, v: Vector<N>) -> Vector<N> {
         let twice = v.dot(self.axis) * self.along.all(2.0);

@@ -1,4 +1,4 @@
-//! This file puts pairs of bodies into lanes, and makes collisions of what comes out of them.
+//! Loads pairs of bodies into lanes, and makes collisions of the results.
 
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
 
@@ -10,10 +10,10 @@ use super::super::points::Points;
 use super::super::reduce::reduce;
 use crate::Geometry;
 
-/// How far from 1 the length of a normal may be: rounding is far below, a broken pose above.
+/// Tolerance of a normal's length: rounding is far below, a broken pose above.
 const NORMAL_TOLERANCE: f32 = 5e-4;
 
-/// One body of the pairs of a batch.
+/// One body of each pair in a batch.
 #[derive(Debug, Default)]
 struct Side {
     position: [Row; 3],
@@ -30,7 +30,8 @@ impl Side {
         for (row, number) in self.orientation.iter_mut().zip(body.pose.orientation) {
             row.0[lane] = number;
         }
-        // What is no box is given to the lanes as one without a size; nothing is made of it.
+        // Other bodies than boxes enter the lanes as boxes without a size, whose results are
+        // ignored.
         let (half_extents, is_box) = match geometry {
             Geometry::Box { half_extents } => (half_extents, true),
             _ => ([0.0; 3], false),
@@ -54,7 +55,7 @@ impl Side {
     }
 }
 
-/// The same in lanes; the orientation as a quaternion's axis and w.
+/// The bodies in lanes; the orientation as a quaternion's axis and w.
 struct Loaded<N> {
     position: Vector<N>,
     axis: Vector<N>,
@@ -68,14 +69,14 @@ pub(super) struct Batch {
     pairs: [(u32, u32); LANES_MAX],
     geometries: [Option<[Geometry; 2]>; LANES_MAX],
     count: usize,
-    /// In which lanes both are boxes.
+    /// The lanes in which both bodies are boxes.
     boxes: u32,
     a: Side,
     b: Side,
 }
 
 impl Batch {
-    /// Takes the next pairs, as many as there are lanes or left.
+    /// Loads the next pairs, up to the number of lanes.
     #[inline(always)]
     pub(super) fn take(
         &mut self,
@@ -103,7 +104,7 @@ impl Batch {
         }
     }
 
-    /// Whether there was no pair left to take.
+    /// Whether no pair was left to load.
     pub(super) fn is_empty(&self) -> bool {
         self.count == 0
     }
@@ -120,7 +121,7 @@ impl Batch {
     ) {
         let (a, b) = (self.a.load(lanes), self.b.load(lanes));
         let (turn_a, turn_b) = (Rotation::new(a.axis, a.w), Rotation::new(b.axis, b.w));
-        // As glam does it: the inverse of A's pose, times B's.
+        // In glam's order: the inverse of A's pose, times B's.
         let (axis, w) = product((a.axis.negated(), a.w), (b.axis, b.w));
         let b_in_a = Rotation::new(axis, w);
         let placed = Placed {
@@ -184,8 +185,7 @@ impl Batch {
         }
     }
 
-    /// Takes the points that parry finds of the pairs in these lanes, on B in its own frame; the axes
-    /// with theirs among them.
+    /// Adds parry's points of the pairs in these lanes, on B in its own frame, and sets their axes.
     #[inline(always)]
     fn ask_parry<N: Numbers>(
         &self,

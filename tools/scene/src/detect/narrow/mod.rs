@@ -1,8 +1,8 @@
-//! This file finds where two bodies touch.
+//! Finds where two bodies touch.
 //!
-//! Pairs are taken a few at a time, one in each lane. Those of boxes are computed [here](super::boxes),
-//! with the bits of [parry](super::parry), which is asked about all others; the choice of points and
-//! their way into the world is the same for both.
+//! A batch has one pair in each lane. [`boxes`](super::boxes) computes pairs of boxes, with the
+//! bits of [parry](super::parry), which computes all other pairs. The choice of points and their
+//! way into the world is the same for both.
 
 mod batch;
 
@@ -21,7 +21,7 @@ pub(super) struct Narrow {
 }
 
 impl Narrow {
-    /// Adds the collisions of those pairs of `bodies` that have one, in their order.
+    /// Adds the collisions of those pairs of `bodies` that have one, in the order of the pairs.
     pub(super) fn collide(
         &mut self,
         bodies: &[Body],
@@ -33,7 +33,7 @@ impl Narrow {
     }
 }
 
-/// What is done, with whatever lanes.
+/// The narrow phase, for any lanes.
 struct Collide<'a, I> {
     narrow: &'a mut Narrow,
     bodies: &'a [Body],

@@ -1,23 +1,17 @@
-//! Where two bodies touch, pair by pair.
+//! Contacts of two bodies, pair by pair.
 
 #![allow(clippy::float_cmp, reason = "of boxes along the axes the normal is exact")]
 
-use zynq_pgs::{Contact, Pose, Velocity};
+use zynq_pgs::Contact;
 
 use super::super::MARGIN;
 use super::super::lanes::Portable;
-use super::super::tests::bits;
 use super::*;
 use crate::Geometry;
+use crate::fixtures::{LEVEL, bits, body as cube};
 use crate::random::SplitMix64;
 
-const LEVEL: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
-
-fn cube(position: [f32; 3], orientation: [f32; 4]) -> Body {
-    Body { pose: Pose { position, orientation }, velocity: Velocity::default(), shape: 1 }
-}
-
-/// The collisions of pairs, which the lanes that every processor has find with the same bits.
+/// The collisions of pairs; asserts that the portable lanes find the same bits.
 fn all(
     narrow: &mut Narrow,
     bodies: &[Body],
@@ -61,11 +55,11 @@ fn the_normal_points_b_in_a_and_the_points_lie_on_b() {
         // The underside of B; the point on A's surface is c + d n, its top at y = 4.
         assert!((contact.point[1] - 3.995).abs() < 1e-5, "{contact:?}");
         assert!((contact.point[1] - contact.distance - 4.0).abs() < 1e-5, "{contact:?}");
-        // Where the faces overlap.
+        // The overlap of the faces.
         assert!((9.999..11.001).contains(&contact.point[0]), "{contact:?}");
         assert!((-0.201..1.001).contains(&contact.point[2]), "{contact:?}");
     }
-    // The other way round the normal turns and the points lie on the other cube.
+    // With A and B exchanged, the normal turns and the points lie on the other cube.
     let found = collide(b, a).expect("contact");
     assert_eq!(found.normal, [0.0, 1.0, 0.0]);
     assert!(found.contacts.iter().all(|c| (c.point[1] - 4.0).abs() < 1e-5), "{found:?}");
@@ -78,8 +72,8 @@ fn a_cube_turned_by_45_degrees_touches_another_in_four_points_of_its_octagon() {
     let b = cube([0.0, 2.99, 0.0], turn);
     let found = collide(a, b).expect("contact");
     assert_eq!(found.count, 4);
-    // parry gives the eight corners of the octagon in which the faces overlap, at the radius
-    // 1 / cos 22.5 degrees. The four are opposites in pairs, the pairs at right angles.
+    // parry gives the eight corners of the octagon in which the faces overlap, at the radius 1 /
+    // cos 22.5 degrees. The chosen four are opposites in pairs, and the pairs are at right angles.
     let radius = 1.082_392_2_f32;
     let planar = found.contacts.map(|contact| [contact.point[0], contact.point[2]]);
     for [x, z] in planar {
@@ -162,7 +156,7 @@ fn crossed_edges_touch_in_one_point() {
 const SPHERE: Geometry = Geometry::Sphere { radius: 0.5 };
 const CAPSULE: Geometry = Geometry::Capsule { half_height: 0.6, radius: 0.4 };
 
-/// The collision of two bodies of these geometries, and that of the two the other way round.
+/// The collision of two bodies with these geometries; checks it with A and B exchanged, too.
 fn pair(a: (Geometry, Body), b: (Geometry, Body)) -> Option<[Collision; 2]> {
     let shaped = |(_, body): (Geometry, Body), shape| Body { shape, ..body };
     let bodies = [shaped(a, 0), shaped(b, 1)];
@@ -219,7 +213,7 @@ fn a_capsule_lies_on_a_box_with_both_ends_and_stands_on_one() {
     let [standing, _] = pair(a, (CAPSULE, cube([0.0, 1.99, 0.0], LEVEL))).expect("standing");
     assert_eq!(standing.count, 1, "{standing:?}");
     assert!((standing.contacts[0].distance + 0.01).abs() < 1e-4, "{standing:?}");
-    // Its round end reaches a corner's diagonal no farther than its radius.
+    // Its round end reaches no farther along a corner's diagonal than its radius.
     let beyond = 1.0 + 0.43 / 3.0_f32.sqrt();
     let far = cube([beyond, beyond + 0.6, beyond], LEVEL);
     assert!(pair(a, (CAPSULE, far)).is_none());
@@ -257,7 +251,7 @@ fn pairs_of_all_kinds_side_by_side_are_as_each_alone() {
     for outlines in [kinds, [Some(Geometry::CUBE); 4]] {
         let (geometries, mut narrow) = (Geometries(&outlines), Narrow::default());
         let found = all(&mut narrow, &bodies, geometries, pairs());
-        // The last ones have no such body.
+        // The last pairs hold no such body.
         let single = pairs().filter_map(|pair| one(&mut narrow, &bodies, geometries, pair));
         assert!(found.len() > 100, "{}", found.len());
         assert_eq!(bits(&found), bits(&single.collect::<Vec<_>>()));

@@ -1,0 +1,20 @@
+//! Tests of the emulated board as a driver sees it: registers, descriptors, memory and the interrupt.
+//!
+//! One program, as each more would be linked with all of the crate.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod accelerator;
+mod direct;
+mod faults;
+mod float_environment;
+mod formats;
+mod profiles;
+mod properties;
+mod quirks;
+mod registers;
+mod scatter_gather;
+mod shortcuts;
+mod shortcuts_buffers;
+mod windowed;

@@ -1,0 +1,28 @@
+//! Tests of the driver through its public interface.
+//!
+//! One program, as each more would be linked with all of the crate. A test that counts the allocations of
+//! its whole process is a program of its own, beside this folder.
+
+#[cfg(feature = "emulation")]
+#[path = "../common/mod.rs"]
+mod common;
+#[cfg(feature = "emulation")]
+#[path = "../vectors/mod.rs"]
+mod vectors;
+
+mod cheapest_order;
+mod check;
+mod float_environment;
+mod interface;
+mod landing;
+mod order;
+mod overlap;
+mod pack_threads;
+mod prepared;
+mod profiles;
+mod refusals;
+mod served;
+mod shapes;
+mod storage;
+mod widths;
+mod windowed;

@@ -1,0 +1,179 @@
+//! Options of every verb: output, board, DMA memory, FPGA manager.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use bitstream_model::interface::address_map::UIO_NODE;
+use clap::Args;
+use zynq_pgs::{ManagerChoice, MemoryChoice};
+
+use crate::environment::{BOARD, MANAGER, MEMORY, is_blank};
+use crate::options::memory::memory_choice;
+
+/// The options of every verb, as parsed.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct CommonOptions {
+    /// Print one JSON document instead of text.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Board to use.
+    #[arg(
+        help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), uio[:NODE] \
+                (the UIO node of that name, or NODE-control, NODE-dma0 ... for each region), devmem \
+                (registers through /dev/mem, at the addresses of the interface; needs root), \
+                emulated or socket:PATH (one that `pgs serve` serves) [env: PGS_BOARD] \
+                [default: auto]",
+        long,
+        global = true,
+        value_name = "BOARD",
+        value_parser = board_name
+    )]
+    board: Option<BoardName>,
+    /// DMA memory of a real board.
+    #[arg(
+        help = "DMA memory of a real board: auto (the u-dma-buf \"pgs\", else the UIO node \
+                \"pgs-memory\"), u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
+                devmem[:ADDRESS+BYTES]; of a served board: file:PATH [env: PGS_MEMORY] \
+                [default: auto]",
+        long,
+        global = true,
+        value_name = "MEMORY",
+        value_parser = memory_choice
+    )]
+    memory: Option<MemoryChoice>,
+    /// FPGA manager of a real board's logic.
+    #[arg(
+        help = "FPGA manager of a real board's logic, which says whether it is programmed: auto (the \
+                ZynqMP's own, by its name), a device as fpga1, or none (do not ask: for logic that \
+                the kernel did not load, as by JTAG. WARNING: an access to logic that is not \
+                programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
+        long,
+        global = true,
+        value_name = "MANAGER",
+        value_parser = manager_choice
+    )]
+    manager: Option<ManagerChoice>,
+}
+
+/// The options of every verb, with the environment and the defaults filled in.
+#[derive(Debug, Clone)]
+pub(crate) struct CommonArgs {
+    pub(crate) json: bool,
+    pub(crate) board: BoardName,
+    pub(crate) memory: MemoryChoice,
+    /// Whether the memory was named by the environment and not by the command line.
+    pub(crate) memory_of_environment: bool,
+    pub(crate) manager: ManagerChoice,
+}
+
+/// A board named on the command line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum BoardName {
+    Auto,
+    /// A UIO node of this name, or one node for each region.
+    Uio(String),
+    /// Registers through /dev/mem.
+    Devmem,
+    Emulated,
+    /// A board in another process, served at this socket.
+    Socket(PathBuf),
+}
+
+/// Reads the name of a board.
+fn board_name(text: &str) -> Result<BoardName, String> {
+    match text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest))) {
+        ("auto", None) => Ok(BoardName::Auto),
+        ("uio", None) => Ok(BoardName::Uio(UIO_NODE.to_owned())),
+        ("uio", Some(node)) if !node.is_empty() => Ok(BoardName::Uio(node.to_owned())),
+        ("devmem", None) => Ok(BoardName::Devmem),
+        ("emulated", None) => Ok(BoardName::Emulated),
+        ("socket", Some(path)) if !path.is_empty() => Ok(BoardName::Socket(path.into())),
+        _ => Err("expected auto, uio[:NODE], devmem, emulated or socket:PATH".to_owned()),
+    }
+}
+
+/// Reads the choice of an FPGA manager.
+fn manager_choice(text: &str) -> Result<ManagerChoice, String> {
+    let number = |text: &str| text.strip_prefix("fpga")?.parse::<u32>().ok();
+    match text.trim() {
+        "auto" => Ok(ManagerChoice::Automatic),
+        "none" => Ok(ManagerChoice::Unasked),
+        device if number(device).is_some() => Ok(ManagerChoice::Device(device.to_owned())),
+        _ => {
+            Err("expected auto, none, or a device of /sys/class/fpga_manager, as fpga0".to_owned())
+        }
+    }
+}
+
+/// The common options that a verb reads. The environment is read for these only: a wrong variable
+/// breaks no command that does not use it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reads {
+    pub(crate) board: bool,
+    /// Whether the memory of an emulated board can be named: a served board keeps it in a file.
+    pub(crate) emulated_memory: bool,
+    pub(crate) manager: bool,
+}
+
+impl CommonOptions {
+    /// Fills in options that the command line leaves out from the environment, through `variable`.
+    pub(crate) fn complete(
+        self,
+        reads: Reads,
+        variable: impl Fn(&str) -> Option<OsString>,
+    ) -> Result<CommonArgs, String> {
+        let Self { json, board, memory, manager } = self;
+        let board = match board {
+            None if reads.board => instead_of("--board", BOARD, &variable, board_name)?,
+            given => given,
+        };
+        let board = board.unwrap_or(BoardName::Auto);
+        let real = board != BoardName::Emulated;
+        let named = match reads.board && (real || reads.emulated_memory) && memory.is_none() {
+            true => instead_of("--memory", MEMORY, &variable, memory_choice)?,
+            false => None,
+        };
+        let memory_of_environment = named.is_some();
+        let memory = memory.or(named).unwrap_or(MemoryChoice::Automatic);
+        let manager = match manager {
+            None if reads.manager && real => {
+                instead_of("--manager", MANAGER, &variable, manager_choice)?
+            }
+            given => given,
+        };
+        let manager = manager.unwrap_or_default();
+        Ok(CommonArgs { json, board, memory, memory_of_environment, manager })
+    }
+}
+
+/// Reads an option from a variable of the environment.
+fn instead_of<T>(
+    option: &str,
+    name: &str,
+    variable: impl Fn(&str) -> Option<OsString>,
+    read: impl Fn(&str) -> Result<T, String>,
+) -> Result<Option<T>, String> {
+    let Some(text) = variable(name).filter(|text| !is_blank(text)) else { return Ok(None) };
+    let found = text.to_str().ok_or_else(|| "expected text".to_owned()).and_then(read);
+    found.map(Some).map_err(|expected| {
+        format!(
+            "the environment variable {name} is {text:?}: {expected}; correct or unset it, or give \
+             {option}"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_manager_is_a_device_none_or_found_by_its_name() {
+        assert_eq!(manager_choice("auto"), Ok(ManagerChoice::Automatic));
+        assert_eq!(manager_choice("none"), Ok(ManagerChoice::Unasked));
+        assert_eq!(manager_choice("fpga10"), Ok(ManagerChoice::Device("fpga10".to_owned())));
+        for wrong in ["fpga", "fpgax", "fpga0/..", "0", "Xilinx"] {
+            manager_choice(wrong).expect_err(wrong);
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The scene, as chosen on the command line.
+
+use clap::{Args, ValueEnum};
+use scene::{Grid, Inertia, Scene, SceneOptions, ShapesOptions};
+use serde_json::{Value, json};
+use zynq_pgs::Capabilities;
+
+use crate::failure::Failure;
+use crate::numbers::grouped;
+use crate::options::build::BuildArgs;
+
+/// Default drop, m: the pile lands within half a second.
+const DROP: f32 = 1.0;
+
+/// The scene and its size.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SceneArgs {
+    /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules
+    /// of several masses), for which the board needs --inertia world.
+    #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
+    scene: SceneName,
+    /// Bodies along each axis; y is up.
+    #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
+    grid: Grid,
+    /// Height of the lowest bodies above the ground at the start, m.
+    #[arg(long, value_name = "H", default_value_t = DROP, value_parser = drop_height)]
+    drop: f32,
+    /// Inverse inertia of the cubes: Bullet's (0.3676), or a textbook's (1.5) [default: bullet]
+    #[arg(long, value_enum)]
+    cube_inertia: Option<CubeInertia>,
+    /// Seed of the shapes' kinds and orientations [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SceneName {
+    Cubes,
+    Shapes,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CubeInertia {
+    Bullet,
+    Textbook,
+}
+
+impl From<CubeInertia> for Inertia {
+    fn from(name: CubeInertia) -> Self {
+        match name {
+            CubeInertia::Bullet => Self::Bullet,
+            CubeInertia::Textbook => Self::Textbook,
+        }
+    }
+}
+
+fn drop_height(text: &str) -> Result<f32, String> {
+    let most = scene::DROP_MAX;
+    match text.parse::<f32>() {
+        Ok(height) if (0.0..=most).contains(&height) => Ok(height),
+        _ => Err(format!("expected a height from 0 to {most} m")),
+    }
+}
+
+impl SceneArgs {
+    /// Builds the scene. Detection uses as many threads as the emulated board may.
+    pub(crate) fn build(&self, board: &BuildArgs) -> Result<Scene, Failure> {
+        let Self { grid, drop, .. } = *self;
+        let built = match self.scene {
+            SceneName::Cubes if self.seed.is_some() => {
+                let error = "--seed is for --scene shapes, the cubes are not placed at random";
+                return Err(Failure::input(error));
+            }
+            SceneName::Cubes => Scene::new(&SceneOptions { grid, drop, inertia: self.inertia() }),
+            SceneName::Shapes if self.cube_inertia.is_some() => {
+                let error = "--cube-inertia is for --scene cubes, the shapes have a textbook's";
+                return Err(Failure::input(error));
+            }
+            SceneName::Shapes => Scene::of_shapes(&ShapesOptions { grid, drop, seed: self.seed() }),
+        };
+        let mut scene = built.map_err(Failure::input)?;
+        scene.set_threads(board.config().threads);
+        Ok(scene)
+    }
+
+    fn inertia(&self) -> Inertia {
+        self.cube_inertia.map_or(Inertia::default(), Into::into)
+    }
+
+    fn seed(&self) -> u64 {
+        self.seed.unwrap_or(ShapesOptions::default().seed)
+    }
+
+    /// Refuses a grid that does not fit, before memory is allocated for it.
+    pub(crate) fn check_size(&self, capabilities: &Capabilities) -> Result<(), Failure> {
+        let capacity = capabilities.body_capacity;
+        if self.grid.cubes() < capacity {
+            return Ok(());
+        }
+        let error = format!(
+            "a grid of {} is {} bodies with the ground, the board takes at most {capacity}",
+            self.grid,
+            u64::from(self.grid.cubes()) + 1
+        );
+        Err(Failure::input(error).next("give a smaller --grid"))
+    }
+
+    /// Whether these are the thesis' cubes.
+    pub(crate) fn is_cubes(&self) -> bool {
+        self.scene == SceneName::Cubes
+    }
+
+    /// The scene for people.
+    pub(crate) fn text(&self) -> String {
+        let Self { grid, drop, .. } = self;
+        let what = match self.scene {
+            SceneName::Cubes => format!("cubes ({grid})"),
+            SceneName::Shapes => {
+                format!("cubes, spheres, boxes and capsules ({grid}, seed {})", self.seed())
+            }
+        };
+        let count = grouped(grid.cubes().into());
+        format!("{count} {what} on a static ground, dropped from {drop} m")
+    }
+
+    /// The scene for programs.
+    pub(crate) fn to_json(&self) -> Value {
+        let cubes = self.is_cubes();
+        json!({
+            "scene": if cubes { "cubes" } else { "shapes" },
+            "grid": self.grid.to_string(),
+            "drop_m": self.drop,
+            "inertia": match self.inertia() {
+                _ if !cubes => None,
+                Inertia::Bullet => Some("bullet"),
+                Inertia::Textbook => Some("textbook"),
+            },
+            "seed": (!cubes).then(|| self.seed()),
+        })
+    }
+}

@@ -1,0 +1,103 @@
+//! Loads a step from a folder, and names the array that the driver refuses.
+
+use std::path::Path;
+
+use thiserror::Error;
+use zynq_pgs::InputError;
+
+use crate::failure::Failure;
+use step_folder::folder::{
+    BODY_ANGULAR, BODY_INVERSE_INERTIA, BODY_INVERSE_MASS, BODY_LINEAR, BODY_ORIENTATION,
+    BODY_POSITION, COLLISION_BODIES, COLLISION_COUNT, COLLISION_NORMAL, COLLISION_POINTS, Folder,
+    ITERATIONS, PARAMS,
+};
+
+/// Loads the step in a folder named on the command line.
+pub(crate) fn load(path: &Path) -> Result<Folder, Failure> {
+    let folder = Folder::load(path).map_err(|error| {
+        Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
+    })?;
+    if folder.bodies.is_empty() {
+        // Checked first: without bodies there are no shapes, no indices and no board.
+        return Err(Failure::input(locate(InputError::NoBodies.into(), &folder)));
+    }
+    Ok(folder)
+}
+
+/// Input that the driver refused, with the file that holds it.
+#[derive(Debug, Error)]
+#[error("{place}")]
+pub(crate) struct Located {
+    place: String,
+    #[source]
+    source: zynq_pgs::Error,
+}
+
+/// Names the array, and for a shape the first body with it.
+pub(crate) fn locate(source: zynq_pgs::Error, folder: &Folder) -> Located {
+    let place = match &source {
+        zynq_pgs::Error::Input(input) => place(input, &folder.path, &folder.shape_bodies),
+        _ => folder.path.display().to_string(),
+    };
+    Located { place, source }
+}
+
+fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
+    let file = folder.join(file_of(error)).display().to_string();
+    let shape = match error {
+        InputError::ShapeValue { shape, .. }
+        | InputError::Anisotropic { shape, .. }
+        | InputError::ShapeOutOfRange { shape, .. }
+        | InputError::StaticShapeRotates { shape, .. } => Some(*shape),
+        _ => None,
+    };
+    match shape.and_then(|shape| shape_bodies.get(shape)) {
+        Some(body) => format!("{file}: the shape of body {body}"),
+        None => file,
+    }
+}
+
+/// The array that holds a refused value.
+fn file_of(error: &InputError) -> &'static str {
+    match error {
+        InputError::BodyNotFinite { field, .. }
+        | InputError::BodyOutOfRange { field, .. }
+        | InputError::StaticBodyMoves { field, .. } => match *field {
+            "orientation" => BODY_ORIENTATION,
+            "linear velocity" => BODY_LINEAR,
+            "angular velocity" => BODY_ANGULAR,
+            _ => BODY_POSITION,
+        },
+        InputError::Orientation { .. } => BODY_ORIENTATION,
+        InputError::ShapeIndex { .. }
+        | InputError::NoShapes
+        | InputError::TooManyShapes { .. }
+        | InputError::ShapeOutOfRange { field: "inverse mass", .. }
+        | InputError::ShapeValue { field: "inverse mass", .. } => BODY_INVERSE_MASS,
+        InputError::ShapeValue { .. }
+        | InputError::Anisotropic { .. }
+        | InputError::ShapeOutOfRange { .. }
+        | InputError::StaticShapeRotates { .. } => BODY_INVERSE_INERTIA,
+        InputError::TooManyCollisions { .. }
+        | InputError::MemoryExceeded { .. }
+        | InputError::BodyIndex { .. }
+        | InputError::SelfCollision { .. }
+        | InputError::BothStatic { .. }
+        | InputError::Order(_)
+        | InputError::OrderTooLong { .. }
+        | InputError::SpanTooLong { .. }
+        | InputError::TooManyLive { .. } => COLLISION_BODIES,
+        InputError::ContactCount { .. } => COLLISION_COUNT,
+        InputError::NormalNotFinite { .. }
+        | InputError::NormalZero { .. }
+        | InputError::NormalLength { .. } => COLLISION_NORMAL,
+        InputError::ContactNotFinite { .. }
+        | InputError::CollisionOutOfRange { contact: Some(_), .. } => COLLISION_POINTS,
+        // The positions of the bodies; a normal of unit length is always in range.
+        InputError::CollisionOutOfRange { contact: None, .. } => BODY_POSITION,
+        InputError::Parameter { .. } | InputError::ParameterOutOfRange { .. } => PARAMS,
+        InputError::TooManyIterations { .. } => ITERATIONS,
+        // No bodies, too many bodies, and errors of later versions of the driver.
+        _ => BODY_POSITION,
+    }
+}

@@ -1,0 +1,111 @@
+//! The verb `list`: lists the boards of the system, and the obstacles to their use.
+
+mod inventory;
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+use zynq_pgs::platform::{
+    System, UioListing, fpga_managers, require_bitstream, u_dma_buf_names, uio_listing,
+};
+
+use crate::board;
+use crate::common::CommonArgs;
+use crate::failure::{Failure, Verdict};
+use crate::output::SCHEMA;
+use inventory::{Buffer, Node, explained, state, unreadable_json};
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs list
+  pgs list --json
+
+A UIO node is recognised by its regions, independently of its name; its line shows the option that
+uses it.";
+
+/// List the boards: UIO nodes, DMA buffers, inaccessible devices with the reason, and the emulated
+/// board.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct ListArgs {
+    /// Directory that holds the system's files, for tests.
+    #[arg(long, hide = true, default_value = "/")]
+    system_root: PathBuf,
+}
+
+/// Lists the boards.
+pub(crate) fn run(
+    args: &ListArgs,
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    let system = System::under(&args.system_root);
+    let (kind, reason) = board::choose(&common.board, &system);
+    let chosen = board::kind_text(kind);
+    let (listing, error) = match uio_listing(&system.uio) {
+        Ok(listing) => (listing, None),
+        Err(error) => (UioListing::default(), Some(explained(&error))),
+    };
+    let UioListing { nodes, unreadable, .. } = listing;
+    let nodes: Vec<_> = nodes.into_iter().map(|node| Node::new(node, &system)).collect();
+    let buffers = u_dma_buf_names(&system).into_iter().map(|name| Buffer::new(name, &system));
+    let buffers: Vec<_> = buffers.collect();
+    let managers = fpga_managers(&system.fpga_manager).unwrap_or_default();
+    let logic_error = require_bitstream(&system, &common.manager).err();
+    if common.json {
+        let logic_error = logic_error.map(|error| Failure::input(error).chain());
+        let managers: Vec<Value> = managers
+            .iter()
+            .map(|m| json!({ "device": m.device, "name": m.name, "state": state(m) }))
+            .collect();
+        let document = json!({
+            "schema": SCHEMA,
+            "verb": "list",
+            "board": { "kind": chosen, "reason": reason },
+            "uio_nodes": nodes.iter().map(Node::to_json).collect::<Vec<_>>(),
+            "uio_error": error,
+            "unreadable_uio_nodes": unreadable.iter().map(unreadable_json).collect::<Vec<_>>(),
+            "u_dma_bufs": buffers.iter().map(|buffer| &buffer.name).collect::<Vec<_>>(),
+            "u_dma_buf_states": buffers.iter().map(Buffer::to_json).collect::<Vec<_>>(),
+            "fpga_managers": managers,
+            "logic_error": logic_error,
+            "emulated": { "available": true },
+        });
+        writeln!(out, "{document:#}")?;
+        return Ok(Verdict::Done);
+    }
+
+    writeln!(out, "would open  {chosen} ({reason})")?;
+    if let Some(error) = error {
+        writeln!(out, "uio nodes   cannot be listed: {error}")?;
+    } else if nodes.is_empty() && unreadable.is_empty() {
+        writeln!(out, "uio nodes   none in {}", system.uio.display())?;
+    }
+    for Node { node, obstacle, .. } in &nodes {
+        let state = obstacle.as_deref().unwrap_or("usable");
+        writeln!(out, "uio node    {} {:?}: {state}", node.device, node.name)?;
+        for map in &node.maps {
+            writeln!(
+                out,
+                "  map {}     {:?} at {:#x}, {} bytes",
+                map.index, map.name, map.address, map.bytes
+            )?;
+        }
+    }
+    for node in &unreadable {
+        writeln!(out, "uio node    {} cannot be read: {}", node.device, explained(&node.error))?;
+    }
+    for buffer in &buffers {
+        writeln!(out, "u-dma-buf   {:?}: {}", buffer.name, buffer.text())?;
+    }
+    for manager in &managers {
+        writeln!(out, "fpga        {manager}: {}", state(manager))?;
+    }
+    if let Some(error) = logic_error {
+        writeln!(out, "logic       {}", explained(&error))?;
+    }
+    writeln!(out, "emulated    always available")?;
+    Ok(Verdict::Done)
+}

@@ -1,0 +1,57 @@
+//! Variables of the environment: a blank one counts as unset, an error names a wrong one, and the
+//! command line overrides them.
+
+use crate::common;
+use crate::common::{Ran, golden, pgs};
+
+/// `pgs solve --digest` with these variables.
+fn solve(variables: &[(&str, &str)], more: &[&str]) -> Ran {
+    let mut command = pgs();
+    command.args(more).arg("solve").arg(golden("two_cubes")).arg("--digest");
+    command.env_remove("PGS_BOARD").envs(variables.iter().copied());
+    command.output().expect("it starts").into()
+}
+
+#[test]
+fn a_blank_variable_is_unset() {
+    for blank in ["", " ", "\t"] {
+        let variables = [
+            ("PGS_BOARD", blank),
+            ("PGS_MEMORY", blank),
+            ("RUST_LOG", blank),
+            ("RUST_LOG_STYLE", blank),
+        ];
+        let ran = solve(&variables, &["--board", "emulated"]);
+        assert_eq!((ran.code, ran.stderr.as_str()), (Some(0), ""), "{blank:?}");
+        if std::path::Path::new("/sys/class/uio").exists() {
+            common::skipped("this machine has UIO nodes");
+            continue;
+        }
+        let ran = solve(&variables, &[]);
+        assert_eq!(ran.code, Some(0), "{blank:?}: {}", ran.stderr);
+        assert!(ran.stderr.contains("WARN"), "a blank RUST_LOG shows warnings: {}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_wrong_variable_is_named_where_it_is_needed_and_nowhere_else() {
+    let wrong = [("PGS_BOARD", "abacus"), ("PGS_MEMORY", "drum")];
+    let ran = solve(&wrong, &[]);
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+    assert!(ran.stderr.contains("PGS_BOARD is \"abacus\""), "{}", ran.stderr);
+    let ran = solve(&wrong, &["--board", "uio"]);
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+    assert!(ran.stderr.contains("PGS_MEMORY is \"drum\""), "{}", ran.stderr);
+    let ran = solve(&wrong, &["--board", "emulated"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn memory_of_real_boards_in_the_environment_is_nothing_to_an_emulated_one() {
+    let ran = solve(&[("PGS_MEMORY", "uio:pgs-memory")], &["--board", "emulated"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(0), ""));
+    let mut compare = pgs();
+    compare.args(["compare", "float", "half", "--grid", "2x2x2", "--steps", "1"]);
+    let ran = Ran::from(compare.env("PGS_MEMORY", "uio").output().expect("it starts"));
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+}

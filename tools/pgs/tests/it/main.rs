@@ -1,0 +1,28 @@
+//! Tests of the command line tool as its users run it.
+//!
+//! One program, as each more would be linked with all of the crate.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod arrays;
+mod bad_input;
+mod check;
+mod command_line;
+mod compare;
+mod documents;
+mod environment;
+mod faults;
+mod golden;
+mod kill;
+mod list;
+mod load;
+mod model;
+mod order;
+mod paths;
+mod results;
+mod run;
+mod saturated;
+mod serve;
+mod signals;
+mod threads;

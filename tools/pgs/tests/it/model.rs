@@ -1,0 +1,429 @@
+//! `pgs model` shows every table of the thesis beside ours, as text, Markdown and JSON.
+
+use std::collections::BTreeSet;
+
+use crate::common::{Ran, near, run};
+use serde_json::{Value, json};
+
+fn model(arguments: &[&str]) -> Ran {
+    run(["model"].iter().chain(arguments))
+}
+
+fn document(arguments: &[&str]) -> Value {
+    let ran = model(&[arguments, &["--json"]].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    ran.json()
+}
+
+fn table<'a>(document: &'a Value, id: &str) -> &'a Value {
+    let tables = document["tables"].as_array().expect("tables");
+    tables.iter().find(|table| table["id"] == id).unwrap_or_else(|| panic!("no table {id}"))
+}
+
+/// The only row in which these members have these values.
+fn row<'a>(document: &'a Value, id: &str, with: &[(&str, &str)]) -> &'a Value {
+    let rows = table(document, id)["rows"].as_array().expect("rows");
+    let found: Vec<_> =
+        rows.iter().filter(|row| with.iter().all(|(key, value)| row[*key] == *value)).collect();
+    assert_eq!(found.len(), 1, "{id} {with:?}");
+    found[0]
+}
+
+fn keys(value: &Value) -> BTreeSet<&str> {
+    value.as_object().expect("an object").keys().map(String::as_str).collect()
+}
+
+#[test]
+fn the_totals_of_tables_4_1_to_4_6_are_exact() {
+    let document = document(&["--section", "data"]);
+    for (id, totals) in [
+        ("T4.1", &[(7_423_040, 1_855_760, 28.32), (3_662_280, 915_570, 13.97)][..]),
+        ("T4.2", &[(311_040, 77_760, 1.19), (233_280, 58_320, 0.89)]),
+        ("T4.3", &[(660_960, 165_240, 2.52), (272_160, 68_040, 1.04), (155_520, 38_880, 0.59)]),
+        ("T4.4", &[(311_040, 77_760, 1.19), (233_280, 58_320, 0.89)]),
+        (
+            "T4.5",
+            &[
+                (8_084_000, 2_021_000, 30.84),
+                (3_934_440, 983_610, 15.01),
+                (3_817_800, 954_450, 14.56),
+            ],
+        ),
+        ("T4.6", &[(622_080, 155_520, 2.37), (233_280, 58_320, 0.89)]),
+    ] {
+        let rows = table(&document, id)["rows"].as_array().expect("rows");
+        assert_eq!(rows.len(), totals.len(), "{id}");
+        for (row, (words, beats, mib)) in rows.iter().zip(totals) {
+            assert_eq!((&row["words"], &row["beats"]), (&json!(words), &json!(beats)), "{id}");
+            assert_eq!(row["words"], row["thesis_words"], "{id}");
+            assert_eq!(row["beats"], row["thesis_beats"], "{id}");
+            near(&row["mib"], *mib, 0.005);
+            near(&row["difference_percent"], 0.0, 0.0);
+            near(&row["beats_difference_percent"], 0.0, 0.0);
+            // The thesis truncates two of its footprints and rounds all others.
+            let printed = match (id, row["state"].as_str()) {
+                ("T4.3", Some("after")) => 1.03,
+                ("T4.5", Some("after")) => 15.00,
+                _ => *mib,
+            };
+            near(&row["thesis_mib"], printed, 1e-9);
+            near(&row["mib_difference_percent"], (mib / printed - 1.0) * 100.0, 1e-9);
+            assert_eq!(row["kind"], "exact");
+        }
+    }
+    let before = row(&document, "T4.1", &[("state", "before")]);
+    let streamed = row(&document, "records", &[("profile", "float")]);
+    // A result has 16 words with its padding; the thesis counts 6.
+    near(&streamed["output_difference_percent"], (16.0 / 6.0 - 1.0) * 100.0, 1e-9);
+    let each = [&before["each"], &before["each_bytes"], &before["each_beats"]];
+    assert_eq!(each, [&json!(56), &json!(224), &json!(14.0)]);
+}
+
+#[test]
+fn cycles_meet_tables_6_4_and_6_8_within_0_6_percent() {
+    let document = document(&["--section", "step"]);
+    let total = |profile, records| {
+        let row = row(&document, "cycles", &[("profile", profile), ("records", records)]);
+        (row["total"].as_u64(), row["thesis"].as_u64(), &row["difference_percent"])
+    };
+    let (ours, thesis, off) = total("float", "packed");
+    assert_eq!((ours, thesis), (Some(2_066_270), Some(2_062_697)));
+    near(off, 0.17, 0.005);
+    let (ours, thesis, off) = total("half", "packed");
+    assert_eq!((ours, thesis), (Some(1_551_952), Some(1_557_317)));
+    near(off, -0.34, 0.005);
+    assert_eq!(total("float", "streamed").0, Some(2_093_000));
+    assert_eq!(total("half", "streamed").0, Some(1_573_336));
+    assert_eq!(total("mixed", "packed").0, Some(1_060_800));
+    assert_eq!(total("mixed", "streamed").0, Some(1_096_440));
+    assert_eq!(total("naive", "streamed").0, Some(29_383_800));
+
+    let time = |profile, bandwidth| {
+        let with = [("profile", profile), ("records", "streamed"), ("bandwidth", bandwidth)];
+        row(&document, "time", &with)
+    };
+    near(&time("float", "12.8 GB/s")["ms"], 9.289, 0.0005);
+    assert_eq!(time("float", "12.8 GB/s")["pass_limit"], "memory");
+    assert_eq!(time("float", "12.8 GB/s")["difference_percent"], Value::Null);
+    near(&time("half", "unlimited")["thesis_ms"], 6.23, 1e-9);
+    assert_eq!(time("naive", "12.8 GB/s")["pass_limit"], "streams");
+}
+
+#[test]
+fn on_chip_memory_is_that_of_section_4_4_2() {
+    let document = document(&["--section", "memory"]);
+    for (profile, mib, with_positions) in [("float", 2.83, 3.27), ("half", 1.86, 2.30)] {
+        let row = row(&document, "memory", &[("profile", profile)]);
+        near(&row["mib"], mib, 0.005);
+        near(&row["with_positions_mib"], with_positions, 0.005);
+        near(&row["difference_percent"], 0.0, 1e-9);
+        near(&row["with_positions_difference_percent"], 0.0, 1e-9);
+    }
+    let blocks = |profile| row(&document, "blocks", &[("profile", profile)]);
+    near(&blocks("float")["ideal_percent"], 70.6, 0.05);
+    near(&blocks("half")["ideal_percent"], 46.4, 0.05);
+    // 418 + 945 and 418 + 500: half's impulses are read and written two rows an issue.
+    assert_eq!(blocks("float")["shaped_blocks"], 1_363);
+    assert_eq!(blocks("half")["shaped_blocks"], 918);
+    assert_eq!(blocks("float")["thesis_percent"], 70.0);
+    assert_eq!(blocks("half")["thesis_percent"], 48.0);
+    let logic = |profile: &str| row(&document, "logic", &[("profile", profile)]).clone();
+    let [dsp, lut, ff] = ["dsp", "lut", "ff"].map(|key| logic("half")[key].clone());
+    assert_eq!([dsp, lut, ff], [42.0, 49.0, 29.0]);
+    assert_eq!(logic("float")["kind"], "recorded");
+    assert_eq!((&logic("mixed")["dsp"], &logic("mixed")["kind"]), (&Value::Null, &json!("open")));
+    // Deviation in bits from the thesis' synthesis report.
+    near(&blocks("float")["ideal_difference_percent"], 70.56 / 70.0 * 100.0 - 100.0, 0.01);
+    near(&blocks("half")["ideal_difference_percent"], 46.38 / 48.0 * 100.0 - 100.0, 0.01);
+    for profile in ["float", "half"] {
+        let shares = ["shaped_percent", "thesis_percent"].map(|key| blocks(profile)[key].as_f64());
+        let [shaped, thesis] = shares.map(|share| share.expect("a share"));
+        near(&blocks(profile)["shaped_difference_percent"], (shaped / thesis - 1.0) * 100.0, 1e-9);
+    }
+    assert_eq!(blocks("mixed")["shaped_difference_percent"], Value::Null);
+}
+
+#[test]
+fn every_interval_is_justified_by_ports_and_streams() {
+    let document = document(&["--section", "ports"]);
+    for (profile, ports, streams, claimed) in
+        [("naive", 2, 28, 28), ("float", 2, 2, 2), ("half", 3, 3, 3), ("mixed", 1, 1, 1)]
+    {
+        let row = row(&document, "interval", &[("profile", profile)]);
+        let found = ["by_ports", "by_streams", "claimed"].map(|key| row[key].as_u64());
+        assert_eq!(found, [Some(ports), Some(streams), Some(claimed)], "{profile}");
+        assert_eq!(row["justified"], "yes");
+    }
+    let without_pump = |profile| {
+        let rows = table(&document, "copies")["rows"].as_array().expect("rows");
+        let found = rows.iter().find(|row| row["profile"] == profile && row["pump"] == 1);
+        ["one", "two", "three", "many"].map(|key| found.and_then(|row| row[key].as_u64()))
+    };
+    assert_eq!(without_pump("mixed"), [Some(2); 4]);
+    assert_eq!(without_pump("half"), [Some(4), Some(3), Some(3), Some(3)]);
+    let schedule = table(&document, "schedule")["rows"].as_array().expect("rows");
+    let mixed: Vec<_> = schedule
+        .iter()
+        .filter(|row| row["profile"] == "mixed" && row["array"] == "velocities")
+        .map(|row| ["clock", "port_a", "port_b"].map(|key| row[key].clone()))
+        .collect();
+    let expected = [
+        [json!(1), json!("read A"), json!("read B")],
+        [json!(2), json!("write A"), json!("write B")],
+    ];
+    assert_eq!(mixed, expected);
+    let banks = |profile| {
+        &row(&document, "load", &[("profile", profile), ("array", "velocities")])["banks"]
+    };
+    assert_eq!([banks("float"), banks("half"), banks("mixed")], [&json!(1), &json!(2), &json!(1)]);
+}
+
+#[test]
+fn mixed_moves_at_most_half_of_floats_bytes() {
+    let document = document(&["--section", "mixed"]);
+    let figure = |name| row(&document, "mixed", &[("figure", name)]);
+    near(&figure("cycles at unlimited")["mixed"], 1_096_440.0, 0.5);
+    near(&figure("cycles at 12.8 GB/s")["mixed"], 1_117_500.0, 0.5);
+    near(&figure("bytes a step")["mixed"], 53_744_640.0, 0.0);
+    near(&figure("bytes a step")["float"], 118_768_640.0, 0.0);
+    near(&figure("bytes a step")["mixed_of_float_percent"], 45.25, 0.005);
+    near(&figure("block RAM, MiB")["mixed"], 2.83, 0.005);
+    near(&figure("cycles a collision")["mixed"], 1.0, 0.0);
+}
+
+#[test]
+fn the_comparison_has_what_the_thesis_prints() {
+    let document = document(&["--section", "comparison,euler"]);
+    for (profile, figures) in [
+        ("float", [7.49, 0.11, 1.82, 7.08, 19.2, 8.67, 35.72, 64.09, 1.37]),
+        ("half", [6.23, 0.09, 2.19, 8.5, 19.2, 8.67, 43.67, 78.34, 1.48]),
+    ] {
+        let rows = table(&document, "comparison")["rows"].as_array().expect("rows");
+        let rows: Vec<_> = rows.iter().filter(|row| row["profile"] == profile).collect();
+        assert_eq!(rows.len(), figures.len());
+        for (row, figure) in rows.iter().zip(figures) {
+            near(&row["thesis"], figure, 1e-9);
+        }
+    }
+    let with = [("profile", "half"), ("figure", "speed-up over GTX 980")];
+    let speedup = row(&document, "comparison", &with);
+    assert_eq!((&speedup["table"], &speedup["kind"]), (&json!("T6.10"), &json!("modelled")));
+    near(&speedup["packed_unlimited"], 13.64 / (1_551_952.0 / 250e3), 1e-9);
+    let with = [("profile", "float"), ("figure", "power efficiency over i7-3770")];
+    let power = row(&document, "comparison", &with);
+    assert_eq!((&power["kind"], &power["packed_unlimited"]), (&json!("recorded"), &Value::Null));
+    near(&power["recomputed"], 133.0 / 15.0, 1e-9);
+    let falls = table(&document, "euler")["rows"].as_array().expect("rows");
+    let metres: Vec<_> = falls.iter().map(|row| row["metres"].as_f64().expect("m")).collect();
+    for (found, expected) in metres.iter().zip([450.0, 499.5, 499.497, 500.0]) {
+        assert!((found - expected).abs() < 5e-4, "{found}");
+    }
+}
+
+#[test]
+fn the_json_keys_are_stable() {
+    let document = document(&[]);
+    assert_eq!(document["schema"], 2);
+    let expected = BTreeSet::from([
+        "schema",
+        "verb",
+        "bodies",
+        "collisions",
+        "contact_iterations",
+        "friction_iterations",
+        "thesis_step",
+        "world_inertia",
+        "profiles",
+        "tables",
+    ]);
+    assert_eq!(keys(&document), expected);
+    let profiles = document["profiles"].as_array().expect("profiles");
+    let names: Vec<_> = profiles.iter().map(|profile| &profile["profile"]).collect();
+    assert_eq!(names, ["naive", "float", "half", "mixed", "windowed", "windowed16"]);
+    let float = &profiles[1];
+    let expected = BTreeSet::from([
+        "profile",
+        "clock_khz",
+        "thesis_words",
+        "streamed_words",
+        "thesis",
+        "memory",
+        "initiation_interval",
+        "stream_bytes_per_second",
+    ]);
+    assert_eq!(keys(float), expected);
+    assert_eq!(float["thesis_words"]["cycles"]["total"], 2_066_270);
+    assert_eq!(float["streamed_words"]["cycles"]["total"], 2_093_000);
+    assert_eq!(float["memory"]["block_ram"], 2_965_120);
+    assert_eq!(float["thesis_words"]["times"].as_array().map(Vec::len), Some(4));
+    assert_eq!(float["thesis"]["cycles"], 2_062_697);
+    let ids: Vec<_> = document["tables"]
+        .as_array()
+        .expect("tables")
+        .iter()
+        .map(|table| table["id"].as_str().expect("an id"))
+        .collect();
+    assert_eq!(
+        ids,
+        [
+            "cycles",
+            "time",
+            "inertia",
+            "mixed",
+            "window_cycles",
+            "window_gains",
+            "window_logic",
+            "T4.1",
+            "T4.2",
+            "T4.3",
+            "T4.4",
+            "T4.5",
+            "T4.6",
+            "records",
+            "memory",
+            "arrays",
+            "blocks",
+            "logic",
+            "streams",
+            "ports",
+            "interval",
+            "schedule",
+            "copies",
+            "load",
+            "platforms",
+            "comparison",
+            "euler",
+        ]
+    );
+    for table in document["tables"].as_array().expect("tables") {
+        let columns: BTreeSet<_> = table["columns"]
+            .as_array()
+            .expect("columns")
+            .iter()
+            .filter_map(Value::as_str)
+            .collect();
+        for row in table["rows"].as_array().expect("rows") {
+            assert_eq!(keys(row), columns, "{}", table["id"]);
+            let kind = &row["kind"];
+            let known =
+                ["exact", "modelled", "recorded", "open"].iter().any(|known| kind == *known);
+            assert!(known, "{row}");
+        }
+    }
+}
+
+#[test]
+fn another_step_is_not_held_against_the_thesis() {
+    let document = document(&["--bodies", "1000", "--collisions", "3001"]);
+    assert_eq!(document["thesis_step"], false);
+    assert!(
+        document["profiles"].as_array().expect("profiles").iter().all(|p| p["thesis"].is_null())
+    );
+    let after = row(&document, "T4.1", &[("state", "after")]);
+    assert_eq!(after["words"], 27 * 3001 + 6 * 1000);
+    for of in ["difference_percent", "mib_difference_percent", "beats_difference_percent"] {
+        assert_eq!(after[of], Value::Null);
+    }
+    let half = row(&document, "cycles", &[("profile", "half"), ("records", "streamed")]);
+    assert_eq!((&half["pass"], &half["difference_percent"]), (&json!(1501 * 3), &Value::Null));
+}
+
+#[test]
+fn world_inertia_costs_cycles_and_memory() {
+    let document = document(&["--profile", "float", "--world-inertia"]);
+    assert_eq!(document["profiles"].as_array().map(Vec::len), Some(1));
+    let float = &document["profiles"][0];
+    assert_eq!(float["streamed_words"]["cycles"]["load"], 38_880);
+    assert_eq!(float["memory"]["world_inertia"], 24 * 38_880);
+    let cost = row(&document, "inertia", &[("profile", "float")]);
+    assert_eq!(
+        (&cost["cycles_without"], &cost["cycles_with"]),
+        (&json!(2_093_000), &json!(2_112_440))
+    );
+    let inertia = row(&document, "ports", &[("array", "world inertia")]);
+    assert_eq!(inertia["interval"], 1);
+}
+
+/// O4: bytes at most a sixth and an eleventh of float's, MiB on chip; nothing is measured.
+#[test]
+fn the_designs_that_stream_once_move_and_hold_what_they_must() {
+    let document = document(&["--profile", "windowed16", "--section", "windowed"]);
+    let gains = row(&document, "window_gains", &[("profile", "windowed16")]);
+    let number = |key: &str| gains[key].as_f64().expect("a number");
+    assert!(11.0 * number("bytes") <= number("float_bytes"));
+    assert!(number("mib") <= 1.2 && number("ms_sustained") < 2.0);
+    let cycles = row(&document, "window_cycles", &[("profile", "windowed16")]);
+    // (127,000 + 7 x 2,816) x 3 + 306.
+    assert_eq!((&cycles["slot"], &cycles["passes"]), (&json!(3), &json!(440_442)));
+    assert_eq!((&cycles["load"], &cycles["integration"]), (&json!(38_880), &json!(77_760)));
+    let logic = row(&document, "window_logic", &[("profile", "windowed16")]);
+    assert_eq!((&logic["dsp"], &logic["lookup_tables"]), (&json!(84.0), &json!(98.0)));
+    let document = self::document(&["--profile", "windowed", "--section", "windowed"]);
+    let gains = row(&document, "window_gains", &[("profile", "windowed")]);
+    let number = |key: &str| gains[key].as_f64().expect("a number");
+    assert!(6.0 * number("bytes") <= number("float_bytes") && number("mib") <= 2.2);
+}
+
+#[test]
+fn the_text_is_aligned_and_fits_a_wide_terminal() {
+    let ran = model(&[]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let words = ran.stdout.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+    let float = ["float", "packed", "14,580", "254,000", "2,680"];
+    assert!(words.into_iter().any(|words| words.starts_with(&float)), "{}", ran.stdout);
+    for line in ran.stdout.lines() {
+        assert!(line.chars().count() <= 140, "{line}");
+        assert_eq!(line, line.trim_end());
+    }
+}
+
+#[test]
+fn markdown_has_every_table_with_a_rule_and_rows_of_its_width() {
+    let ran = model(&["--markdown"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let lines: Vec<&str> = ran.stdout.lines().collect();
+    let headings = lines.iter().filter(|line| line.starts_with("### ")).count();
+    assert_eq!(headings, 27);
+    let cells = |line: &str| line.matches('|').count();
+    let mut tables = 0;
+    for (k, line) in lines.iter().enumerate() {
+        if line.starts_with("| :--") {
+            tables += 1;
+            assert_eq!(cells(line), cells(lines[k - 1]), "{line}");
+            assert_eq!(lines[k - 2], "", "a blank line before the table");
+            for row in lines[k + 1..].iter().take_while(|row| row.starts_with('|')) {
+                assert_eq!(cells(row), cells(line), "{row}");
+            }
+        }
+    }
+    assert_eq!(tables, headings);
+}
+
+#[test]
+fn the_largest_numbers_are_taken() {
+    let most = u32::MAX.to_string();
+    let ran = model(&["--collisions", &most, "--bodies", &most]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stdout.contains("does not fit"), "{}", ran.stdout);
+    let nothing = model(&["--collisions", "0", "--bodies", "0"]);
+    assert_eq!(nothing.code, Some(0), "{}", nothing.stderr);
+    assert!(!nothing.stdout.contains("NaN") && !nothing.stdout.contains("inf "));
+}
+
+#[test]
+fn what_excludes_each_other_is_refused_with_2() {
+    for (arguments, said) in [
+        (&["--json", "--markdown"][..], "exclude each other"),
+        (&["--section", "mixed", "--profile", "half"], "--profile mixed"),
+        (&["--section", "windowed", "--profile", "mixed"], "--profile windowed or windowed16"),
+        (&["--profile", "quarter"], "naive, float, half, mixed, windowed, windowed16, all"),
+        (&["--section", "tables"], "possible values"),
+        (&["--bodies", "5"], "--collisions"),
+        (&["--bandwidth", "0"], "GB/s"),
+    ] {
+        let ran = model(arguments);
+        assert_eq!(ran.code, Some(2), "{arguments:?}");
+        assert!(ran.stderr.contains(said), "{arguments:?}: {}", ran.stderr);
+        assert!(ran.stdout.is_empty(), "{arguments:?}");
+    }
+}

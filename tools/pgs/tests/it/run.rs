@@ -1,0 +1,116 @@
+//! The output of `pgs run`, for people and for programs.
+
+use crate::common::{Ran, run};
+use serde_json::Value;
+
+/// Columns of the terminal.
+const WIDTH: usize = 100;
+
+fn ran(options: &str) -> Ran {
+    let ran = run(["run"].into_iter().chain(options.split_whitespace()));
+    assert_eq!(ran.code, Some(0), "{options}: {}", ran.stderr);
+    ran
+}
+
+fn document(options: &str) -> Value {
+    ran(&format!("{options} --json")).json()
+}
+
+/// The fact behind a label, its lines joined.
+fn fact(text: &str, label: &str) -> String {
+    let mut lines = text.lines().skip_while(|line| !line.starts_with(&format!("{label:<11}")));
+    let first = lines.next().unwrap_or_else(|| panic!("no {label}: {text}"));
+    let rest = lines.take_while(|line| line.starts_with("           "));
+    let words: Vec<&str> = [first].into_iter().chain(rest).map(|line| line[11..].trim()).collect();
+    words.join(" ")
+}
+
+#[test]
+fn no_line_is_wider_than_a_terminal() {
+    for options in [
+        "--grid 5x5x5 --steps 40",
+        "--grid 4x4x4 --steps 30 --profile half --format thesis16 --arithmetic f32 --hazards unchecked",
+        "--grid 4x4x4 --steps 30 --profile windowed16 --verify",
+        "--grid 3x3x3 --steps 3 --scene shapes --inertia world --length-width 14 --retries 2",
+        "--grid 3x3x3 --steps 9 --fault irq-drop,times=3",
+    ] {
+        let text = ran(options).stdout;
+        let wide: Vec<&str> = text.lines().filter(|line| line.chars().count() > WIDTH).collect();
+        assert!(wide.is_empty(), "{options}: {wide:?}");
+    }
+    let text = ran("--grid 3x3x3 --steps 3 --wide").stdout;
+    assert!(text.contains("detect") && text.contains("formula"), "{text}");
+}
+
+#[test]
+fn the_table_and_the_summary_say_what_the_document_says() {
+    let scene = "--grid 4x4x4 --steps 60 --report-every 60";
+    let (text, document) = (ran(scene).stdout, document(scene));
+    let last = document["steps"].as_array().expect("steps").last().expect("a step");
+    let row: Vec<&str> = text
+        .lines()
+        .find(|line| line.starts_with("    60 "))
+        .expect("a row")
+        .split_whitespace()
+        .collect();
+    let number = |value: &Value| value.as_f64().expect("a number");
+    assert_eq!(row[1], last["collisions"].to_string());
+    assert_eq!(row[2], format!("{:.1}", 1e3 * number(&last["deepest_penetration_m"])));
+    assert_eq!(row[3], format!("{:.3}", number(&last["kinetic_energy_before_gravity_j"]) / 1e3));
+    assert_eq!(row[4], format!("{:.3}", number(&last["modelled_ms"])));
+
+    let config = &document["config"];
+    assert_eq!(
+        (&config["contact_iterations"], &config["friction_iterations"]),
+        (&10.into(), &10.into())
+    );
+    assert_eq!((&config["drop_m"], &config["time_step"]), (&1.0.into(), &"1/60 s".into()));
+    let summary = &document["summary"];
+    let mean = number(&summary["modelled_ms"]["mean"]);
+    let steps = document["steps"].as_array().expect("steps");
+    let sum: f64 = steps.iter().map(|step| number(&step["modelled_ms"])).sum();
+    assert!((mean - sum / 60.0).abs() < 1e-9);
+    assert!(fact(&text, "time").starts_with(&format!("{mean:.3} ms a step")), "{text}");
+    assert!(fact(&text, "simulated").starts_with("1.00 s in 60 steps of 1/60 s with 10 contact"));
+    let thesis = fact(&text, "thesis");
+    assert!(
+        thesis.contains("float design 7.49 ms, GTX 980 13.64 ms, i7-3770 53.01 ms"),
+        "{thesis}"
+    );
+    assert!(thesis.contains("20 passes are 18.57 ms"), "{thesis}");
+    assert_eq!(summary["thesis"]["recorded_ms"], 7.49);
+    assert_eq!(document["steps"][0]["order"]["choice"]["reason"], "cheapest");
+}
+
+#[test]
+fn the_thesis_is_left_out_where_its_scene_is_not_stepped() {
+    let text = ran("--grid 3x3x3 --steps 2 --scene shapes --inertia world").stdout;
+    assert!(!text.contains("thesis"), "{text}");
+}
+
+/// The lattice leaves the rim of its top layer on an edge: here seven cubes, which topple, fall and
+/// come to rest.
+#[test]
+fn a_pile_comes_to_rest_without_energy() {
+    let text = ran("--grid 4x4x4 --steps 600").stdout;
+    let pile = fact(&text, "pile");
+    assert!(pile.starts_with("at rest: ") && pile.contains(" (0.000 kJ), "), "{pile}");
+    let summary = &document("--grid 4x4x4 --steps 240")["summary"]["end"];
+    assert_eq!(summary["at_rest"], false, "the rim is falling: {summary}");
+}
+
+#[test]
+fn iterations_and_time_step_are_those_of_the_command_line() {
+    let options =
+        "--grid 2x2x2 --steps 2 --contact-iterations 3 --friction-iterations 2 --dt 1/120";
+    let document = document(options);
+    assert_eq!(document["steps"][0]["passes"], 5);
+    assert_eq!(document["config"]["time_step"], "1/120 s");
+    // v = -g dt twice, and x by the first v.
+    let fall = 8.0 * 9.8_f64.powi(2) * (2.0 / 120.0_f64).powi(2) / 2.0;
+    let energy = document["steps"][1]["kinetic_energy_j"].as_f64().expect("a number");
+    assert!((energy - fall).abs() < 1e-4, "{energy} J of {fall}");
+    for wrong in ["--dt 0", "--dt 1/0", "--contact-iterations 256", "--friction-iterations -1"] {
+        assert_eq!(run(["run"].into_iter().chain(wrong.split(' '))).code, Some(2), "{wrong}");
+    }
+}

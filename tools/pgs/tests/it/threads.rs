@@ -1,0 +1,61 @@
+//! Where the system gives no more threads, as in a container with a limit on processes, every
+//! command does with fewer.
+
+use std::process::Command;
+
+use crate::common::{Ran, golden, pgs, run, skipped};
+
+/// `command`, for a user who may have one process and no more. Root has no such limit, and becomes
+/// nobody first.
+fn limited(command: &Command) -> Command {
+    let mut limited = Command::new("setpriv");
+    let id = Command::new("id").arg("-u").output();
+    if id.is_ok_and(|id| id.stdout == b"0\n") {
+        limited.args(["--reuid", "65534", "--regid", "65534", "--clear-groups"]);
+    }
+    limited.args(["prlimit", "--nproc=1:1"]);
+    limited.arg(command.get_program()).args(command.get_args());
+    limited.envs(command.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    limited
+}
+
+/// Whether that limit can be set here, and holds, and the command can be started under it.
+fn can_limit() -> bool {
+    let mut fork = Command::new("sh");
+    fork.args(["-c", "true & wait; echo forked"]);
+    let refuses = limited(&fork).output().is_ok_and(|output| !output.stdout.starts_with(b"forked"));
+    let mut version = pgs();
+    version.arg("--version");
+    refuses && limited(&version).output().is_ok_and(|output| output.status.success())
+}
+
+#[test]
+fn every_command_does_with_fewer_threads() {
+    if !can_limit() {
+        return skipped("a limit on threads (no setpriv and prlimit, or no limit on processes)");
+    }
+    let cube = golden("one_cube").display().to_string();
+    for arguments in [
+        &["compare", "float", "half", "--grid", "4x4x4", "--steps", "2"][..],
+        &["compare", "float", "half", "--input", &cube],
+        &["run", "--grid", "4x4x4", "--steps", "2"],
+        &["solve", &cube, "--digest"],
+        &["formats", "--grid", "3x3x3", "--step", "2"],
+        &["order", "--input", &cube],
+        &["check"],
+        &["faults", "--profile", "naive", "--json"],
+    ] {
+        let mut command = pgs();
+        command.args(arguments);
+        let alone: Ran = limited(&command).output().expect("it starts").into();
+        let usual = run(arguments);
+        assert_eq!(alone.code, usual.code, "{arguments:?}: {}", alone.stderr);
+        assert!(!alone.stderr.contains("panicked"), "{arguments:?}: {}", alone.stderr);
+        if arguments[0] == "compare" {
+            assert_eq!(alone.stdout, usual.stdout, "{arguments:?}");
+            let mut loud = limited(&command);
+            let ran: Ran = loud.env("RUST_LOG", "warn").output().expect("it starts").into();
+            assert!(ran.stderr.contains("no thread of its own for board B"), "{}", ran.stderr);
+        }
+    }
+}
