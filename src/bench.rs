@@ -1,4 +1,4 @@
-//! This file lets a benchmark pack and unpack without a board: feature `bench`.
+//! Packs and unpacks without a board, for benchmarks: feature `bench`.
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::profile::Variant;

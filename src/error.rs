@@ -1,4 +1,4 @@
-//! This file holds the public error: what failed, and what the caller can do next.
+//! The public error: what failed, and what the caller can do next.
 
 use thiserror::Error;
 

@@ -1,4 +1,4 @@
-//! This file drives one direction of a DMA core; both directions are this one piece of code.
+//! Drives one channel of a DMA core; both directions share this code.
 
 use std::sync::Arc;
 

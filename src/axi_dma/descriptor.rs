@@ -1,4 +1,4 @@
-//! This file encodes and decodes one scatter-gather descriptor, and splits lengths into several.
+//! Encodes and decodes one scatter-gather descriptor, and splits lengths into several.
 
 use std::fmt;
 

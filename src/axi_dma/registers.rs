@@ -1,4 +1,4 @@
-//! This file gives DMACR and DMASR as values with names.
+//! DMACR and DMASR as values with named fields.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! This file resets a whole DMA core: both directions, whichever was asked.
+//! Resets a whole DMA core: a reset of one direction resets both.
 
 use super::{Channel, DmaError, STATE_CHANGE};
 use crate::platform::{Deadline, Platform, poll_until};

@@ -1,4 +1,4 @@
-//! This file keeps the descriptors of one channel in a ring that is linked once and never stopped.
+//! Keeps the descriptors of one channel in a ring that is linked once and never stopped.
 //!
 //! ```text
 //!   first            tail   spare

@@ -1,4 +1,4 @@
-//! This file deals collisions out without making records of them: feature `bench`.
+//! The yardstick of the packing benchmark: deals collisions out without making records of them.
 //!
 //! Every word of each is read, and as many bytes as its record has go to the channels, through the loops of
 //! [units](super::pack::unrolled); no body is looked up, nothing is masked, converted or looked at. About that is the

@@ -1,4 +1,4 @@
-//! This file makes beats of records and records of beats, in each format that a stream may have.
+//! Joins the rows of records into beats, and splits beats into rows, in each format of a stream.
 
 use std::marker::PhantomData;
 

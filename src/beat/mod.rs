@@ -1,4 +1,4 @@
-//! This folder lays records out over the channels of a board, and reads results back from them.
+//! Lays records out over the channels of a board, and reads results back from them.
 
 #[cfg(feature = "bench")]
 pub(crate) mod bare;

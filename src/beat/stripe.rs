@@ -1,4 +1,4 @@
-//! This file says on which channel a beat travels, and where in that channel's segment it lies.
+//! Maps a beat to its channel, and to its slot in that channel's segment.
 //!
 //! The beats of a segment are numbered through from the first beat of its first record. The
 //! profile's [`Stripe`] deals them out in groups:

@@ -1,4 +1,4 @@
-//! This file says, once a board, what is odd and was dealt with.
+//! Logs, once a board, every oddity that the driver has dealt with.
 
 /// Something odd that costs no step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! This file tells the two banks of buffers apart.
+//! The two banks of buffers: one is on the board, the other is packed.
 //!
 //! Every port has a buffer in each. A step is packed into one bank and stays there; the next one may
 //! be packed into the other meanwhile. The second has no memory before a step is first prepared.

@@ -1,4 +1,4 @@
-//! This file brings a board up in stages: opening goes through them at once, the self-test one by
+//! Brings a board up in stages: opening goes through them at once, the self-test one by
 //! one.
 
 use std::sync::Arc;

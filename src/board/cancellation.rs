@@ -1,4 +1,4 @@
-//! This file lets somebody else end the step that is waited for.
+//! Lets another thread end the step that a caller waits for.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,4 @@
-//! This file waits for a step's results: on the interrupt, on the clock, and never without end.
+//! Waits for a step's results: on the interrupt, on the clock, and never beyond the deadline.
 //!
 //! An interrupt is a hint, the descriptors in memory are the truth. Per wake-up: read all status
 //! registers, acknowledge what they show, let the next interrupt through, look once more.

@@ -1,4 +1,4 @@
-//! This file holds an open board: its ports and its control block, from opening to closing.
+//! An open board: its ports and its control block, from opening to closing.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! This file lays out one step: where the segments lie in each channel's buffer, how many
+//! Lays out one step: where the segments lie in each channel's buffer, how many
 //! descriptors they take, and how long the step may last.
 //!
 //! ```text

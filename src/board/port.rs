@@ -1,4 +1,4 @@
-//! This file joins what one DMA channel needs for a step: its buffers, its ring, its registers.
+//! Joins what one DMA channel needs for a step: its buffers, its ring, its registers.
 
 use std::sync::Arc;
 

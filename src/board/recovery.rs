@@ -1,4 +1,4 @@
-//! This file leads from any fault to "the next step works" or "open again".
+//! Leads from any fault to "the next step works" or "open again".
 
 use super::anomalies::Anomaly;
 use super::bank::Bank;

@@ -1,4 +1,4 @@
-//! This file tells which of all that stands is what the rest follows from.
+//! Picks the root cause out of a diagnosis.
 
 use pgs_interface::axi_dma::dmasr;
 use pgs_interface::control::{ErrorCode, error};

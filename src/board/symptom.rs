@@ -1,4 +1,4 @@
-//! This file says why a step was given up. The [diagnosis](crate::fault::diagnosis) finds out the cause.
+//! The reason for giving a step up. The [diagnosis](crate::fault::diagnosis) finds its cause.
 
 use std::time::Duration;
 

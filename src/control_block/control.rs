@@ -1,4 +1,4 @@
-//! This file writes the accelerator's arguments, starts it and resets it.
+//! Writes the accelerator's arguments, starts it and resets it.
 
 use std::time::Duration;
 

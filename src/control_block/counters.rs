@@ -1,4 +1,4 @@
-//! This file reads what the accelerator counted in a step, and its sticky error.
+//! Reads the accelerator's counters of a step, and its sticky error.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! This file tells whether the bitstream is still the one that was identified at opening.
+//! Checks that the bitstream is still the one that was identified at opening.
 
 use pgs_interface::control::{
     BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY, CONTACT_DEPTH, DMA, FEATURES,

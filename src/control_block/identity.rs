@@ -1,4 +1,4 @@
-//! This file reads what a bitstream says of itself, and refuses what the driver does not know.
+//! Reads the identification and the capabilities of a bitstream, and refuses unknown ones.
 
 use pgs_interface::address_map::CONTROL_BYTES;
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};

@@ -1,4 +1,4 @@
-//! This file loads the shape table.
+//! Loads the shape table.
 
 use pgs_interface::control::{
     SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,

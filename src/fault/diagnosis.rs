@@ -1,4 +1,4 @@
-//! This file takes down how everything stands when a step has failed, before anything is reset.
+//! The state of every channel and of the control block when a step failed, before the reset.
 
 use std::fmt;
 use std::time::Duration;

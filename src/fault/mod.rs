@@ -1,4 +1,4 @@
-//! This file says how a step can fail once it has begun: one fault a cause, each with a name.
+//! The faults of a step that has begun: one fault a cause, each with a stable name.
 pub(crate) mod diagnosis;
 pub(crate) mod phase;
 

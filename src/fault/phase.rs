@@ -1,4 +1,4 @@
-//! This file says how far a step was, from the descriptors that each channel is through with.
+//! The phases of a step, which tell how far a failed step had come.
 //!
 //! A descriptor is complete when its data has left memory. The accelerator may be behind by what its
 //! FIFOs hold: where a step is small that can be a whole phase.

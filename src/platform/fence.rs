@@ -1,4 +1,4 @@
-//! This file orders the CPU's memory accesses against those of the device.
+//! Orders the CPU's memory accesses against those of the device.
 //!
 //! A doorbell must not overtake the stores to the buffers and descriptors that it announces, and no
 //! load from a buffer may overtake the load that saw its completion. The DMA cores lie outside the

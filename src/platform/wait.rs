@@ -1,4 +1,4 @@
-//! This file bounds every wait by a deadline on the platform's clock.
+//! Bounds every wait by a deadline on the platform's clock.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! This file says what the record of a collision takes from either of its bodies.
+//! One entry per body: the values of the body that the records of its collisions need.
 
 use std::fmt;
 use std::ops::Range;

@@ -1,4 +1,4 @@
-//! This file makes the record of a collision in world coordinates.
+//! Makes the record of a collision in world coordinates.
 
 use std::mem::offset_of;
 

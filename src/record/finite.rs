@@ -1,4 +1,4 @@
-//! This file finds out on the way whether all numbers of results are finite.
+//! Checks, while results are read, that all their numbers are finite.
 
 use super::result::Record;
 use crate::simd::Lanes;

@@ -1,4 +1,4 @@
-//! This file turns the inverse inertia of a shape into that of a body, about world axes.
+//! Turns a shape's inverse inertia into that of a body, about world axes.
 
 use crate::scene::Shape;
 

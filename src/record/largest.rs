@@ -1,4 +1,4 @@
-//! This file finds out at once whether all numbers of a record are within their limits.
+//! Checks all numbers of a record against their limits at once.
 
 use crate::simd::Lanes;
 use pgs_interface::record::{Beat, LANES, WORD_LANE};

@@ -1,4 +1,4 @@
-//! This folder turns a caller's values into the rows of a record, and a result record back.
+//! Turns a caller's values into the rows of a record, and a result record back.
 //!
 //! One file a record kind makes rows of 32-bit words, each of which is a beat of an f32 stream;
 //! `sixteen` narrows rows for the streams of sixteen bits and widens what comes back. The layout is

@@ -1,4 +1,4 @@
-//! This file makes the pose record of a body.
+//! Makes the pose record of a body.
 
 use super::{ORIENTATION, POSITION, row_of};
 use crate::scene::Body;

@@ -1,4 +1,4 @@
-//! This file makes the record of a collision relative to body A.
+//! Makes the record of a collision relative to body A.
 
 use super::body_table::End;
 use super::{Counted, NORMAL, Record, contact_rows, row_of, used};

@@ -1,4 +1,4 @@
-//! This file reads the result record of a body, and makes that of one which stays as it is.
+//! Reads the result record of a body, and makes the record of a body that does not change.
 
 use super::{to_vec3, to_vec4, vec3_and_word, vec4};
 use crate::scene::{Pose, Velocity};

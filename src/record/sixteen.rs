@@ -1,4 +1,4 @@
-//! This file narrows rows to words of sixteen bits and widens them again.
+//! Narrows rows to words of sixteen bits and widens them again.
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::WORD_LANE;

@@ -1,5 +1,4 @@
-//! This file says where the collisions lie that a caller keeps as structures: they are read there, without a
-//! copy.
+//! A source of collisions that packing reads in place, chunk by chunk, without a copy.
 
 use std::iter;
 use std::ops::Range;
@@ -8,23 +7,24 @@ use crate::scene::Collision;
 use crate::simd::{later_with_those_behind, soon_alone, soon_with_those_behind};
 use pgs_support::chunks::Chunks;
 
-/// Collisions that lie somewhere, to look up.
+/// Collisions in the order in which they are sent, looked up where the caller keeps them.
 ///
-/// All of it is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
+/// Every implementation carries `#[inline(always)]`: each look-up becomes a part of the packing loop.
 pub(crate) trait CollisionSource<'a>: Copy {
-    /// How many there are.
+    /// The number of collisions.
     fn len(self) -> usize;
 
-    /// The `nth` so many of them, if there are as many.
+    /// The `nth` chunk of `N` collisions, if it is complete.
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]>;
 
-    /// The `nth` so many of them, of which there are as many, while those are fetched whose turn it is soon.
+    /// The `nth` chunk of `N` collisions, if it is complete. Prefetches collisions that a later chunk
+    /// needs.
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>>;
 
-    /// Those of a range, as many as there are.
+    /// The collisions of a range; a range past the end is cut.
     fn part(self, range: Range<usize>) -> Self;
 
-    /// One after the other.
+    /// All collisions, one by one.
     #[inline(always)]
     fn iter(self) -> impl Iterator<Item = &'a Collision> {
         let mut at = 0;
@@ -36,12 +36,12 @@ pub(crate) trait CollisionSource<'a>: Copy {
     }
 }
 
-/// Collisions whose turn it is.
+/// The chunk that is packed now, and the chunk whose bodies are prefetched.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Next<'a, const N: usize> {
     pub(crate) these: [&'a Collision; N],
-    /// Those whose bodies are to be fetched. `None` shortly before the end, and where it costs more than it
-    /// brings: where collisions lie one behind the other, or about so, their bodies do, too.
+    /// A later chunk, whose bodies the caller prefetches. `None` near the end, and where a prefetch costs
+    /// more than it saves: the bodies of adjacent collisions are adjacent, too.
     pub(crate) soon: Option<[&'a Collision; N]>,
 }
 

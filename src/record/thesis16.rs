@@ -1,4 +1,4 @@
-//! This file holds the thesis' sixteen-bit numbers: words from f32 by truncation, and back.
+//! The thesis' sixteen-bit numbers: words from f32 by truncation, and back.
 //!
 //! ```text
 //! f32     s eeeeeeee mmmmmmmmmm mmmmmmmmmmmmm

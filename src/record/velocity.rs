@@ -1,4 +1,4 @@
-//! This file makes the velocity record of a body.
+//! Makes the velocity record of a body.
 
 use super::inertia::Inverse;
 use super::{ANGULAR, LINEAR, Record, SHAPE, row_of, vec3_and_word};

@@ -1,4 +1,4 @@
-//! This file converts rows of numbers between f32 and binary16 by the processor's instructions.
+//! Converts rows of numbers between f32 and binary16 with the conversion instructions of the processor.
 //!
 //! `half` knows them, too, but on aarch64 it wants more than every processor has: on a Cortex-A53, whose
 //! instructions these are, it would compute with integers. It does so where there are none.

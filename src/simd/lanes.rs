@@ -1,4 +1,4 @@
-//! This file computes with the four words of a beat at once.
+//! Computes with the four words of a beat at once.
 //!
 //! Every x86-64 and every aarch64 has the instructions. Written as loops over four words the compiler
 //! finds them only now and then.

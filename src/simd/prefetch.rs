@@ -1,4 +1,4 @@
-//! This file tells the processor what will be read soon.
+//! Prefetches values that a packing loop reads soon.
 #![allow(unsafe_code, reason = "hints to the caches exist as intrinsics on raw pointers only")]
 
 /// Says that a value will be read soon.

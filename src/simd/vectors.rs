@@ -1,4 +1,4 @@
-//! This file runs loops in wider vectors than every processor has, where this one has them.
+//! Runs loops in wider vectors on processors that have them.
 #![allow(unsafe_code, reason = "not every processor has the instructions")]
 
 use super::halves::{self, Narrow};

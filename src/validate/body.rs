@@ -1,4 +1,4 @@
-//! This file refuses bodies that cannot be solved.
+//! Refuses bodies that cannot be solved.
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;

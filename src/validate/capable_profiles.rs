@@ -1,4 +1,4 @@
-//! This file finds the profiles that could carry what a bitstream has to refuse.
+//! Finds the profiles that can take a scene which this bitstream refuses.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! This file refuses collisions that cannot be solved.
+//! Refuses collisions that cannot be solved.
 
 use super::InputError;
 use super::{all_within, first};

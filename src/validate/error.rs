@@ -1,4 +1,4 @@
-//! This file lists everything that a step refuses before anything is sent.
+//! Lists everything that a step refuses before anything is sent.
 
 use super::CapableProfiles;
 use crate::order::OrderError;

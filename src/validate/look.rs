@@ -1,4 +1,4 @@
-//! This file looks at the collisions of a block, one after the other, while their records are made.
+//! Screens the collisions of a block, one by one, while their records are made.
 
 use pgs_interface::number::StreamFormat;
 

@@ -1,4 +1,4 @@
-//! This folder refuses bad input before anything is sent.
+//! Refuses bad input before anything is sent.
 //!
 //! One pass over the bodies, one over the collisions ([`validate`]). What passes here, a board of
 //! the same capacities accepts. A step looks at its input while it packs it ([`Quick`]), and comes

@@ -1,4 +1,4 @@
-//! This file refuses step parameters outside their range.
+//! Refuses step parameters outside their range.
 
 use pgs_interface::number::StreamFormat;
 

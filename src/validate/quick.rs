@@ -1,4 +1,5 @@
-//! This file looks at the input of a step while it is packed: a block at a time.
+//! Screens the input of a step block by block while it is packed: a conservative test that never
+//! accepts input that [`validate`](super::validate) refuses.
 //!
 //! Without a branch per number it is found out whether everything of a block is surely right. One
 //! of which that cannot be said is checked as [`validate`](super::validate) does; what that refuses

@@ -1,5 +1,5 @@
-//! This file says which numbers a bitstream holds on their whole way, and refuses collisions with
-//! others.
+//! The range of the numbers that a bitstream keeps from stream to solver; refuses collisions with
+//! numbers outside it.
 
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Geometry, Variant};

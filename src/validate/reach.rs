@@ -1,5 +1,5 @@
-//! This file finds out of many collisions at once whether the rows that a bitstream computes of them
-//! stay in binary16, as [`rows`](super::rows) finds out of each.
+//! Checks the constraint rows of many collisions against binary16's range at once, where
+//! [`rows`](super::rows) checks one collision.
 
 use pgs_interface::record::{CONTACT_POINTS, LANES};
 

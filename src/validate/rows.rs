@@ -1,5 +1,5 @@
-//! This file refuses collisions whose constraint rows leave binary16, where a bitstream computes
-//! them in it.
+//! Refuses collisions whose constraint rows leave the range of binary16, on a bitstream that computes
+//! rows in binary16.
 //!
 //! An effective mass that overflows there is 0, and the accelerator leaves the contact out without
 //! a word; a lever arm that overflows makes NaN of the row, even that of a static body.

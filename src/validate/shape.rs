@@ -1,4 +1,4 @@
-//! This file refuses shape tables that the accelerator cannot hold.
+//! Refuses shape tables that the accelerator cannot hold.
 
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Inertia, Variant};

@@ -1,4 +1,4 @@
-//! This file says which designs with a window contradict themselves.
+//! Refuses window designs that contradict themselves.
 
 use pgs_interface::profile::{Geometry, Profile, Window};
 use pgs_interface::record::live;

@@ -1,5 +1,5 @@
-//! This file says how an emulated board can be built wrongly: mistakes of a block design, a device
-//! tree or a boot image that a driver's self-test must find.
+//! The ways to build an emulated board wrongly: mistakes of a block design, a device tree or a boot
+//! image that a driver's self-test must find.
 //!
 //! Unlike a [`Fault`](crate::Fault), which happens once, they last as long as the board.
 

@@ -62,8 +62,8 @@ pub struct MemoryUse {
     pub arrays: Vec<ArrayUse>,
     /// Block RAM of the device for these arrays, bytes.
     pub capacity: u64,
-    /// Bytes that the positions of all bodies would take too, in as many copies as the velocities
-    /// have.
+    /// Bytes that the positions of all bodies would take in addition, with one copy for each copy of
+    /// the velocities.
     pub positions: u64,
 }
 

@@ -1,4 +1,4 @@
-//! This file writes the velocity and pose segments of a step into the channels' buffers.
+//! Writes the velocity and pose segments of a step into the channels' buffers.
 //!
 //! The buffers may be write-combining memory of a board, so they are written once, each thread's range
 //! of them upwards, in whole beats, and never read: the sum that the accelerator is checked with is

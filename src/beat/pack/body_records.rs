@@ -1,4 +1,4 @@
-//! This file writes velocity and pose records, a block at a time.
+//! Writes velocity and pose records, a block at a time.
 
 use pgs_interface::profile::Inertia;
 use pgs_interface::record::{Beat, pose, velocity};
@@ -27,7 +27,8 @@ impl<'a, 'b> Velocities<'a, 'b> {
         Self { shapes: target.shapes, dealer: StripeWriter::new(&layout, channels), inertia }
     }
 
-    /// Writes those of the next bodies, at most [`BODIES`](super::stripe_writer::BODIES); only the last may be fewer.
+    /// Writes the records of the next block of bodies. A block has
+    /// [`BODIES`](super::stripe_writer::BODIES) bodies, and only the last block may have fewer.
     #[inline(always)]
     pub(crate) fn write<V: Vectors>(&mut self, vectors: V, bodies: &[Body]) {
         match self.inertia {
@@ -59,7 +60,8 @@ impl<'a, 'b> Poses<'a, 'b> {
         Self { dealer: StripeWriter::new(&layout, channels) }
     }
 
-    /// Writes those of the next bodies, at most [`BODIES`](super::stripe_writer::BODIES); only the last may be fewer.
+    /// Writes the records of the next block of bodies. A block has
+    /// [`BODIES`](super::stripe_writer::BODIES) bodies, and only the last block may have fewer.
     #[inline(always)]
     pub(crate) fn write<V: Vectors>(&mut self, vectors: V, bodies: &[Body]) {
         self.dealer.write(vectors, &mut OfPoses(bodies));

@@ -1,4 +1,4 @@
-//! This file writes the collision segments of a step into the channels' buffers.
+//! Writes the collision segments of a step into the channels' buffers.
 //!
 //! As [`bodies`](super::bodies) writes theirs: by ranges for several threads, and in these block by block,
 //! once, upwards, never read back.

@@ -1,4 +1,4 @@
-//! This file makes the records of a block of collisions, and has them looked at on their way.
+//! Makes the records of a block of collisions, and screens them on the way.
 
 use pgs_interface::record::{CONTACT_POINTS, collision, relative};
 

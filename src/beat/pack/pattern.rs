@@ -1,4 +1,4 @@
-//! This file knows the stripes of the profiles and their units when it is compiled.
+//! The stripes of the profiles, and their units, as constants of the compiler.
 
 use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
 

@@ -1,4 +1,4 @@
-//! This file cuts the records of a segment into ranges, and has threads write or read them side by side.
+//! Splits the records of a segment into ranges, and packs or reads the ranges on several threads.
 //!
 //! A range is whole blocks, but for the last, so that it begins with a group of every stripe: on each
 //! channel its beats lie by themselves. Only the last range ends within a group, and is padded.

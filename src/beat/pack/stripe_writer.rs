@@ -1,4 +1,4 @@
-//! This file deals the records of a segment out to its channels.
+//! Deals the records of a segment out to its channels.
 //!
 //! They go by units ([`unit`](mod@unit)), from registers, and beat by beat what is left at a segment's end, or has
 //! a stripe that no profile has: in whole beats, on each channel upwards, as memory that combines

@@ -1,4 +1,4 @@
-//! This file says what records are packed for.
+//! The design that records are packed for: variant, shapes, screening.
 
 use pgs_interface::profile::Variant;
 

@@ -1,5 +1,4 @@
-//! This file writes records to the channels in the stripes of the profiles, which are known when it is
-//! compiled.
+//! Writes records to the channels, stripe by stripe, in loops that the compiler unrolls.
 //!
 //! A *unit* is as many records as fill whole groups of a stripe. Its rows go from registers to their
 //! places in whole beats, on each channel upwards, with nothing in between.

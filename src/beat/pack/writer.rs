@@ -1,5 +1,4 @@
-//! This file writes collisions into the channels' buffers as a caller finds them, one after the
-//! other.
+//! Writes collisions into the channels' buffers one by one, as a caller finds them.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! This file reads the results out of the channels' beats.
+//! Reads the results out of the channels' beats.
 //!
 //! The memory may be slow to read, so each beat is read once, and what is to be known of it is found out
 //! on the way. They come by units ([`collect`]), and beat by beat what is left at a segment's end, or has

@@ -1,5 +1,4 @@
-//! This file reads results from the channels in the stripes of the profiles, which are known when it is
-//! compiled.
+//! Reads results from the channels, stripe by stripe. The compiler knows the stripes of the profiles.
 //!
 //! The beats of a unit come from their places through registers into its records, on each channel
 //! upwards, with nothing in between.

@@ -1,4 +1,4 @@
-//! This file is the platform over the emulated board.
+//! The platform over the emulated board.
 
 use std::time::Duration;
 

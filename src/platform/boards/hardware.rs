@@ -1,4 +1,4 @@
-//! This file is the platform of a real board: its registers, its memory, its interrupt.
+//! The platform of a real board: its registers, its memory, its interrupt.
 
 use std::ops::Range;
 #[cfg(feature = "emulation")]

@@ -1,5 +1,5 @@
-//! This file is the platform over a board in another process: registers, interrupt and time through
-//! its socket, memory for DMA in the file that both processes have open.
+//! The platform over a board in another process: registers, interrupt and time through its socket,
+//! memory for DMA in the file that both processes have open.
 //!
 //! The file is locked like every device file: the board has one driver at a time. Time is the
 //! board's, which is virtual; it passes with what is asked of the board, and each answer says how

@@ -1,4 +1,4 @@
-//! This file maps physical memory through `/dev/mem`: only on request, and only inside windows that
+//! Maps physical memory through `/dev/mem`: only on request, and only inside windows that
 //! were configured.
 //!
 //! `/dev/mem` is locked, and with it every device file that shows memory of these windows too: who

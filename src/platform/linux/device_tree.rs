@@ -1,4 +1,4 @@
-//! This file reads from the device tree how long the regions of a device are.
+//! Reads the lengths of a device's regions from the device tree.
 //!
 //! `uio_pdrv_genirq` rounds every region up to whole pages; the node's `reg` is exact. The regions
 //! are the entries of `reg`, in its order. Each is an address and a length of as many big-endian

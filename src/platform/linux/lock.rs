@@ -1,4 +1,4 @@
-//! This file opens a device file for one user alone.
+//! Opens a device file for one user alone.
 //!
 //! The lock is that of `flock(2)`: it belongs to one opening of the file, so that a second opening
 //! is refused whether it is made by another program or by another part of this one. Every device

@@ -1,4 +1,4 @@
-//! This file maps device files and reaches what is mapped: registers, and memory for DMA.
+//! Maps device files, and accesses the mapping: registers, and memory for DMA.
 #![allow(unsafe_code, reason = "what is mapped is reached through raw pointers only")]
 
 use std::fs::File;

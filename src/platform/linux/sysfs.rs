@@ -1,4 +1,4 @@
-//! This file reads the small text files in which the kernel describes devices.
+//! Reads the small text files in which the kernel describes devices.
 
 use std::fs;
 use std::io;

@@ -1,4 +1,4 @@
-//! This file opens a UIO node, for one user alone, and waits for its interrupt.
+//! Opens a UIO node, for one user alone, and waits for its interrupt.
 //!
 //! The kernel's handler masks the interrupt and counts it; reading four bytes gives the count since
 //! the device was registered, writing a 1 lets the next one through. A count that jumps is no

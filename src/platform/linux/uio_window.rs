@@ -1,4 +1,4 @@
-//! This file maps a region of a UIO node, and reaches the registers in it.
+//! Maps a region of a UIO node, and accesses the registers in it.
 //!
 //! Source: Linux `Documentation/driver-api/uio-howto.rst`, `drivers/uio/uio_pdrv_genirq.c`.
 

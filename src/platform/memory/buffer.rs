@@ -1,4 +1,4 @@
-//! This file keeps DMA memory in the hands of either the CPU or the device, by type.
+//! Tracks by type whether the CPU or the device owns a DMA buffer.
 //!
 //! ```text
 //! CpuBuffer --into_device--> DeviceBuffer     no slice of it exists, only bus addresses

@@ -1,4 +1,4 @@
-//! This file copies beats into and out of device-mapped memory.
+//! Copies beats into and out of device-mapped memory.
 //!
 //! Device memory takes aligned accesses only and merges none: `memcpy` and `memset` would use
 //! unaligned vectors or `dc zva`, which end in SIGBUS. Each beat is two aligned 64-bit accesses, in

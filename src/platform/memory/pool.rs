@@ -1,4 +1,4 @@
-//! This file cuts buffers out of the memory that there is for DMA.
+//! Allocates buffers from the memory for DMA.
 //!
 //! First fit; every piece begins on a cache line of the bus and is whole lines long, so that no two
 //! share one. Handing over and taking back allocate nothing.

@@ -1,4 +1,4 @@
-//! This file reaches memory that the device tree reserves for DMA and the kernel does not map.
+//! Opens memory that the device tree reserves for DMA and the kernel does not map.
 //!
 //! It is Device memory for the CPU: whole aligned beats only, through [`super::copy`].
 

@@ -1,4 +1,4 @@
-//! This file is memory for DMA while the CPU holds it, wherever it lies.
+//! Memory for DMA that the CPU holds, mapped or allocated.
 #![allow(unsafe_code, reason = "a slice of mapped memory is made from a raw pointer")]
 
 use std::sync::Arc;

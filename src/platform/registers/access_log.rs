@@ -1,4 +1,4 @@
-//! This file keeps the last register accesses of a board, for a report of what went wrong.
+//! Keeps the last register accesses of a board, for the report of a fault.
 //!
 //! A ring of fixed length: an access costs a clock reading and no allocation.
 

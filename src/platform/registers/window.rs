@@ -1,4 +1,4 @@
-//! This file is the only way to a register: bounds-checked, counted, logged 32-bit accesses.
+//! The only way to a register: bounds-checked, counted, logged 32-bit accesses.
 
 use std::fmt;
 use std::sync::Arc;

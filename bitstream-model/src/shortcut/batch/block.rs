@@ -1,4 +1,4 @@
-//! This file lays collisions out sixteen side by side, word by word, as SIMD lanes take them.
+//! Lays sixteen collisions out side by side, word by word, as SIMD lanes read them.
 //!
 //! A block is what one collision record is, times sixteen: a row of sixteen numbers for each word of
 //! the record, then the accumulated impulses. The collisions of a block share no moving body, but

@@ -1,5 +1,5 @@
-//! This file finds each collision its block: the first with an empty lane behind all earlier
-//! collisions of its moving bodies.
+//! Assigns each collision to a block: the first with an empty slot behind all earlier collisions of
+//! its moving bodies.
 //!
 //! So the collisions of a body lie in different blocks in the order in which they came, and taking
 //! block after block gives the bits of taking collision after collision. In hazard-free order the

@@ -1,5 +1,5 @@
-//! This file is the passes over the collisions of a block, side by side: the formulae and the order
-//! of evaluation of `solver.rs`, lane by lane.
+//! The passes over the collisions of a block, side by side: the formulae and the order of evaluation of
+//! `solver.rs`, SIMD lane by SIMD lane.
 //!
 //! What a lane's collision lacks (a contact point, a static body's answer) is computed and not
 //! taken.

@@ -1,5 +1,5 @@
-//! This file puts off the blocks whose bodies are not used again for long, so that the uses of a
-//! body lie close together.
+//! Delays blocks whose bodies are not used again for long, so that the uses of a body lie close
+//! together.
 //!
 //! Without it a front would have to wait: collisions with the ground often come first of all, and
 //! their bodies' others much later.

@@ -1,5 +1,4 @@
-//! This file passes work from one thread to others: a few pieces wait, and whoever has nothing to do
-//! takes the oldest.
+//! A short queue of work from one thread to the others: an idle thread takes the oldest piece.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};

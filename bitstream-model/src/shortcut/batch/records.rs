@@ -1,4 +1,4 @@
-//! This file reads collision records where their beats are, and puts sixteen of them side by side.
+//! Reads collision records in place from their beats, and sets sixteen of them side by side.
 
 use super::block::{Block, LANES, ROWS_APART, Words};
 use super::lanes::{Lanes, Numbers, Quad, Work};

@@ -1,5 +1,5 @@
-//! This file runs passes over blocks as moving fronts: a pass follows the one before as soon as that
-//! has finished with the bodies.
+//! Runs the passes over the blocks as wave fronts: a pass takes a block as soon as the pass before it
+//! has finished with the bodies of that block.
 //!
 //! ```text
 //! pass 0   ################>            chunks of blocks, in their order

@@ -1,4 +1,4 @@
-//! This file chooses the lanes to compute with, of those that the processor has.
+//! Chooses the widest SIMD lanes that the processor has.
 
 use super::lanes::{Lanes, Portable, Work};
 

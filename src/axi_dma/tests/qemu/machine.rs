@@ -1,4 +1,4 @@
-//! This file starts QEMU with its own model of the AXI DMA, and speaks qtest to it.
+//! Starts QEMU with its own model of the AXI DMA, and speaks qtest to it.
 //!
 //! qtest is lines of text: a command (`readl ADDRESS`, `writel ADDRESS VALUE`, `read ADDRESS SIZE`,
 //! `write ADDRESS SIZE DATA`) is answered by `OK` and perhaps a value. `IRQ raise N` and

@@ -1,4 +1,4 @@
-//! This file tests the driver's scatter-gather code against QEMU's own model of the AXI DMA.
+//! Tests the driver's scatter-gather code against QEMU's own model of the AXI DMA.
 //!
 //! That model was written by others from the same product guide. Its streams end in an Ethernet
 //! MAC, whose cable is a UDP socket of the test: what MM2S sends is read there, and what is put

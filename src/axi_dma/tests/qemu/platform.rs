@@ -1,4 +1,4 @@
-//! This file is the platform over QEMU's machine: its registers, memory, interrupt and cable.
+//! The platform over QEMU's machine: its registers, memory, interrupt and cable.
 //!
 //! Memory that both sides may touch is coherent at every register access: before one, what the
 //! driver stored is put into the machine's memory; after one, what the engine stored is taken from

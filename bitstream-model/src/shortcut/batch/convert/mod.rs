@@ -1,5 +1,5 @@
-//! This file translates collisions of other designs into those that a batch takes in: f32, in world
-//! coordinates, on four streams. So many at a time that they stay in the cache.
+//! Converts collisions of other designs to the batch's own format: f32, in world coordinates, on four
+//! streams. It converts as many at a time as the cache holds.
 //!
 //! A record relative to body A is one whose body A stands at the origin. Of two records of three and a
 //! half beats the first takes the sum of the words of both, and what pads the last one up.

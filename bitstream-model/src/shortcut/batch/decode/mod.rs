@@ -1,5 +1,4 @@
-//! This file takes records in: one thread finds each its block, in their order, and all threads put
-//! them there.
+//! Decodes records into blocks: one thread assigns the blocks in order, and all threads fill them.
 //!
 //! Where sixteen neighbours are a block in their order, the block is theirs alone, and whoever fills
 //! it has it to himself. All others are put in when the threads have ended.

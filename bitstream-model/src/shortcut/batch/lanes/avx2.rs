@@ -1,4 +1,4 @@
-//! This file is the eight lanes of AVX2.
+//! The eight SIMD lanes of AVX2.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};

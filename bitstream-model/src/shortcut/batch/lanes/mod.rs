@@ -1,5 +1,5 @@
-//! This file says what the lanes of a processor do: numbers side by side, each with the operations
-//! of `number.rs` and their bits, one rounding an operation.
+//! The operations of a processor's SIMD lanes. Each gives the bits of the same operation in
+//! `number.rs`, with one rounding.
 //!
 //! A value of a [`Lanes`] type proves that the processor has its instructions, and numbers are made
 //! by one only.

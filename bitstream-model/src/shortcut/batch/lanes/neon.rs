@@ -1,4 +1,4 @@
-//! This file is the four lanes of NEON.
+//! The four SIMD lanes of NEON.
 
 use std::arch::aarch64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -1,4 +1,4 @@
-//! This file is lanes that every processor has: an array, left to the compiler.
+//! SIMD lanes for every processor: an array, left to the compiler.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

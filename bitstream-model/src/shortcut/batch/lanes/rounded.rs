@@ -1,5 +1,5 @@
-//! This file is the lanes of any processor with numbers in binary16, held as the f32 of the same
-//! value: what an operation gives is rounded once more, as in `number.rs`.
+//! SIMD lanes with numbers in binary16, held as the f32 of the same value. Each result is rounded once
+//! more, as in `number.rs`.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,5 +1,5 @@
-//! This file integrates bodies side by side: the formulae and the order of evaluation of
-//! `integrate.rs`, lane by lane.
+//! Integrates bodies side by side: the formulae and the order of evaluation of `integrate.rs`, SIMD
+//! lane by SIMD lane.
 //!
 //! The bodies come and go on streams that take turns: the first body of each period is found at every
 //! so many beats of its streams, the next one likewise.
