@@ -128,7 +128,7 @@ impl Options {
 enum Thing {
     Bodies,
     AsGiven,
-    Indexed,
+    InOrder,
     BareAsGiven,
     BareInOrder,
     StepAsGiven,
@@ -149,7 +149,7 @@ impl Thing {
         match self {
             Self::Bodies => "bodies",
             Self::AsGiven => "as given",
-            Self::Indexed => "in order",
+            Self::InOrder => "in order",
             Self::BareAsGiven => "bare, as given",
             Self::BareInOrder => "bare, in order",
             Self::StepAsGiven => "step, as given",
@@ -310,7 +310,7 @@ fn measure(
         let added = Some(schedule.empty());
         match thing {
             Thing::AsGiven | Thing::StepAsGiven => packer.pack_collisions(collisions, shapes, None),
-            Thing::Indexed | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
+            Thing::InOrder | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
             Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, None)?,
             Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, added)?,
             Thing::BareAsGiven => (packer.deal_bare(collisions) > 0).then_some(0),
@@ -324,7 +324,7 @@ fn measure(
     let bytes = match thing {
         Thing::Bodies => of_bodies,
         Thing::AsGiven | Thing::BareAsGiven => of_collisions,
-        Thing::Indexed | Thing::BareInOrder => of_entries,
+        Thing::InOrder | Thing::BareInOrder => of_entries,
         Thing::StepAsGiven | Thing::CheckedAsGiven => of_bodies + of_collisions,
         Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
         Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
@@ -377,7 +377,7 @@ fn packing<'a>(
             Thing::AsGiven | Thing::StepAsGiven => {
                 black_box(packer.pack_collisions(black_box(collisions), shapes, None));
             }
-            Thing::Indexed | Thing::StepInOrder => {
+            Thing::InOrder | Thing::StepInOrder => {
                 black_box(packer.pack_collisions(black_box(ordered), shapes, added));
             }
             Thing::CheckedAsGiven => {
