@@ -1,0 +1,8 @@
+//! Generates the accelerator's hardware: the equations of a step become an operation graph, the
+//! graph a modulo schedule, and the schedule pipelines in Verilog-2001.
+//!
+//! The parts that a generator would only copy (operators, memories, streams, sequence, registers)
+//! are written by hand in `bitstream-model/rtl`.
+#![forbid(unsafe_code)]
+
+pub mod verify;

@@ -1,0 +1,1 @@
+//! Checks of the hardware against references that share no code with it.
