@@ -13,6 +13,7 @@ use pgs_support::float_env::standard;
 use crate::axi_dma::PacketCount;
 use crate::board::{Board, Counts};
 use crate::config::{BoardConfig, ConfigError};
+use crate::external::ExternalAccelerator;
 use crate::fault::FaultPlan;
 use crate::memory::external::DeviceMemory;
 use crate::memory::{DeviceAccess, Memory, MemoryError};
@@ -54,8 +55,30 @@ impl EmulatedBoard {
         Ok(Self::of(config, Memory::external(memory, granted)))
     }
 
+    /// Builds a board around another accelerator: registers, beats and interrupts are its own. It
+    /// must be built as `config` says.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if a number is outside its range.
+    pub fn with_accelerator(
+        config: BoardConfig,
+        accelerator: Box<dyn ExternalAccelerator>,
+    ) -> Result<Self, ConfigError> {
+        config.check()?;
+        let memory = Memory::new(config.address_width, config.quirks.coherency);
+        let board = Board::new(config, memory, None, Some(accelerator));
+        Ok(Self(Arc::new(Mutex::new(board))))
+    }
+
     fn of(config: BoardConfig, memory: Memory) -> Self {
-        Self(Arc::new(Mutex::new(standard(|| Board::new(config, memory, shortcut::of(&config))))))
+        let board = standard(|| Board::new(config, memory, shortcut::of(&config), None));
+        Self(Arc::new(Mutex::new(board)))
+    }
+
+    /// Why the external accelerator does not answer any more, in words.
+    #[must_use]
+    pub fn accelerator_error(&self) -> Option<String> {
+        with_board(&self.0, |board| board.accelerator_error().map(ToString::to_string))
     }
 
     /// The handle for a driver of this board.

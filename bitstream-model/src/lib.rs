@@ -9,6 +9,7 @@ mod board;
 mod cast;
 mod config;
 pub mod estimate;
+pub mod external;
 mod fault;
 mod handle;
 mod memory;

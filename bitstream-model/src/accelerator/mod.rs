@@ -298,6 +298,14 @@ impl Accelerator {
         ran
     }
 
+    /// A step begins on the accelerator that this one shadows: its packets are known, and nothing is
+    /// computed.
+    pub(crate) fn shadow_start(&mut self, faults: &mut Faults) {
+        self.start_due = false;
+        self.arguments = self.registers.arguments();
+        faults.step_begins(self.step_shape());
+    }
+
     /// The packets of the step.
     fn step_shape(&self) -> StepShape {
         let segments = [self.velocities_in(), self.collisions_in(), self.poses_in()];

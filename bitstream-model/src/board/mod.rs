@@ -16,6 +16,7 @@ use crate::accelerator::Accelerator;
 use crate::axi_dma::{Core, Moved, PacketCount, Surroundings};
 use crate::config::BoardConfig;
 use crate::config::quirks::InterruptWiring;
+use crate::external::{ExternalAccelerator, ExternalError, Installed};
 use crate::fault::{Fault, FaultKind, Faults};
 use crate::memory::{Memory, MemoryError};
 use crate::stream::Stream;
@@ -60,7 +61,7 @@ pub(crate) struct Board {
     pub(crate) interrupt: InterruptLine,
     pub(crate) log: Log,
     cores: Vec<Core>,
-    accelerator: Accelerator,
+    accelerator: Installed,
     inputs: Vec<Stream>,
     outputs: Vec<Stream>,
     moved: Moved,
@@ -77,11 +78,13 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    /// Builds a board, with a short cut or without.
+    /// Builds a board with the built-in accelerator, with a short cut or without, or with another
+    /// accelerator, which no short cut knows.
     pub(crate) fn new(
         config: BoardConfig,
         memory: Memory,
         short_cut: Option<Box<dyn ShortCut>>,
+        external: Option<Box<dyn ExternalAccelerator>>,
     ) -> Self {
         let profile = config.profile;
         let streams = |widths: &[u32]| {
@@ -97,7 +100,7 @@ impl Board {
             interrupt: InterruptLine::default(),
             log: Log::new(),
             cores: (0..cores).map(|core| Core::new(core, &config)).collect(),
-            accelerator: Accelerator::new(&config),
+            accelerator: Installed::new(Accelerator::new(&config), external),
             inputs,
             outputs,
             moved: Moved::default(),
@@ -136,6 +139,11 @@ impl Board {
         self.faults.happened()
     }
 
+    /// Why the external accelerator does not answer any more.
+    pub(crate) fn accelerator_error(&self) -> Option<&ExternalError> {
+        self.accelerator.error()
+    }
+
     /// The packets that ended since the last step began.
     pub(crate) fn packets(&self) -> &[PacketCount] {
         &self.moved.packets
@@ -151,7 +159,7 @@ impl Board {
                 for (number, core) in self.cores.iter_mut().enumerate() {
                     *core = Core::new(number, &self.config);
                 }
-                self.accelerator = Accelerator::new(&self.config);
+                self.accelerator.replace_model(Accelerator::new(&self.config));
                 self.inputs.iter_mut().chain(&mut self.outputs).for_each(Stream::clear);
             }
             Some(FaultKind::IrqSpurious) => self.interrupt.disturb(1),
@@ -314,7 +322,7 @@ impl Board {
         let cycles = short_cut.fast_forward(Stretch {
             now: self.now,
             until,
-            accelerator: &mut self.accelerator,
+            accelerator: &mut self.accelerator.model,
             cores: &mut self.cores,
             inputs: &mut self.inputs,
             outputs: &mut self.outputs,

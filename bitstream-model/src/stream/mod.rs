@@ -11,6 +11,7 @@ use std::fmt;
 
 use self::span::Spans;
 use crate::cast::index;
+use crate::external::StreamBeat;
 use crate::memory::{Memory, Source};
 use pgs_interface::record::Beat;
 
@@ -154,6 +155,21 @@ impl Stream {
     pub(crate) fn peek(&self, ahead: usize) -> Beat {
         debug_assert!(ahead < self.len(), "the receiver looks at the length first");
         self.ring[self.slot(self.taken + ahead as u64)]
+    }
+
+    /// The next `beats` beats with their marks; the FIFO must hold the beats themselves.
+    pub(crate) fn marked_beats(&self, beats: usize) -> Vec<StreamBeat> {
+        let mut marked: Vec<StreamBeat> = (0..beats)
+            .map(|ahead| StreamBeat { beat: self.peek(ahead), last: false, partial: false })
+            .collect();
+        let ahead = |number: &u64| index(number - self.taken);
+        for last in self.lasts.iter().map(ahead).filter(|ahead| *ahead < beats) {
+            marked[last].last = true;
+        }
+        for partial in self.partials.iter().map(ahead).filter(|ahead| *ahead < beats) {
+            marked[partial].partial = true;
+        }
+        marked
     }
 
     /// How far behind the front the next TLAST is.

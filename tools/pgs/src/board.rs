@@ -4,7 +4,8 @@ use std::io::{self, Write};
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
-use bitstream_model::interface::profile::{PROFILES, Variant};
+use bitstream_model::external::SimulatorProcess;
+use bitstream_model::interface::profile::{FLOAT, PROFILES, Variant};
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::platform::{System, uio_listing};
@@ -13,7 +14,7 @@ use zynq_pgs::{
     OpenOptions, StepParameters,
 };
 
-use crate::common::{BoardName, CommonArgs};
+use crate::common::{AcceleratorChoice, BoardName, CommonArgs};
 use crate::diagnosis;
 use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure};
@@ -104,6 +105,25 @@ pub(crate) struct ChosenBoard {
     pub(crate) reason: String,
 }
 
+/// Builds an emulated board with the accelerator that was chosen.
+fn emulated_board(
+    config: BoardConfig,
+    accelerator: &AcceleratorChoice,
+) -> Result<EmulatedBoard, Failure> {
+    let AcceleratorChoice::Rtl(path) = accelerator else {
+        return EmulatedBoard::new(config).map_err(not_built);
+    };
+    if config.profile != &FLOAT {
+        let error = format!(
+            "the generated accelerator is of profile {}, not {}",
+            FLOAT.name, config.profile.name
+        );
+        return Err(Failure::input(error).next("leave out --profile, or --accelerator"));
+    }
+    let simulator = SimulatorProcess::start(path).map_err(Failure::input)?;
+    EmulatedBoard::with_accelerator(config, Box::new(simulator)).map_err(not_built)
+}
+
 /// Chooses a board. `given` is an option of the command line that only an emulated board has.
 pub(crate) fn find(
     common: &CommonArgs,
@@ -129,7 +149,7 @@ pub(crate) fn find(
             );
             return Err(Failure::input(error).next(next));
         }
-        let emulated = EmulatedBoard::new(config).map_err(not_built)?;
+        let emulated = emulated_board(config, &common.accelerator)?;
         (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
     } else if let (BoardName::Socket(_), Some(option)) = (name, given) {
         let error = format!("{option} builds an emulated board, but this one is already built");

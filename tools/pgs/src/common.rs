@@ -7,7 +7,7 @@ use bitstream_model::interface::address_map::UIO_NODE;
 use clap::Args;
 use zynq_pgs::{ManagerChoice, MemoryChoice};
 
-use crate::environment::{BOARD, MANAGER, MEMORY, is_blank};
+use crate::environment::{BOARD, MANAGER, MEMORY, RTL, is_blank};
 use crate::options::memory::memory_choice;
 
 /// The options of every verb, as parsed.
@@ -53,6 +53,27 @@ pub(crate) struct CommonOptions {
         value_parser = manager_choice
     )]
     manager: Option<ManagerChoice>,
+    /// Accelerator of an emulated board.
+    #[arg(
+        help = "Accelerator of an emulated board: model, or rtl:PATH, a simulator of the generated \
+                Verilog (`rtlgen simulator` builds one) [env: PGS_RTL, the PATH alone] \
+                [default: model]",
+        long,
+        global = true,
+        value_name = "ACCELERATOR",
+        value_parser = accelerator_choice
+    )]
+    accelerator: Option<AcceleratorChoice>,
+}
+
+/// The accelerator of an emulated board.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) enum AcceleratorChoice {
+    /// The built-in model.
+    #[default]
+    Model,
+    /// A simulator of the generated Verilog, at this path.
+    Rtl(PathBuf),
 }
 
 /// The options of every verb, with the environment and the defaults filled in.
@@ -64,6 +85,7 @@ pub(crate) struct CommonArgs {
     /// Whether the memory was named by the environment and not by the command line.
     pub(crate) memory_of_environment: bool,
     pub(crate) manager: ManagerChoice,
+    pub(crate) accelerator: AcceleratorChoice,
 }
 
 /// A board named on the command line.
@@ -90,6 +112,20 @@ fn board_name(text: &str) -> Result<BoardName, String> {
         ("socket", Some(path)) if !path.is_empty() => Ok(BoardName::Socket(path.into())),
         _ => Err("expected auto, uio[:NODE], devmem, emulated or socket:PATH".to_owned()),
     }
+}
+
+/// Reads the choice of an accelerator.
+fn accelerator_choice(text: &str) -> Result<AcceleratorChoice, String> {
+    match text.split_once(':') {
+        None if text == "model" => Ok(AcceleratorChoice::Model),
+        Some(("rtl", path)) if !path.is_empty() => Ok(AcceleratorChoice::Rtl(path.into())),
+        _ => Err("expected model or rtl:PATH".to_owned()),
+    }
+}
+
+/// Reads the path of a simulator.
+fn simulator_path(text: &str) -> Result<AcceleratorChoice, String> {
+    Ok(AcceleratorChoice::Rtl(text.into()))
 }
 
 /// Reads the choice of an FPGA manager.
@@ -122,7 +158,7 @@ impl CommonOptions {
         reads: Reads,
         variable: impl Fn(&str) -> Option<OsString>,
     ) -> Result<CommonArgs, String> {
-        let Self { json, board, memory, manager } = self;
+        let Self { json, board, memory, manager, accelerator } = self;
         let board = match board {
             None if reads.board => instead_of("--board", BOARD, &variable, board_name)?,
             given => given,
@@ -142,7 +178,15 @@ impl CommonOptions {
             given => given,
         };
         let manager = manager.unwrap_or_default();
-        Ok(CommonArgs { json, board, memory, memory_of_environment, manager })
+        let emulated = matches!(board, BoardName::Auto | BoardName::Emulated);
+        let accelerator = match accelerator {
+            None if reads.board && emulated => {
+                instead_of("--accelerator", RTL, &variable, simulator_path)?
+            }
+            given => given,
+        };
+        let accelerator = accelerator.unwrap_or_default();
+        Ok(CommonArgs { json, board, memory, memory_of_environment, manager, accelerator })
     }
 }
 

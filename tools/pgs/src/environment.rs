@@ -8,6 +8,8 @@ pub(crate) const BOARD: &str = "PGS_BOARD";
 pub(crate) const MEMORY: &str = "PGS_MEMORY";
 /// Names the FPGA manager.
 pub(crate) const MANAGER: &str = "PGS_MANAGER";
+/// Names the simulator that is the accelerator of an emulated board.
+pub(crate) const RTL: &str = "PGS_RTL";
 /// Sets the filter of the log.
 pub(crate) const LOG: &str = "RUST_LOG";
 /// Sets the colours of the log.

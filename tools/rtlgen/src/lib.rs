@@ -5,4 +5,11 @@
 //! are written by hand in `bitstream-model/rtl`.
 #![forbid(unsafe_code)]
 
+pub mod design;
+pub mod emit;
+pub mod equations;
+pub mod graph;
+pub mod operators;
+pub mod schedule;
+pub mod sources;
 pub mod verify;

@@ -24,12 +24,12 @@ Examples:
 Exit codes: 0 done; 1 a check failed; 2 wrong usage; 77 a tool that the verb needs is not installed.";
 
 #[derive(Debug, Subcommand)]
-enum Verb {}
+enum Verb { None }
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let mut out = io::stdout().lock();
-    let done = match cli.verb {};
+    let done = match cli.verb { Verb::None => Ok::<_, io::Error>(ExitCode::SUCCESS) };
     match done {
         Ok(code) => code,
         Err(error) => {

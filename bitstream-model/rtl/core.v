@@ -1,0 +1,446 @@
+// The accelerator without its registers: beats in, beats out.
+//
+//   receivers -> loader ------------------------------------> velocities <-> contact, friction
+//            \-> finder -> issue -> record registers -> contact / friction pipeline
+//            \-> integrator -> integration pipeline -> senders
+//
+// An issue slot of two cycles carries a collision or nothing, and nothing behind the issue ever
+// stops: no pipeline has a clock enable. README.md has the block diagram, the memories and the
+// schedule of a step.
+`default_nettype none
+
+module core #(
+  parameter INTERLOCKED = 1
+) (
+  input  wire         clk,
+  input  wire         reset,
+  input  wire         start,
+
+  // Arguments; they do not change while a step runs.
+  input  wire [19:0]  bodies,
+  input  wire [19:0]  collisions,
+  input  wire [7:0]   contact_iterations,
+  input  wire [7:0]   friction_iterations,
+  input  wire         integrate,
+  input  wire [31:0]  time_step,
+  input  wire [31:0]  drift,
+  input  wire [31:0]  coefficient,
+  input  wire [31:0]  friction_coefficient,
+  input  wire [31:0]  damping,
+  input  wire [31:0]  gravity_x,
+  input  wire [31:0]  gravity_y,
+  input  wire [31:0]  gravity_z,
+  input  wire [1:0]   shape_write,
+  input  wire [5:0]   shape_address,
+  input  wire [31:0]  shape_in,
+
+  input  wire [511:0] s_tdata,
+  input  wire [63:0]  s_tkeep,
+  input  wire [3:0]   s_tlast,
+  input  wire [3:0]   s_tvalid,
+  output wire [3:0]   s_tready,
+  output wire [511:0] m_tdata,
+  output wire [3:0]   m_tlast,
+  output wire [3:0]   m_tvalid,
+  input  wire [3:0]   m_tready,
+
+  output wire         busy,
+  output wire         done,
+  output reg          error,           // stays until reset
+  output reg  [7:0]   error_code,
+  output reg  [7:0]   error_channel,
+  output reg  [31:0]  error_detail,
+  output wire [63:0]  cycles,
+  output wire [31:0]  work_cycles,
+  output wire [31:0]  wait_cycles,
+  output wire [31:0]  hazards,
+  output reg  [31:0]  sum_received,
+  output reg  [31:0]  sum_sent,
+  output wire [63:0]  impulse_total
+);
+`include "pgs_interface.vh"
+`include "pgs_schedule.vh"
+
+  localparam ADDRESS_STAGES = MEMORY_ADDRESS_STAGES;
+  localparam OUTPUT_STAGES  = MEMORY_OUTPUT_STAGES;
+  localparam READ_LATENCY   = ADDRESS_STAGES + 1 + OUTPUT_STAGES;
+  localparam BODY           = BODY_BITS;       // bits of a body's number
+  localparam COLLISION      = COLLISION_BITS;  // bits of a collision's number
+  localparam SHAPE          = 6;               // bits of a shape's number
+
+  wire clear = reset | start;
+  wire run   = busy & ~error;
+
+  // Passes of the step; without collisions there are none.
+  reg [8:0] contact_passes, friction_passes, passes;
+  always @(posedge clk) begin
+    contact_passes  <= (collisions == 20'd0) ? 9'd0 : {1'b0, contact_iterations};
+    friction_passes <= (collisions == 20'd0) ? 9'd0 : {1'b0, friction_iterations};
+    passes          <= contact_passes + friction_passes;
+  end
+
+  // ---- Sequence
+
+  wire phase, loading, finding, passing, draining, begin_pass, integrating;
+  wire friction, first_of_kind, last_contact, parity;
+  wire [1:0] loads, load_finished;
+  wire issues, stalls, waits, enters, enter_finished;
+  wire [3:0] sender_finished;
+
+  step_sequence #(
+    .CONTACT_FILL(CONTACT_FILL), .FRICTION_FILL(FRICTION_FILL), .FINISH(READ_LATENCY + INTEGRATION_DEPTH + 4)
+  ) steps (
+    .clk(clk), .reset(reset), .start(start), .error(error),
+    .collisions(collisions), .contact_passes(contact_passes), .friction_passes(friction_passes),
+    .loads(|loads), .load_finished(&load_finished),
+    .issues(issues), .stalls(stalls), .waits(waits),
+    .enters(enters), .enter_finished(enter_finished), .results_finished(&sender_finished),
+    .busy(busy), .done(done), .phase(phase), .loading(loading), .finding(finding), .passing(passing),
+    .draining(draining), .begin_pass(begin_pass), .integrating(integrating),
+    .friction(friction), .first_of_kind(first_of_kind), .last_contact(last_contact), .parity(parity),
+    .cycles(cycles), .work_cycles(work_cycles), .wait_cycles(wait_cycles)
+  );
+
+  wire [31:0] per_second, speed_limit, half_step, series;
+  wire [95:0] gravity_step;
+  constants numbers (
+    .clk(clk), .start(start), .time_step(time_step),
+    .gravity_x(gravity_x), .gravity_y(gravity_y), .gravity_z(gravity_z),
+    .per_second(per_second), .speed_limit(speed_limit), .half_step(half_step), .series(series),
+    .gravity_step(gravity_step)
+  );
+
+  // ---- Streams in
+
+  wire [255:0] body_pose;
+  wire [127:0] head [0:3];
+  wire [5:0]   count [0:3];
+  wire [31:0]  received [0:3];
+  wire [20:0]  wrong_beat [0:3];
+  wire [7:0]   wrong_code [0:3];
+  wire [3:0]   pop, wrong, collision_begins;
+  wire         unused = &{1'b0, collision_begins[3], body_pose[127:96]};
+  genvar k;
+  generate
+    for (k = 0; k < 4; k = k + 1) begin : g_receiver
+      receiver #(.CHANNEL(k)) stream (
+        .clk(clk), .reset(reset), .start(start), .run(run),
+        .bodies(bodies), .collisions(collisions), .passes(passes),
+        .tdata(s_tdata[128*k +: 128]), .tkeep(s_tkeep[16*k +: 16]), .tlast(s_tlast[k]),
+        .tvalid(s_tvalid[k]), .tready(s_tready[k]),
+        .head(head[k]), .count(count[k]), .pop(pop[k]), .collision_begins(collision_begins[k]),
+        .sum(received[k]), .error(wrong[k]), .error_code(wrong_code[k]), .error_beat(wrong_beat[k])
+      );
+    end
+  endgenerate
+  always @(posedge clk) sum_received <= (received[0] + received[1]) + (received[2] + received[3]);
+
+  // ---- Load, and the properties of the bodies
+
+  wire [1:0]       load_ready, load_write, load_error, load_moves;
+  wire [BODY-1:0]  load_address [0:1];
+  wire [7:0]       load_shape [0:1];
+  wire [191:0]     load_velocity [0:1];
+  wire [SHAPE-1:0] load_lookup [0:1];
+  wire [19:0]      load_error_body [0:1];
+  wire [63:0]      properties [0:1];
+  generate
+    for (k = 0; k < 2; k = k + 1) begin : g_loader
+      loader #(.BODY(BODY), .SHAPE(SHAPE), .ODD(k)) side (
+        .clk(clk), .start(clear), .run(loading), .bodies(bodies),
+        .linear_there(count[2*k] != 6'd0), .linear(head[2*k]),
+        .angular_there(count[2*k+1] != 6'd0), .angular(head[2*k+1]),
+        .ready(load_ready[k]), .other_ready(load_ready[1-k]), .pop(loads[k]), .finished(load_finished[k]),
+        .lookup(load_lookup[k]), .lookup_moves(load_moves[k]),
+        .write(load_write[k]), .address(load_address[k]), .shape(load_shape[k]), .velocity(load_velocity[k]),
+        .error(load_error[k]), .error_body(load_error_body[k])
+      );
+      assign load_moves[k] = |properties[k][30:0];
+    end
+  endgenerate
+
+  wire [BODY-1:0] shape_of_a, shape_of_b, entering;
+  body_shapes #(.BODIES(BODIES), .BODY(BODY), .SHAPE(SHAPE)) shapes (
+    .clk(clk), .table_write(shape_write), .table_address(shape_address), .table_in(shape_in),
+    .loading(~finding & ~integrating),
+    .write_a(load_write[0]),
+    .address_a(load_write[0] ? load_address[0] : integrating ? entering : shape_of_a),
+    .shape_a(load_shape[0]), .lookup_a(load_lookup[0]), .properties_a(properties[0]),
+    .write_b(load_write[1]), .address_b(load_write[1] ? load_address[1] : shape_of_b),
+    .shape_b(load_shape[1]), .lookup_b(load_lookup[1]), .properties_b(properties[1])
+  );
+
+  // ---- Collisions: found, issued, registered
+
+  wire [5:0]         found;
+  wire [COLLISION:0] last_use_a, last_use_b;
+  wire [BODY-1:0]    found_a, found_b;
+  wire               found_moves_a, found_moves_b;
+  wire [63:0]        found_mass_a, found_mass_b;
+  wire [2:0]         found_points;
+  wire               find_error;
+  wire [7:0]         find_error_code;
+  wire [19:0]        find_error_collision;
+  finder #(.BODIES(BODIES), .BODY(BODY), .COLLISION(COLLISION)) find (
+    .clk(clk), .clear(clear), .run(finding), .phase(phase), .bodies(bodies), .collisions(collisions),
+    .count_comes(collision_begins[0]), .count_word(s_tdata[127:96]),
+    .body_a_comes(collision_begins[1]), .body_a_word(s_tdata[255:224]),
+    .body_b_comes(collision_begins[2]), .body_b_word(s_tdata[383:352]),
+    .load_a(load_write[0]), .load_address_a(load_address[0]),
+    .load_b(load_write[1]), .load_address_b(load_address[1]),
+    .shape_address_a(shape_of_a), .shape_address_b(shape_of_b),
+    .properties_a(properties[0]), .properties_b(properties[1]),
+    .pop(issues), .found(found), .last_use_a(last_use_a), .last_use_b(last_use_b),
+    .body_a(found_a), .body_b(found_b), .moves_a(found_moves_a), .moves_b(found_moves_b),
+    .mass_a(found_mass_a), .mass_b(found_mass_b), .points(found_points),
+    .error(find_error), .error_code(find_error_code), .error_collision(find_error_collision)
+  );
+
+  // In the cycle before an issue the second beats of the collision before may still be in the FIFOs.
+  reg  second;                         // the second beats are taken in this cycle
+  wire [5:0] beats_needed = second ? 6'd3 : 6'd2;
+  wire beats_there = (count[0] >= beats_needed) & (count[1] >= beats_needed) & (count[2] >= beats_needed)
+                   & (count[3] != 6'd0);
+  issue #(
+    .COLLISION(COLLISION), .INTERLOCKED(INTERLOCKED),
+    .CONTACT_WINDOW(CONTACT_WINDOW), .FRICTION_WINDOW(FRICTION_WINDOW)
+  ) issuer (
+    .clk(clk), .clear(clear), .phase(phase), .passing(passing), .draining(draining),
+    .friction(friction), .parity(parity), .beats_there(beats_there), .found(found),
+    .last_use_a(last_use_a), .last_use_b(last_use_b), .moves_a(found_moves_a), .moves_b(found_moves_b),
+    .issues(issues), .stalls(stalls), .waits(waits), .hazards(hazards)
+  );
+
+  assign pop = loading ? {{2{loads[1]}}, {2{loads[0]}}}
+             : integrating ? {{2{pop_odd}}, {2{pop_even}}}
+             : {issues, {3{issues | second}}};
+
+  // The seven beats and the found facts of a collision, for the two cycles of its slot. Cycle 0 of a
+  // pipeline is the first of them.
+  reg  [511:0]    early;               // rows 0 to 3
+  reg  [895:0]    rows;                // rows 0 to 6
+  reg             valid;
+  reg  [BODY-1:0] early_a, early_b, body_a, body_b;
+  reg             early_moves_a, early_moves_b, moves_a, moves_b;
+  reg  [63:0]     early_mass_a, early_mass_b, mass_a, mass_b;
+  reg  [2:0]      early_points, points;
+  always @(posedge clk) begin
+    second <= issues & ~clear;
+    if (issues) begin
+      early <= {head[3], head[2], head[1], head[0]};
+      {early_a, early_b, early_moves_a, early_moves_b} <= {found_a, found_b, found_moves_a, found_moves_b};
+      {early_mass_a, early_mass_b, early_points}       <= {found_mass_a, found_mass_b, found_points};
+    end
+    if (phase) begin
+      valid <= second & ~clear;
+      rows  <= {head[2], head[1], head[0], early};
+      {body_a, body_b}         <= {early_a, early_b};
+      {moves_a, moves_b}       <= {early_moves_a & second, early_moves_b & second};
+      {mass_a, mass_b, points} <= {early_mass_a, early_mass_b, early_points};
+    end
+    if (clear) valid <= 1'b0;
+  end
+
+  wire [3:0] used = {points > 3'd3, points > 3'd2, points > 3'd1, points != 3'd0};
+  wire [31:0] per_count = (points == 3'd1) ? 32'h3f800000 : (points == 3'd2) ? 32'h3f000000
+                        : (points == 3'd3) ? 32'h3eaaaaab : 32'h3e800000;
+  // A mass below the smallest normal number moves but counts as 0 in arithmetic.
+  wire one_static = ~|mass_a[30:23] | ~|mass_b[30:23];
+
+  // ---- Times of a collision in the pipelines, in slots after its cycle 0
+
+  localparam LONGEST = ((CONTACT_DEPTH > FRICTION_DEPTH) ? CONTACT_DEPTH : FRICTION_DEPTH) / 2;
+  reg [LONGEST-1:0] slots;             // valid records, one bit a slot
+  always @(posedge clk) begin
+    if (clear) slots <= {LONGEST{1'b0}};
+    else if (~phase) slots <= {slots[LONGEST-2:0], valid};
+  end
+  wire contact_ends  = ~friction & slots[CONTACT_DEPTH/2 - 1];
+  wire friction_ends = friction & slots[FRICTION_DEPTH/2 - 1];
+  wire ends          = ~phase & (contact_ends | friction_ends);
+  wire reads_impulse = ~phase & (friction ? slots[(FRICTION_IMPULSES - READ_LATENCY)/2 - 1]
+                                          : slots[(CONTACT_IMPULSES - READ_LATENCY)/2 - 1]);
+
+  wire [BODY-1:0] contact_read_a, contact_read_b, friction_read_a, friction_read_b;
+  wire [BODY-1:0] contact_write_a, contact_write_b, friction_write_a, friction_write_b;
+  wire            contact_moves_a, contact_moves_b, friction_moves_a, friction_moves_b;
+  wire            contact_padding;
+  delay #(.WIDTH(2*BODY), .SLOTS((CONTACT_VELOCITIES - READ_LATENCY)/2)) contact_reads (
+    .clk(clk), .enable(~phase), .d({body_a, body_b}), .q({contact_read_a, contact_read_b})
+  );
+  delay #(.WIDTH(2*BODY), .SLOTS((FRICTION_VELOCITIES - READ_LATENCY)/2)) friction_reads (
+    .clk(clk), .enable(~phase), .d({body_a, body_b}), .q({friction_read_a, friction_read_b})
+  );
+  delay #(.WIDTH(2*BODY + 3), .SLOTS(CONTACT_DEPTH/2)) contact_writes (
+    .clk(clk), .enable(~phase), .d({body_a, body_b, moves_a, moves_b, points == 3'd0}),
+    .q({contact_write_a, contact_write_b, contact_moves_a, contact_moves_b, contact_padding})
+  );
+  delay #(.WIDTH(2*BODY + 2), .SLOTS(FRICTION_DEPTH/2)) friction_writes (
+    .clk(clk), .enable(~phase), .d({body_a, body_b, moves_a, moves_b}),
+    .q({friction_write_a, friction_write_b, friction_moves_a, friction_moves_b})
+  );
+
+  // ---- Velocities: in a pass port A is body A's and port B body B's; reads in phase 0, writes in
+  // phase 1, so that no address is read while it is written
+
+  wire [191:0] velocity_a, velocity_b;
+  wire [191:0] contact_velocity_a, contact_velocity_b, friction_velocity_a, friction_velocity_b;
+  reg          write_a, write_b;
+  reg  [BODY-1:0] write_address_a, write_address_b;
+  reg  [191:0] write_velocity_a, write_velocity_b;
+  always @(posedge clk) begin
+    write_a          <= ~clear & ends & (friction ? friction_moves_a : contact_moves_a);
+    write_b          <= ~clear & ends & (friction ? friction_moves_b : contact_moves_b);
+    write_address_a  <= friction ? friction_write_a : contact_write_a;
+    write_address_b  <= friction ? friction_write_b : contact_write_b;
+    write_velocity_a <= friction ? friction_velocity_a : contact_velocity_a;
+    write_velocity_b <= friction ? friction_velocity_b : contact_velocity_b;
+  end
+  wire in_pass = passing | draining;
+  true_dual_port #(
+    .WIDTH(192), .DEPTH(BODIES), .ADDRESS(BODY),
+    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
+  ) velocities (
+    .clk(clk),
+    .write_a(in_pass ? write_a : load_write[0]),
+    .address_a(integrating ? entering : ~in_pass ? load_address[0]
+               : phase ? write_address_a : friction ? friction_read_a : contact_read_a),
+    .in_a(in_pass ? write_velocity_a : load_velocity[0]), .out_a(velocity_a),
+    .write_b(in_pass ? write_b : load_write[1]),
+    .address_b(~in_pass ? load_address[1]
+               : phase ? write_address_b : friction ? friction_read_b : contact_read_b),
+    .in_b(in_pass ? write_velocity_b : load_velocity[1]), .out_b(velocity_b)
+  );
+
+  // ---- Impulses
+
+  wire [31:0]  impulse0, impulse1, impulse2, impulse3;
+  wire [127:0] contact_impulses;
+  wire [31:0]  contact_total;
+  wire [63:0]  friction_impulses;
+  impulses #(
+    .COLLISIONS(COLLISIONS), .COLLISION(COLLISION),
+    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
+  ) accumulated (
+    .clk(clk), .begin_pass(clear | begin_pass), .friction(friction), .first_of_kind(first_of_kind),
+    .last_contact(last_contact), .no_contacts(contact_passes == 9'd0), .read(reads_impulse),
+    .impulse0(impulse0), .impulse1(impulse1), .impulse2(impulse2), .impulse3(impulse3),
+    .write(ends), .contact_impulses(contact_impulses), .contact_total(contact_total),
+    .friction_impulses(friction_impulses)
+  );
+  impulse_sum impulse_words (
+    .clk(clk), .clear(clear), .valid(ends & contact_ends & last_contact & ~contact_padding),
+    .total(contact_total[30:0]), .sum(impulse_total)
+  );
+
+  // ---- Pipelines
+
+  contact contact_pipeline (
+    .clk(clk), .phase({phase, ~phase}),
+    .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
+    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[63:32]),
+    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[63:32]),
+    .linear_a(velocity_a[95:0]), .angular_a(velocity_a[191:96]),
+    .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
+    .per_second(per_second), .drift(drift), .coefficient(coefficient),
+    .point0(rows[479:384]), .distance0(rows[511:480]), .used0(used[0]), .impulse0(impulse0),
+    .point1(rows[607:512]), .distance1(rows[639:608]), .used1(used[1]), .impulse1(impulse1),
+    .point2(rows[735:640]), .distance2(rows[767:736]), .used2(used[2]), .impulse2(impulse2),
+    .point3(rows[863:768]), .distance3(rows[895:864]), .used3(used[3]), .impulse3(impulse3),
+    .out_impulse0(contact_impulses[31:0]), .out_impulse1(contact_impulses[63:32]),
+    .out_impulse2(contact_impulses[95:64]), .out_impulse3(contact_impulses[127:96]),
+    .out_total(contact_total),
+    .out_linear_a(contact_velocity_a[95:0]), .out_angular_a(contact_velocity_a[191:96]),
+    .out_linear_b(contact_velocity_b[95:0]), .out_angular_b(contact_velocity_b[191:96])
+  );
+  friction friction_pipeline (
+    .clk(clk), .phase({phase, ~phase}),
+    .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
+    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[63:32]),
+    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[63:32]),
+    .per_count(per_count), .one_static(one_static), .used0(used[0]),
+    .linear_a(velocity_a[95:0]), .angular_a(velocity_a[191:96]),
+    .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
+    .point0(rows[479:384]), .point1(rows[607:512]), .point2(rows[735:640]), .point3(rows[863:768]),
+    .used1(used[1]), .used2(used[2]), .used3(used[3]),
+    .total(impulse0), .friction(friction_coefficient), .impulse0(impulse1), .impulse1(impulse2),
+    .out_impulse0(friction_impulses[31:0]), .out_impulse1(friction_impulses[63:32]),
+    .out_linear_a(friction_velocity_a[95:0]), .out_angular_a(friction_velocity_a[191:96]),
+    .out_linear_b(friction_velocity_b[95:0]), .out_angular_b(friction_velocity_b[191:96])
+  );
+
+  // ---- Integration and streams out
+
+  wire [3:0]   room;
+  wire         pop_even, pop_odd;
+  wire         body_valid, body_moves;
+  integrator #(.BODY(BODY), .READ_LATENCY(READ_LATENCY)) integrates (
+    .clk(clk), .start(clear), .run(integrating), .integrate(integrate), .bodies(bodies), .room(&room),
+    .even_there((count[0] != 6'd0) & (count[1] != 6'd0)), .even_pose({head[1], head[0]}),
+    .odd_there((count[2] != 6'd0) & (count[3] != 6'd0)), .odd_pose({head[3], head[2]}),
+    .pop_even(pop_even), .pop_odd(pop_odd), .enters(enters), .finished(enter_finished),
+    .address(entering), .inverse_mass(properties[0][30:0]),
+    .valid(body_valid), .pose(body_pose), .moves(body_moves)
+  );
+
+  wire [95:0]  new_position, new_linear, new_angular;
+  wire [127:0] new_orientation;
+  integration integration_pipeline (
+    .clk(clk),
+    .position(body_pose[95:0]), .orientation(body_pose[255:128]),
+    .linear(velocity_a[95:0]), .angular(velocity_a[191:96]), .moves(body_moves),
+    .time_step(time_step), .damping(damping), .gravity_step(gravity_step),
+    .half_step(half_step), .series(series), .speed_limit(speed_limit),
+    .out_position(new_position), .out_orientation(new_orientation),
+    .out_linear(new_linear), .out_angular(new_angular)
+  );
+
+  wire result_valid;
+  timed_flag #(.STAGES(INTEGRATION_DEPTH)) result_time (
+    .clk(clk), .clear(clear), .d(body_valid), .q(result_valid)
+  );
+  wire [127:0] result [0:3];
+  wire [31:0]  sent [0:3];
+  assign result[0] = {32'd0, new_position};
+  assign result[1] = new_orientation;
+  assign result[2] = {32'd0, new_linear};
+  assign result[3] = {32'd0, new_angular};
+  generate
+    for (k = 0; k < 4; k = k + 1) begin : g_sender
+      sender #(.ADDRESS(10)) stream (
+        .clk(clk), .reset(reset), .start(start), .run(run), .bodies(bodies),
+        .enters(enters), .has_room(room[k]), .push(result_valid), .row(result[k]),
+        .tdata(m_tdata[128*k +: 128]), .tlast(m_tlast[k]), .tvalid(m_tvalid[k]), .tready(m_tready[k]),
+        .finished(sender_finished[k]), .sum(sent[k])
+      );
+    end
+  endgenerate
+  always @(posedge clk) sum_sent <= (sent[0] + sent[1]) + (sent[2] + sent[3]);
+
+  // ---- Errors: the first one stays
+
+  always @(posedge clk) begin
+    if (reset) begin
+      error <= 1'b0;
+    end else if (busy & ~error) begin
+      if (|wrong) begin
+        error         <= 1'b1;
+        error_code    <= wrong[0] ? wrong_code[0] : wrong[1] ? wrong_code[1] : wrong[2] ? wrong_code[2] : wrong_code[3];
+        error_channel <= wrong[0] ? 8'd0 : wrong[1] ? 8'd1 : wrong[2] ? 8'd2 : 8'd3;
+        error_detail  <= {11'd0, wrong[0] ? wrong_beat[0] : wrong[1] ? wrong_beat[1] : wrong[2] ? wrong_beat[2] : wrong_beat[3]};
+      end else if (|load_error) begin
+        error         <= 1'b1;
+        error_code    <= ERROR_SHAPE_INDEX;
+        error_channel <= 8'd0;
+        error_detail  <= {12'd0, load_error[0] ? load_error_body[0] : load_error_body[1]};
+      end else if (find_error) begin
+        error         <= 1'b1;
+        error_code    <= find_error_code;
+        error_channel <= 8'd0;
+        error_detail  <= {12'd0, find_error_collision};
+      end
+    end
+  end
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,38 @@
+// FIFO of 2^ADDRESS words whose oldest word is visible at `head` while `count` is not 0.
+//
+// The user pushes only while there is room and pops only while there is a word.
+`default_nettype none
+
+module fifo #(
+  parameter WIDTH   = 32,
+  parameter ADDRESS = 5
+) (
+  input  wire             clk,
+  input  wire             clear,
+  input  wire             push,
+  input  wire [WIDTH-1:0] in,
+  input  wire             pop,
+  output wire [WIDTH-1:0] head,
+  output reg  [ADDRESS:0] count
+);
+  reg [WIDTH-1:0]   words [0:(1<<ADDRESS)-1];
+  reg [ADDRESS-1:0] newest, oldest;
+
+  assign head = words[oldest];
+
+  always @(posedge clk) begin
+    if (push) words[newest] <= in;
+    if (clear) begin
+      newest <= {ADDRESS{1'b0}};
+      oldest <= {ADDRESS{1'b0}};
+      count  <= {(ADDRESS+1){1'b0}};
+    end else begin
+      if (push) newest <= newest + 1'b1;
+      if (pop) oldest <= oldest + 1'b1;
+      if (push & ~pop) count <= count + 1'b1;
+      if (pop & ~push) count <= count - 1'b1;
+    end
+  end
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,184 @@
+// Looks up, for each collision before it may be issued, the mass properties of its bodies and the
+// last collision before it that used one of them; and refuses what no pass can carry out.
+//
+// The finder runs ahead of the issue, in the order of the records and without waiting. A memory
+// holds for each body {parity of the pass, number of the collision} of its last use: read in a cycle
+// with phase 1, written in the next one. A use in an earlier pass has the other parity, and so has
+// the value that the load writes: neither is a hazard.
+`default_nettype none
+
+module finder #(
+  parameter BODIES    = 40960,
+  parameter BODY      = 16,
+  parameter COLLISION = 17
+) (
+  input  wire                 clk,
+  input  wire                 clear,
+  input  wire                 run,
+  input  wire                 phase,         // 1 in every second cycle
+  input  wire [19:0]          bodies,
+  input  wire [19:0]          collisions,
+
+  // The first beats of a collision, as they enter the accelerator.
+  input  wire                 count_comes,
+  input  wire [31:0]          count_word,
+  input  wire                 body_a_comes,
+  input  wire [31:0]          body_a_word,
+  input  wire                 body_b_comes,
+  input  wire [31:0]          body_b_word,
+
+  // The load clears the last uses.
+  input  wire                 load_a,
+  input  wire [BODY-1:0]      load_address_a,
+  input  wire                 load_b,
+  input  wire [BODY-1:0]      load_address_b,
+
+  // Shapes of the bodies: properties 3 cycles after the address.
+  output wire [BODY-1:0]      shape_address_a,
+  output wire [BODY-1:0]      shape_address_b,
+  input  wire [63:0]          properties_a,
+  input  wire [63:0]          properties_b,
+
+  // The collision that is issued next.
+  input  wire                 pop,
+  output wire [5:0]           found,         // collisions that wait for their issue
+  output wire [COLLISION:0]   last_use_a,    // {parity, collision}
+  output wire [COLLISION:0]   last_use_b,
+  output wire [BODY-1:0]      body_a,
+  output wire [BODY-1:0]      body_b,
+  output wire                 moves_a,       // hazards and write-backs; 0 for padding
+  output wire                 moves_b,
+  output wire [63:0]          mass_a,
+  output wire [63:0]          mass_b,
+  output wire [2:0]           points,        // 0 for padding
+
+  output reg                  error,
+  output reg  [7:0]           error_code,
+  output reg  [19:0]          error_collision
+);
+`include "pgs_interface.vh"
+
+  // Words of a record, with all that a check needs of them: an index too long for a body's number, a
+  // count too large for three bits.
+  wire [BODY:0] next_a, next_b;
+  wire [2:0]    next_count;
+  wire [5:0]    waiting_a, waiting_b, waiting_count;
+  wire          take;
+  wire [2:0]    count_in = |count_word[31:3] ? 3'd7 : count_word[2:0];
+
+  fifo #(.WIDTH(3), .ADDRESS(5)) counts (
+    .clk(clk), .clear(clear), .push(count_comes), .in(count_in),
+    .pop(take), .head(next_count), .count(waiting_count)
+  );
+  fifo #(.WIDTH(BODY + 1), .ADDRESS(5)) bodies_a (
+    .clk(clk), .clear(clear), .push(body_a_comes), .in({|body_a_word[31:BODY], body_a_word[BODY-1:0]}),
+    .pop(take), .head(next_a), .count(waiting_a)
+  );
+  fifo #(.WIDTH(BODY + 1), .ADDRESS(5)) bodies_b (
+    .clk(clk), .clear(clear), .push(body_b_comes), .in({|body_b_word[31:BODY], body_b_word[BODY-1:0]}),
+    .pop(take), .head(next_b), .count(waiting_b)
+  );
+
+  assign take = run & phase & (waiting_a != 6'd0) & (waiting_b != 6'd0) & (waiting_count != 6'd0)
+              & (found < 6'd24);
+
+  // The number and the pass of the collision that is taken.
+  reg [COLLISION-1:0] number;
+  reg [19:0]          left;
+  reg                 number_is_last, parity;
+  always @(posedge clk) begin
+    if (clear) begin
+      number         <= {COLLISION{1'b0}};
+      left           <= collisions;
+      number_is_last <= collisions == 20'd1;
+      parity         <= 1'b0;
+    end else if (take) begin
+      if (number_is_last) begin
+        number         <= {COLLISION{1'b0}};
+        left           <= collisions;
+        number_is_last <= collisions == 20'd1;
+        parity         <= ~parity;
+      end else begin
+        number         <= number + 1'b1;
+        left           <= left - 20'd1;
+        number_is_last <= left == 20'd2;
+      end
+    end
+  end
+
+  // Stage 0 reads, stage 1 writes, stage 3 has everything.
+  reg                 valid_s1, valid_s2, valid_s3;
+  reg [BODY-1:0]      a_s1, a_s2, a_s3, b_s1, b_s2, b_s3;
+  reg [COLLISION-1:0] number_s1, number_s2, number_s3;
+  reg                 parity_s1;
+  reg [2:0]           count_s1, count_s2, count_s3;
+  reg                 beyond_s1, beyond_s2, beyond_s3;
+  reg                 same_s1, same_s2, same_s3;
+  wire                beyond_a = next_a[BODY] | ({{(20-BODY){1'b0}}, next_a[BODY-1:0]} >= bodies);
+  wire                beyond_b = next_b[BODY] | ({{(20-BODY){1'b0}}, next_b[BODY-1:0]} >= bodies);
+  always @(posedge clk) begin
+    valid_s1  <= take & ~clear;
+    a_s1      <= next_a[BODY-1:0];
+    b_s1      <= next_b[BODY-1:0];
+    number_s1 <= number;
+    parity_s1 <= parity;
+    count_s1  <= next_count;
+    beyond_s1 <= beyond_a | beyond_b;
+    same_s1   <= next_a == next_b;
+
+    valid_s2  <= valid_s1 & ~clear;
+    {a_s2, b_s2, number_s2, count_s2, beyond_s2, same_s2}
+      <= {a_s1, b_s1, number_s1, count_s1, beyond_s1, same_s1};
+
+    valid_s3  <= valid_s2 & ~clear;
+    {a_s3, b_s3, number_s3, count_s3, beyond_s3, same_s3}
+      <= {a_s2, b_s2, number_s2, count_s2, beyond_s2, same_s2};
+  end
+
+  assign shape_address_a = next_a[BODY-1:0];
+  assign shape_address_b = next_b[BODY-1:0];
+
+  localparam [COLLISION:0] NEVER = {1'b1, {COLLISION{1'b0}}};
+  wire                 uses = valid_s1 & (count_s1 != 3'd0);
+  wire                 load = load_a | load_b;
+  wire [BODY-1:0]      use_address_a = load ? load_address_a : phase ? next_a[BODY-1:0] : a_s1;
+  wire [BODY-1:0]      use_address_b = load ? load_address_b : phase ? next_b[BODY-1:0] : b_s1;
+  wire [COLLISION:0]   use_in = load ? NEVER : {parity_s1, number_s1};
+  wire [COLLISION:0]   use_a_s2, use_b_s2;
+  reg  [COLLISION:0]   use_a_s3, use_b_s3;
+  true_dual_port #(
+    .WIDTH(COLLISION + 1), .DEPTH(BODIES), .ADDRESS(BODY), .OUTPUT_STAGES(1)
+  ) last_uses (
+    .clk(clk),
+    .write_a(load ? load_a : uses), .address_a(use_address_a), .in_a(use_in), .out_a(use_a_s2),
+    .write_b(load ? load_b : uses), .address_b(use_address_b), .in_b(use_in), .out_b(use_b_s2)
+  );
+  always @(posedge clk) begin
+    use_a_s3 <= use_a_s2;
+    use_b_s3 <= use_b_s2;
+  end
+
+  wire padding    = count_s3 == 3'd0;
+  wire moves_a_s3 = |properties_a[30:0] & ~padding;
+  wire moves_b_s3 = |properties_b[30:0] & ~padding;
+
+  localparam WIDTH = 2 * (COLLISION + 1) + 2 * BODY + 2 + 128 + 3;
+  fifo #(.WIDTH(WIDTH), .ADDRESS(5)) found_collisions (
+    .clk(clk), .clear(clear), .push(valid_s3),
+    .in({use_a_s3, use_b_s3, a_s3, b_s3, moves_a_s3, moves_b_s3, properties_a, properties_b, count_s3}),
+    .pop(pop),
+    .head({last_use_a, last_use_b, body_a, body_b, moves_a, moves_b, mass_a, mass_b, points}),
+    .count(found)
+  );
+
+  always @(posedge clk) begin
+    error <= valid_s3 & ~padding & ~clear
+           & ((count_s3 > 3'd4) | beyond_s3 | same_s3 | ~(moves_a_s3 | moves_b_s3));
+    error_code <= (count_s3 > 3'd4) ? ERROR_CONTACT_COUNT
+                : beyond_s3 ? ERROR_BODY_INDEX
+                : same_s3 ? ERROR_SELF_COLLISION : ERROR_STATIC_PAIR;
+    error_collision <= {{(20-COLLISION){1'b0}}, number_s3};
+  end
+endmodule
+
+`default_nettype wire

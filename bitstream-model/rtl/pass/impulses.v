@@ -1,0 +1,65 @@
+// The accumulated impulses: four words a collision, read and written in the order of the records.
+//
+//                      word 0          word 1      word 2      word 3
+//   contact passes     L_0             L_1         L_2         L_3
+//   last one writes    their total     L_1         L_2         L_3
+//   friction passes    the total       G_0         G_1
+//
+// All start at 0. Nothing clears the memory: the first pass of a kind reads 0 instead of it.
+`default_nettype none
+
+module impulses #(
+  parameter COLLISIONS     = 131072,
+  parameter COLLISION      = 17,
+  parameter ADDRESS_STAGES = 2,
+  parameter OUTPUT_STAGES  = 3
+) (
+  input  wire         clk,
+  input  wire         begin_pass,       // both counters go back to the first collision
+  input  wire         friction,
+  input  wire         first_of_kind,
+  input  wire         last_contact,
+  input  wire         no_contacts,      // the step has no contact pass, so that all totals are 0
+
+  input  wire         read,             // the next collision; its impulses follow the latency later
+  output wire [31:0]  impulse0,         // L_0, or the total
+  output wire [31:0]  impulse1,         // L_1, or G_0
+  output wire [31:0]  impulse2,         // L_2, or G_1
+  output wire [31:0]  impulse3,         // L_3
+
+  input  wire         write,
+  input  wire [127:0] contact_impulses, // L_3 .. L_0
+  input  wire [31:0]  contact_total,
+  input  wire [63:0]  friction_impulses // G_1, G_0
+);
+  reg  [COLLISION-1:0] next_read, next_write, write_address;
+  reg  [3:0]           write_words;
+  reg  [127:0]         in;
+  wire [127:0]         out;
+
+  always @(posedge clk) begin
+    if (begin_pass) next_read <= {COLLISION{1'b0}};
+    else if (read) next_read <= next_read + 1'b1;
+    if (begin_pass) next_write <= {COLLISION{1'b0}};
+    else if (write) next_write <= next_write + 1'b1;
+    write_address <= next_write;
+    write_words   <= ~write ? 4'b0000 : friction ? 4'b0110 : 4'b1111;
+    in            <= friction ? {32'd0, friction_impulses, 32'd0}
+                              : {contact_impulses[127:32], last_contact ? contact_total : contact_impulses[31:0]};
+  end
+
+  simple_dual_port #(
+    .WORDS(4), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
+    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
+  ) memory (
+    .clk(clk), .write(write_words), .write_address(write_address), .in(in), .read_address(next_read), .out(out)
+  );
+
+  wire total_is_zero = friction ? no_contacts : first_of_kind;
+  assign impulse0 = total_is_zero ? 32'd0 : out[31:0];
+  assign impulse1 = first_of_kind ? 32'd0 : out[63:32];
+  assign impulse2 = first_of_kind ? 32'd0 : out[95:64];
+  assign impulse3 = first_of_kind ? 32'd0 : out[127:96];
+endmodule
+
+`default_nettype wire

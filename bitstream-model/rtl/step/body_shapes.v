@@ -1,0 +1,53 @@
+// The shape of every body, and the mass properties of every shape.
+//
+// A body's number at `address` gives its properties 3 cycles later. While `loading`, the properties
+// of the shape at `lookup` come one cycle later instead.
+`default_nettype none
+
+module body_shapes #(
+  parameter BODIES = 40960,
+  parameter BODY   = 16,
+  parameter SHAPE  = 6
+) (
+  input  wire             clk,
+  input  wire [1:0]       table_write,   // inverse mass, inverse inertia
+  input  wire [SHAPE-1:0] table_address,
+  input  wire [31:0]      table_in,
+
+  input  wire             loading,
+  input  wire             write_a,
+  input  wire [BODY-1:0]  address_a,
+  input  wire [7:0]       shape_a,
+  input  wire [SHAPE-1:0] lookup_a,
+  output reg  [63:0]      properties_a,  // {inverse inertia, inverse mass}
+  input  wire             write_b,
+  input  wire [BODY-1:0]  address_b,
+  input  wire [7:0]       shape_b,
+  input  wire [SHAPE-1:0] lookup_b,
+  output reg  [63:0]      properties_b
+);
+  reg [31:0] inverse_mass [0:(1<<SHAPE)-1];
+  reg [31:0] inverse_inertia [0:(1<<SHAPE)-1];
+  always @(posedge clk) begin
+    if (table_write[0]) inverse_mass[table_address] <= table_in;
+    if (table_write[1]) inverse_inertia[table_address] <= table_in;
+  end
+
+  wire [7:0] found_a, found_b;
+  true_dual_port #(.WIDTH(8), .DEPTH(BODIES), .ADDRESS(BODY), .OUTPUT_STAGES(1)) shape_of_body (
+    .clk(clk),
+    .write_a(write_a), .address_a(address_a), .in_a(shape_a), .out_a(found_a),
+    .write_b(write_b), .address_b(address_b), .in_b(shape_b), .out_b(found_b)
+  );
+
+  wire unused = &{1'b0, found_a[7:SHAPE], found_b[7:SHAPE]};
+
+  wire [SHAPE-1:0] index_a = loading ? lookup_a : found_a[SHAPE-1:0];
+  wire [SHAPE-1:0] index_b = loading ? lookup_b : found_b[SHAPE-1:0];
+  always @(posedge clk) begin
+    properties_a <= {inverse_inertia[index_a], inverse_mass[index_a]};
+    properties_b <= {inverse_inertia[index_b], inverse_mass[index_b]};
+  end
+endmodule
+
+`default_nettype wire

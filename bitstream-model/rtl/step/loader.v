@@ -1,0 +1,79 @@
+// Load: the velocities and the shapes of all bodies go from the streams into the memories, a pair of
+// bodies a cycle: the even one from streams 0 and 1 through port A, the odd one from streams 2 and 3
+// through port B. Both enter together, so that a load takes as many cycles as there are pairs.
+//
+// A static body is at rest because of its shape: 0 is stored, whatever its words are.
+`default_nettype none
+
+module loader #(
+  parameter BODY      = 16,      // bits of a body's number
+  parameter SHAPE     = 6,       // bits of a shape's number
+  parameter ODD       = 0        // 1: this is the loader of the odd bodies
+) (
+  input  wire            clk,
+  input  wire            start,
+  input  wire            run,
+  input  wire [19:0]     bodies,
+
+  input  wire            linear_there,    // the oldest beats of both streams
+  input  wire [127:0]    linear,
+  input  wire            angular_there,
+  input  wire [127:0]    angular,
+  output wire            ready,           // the body is there, or there is none on this side
+  input  wire            other_ready,
+  output wire            pop,
+  output reg             finished,        // all bodies have been taken
+
+  output reg  [SHAPE-1:0] lookup,         // shape whose properties are needed in the next cycle
+  input  wire            lookup_moves,
+
+  output reg             write,
+  output reg  [BODY-1:0] address,
+  output reg  [7:0]      shape,
+  output wire [191:0]    velocity,
+
+  output reg             error,           // a shape index beyond the table
+  output reg  [19:0]     error_body
+);
+  reg  [19:0] body;         // the next one
+  reg         write_s1;
+  reg  [BODY-1:0] body_s1;
+  reg  [7:0]  shape_s1;
+  reg [191:0] velocity_s1, velocity_s2;
+
+  // Bodies left on this side, as a down-counter with a prepared flag.
+  reg  [19:0] left;
+  wire [19:0] share = (bodies + ((ODD == 0) ? 20'd1 : 20'd0)) >> 1;
+
+  assign ready    = finished | (linear_there & angular_there);
+  assign pop      = run & ~finished & ready & other_ready;
+  wire unused = &{1'b0, angular[127:96]};
+  assign velocity = lookup_moves ? velocity_s2 : 192'd0;
+
+  always @(posedge clk) begin
+    if (start) begin
+      body     <= (ODD == 0) ? 20'd0 : 20'd1;
+      left     <= share;
+      finished <= share == 20'd0;
+    end else if (pop) begin
+      body     <= body + 20'd2;
+      left     <= left - 20'd1;
+      finished <= left == 20'd1;
+    end
+
+    write_s1    <= pop;
+    body_s1     <= body[BODY-1:0];
+    lookup      <= linear[96 +: SHAPE];
+    shape_s1    <= linear[103:96];
+    velocity_s1 <= {angular[95:0], linear[95:0]};
+    error       <= pop & |linear[127:96+SHAPE];
+    error_body  <= body;
+
+    write       <= write_s1;
+    address     <= body_s1;
+    shape       <= shape_s1;
+    velocity_s2 <= velocity_s1;
+  end
+endmodule
+
+`default_nettype wire

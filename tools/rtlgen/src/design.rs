@@ -1,0 +1,122 @@
+//! One build of the accelerator: its parameters, and the schedules that follow from them.
+
+use pgs_interface::profile::{FLOAT, Depth};
+use pgs_interface::record::CONTACT_POINTS;
+
+use crate::equations;
+use crate::graph::Graph;
+use crate::schedule::Schedule;
+
+/// What a user chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Parameters {
+    /// Bodies that the memories hold.
+    pub bodies: u32,
+    /// Collisions that the memories hold.
+    pub collisions: u32,
+    /// Whether a collision waits for the velocities that it needs; otherwise it reads stale ones,
+    /// and HAZARDS counts.
+    pub interlocked: bool,
+    /// Registers in front of the velocities and the impulses.
+    pub address_stages: u32,
+    /// Registers behind the velocities and the impulses.
+    pub output_stages: u32,
+    /// Clock that CLOCK_KHZ reports.
+    pub clock_khz: u32,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            bodies: 40_960,
+            collisions: 131_072,
+            interlocked: true,
+            address_stages: 2,
+            output_stages: 3,
+            clock_khz: FLOAT.clock_khz,
+        }
+    }
+}
+
+impl Parameters {
+    /// Cycles from an address to the velocity or the impulses.
+    #[must_use]
+    pub fn read_latency(&self) -> u32 {
+        self.address_stages + 1 + self.output_stages
+    }
+}
+
+/// A pipeline: its equations and their schedule.
+#[derive(Debug)]
+pub struct Pipeline {
+    /// Name of the Verilog module.
+    pub name: &'static str,
+    /// The equations.
+    pub graph: Graph,
+    /// Their schedule.
+    pub schedule: Schedule,
+}
+
+impl Pipeline {
+    fn new(name: &'static str, graph: Graph, interval: u32) -> Self {
+        let schedule = Schedule::new(&graph, interval);
+        Self { name, graph, schedule }
+    }
+}
+
+/// A build of profile `float`.
+#[derive(Debug)]
+pub struct Design {
+    /// The choices.
+    pub parameters: Parameters,
+    /// Contact passes, a collision every initiation interval of the profile.
+    pub contact: Pipeline,
+    /// Friction passes, likewise.
+    pub friction: Pipeline,
+    /// Integration, a body a cycle: as fast as the streams take results.
+    pub integration: Pipeline,
+}
+
+/// Cycles between the issue of a collision and cycle 0 of its pipeline, and between the results and
+/// the first issue that sees them: record registers, write registers.
+const AROUND_A_PASS: u32 = 8;
+
+impl Design {
+    /// Schedules the three pipelines.
+    #[must_use]
+    pub fn new(parameters: Parameters) -> Self {
+        let interval = FLOAT.initiation_interval;
+        Self {
+            parameters,
+            contact: Pipeline::new("contact", equations::contact(CONTACT_POINTS), interval),
+            friction: Pipeline::new("friction", equations::friction(), interval),
+            integration: Pipeline::new("integration", equations::integration(), 1),
+        }
+    }
+
+    /// The three pipelines.
+    #[must_use]
+    pub fn pipelines(&self) -> [&Pipeline; 3] {
+        [&self.contact, &self.friction, &self.integration]
+    }
+
+    /// Fill and hazard window of a pass, as the capability registers report them.
+    ///
+    /// The window is the time from the read of the velocities to the first read that sees the
+    /// write-back: from the address, a read latency before the velocities are there, to the write,
+    /// which passes the same address registers, one interval after the results.
+    #[must_use]
+    pub fn depth(&self, pass: &Pipeline) -> Depth {
+        let schedule = &pass.schedule;
+        let after_velocities = unsigned(schedule.depth - schedule.velocities_at);
+        Depth {
+            fill: unsigned(schedule.depth) + AROUND_A_PASS,
+            window: after_velocities + self.parameters.read_latency() + unsigned(schedule.interval),
+        }
+    }
+}
+
+/// A cycle of a schedule, which is never negative.
+fn unsigned(cycle: i32) -> u32 {
+    u32::try_from(cycle).unwrap_or(0)
+}

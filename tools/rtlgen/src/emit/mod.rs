@@ -1,0 +1,46 @@
+//! Writes a design as Verilog-2001: a module for each pipeline, and headers with the facts that the
+//! hand-written modules need of it.
+
+mod headers;
+mod pipeline;
+
+use std::fmt;
+
+use crate::design::Design;
+use crate::sources;
+
+/// A file of the generated folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct File {
+    /// Its name.
+    pub name: String,
+    /// Its text.
+    pub text: String,
+}
+
+/// All files of a design, ready for a tool: hand-written and generated modules, headers, and
+/// `pgs.f`, the list of the modules.
+///
+/// # Errors
+///
+/// None while there is memory for the text.
+pub fn files(design: &Design) -> Result<Vec<File>, fmt::Error> {
+    let file = |name: &str, text: String| File { name: name.into(), text };
+    let mut files = vec![
+        file("pgs_interface.vh", headers::interface()?),
+        file("pgs_operators.vh", headers::operators()?),
+        file("pgs_schedule.vh", headers::schedule(design)?),
+    ];
+    let mut modules = Vec::new();
+    for source in sources::ALL {
+        modules.push(file(source.name, source.text.into()));
+    }
+    for pipeline in design.pipelines() {
+        let text = pipeline::pipeline(pipeline.name, &pipeline.graph, &pipeline.schedule)?;
+        modules.push(file(&format!("{}.v", pipeline.name), text));
+    }
+    let list: String = modules.iter().map(|module| format!("{}\n", module.name)).collect();
+    files.append(&mut modules);
+    files.push(file("pgs.f", list));
+    Ok(files)
+}

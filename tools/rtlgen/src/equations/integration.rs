@@ -1,0 +1,105 @@
+//! Integration of one body.
+//!
+//! ```text
+//! w = w * damping;  a = sqrt(dot(w,w));  if a*dt > limit: a = limit / dt     limit = 0.25 * 3.1415925
+//! a < 0.001:  h = w * (0.5*dt - ((((dt*dt)*dt) * 0.020833334) * a) * a)
+//! otherwise:  h = w * (sin((0.5*a)*dt) / a)
+//! r = (h, cos((a*dt)*0.5)) * q;  q = r * (1 / |r|);  p = p + v*dt;  v = v + g*dt
+//! ```
+//!
+//! What depends on the arguments alone is computed once a step, by the unit `constants`:
+//! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt and the
+//! three components of g*dt. The arguments of the sine and of the cosine are the same number, for
+//! a factor of 0.5 is exact.
+
+use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW};
+
+use crate::graph::{Graph, Operand, Source, Vec3};
+
+/// The graph of the integration. `moves` is 0 for a body that keeps its state: a static one, or
+/// any body of a step without integration.
+#[must_use]
+pub fn integration() -> Graph {
+    let mut graph = Graph::default();
+    let g = &mut graph;
+    let position = g.input3(Source::Record, "position");
+    let orientation = g.input4(Source::Record, "orientation");
+    let linear = g.input3(Source::Velocity, "linear");
+    let angular = g.input3(Source::Velocity, "angular");
+    let moves = g.input(Source::Flag, "moves");
+    let time_step = g.input(Source::Argument, "time_step");
+    let damping = g.input(Source::Argument, "damping");
+    let gravity = g.input3(Source::Argument, "gravity_step");
+
+    let damped = g.within("damped", |g| g.scale(angular, damping));
+    let rotation = g.within("rotation", |g| rotation(g, damped, time_step));
+    let turned = g.within("turned", |g| turned(g, rotation, orientation));
+
+    let way = g.within("way", |g| g.scale(linear, time_step));
+    let moved = g.within("moved", |g| g.add3(position, way));
+    let fallen = g.within("fallen", |g| g.add3(linear, gravity));
+    output_if(g, moves, "position", moved.0, position.0);
+    output_if(g, moves, "orientation", turned, orientation);
+    output_if(g, moves, "linear", fallen.0, linear.0);
+    output_if(g, moves, "angular", damped.0, angular.0);
+    graph
+}
+
+/// An output: the new values where `moves` is 1, else the old ones.
+fn output_if<const N: usize>(
+    g: &mut Graph,
+    moves: Operand,
+    name: &str,
+    new: [Operand; N],
+    old: [Operand; N],
+) {
+    let chosen: Vec<_> =
+        new.into_iter().zip(old).map(|(new, old)| g.select(moves, new, old)).collect();
+    g.output(name, &chosen);
+}
+
+/// The rotation of one time step as a quaternion: h, and the cosine of half the angle.
+fn rotation(g: &mut Graph, angular: Vec3, time_step: Operand) -> [Operand; 4] {
+    let [half_step, series, speed_limit] =
+        ["half_step", "series", "speed_limit"].map(|name| g.input(Source::Argument, name));
+    let square = g.dot(angular, angular);
+    let speed = g.square_root(square);
+    let limit = g.constant(ROTATION_LIMIT);
+    let angle = g.multiply(speed, time_step);
+    let too_fast = g.less(limit, angle);
+    let speed = g.select(too_fast, speed_limit, speed);
+
+    let slow_below = g.constant(SERIES_BELOW);
+    let slow = g.less(speed, slow_below);
+    let term = g.multiply(series, speed);
+    let term = g.multiply(term, speed);
+    let by_series = g.subtract(half_step, term);
+
+    let angle = g.multiply(speed, time_step);
+    let half = g.constant(0.5);
+    let half_angle = g.multiply(angle, half);
+    let [sine, cosine] = g.sine_cosine(half_angle);
+    let by_sine = g.divide(sine, speed);
+    let scale = g.select(slow, by_series, by_sine);
+    let Vec3([x, y, z]) = g.scale(angular, scale);
+    [x, y, z, cosine]
+}
+
+/// The product of rotation and orientation, normalised.
+fn turned(g: &mut Graph, [x, y, z, c]: [Operand; 4], [qx, qy, qz, qw]: [Operand; 4]) -> [Operand; 4] {
+    let mut sum = |terms: [(Operand, Operand); 4]| {
+        let [first, rest @ ..] = terms.map(|(a, b)| g.multiply(a, b));
+        rest.into_iter().fold(first, |sum, term| g.add(sum, term))
+    };
+    let r = [
+        sum([(c, qx), (x, qw), (y, qz), (z.negated(), qy)]),
+        sum([(c, qy), (y, qw), (z, qx), (x.negated(), qz)]),
+        sum([(c, qz), (z, qw), (x, qy), (y.negated(), qx)]),
+        sum([(c, qw), (x.negated(), qx), (y.negated(), qy), (z.negated(), qz)]),
+    ];
+    let square = sum(r.map(|part| (part, part)));
+    let length = g.square_root(square);
+    let one = g.constant(1.0);
+    let scale = g.divide(one, length);
+    r.map(|part| g.multiply(part, scale))
+}
