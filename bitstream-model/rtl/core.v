@@ -119,7 +119,7 @@ module core #(
   wire [20:0]  wrong_beat [0:3];
   wire [7:0]   wrong_code [0:3];
   wire [3:0]   pop, wrong, collision_begins;
-  wire         unused = &{1'b0, collision_begins[3], body_pose[127:96]};
+  wire         unused = &{1'b0, collision_begins[3], body_pose[127:96], rows[127:96], rows[255:224], rows[383:352]};
   genvar k;
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_receiver
