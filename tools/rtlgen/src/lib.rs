@@ -5,4 +5,5 @@
 //! are written by hand in `bitstream-model/rtl`.
 #![forbid(unsafe_code)]
 
+pub mod sources;
 pub mod verify;
