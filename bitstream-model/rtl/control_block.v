@@ -5,9 +5,7 @@
 // 32 bits does not exist here: strobes are ignored, as the specification allows 32 bits only.
 `default_nettype none
 
-module control_block #(
-  parameter INTERLOCKED = 1
-) (
+module control_block (
   input  wire        clk,
   input  wire        resetn,
 
@@ -252,7 +250,7 @@ module control_block #(
       OFFSET_IDENTIFICATION:       read = CAPABILITY_IDENTIFICATION;
       OFFSET_VERSION:              read = CAPABILITY_VERSION;
       OFFSET_PROFILE:              read = CAPABILITY_PROFILE;
-      OFFSET_FEATURES:             read = CAPABILITY_FEATURES | ((INTERLOCKED != 0) ? FEATURE_INTERLOCKED : 32'd0);
+      OFFSET_FEATURES:             read = CAPABILITY_FEATURES;
       OFFSET_CHANNELS:             read = CAPABILITY_CHANNELS;
       OFFSET_MM2S_WIDTHS:          read = CAPABILITY_MM2S_WIDTHS;
       OFFSET_S2MM_WIDTHS:          read = CAPABILITY_S2MM_WIDTHS;

@@ -9,9 +9,7 @@
 // schedule of a step.
 `default_nettype none
 
-module core #(
-  parameter INTERLOCKED = 1
-) (
+module core (
   input  wire         clk,
   input  wire         reset,
   input  wire         start,
@@ -202,7 +200,7 @@ module core #(
   wire beats_there = (count[0] >= beats_needed) & (count[1] >= beats_needed) & (count[2] >= beats_needed)
                    & (count[3] != 6'd0);
   issue #(
-    .COLLISION(COLLISION), .INTERLOCKED(INTERLOCKED),
+    .COLLISION(COLLISION), .INTERLOCKED(DESIGN_INTERLOCKED),
     .CONTACT_WINDOW(CONTACT_WINDOW), .FRICTION_WINDOW(FRICTION_WINDOW)
   ) issuer (
     .clk(clk), .clear(clear), .phase(phase), .passing(passing), .draining(draining),

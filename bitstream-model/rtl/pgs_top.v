@@ -2,9 +2,7 @@
 // level-sensitive interrupt. Tools infer the interfaces from the names of the ports.
 `default_nettype none
 
-module pgs_top #(
-  parameter INTERLOCKED = 1
-) (
+module pgs_top (
   (* X_INTERFACE_INFO = "xilinx.com:signal:clock:1.0 aclk CLK" *)
   (* X_INTERFACE_PARAMETER = "ASSOCIATED_BUSIF s_axi:s0_axis:s1_axis:s2_axis:s3_axis:m0_axis:m1_axis:m2_axis:m3_axis, ASSOCIATED_RESET aresetn" *)
   input  wire         aclk,
@@ -66,7 +64,7 @@ module pgs_top #(
   wire unused = &{1'b0, s_axi_wstrb, bodies[31:20], collisions[31:20],
                   contact_iterations[31:8], friction_iterations[31:8], flags[31:1]};
 
-  control_block #(.INTERLOCKED(INTERLOCKED)) control (
+  control_block control (
     .clk(aclk), .resetn(aresetn),
     .awaddr(s_axi_awaddr), .awvalid(s_axi_awvalid), .awready(s_axi_awready),
     .wdata(s_axi_wdata), .wvalid(s_axi_wvalid), .wready(s_axi_wready),
@@ -84,7 +82,7 @@ module pgs_top #(
     .hazards(hazards), .sum_received(sum_received), .sum_sent(sum_sent), .impulse_total(impulse_total)
   );
 
-  core #(.INTERLOCKED(INTERLOCKED)) accelerator (
+  core accelerator (
     .clk(aclk), .reset(core_reset), .start(start),
     .bodies(bodies[19:0]), .collisions(collisions[19:0]),
     .contact_iterations(contact_iterations[7:0]), .friction_iterations(friction_iterations[7:0]),

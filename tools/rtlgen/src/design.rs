@@ -1,6 +1,6 @@
 //! One build of the accelerator: its parameters, and the schedules that follow from them.
 
-use pgs_interface::profile::{FLOAT, Depth};
+use pgs_interface::profile::{Depth, FLOAT};
 use pgs_interface::record::CONTACT_POINTS;
 
 use crate::equations;
@@ -21,7 +21,7 @@ pub struct Parameters {
     pub address_stages: u32,
     /// Registers behind the velocities and the impulses.
     pub output_stages: u32,
-    /// Clock that CLOCK_KHZ reports.
+    /// Clock that `CLOCK_KHZ` reports, kHz.
     pub clock_khz: u32,
 }
 
@@ -98,6 +98,12 @@ impl Design {
     #[must_use]
     pub fn pipelines(&self) -> [&Pipeline; 3] {
         [&self.contact, &self.friction, &self.integration]
+    }
+
+    /// Fill and hazard window of a pipeline, if it is one of the passes.
+    #[must_use]
+    pub fn pass_depth(&self, pipeline: &Pipeline) -> Option<Depth> {
+        (pipeline.schedule.velocities_at > 0).then(|| self.depth(pipeline))
     }
 
     /// Fill and hazard window of a pass, as the capability registers report them.

@@ -11,5 +11,6 @@ pub mod equations;
 pub mod graph;
 pub mod operators;
 pub mod schedule;
+pub mod simulator;
 pub mod sources;
 pub mod verify;

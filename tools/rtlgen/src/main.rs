@@ -2,10 +2,12 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stderr, reason = "a program says what it does")]
 
+use std::error::Error as _;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use rtlgen::verify;
 
 mod verbs;
 
@@ -19,22 +21,66 @@ struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
+  rtlgen generate --out rtl            the accelerator, as a folder of Verilog for a tool
+  rtlgen simulator --out rtl-sim       a simulator of it, for `pgs --accelerator rtl:rtl-sim/pgs-rtl`
+  rtlgen schedule                      depths, units and delays of the pipelines
   rtlgen operators --vectors 1000000   the operators against an independent reference
+  rtlgen sincos --all                  sine and cosine in fixed point against libm
 
-Exit codes: 0 done; 1 a check failed; 2 wrong usage; 77 a tool that the verb needs is not installed.";
+Exit codes: 0 done; 1 a check failed; 2 wrong usage or an error; 77 a tool that the verb needs is
+not installed.";
 
 #[derive(Debug, Subcommand)]
-enum Verb { None }
+enum Verb {
+    Generate(verbs::generate::Generate),
+    Simulator(verbs::simulator::Simulator),
+    Schedule(verbs::schedule::Schedule),
+    Operators(verbs::operators::Operators),
+    Sincos(verbs::sincos::Sincos),
+}
+
+/// Wrong usage, or an error that keeps a verb from its result.
+const USAGE: u8 = 2;
+/// A tool that the verb needs is not installed. Test runners take it as skipped.
+const SKIPPED: u8 = 77;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
     let mut out = io::stdout().lock();
-    let done = match cli.verb { Verb::None => Ok::<_, io::Error>(ExitCode::SUCCESS) };
-    match done {
+    let done = match Cli::try_parse() {
+        Ok(cli) => act(&cli.verb, &mut out),
+        Err(message) if message.use_stderr() => message.exit(),
+        // Help or the version.
+        Err(message) => write!(out, "{message}").map(|()| ExitCode::SUCCESS).map_err(Into::into),
+    };
+    match done.and_then(|code| out.flush().map(|()| code).map_err(Into::into)) {
         Ok(code) => code,
+        // The reader of a pipe has seen enough.
+        Err(verbs::Error::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => {
+            ExitCode::SUCCESS
+        }
+        Err(verbs::Error::Verify(error @ verify::Error::Missing { .. })) => {
+            eprintln!("skipped: {error}");
+            ExitCode::from(SKIPPED)
+        }
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::from(2)
+            let mut cause = error.source();
+            while let Some(error) = cause {
+                eprintln!("  because: {error}");
+                cause = error.source();
+            }
+            ExitCode::from(USAGE)
         }
+    }
+}
+
+/// Runs a verb. Its result goes to `out`, its progress to stderr.
+fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, verbs::Error> {
+    match verb {
+        Verb::Generate(args) => verbs::generate::run(args, out),
+        Verb::Simulator(args) => verbs::simulator::run(args, out),
+        Verb::Schedule(args) => verbs::schedule::run(args, out),
+        Verb::Operators(args) => verbs::operators::run(args, out),
+        Verb::Sincos(args) => verbs::sincos::run(args, out),
     }
 }

@@ -1,10 +1,10 @@
-//! The hand-written Verilog, as part of the program.
+//! The Verilog of the repository, as part of the program.
 
-/// A hand-written module.
+/// A file of Verilog.
 #[derive(Debug, Clone, Copy)]
 pub struct Source {
     /// Name of the file.
-    pub name: &'static str,
+    pub file: &'static str,
     /// Text of the file.
     pub text: &'static str,
 }
@@ -12,7 +12,7 @@ pub struct Source {
 macro_rules! sources {
     ($($folder:literal: $($name:literal),+;)*) => {
         &[$($(Source {
-            name: concat!($name, ".v"),
+            file: concat!($name, ".v"),
             text: include_str!(concat!(
                 env!("CARGO_MANIFEST_DIR"), "/../../bitstream-model/rtl/", $folder, $name, ".v"
             )),
@@ -20,13 +20,61 @@ macro_rules! sources {
     };
 }
 
-/// Every hand-written module, each after the modules that it is made of.
-pub const ALL: &[Source] = sources! {
+/// The operators, each after the modules that it is made of.
+pub const OPERATORS: &[Source] = sources! {
     "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos", "fbelow", "fmax", "fmin",
         "fless", "fselect", "fnonzero", "flogic_or";
-    "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "simple_dual_port", "true_dual_port";
+};
+
+/// All other hand-written modules, each after the modules that it is made of.
+pub const AROUND: &[Source] = sources! {
+    "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "simple_dual_port",
+        "true_dual_port";
     "stream/": "word_sum", "receiver", "sender";
     "step/": "constants", "loader", "body_shapes", "integrator", "step_sequence";
     "pass/": "finder", "issue", "impulses", "impulse_sum";
     "": "core", "control_block", "pgs_top";
 };
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::{fs, io};
+
+    use super::*;
+
+    fn verilog_below(folder: &Path, files: &mut Vec<String>) -> io::Result<()> {
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            if path.is_dir() {
+                verilog_below(&path, files)?;
+            } else if path.extension().is_some_and(|extension| extension == "v") {
+                files.extend(path.file_name().map(|name| name.to_string_lossy().into_owned()));
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn the_lists_have_every_file_of_the_folder() -> io::Result<()> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bitstream-model/rtl");
+        let mut files = Vec::new();
+        verilog_below(&folder, &mut files)?;
+        let mut listed: Vec<_> = OPERATORS.iter().chain(AROUND).map(|source| source.file).collect();
+        files.sort();
+        listed.sort_unstable();
+        assert_eq!(files, listed);
+        Ok(())
+    }
+
+    #[test]
+    fn every_file_holds_the_module_of_its_name() {
+        for Source { file, text } in OPERATORS.iter().chain(AROUND) {
+            let module = format!("\nmodule {} ", file.trim_end_matches(".v"));
+            assert_eq!(text.matches("\nmodule ").count(), 1, "{file}");
+            assert!(text.contains(&module), "{file}");
+            assert!(text.contains("\n`default_nettype none\n"), "{file}");
+            assert!(text.ends_with("\n`default_nettype wire\n"), "{file}");
+        }
+    }
+}

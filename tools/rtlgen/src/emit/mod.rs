@@ -3,8 +3,7 @@
 
 mod headers;
 mod pipeline;
-
-use std::fmt;
+mod text;
 
 use crate::design::Design;
 use crate::sources;
@@ -18,29 +17,29 @@ pub struct File {
     pub text: String,
 }
 
+/// Name of the top module.
+pub const TOP: &str = "pgs_top";
+
 /// All files of a design, ready for a tool: hand-written and generated modules, headers, and
 /// `pgs.f`, the list of the modules.
-///
-/// # Errors
-///
-/// None while there is memory for the text.
-pub fn files(design: &Design) -> Result<Vec<File>, fmt::Error> {
+#[must_use]
+pub fn files(design: &Design) -> Vec<File> {
     let file = |name: &str, text: String| File { name: name.into(), text };
     let mut files = vec![
-        file("pgs_interface.vh", headers::interface()?),
-        file("pgs_operators.vh", headers::operators()?),
-        file("pgs_schedule.vh", headers::schedule(design)?),
+        file("pgs_interface.vh", headers::interface()),
+        file("pgs_operators.vh", headers::operators()),
+        file("pgs_schedule.vh", headers::schedule(design)),
     ];
     let mut modules = Vec::new();
-    for source in sources::ALL {
-        modules.push(file(source.name, source.text.into()));
+    for source in sources::OPERATORS.iter().chain(sources::AROUND) {
+        modules.push(file(source.file, source.text.into()));
     }
     for pipeline in design.pipelines() {
-        let text = pipeline::pipeline(pipeline.name, &pipeline.graph, &pipeline.schedule)?;
+        let text = pipeline::pipeline(pipeline.name, &pipeline.graph, &pipeline.schedule);
         modules.push(file(&format!("{}.v", pipeline.name), text));
     }
     let list: String = modules.iter().map(|module| format!("{}\n", module.name)).collect();
     files.append(&mut modules);
     files.push(file("pgs.f", list));
-    Ok(files)
+    files
 }

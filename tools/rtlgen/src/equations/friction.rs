@@ -108,7 +108,12 @@ fn tangents(g: &mut Graph, n: Vec3) -> [Vec3; 2] {
 }
 
 /// Whether this collision damps the spin of its bodies about the normal.
-fn spin_is_damped(g: &mut Graph, one_static: Operand, positions: [Vec3; 2], arm_a: Vec3) -> Operand {
+fn spin_is_damped(
+    g: &mut Graph,
+    one_static: Operand,
+    positions: [Vec3; 2],
+    arm_a: Vec3,
+) -> Operand {
     let between = g.subtract3(positions[1], positions[0]);
     let between = g.unit(between);
     let arm = g.unit(arm_a);

@@ -86,7 +86,11 @@ fn rotation(g: &mut Graph, angular: Vec3, time_step: Operand) -> [Operand; 4] {
 }
 
 /// The product of rotation and orientation, normalised.
-fn turned(g: &mut Graph, [x, y, z, c]: [Operand; 4], [qx, qy, qz, qw]: [Operand; 4]) -> [Operand; 4] {
+fn turned(
+    g: &mut Graph,
+    [x, y, z, c]: [Operand; 4],
+    [qx, qy, qz, qw]: [Operand; 4],
+) -> [Operand; 4] {
     let mut sum = |terms: [(Operand, Operand); 4]| {
         let [first, rest @ ..] = terms.map(|(a, b)| g.multiply(a, b));
         rest.into_iter().fold(first, |sum, term| g.add(sum, term))

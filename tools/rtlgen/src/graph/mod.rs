@@ -409,7 +409,8 @@ mod tests {
         let (one, two) = graph.within("point0", |graph| {
             graph.within("row", |graph| (graph.add(a, a), graph.subtract(a, a)))
         });
-        let three = graph.within("point0", |graph| graph.within("row", |graph| graph.add(one, two)));
+        let three =
+            graph.within("point0", |graph| graph.within("row", |graph| graph.add(one, two)));
         assert_eq!(graph.node(one.node).name, "point0_row_sum");
         assert_eq!(graph.node(two.node).name, "point0_row_difference");
         assert_eq!(graph.node(three.node).name, "point0_row_sum_2");

@@ -67,9 +67,8 @@ fn distance_from_velocities(graph: &Graph) -> Vec<i32> {
     for id in graph.ids() {
         let node = graph.node(id);
         let start = if node.kind == Kind::Input(Source::Velocity) { 0 } else { UNREACHED };
-        let reads = node.reads().map(|read| {
-            distance[read.index()] + latency(graph.node(read).kind)
-        });
+        let reads =
+            node.reads().map(|read| distance[read.index()] + latency(graph.node(read).kind));
         distance[id.index()] = reads.fold(start, i32::max);
     }
     distance
@@ -90,7 +89,8 @@ impl Units {
             *operations.entry(operation).or_default() += 1;
         }
         let phases = usize::try_from(interval).unwrap_or(1);
-        let available = operations.into_iter().map(|(operation, n)| (operation, n.div_ceil(phases)));
+        let available =
+            operations.into_iter().map(|(operation, n)| (operation, n.div_ceil(phases)));
         Self { interval, available: available.collect(), taken: HashMap::new() }
     }
 

@@ -1,1 +1,35 @@
 //! One module per verb of the command line.
+
+use std::io;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use rtlgen::verify;
+
+pub(crate) mod build;
+pub(crate) mod generate;
+pub(crate) mod operators;
+pub(crate) mod schedule;
+pub(crate) mod simulator;
+pub(crate) mod sincos;
+
+/// Why a verb has no result.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Error {
+    /// Nobody can read its result.
+    #[error("standard output cannot be written")]
+    Output(#[from] io::Error),
+    /// A check could not be made.
+    #[error(transparent)]
+    Verify(#[from] verify::Error),
+}
+
+/// A bar over a number of `things`: on stderr, and only if it is a terminal.
+fn progress_bar(number: u64, things: &str) -> ProgressBar {
+    let bar = ProgressBar::new(number);
+    let style =
+        format!("{{bar:30}} {{human_pos}}/{{human_len}} {things}, {{per_sec}}, {{eta}} left");
+    if let Ok(style) = ProgressStyle::with_template(&style) {
+        bar.set_style(style);
+    }
+    bar
+}

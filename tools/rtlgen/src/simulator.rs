@@ -1,0 +1,58 @@
+//! A simulator of the whole accelerator: generated, Verilated, and compiled with
+//! `bitstream-model/rtl/simulator/main.cpp` into a process that an emulated board talks to.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::design::Design;
+use crate::emit::{self, File};
+use crate::verify::{Error, verilator};
+
+/// The C++ program around the Verilated accelerator.
+const MAIN: &str = include_str!("../../../bitstream-model/rtl/simulator/main.cpp");
+
+/// Name of the built program.
+pub const PROGRAM: &str = "pgs-rtl";
+
+/// Writes the files of a design into a folder, which is made if it does not exist.
+///
+/// # Errors
+///
+/// The folder or a file cannot be written.
+pub fn write(folder: &Path, files: &[File]) -> Result<(), Error> {
+    fs::create_dir_all(folder).map_err(Error::io("make the folder"))?;
+    for File { name, text } in files {
+        fs::write(folder.join(name), text).map_err(Error::io("write a file of the design"))?;
+    }
+    Ok(())
+}
+
+/// Builds the simulator of a design in a folder; the path of the program.
+///
+/// # Errors
+///
+/// A tool is missing, or the build fails: Verilator's warnings are errors.
+pub fn build(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
+    build_files(&emit::files(design), folder)
+}
+
+/// Builds the simulator from the files of a design, which may have been changed.
+///
+/// # Errors
+///
+/// As for [`build`].
+pub fn build_files(files: &[File], folder: &Path) -> Result<PathBuf, Error> {
+    verilator::require("a simulator of the accelerator")?;
+    write(folder, files)?;
+    fs::write(folder.join("main.cpp"), MAIN).map_err(Error::io("write the simulator's program"))?;
+    let modules = files.iter().filter(|file| file.name.ends_with(".v"));
+    let mut names: Vec<String> = modules.map(|file| file.name.clone()).collect();
+    names.push("main.cpp".into());
+    // The simulation is hardly faster with -O2, and the build takes four times as long.
+    let build = verilator::Build { top: emit::TOP, flags: "-O1", files: &names };
+    verilator::build(folder, &build)?;
+    let program = folder.join(PROGRAM);
+    fs::copy(folder.join("obj").join(format!("V{}", emit::TOP)), &program)
+        .map_err(Error::io("copy the simulator"))?;
+    Ok(program)
+}

@@ -1,0 +1,55 @@
+//! The options that describe a build of the accelerator.
+
+use clap::{Args, ValueEnum};
+use rtlgen::design::{Design, Parameters};
+
+/// What the hardware does on a hazard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Hazards {
+    /// Waits for the velocity.
+    Interlocked,
+    /// Reads the stale velocity, and counts.
+    Unchecked,
+}
+
+/// A build of the accelerator.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Build")]
+pub(crate) struct BuildArgs {
+    /// Bodies that the memories hold
+    #[arg(long, value_name = "N", default_value_t = Parameters::default().bodies,
+          value_parser = clap::value_parser!(u32).range(2..=131_072))]
+    bodies: u32,
+    /// Collisions that the memories hold
+    #[arg(long, value_name = "N", default_value_t = Parameters::default().collisions,
+          value_parser = clap::value_parser!(u32).range(2..=524_288))]
+    collisions: u32,
+    /// On a hazard, wait for the velocity or read the stale one
+    #[arg(long, value_enum, default_value_t = Hazards::Interlocked)]
+    hazards: Hazards,
+    /// Registers in front of the velocity and impulse memories
+    #[arg(long, value_name = "N", default_value_t = Parameters::default().address_stages,
+          value_parser = clap::value_parser!(u32).range(1..=4))]
+    address_stages: u32,
+    /// Registers behind the velocity and impulse memories
+    #[arg(long, value_name = "N", default_value_t = Parameters::default().output_stages,
+          value_parser = clap::value_parser!(u32).range(1..=5))]
+    output_stages: u32,
+    /// Clock that the capability register reports, kHz
+    #[arg(long, value_name = "KHZ", default_value_t = Parameters::default().clock_khz)]
+    clock_khz: u32,
+}
+
+impl BuildArgs {
+    /// The design that the options describe.
+    pub(crate) fn design(&self) -> Design {
+        Design::new(Parameters {
+            bodies: self.bodies,
+            collisions: self.collisions,
+            interlocked: self.hazards == Hazards::Interlocked,
+            address_stages: self.address_stages,
+            output_stages: self.output_stages,
+            clock_khz: self.clock_khz,
+        })
+    }
+}

@@ -1,0 +1,82 @@
+//! `rtlgen operators`: the operators against the reference.
+
+use std::io::Write;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use rtlgen::verify::operators::{self, Tally, Wrong};
+use rtlgen::verify::simulation::Simulator;
+use rtlgen::verify::vectors::Vector;
+use serde_json::{Value, json};
+
+use super::{Error, progress_bar};
+
+/// Simulates the operators with Verilator and compares every result with a reference.
+///
+/// The reference is arithmetic in integers (`rustc_apfloat`) with the flush rules of the
+/// specification; sine and cosine are libm's. Result bits and latencies must agree.
+#[derive(Debug, Args)]
+pub(crate) struct Operators {
+    /// Vectors for each operator
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    vectors: u64,
+    /// Seed of the vectors
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Print one JSON document instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Fails if a result is wrong.
+pub(crate) fn run(args: &Operators, out: &mut dyn Write) -> Result<ExitCode, Error> {
+    let start = Instant::now();
+    let simulator = Simulator::build()?;
+    let build = start.elapsed();
+    let bar = progress_bar(args.vectors, "vectors");
+    let tallies =
+        operators::verify(&simulator, args.vectors, args.seed, |done| bar.set_position(done))?;
+    bar.finish_and_clear();
+    let seconds = start.elapsed().as_secs_f64();
+    if args.json {
+        let document = json!({
+            "vectors": args.vectors,
+            "seed": args.seed,
+            "seconds": seconds,
+            "operators": tallies.iter().map(document).collect::<Vec<_>>(),
+        });
+        writeln!(out, "{document:#}")?;
+    } else {
+        writeln!(out, "{:<25} {:>7} {:>12} {:>12}", "operator", "latency", "vectors", "wrong")?;
+        for tally in &tallies {
+            let Tally { operator, wrong, first } = tally;
+            let (name, latency) = (operator.name, operator.latency);
+            writeln!(out, "{name:<25} {latency:>7} {:>12} {wrong:>12}", args.vectors)?;
+            if let Some(first) = first {
+                writeln!(out, "  first: {}", describe(first))?;
+            }
+        }
+        let build = build.as_secs_f64();
+        writeln!(out, "seed {}, {seconds:.1} s, {build:.1} s of it to build", args.seed)?;
+    }
+    let passed = tallies.iter().all(|tally| tally.wrong == 0);
+    Ok(if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn describe(wrong: &Wrong) -> String {
+    let Wrong { vector: Vector { a, b, radicand, argument }, expected, found } = wrong;
+    format!(
+        "a {a:08x}, b {b:08x}, radicand {radicand:08x}, argument {argument:08x}: \
+         {found:08x}, expected {expected:08x}"
+    )
+}
+
+fn document(tally: &Tally) -> Value {
+    json!({
+        "operator": tally.operator.name,
+        "latency": tally.operator.latency,
+        "wrong": tally.wrong,
+        "first": tally.first.as_ref().map(describe),
+    })
+}

@@ -1,0 +1,64 @@
+//! `rtlgen sincos`: the fixed-point definition of sine and cosine against libm.
+
+use std::io::Write;
+use std::num::NonZero;
+use std::process::ExitCode;
+use std::thread;
+use std::time::Instant;
+
+use clap::Args;
+use rtlgen::verify::sincos;
+use serde_json::json;
+
+use super::{Error, progress_bar};
+
+/// Compares the fixed-point definition of sine and cosine with libm, from 2^-12 to pi/8.
+///
+/// Below 2^-12 both are the argument and 1; above pi/8 no argument of a step lies.
+#[derive(Debug, Args)]
+pub(crate) struct Sincos {
+    /// Compare every argument
+    #[arg(long, conflicts_with = "step")]
+    all: bool,
+    /// Compare every N-th argument
+    #[arg(long, value_name = "N", default_value = "100", value_parser = parse_step)]
+    step: NonZero<u32>,
+    /// Print one JSON document instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+fn parse_step(text: &str) -> Result<NonZero<u32>, std::num::ParseIntError> {
+    text.parse()
+}
+
+/// Fails if a sine or cosine differs.
+pub(crate) fn run(args: &Sincos, out: &mut dyn Write) -> Result<ExitCode, Error> {
+    let start = Instant::now();
+    let step = if args.all { 1 } else { args.step.get() };
+    let threads = thread::available_parallelism().map_or(1, NonZero::get);
+    let (first, last) = (sincos::POLYNOMIAL.start(), sincos::POLYNOMIAL.end());
+    let bar = progress_bar(u64::from((last - first) / step + 1), "arguments");
+    let found = sincos::compare(step, threads, |compared| bar.inc(compared));
+    bar.finish_and_clear();
+    let seconds = start.elapsed().as_secs_f64();
+    if args.json {
+        let document = json!({
+            "arguments": found.arguments,
+            "sine": found.sine,
+            "cosine": found.cosine,
+            "threads": threads,
+            "seconds": seconds,
+        });
+        writeln!(out, "{document:#}")?;
+    } else {
+        let sincos::Differences { arguments, sine, cosine } = found;
+        writeln!(
+            out,
+            "{arguments} arguments from 2^-12 to pi/8: sin {sine} differ, cos {cosine} differ\n\
+             {threads} threads, {seconds:.1} s"
+        )?;
+    }
+    let passed = found.sine == 0 && found.cosine == 0;
+    Ok(if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}

@@ -1,0 +1,190 @@
+//! The operators in Verilog against the reference in software, each with its latency.
+
+use std::iter;
+
+use super::simulation::{BATCH, Outputs, Simulator};
+use super::vectors::{Vector, Vectors};
+use super::{Error, reference};
+
+/// An operator: what its output is to be, how many cycles after its operands.
+#[derive(Debug)]
+pub struct Operator {
+    /// Name in reports.
+    pub name: &'static str,
+    /// Register stages.
+    pub latency: usize,
+    expected: fn(&Vector) -> u64,
+    found: fn(&Outputs) -> u64,
+}
+
+/// The longest latency.
+const LONGEST: usize = 29;
+
+fn pair(low: u32, high: u32) -> u64 {
+    u64::from(high) << 32 | u64::from(low)
+}
+
+/// The operators of `operators_top.v`.
+pub const OPERATORS: [Operator; 13] = [
+    Operator {
+        name: "add",
+        latency: 7,
+        expected: |v| reference::add(v.a, v.b).into(),
+        found: |outputs| outputs[0].into(),
+    },
+    Operator {
+        name: "mul",
+        latency: 5,
+        expected: |v| reference::mul(v.a, v.b).into(),
+        found: |outputs| outputs[1].into(),
+    },
+    Operator {
+        name: "div",
+        latency: 29,
+        expected: |v| reference::div(v.a, v.b).into(),
+        found: |outputs| outputs[2].into(),
+    },
+    Operator {
+        name: "sqrt",
+        latency: 27,
+        expected: |v| reference::sqrt(v.radicand).into(),
+        found: |outputs| outputs[3].into(),
+    },
+    Operator {
+        name: "sincos",
+        latency: 20,
+        expected: |v| {
+            let (sine, cosine) = reference::sincos(v.argument);
+            pair(sine, cosine)
+        },
+        found: |outputs| pair(outputs[4], outputs[5]),
+    },
+    Operator {
+        name: "max",
+        latency: 1,
+        expected: |v| reference::max(v.a, v.b).into(),
+        found: |outputs| outputs[6].into(),
+    },
+    Operator {
+        name: "min",
+        latency: 1,
+        expected: |v| reference::min(v.a, v.b).into(),
+        found: |outputs| outputs[7].into(),
+    },
+    Operator {
+        name: "less",
+        latency: 1,
+        expected: |v| reference::less(v.a, v.b).into(),
+        found: |outputs| (outputs[11] & 1).into(),
+    },
+    Operator {
+        name: "select",
+        latency: 1,
+        expected: |v| if v.argument & 1 == 1 { v.a } else { v.b }.into(),
+        found: |outputs| outputs[8].into(),
+    },
+    Operator {
+        name: "nonzero",
+        latency: 1,
+        expected: |v| (v.argument & 1 == 1 && reference::nonzero(v.a)).into(),
+        found: |outputs| (outputs[11] >> 1 & 1).into(),
+    },
+    Operator {
+        name: "or",
+        latency: 1,
+        expected: |v| (v.argument & 3 != 0).into(),
+        found: |outputs| (outputs[11] >> 2 & 1).into(),
+    },
+    Operator {
+        name: "mul, SMALLEST_NORMAL = 0",
+        latency: 5,
+        expected: |v| reference::mul_unbounded(v.a, v.b).into(),
+        found: |outputs| outputs[9].into(),
+    },
+    Operator {
+        name: "div, SMALLEST_NORMAL = 0",
+        latency: 29,
+        expected: |v| reference::div_unbounded(v.a, v.b).into(),
+        found: |outputs| outputs[10].into(),
+    },
+];
+
+/// A result that is not the reference's.
+#[derive(Debug, Clone, Copy)]
+pub struct Wrong {
+    /// The operands of all operators in that cycle.
+    pub vector: Vector,
+    /// The reference's result.
+    pub expected: u64,
+    /// The Verilog's.
+    pub found: u64,
+}
+
+/// What the vectors found of one operator.
+#[derive(Debug)]
+pub struct Tally {
+    /// The operator.
+    pub operator: &'static Operator,
+    /// Results that are wrong.
+    pub wrong: u64,
+    /// The first of them.
+    pub first: Option<Wrong>,
+}
+
+/// Feeds vectors to all operators and counts the results that are wrong. `progress` is called with
+/// the number of vectors compared so far.
+///
+/// # Errors
+///
+/// The simulator ends early.
+pub fn verify(
+    simulator: &Simulator,
+    vectors: u64,
+    seed: u64,
+    mut progress: impl FnMut(u64),
+) -> Result<Vec<Tally>, Error> {
+    static ALL: [Operator; 13] = OPERATORS;
+    let mut tallies: Vec<Tally> =
+        ALL.iter().map(|operator| Tally { operator, wrong: 0, first: None }).collect();
+    // More vectors push the last results out, to the end of a batch.
+    let batch = BATCH as u64;
+    let clocked = (vectors + LONGEST as u64).next_multiple_of(batch);
+    let operands = iter::zip(0..clocked, Vectors::new(seed)).map(|(_, vector)| vector);
+    // The vectors of the batch, behind the last ones of the batch before.
+    let mut recent: Vec<Vector> = Vec::new();
+    let mut before: u64 = 0;
+    simulator.run(operands, |batch, outputs| {
+        recent.drain(..recent.len().saturating_sub(LONGEST));
+        let kept = recent.len();
+        recent.extend(batch);
+        for tally in &mut tallies {
+            let Operator { latency, expected, found, .. } = tally.operator;
+            for (cycle, outputs) in outputs.iter().enumerate() {
+                let now = before + cycle as u64;
+                let delay = latency - 1;
+                if now < delay as u64 || now - delay as u64 >= vectors {
+                    continue;
+                }
+                let vector = recent[kept + cycle - delay];
+                let (expected, found) = (expected(&vector), found(outputs));
+                if expected != found {
+                    tally.wrong += 1;
+                    tally.first.get_or_insert(Wrong { vector, expected, found });
+                }
+            }
+        }
+        before += batch.len() as u64;
+        progress(before.min(vectors));
+    })?;
+    Ok(tallies)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_latency_is_the_longest() {
+        assert_eq!(OPERATORS.iter().map(|operator| operator.latency).max(), Some(LONGEST));
+    }
+}

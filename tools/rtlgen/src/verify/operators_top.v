@@ -1,0 +1,36 @@
+// Every operator beside the others, for the vectors of `rtlgen operators`. In each cycle four words
+// go in and twelve come out, each result after the latency of its operator.
+`default_nettype none
+
+module operators_top (
+  input  wire         clk,
+  input  wire [127:0] operands,
+  output wire [383:0] results
+);
+
+  wire [31:0] a        = operands[31:0];
+  wire [31:0] b        = operands[63:32];
+  wire [31:0] radicand = operands[95:64];
+  wire [31:0] argument = operands[127:96];
+
+  wire [2:0] flags;
+
+  assign results[383:352] = {29'd0, flags};
+
+  fadd add (.clk(clk), .a(a), .b(b), .y(results[31:0]));
+  fmul mul (.clk(clk), .a(a), .b(b), .y(results[63:32]));
+  fdiv div (.clk(clk), .a(a), .b(b), .y(results[95:64]));
+  fsqrt sqrt (.clk(clk), .a(radicand), .y(results[127:96]));
+  fsincos sincos (.clk(clk), .a(argument), .y(results[191:128]));
+  fmax max (.clk(clk), .a(a), .b(b), .y(results[223:192]));
+  fmin min (.clk(clk), .a(a), .b(b), .y(results[255:224]));
+  fselect select (.clk(clk), .condition(argument[0]), .a(a), .b(b), .y(results[287:256]));
+  fmul #(.SMALLEST_NORMAL(0)) mul_0 (.clk(clk), .a(a), .b(b), .y(results[319:288]));
+  fdiv #(.SMALLEST_NORMAL(0)) div_0 (.clk(clk), .a(a), .b(b), .y(results[351:320]));
+  fless less (.clk(clk), .a(a), .b(b), .y(flags[0]));
+  fnonzero nonzero (.clk(clk), .flag(argument[0]), .a(a), .y(flags[1]));
+  flogic_or logic_or (.clk(clk), .a(argument[0]), .b(argument[1]), .y(flags[2]));
+
+endmodule
+
+`default_nettype wire

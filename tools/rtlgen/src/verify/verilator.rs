@@ -1,0 +1,60 @@
+//! Runs Verilator and the C++ compiler behind it.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use super::Error;
+
+/// A program to build from Verilog and C++.
+#[derive(Debug)]
+pub struct Build<'a> {
+    /// The top module.
+    pub top: &'a str,
+    /// Flags of the C++ compiler.
+    pub flags: &'a str,
+    /// Names of the files, in the folder.
+    pub files: &'a [String],
+}
+
+/// Whether a program can be run.
+fn installed(tool: &str) -> bool {
+    let run =
+        Command::new(tool).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    run.is_ok_and(|status| status.success())
+}
+
+/// Refuses a purpose for which a tool is missing.
+///
+/// # Errors
+///
+/// [`Error::Missing`] with the first tool that is not installed.
+pub fn require(purpose: &'static str) -> Result<(), Error> {
+    match ["verilator", "c++", "make"].into_iter().find(|tool| !installed(tool)) {
+        Some(tool) => Err(Error::Missing { tool, purpose }),
+        None => Ok(()),
+    }
+}
+
+/// Builds `obj/V<top>` in a folder. Verilator's warnings are errors.
+///
+/// # Errors
+///
+/// The tools' messages, if one of them fails.
+pub fn build(folder: &Path, build: &Build<'_>) -> Result<(), Error> {
+    let output = Command::new("verilator")
+        .current_dir(folder)
+        .args(["--cc", "--exe", "--build", "-Wall", "-O3", "--noassert"])
+        .args(["--x-assign", "fast", "--x-initial", "fast"])
+        // Smaller files of C++, which make compiles side by side.
+        .args(["--output-split", "20000", "-j", "0"])
+        .args(["--top-module", build.top, "-Mdir", "obj", "-CFLAGS", build.flags])
+        .args(build.files)
+        .output()
+        .map_err(Error::io("run verilator"))?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let text = [output.stdout, output.stderr].concat();
+    let output_text = String::from_utf8_lossy(&text).into_owned();
+    Err(Error::Build { status: output.status, output: output_text })
+}
