@@ -2,11 +2,11 @@
 
 /// A Verilog file.
 #[derive(Debug, Clone, Copy)]
-pub struct Source {
+pub struct Source<'a> {
     /// Name of the file, which is the module's with `.v`.
-    pub file: &'static str,
+    pub file: &'a str,
     /// The Verilog in it.
-    pub text: &'static str,
+    pub text: &'a str,
 }
 
 macro_rules! sources {
@@ -21,7 +21,7 @@ macro_rules! sources {
 }
 
 /// The operators, and the modules inside them.
-pub const OPERATORS: &[Source] = sources!("operators":
+pub const OPERATORS: &[Source<'_>] = sources!("operators":
     "fadd" "fmul" "fdiv" "fsqrt" "fsincos" "horner"
     "fmax" "fmin" "fless" "fbelow" "fselect" "fnonzero" "flogic_or"
 );
