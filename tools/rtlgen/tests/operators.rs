@@ -55,12 +55,12 @@ const FAULTS: [Fault; 11] = [
         correct: "{30'd0, root_s26[0]}",
         wrong: "{30'd0, root_s26[0] & zero_s26}",
     },
-    // The last bit of a coefficient.
+    // A delay is one stage short.
     Fault {
         operator: "sincos",
         file: "fsincos.v",
-        correct: "46912496047961",
-        wrong: "46912496047960",
+        correct: "zs[46*6 +: 46]",
+        wrong: "zs[46*5 +: 46]",
     },
     // NaN gives the first operand.
     Fault {
