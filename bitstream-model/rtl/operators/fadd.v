@@ -104,10 +104,10 @@ module fadd (
     nan_s3                <= nan_s2;
   end
 
-  // Stage 4: add. A bit below the sum carries the 1 of the two's complement.
-  wire [28:0] larger_operand  = {1'b0, larger_significand_s3, 3'b000, 1'b1};
-  wire [28:0] smaller_operand = {{1'b0, smaller_aligned_s3} ^ {28{subtract_s3}}, subtract_s3};
-  wire [28:0] total           = larger_operand + smaller_operand;
+  // Stage 4: add. A sum is the difference to the complement, less 1: the bit below borrows it.
+  wire [28:0] minuend    = {1'b0, larger_significand_s3, 3'b000, subtract_s3};
+  wire [28:0] subtrahend = {{1'b0, smaller_aligned_s3} ^ {28{~subtract_s3}}, 1'b1};
+  wire [28:0] difference = minuend - subtrahend;
 
   reg  [27:0] sum_s4;
   reg   [7:0] exponent_s4;
@@ -117,7 +117,7 @@ module fadd (
   reg         nan_s4;
 
   always @(posedge clk) begin
-    sum_s4      <= total[28:1];
+    sum_s4      <= difference[28:1];
     exponent_s4 <= exponent_s3;
     sign_s4     <= sign_s3;
     subtract_s4 <= subtract_s3;
@@ -193,8 +193,8 @@ module fadd (
       y <= {sign_s6, rounded[30:0]};
   end
 
-  // The bit that carried in, one that no count needs, and the leading one.
-  wire unused = &{1'b0, total[0], in_4[0], normalised[27]};
+  // The bit that borrowed, one that no count needs, and the leading one.
+  wire unused = &{1'b0, difference[0], in_4[0], normalised[27]};
 
 endmodule
 

@@ -10,15 +10,17 @@ module fbelow (
   output wire        y
 );
 
-  // Unsigned integers in the order of the numbers.
-  wire [31:0] a_rank = {~a[31], a[30:0] ^ {31{a[31]}}};
-  wire [31:0] b_rank = {~b[31], b[30:0] ^ {31{b[31]}}};
+  // Of two negative numbers the one of the larger magnitude is less.
+  wire same_sign       = a[31] == b[31];
+  wire magnitude_below = a[30:0] < b[30:0];
+  wire magnitude_above = a[30:0] > b[30:0];
+  wire a_is_less       = a[31] ? (magnitude_above | ~same_sign) : (magnitude_below & same_sign);
 
   wire both_zero = (~|a[30:23]) & (~|b[30:23]);
   wire a_is_nan  = (&a[30:23]) & (|a[22:0]);
   wire b_is_nan  = (&b[30:23]) & (|b[22:0]);
 
-  assign y = (a_rank < b_rank) & ~(both_zero | a_is_nan | b_is_nan);
+  assign y = a_is_less & ~(both_zero | a_is_nan | b_is_nan);
 
 endmodule
 

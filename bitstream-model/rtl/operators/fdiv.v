@@ -73,16 +73,19 @@ module fdiv #(
   end
 
   // Stages 3 to 27: rows 1 to 25. A row doubles the remainder, then subtracts the divisor from one
-  // that is not negative and adds it to one that is. The doubled remainder's lowest bit is free for
-  // the 1 of the two's complement.
+  // that is not negative and adds it to one that is, which is to subtract its complement and 1: the
+  // bit below the difference borrows it.
   genvar row;
   generate
     for (row = 1; row < ROWS; row = row + 1) begin : rows
-      wire        subtract = ~remainder[25*(row-1)+24];
-      wire [24:0] doubled  = {remainder[25*(row-1) +: 24], subtract};
-      wire [24:0] step     = {1'b0, divisor[24*row +: 24]} ^ {25{subtract}};
-      wire [24:0] left     = doubled + step;
-      wire [25:0] bit_here = {{(ROWS-1){1'b0}}, ~left[24]} << (ROWS - 1 - row);
+      wire        add_back   = remainder[25*(row-1)+24];
+      wire [24:0] doubled    = {remainder[25*(row-1) +: 24], 1'b0};
+      wire [24:0] step       = {1'b0, divisor[24*row +: 24]} ^ {25{add_back}};
+      wire [25:0] difference = {doubled, ~add_back} - {step, 1'b1};
+      wire [24:0] left       = difference[25:1];
+      wire [25:0] bit_here   = {{(ROWS-1){1'b0}}, ~left[24]} << (ROWS - 1 - row);
+
+      wire unused_borrow = difference[0];
 
       always @(posedge clk) begin
         quotient[ROWS*row +: ROWS] <= quotient[ROWS*(row-1) +: ROWS] | bit_here;
@@ -93,7 +96,7 @@ module fdiv #(
           remainder[25*row +: 25] <= left;
         end
       end else begin : drop
-        wire unused = &{1'b0, left[23:0]};
+        wire unused_remainder = &{1'b0, left[23:0]};
       end
     end
   endgenerate

@@ -20,11 +20,11 @@ module fmax (
     .y(a_above_b)
   );
 
-  wire [31:0] chosen = a_above_b ? a : b;
-  wire        zero   = ~|chosen[30:23];
+  wire [31:0] a_flushed = {a[31:23], a[22:0] & {23{|a[30:23]}}};
+  wire [31:0] b_flushed = {b[31:23], b[22:0] & {23{|b[30:23]}}};
 
   always @(posedge clk) begin
-    y <= {chosen[31:23], zero ? 23'd0 : chosen[22:0]};
+    y <= a_above_b ? a_flushed : b_flushed;
   end
 
 endmodule

@@ -47,7 +47,7 @@ module fsqrt (
   // Stages 2 to 26: the rows. Row r has r bits of root and a remainder of r + 2 bits, in two's
   // complement between -2 root - 1 and 2 root. It quadruples the remainder, appends two bits of the
   // radicand, and subtracts 4 root + 1 from a remainder that is not negative, or adds 4 root + 3 to
-  // one that is: in two's complement both are the root, or its complement, followed by 11.
+  // one that is: that subtracts the root, or its complement, followed by 01.
   //
   // `roots` and `remainders` hold the operands of the rows one behind the other, the root with a
   // zero in front: r + 1 bits of root and r + 2 bits of remainder for row r.
@@ -69,11 +69,11 @@ module fsqrt (
       localparam NEXT_REMAINDER = REMAINDER + row + 2;
 
       wire [row:0]   root     = roots[ROOT +: row+1];
-      wire           subtract = ~remainders[REMAINDER+row+1];
+      wire           add_back = remainders[REMAINDER+row+1];
       wire [1:0]     digits;
       wire [row+2:0] grown    = {remainders[REMAINDER +: row+1], digits};
-      wire [row+2:0] step     = {root ^ {(row+1){subtract}}, 2'b11};
-      wire [row+2:0] left     = grown + step;
+      wire [row+2:0] step     = {root ^ {(row+1){add_back}}, 2'b01};
+      wire [row+2:0] left     = grown - step;
       wire           bit_here = ~left[row+2];
 
       if (row < RADICAND_ROWS) begin : with_radicand

@@ -1,15 +1,14 @@
 // A step of a polynomial in fixed point with 48 fraction bits:
 // y = COEFFICIENT + floor(z * factor / 2^48 + 1/2).
 //
-// Latency 3, one step a cycle: product with a register for the multiplier's inside, then sum. z is
-// not negative; the other numbers are in two's complement, and y is the low SUM_WIDTH bits of the
-// result.
+// Latency 3, one step a cycle. z is not negative; the other numbers are in two's complement, and y
+// is the low SUM_WIDTH bits of the result. The suffix _s<n> names a register at the end of stage n.
 `default_nettype none
 
 module horner #(
-  parameter                              FACTOR_WIDTH = 48,
-  parameter                              SUM_WIDTH    = 48,
-  parameter signed [SUM_WIDTH-1:0]       COEFFICIENT  = 0
+  parameter                        FACTOR_WIDTH = 48,
+  parameter                        SUM_WIDTH    = 48,
+  parameter signed [SUM_WIDTH-1:0] COEFFICIENT  = 0
 ) (
   input  wire                           clk,
   input  wire [45:0]                    z,
@@ -19,7 +18,7 @@ module horner #(
 
   localparam PRODUCT_WIDTH = FACTOR_WIDTH + 46;
 
-  // Stages 1 and 2: product.
+  // Stages 1 and 2: product, with a register for the inside of the multiplier.
   wire signed [PRODUCT_WIDTH-1:0] wide_z      = {{FACTOR_WIDTH{1'b0}}, z};
   wire signed [PRODUCT_WIDTH-1:0] wide_factor = {{46{factor[FACTOR_WIDTH-1]}}, factor};
 

@@ -2,11 +2,11 @@
 
 /// A file of Verilog.
 #[derive(Debug, Clone, Copy)]
-pub struct Source {
-    /// Name of the file.
-    pub file: &'static str,
-    /// Text of the file.
-    pub text: &'static str,
+pub struct Source<'a> {
+    /// Name of the file, which is the module's with `.v`.
+    pub file: &'a str,
+    /// The Verilog in it.
+    pub text: &'a str,
 }
 
 macro_rules! sources {
@@ -21,13 +21,13 @@ macro_rules! sources {
 }
 
 /// The operators, each after the modules that it is made of.
-pub const OPERATORS: &[Source] = sources! {
+pub const OPERATORS: &[Source<'_>] = sources! {
     "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos", "fbelow", "fmax", "fmin",
         "fless", "fselect", "fnonzero", "flogic_or";
 };
 
 /// All other hand-written modules, each after the modules that it is made of.
-pub const AROUND: &[Source] = sources! {
+pub const AROUND: &[Source<'_>] = sources! {
     "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "simple_dual_port",
         "true_dual_port";
     "stream/": "word_sum", "receiver", "sender";

@@ -15,7 +15,7 @@ pub(crate) mod sincos;
 /// Why a verb has no result.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
-    /// Nobody can read its result.
+    /// The result reaches no reader.
     #[error("standard output cannot be written")]
     Output(#[from] io::Error),
     /// A check could not be made.

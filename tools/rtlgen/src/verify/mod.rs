@@ -20,7 +20,7 @@ pub enum Error {
     Missing {
         /// Name of the tool's program.
         tool: &'static str,
-        /// What cannot be done without it.
+        /// The work that needs it.
         purpose: &'static str,
     },
     /// Verilator refuses the Verilog, or the C++ compiler what Verilator made of it.
@@ -34,7 +34,7 @@ pub enum Error {
     /// A file, a program or a pipe.
     #[error("cannot {act}")]
     Io {
-        /// What was tried.
+        /// The act that failed.
         act: &'static str,
         /// Why it failed.
         source: io::Error,

@@ -120,7 +120,7 @@ pub struct Wrong {
     pub found: u64,
 }
 
-/// What the vectors found of one operator.
+/// The wrong results of one operator.
 #[derive(Debug)]
 pub struct Tally {
     /// The operator.

@@ -36,6 +36,7 @@ impl SplitMix64 {
 
     /// One of a list that is not empty.
     pub fn pick(&mut self, from: &[u32]) -> u32 {
-        from[self.bits64() as usize % from.len()]
+        let index = self.bits64() % from.len() as u64;
+        from[usize::try_from(index).unwrap_or(0)]
     }
 }

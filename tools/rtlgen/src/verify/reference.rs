@@ -76,7 +76,7 @@ pub fn sqrt(a: u32) -> u32 {
     let square = significand << 25;
     let root = square.isqrt();
     let above_half = root * root != square;
-    let truncated = (root >> 1) as u32;
+    let truncated = ((root >> 1) & 0x00FF_FFFF) as u32;
     let round_up = root & 1 == 1 && (above_half || truncated & 1 == 1);
     let biased = (half + 127).cast_unsigned();
     (biased << 23) + (truncated & FRACTION) + u32::from(round_up)
@@ -203,8 +203,8 @@ mod tests {
             let b = ((1 << 47) - 1) / a;
             let product = a * b;
             assert!(product >> 46 == 1);
-            let x = (0x20 << 23) | (a as u32 & FRACTION);
-            let y = ((127 - 0x20) << 23) | (b as u32 & FRACTION);
+            let x = (0x20 << 23) | (a & 0x007F_FFFF) as u32;
+            let y = ((127 - 0x20) << 23) | (b & 0x007F_FFFF) as u32;
             let ones = product >> 23 == 0x00FF_FFFF;
             assert_eq!(mul(x, y), if ones { SMALLEST } else { 0 }, "{x:08x} {y:08x}");
         }

@@ -28,7 +28,7 @@ pub const RESULTS: usize = 12;
 pub type Outputs = [u32; RESULTS];
 
 /// The simulator's own Verilog.
-const TOP: Source = Source { file: "operators_top.v", text: include_str!("operators_top.v") };
+const TOP: Source<'_> = Source { file: "operators_top.v", text: include_str!("operators_top.v") };
 
 /// A built simulator of the operators. Its folder is removed with it.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl Simulator {
     /// # Errors
     ///
     /// As [`Simulator::build`].
-    pub fn build_from(operators: &[Source]) -> Result<Self, Error> {
+    pub fn build_from(operators: &[Source<'_>]) -> Result<Self, Error> {
         const PURPOSE: &str = "the simulation of the operators";
         verilator::require(PURPOSE)?;
         let folder = TempDir::new().map_err(Error::io("make a temporary folder"))?;

