@@ -1,7 +1,7 @@
-//! Registers, memory, interrupts and time, as a board gives them; the only folder with `unsafe`.
+//! Reaches the registers, memory, interrupt and clock of a board, on Linux or emulated.
 //!
-//! What is public here works with any UIO node that has registers, an interrupt, and memory for
-//! DMA. The accelerator's driver is built on it:
+//! The public types work with any UIO node that has registers, an interrupt and memory for DMA.
+//! The accelerator's driver is built on them:
 //!
 //! ```no_run
 //! use std::time::Duration;
@@ -74,7 +74,7 @@ pub(crate) use {
     linux::fpga::fake as fpga_fake, linux::uio::fake as uio_fake, registers::window::fake,
 };
 
-/// What the device will do with a buffer.
+/// The device's use of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Access {
     /// Read it (MM2S).

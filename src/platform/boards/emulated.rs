@@ -1,4 +1,4 @@
-//! The platform over the emulated board.
+//! Drives the emulated board: the platform without hardware.
 
 use std::time::Duration;
 
@@ -8,14 +8,14 @@ use pgs_interface::record::BEAT_BYTES;
 
 use crate::platform::{Access, DmaMemory, Platform, PlatformError, RegisterWindow, SharedMemory};
 
-/// The emulated board, as its processor sees it.
+/// The emulated board from the side of its processor.
 #[derive(Debug)]
 pub(crate) struct EmulatedPlatform {
     port: CpuPort,
 }
 
 impl EmulatedPlatform {
-    /// The platform of that board.
+    /// The board behind this port.
     pub(crate) fn new(port: CpuPort) -> Self {
         Self { port }
     }

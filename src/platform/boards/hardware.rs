@@ -1,4 +1,4 @@
-//! The platform of a real board: its registers, its memory, its interrupt.
+//! Drives a real board: finds and maps its registers and memory, and waits for its interrupt.
 
 use std::ops::Range;
 #[cfg(feature = "emulation")]
@@ -47,14 +47,14 @@ pub enum MemoryChoice {
     /// A file: the memory of a board in another process, if it is not the file beside its socket.
     #[cfg(feature = "emulation")]
     File {
-        /// Which.
+        /// The file.
         path: PathBuf,
     },
 }
 
-/// How long to sleep in place of an interrupt that there is not.
+/// Time to sleep between two polls of a board without an interrupt.
 const WITHOUT_INTERRUPT: Duration = Duration::from_millis(1);
-/// Pauses up to this are spent spinning: the kernel cannot sleep that short.
+/// Shorter pauses spin: the kernel cannot sleep for less.
 const SPIN: Duration = Duration::from_micros(20);
 
 /// How the registers are reached.
@@ -64,7 +64,7 @@ enum Registers {
     OneNode(UioDevice),
     /// Each region has a node of its own; absent DMAs have none.
     Nodes { board: String, control: UioDevice, dma: Vec<(usize, UioDevice)> },
-    /// Through `/dev/mem`, at these places.
+    /// Through `/dev/mem`, at these addresses.
     DevMem(DevMem, DevMemWindows),
 }
 
@@ -81,14 +81,15 @@ pub(crate) struct HardwarePlatform {
 /// How to reach a real board's registers.
 #[derive(Debug, Clone)]
 pub(crate) enum RegisterChoice {
-    /// One node of that name, or a node for each region if there is no such one.
+    /// The node of that name; without one, the nodes of the single regions.
     Uio(String),
     /// These windows of `/dev/mem`.
     DevMem(DevMemWindows),
 }
 
 impl HardwarePlatform {
-    /// Opens registers and memory. No register is touched; the programmable logic is programmed.
+    /// Opens registers and memory, once the kernel knows that the logic is programmed. No register
+    /// is touched.
     pub(crate) fn open(
         system: &System,
         registers: RegisterChoice,
@@ -105,7 +106,7 @@ impl HardwarePlatform {
         let registers = match registers {
             RegisterChoice::Uio(node) => open_uio(system, &node)?,
             RegisterChoice::DevMem(windows) => {
-                // Opened once for both: it has one user at a time.
+                // One opening serves registers and memory: the file has one user at a time.
                 let wanted = windows.registers().into_iter().chain(window.clone()).collect();
                 Registers::DevMem(DevMem::open(system, wanted)?, windows)
             }
@@ -160,7 +161,7 @@ fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
     let control = part_name(name, UIO_CONTROL_MAP);
     if listing.has(name) || !listing.has(&control) {
         let node = listing.node(name)?;
-        // What lacks a control block is another device.
+        // A node without a control block is another device.
         node.map(UIO_CONTROL_MAP)?;
         return Ok(Registers::OneNode(UioDevice::of_node(system, node)?));
     }
@@ -175,8 +176,8 @@ fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
     Ok(Registers::Nodes { board: name.to_owned(), control, dma })
 }
 
-/// Opens memory that does not come from `/dev/mem`. Whichever it is, its device file is locked as
-/// long as the region, or a piece of it, exists.
+/// Opens a u-dma-buf or the memory of a UIO node. Its device file is locked as long as the region,
+/// or a piece of it, exists.
 fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>, PlatformError> {
     let u_dma_buf = |name: &str, caching| -> Result<Box<dyn Region>, PlatformError> {
         Ok(Box::new(UDmaBuf::open(system, name, caching)?))

@@ -1,9 +1,8 @@
-//! The platform over a board in another process: registers, interrupt and time through its socket,
-//! memory for DMA in the file that both processes have open.
+//! Drives a board in another process: registers, interrupt and time through a socket, memory for
+//! DMA in a file that both processes have open.
 //!
-//! The file is locked like every device file: the board has one driver at a time. Time is the
-//! board's, which is virtual; it passes with what is asked of the board, and each answer says how
-//! far it has come.
+//! The file is locked like every device file: the board has one driver at a time. The clock is the
+//! board's and virtual: it advances with each request, and each answer carries its time.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -28,14 +27,14 @@ use crate::platform::{
     Access, DmaMemory, Platform, PlatformError, RegisterWindow, ReservedMemory, SharedMemory,
 };
 
-/// How long an answer may take. The board's process computes what the board does meanwhile, at most
-/// [`LONGEST_WAIT`] of its time.
+/// Longest real time for an answer, in which the board's process computes at most [`LONGEST_WAIT`]
+/// of the board's time.
 const ANSWER_LIMIT: Duration = Duration::from_secs(60);
 
-/// How long a board that nobody has may take to let a driver in, which is the answer to its hello.
+/// Longest real time in which a free board answers the hello of a driver.
 const HELLO_LIMIT: Duration = Duration::from_secs(10);
 
-/// The file that is a served board's memory, if nobody says otherwise.
+/// The default file for the memory of a board served at `socket`.
 pub(crate) fn memory_beside(socket: &Path) -> PathBuf {
     let mut path = OsString::from(socket);
     path.push(MEMORY_SUFFIX);
@@ -56,7 +55,7 @@ impl RemotePlatform {
         Self::open_within(socket, memory, HELLO_LIMIT)
     }
 
-    /// The same for a board that lets its driver in within `limit`.
+    /// The same for a board that answers the hello within `limit`.
     fn open_within(socket: &Path, memory: &Path, limit: Duration) -> Result<Self, PlatformError> {
         let line = Line::connect(socket, limit)?;
         let error = |act| {
@@ -115,19 +114,19 @@ impl RemotePlatform {
     }
 }
 
-/// The socket to a board.
+/// The connection to a board.
 struct Line {
     socket: PathBuf,
     state: Mutex<State>,
 }
 
-/// What is known of the other side.
+/// The state of a connection.
 struct State {
     stream: UnixStream,
-    /// How long an answer may take.
+    /// Longest real time for an answer.
     limit: Duration,
-    /// The board's time at its last answer. A board that is lost has no time: there it is that of
-    /// our waits, so that these end.
+    /// The board's time at its last answer. A lost board has no clock: our own waits advance this
+    /// time then, so that they end.
     now: Duration,
     lost: Option<Arc<io::Error>>,
 }
@@ -157,7 +156,7 @@ impl Line {
             .map_err(|source| self.lost_to(Arc::new(source)))
     }
 
-    /// The first request. A board that does not answer it is not lost: it was never had.
+    /// The first request. A board that does not answer it is silent, not lost: no step has begun.
     fn hello(&self, limit: Duration) -> Result<Answer, PlatformError> {
         self.ask(Request::Hello { version: VERSION }).map_err(|error| match &error {
             PlatformError::ServerLost { socket, source }
@@ -170,11 +169,11 @@ impl Line {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // Nothing in here panics between two changes that belong together.
+        // No code under the lock panics between two changes that belong together.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// One request and its answer. Once that has failed the board is lost for good.
+    /// One request and its answer. After the first failure the board is lost for good.
     fn ask(&self, request: Request) -> Result<Answer, PlatformError> {
         let mut state = self.state();
         if state.lost.is_none() {
@@ -204,17 +203,17 @@ impl Line {
         PlatformError::ServerLost { socket: self.socket.clone(), source }
     }
 
-    /// What a register reads: all ones from a board that is lost, as from one without power.
+    /// The value of a register: all ones if the board is lost, like a board without power.
     fn read(&self, address: u64) -> u32 {
         self.ask(Request::Read { address }).map_or(u32::MAX, |answer| answer.value)
     }
 }
 
-/// Sends a request and reads its answer, in bounded time: a part that comes late counts as late.
+/// Sends a request and reads its answer. The whole answer must arrive within `limit`.
 fn exchange(stream: &mut UnixStream, request: Request, limit: Duration) -> io::Result<Answer> {
     let until = Instant::now() + limit;
     let late = || io::Error::new(io::ErrorKind::TimedOut, format!("no answer within {limit:?}"));
-    // What the kernel calls a transfer that has timed out.
+    // The kernel reports a transfer that has timed out as `WouldBlock`.
     let timed = |error: io::Error| match error.kind() {
         io::ErrorKind::WouldBlock => late(),
         _ => error,
@@ -264,7 +263,7 @@ impl RegisterWindow for RemoteWindow {
     }
 
     fn write32(&self, at: u32, value: u32) {
-        // A write to a board that is lost goes nowhere; the next wait says so.
+        // A write to a lost board goes nowhere; the next wait reports the loss.
         let _ = self.line.ask(Request::Write { address: self.base + u64::from(at), value });
     }
 }
@@ -383,7 +382,7 @@ mod tests {
         assert_eq!(sent, Request::Unmask.encode());
     }
 
-    /// A folder with a socket that somebody has bound, and with a file for the memory.
+    /// A folder with a bound socket and a file for the memory.
     fn bound() -> (tempfile::TempDir, PathBuf, PathBuf, UnixListener) {
         let folder = tempfile::tempdir().expect("a directory");
         let (socket, memory) = (folder.path().join("board"), folder.path().join("memory"));

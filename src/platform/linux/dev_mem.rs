@@ -1,11 +1,10 @@
-//! Maps physical memory through `/dev/mem`: only on request, and only inside windows that
-//! were configured.
+//! Maps physical memory through `/dev/mem`: only on request, and only inside configured windows.
 //!
-//! `/dev/mem` is locked, and with it every device file that shows memory of these windows too: who
-//! opens a UIO node or a u-dma-buf has it alone, whichever way the other one comes.
+//! `/dev/mem` is locked, and with it every device file that shows memory of these windows too: a
+//! register or a buffer has one user, through `/dev/mem` or through its own device file.
 //!
-//! There is no interrupt this way. What the kernel does not map (registers, memory reserved with
-//! `no-map`) is Device memory.
+//! `/dev/mem` gives no interrupt. Memory that the kernel does not map (registers, memory reserved
+//! with `no-map`) is mapped as Device memory.
 //!
 //! Source: Linux `Documentation/arch/arm64/memory.rst`, `drivers/char/mem.c`.
 
@@ -25,7 +24,7 @@ use super::uio_listing::uio_listing;
 use crate::platform::memory::u_dma_buf::directory;
 use crate::platform::{PlatformError, ReservedMemory, System, u_dma_buf_names};
 
-/// What may be reached through `/dev/mem`. The default is the address map of the interface.
+/// The windows that a board may use of `/dev/mem`. The default is the address map of the interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DevMemWindows {
     /// Physical address of each AXI DMA, whose registers take 64 KiB.
@@ -76,14 +75,14 @@ fn overlap(a: &Range<u64>, b: &Range<u64>) -> bool {
 #[derive(Debug)]
 pub(crate) struct DevMem {
     file: Arc<LockedFile>,
-    /// What may be mapped.
+    /// Ranges that may be mapped.
     windows: Vec<Range<u64>>,
-    /// What the kernel uses as its own, as far as it says.
+    /// Ranges that the kernel lists as its own, with its lines for them.
     kernel: Vec<(Range<u64>, String)>,
 }
 
 impl DevMem {
-    /// Opens it, to map these windows and nothing else.
+    /// Opens `/dev/mem` to map these windows and nothing else.
     pub(crate) fn open(system: &System, windows: Vec<Range<u64>>) -> Result<Self, PlatformError> {
         let first = windows.first().map_or(0, |window| window.start);
         let file = LockedFile::open(&system.dev.join("mem"), nix::libc::O_SYNC)
@@ -121,15 +120,15 @@ impl DevMem {
     }
 }
 
-/// Locks the device files that show memory of these windows too. One whose file is not there nobody
-/// can open.
+/// Locks the device files that show memory of these windows too. A device without a file cannot be
+/// opened and needs no lock.
 fn lock_others(system: &System, windows: &[Range<u64>]) -> Result<Vec<LockedFile>, PlatformError> {
     let shown = |start: u64, bytes: u64| {
         let shown = start..start.saturating_add(bytes);
         windows.iter().any(|window| overlap(window, &shown))
     };
     let listing = uio_listing(&system.uio)?;
-    // Nobody knows what a node shows that cannot be read.
+    // A node with an unreadable description may show memory of the windows.
     let mut names: Vec<_> = listing.unreadable.into_iter().map(|node| node.device).collect();
     for node in listing.nodes {
         if node.maps.iter().any(|map| shown(map.address, map.bytes)) {
@@ -171,7 +170,7 @@ fn refused(act: &'static str, address: u64, error: PlatformError) -> PlatformErr
     }
 }
 
-/// The lines of `/proc/iomem` that are memory of the kernel's. Without rights it shows zeros.
+/// The lines of `/proc/iomem` for the kernel's own memory. A reader without rights sees zeros.
 fn kernel_memory(iomem: &str) -> Vec<(Range<u64>, String)> {
     let parse = |line: &str| {
         let (addresses, name) = line.trim().split_once(" : ")?;

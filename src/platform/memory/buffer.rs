@@ -42,7 +42,7 @@ enum Owner {
     Device,
 }
 
-/// Memory of the platform's, released when dropped unless the device owns it.
+/// Memory of the platform, released on drop unless the device owns it.
 #[derive(Debug)]
 struct Allocation {
     platform: Arc<dyn Platform>,
@@ -97,7 +97,7 @@ impl Drop for Allocation {
 /// A buffer that the CPU owns.
 #[derive(Debug)]
 pub(crate) struct CpuBuffer {
-    // Dropped before the allocation, which makes the memory free for others.
+    // Dropped before the allocation, whose drop frees the memory for others.
     memory: DmaMemory,
     allocation: Allocation,
 }
@@ -206,7 +206,7 @@ impl SharedWords {
         self.allocation.range(index as u64 * 4, count as u64 * 4)
     }
 
-    /// Where a word lies on the bus, to compare with what an engine says.
+    /// Bus address of a word, to compare with an engine's CURDESC.
     pub(crate) fn address(&self, index: usize) -> u64 {
         self.allocation.address.saturating_add(index as u64 * 4)
     }

@@ -1,4 +1,4 @@
-//! The only way to a register: bounds-checked, counted, logged 32-bit accesses.
+//! Makes every register access a checked, counted and logged access of 32 bits.
 
 use std::fmt;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
     fn write32(&self, at: u32, value: u32);
 }
 
-/// Register accesses of a board, all regions together: how many, and the last ones.
+/// Register accesses of a board, all regions together: their number, and the last ones.
 #[derive(Debug, Default)]
 pub(crate) struct AccessCounts {
     reads: AtomicU64,
@@ -45,10 +45,10 @@ impl AccessCounts {
     }
 }
 
-/// What the registers of a region are called.
+/// The kind of a register region, which names its registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RegisterMap {
-    /// AXI DMA of that number.
+    /// The AXI DMA of this number.
     Dma(usize),
     /// The accelerator's control block.
     Control,
@@ -189,7 +189,7 @@ pub(crate) mod fake {
         pub(crate) values: BTreeMap<u32, u32>,
         pub(crate) scripted: BTreeMap<u32, Vec<u32>>,
         pub(crate) writes: Vec<(u32, u32)>,
-        /// What a write leaves behind, where that is not what was written.
+        /// The bits that a write changes, for offsets where it does not change all.
         pub(crate) kept_bits: BTreeMap<u32, u32>,
     }
 
