@@ -173,7 +173,7 @@ fn what_is_refused_is_refused_in_the_same_words_with_any_number_of_threads() {
     }
 }
 
-/// Collisions, one of which panics when it is read.
+/// Collisions, among them one that panics when it is read.
 struct Torn<'a> {
     list: &'a [Collision],
     at: usize,

@@ -44,7 +44,7 @@ const FINE: f32 = 512.0;
 const COARSE: f32 = 2.0;
 
 /// Moves bodies and contact points to a grid of `grid` points a metre. On it lever arms are the
-/// same numbers from world coordinates and from offsets. Of three contact points two remain, since
+/// same numbers from world coordinates and from offsets. Two of three contact points remain, since
 /// a third is not exact.
 fn snap(bodies: &mut [Body], collisions: &mut [Collision], grid: f32) {
     let snap = |point: &mut [f32; 3]| {
@@ -284,8 +284,8 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
     assert!(matches!(error, Error::Input(InputError::TooManyLive { .. })), "{error:?}");
 }
 
-/// Collisions, one of which loses its contact points after the read `good_reads`, for good or for
-/// one read.
+/// Collisions, among them one that loses its contact points after the read `good_reads`, for good
+/// or for one read.
 struct Unsteady<'a> {
     list: &'a [Collision],
     which: usize,

@@ -1,8 +1,8 @@
 //! Asks the kernel whether the programmable logic carries a bitstream.
 //!
-//! An access to a register of logic that is not programmed hangs the CPU: the question comes before
-//! the first access. The answer is the state of the logic's FPGA manager, which is known by its
-//! name: a board may have managers of other chips.
+//! An access to a register of logic that is not programmed hangs the CPU: the question comes
+//! before the first access. The answer is the state of the logic's FPGA manager, which is known by
+//! its name: a board may have managers of other chips.
 //!
 //! Source: Linux `Documentation/ABI/testing/sysfs-class-fpga-manager`, `drivers/fpga/zynqmp-fpga.c`.
 

@@ -23,9 +23,9 @@ use crate::platform::{PlatformError, System, UioMap, UioNode, UioWindow};
 
 /// An open UIO node.
 ///
-/// The interrupt protocol of a level-triggered device: acknowledge the interrupt in the device, then
-/// [`unmask`](Self::unmask), then read the device's status once more (an event in between raised no
-/// interrupt), then [`wait_interrupt`](Self::wait_interrupt).
+/// The interrupt protocol of a level-triggered device: acknowledge the interrupt in the device,
+/// then [`unmask`](Self::unmask), then read the device's status once more (an event in between
+/// raised no interrupt), then [`wait_interrupt`](Self::wait_interrupt).
 #[derive(Debug)]
 pub struct UioDevice {
     node: UioNode,

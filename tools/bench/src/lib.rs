@@ -74,8 +74,8 @@ pub const STRETCH: usize = WARMING + MEASURED;
 
 /// Runs all in turn, in `stretches` stretches each; returns the median time of each.
 ///
-/// In a stretch, one run has the machine to itself: the caches hold as much of its memory as they
-/// can, and nothing of the others'. The first runs of a stretch do not count.
+/// In a stretch, one run has the machine and its caches to itself. The first runs of a stretch fill
+/// the caches and do not count.
 pub fn warm_medians(stretches: usize, clock: Clock, contestants: &mut [Run<'_>]) -> Vec<Duration> {
     let mut times = vec![Vec::with_capacity(stretches * MEASURED); contestants.len()];
     for _ in 0..stretches {

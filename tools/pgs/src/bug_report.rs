@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::options::ordering;
 use crate::output::SCHEMA;
 
-/// What to do when a step fails.
+/// The arguments for a failed step.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "When a step fails")]
 pub(crate) struct FaultArgs {

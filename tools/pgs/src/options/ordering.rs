@@ -41,7 +41,7 @@ pub(crate) enum OrderName {
 }
 
 impl OrderName {
-    /// The order that the driver is asked for.
+    /// The driver's order of this name.
     fn order(self) -> Option<Order> {
         match self {
             Self::Auto => None,
@@ -98,7 +98,7 @@ impl OrderingArgs {
     }
 }
 
-/// Whether the board's results equal those of solving one collision after the other, in any order.
+/// Whether the board's results equal a solution of one collision after the other, in any order.
 pub(crate) fn is_sequential(capabilities: &Capabilities) -> bool {
     capabilities.interlocked && capabilities.window.is_none()
 }

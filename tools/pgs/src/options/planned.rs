@@ -53,7 +53,7 @@ impl PlannedArgs {
         })
     }
 
-    /// Whether any fault is asked for.
+    /// Whether the command line requests faults.
     pub(crate) fn is_given(&self) -> bool {
         self.fault.is_some()
     }
