@@ -22,8 +22,8 @@ pub(crate) struct FaultArgs {
     /// Repeat a failed step up to N times, if the board is ready for it after its reset
     #[arg(long, value_name = "N", default_value_t = 0)]
     retries: u32,
-    /// Write to FILE what a bug report needs: version, board, parameters, registers, last accesses.
-    /// Nothing is written without a fault
+    /// Write the data for a bug report to FILE after a fault: version, board, parameters, registers,
+    /// last accesses
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }

@@ -19,16 +19,15 @@ pub(crate) struct OrderingArgs {
 /// An order of the collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OrderName {
-    /// Fewest cycles on the board: hazard-free-nearby (without empty entries where the pipeline
-    /// waits on hazards), or as-given where that takes fewer cycles; hazard-free where the chip
-    /// keeps live bodies only
+    /// Fewest cycles on the board: hazard-free-nearby (without empty entries if the pipeline waits
+    /// on hazards), or as-given if it takes fewer cycles; hazard-free if the chip keeps live bodies
+    /// only
     Auto,
     /// As detected, which is Bullet's order: many hazards
     AsGiven,
     /// No hazards, few bodies alive, few empty entries
     HazardFree,
-    /// No hazards, near the order as given, few empty entries (falls back to hazard-free where they
-    /// would be many)
+    /// No hazards, near the order as given, few empty entries (otherwise falls back to hazard-free)
     HazardFreeNearby,
     /// The thesis' Algorithm 3, ties by the lowest index: few bodies alive, nearly all hazardous
     BodyByBody,
