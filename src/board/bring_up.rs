@@ -69,8 +69,8 @@ pub(crate) fn connect(
 ) -> Result<Vec<Core>, PlatformError> {
     let width = capabilities.address_width;
     let core = |core| {
-        let registers = platform.dma_window(core)?;
-        let window = Arc::new(Window::new(registers, RegisterMap::Dma(core), Arc::clone(counts))?);
+        let map = RegisterMap::Dma(core);
+        let window = Arc::new(Window::new(platform.window(map)?, map, Arc::clone(counts))?);
         Ok(Core {
             sender: Channel::new(Arc::clone(&window), core, Direction::Mm2s, width),
             receiver: Channel::new(window, core, Direction::S2mm, width),

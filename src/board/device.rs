@@ -89,8 +89,11 @@ impl Device {
 
     fn identify(platform: Arc<dyn Platform>, length_width: Option<u32>) -> Result<Self, OpenError> {
         let counts = Arc::<AccessCounts>::default();
-        let window =
-            Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;
+        let window = Window::new(
+            platform.window(RegisterMap::Control)?,
+            RegisterMap::Control,
+            Arc::clone(&counts),
+        )?;
         let mut capabilities = identify(&window)?;
         check_given_width(length_width)?;
         capabilities.length_width = length_width.unwrap_or(capabilities.length_width);

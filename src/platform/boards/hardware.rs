@@ -15,8 +15,8 @@ use crate::platform::linux::uio_listing::uio_listing;
 use crate::platform::memory::pool::{Pool, Region};
 use crate::platform::memory::u_dma_buf::{Caching, UDmaBuf};
 use crate::platform::{
-    Access, DmaMemory, ManagerChoice, Platform, PlatformError, RegisterWindow, ReservedMemory,
-    SharedMemory, System, UioDevice, require_bitstream,
+    DmaMemorySource, ManagerChoice, Platform, PlatformError, RegisterMap, RegisterWindow,
+    ReservedMemory, System, UioDevice, require_bitstream,
 };
 
 /// Where a real board's memory for DMA comes from.
@@ -195,60 +195,40 @@ fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>
 }
 
 impl Platform for HardwarePlatform {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        let map = UIO_DMA_MAPS.get(core).copied().unwrap_or_default();
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let region = match map {
+            RegisterMap::Dma(core) => UIO_DMA_MAPS.get(core).copied().unwrap_or_default(),
+            RegisterMap::Control => UIO_CONTROL_MAP,
+        };
         match &self.registers {
-            Registers::OneNode(device) => Ok(device.window(map)?.into()),
+            Registers::OneNode(device) => Ok(device.window(region)?.into()),
             Registers::Nodes { board, control, dma } => {
-                let present = dma.iter().find(|(number, _)| *number == core);
-                let (_, device) = present.ok_or_else(|| {
+                let device = match map {
+                    RegisterMap::Control => Some(control),
+                    RegisterMap::Dma(core) => {
+                        dma.iter().find(|(number, _)| *number == core).map(|(_, device)| device)
+                    }
+                };
+                let device = device.ok_or_else(|| {
                     let devices = dma.iter().map(|(_, device)| device).chain([control]);
                     let names: Vec<_> = devices.map(|device| device.node().name.as_str()).collect();
                     PlatformError::NoNode {
-                        wanted: part_name(board, &format!("dma{core}")),
+                        wanted: part_name(board, &map.to_string()),
                         found: names.join(", "),
                     }
                 })?;
-                Ok(device.map(device.node().map_or_only(map)?)?.into())
+                Ok(device.map(device.node().map_or_only(region)?)?.into())
             }
-            Registers::DevMem(mem, windows) => map_registers(mem, windows.dma(core)),
+            Registers::DevMem(mem, windows) => {
+                let window = windows.window(map);
+                let missing = PlatformError::OutOfWindows { address: u64::MAX, bytes: 0 };
+                Ok(Box::new(mem.map(&window.ok_or(missing)?)?))
+            }
         }
     }
 
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        match &self.registers {
-            Registers::OneNode(device) => Ok(device.window(UIO_CONTROL_MAP)?.into()),
-            Registers::Nodes { control, .. } => {
-                Ok(control.map(control.node().map_or_only(UIO_CONTROL_MAP)?)?.into())
-            }
-            Registers::DevMem(mem, windows) => map_registers(mem, windows.control()),
-        }
-    }
-
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
-        self.pool.allocate(beats)
-    }
-
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
-        self.pool.allocate_shared(words)
-    }
-
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
-        self.pool.hand_over(address, memory, used, access)
-    }
-
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
-        self.pool.take_back(address)
-    }
-
-    fn release(&self, address: u64) -> Result<(), PlatformError> {
-        self.pool.release(address)
+    fn memory(&self) -> &dyn DmaMemorySource {
+        &self.pool
     }
 
     fn now(&self) -> Duration {
@@ -276,12 +256,4 @@ impl Platform for HardwarePlatform {
     fn unmask_interrupt(&self) -> Result<(), PlatformError> {
         self.with_interrupt(UioDevice::unmask).map(|_| ())
     }
-}
-
-fn map_registers(
-    mem: &DevMem,
-    window: Option<Range<u64>>,
-) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-    let window = window.ok_or(PlatformError::OutOfWindows { address: u64::MAX, bytes: 0 })?;
-    Ok(Box::new(mem.map(&window)?))
 }

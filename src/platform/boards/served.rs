@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bitstream_model::remote::{connect, mark};
-use pgs_interface::address_map;
+
 use pgs_interface::message::{
     ANSWER_BYTES, Answer, LONGEST_WAIT, MEMORY_SUFFIX, Request, Status, VERSION,
 };
@@ -24,7 +24,7 @@ use crate::platform::linux::lock::LockedFile;
 use crate::platform::linux::mapped::Mapping;
 use crate::platform::memory::pool::Pool;
 use crate::platform::{
-    Access, DmaMemory, Platform, PlatformError, RegisterWindow, ReservedMemory, SharedMemory,
+    DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow, ReservedMemory,
 };
 
 /// Longest real time for an answer, in which the board's process computes at most [`LONGEST_WAIT`]
@@ -107,10 +107,6 @@ impl RemotePlatform {
         let memory = ReservedMemory::new(mapping, address, name)?;
         log::info!("memory for DMA: {} bytes at {:#x}", memory.bytes(), memory.address());
         Ok(Self { line: Arc::new(line), pool: Pool::new(Box::new(memory)) })
-    }
-
-    fn window(&self, base: u64, bytes: u32) -> Box<dyn RegisterWindow> {
-        Box::new(RemoteWindow { line: Arc::clone(&self.line), base, bytes })
     }
 }
 
@@ -269,38 +265,13 @@ impl RegisterWindow for RemoteWindow {
 }
 
 impl Platform for RemotePlatform {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        Ok(self.window(address_map::dma_base(core), address_map::DMA_BYTES))
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let (base, bytes) = map.place();
+        Ok(Box::new(RemoteWindow { line: Arc::clone(&self.line), base, bytes }))
     }
 
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        Ok(self.window(address_map::CONTROL_BASE, address_map::CONTROL_BYTES))
-    }
-
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
-        self.pool.allocate(beats)
-    }
-
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
-        self.pool.allocate_shared(words)
-    }
-
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
-        self.pool.hand_over(address, memory, used, access)
-    }
-
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
-        self.pool.take_back(address)
-    }
-
-    fn release(&self, address: u64) -> Result<(), PlatformError> {
-        self.pool.release(address)
+    fn memory(&self) -> &dyn DmaMemorySource {
+        &self.pool
     }
 
     fn now(&self) -> Duration {
@@ -366,7 +337,7 @@ mod tests {
         // From here on nothing is sent, and no time of ours passes.
         let (_root, memory) = reserved(0x6000_0000, 1 << 16);
         let platform = RemotePlatform { line: Arc::new(line), pool: Pool::new(Box::new(memory)) };
-        let window = platform.control_window().expect("a window");
+        let window = platform.window(RegisterMap::Control).expect("a window");
         assert_eq!(window.read32(0), u32::MAX);
         assert!(matches!(platform.lost(), Some(PlatformError::ServerLost { .. })));
         window.write32(0, 1);

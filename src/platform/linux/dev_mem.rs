@@ -22,7 +22,7 @@ use super::sysfs::{is_gone, read_if_present, read_number};
 use super::system::page_bytes;
 use super::uio_listing::uio_listing;
 use crate::platform::memory::u_dma_buf::directory;
-use crate::platform::{PlatformError, ReservedMemory, System, u_dma_buf_names};
+use crate::platform::{PlatformError, RegisterMap, ReservedMemory, System, u_dma_buf_names};
 
 /// The windows that a board may use of `/dev/mem`. The default is the address map of the interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,25 +46,20 @@ impl Default for DevMemWindows {
 }
 
 impl DevMemWindows {
-    /// The registers of AXI DMA `core`.
-    pub(crate) fn dma(&self, core: usize) -> Option<Range<u64>> {
-        self.dma.get(core).and_then(|start| range(*start, u64::from(DMA_BYTES)))
-    }
-
-    /// The registers of the accelerator.
-    pub(crate) fn control(&self) -> Option<Range<u64>> {
-        range(self.control, u64::from(CONTROL_BYTES))
+    /// The registers of an AXI DMA or of the accelerator.
+    pub(crate) fn window(&self, map: RegisterMap) -> Option<Range<u64>> {
+        let (start, bytes) = match map {
+            RegisterMap::Dma(core) => (*self.dma.get(core)?, DMA_BYTES),
+            RegisterMap::Control => (self.control, CONTROL_BYTES),
+        };
+        Some(start..start.checked_add(u64::from(bytes))?)
     }
 
     /// All registers.
     pub(crate) fn registers(&self) -> Vec<Range<u64>> {
-        let dma = (0..DMA_COUNT_MAX).map(|core| self.dma(core));
-        dma.chain([self.control()]).flatten().collect()
+        let maps = (0..DMA_COUNT_MAX).map(RegisterMap::Dma).chain([RegisterMap::Control]);
+        maps.filter_map(|map| self.window(map)).collect()
     }
-}
-
-fn range(start: u64, bytes: u64) -> Option<Range<u64>> {
-    Some(start..start.checked_add(bytes)?)
 }
 
 fn overlap(a: &Range<u64>, b: &Range<u64>) -> bool {
@@ -218,16 +213,16 @@ mod tests {
     #[test]
     fn the_default_windows_are_those_of_the_interface() {
         let windows = DevMemWindows::default();
-        assert_eq!(windows.dma(3), Some(0xA003_0000..0xA004_0000));
-        assert_eq!(windows.dma(4), None);
-        assert_eq!(windows.control(), Some(0xA004_0000..0xA004_1000));
+        assert_eq!(windows.window(RegisterMap::Dma(3)), Some(0xA003_0000..0xA004_0000));
+        assert_eq!(windows.window(RegisterMap::Dma(4)), None);
+        assert_eq!(windows.window(RegisterMap::Control), Some(0xA004_0000..0xA004_1000));
         assert_eq!(windows.memory, 0x5000_0000..0x5400_0000);
     }
 
     #[test]
     fn a_window_is_mapped_where_it_lies_and_need_not_begin_on_a_page() {
         let (_root, system, windows) = memory();
-        let control = windows.control().expect("no overflow");
+        let control = windows.window(RegisterMap::Control).expect("no overflow");
         let memory_window = windows.memory.clone();
         let mem = open(&system, &windows).expect("opened");
         mem.map(&control).expect("mapped").write32(8, 0x0403_0201);
@@ -262,7 +257,8 @@ mod tests {
         let mem = open(&system, &windows).expect("opened");
         let error = open(&system, &windows).expect_err("in use");
         assert!(matches!(&error, PlatformError::Busy { path } if path.ends_with("mem")), "{error}");
-        let control = mem.map(&windows.control().expect("no overflow")).expect("mapped");
+        let control =
+            mem.map(&windows.window(RegisterMap::Control).expect("no overflow")).expect("mapped");
         let memory = mem.memory(&windows.memory).expect("mapped");
         // Either keeps it.
         drop((mem, control));
@@ -338,7 +334,7 @@ mod tests {
                      00080000-00080fff : a0040000.control\n";
         write(system.iomem.clone(), iomem);
         let memory = windows.memory.clone();
-        let control = windows.control().expect("no overflow");
+        let control = windows.window(RegisterMap::Control).expect("no overflow");
         let mem = open(&system, &windows).expect("opened");
         let error = mem.memory(&memory).expect_err("overlaps");
         assert!(

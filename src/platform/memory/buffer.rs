@@ -82,7 +82,7 @@ impl Drop for Allocation {
         let Self { address, bytes, .. } = *self;
         match self.owner {
             Owner::Cpu => {
-                if let Err(error) = self.platform.release(address) {
+                if let Err(error) = self.platform.memory().release(address) {
                     log::error!("cannot free {bytes} bytes of DMA memory at {address:#x}: {error}");
                 }
             }
@@ -109,7 +109,7 @@ impl CpuBuffer {
         beats: usize,
         address_width: u32,
     ) -> Result<Self, PlatformError> {
-        let (address, memory) = platform.allocate(beats)?;
+        let (address, memory) = platform.memory().allocate(beats)?;
         let bytes = (memory.beats().len() as u64) * BEAT_BYTES as u64;
         let allocation = Allocation::new(platform, address, bytes, address_width)?;
         Ok(Self { memory, allocation })
@@ -138,7 +138,8 @@ impl CpuBuffer {
     ) -> Result<DeviceBuffer, PlatformError> {
         let Self { memory, mut allocation } = self;
         allocation.owner = Owner::Device;
-        allocation.platform.hand_over(allocation.address, memory, used, access)?;
+        let source = allocation.platform.memory();
+        source.hand_over(allocation.address, memory, used, access)?;
         release_to_device();
         Ok(DeviceBuffer { allocation })
     }
@@ -161,7 +162,7 @@ impl DeviceBuffer {
     pub(crate) fn into_cpu(self) -> Result<CpuBuffer, PlatformError> {
         let Self { mut allocation } = self;
         acquire_from_device();
-        let memory = allocation.platform.take_back(allocation.address)?;
+        let memory = allocation.platform.memory().take_back(allocation.address)?;
         allocation.owner = Owner::Cpu;
         Ok(CpuBuffer { memory, allocation })
     }
@@ -181,7 +182,7 @@ impl SharedWords {
         words: usize,
         address_width: u32,
     ) -> Result<Self, PlatformError> {
-        let (address, memory) = platform.allocate_shared(words)?;
+        let (address, memory) = platform.memory().allocate_shared(words)?;
         let bytes = (memory.len() as u64) * 4;
         let allocation = Allocation::new(platform, address, bytes, address_width)?;
         let this = Self { words: memory, allocation };

@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pgs_interface::record::BEAT_BYTES;
 
-use crate::platform::{Access, DmaMemory, PlatformError, SharedMemory};
+use crate::platform::{Access, DmaMemory, DmaMemorySource, PlatformError, SharedMemory};
 
 /// Bytes of a cache line, the alignment and the unit of a piece.
 const LINE: u64 = 64;
@@ -129,24 +129,20 @@ impl Pool {
             }
         }
     }
+}
 
-    /// Memory for `beats` beats.
-    pub(crate) fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+impl DmaMemorySource for Pool {
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
         self.give(bytes, |at| self.region.memory(at, beats))
     }
 
-    /// Memory for `words` shared words.
-    pub(crate) fn allocate_shared(
-        &self,
-        words: usize,
-    ) -> Result<(u64, SharedMemory), PlatformError> {
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
         let bytes = (words as u64).saturating_mul(4);
         self.give(bytes, |at| self.region.shared(at, words))
     }
 
-    /// Gives a piece to the device.
-    pub(crate) fn hand_over(
+    fn hand_over(
         &self,
         address: u64,
         memory: DmaMemory,
@@ -165,8 +161,7 @@ impl Pool {
         }
     }
 
-    /// Takes a piece back from the device.
-    pub(crate) fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
         let at = self.offset(address)?;
         let mut state = self.state();
         let piece = state.pieces.get_mut(&address);
@@ -179,8 +174,8 @@ impl Pool {
         Ok(memory)
     }
 
-    /// Frees a piece. A piece with the device is refused: the device may still write it.
-    pub(crate) fn release(&self, address: u64) -> Result<(), PlatformError> {
+    /// Refuses a piece with the device, which may still write it.
+    fn release(&self, address: u64) -> Result<(), PlatformError> {
         let mut state = self.state();
         match state.pieces.get(&address) {
             Some(Piece { handed_over: None, .. }) => {}

@@ -263,6 +263,7 @@ mod tests {
     use pgs_interface::record::Beat;
 
     use super::*;
+    use crate::platform::DmaMemorySource as _;
     use crate::platform::memory::pool::Pool;
     use crate::platform::uio_fake::write;
 

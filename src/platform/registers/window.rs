@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use pgs_interface::register::Register;
-use pgs_interface::{axi_dma, control};
+use pgs_interface::{address_map, axi_dma, control};
 
 use super::access_log::{AccessKind, AccessLog, RegisterAccess};
 use crate::platform::PlatformError;
@@ -64,11 +64,20 @@ impl fmt::Display for RegisterMap {
 }
 
 impl RegisterMap {
+    /// Physical address of the region by the address map, and its length in bytes.
+    #[cfg(feature = "emulation")]
+    pub(crate) fn place(self) -> (u64, u32) {
+        match self {
+            Self::Dma(core) => (address_map::dma_base(core), address_map::DMA_BYTES),
+            Self::Control => (address_map::CONTROL_BASE, address_map::CONTROL_BYTES),
+        }
+    }
+
     /// Bytes that the driver may touch.
     const fn bytes(self) -> u32 {
         match self {
             Self::Dma(_) => 2 * axi_dma::S2MM_OFFSET,
-            Self::Control => pgs_interface::address_map::CONTROL_BYTES,
+            Self::Control => address_map::CONTROL_BYTES,
         }
     }
 
@@ -177,7 +186,7 @@ pub(crate) mod fake {
     use std::time::Duration;
 
     use super::*;
-    use crate::platform::{Access, DmaMemory, Platform, SharedMemory};
+    use crate::platform::{Access, DmaMemory, DmaMemorySource, Platform, SharedMemory};
     use std::sync::atomic::AtomicU32;
 
     /// Registers that keep what is written, with a script for reads: a queue of values per offset.
@@ -242,15 +251,7 @@ pub(crate) mod fake {
         }
     }
 
-    impl Platform for FakePlatform {
-        fn dma_window(&self, _: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-            Ok(Box::new(FakeRegisters::default()))
-        }
-
-        fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-            Ok(Box::new(FakeRegisters::default()))
-        }
-
+    impl DmaMemorySource for FakePlatform {
         fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
             let memory = DmaMemory::Heap(vec![Default::default(); beats].into());
             Ok((self.address(beats * 16), memory))
@@ -280,6 +281,16 @@ pub(crate) mod fake {
         fn release(&self, address: u64) -> Result<(), PlatformError> {
             self.released.lock().expect("no test panics with the lock").push(address);
             Ok(())
+        }
+    }
+
+    impl Platform for FakePlatform {
+        fn window(&self, _: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+            Ok(Box::new(FakeRegisters::default()))
+        }
+
+        fn memory(&self) -> &dyn DmaMemorySource {
+            self
         }
 
         fn now(&self) -> Duration {

@@ -9,7 +9,7 @@ use pgs_interface::axi_dma::dmasr;
 use pgs_interface::profile::Profile;
 
 use super::fault::{CUBES, fault_of};
-use super::tampered::{CONTROL, Tamper, Tampered};
+use super::tampered::{CONTROL_BLOCK, Tamper, Tampered};
 use super::{bits, open, scene, step, undisturbed};
 use crate::board::anomalies::Anomaly;
 use crate::{Aftermath, Cancellation, Error, InputError, StepParameters};
@@ -170,7 +170,7 @@ fn a_board_that_is_gone_before_a_larger_step_did_not_fail_to_stop() {
             tampered.tamper(core, base + DMASR, Tamper::Value(u32::MAX));
         }
     }
-    tampered.tamper(CONTROL, 0x100, Tamper::Value(u32::MAX));
+    tampered.tamper(CONTROL_BLOCK, 0x100, Tamper::Value(u32::MAX));
     let error = step(&mut accelerator, CUBES).0.expect_err("nothing answers");
     assert_eq!(fault_of(&error).name(), "gone");
     assert!(error.must_reopen(), "{error}");

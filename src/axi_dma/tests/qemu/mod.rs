@@ -51,7 +51,7 @@ impl Core {
         };
         let qemu = Arc::new(qemu);
         let platform: Arc<dyn Platform> = Arc::clone(&qemu) as _;
-        let registers = platform.dma_window(0).expect("one core");
+        let registers = platform.window(RegisterMap::Dma(0)).expect("one core");
         let window = Window::new(registers, RegisterMap::Dma(0), Arc::default());
         let window = Arc::new(window.expect("long enough"));
         let channel = |direction| Channel::new(Arc::clone(&window), 0, direction, ADDRESS_WIDTH);

@@ -13,13 +13,15 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use pgs_interface::address_map;
 use pgs_interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 use pgs_interface::record::{BEAT_BYTES, Beat};
 use pgs_support::chunks::Chunks;
 
 use super::machine::Machine;
-use crate::platform::{Access, DmaMemory, Platform, PlatformError, RegisterWindow, SharedMemory};
+use crate::platform::{
+    Access, DmaMemory, DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow,
+    SharedMemory,
+};
 
 /// Where the machine's parts lie.
 const RAM: u64 = 0x5000_0000;
@@ -188,17 +190,7 @@ impl RegisterWindow for DmaWindow {
     }
 }
 
-impl Platform for QtestPlatform {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        assert_eq!(core, 0, "the machine has one AXI DMA");
-        Ok(Box::new(DmaWindow(Arc::clone(&self.board))))
-    }
-
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        let expected = address_map::CONTROL_BYTES;
-        Err(PlatformError::ShortRegion { region: "control".to_owned(), expected, found: 0 })
-    }
-
+impl DmaMemorySource for QtestPlatform {
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let address = self.board().allocate((beats * BEAT_BYTES) as u64);
         Ok((address, DmaMemory::Heap(vec![Beat::default(); beats].into())))
@@ -251,6 +243,17 @@ impl Platform for QtestPlatform {
         board.shared.remove(&address);
         assert!(board.allocated.remove(&address), "{address:#x} was allocated");
         Ok(())
+    }
+}
+
+impl Platform for QtestPlatform {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        assert_eq!(map, RegisterMap::Dma(0), "the machine has one AXI DMA");
+        Ok(Box::new(DmaWindow(Arc::clone(&self.board))))
+    }
+
+    fn memory(&self) -> &dyn DmaMemorySource {
+        self
     }
 
     fn now(&self) -> Duration {
