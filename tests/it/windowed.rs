@@ -9,7 +9,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::common::{bits, by_hand, open, ordered};
+use crate::common::{at_rest, bits, by_hand, open, ordered, standing};
 use crate::vectors;
 use bitstream_model::interface::profile::{
     FLOAT, Flow, HALF, Inertia, MIXED, Profile, WINDOWED, WINDOWED16, Window,
@@ -18,8 +18,7 @@ use bitstream_model::{Bandwidth, BoardConfig};
 use scene::{Scene, SceneOptions, ShapesOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Body, Collision, Collisions, Contact, Error, InputError, Pose, Shape, StepParameters,
-    StepReport, Velocity,
+    Body, Collision, Collisions, Error, InputError, Shape, StepParameters, StepReport, Velocity,
 };
 
 fn of(profile: &'static Profile) -> BoardConfig {
@@ -123,25 +122,13 @@ fn a_pile_of_shapes_gives_the_bits_of_one_collision_after_the_other() {
 }
 
 fn body(x: f32, shape: u32) -> Body {
-    Body {
-        pose: Pose { position: [x, 1.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity: Velocity {
-            linear: [0.0, if shape == 0 { 0.0 } else { -1.0 }, 0.0],
-            ..Velocity::default()
-        },
-        shape,
-    }
+    let linear = [0.0, if shape == 0 { 0.0 } else { -1.0 }, 0.0];
+    let velocity = Velocity { linear, ..Velocity::default() };
+    Body { velocity, ..at_rest([x, 1.0, 0.0], shape) }
 }
 
 fn touch(body_a: u32, body_b: u32) -> Collision {
-    let corner = |dx, dz| Contact { point: [dx, 0.0, dz], distance: -0.01 };
-    Collision {
-        body_a,
-        body_b,
-        normal: [0.0, -1.0, 0.0],
-        count: 4,
-        contacts: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)],
-    }
+    standing([body_a, body_b], 0.0, 0.0, -0.01)
 }
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 0.5)];

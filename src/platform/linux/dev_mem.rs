@@ -184,7 +184,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, write};
+    use crate::platform::uio_fake::{add_node, empty_system, write};
     use crate::platform::{RegisterWindow, UioDevice, release_to_device};
     use pgs_interface::record::Beat;
 
@@ -197,8 +197,7 @@ mod tests {
 
     /// A `/dev/mem` of 1 MiB with registers at its start and memory at 0x40040.
     fn memory() -> (tempfile::TempDir, System, DevMemWindows) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         let path = system.dev.join("mem");
         write(path.clone(), "");
         File::create(path).and_then(|file| file.set_len(1 << 20)).expect("resized");

@@ -154,14 +154,9 @@ pub(crate) mod fake {
 mod tests {
     use super::fake::add_manager;
     use super::*;
+    use crate::platform::uio_fake::empty_system;
 
     const SELECT_MAP: &str = "Xilinx Slave SelectMap FPGA Manager";
-
-    fn system() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        (root, system)
-    }
 
     fn ask(system: &System) -> Result<(), PlatformError> {
         require_bitstream(system, &ManagerChoice::Automatic)
@@ -169,7 +164,7 @@ mod tests {
 
     #[test]
     fn only_an_operating_logic_or_one_nobody_knows_of_is_touched() {
-        let (_root, system) = system();
+        let (_root, system) = empty_system();
         ask(&system).expect("cannot be asked for");
         add_manager(&system, 0, ZYNQMP_MANAGER, "operating");
         ask(&system).expect("operating");
@@ -186,7 +181,7 @@ mod tests {
 
     #[test]
     fn the_manager_of_another_chip_does_not_answer_for_this_one() {
-        let (_root, system) = system();
+        let (_root, system) = empty_system();
         add_manager(&system, 0, SELECT_MAP, "unknown");
         add_manager(&system, 1, ZYNQMP_MANAGER, "operating");
         ask(&system).expect("fpga1 runs");
@@ -198,7 +193,7 @@ mod tests {
 
     #[test]
     fn where_several_fit_or_none_the_caller_is_asked() {
-        let (_root, system) = system();
+        let (_root, system) = empty_system();
         add_manager(&system, 0, ZYNQMP_MANAGER, "operating");
         add_manager(&system, 2, ZYNQMP_MANAGER, "unknown");
         let error = ask(&system).expect_err("which?");

@@ -152,6 +152,20 @@ pub(crate) mod fake {
         fs::write(path, format!("{text}\n")).expect("written");
     }
 
+    /// A system without devices; it lasts as long as the folder.
+    pub(crate) fn empty_system() -> (tempfile::TempDir, System) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        (root, system)
+    }
+
+    /// A system with the accelerator as node `uio3`.
+    pub(crate) fn accelerator() -> (tempfile::TempDir, System) {
+        let (root, system) = empty_system();
+        add_node(&system, 3, "pgs", &regions());
+        (root, system)
+    }
+
     /// Adds the node `uio<number>` with these regions; its device file is of zeros, and long enough
     /// for pages of up to 64 KiB.
     pub(crate) fn add_node(system: &System, number: u32, name: &str, maps: &[Map<'_>]) {
@@ -189,12 +203,11 @@ pub(crate) mod fake {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::platform::{System, uio_nodes};
+    use crate::platform::uio_nodes;
 
     #[test]
     fn a_region_is_found_by_name_whatever_its_number() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (_root, system) = fake::empty_system();
         let mut regions = fake::regions();
         regions.swap(0, 4);
         regions.remove(2);
@@ -209,8 +222,7 @@ mod tests {
 
     #[test]
     fn the_only_region_of_a_node_needs_no_name() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (_root, system) = fake::empty_system();
         fake::add_node(&system, 0, "pgs-dma0", &[("dma@a0000000", 0xA000_0000, 0x1_0000)]);
         let node = uio_nodes(&system.uio).expect("readable").remove(0);
         assert_eq!(node.map_or_only("dma0").expect("the only one").address, 0xA000_0000);

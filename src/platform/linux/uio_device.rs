@@ -188,7 +188,7 @@ mod tests {
     use std::os::unix::net::UnixStream;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, regions};
+    use crate::platform::uio_fake::accelerator;
 
     const SHORT: Duration = Duration::from_millis(5);
     const LONG: Duration = Duration::from_secs(30);
@@ -266,16 +266,9 @@ mod tests {
         assert!(matches!(other, PlatformError::File { .. }), "{other}");
     }
 
-    fn system() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        add_node(&system, 3, "pgs", &regions());
-        (root, system)
-    }
-
     #[test]
     fn each_obstacle_is_an_error_of_its_own() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let error = UioDevice::open_in(&system, "pgs2").expect_err("no such node");
         assert!(matches!(error, PlatformError::NoNode { .. }), "{error}");
         let device = UioDevice::open_in(&system, "pgs").expect("opened");

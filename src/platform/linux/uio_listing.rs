@@ -164,11 +164,10 @@ mod tests {
 
     use super::*;
     use crate::platform::System;
-    use crate::platform::uio_fake::{add_node, regions};
+    use crate::platform::uio_fake::{add_node, empty_system, regions};
 
     fn system() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         add_node(&system, 10, "pgs", &regions());
         add_node(&system, 2, "axi-pmon", &[("pmon", 0xFD0B_0000, 0x1000)]);
         (root, system)

@@ -187,19 +187,12 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, add_reg, regions};
-    use crate::platform::{System, UioDevice};
-
-    fn system() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        add_node(&system, 3, "pgs", &regions());
-        (root, system)
-    }
+    use crate::platform::UioDevice;
+    use crate::platform::uio_fake::{accelerator, add_reg};
 
     #[test]
     fn a_window_is_the_map_at_its_number_of_pages() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let page = usize::try_from(page_bytes(&system.dev).expect("a size")).expect("fits");
         let path = system.dev.join("uio3");
         let mut file = fs::read(&path).expect("read");
@@ -221,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_region_has_one_window_at_a_time() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let device = UioDevice::open_in(&system, "pgs").expect("opened");
         let control = device.window("control").expect("mapped");
         device.window("dma0").expect("another region");
@@ -242,7 +235,7 @@ mod tests {
 
     #[test]
     fn a_region_ends_where_the_device_tree_says_and_not_with_its_page() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let page = page_bytes(&system.dev).expect("a size");
         let window = |map: &str, regions: &[(u64, u64)]| {
             add_reg(&system, 3, regions);
@@ -272,7 +265,7 @@ mod tests {
 
     #[test]
     fn a_region_that_begins_inside_its_page_ends_with_the_pages() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let map = system.uio.join("uio3/maps/map0");
         fs::write(map.join("offset"), "0x40\n").expect("written");
         let device = UioDevice::open_in(&system, "pgs").expect("opened");

@@ -164,7 +164,7 @@ pub(crate) mod fake {
     //! Reserved memory that is a file.
 
     use super::*;
-    use crate::platform::uio_fake::add_node;
+    use crate::platform::uio_fake::{add_node, empty_system};
 
     /// The same memory from the side of the device.
     pub(crate) fn as_the_device(memory: &ReservedMemory) -> ReservedMemory {
@@ -174,8 +174,7 @@ pub(crate) mod fake {
 
     /// Memory of `bytes` bytes at `address`; it lasts as long as the folder.
     pub(crate) fn reserved(address: u64, bytes: u64) -> (tempfile::TempDir, ReservedMemory) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         add_node(&system, 0, "pgs-memory", &[("memory", address, bytes)]);
         let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
         (root, memory)
@@ -187,11 +186,10 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, add_reg};
+    use crate::platform::uio_fake::{add_node, add_reg, empty_system};
 
     fn memory() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         add_node(&system, 0, "other", &[("memory", 0x1000_0000, 0x1000)]);
         add_node(&system, 1, "pgs-memory", &[("buffer@60000000", 0x6000_0000, 0x2000)]);
         (root, system)

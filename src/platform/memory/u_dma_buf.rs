@@ -265,12 +265,11 @@ mod tests {
     use super::*;
     use crate::platform::DmaMemorySource as _;
     use crate::platform::memory::pool::Pool;
-    use crate::platform::uio_fake::write;
+    use crate::platform::uio_fake::{empty_system, write};
 
     /// A system with the buffer `pgs` of 64 KiB, in that mode.
     fn system(mode: &str, coherent: &str) -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         let file = |name: &str, text: &str| write(system.u_dma_buf.join("pgs").join(name), text);
         file("phys_addr", "0x0000000070000000");
         file("size", "65536");

@@ -20,7 +20,7 @@ use crate::check::check_found;
 use crate::platform::{
     Access, Caching, DmaMemory, DmaMemorySource, EmulatedPlatform, HardwarePlatform, ManagerChoice,
     MemoryChoice, Platform, PlatformError, RegisterChoice, RegisterMap, RegisterWindow,
-    SharedMemory, System, uio_fake,
+    SharedMemory, uio_fake,
 };
 use crate::{Accelerator, Aftermath, Error, Fault, InputError, Outcome, Shape, StepParameters};
 
@@ -50,8 +50,7 @@ struct Composed {
 
 impl Composed {
     fn new(board: &EmulatedBoard, choice: &MemoryChoice) -> Self {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = uio_fake::empty_system();
         uio_fake::add_node(&system, 0, "pgs", &uio_fake::regions());
         let file = match choice {
             MemoryChoice::UDmaBuf { name, .. } => {
