@@ -14,11 +14,11 @@ use pgs_interface::control;
 use pgs_interface::profile::{FLOAT, Profile};
 
 use super::tampered::{CONTROL_BLOCK, MEMORY, Tampered};
-use super::{bits, open, options, scene, undisturbed};
+use super::{SHAPES, bits, open, options, scene, undisturbed};
 use crate::order::Order;
 use crate::{
     Accelerator, Aftermath, Bodies, Body, Cancellation, Collision, Collisions, Error, Fault,
-    InputError, Pose, Shape, StepParameters, Velocity,
+    InputError, Pose, StepParameters, Velocity,
 };
 
 const CUBES: u32 = 20;
@@ -127,8 +127,7 @@ fn a_step_that_was_forgotten_is_stopped_by_the_next_call() {
 
         // The shapes are loaded into a board that has been stopped.
         let _forgotten = ManuallyDrop::new(start(&board, &mut accelerator, clocks));
-        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        accelerator.set_shapes(&SHAPES).expect("shapes that fit");
         assert_works(&board, &mut accelerator, &after);
 
         // The driver makes no further call. The next opening of the board stops it.
@@ -138,7 +137,7 @@ fn a_step_that_was_forgotten_is_stopped_by_the_next_call() {
         board.cpu_port().pause(Duration::from_millis(1));
         assert_eq!(board.counts().beats_read + board.counts().beats_written, moved, "{after}");
         let mut accelerator = Accelerator::open(options(&board)).expect("opened again");
-        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        accelerator.set_shapes(&SHAPES).expect("shapes that fit");
         assert_works(&board, &mut accelerator, &after);
     }
 }

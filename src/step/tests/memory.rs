@@ -14,15 +14,15 @@ use std::time::Duration;
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use pgs_interface::record::Beat;
 
-use super::{bits, scene, undisturbed};
-use crate::board::open::{BoardDescription, BoardKind, Found};
+use super::{bits, found, open_on, scene, undisturbed};
+
 use crate::check::check_found;
 use crate::platform::{
     Access, Caching, DmaMemory, DmaMemorySource, EmulatedPlatform, HardwarePlatform, ManagerChoice,
     MemoryChoice, Platform, PlatformError, RegisterChoice, RegisterMap, RegisterWindow,
     SharedMemory, uio_fake,
 };
-use crate::{Accelerator, Aftermath, Error, Fault, InputError, Outcome, Shape, StepParameters};
+use crate::{Accelerator, Aftermath, Error, Fault, InputError, Outcome, StepParameters};
 
 const BASE: u64 = 0x6000_0000;
 const BYTES: u64 = 1 << 20;
@@ -176,16 +176,10 @@ impl Platform for Composed {
 
 #[test]
 fn steps_through_the_memory_of_a_real_board_give_the_same_bits() {
-    for choice in [
-        MemoryChoice::Uio { node: "pgs-memory".to_owned() },
-        u_dma_buf(Caching::Cached),
-        u_dma_buf(Caching::WriteCombining),
-    ] {
+    for choice in choices() {
         let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
         let platform = Arc::new(Composed::new(&board, &choice));
-        let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
-        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        let mut accelerator = open_on(Arc::clone(&platform) as _);
         // Buffers grow, are used in part, and are replaced.
         for cubes in [3, 40, 2, 90, 7] {
             let (mut bodies, collisions) = scene(cubes);
@@ -206,25 +200,17 @@ fn u_dma_buf(caching: Caching) -> MemoryChoice {
     MemoryChoice::UDmaBuf { name: "pgs".to_owned(), caching }
 }
 
-fn found(platform: &Arc<Composed>) -> Found {
-    let description = BoardDescription {
-        kind: BoardKind::Uio,
-        name: "composed".to_owned(),
-        reason: "a test".to_owned(),
-    };
-    Found { platform: Arc::clone(platform) as _, description }
+fn choices() -> [MemoryChoice; 3] {
+    let uio = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
+    [uio, u_dma_buf(Caching::Cached), u_dma_buf(Caching::WriteCombining)]
 }
 
 #[test]
 fn the_self_test_passes_through_the_memory_of_a_real_board_and_says_when_it_is_too_small() {
-    for choice in [
-        MemoryChoice::Uio { node: "pgs-memory".to_owned() },
-        u_dma_buf(Caching::Cached),
-        u_dma_buf(Caching::WriteCombining),
-    ] {
+    for choice in choices() {
         let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
         let platform = Arc::new(Composed::new(&board, &choice));
-        let report = check_found(found(&platform), None).expect("reachable");
+        let report = check_found(found(Arc::clone(&platform) as _), None).expect("reachable");
         assert!(
             report.lines.iter().all(|line| matches!(line.outcome, Outcome::Ok { .. })),
             "{choice:?}: {report:#?}"
@@ -233,7 +219,7 @@ fn the_self_test_passes_through_the_memory_of_a_real_board_and_says_when_it_is_t
         let whole = usize::try_from(BYTES / 16).expect("fits");
         platform.real.memory().allocate(whole).expect("all of it came back");
         // The pool is empty now.
-        let report = check_found(found(&platform), None).expect("reachable");
+        let report = check_found(found(Arc::clone(&platform) as _), None).expect("reachable");
         let echo = report.lines.iter().find(|line| line.name == "echo").expect("it");
         assert!(
             matches!(&echo.outcome, Outcome::Failed { found, next, .. }
@@ -254,9 +240,7 @@ fn memory_that_is_too_small_is_an_error_and_a_smaller_step_still_works() {
         .memory()
         .allocate(usize::try_from((BYTES - 8192) / 16).expect("fits"))
         .expect("room");
-    let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
-    let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-    accelerator.set_shapes(&shapes).expect("shapes that fit");
+    let mut accelerator = open_on(Arc::clone(&platform) as _);
     let mut step = |cubes| {
         let (mut bodies, collisions) = scene(cubes);
         let result = accelerator.step(&mut bodies, &collisions, &StepParameters::default());
@@ -356,8 +340,6 @@ fn composed(choice: &MemoryChoice, in_use: u64) -> (EmulatedBoard, Arc<Composed>
         let beats = usize::try_from(in_use / 16).expect("fits");
         platform.real.memory().allocate(beats).expect("there is room");
     }
-    let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
-    let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-    accelerator.set_shapes(&shapes).expect("shapes that fit");
+    let accelerator = open_on(Arc::clone(&platform) as _);
     (board, platform, accelerator)
 }

@@ -10,6 +10,7 @@ mod tampered;
 mod wait;
 mod written;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, FaultKind};
@@ -17,7 +18,8 @@ use pgs_interface::control::ErrorCode;
 use pgs_interface::profile::PROFILES;
 
 use self::tampered::{CONTROL_BLOCK, MEMORY, Tampered};
-use crate::platform::{Access, Platform as _};
+use crate::board::open::{BoardDescription, BoardKind, Found};
+use crate::platform::{Access, Platform};
 use crate::{
     Accelerator, Aftermath, Awaited, BoardChoice, Body, Collision, Contact, Error, Fault,
     OpenError, OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
@@ -26,8 +28,24 @@ use crate::{
 pub(super) fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
     let board = EmulatedBoard::new(config).expect("a board that can be built");
     let mut accelerator = Accelerator::open(options(&board)).expect("a board that opens");
-    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
+    accelerator.set_shapes(&SHAPES).expect("shapes that fit");
     (board, accelerator)
+}
+
+/// The ground's shape and the cubes'.
+const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+
+/// A board behind a test's own platform.
+fn found(platform: Arc<dyn Platform>) -> Found {
+    let (name, reason) = ("between".to_owned(), "a test".to_owned());
+    Found { platform, description: BoardDescription { kind: BoardKind::Emulated, name, reason } }
+}
+
+/// Opens a board behind a test's own platform.
+fn open_on(platform: Arc<dyn Platform>) -> Accelerator {
+    let mut accelerator = Accelerator::on(found(platform), None).expect("a board that opens");
+    accelerator.set_shapes(&SHAPES).expect("shapes that fit");
+    accelerator
 }
 
 pub(super) fn options(board: &EmulatedBoard) -> OpenOptions {

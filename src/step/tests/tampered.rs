@@ -10,7 +10,7 @@ use std::time::Duration;
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use pgs_interface::descriptor::{STATUS, WORDS};
 
-use crate::board::open::{BoardDescription, BoardKind, Found};
+use super::open_on;
 use crate::platform::{
     Access, DmaMemory, DmaMemorySource, EmulatedPlatform, Platform, PlatformError, RegisterMap,
     RegisterWindow, SharedMemory,
@@ -120,17 +120,7 @@ impl Tampered {
     pub(crate) fn on(board: &EmulatedBoard) -> (Arc<Self>, Accelerator) {
         let inner = EmulatedPlatform::new(board.cpu_port());
         let tampered = Arc::new(Self { inner, wires: Arc::default() });
-        let description = BoardDescription {
-            kind: BoardKind::Emulated,
-            name: "tampered".to_owned(),
-            reason: "a test".to_owned(),
-        };
-        let platform: Arc<dyn Platform> = Arc::clone(&tampered) as _;
-        let mut accelerator =
-            Accelerator::on(Found { platform, description }, None).expect("a board that opens");
-        accelerator
-            .set_shapes(&[crate::Shape::STATIC, crate::Shape::isotropic(1.0, 0.4)])
-            .expect("shapes that fit");
+        let accelerator = open_on(Arc::clone(&tampered) as _);
         (tampered, accelerator)
     }
 

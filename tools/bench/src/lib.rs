@@ -16,13 +16,24 @@ pub mod options;
 pub mod step;
 pub mod yardstick;
 
+use std::error::Error;
 use std::ffi::OsString;
+use std::io::{self, Write as _};
+use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use nix::time::{ClockId, clock_gettime};
 
 /// A timed run; the caller keeps its result from being optimised away.
 pub type Run<'a> = Box<dyn FnMut() + 'a>;
+
+/// Ends a benchmark: code 0, or code 2 after the error on stderr.
+#[must_use]
+pub fn exit_code(outcome: Result<(), Box<dyn Error>>) -> ExitCode {
+    let Err(error) = outcome else { return ExitCode::SUCCESS };
+    let _ = writeln!(io::stderr(), "error: {error}");
+    ExitCode::from(2)
+}
 
 /// Reads a variable of the environment; a blank one counts as unset.
 #[must_use]
