@@ -69,8 +69,7 @@ pub(crate) fn connect(
 ) -> Result<Vec<Core>, PlatformError> {
     let width = capabilities.address_width;
     let core = |core| {
-        let map = RegisterMap::Dma(core);
-        let window = Arc::new(Window::new(platform.window(map)?, map, Arc::clone(counts))?);
+        let window = Arc::new(Window::open(platform, RegisterMap::Dma(core), counts)?);
         Ok(Core {
             sender: Channel::new(Arc::clone(&window), core, Direction::Mm2s, width),
             receiver: Channel::new(window, core, Direction::S2mm, width),

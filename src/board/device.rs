@@ -89,11 +89,7 @@ impl Device {
 
     fn identify(platform: Arc<dyn Platform>, length_width: Option<u32>) -> Result<Self, OpenError> {
         let counts = Arc::<AccessCounts>::default();
-        let window = Window::new(
-            platform.window(RegisterMap::Control)?,
-            RegisterMap::Control,
-            Arc::clone(&counts),
-        )?;
+        let window = Window::open(&*platform, RegisterMap::Control, &counts)?;
         let mut capabilities = identify(&window)?;
         check_given_width(length_width)?;
         capabilities.length_width = length_width.unwrap_or(capabilities.length_width);

@@ -8,7 +8,7 @@ use pgs_interface::register::Register;
 use pgs_interface::{address_map, axi_dma, control};
 
 use super::access_log::{AccessKind, AccessLog, RegisterAccess};
-use crate::platform::PlatformError;
+use crate::platform::{Platform, PlatformError};
 
 /// One register region of a board: aligned 32-bit accesses inside `bytes`.
 pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
@@ -135,7 +135,7 @@ pub(crate) struct Window {
 
 impl Window {
     /// Refuses a region that is shorter than the registers in it.
-    pub(crate) fn new(
+    fn new(
         registers: Box<dyn RegisterWindow>,
         map: RegisterMap,
         counts: Arc<AccessCounts>,
@@ -148,6 +148,15 @@ impl Window {
             });
         }
         Ok(Self { registers, map, counts })
+    }
+
+    /// Opens a region of a board.
+    pub(crate) fn open(
+        platform: &dyn Platform,
+        map: RegisterMap,
+        counts: &Arc<AccessCounts>,
+    ) -> Result<Self, PlatformError> {
+        Self::new(platform.window(map)?, map, Arc::clone(counts))
     }
 
     fn check(&self, at: u32) {
@@ -186,7 +195,7 @@ pub(crate) mod fake {
     use std::time::Duration;
 
     use super::*;
-    use crate::platform::{Access, DmaMemory, DmaMemorySource, Platform, SharedMemory};
+    use crate::platform::{Access, DmaMemory, DmaMemorySource, SharedMemory};
     use std::sync::atomic::AtomicU32;
 
     /// Registers that keep what is written, with a script for reads: a queue of values per offset.

@@ -51,9 +51,8 @@ impl Core {
         };
         let qemu = Arc::new(qemu);
         let platform: Arc<dyn Platform> = Arc::clone(&qemu) as _;
-        let registers = platform.window(RegisterMap::Dma(0)).expect("one core");
-        let window = Window::new(registers, RegisterMap::Dma(0), Arc::default());
-        let window = Arc::new(window.expect("long enough"));
+        let window = Window::open(&*platform, RegisterMap::Dma(0), &Arc::default());
+        let window = Arc::new(window.expect("one core"));
         let channel = |direction| Channel::new(Arc::clone(&window), 0, direction, ADDRESS_WIDTH);
         let (mm2s, s2mm) = (channel(Direction::Mm2s), channel(Direction::S2mm));
         let mut core = Self { qemu, platform, mm2s, s2mm };
