@@ -1,4 +1,4 @@
-//! Refuses bodies that cannot be solved.
+//! Refuses bodies that no bitstream can solve, or that this one cannot hold.
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
@@ -11,7 +11,7 @@ use crate::scene::Body;
 const LINEAR: &str = "linear velocity";
 const ANGULAR: &str = "angular velocity";
 
-/// What of one body a step refuses.
+/// Checks one body.
 #[inline]
 pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result<(), InputError> {
     for (field, values, format) in fields(body, &scene.held) {
@@ -39,10 +39,10 @@ pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result
     Ok(())
 }
 
-/// Numbers of a body: name, values, format.
+/// A field of a body: name, values, format.
 type Field<'a> = (&'static str, &'a [f32], StreamFormat);
 
-/// The numbers of a body that are streamed.
+/// The streamed fields of a body.
 #[inline]
 fn fields<'a>(body: &'a Body, held: &Held) -> [Field<'a>; 4] {
     [
@@ -53,7 +53,7 @@ fn fields<'a>(body: &'a Body, held: &Held) -> [Field<'a>; 4] {
     ]
 }
 
-/// Names the number of a field that is known not to be finite or to be out of range.
+/// Names the number that puts a field out of range.
 #[cold]
 fn number_refused(
     index: usize,
@@ -74,7 +74,7 @@ fn number_refused(
     InputError::BodyOutOfRange { body: index, field, component, found, format, limit, carriers }
 }
 
-/// A body's shape as an index; an index that this machine cannot address is in no table.
+/// The shape of a body as an index. An index beyond `usize` saturates, and is in no table.
 pub(crate) fn shape_of(body: &Body) -> usize {
     usize::try_from(body.shape).unwrap_or(usize::MAX)
 }

@@ -1,11 +1,11 @@
-//! Finds the profiles that can take a scene which this bitstream refuses.
+//! Finds the profiles that take a scene which this bitstream refuses.
 
 use std::fmt;
 
 use pgs_interface::profile::{Inertia, PROFILES, Profile, Variant};
 
-/// The profiles, as they are built unless other formats are chosen, that could carry what was
-/// refused, in a scene of as many bodies and collisions.
+/// The profiles, built with their default formats, that take a refused scene: its refused value and
+/// its number of bodies and collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CapableProfiles {
     /// Bit k is profile k of the table.
@@ -22,7 +22,7 @@ impl CapableProfiles {
         (0..).zip(PROFILES).filter(move |(at, _)| bits >> at & 1 != 0).map(|(_, profile)| *profile)
     }
 
-    /// How they must be built to know the inertia of the scene's bodies.
+    /// The inertia with which they must be built for the shapes of the scene.
     #[must_use]
     pub const fn inertia(&self) -> Inertia {
         self.inertia
@@ -47,19 +47,19 @@ impl fmt::Display for CapableProfiles {
     }
 }
 
-/// What a scene asks of any bitstream.
+/// The demands of a scene on any bitstream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SceneNeeds {
     /// Number of bodies.
     pub(crate) bodies: usize,
     /// Number of collisions.
     pub(crate) collisions: usize,
-    /// The least that its shapes need.
+    /// The least inertia that its shapes need.
     pub(crate) inertia: Inertia,
 }
 
 impl SceneNeeds {
-    /// The profiles that have room for the scene and fulfil a condition.
+    /// The profiles that have room for the scene and satisfy `can`.
     #[cold]
     pub(crate) fn carriers(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
         let mut profiles = 0;
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn a_profile_without_room_for_the_scene_is_left_out() {
-        // 16-bit indices end at 65,535. What keeps no more than is alive has room for any number.
+        // 16-bit indices end at 65,535. A design that keeps live bodies alone takes 2^20 bodies.
         let bodies = |bodies| SceneNeeds { bodies, ..SMALL };
         assert_eq!(names(bodies(65_536), |_| true).len(), 6);
         let windowed = ["windowed", "windowed16"];

@@ -1,4 +1,4 @@
-//! Lists everything that a step refuses before anything is sent.
+//! The reasons for which a step refuses its input, before anything is sent.
 
 use super::CapableProfiles;
 use crate::order::OrderError;
@@ -6,7 +6,7 @@ use crate::scene::ShapeError;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::CONTACT_POINTS;
 
-/// Why input was refused. Nothing was sent, and nothing of the caller's was changed.
+/// Why input was refused. Nothing was sent, and the caller's data is unchanged.
 ///
 /// Indices are positions in the arrays that the caller gave.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -26,7 +26,7 @@ pub enum InputError {
         found: usize,
         /// Bodies that the bitstream takes.
         limit: u32,
-        /// Who takes them.
+        /// Profiles that take them.
         carriers: CapableProfiles,
     },
 
@@ -40,11 +40,11 @@ pub enum InputError {
         found: usize,
         /// Collisions that the bitstream takes.
         limit: u32,
-        /// Who takes them.
+        /// Profiles that take them.
         carriers: CapableProfiles,
     },
 
-    /// Other bodies than those that the step was started with.
+    /// The number of bodies differs from the number that the step was started with.
     #[error(
         "the step was started with {expected} bodies, {found} wait for its results: give the same \
          bodies; the step was stopped"
@@ -56,28 +56,28 @@ pub enum InputError {
         expected: usize,
     },
 
-    /// A prepared step whose records are not there any more.
+    /// The records of a prepared step are no longer in its buffers.
     #[error(
         "the prepared step is not in its buffers any more, because another was packed in its \
          place, or it was prepared by another accelerator: prepare it again"
     )]
     NotPrepared,
 
-    /// What was refused while it was packed was right when it was looked at again.
+    /// The input changed during the call: packing refused it, and validation then accepted it.
     #[error(
         "bodies or collisions were wrong when they were packed, and right when they were looked at \
          again: what is given must stay as it is until the call returns"
     )]
     Unsteady,
 
-    /// More collisions were written than room was made for.
+    /// More collisions were written than were announced.
     #[error("more than the {announced} collisions that were announced were written: announce more")]
     MoreThanAnnounced {
         /// Collisions announced.
         announced: usize,
     },
 
-    /// Collisions that are written one by one go to the board as they come.
+    /// Collisions that are written one by one cannot be reordered, verified or placed.
     #[error(
         "collisions that are written one by one cannot be put into another order, verified, or \
          placed on a bitstream that keeps live bodies alone: ask for the order as given, \
@@ -85,11 +85,11 @@ pub enum InputError {
     )]
     WrittenInOrder,
 
-    /// A prepared step that was checked and packed with other shapes.
+    /// The prepared step was checked and packed with other shapes.
     #[error("the shapes were replaced after the step was prepared: prepare it again")]
     ShapesChanged,
 
-    /// Separate arrays of different lengths.
+    /// The separate arrays of one kind differ in length.
     #[error("the arrays of the {what} have different lengths: give every array for all {what}")]
     UnequalLengths {
         /// "bodies" or "collisions".
@@ -107,13 +107,13 @@ pub enum InputError {
         bodies: usize,
         /// Collisions given.
         collisions: usize,
-        /// What they need, bytes.
+        /// Memory that they need, bytes.
         needed: u64,
-        /// What there is, bytes.
+        /// Memory of the bitstream, bytes.
         available: u32,
         /// Collisions that fit beside the bodies; 0 if the bodies alone are too many.
         fitting: u32,
-        /// Who has room for both.
+        /// Profiles with room for both.
         carriers: CapableProfiles,
     },
 
@@ -148,11 +148,11 @@ pub enum InputError {
         format: StreamFormat,
         /// Its largest number.
         limit: f32,
-        /// Who carries the body.
+        /// Profiles that hold the body.
         carriers: CapableProfiles,
     },
 
-    /// A quaternion that stands for no rotation.
+    /// The quaternion of a body is no rotation.
     #[error(
         "body {body}: the orientation has length {length:e}, which cannot be normalised (at least \
          {limit:e} and finite): give a unit quaternion x, y, z, w",
@@ -165,7 +165,7 @@ pub enum InputError {
         length: f32,
     },
 
-    /// A static body moves.
+    /// A static body has a velocity.
     #[error(
         "body {body} is static (its shape has inverse mass 0) but its {field}[{component}] is \
          {found}: set its velocity to 0, or give it a shape with a mass"
@@ -211,7 +211,7 @@ pub enum InputError {
         bodies: usize,
     },
 
-    /// A collision of a body with itself.
+    /// A body collides with itself.
     #[error("collision {collision}: bodies A and B are both {body}: remove the collision")]
     SelfCollision {
         /// The collision.
@@ -220,7 +220,7 @@ pub enum InputError {
         body: u32,
     },
 
-    /// A collision between bodies that cannot move.
+    /// Both bodies of a collision are static.
     #[error(
         "collision {collision}: bodies {body_a} and {body_b} are both static, nothing can move: \
          remove the collision"
@@ -234,7 +234,7 @@ pub enum InputError {
         body_b: u32,
     },
 
-    /// A number of contact points outside 1 to [`CONTACT_POINTS`].
+    /// The number of contact points is not within 1 to [`CONTACT_POINTS`].
     #[error(
         "collision {collision}: its count is {found}, expected 1 to {CONTACT_POINTS} contact \
          points: remove the collision if there are none, reduce them if there are more"
@@ -283,7 +283,7 @@ pub enum InputError {
         length: f32,
     },
 
-    /// A number of a contact point in use is NaN or infinite.
+    /// A number of a used contact point is NaN or infinite.
     #[error(
         "collision {collision}, contact point {contact}: {field}[{component}] is {found}, expected \
          a finite number: correct it, or lower the count if the point is not in use"
@@ -313,7 +313,7 @@ pub enum InputError {
         collision: usize,
         /// The contact point, if it is a number of one.
         contact: Option<usize>,
-        /// What is streamed: position of a body, offset from body A, normal, distance.
+        /// The streamed field: position of a body, offset from body A, normal, point or distance.
         field: &'static str,
         /// Component of the field, 0 for x; 0 for the distance.
         component: usize,
@@ -323,17 +323,17 @@ pub enum InputError {
         format: StreamFormat,
         /// Its largest number.
         limit: f32,
-        /// Who carries the collision.
+        /// Profiles that hold the collision.
         carriers: CapableProfiles,
     },
 
-    /// The collisions cannot be ordered, or have hazards although the order was to be verified.
+    /// The collisions cannot be ordered, or their order has hazards and was to be verified.
     #[error(
         "the collisions cannot be sent in this order: ask for another, or do not have it verified"
     )]
     Order(#[from] OrderError),
 
-    /// An order without hazards has so many empty entries that the bitstream has no room for it.
+    /// An order without hazards needs more entries, empty ones included, than the bitstream takes.
     #[error(
         "{collisions} collisions without a hazard, at a depth of {depth} issue slots, take more \
          than the {limit} entries that fit beside {bodies} bodies (body {body} alone has {uses} of \
@@ -352,11 +352,11 @@ pub enum InputError {
         body: usize,
         /// Its collisions.
         uses: usize,
-        /// Who could have room for it.
+        /// Profiles that could have room for it.
         carriers: CapableProfiles,
     },
 
-    /// A body lives longer than the bitstream lets it.
+    /// The span from the first to the last use of a body is longer than the delay lines.
     #[error(
         "in this order body {body} is used first in entry {first} and last in entry {last}, and the \
          bitstream's delay lines take spans of less than {lag}: ask for another order (hazard-free \
@@ -372,7 +372,7 @@ pub enum InputError {
         last: usize,
         /// Length of the delay lines.
         lag: u32,
-        /// Who could take it.
+        /// Profiles that could take the order.
         carriers: CapableProfiles,
     },
 
@@ -387,9 +387,9 @@ pub enum InputError {
         held: u32,
         /// Most bodies between their first and their last use.
         alive: u32,
-        /// Places that there are.
+        /// Places of the bitstream.
         places: u32,
-        /// Who could take them.
+        /// Profiles that could take the order.
         carriers: CapableProfiles,
     },
 
@@ -410,13 +410,13 @@ pub enum InputError {
         field: &'static str,
         /// Component of the field, 0 for x; 0 for a mass.
         component: usize,
-        /// Its magnitude, or the most that rounding can make of it; m or 1/kg.
+        /// Its magnitude, with the most that rounding can add; m or 1/kg.
         found: f32,
         /// The smallest magnitude.
         smallest: f32,
         /// The largest magnitude that leaves room for the roundings.
         largest: f32,
-        /// Who computes the rows.
+        /// Profiles that compute the rows.
         carriers: CapableProfiles,
     },
 
@@ -448,11 +448,11 @@ pub enum InputError {
         smallest: f32,
         /// The largest magnitude.
         largest: f32,
-        /// Who computes with it.
+        /// Profiles that compute with it.
         carriers: CapableProfiles,
     },
 
-    /// More passes than a step takes.
+    /// A solver has more iterations than a step takes.
     #[error(
         "{found} {solver} iterations, a step takes at most {limit}: give fewer, or take several \
          steps",
@@ -484,7 +484,7 @@ pub enum InputError {
         limit: u32,
     },
 
-    /// An inverse mass or inertia is no mass or inertia.
+    /// An inverse mass or inertia is negative, subnormal or not finite.
     #[error(
         "shape {shape}: its {field}[{component}] is {found:e}, expected 0 or a finite number of at \
          least {limit:e}: correct it",
@@ -501,7 +501,7 @@ pub enum InputError {
         found: f32,
     },
 
-    /// A shape whose inertia differs between axes.
+    /// The inertia of a shape differs between its axes.
     #[error(
         "shape {shape}: its inverse inertia is {found:?}, but this bitstream takes only shapes with \
          three equal components (cube, sphere): give such a shape, or load another ({carriers})"
@@ -511,7 +511,7 @@ pub enum InputError {
         shape: usize,
         /// Its inverse inertia, 1/(kg m²).
         found: [f32; 3],
-        /// Who takes it.
+        /// Profiles that take the shape.
         carriers: CapableProfiles,
     },
 
@@ -536,15 +536,15 @@ pub enum InputError {
         smallest: f32,
         /// The largest number.
         largest: f32,
-        /// Who carries it.
+        /// Profiles that hold it.
         carriers: CapableProfiles,
     },
 
-    /// A shape was asked for that has no mass properties.
+    /// The mass or the size of a shape gives no valid mass properties.
     #[error(transparent)]
     Shape(#[from] ShapeError),
 
-    /// A static shape that could rotate.
+    /// A static shape has an inverse inertia.
     #[error(
         "shape {shape} is static (inverse mass 0) but its inverse inertia is {found}: set that to \
          0 too, or give the shape a mass"
@@ -558,10 +558,10 @@ pub enum InputError {
 }
 
 impl InputError {
-    /// Length below which a quaternion stands for no rotation.
+    /// Length of the shortest quaternion that counts as a rotation.
     pub const SHORTEST_ORIENTATION: f32 = 1e-6;
     /// How far from 1 a normal's length may be.
     pub const NORMAL_TOLERANCE: f32 = 1e-3;
-    /// Passes of each solver that a step takes.
+    /// The most iterations of each solver.
     pub const MAX_ITERATIONS: u32 = pgs_interface::control::ITERATIONS_MAX;
 }

@@ -1,8 +1,8 @@
 //! Refuses bad input before anything is sent.
 //!
-//! One pass over the bodies, one over the collisions ([`validate`]). What passes here, a board of
-//! the same capacities accepts. A step looks at its input while it packs it ([`Quick`]), and comes
-//! here for the words of what it has found.
+//! [`validate`] makes one pass over the bodies and one over the collisions. A board of the same
+//! capacities accepts every step that passes. Packing screens its input block by block ([`Quick`])
+//! and calls [`validate`] only for the error of a block that it refuses.
 
 mod body;
 pub(crate) mod capable_profiles;
@@ -35,7 +35,7 @@ use crate::scene::{Bodies, Collision, Collisions, Shape, StepParameters};
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Geometry, Variant};
 
-/// What a bitstream carries.
+/// The capacities and formats of a bitstream, as far as they limit the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Limits {
     /// Its profile, formats and inertia.
@@ -50,27 +50,27 @@ pub(crate) struct Limits {
     pub(crate) shape_capacity: u32,
     /// On-chip memory that bodies and collisions share, bytes.
     pub(crate) memory_bytes: u32,
-    /// What a body takes of it, bytes.
+    /// Memory of a body, bytes.
     pub(crate) bytes_per_body: u32,
-    /// What a collision takes of it, bytes.
+    /// Memory of a collision, bytes.
     pub(crate) bytes_per_collision: u32,
 }
 
 impl Limits {
-    /// Collisions that fit beside so many bodies.
+    /// The number of collisions that fit beside `bodies` bodies.
     pub(crate) fn room_for_collisions(&self, bodies: usize) -> u32 {
         let for_bodies = (bodies as u64).saturating_mul(u64::from(self.bytes_per_body));
         let Some(free) = u64::from(self.memory_bytes).checked_sub(for_bodies) else { return 0 };
-        // Where they take nothing there is room for all that can be counted.
+        // Collisions that take no memory are limited by their capacity alone.
         let fitting = free.checked_div(u64::from(self.bytes_per_collision)).unwrap_or(u64::MAX);
         u32::try_from(fitting).unwrap_or(u32::MAX).min(self.collision_capacity)
     }
 }
 
-/// Everything a step refuses before anything is sent.
+/// Checks the whole input of a step.
 ///
-/// `shapes` is the table as [`validate_shapes`] has accepted it; a shape of inverse mass 0 is
-/// static. Of several mistakes of one kind the one with the lowest index is reported.
+/// `shapes` is a table that [`validate_shapes`] has accepted; a shape of inverse mass 0 is static.
+/// Among several mistakes of one kind, the mistake with the lowest index is reported.
 pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     bodies: &B,
     collisions: &C,
@@ -93,8 +93,8 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     Ok(())
 }
 
-/// What a step refuses whatever its bodies and collisions hold: the first part of [`validate`].
-/// Returns what the rest looks at.
+/// The first part of [`validate`]: checks parameters, counts and shapes, before any body or
+/// collision. Returns the context of the checks that follow.
 pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     bodies: &B,
     collisions: &C,
@@ -119,7 +119,7 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     Ok(Scene { shapes, demand, variant: &limits.variant, held, flush_subnormals })
 }
 
-/// What of one collision a step refuses; `end` is the position and the shape of a body.
+/// Checks one collision; `end` returns the position and the shape of a body.
 #[inline]
 fn check_whole<'a>(
     index: usize,
@@ -135,7 +135,7 @@ fn check_whole<'a>(
         let Collision { body_a, body_b, .. } = *collision;
         return Err(InputError::BothStatic { collision: index, body_a, body_b });
     }
-    // What is finite in world coordinates is in the range of f32 as it is.
+    // World coordinates in f32 are in range if they are finite, which is already checked.
     let geometry = scene.variant.profile.geometry;
     if scene.held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute {
         return Ok(());
@@ -150,7 +150,7 @@ fn check_whole<'a>(
     Ok(())
 }
 
-/// What the checks of single bodies and collisions look at beside them.
+/// The context in which bodies and collisions are checked.
 #[derive(Debug)]
 pub(crate) struct Scene<'a> {
     shapes: &'a [Shape],
@@ -194,19 +194,19 @@ fn check_room(demand: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
     Ok(())
 }
 
-/// Whether a number of things is above a limit of the hardware.
+/// Whether a count exceeds a limit of the hardware.
 fn exceeds(found: usize, limit: u32) -> bool {
     !u32::try_from(found).is_ok_and(|found| found <= limit)
 }
 
-/// Whether all are numbers of at most that magnitude. Without a branch per number: these loops see
+/// Whether every value is a number of at most this magnitude. No branch per value: these loops read
 /// every number of a step.
 fn all_within(values: &[f32], limit: f32) -> bool {
     values.iter().fold(true, |within, value| within & (value.abs() <= limit))
 }
 
-/// The first value that is wrong, and where it stands. The caller has found one to exist; should
-/// that not be so, the refusal stands, and blames the first.
+/// The index of the first wrong value, and the value. The caller knows that one exists; if none is
+/// found, the refusal stands with index 0 and NaN.
 #[cold]
 fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
     let mut values = values.iter().copied().enumerate();
@@ -219,7 +219,7 @@ pub(crate) mod tests {
     use crate::scene::{Body, BodyArrays, CollisionArrays, Contact, Pose, Velocity};
     use pgs_interface::profile::{self, Inertia, Profile};
 
-    /// What a bitstream of that profile reports.
+    /// The limits of a bitstream of `profile`, with the capacities of [`FLOAT`].
     pub(crate) const fn on(profile: &'static Profile, inertia: Inertia) -> Limits {
         Limits { variant: Variant { profile, numbers: profile.numbers, inertia }, ..FLOAT }
     }
@@ -320,7 +320,7 @@ pub(crate) mod tests {
             "found 131073 bodies, the bitstream takes at most 131072: give fewer, or load another \
              (profiles that could: windowed, windowed16)"
         );
-        // Indices of sixteen bits name fewer.
+        // Indices of sixteen bits name fewer bodies.
         assert_eq!(room(65_536, 0, &HALF), Ok(()));
         let text = room(65_537, 0, &HALF).expect_err("one too many").to_string();
         assert!(text.contains("found 65537 bodies") && text.contains("at most 65536"), "{text}");
@@ -411,7 +411,7 @@ pub(crate) mod tests {
         assert_eq!(check(&[0, 1], &[]), unequal("collisions"));
     }
 
-    /// A number that is right by itself, in a scene that a stream of sixteen bits does not carry.
+    /// 70,000 m are in the range of f32, and beyond the range of a stream of sixteen bits.
     #[test]
     fn ranges_are_checked_where_the_streams_are_narrow() {
         let mut bodies = [body(0), body(1)];
@@ -432,7 +432,7 @@ pub(crate) mod tests {
         );
     }
 
-    /// 300,000 collisions and shapes with axes: `half` alone has room for the first.
+    /// 300,000 collisions, and a shape with three different inertias: `float` has no room for them.
     #[test]
     fn shapes_are_refused_with_the_profiles_that_have_room_for_the_scene() {
         let shapes = [Shape::STATIC, Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 2.0, 3.0] }];
@@ -451,7 +451,7 @@ pub(crate) mod tests {
         );
     }
 
-    /// Each number of it has its place in binary16, and what is made of them has none.
+    /// Every number of the collision fits binary16, and its effective mass does not.
     #[test]
     fn rows_are_checked_where_they_are_computed_in_sixteen_bits() {
         let mut bodies = [body(0), body(1)];

@@ -9,7 +9,7 @@ use crate::scene::StepParameters;
 
 const TIME_STEP: &str = "time step";
 
-/// What of the parameters themselves a step refuses.
+/// Checks the step parameters against their ranges, and against the bitstream's arithmetic.
 pub(crate) fn check_parameters(
     parameters: &StepParameters,
     demand: &SceneNeeds,
@@ -17,7 +17,7 @@ pub(crate) fn check_parameters(
 ) -> Result<(), InputError> {
     let finite = |value: f32| value.is_finite();
     let not_negative = |value: f32| value.is_finite() && value >= 0.0;
-    // Its reciprocal is computed, and that of a subnormal is infinite.
+    // The accelerator computes its reciprocal, which is infinite for a subnormal number.
     let positive = |value: f32| value.is_normal() && value > 0.0;
     let [x, y, z] = parameters.gravity;
     let StepParameters { time_step, position_drift, position_coefficient, .. } = *parameters;
@@ -48,7 +48,7 @@ pub(crate) fn check_parameters(
         for (parameter, found, ..) in checks {
             let nonzero = smallest_short(limits.flush_subnormals);
             let (zero, smallest) = match parameter {
-                // Its reciprocal is computed.
+                // Its reciprocal must fit, too.
                 TIME_STEP => (false, nonzero.max(1.0 / largest)),
                 _ => (true, nonzero),
             };

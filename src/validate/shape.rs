@@ -11,13 +11,13 @@ use crate::scene::Shape;
 const MASS: &str = "inverse mass";
 const INERTIA: &str = "inverse inertia";
 
-/// What the shape table refuses, whatever scene it is for.
+/// Checks a shape table before any scene uses it.
 pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), InputError> {
     let demand = SceneNeeds { bodies: 0, collisions: 0, inertia: needed(shapes) };
     check_shapes(shapes, &demand, limits)
 }
 
-/// What the shape table of a scene refuses.
+/// Checks the shape table of a scene.
 ///
 /// A moving shape of inverse inertia 0 is legal: it does not rotate.
 pub(crate) fn check_shapes(
@@ -34,7 +34,8 @@ pub(crate) fn check_shapes(
             limit: limits.shape_capacity,
         });
     }
-    // A subnormal would be 0 to a bitstream that flushes them: static there, moving here.
+    // A bitstream that flushes subnormal numbers takes a subnormal inverse mass for 0: the body
+    // would be static there, and moving in the driver.
     let usable = |value: f32| value == 0.0 || (value > 0.0 && value.is_normal());
     for (index, shape) in shapes.iter().enumerate() {
         let [x, y, z] = shape.inverse_inertia;
@@ -80,8 +81,8 @@ pub(crate) fn check_shapes(
     Ok(())
 }
 
-/// The narrowest format of an inverse mass or inertia on its way: the shape table has f32, the
-/// inertia about world axes comes with the velocities and stays beside them.
+/// The narrowest format of an inverse mass or inertia on its way. The shape table holds f32; the
+/// inertia about world axes is streamed and stored with the velocities.
 fn held(field: &'static str, variant: &Variant) -> StreamFormat {
     let numbers = &variant.numbers;
     let streamed = field == INERTIA && variant.inertia == Inertia::World;
@@ -93,7 +94,7 @@ fn held(field: &'static str, variant: &Variant) -> StreamFormat {
     }
 }
 
-/// The least that shapes need to be told of their bodies' inertia.
+/// The least inertia that a bitstream must be built with for these shapes.
 pub(crate) fn needed(shapes: &[Shape]) -> Inertia {
     let isotropic = shapes.iter().all(Shape::is_isotropic);
     if isotropic { Inertia::Isotropic } else { Inertia::World }
