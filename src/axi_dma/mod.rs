@@ -2,10 +2,10 @@
 
 mod channel;
 mod descriptor;
-// QEMU is started by the test itself, which as a Cortex-A53 would run under QEMU already.
 mod registers;
 mod reset;
 mod ring;
+// On x86-64 only: the tests start QEMU, and a build for the Cortex-A53 runs under QEMU already.
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests;
 
@@ -61,7 +61,7 @@ pub enum DmaError {
         channel: String,
         /// The state that was awaited.
         awaited: &'static str,
-        /// How long.
+        /// The time limit.
         limit: Duration,
         /// The register that shows the state, decoded.
         found: String,
@@ -76,7 +76,7 @@ pub enum DmaError {
         /// Its status, decoded.
         found: String,
     },
-    /// The length register has another width than was said.
+    /// The length register has another width than expected.
     #[error(
         "{channel} has a length register of {found} bits, {expected} were expected: correct the \
          bitstream's DMA capability register or the length width given at opening"
@@ -84,7 +84,7 @@ pub enum DmaError {
     LengthWidth {
         /// Which channel.
         channel: String,
-        /// Width as given, bits.
+        /// Width by the capability register or by the caller, bits.
         expected: u32,
         /// Width as found, bits.
         found: u32,
@@ -94,10 +94,10 @@ pub enum DmaError {
     NotALength {
         /// Which channel.
         channel: String,
-        /// What was read.
+        /// Its value.
         found: u32,
     },
-    /// Memory for descriptors.
+    /// The memory for descriptors failed.
     #[error(transparent)]
     Platform(#[from] PlatformError),
 }
