@@ -1,11 +1,9 @@
 //! Refuses bodies that no bitstream can solve, or that this one cannot hold.
 
 use pgs_interface::number::StreamFormat;
-use pgs_interface::profile::Variant;
 
-use super::InputError;
 use super::range::Held;
-use super::{Scene, all_within, first};
+use super::{Excess, InputError, Scene, all_within, first};
 use crate::scene::Body;
 
 const LINEAR: &str = "linear velocity";
@@ -67,11 +65,11 @@ fn number_refused(
     }
     let limit = format.largest();
     let (component, found) = first(values, |value| value.abs() > limit);
-    let carriers = scene.demand.carriers(|variant: &Variant| {
+    let excess = Excess::BodyOutOfRange { body: index, field, component, found, format, limit };
+    scene.needs.refuse(excess, |variant| {
         let fields = fields(body, &Held::by(&variant.numbers));
         fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
-    });
-    InputError::BodyOutOfRange { body: index, field, component, found, format, limit, carriers }
+    })
 }
 
 /// The shape of a body as an index. An index beyond `usize` saturates, and is in no table.
@@ -94,10 +92,10 @@ mod tests {
     };
 
     fn check_on(profile: &'static Profile, body: &Body) -> Result<(), InputError> {
-        let demand = SceneNeeds { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
+        let needs = SceneNeeds { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
         let variant = &profile.default_variant();
         let held = Held::by(&variant.numbers);
-        let scene = Scene { shapes: &SHAPES, demand, variant, held, flush_subnormals: false };
+        let scene = Scene { shapes: &SHAPES, needs, variant, held, flush_subnormals: false };
         check_body(7, body, &scene)
     }
 
@@ -120,14 +118,14 @@ mod tests {
         let refused = check_on(&HALF, &body).expect_err("beyond binary16");
         assert!(
             matches!(
-                refused,
-                InputError::BodyOutOfRange {
+                refused.excess(),
+                Some(Excess::BodyOutOfRange {
                     body: 7,
                     field: "angular velocity",
                     component: 1,
                     format: StreamFormat::Binary16,
                     ..
-                }
+                })
             ),
             "{refused}"
         );

@@ -4,6 +4,8 @@ use std::fmt;
 
 use pgs_interface::profile::{Inertia, PROFILES, Profile, Variant};
 
+use super::{Excess, InputError};
+
 /// The profiles, built with their default formats, that take a refused scene: its refused value and
 /// its number of bodies and collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,9 +61,15 @@ pub(crate) struct SceneNeeds {
 }
 
 impl SceneNeeds {
-    /// The profiles that have room for the scene and satisfy `can`.
+    /// The error of a scene that exceeds a bitstream; `can` tells whether another would take the
+    /// excess.
     #[cold]
-    pub(crate) fn carriers(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
+    pub(crate) fn refuse(&self, excess: Excess, can: impl Fn(&Variant) -> bool) -> InputError {
+        InputError::BeyondBitstream { excess, capable: self.capable(can) }
+    }
+
+    /// The profiles that have room for the scene and satisfy `can`.
+    pub(crate) fn capable(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
         let mut profiles = 0;
         for (at, profile) in PROFILES.iter().enumerate() {
             let variant = Variant { inertia: self.inertia, ..profile.default_variant() };
@@ -84,8 +92,8 @@ impl SceneNeeds {
 mod tests {
     use super::*;
 
-    fn names(demand: SceneNeeds, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
-        demand.carriers(can).profiles().map(|profile| profile.name).collect()
+    fn names(needs: SceneNeeds, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
+        needs.capable(can).profiles().map(|profile| profile.name).collect()
     }
 
     const SMALL: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
@@ -94,14 +102,14 @@ mod tests {
     fn profiles_are_named_in_the_order_of_the_table() {
         let all = ["naive", "float", "half", "mixed", "windowed", "windowed16"];
         assert_eq!(names(SMALL, |_| true), all);
-        let text = SMALL.carriers(|variant| variant.profile.name != "half").to_string();
+        let text = SMALL.capable(|variant| variant.profile.name != "half").to_string();
         assert_eq!(text, "profiles that could: naive, float, mixed, windowed, windowed16");
-        assert_eq!(SMALL.carriers(|_| false).to_string(), "no profile could");
+        assert_eq!(SMALL.capable(|_| false).to_string(), "no profile could");
         let world = SceneNeeds { inertia: Inertia::World, ..SMALL };
-        let text = world.carriers(|variant| variant.profile.id == 1).to_string();
+        let text = world.capable(|variant| variant.profile.id == 1).to_string();
         assert_eq!(text, "profiles that could, built with world inertia: float");
         assert_eq!(
-            world.carriers(|_| false).to_string(),
+            world.capable(|_| false).to_string(),
             "no profile could, built with world inertia"
         );
     }

@@ -1,9 +1,8 @@
 //! The reasons for which a step refuses its input, before anything is sent.
 
-use super::CapableProfiles;
+use super::{CapableProfiles, Excess};
 use crate::order::OrderError;
 use crate::scene::ShapeError;
-use pgs_interface::number::StreamFormat;
 use pgs_interface::record::CONTACT_POINTS;
 
 /// Why input was refused. Nothing was sent, and the caller's data is unchanged.
@@ -16,32 +15,13 @@ pub enum InputError {
     #[error("a step needs at least one body, found none: give all bodies, static ones included")]
     NoBodies,
 
-    /// More bodies than the bitstream has room for, whatever the memory.
-    #[error(
-        "found {found} bodies, the bitstream takes at most {limit}: give fewer, or load another \
-         ({carriers})"
-    )]
-    TooManyBodies {
-        /// Bodies given.
-        found: usize,
-        /// Bodies that the bitstream takes.
-        limit: u32,
-        /// Profiles that take them.
-        carriers: CapableProfiles,
-    },
-
-    /// More collisions than the bitstream has room for, whatever the memory.
-    #[error(
-        "found {found} collisions, the bitstream takes at most {limit}: give fewer, or load another \
-         ({carriers})"
-    )]
-    TooManyCollisions {
-        /// Collisions given.
-        found: usize,
-        /// Collisions that the bitstream takes.
-        limit: u32,
-        /// Profiles that take them.
-        carriers: CapableProfiles,
+    /// The input exceeds this bitstream; another may take it.
+    #[error("{excess} ({capable})")]
+    BeyondBitstream {
+        /// The part of the input that exceeds it.
+        excess: Excess,
+        /// Profiles that take the step.
+        capable: CapableProfiles,
     },
 
     /// The number of bodies differs from the number that the step was started with.
@@ -96,27 +76,6 @@ pub enum InputError {
         what: &'static str,
     },
 
-    /// Bodies and collisions together exceed the on-chip memory.
-    #[error(
-        "{bodies} bodies and {collisions} collisions need {needed} bytes of on-chip memory, there \
-         are {available}: with so many bodies at most {fitting} collisions fit; give fewer, or load \
-         another bitstream ({carriers})"
-    )]
-    MemoryExceeded {
-        /// Bodies given.
-        bodies: usize,
-        /// Collisions given.
-        collisions: usize,
-        /// Memory that they need, bytes.
-        needed: u64,
-        /// Memory of the bitstream, bytes.
-        available: u32,
-        /// Collisions that fit beside the bodies; 0 if the bodies alone are too many.
-        fitting: u32,
-        /// Profiles with room for both.
-        carriers: CapableProfiles,
-    },
-
     /// A number of a body is NaN or infinite.
     #[error("body {body}: {field}[{component}] is {found}, expected a finite number: correct it")]
     BodyNotFinite {
@@ -128,28 +87,6 @@ pub enum InputError {
         component: usize,
         /// Its value.
         found: f32,
-    },
-
-    /// A number of a body is beyond what the bitstream's streams, arithmetic or arrays hold.
-    #[error(
-        "body {body}: {field}[{component}] is {found}, but this bitstream holds bodies in {}, \
-         which ends at {limit}: bring it into range, or load another ({carriers})", format.name()
-    )]
-    BodyOutOfRange {
-        /// The body.
-        body: usize,
-        /// Position, orientation, linear or angular velocity.
-        field: &'static str,
-        /// Component of the field, 0 for x.
-        component: usize,
-        /// Its value.
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// Its largest number.
-        limit: f32,
-        /// Profiles that hold the body.
-        carriers: CapableProfiles,
     },
 
     /// The quaternion of a body is no rotation.
@@ -301,124 +238,11 @@ pub enum InputError {
         found: f32,
     },
 
-    /// A number of a collision is beyond what the bitstream's streams or arithmetic hold.
-    #[error(
-        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream holds \
-         collisions in {}, which ends at {limit}: bring it into range, or load another ({carriers})",
-        contact.map_or_else(String::new, |contact| format!(", contact point {contact}")),
-        format.name()
-    )]
-    CollisionOutOfRange {
-        /// The collision.
-        collision: usize,
-        /// The contact point, if it is a number of one.
-        contact: Option<usize>,
-        /// The streamed field: position of a body, offset from body A, normal, point or distance.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for the distance.
-        component: usize,
-        /// Its value as it would be streamed.
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// Its largest number.
-        limit: f32,
-        /// Profiles that hold the collision.
-        carriers: CapableProfiles,
-    },
-
     /// The collisions cannot be ordered, or their order has hazards and was to be verified.
     #[error(
         "the collisions cannot be sent in this order: ask for another, or do not have it verified"
     )]
     Order(#[from] OrderError),
-
-    /// An order without hazards needs more entries, empty ones included, than the bitstream takes.
-    #[error(
-        "{collisions} collisions without a hazard, at a depth of {depth} issue slots, take more \
-         than the {limit} entries that fit beside {bodies} bodies (body {body} alone has {uses} of \
-         the collisions): give fewer, ask for another order, or load another bitstream ({carriers})"
-    )]
-    OrderTooLong {
-        /// Collisions given.
-        collisions: usize,
-        /// Bodies given.
-        bodies: usize,
-        /// Entries that fit beside the bodies.
-        limit: usize,
-        /// Hazard window, issue slots.
-        depth: u32,
-        /// The moving body with the most collisions.
-        body: usize,
-        /// Its collisions.
-        uses: usize,
-        /// Profiles that could have room for it.
-        carriers: CapableProfiles,
-    },
-
-    /// The span from the first to the last use of a body is longer than the delay lines.
-    #[error(
-        "in this order body {body} is used first in entry {first} and last in entry {last}, and the \
-         bitstream's delay lines take spans of less than {lag}: ask for another order (hazard-free \
-         keeps spans short unless a body has dozens of collisions), or load another bitstream \
-         ({carriers})"
-    )]
-    SpanTooLong {
-        /// The body with the longest span.
-        body: usize,
-        /// Entry of its first use.
-        first: usize,
-        /// Entry of its last use.
-        last: usize,
-        /// Length of the delay lines.
-        lag: u32,
-        /// Profiles that could take the order.
-        carriers: CapableProfiles,
-    },
-
-    /// More bodies are alive than the bitstream has places for.
-    #[error(
-        "in this order {held} moving bodies are on their way through the passes at once ({alive} of \
-         them with collisions to come), the bitstream has places for {places}: ask for \
-         another order, or load another bitstream ({carriers})"
-    )]
-    TooManyLive {
-        /// Most bodies that need a place at once.
-        held: u32,
-        /// Most bodies between their first and their last use.
-        alive: u32,
-        /// Places of the bitstream.
-        places: u32,
-        /// Profiles that could take the order.
-        carriers: CapableProfiles,
-    },
-
-    /// The constraint rows of a collision leave what the bitstream's arithmetic holds.
-    #[error(
-        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream computes \
-         constraint rows in binary16, which takes {smallest:e} to {largest}: bring it into range, \
-         or load another ({carriers})",
-        contact.map_or_else(String::new, |contact| format!(", contact point {contact}"))
-    )]
-    RowOutOfRange {
-        /// The collision.
-        collision: usize,
-        /// The contact point, if it is a number of one.
-        contact: Option<usize>,
-        /// Lever arm about a body, inverse effective mass, sum of the inverse masses or of the
-        /// contact points.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for a mass.
-        component: usize,
-        /// Its magnitude, with the most that rounding can add; m or 1/kg.
-        found: f32,
-        /// The smallest magnitude.
-        smallest: f32,
-        /// The largest magnitude that leaves room for the roundings.
-        largest: f32,
-        /// Profiles that compute the rows.
-        carriers: CapableProfiles,
-    },
 
     /// A parameter is outside its range.
     #[error("the {parameter} is {found}, expected {expected}: correct the step parameters")]
@@ -429,27 +253,6 @@ pub enum InputError {
         found: f32,
         /// Its range.
         expected: &'static str,
-    },
-
-    /// A parameter is beyond what the bitstream's arithmetic holds.
-    #[error(
-        "the {parameter} is {found:e}, but this bitstream computes in binary16, which takes \
-         {}{smallest:e} to {largest}: correct the step parameters, or load another ({carriers})",
-        if *zero { "0, or " } else { "" }
-    )]
-    ParameterOutOfRange {
-        /// The parameter; a gravity component with its axis.
-        parameter: &'static str,
-        /// Its value.
-        found: f32,
-        /// Whether 0 is taken as well.
-        zero: bool,
-        /// The smallest magnitude, 0 aside.
-        smallest: f32,
-        /// The largest magnitude.
-        largest: f32,
-        /// Profiles that compute with it.
-        carriers: CapableProfiles,
     },
 
     /// A solver has more iterations than a step takes.
@@ -501,45 +304,6 @@ pub enum InputError {
         found: f32,
     },
 
-    /// The inertia of a shape differs between its axes.
-    #[error(
-        "shape {shape}: its inverse inertia is {found:?}, but this bitstream takes only shapes with \
-         three equal components (cube, sphere): give such a shape, or load another ({carriers})"
-    )]
-    Anisotropic {
-        /// The shape.
-        shape: usize,
-        /// Its inverse inertia, 1/(kg m²).
-        found: [f32; 3],
-        /// Profiles that take the shape.
-        carriers: CapableProfiles,
-    },
-
-    /// An inverse mass or inertia is beyond what the bitstream's arithmetic or streams hold.
-    #[error(
-        "shape {shape}: its {field}[{component}] is {found:e}, but this bitstream holds it in {}, \
-         from {smallest:e} to {largest}: give another shape, or load another bitstream ({carriers})",
-        format.name()
-    )]
-    ShapeOutOfRange {
-        /// The shape.
-        shape: usize,
-        /// Inverse mass or inverse inertia.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for the mass.
-        component: usize,
-        /// Its value, 1/kg or 1/(kg m²).
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// The smallest number above 0 that does not become 0.
-        smallest: f32,
-        /// The largest number.
-        largest: f32,
-        /// Profiles that hold it.
-        carriers: CapableProfiles,
-    },
-
     /// The mass or the size of a shape gives no valid mass properties.
     #[error(transparent)]
     Shape(#[from] ShapeError),
@@ -558,6 +322,15 @@ pub enum InputError {
 }
 
 impl InputError {
+    /// The part of the input that exceeds the bitstream, if that is the reason.
+    #[must_use]
+    pub fn excess(&self) -> Option<Excess> {
+        match self {
+            Self::BeyondBitstream { excess, .. } => Some(*excess),
+            _ => None,
+        }
+    }
+
     /// Length of the shortest quaternion that counts as a rotation.
     pub const SHORTEST_ORIENTATION: f32 = 1e-6;
     /// How far from 1 a normal's length may be.

@@ -8,6 +8,7 @@ mod body;
 pub(crate) mod capable_profiles;
 mod collision;
 pub(crate) mod error;
+mod excess;
 mod look;
 mod parameters;
 mod quick;
@@ -19,6 +20,7 @@ mod shape;
 pub use capable_profiles::CapableProfiles;
 pub(crate) use capable_profiles::SceneNeeds;
 pub use error::InputError;
+pub use excess::Excess;
 pub(crate) use look::Look;
 pub(crate) use quick::{Block, Quick};
 pub(crate) use reach::Locations;
@@ -79,7 +81,7 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     limits: &Limits,
 ) -> Result<(), InputError> {
     let scene = preflight(bodies, collisions, shapes, parameters, limits)?;
-    for index in 0..scene.demand.bodies {
+    for index in 0..scene.needs.bodies {
         check_body(index, &bodies.body(index), &scene)?;
     }
     // A body without a shape was refused above.
@@ -87,7 +89,7 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         let body = bodies.body(index);
         (body.pose.position, shapes.get(shape_of(&body)).unwrap_or(&Shape::STATIC))
     };
-    for index in 0..scene.demand.collisions {
+    for index in 0..scene.needs.collisions {
         check_whole(index, &collisions.collision(index), end, &scene)?;
     }
     Ok(())
@@ -109,14 +111,14 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
             return Err(InputError::UnequalLengths { what });
         }
     }
-    let demand =
+    let needs =
         SceneNeeds { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
-    check_parameters(parameters, &demand, limits)?;
-    check_room(&demand, limits)?;
-    check_shapes(shapes, &demand, limits)?;
+    check_parameters(parameters, &needs, limits)?;
+    check_room(&needs, limits)?;
+    check_shapes(shapes, &needs, limits)?;
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
-    Ok(Scene { shapes, demand, variant: &limits.variant, held, flush_subnormals })
+    Ok(Scene { shapes, needs, variant: &limits.variant, held, flush_subnormals })
 }
 
 /// Checks one collision; `end` returns the position and the shape of a body.
@@ -127,7 +129,7 @@ fn check_whole<'a>(
     end: impl Fn(usize) -> ([f32; 3], &'a Shape),
     scene: &Scene<'_>,
 ) -> Result<(), InputError> {
-    let (body_a, body_b) = check_collision(index, collision, scene.demand.bodies)?;
+    let (body_a, body_b) = check_collision(index, collision, scene.needs.bodies)?;
     let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
     let (mut positions, shapes) = ([a, b], [shape_a, shape_b]);
     let moves = shapes.map(|shape| !shape.is_static());
@@ -154,25 +156,25 @@ fn check_whole<'a>(
 #[derive(Debug)]
 pub(crate) struct Scene<'a> {
     shapes: &'a [Shape],
-    demand: SceneNeeds,
+    needs: SceneNeeds,
     variant: &'a Variant,
     held: Held,
     flush_subnormals: bool,
 }
 
-fn check_room(demand: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
-    let SceneNeeds { bodies, collisions, .. } = *demand;
+fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
+    let SceneNeeds { bodies, collisions, .. } = *needs;
     if bodies == 0 {
         return Err(InputError::NoBodies);
     }
-    let carriers = || demand.carriers(|_| true);
-    if exceeds(bodies, limits.body_capacity) {
-        let (limit, carriers) = (limits.body_capacity, carriers());
-        return Err(InputError::TooManyBodies { found: bodies, limit, carriers });
+    let refuse = |excess| Err(needs.refuse(excess, |_| true));
+    let limit = limits.body_capacity;
+    if exceeds(bodies, limit) {
+        return refuse(Excess::TooManyBodies { found: bodies, limit });
     }
-    if exceeds(collisions, limits.collision_capacity) {
-        let (limit, carriers) = (limits.collision_capacity, carriers());
-        return Err(InputError::TooManyCollisions { found: collisions, limit, carriers });
+    let limit = limits.collision_capacity;
+    if exceeds(collisions, limit) {
+        return refuse(Excess::TooManyCollisions { found: collisions, limit });
     }
     // Neither product leaves 64 bits: both factors are below 2^32 by now.
     let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
@@ -181,15 +183,7 @@ fn check_room(demand: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
     let available = limits.memory_bytes;
     if needed > u64::from(available) {
         let fitting = limits.room_for_collisions(bodies);
-        let carriers = carriers();
-        return Err(InputError::MemoryExceeded {
-            bodies,
-            collisions,
-            needed,
-            available,
-            fitting,
-            carriers,
-        });
+        return refuse(Excess::MemoryExceeded { bodies, collisions, needed, available, fitting });
     }
     Ok(())
 }
@@ -335,20 +329,14 @@ pub(crate) mod tests {
         // (4,194,304 - 38,881 * 24) / 16 = 203,822.5
         assert_eq!(room(38_881, 203_822, &FLOAT), Ok(()));
         let refused = room(38_881, 203_823, &FLOAT).expect_err("one too many");
-        assert!(
-            matches!(
-                refused,
-                InputError::MemoryExceeded {
-                    bodies: 38_881,
-                    collisions: 203_823,
-                    needed: 4_194_312,
-                    available: 4_194_304,
-                    fitting: 203_822,
-                    ..
-                }
-            ),
-            "{refused}"
-        );
+        let expected = Excess::MemoryExceeded {
+            bodies: 38_881,
+            collisions: 203_823,
+            needed: 4_194_312,
+            available: 4_194_304,
+            fitting: 203_822,
+        };
+        assert_eq!(refused.excess(), Some(expected), "{refused}");
         let text = refused.to_string();
         for number in ["38881", "203823", "4194312", "4194304", "203822"] {
             assert!(text.contains(number), "{text}");
@@ -359,15 +347,14 @@ pub(crate) mod tests {
     #[test]
     fn bodies_that_fill_the_memory_alone_leave_room_for_no_collision() {
         let small = Limits { memory_bytes: 47, ..FLOAT };
-        assert!(matches!(
-            room(2, 0, &small),
-            Err(InputError::MemoryExceeded { needed: 48, available: 47, fitting: 0, .. })
-        ));
         let free = Limits { bytes_per_collision: 0, ..small };
-        assert!(matches!(
-            room(2, 9, &free),
-            Err(InputError::MemoryExceeded { needed: 48, fitting: 0, .. })
-        ));
+        for (collisions, limits) in [(0, &small), (9, &free)] {
+            let refused = room(2, collisions, limits).expect_err("48 bytes");
+            let (bodies, needed, available, fitting) = (2, 48, 47, 0);
+            let expected =
+                Excess::MemoryExceeded { bodies, collisions, needed, available, fitting };
+            assert_eq!(refused.excess(), Some(expected), "{refused}");
+        }
     }
 
     #[test]
@@ -375,10 +362,7 @@ pub(crate) mod tests {
         let free = Limits { bytes_per_collision: 0, collision_capacity: 9, ..FLOAT };
         assert_eq!(room(1, 9, &free), Ok(()));
         let refused = room(1, 10, &free).expect_err("one too many");
-        assert!(
-            matches!(refused, InputError::TooManyCollisions { found: 10, limit: 9, .. }),
-            "{refused}"
-        );
+        assert_eq!(refused.excess(), Some(Excess::TooManyCollisions { found: 10, limit: 9 }));
     }
 
     #[test]
@@ -423,11 +407,15 @@ pub(crate) mod tests {
         bodies[1].pose.position[2] = 7e4;
         assert_eq!(check(&bodies, &FLOAT), Ok(()));
         let refused = check(&bodies, &HALF).expect_err("beyond binary16");
-        assert!(matches!(refused, InputError::BodyOutOfRange { body: 1, .. }), "{refused}");
+        let excess = refused.excess();
+        assert!(matches!(excess, Some(Excess::BodyOutOfRange { body: 1, .. })), "{refused}");
         let refused = check(&bodies, &on(&profile::MIXED, Inertia::Isotropic));
         let refused = refused.expect_err("body B is far from A");
         assert!(
-            matches!(refused, InputError::CollisionOutOfRange { collision: 0, component: 2, .. }),
+            matches!(
+                refused.excess(),
+                Some(Excess::CollisionOutOfRange { collision: 0, component: 2, .. })
+            ),
             "{refused}"
         );
     }
@@ -464,8 +452,8 @@ pub(crate) mod tests {
         let refused = check(&HALF).expect_err("1 + 1.5 x 300^2");
         assert!(
             matches!(
-                refused,
-                InputError::RowOutOfRange { collision: 0, field: "inverse effective mass", .. }
+                refused.excess(),
+                Some(Excess::RowOutOfRange { collision: 0, field: "inverse effective mass", .. })
             ),
             "{refused}"
         );

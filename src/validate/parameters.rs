@@ -2,9 +2,8 @@
 
 use pgs_interface::number::StreamFormat;
 
-use super::Limits;
 use super::range::{computes_short, smallest_short};
-use super::{InputError, SceneNeeds};
+use super::{Excess, InputError, Limits, SceneNeeds};
 use crate::scene::StepParameters;
 
 const TIME_STEP: &str = "time step";
@@ -12,7 +11,7 @@ const TIME_STEP: &str = "time step";
 /// Checks the step parameters against their ranges, and against the bitstream's arithmetic.
 pub(crate) fn check_parameters(
     parameters: &StepParameters,
-    demand: &SceneNeeds,
+    needs: &SceneNeeds,
     limits: &Limits,
 ) -> Result<(), InputError> {
     let finite = |value: f32| value.is_finite();
@@ -54,15 +53,9 @@ pub(crate) fn check_parameters(
             };
             let fits = (smallest..=largest).contains(&found.abs()) || (zero && found == 0.0);
             if !fits {
-                let carriers = demand.carriers(|variant| !computes_short(&variant.numbers));
-                return Err(InputError::ParameterOutOfRange {
-                    parameter,
-                    found,
-                    zero,
-                    smallest,
-                    largest,
-                    carriers,
-                });
+                let excess =
+                    Excess::ParameterOutOfRange { parameter, found, zero, smallest, largest };
+                return Err(needs.refuse(excess, |variant| !computes_short(&variant.numbers)));
             }
         }
     }
@@ -82,10 +75,10 @@ mod tests {
     use super::*;
     use pgs_interface::profile::Inertia;
 
-    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    const NEEDS: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     fn checked(parameters: &StepParameters) -> Result<(), InputError> {
-        check_parameters(parameters, &DEMAND, &FLOAT)
+        check_parameters(parameters, &NEEDS, &FLOAT)
     }
 
     const NOT_FINITE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
@@ -172,7 +165,7 @@ mod tests {
     fn what_binary16_does_not_hold_is_refused_where_it_computes() {
         let mut parameters = StepParameters::default();
         let check = |parameters: &StepParameters, limits: &Limits| {
-            check_parameters(parameters, &DEMAND, limits).map_err(|error| error.to_string())
+            check_parameters(parameters, &NEEDS, limits).map_err(|error| error.to_string())
         };
         assert_eq!(check(&parameters, &HALF), Ok(()));
         parameters.gravity[2] = -7e4;
@@ -210,7 +203,7 @@ mod tests {
             let check = |value, limits| {
                 let mut parameters = StepParameters::default();
                 set(&mut parameters, value);
-                check_parameters(&parameters, &DEMAND, limits).map_err(|error| error.to_string())
+                check_parameters(&parameters, &NEEDS, limits).map_err(|error| error.to_string())
             };
             for (limits, smallest) in [(&HALF, subnormal), (&flush, normal)] {
                 assert_eq!(check(0.0, limits), Ok(()), "{name}");

@@ -3,8 +3,7 @@
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Geometry, Variant};
 
-use super::InputError;
-use super::Scene;
+use super::{Excess, InputError, Scene};
 use crate::record::relative::difference;
 use crate::scene::{CONTACT_POINTS, Collision, Contact};
 
@@ -145,8 +144,7 @@ fn refused(
         .chain(of_contacts)
         .find(|(.., found)| found.is_nan() || found.abs() > limit)
         .unwrap_or((None, "normal", 0, collision.normal[0]));
-    let carriers = scene.demand.carriers(|variant| fits(variant, collision, positions));
-    InputError::CollisionOutOfRange {
+    let excess = Excess::CollisionOutOfRange {
         collision: index,
         contact,
         field,
@@ -154,8 +152,8 @@ fn refused(
         found,
         format,
         limit,
-        carriers,
-    }
+    };
+    scene.needs.refuse(excess, |variant| fits(variant, collision, positions))
 }
 
 #[cfg(test)]
@@ -165,7 +163,7 @@ mod tests {
     use pgs_interface::number::StreamFormat;
     use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile, WINDOWED16};
 
-    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    const NEEDS: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
     const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
     const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
     const COLLISION: Collision = Collision {
@@ -184,7 +182,7 @@ mod tests {
         let variant = profile.default_variant();
         let held = Held::by(&variant.numbers);
         let scene =
-            Scene { shapes: &[], demand: DEMAND, variant: &variant, held, flush_subnormals: false };
+            Scene { shapes: &[], needs: NEEDS, variant: &variant, held, flush_subnormals: false };
         check_range(7, collision, positions, &scene)
     }
 
@@ -226,11 +224,8 @@ mod tests {
         ];
         for (collision, positions, contact, field, component, found) in cases {
             let refused = check(&HALF, &collision, positions).expect_err(field);
-            let InputError::CollisionOutOfRange { carriers, .. } = refused else {
-                panic!("{refused}")
-            };
             let (format, limit) = (StreamFormat::Binary16, 65_504.0);
-            let expected = InputError::CollisionOutOfRange {
+            let expected = Excess::CollisionOutOfRange {
                 collision: 7,
                 contact,
                 field,
@@ -238,9 +233,8 @@ mod tests {
                 found,
                 format,
                 limit,
-                carriers,
             };
-            assert_eq!(refused, expected);
+            assert_eq!(refused.excess(), Some(expected), "{refused}");
             assert_eq!(check(&FLOAT, &collision, positions), Ok(()));
         }
     }

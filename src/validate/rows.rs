@@ -7,9 +7,8 @@
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Variant;
 
-use super::InputError;
-use super::Scene;
 use super::range::{fits, origin, used};
+use super::{Excess, InputError, Scene};
 use crate::record::relative::difference;
 use crate::scene::{Collision, Contact, Shape};
 
@@ -128,12 +127,9 @@ impl Rows<'_> {
                 smallest,
                 largest,
             ));
-        let carriers = scene.demand.carriers(|variant| {
-            fits(variant, self.collision, self.positions) && self.fit(variant, flush)
-        });
         // The sum of the masses has no upper limit of its own: the effective mass includes it.
         let largest = largest.min(StreamFormat::Binary16.largest());
-        InputError::RowOutOfRange {
+        let excess = Excess::RowOutOfRange {
             collision: self.index,
             contact,
             field,
@@ -141,8 +137,10 @@ impl Rows<'_> {
             found,
             smallest,
             largest,
-            carriers,
-        }
+        };
+        scene.needs.refuse(excess, |variant| {
+            fits(variant, self.collision, self.positions) && self.fit(variant, flush)
+        })
     }
 }
 
@@ -174,7 +172,7 @@ mod tests {
 
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
     const GROUND: Shape = Shape::STATIC;
-    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    const NEEDS: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     /// Two used contact points, at the origin and at `point`; the other two are not numbers.
     fn collision(point: [f32; 3]) -> Collision {
@@ -198,7 +196,7 @@ mod tests {
     ) -> Result<(), String> {
         let held = Held::by(&variant.numbers);
         let variant = &variant;
-        let scene = Scene { shapes: &[], demand: DEMAND, variant, held, flush_subnormals };
+        let scene = Scene { shapes: &[], needs: NEEDS, variant, held, flush_subnormals };
         let rows = Rows { index: 7, collision, positions, shapes };
         rows.check(&scene).map_err(|error| error.to_string())
     }

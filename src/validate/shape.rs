@@ -4,8 +4,7 @@ use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Inertia, Variant};
 
 use super::range::{computes_short, smallest_short};
-use super::{InputError, SceneNeeds};
-use super::{Limits, exceeds};
+use super::{Excess, InputError, Limits, SceneNeeds, exceeds};
 use crate::scene::Shape;
 
 const MASS: &str = "inverse mass";
@@ -13,8 +12,8 @@ const INERTIA: &str = "inverse inertia";
 
 /// Checks a shape table before any scene uses it.
 pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), InputError> {
-    let demand = SceneNeeds { bodies: 0, collisions: 0, inertia: needed(shapes) };
-    check_shapes(shapes, &demand, limits)
+    let needs = SceneNeeds { bodies: 0, collisions: 0, inertia: needed(shapes) };
+    check_shapes(shapes, &needs, limits)
 }
 
 /// Checks the shape table of a scene.
@@ -22,7 +21,7 @@ pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), I
 /// A moving shape of inverse inertia 0 is legal: it does not rotate.
 pub(crate) fn check_shapes(
     shapes: &[Shape],
-    demand: &SceneNeeds,
+    needs: &SceneNeeds,
     limits: &Limits,
 ) -> Result<(), InputError> {
     if shapes.is_empty() {
@@ -51,8 +50,8 @@ pub(crate) fn check_shapes(
             return Err(InputError::StaticShapeRotates { shape: index, found });
         }
         if limits.variant.inertia == Inertia::Isotropic && !shape.is_isotropic() {
-            let (found, carriers) = (shape.inverse_inertia, demand.carriers(|_| true));
-            return Err(InputError::Anisotropic { shape: index, found, carriers });
+            let excess = Excess::Anisotropic { shape: index, found: shape.inverse_inertia };
+            return Err(needs.refuse(excess, |_| true));
         }
         let smallest = smallest_short(limits.flush_subnormals);
         let beyond = |field: &'static str, found: f32, variant: &Variant| {
@@ -65,7 +64,7 @@ pub(crate) fn check_shapes(
         };
         for (field, component, found) in fields {
             if let Some(format) = beyond(field, found, &limits.variant) {
-                return Err(InputError::ShapeOutOfRange {
+                let excess = Excess::ShapeOutOfRange {
                     shape: index,
                     field,
                     component,
@@ -73,8 +72,9 @@ pub(crate) fn check_shapes(
                     format,
                     smallest,
                     largest: format.largest(),
-                    carriers: demand.carriers(|variant| beyond(field, found, variant).is_none()),
-                });
+                };
+                let holds = |variant: &Variant| beyond(field, found, variant).is_none();
+                return Err(needs.refuse(excess, holds));
             }
         }
     }
@@ -173,7 +173,7 @@ mod tests {
             let found = shape.inverse_inertia;
             let error = refused(shape);
             assert!(
-                matches!(error, InputError::Anisotropic { shape: 1, found: of, .. }
+                matches!(error.excess(), Some(Excess::Anisotropic { shape: 1, found: of })
                     if of.map(f32::to_bits) == found.map(f32::to_bits)),
                 "{error}"
             );
@@ -191,7 +191,8 @@ mod tests {
 
     fn out_of_range(shape: Shape, limits: &Limits) -> String {
         let error = validate_shapes(&[Shape::STATIC, shape], limits).expect_err("out of range");
-        assert!(matches!(error, InputError::ShapeOutOfRange { shape: 1, .. }), "{error}");
+        let excess = error.excess();
+        assert!(matches!(excess, Some(Excess::ShapeOutOfRange { shape: 1, .. })), "{error}");
         error.to_string()
     }
 
