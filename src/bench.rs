@@ -73,21 +73,12 @@ pub struct StepPacker {
 }
 
 impl StepPacker {
-    /// For one bitstream, of the capacities of its profile; without memory of its own yet. As many
+    /// For a bitstream that has room for every scene; without memory of its own yet. As many
     /// threads write as [`OpenOptions::pack_threads`](crate::OpenOptions::pack_threads) says.
     #[must_use]
     pub fn new(variant: Variant, threads: Option<usize>) -> Self {
         Self {
-            limits: Limits {
-                variant,
-                flush_subnormals: false,
-                body_capacity: variant.body_capacity(),
-                collision_capacity: u32::MAX,
-                shape_capacity: u32::MAX,
-                memory_bytes: variant.profile.memory.bytes,
-                bytes_per_body: variant.bytes_per_body(),
-                bytes_per_collision: variant.bytes_per_collision(),
-            },
+            limits: Limits::roomy(variant),
             velocities: Default::default(),
             collisions: Default::default(),
             poses: Default::default(),

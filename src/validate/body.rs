@@ -3,7 +3,7 @@
 use pgs_interface::number::StreamFormat;
 
 use super::range::Held;
-use super::{Excess, InputError, Scene, all_within, first};
+use super::{Excess, InputError, InputItem, OutOfRange, Scene, all_within, first};
 use crate::scene::Body;
 
 const LINEAR: &str = "linear velocity";
@@ -65,8 +65,9 @@ fn number_refused(
     }
     let limit = format.largest();
     let (component, found) = first(values, |value| value.abs() > limit);
-    let excess = Excess::BodyOutOfRange { body: index, field, component, found, format, limit };
-    scene.needs.refuse(excess, |variant| {
+    let (item, smallest, largest) = (InputItem::Body(index), 0.0, limit);
+    let number = OutOfRange { item, field, component, found, format, smallest, largest };
+    scene.needs.refuse(Excess::OutOfRange(number), |variant| {
         let fields = fields(body, &Held::by(&variant.numbers));
         fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
     })
@@ -79,12 +80,11 @@ pub(crate) fn shape_of(body: &Body) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::scene_on;
     use super::*;
-    use crate::scene::{Pose, Shape, Velocity};
-    use crate::validate::SceneNeeds;
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
+    use crate::scene::{Pose, Velocity};
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, Profile};
 
-    const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
     const MOVING: Body = Body {
         pose: Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] },
         velocity: Velocity { linear: [4.0, 5.0, 6.0], angular: [7.0, 8.0, 9.0] },
@@ -92,11 +92,7 @@ mod tests {
     };
 
     fn check_on(profile: &'static Profile, body: &Body) -> Result<(), InputError> {
-        let needs = SceneNeeds { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
-        let variant = &profile.default_variant();
-        let held = Held::by(&variant.numbers);
-        let scene = Scene { shapes: &SHAPES, needs, variant, held, flush_subnormals: false };
-        check_body(7, body, &scene)
+        check_body(7, body, &scene_on(&profile.default_variant(), false))
     }
 
     fn check(body: &Body) -> Result<(), InputError> {
@@ -116,19 +112,9 @@ mod tests {
         body.velocity.angular[1] = -65_504.0_f32.next_up();
         assert_eq!(check_on(&MIXED, &body), Ok(()), "bodies are f32 there");
         let refused = check_on(&HALF, &body).expect_err("beyond binary16");
-        assert!(
-            matches!(
-                refused.excess(),
-                Some(Excess::BodyOutOfRange {
-                    body: 7,
-                    field: "angular velocity",
-                    component: 1,
-                    format: StreamFormat::Binary16,
-                    ..
-                })
-            ),
-            "{refused}"
-        );
+        let number = refused.out_of_range().expect("out of range");
+        assert_eq!((number.item, number.field), (InputItem::Body(7), "angular velocity"));
+        assert_eq!((number.component, number.format), (1, StreamFormat::Binary16));
         assert_eq!(
             refused.to_string(),
             "body 7: angular velocity[1] is -65504.004, but this bitstream holds bodies in \

@@ -90,13 +90,12 @@ impl SceneNeeds {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::NEEDS as SMALL;
     use super::*;
 
     fn names(needs: SceneNeeds, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
         needs.capable(can).profiles().map(|profile| profile.name).collect()
     }
-
-    const SMALL: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     #[test]
     fn profiles_are_named_in_the_order_of_the_table() {

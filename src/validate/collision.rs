@@ -76,10 +76,9 @@ fn contact_not_finite(collision: usize, contacts: &[Contact]) -> InputError {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{UNUSED, USED};
     use super::*;
 
-    const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
-    const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
     const COLLISION: Collision = Collision {
         body_a: 2,
         body_b: 0,

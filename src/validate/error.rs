@@ -1,6 +1,6 @@
 //! The reasons for which a step refuses its input, before anything is sent.
 
-use super::{CapableProfiles, Excess};
+use super::{CapableProfiles, Excess, OutOfRange};
 use crate::order::OrderError;
 use crate::scene::ShapeError;
 use pgs_interface::record::CONTACT_POINTS;
@@ -327,6 +327,15 @@ impl InputError {
     pub fn excess(&self) -> Option<Excess> {
         match self {
             Self::BeyondBitstream { excess, .. } => Some(*excess),
+            _ => None,
+        }
+    }
+
+    /// The number that is out of the bitstream's range, if that is the reason.
+    #[must_use]
+    pub fn out_of_range(&self) -> Option<OutOfRange> {
+        match self.excess() {
+            Some(Excess::OutOfRange(number)) => Some(number),
             _ => None,
         }
     }

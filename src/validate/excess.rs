@@ -1,5 +1,7 @@
 //! The ways in which input exceeds one bitstream, while another may take it.
 
+use std::fmt;
+
 use pgs_interface::number::StreamFormat;
 
 /// The part of the input that exceeds the bitstream.
@@ -47,93 +49,9 @@ pub enum Excess {
         fitting: u32,
     },
 
-    /// A number of a body is beyond what the bitstream's streams, arithmetic or arrays hold.
-    #[error(
-        "body {body}: {field}[{component}] is {found}, but this bitstream holds bodies in {}, \
-         which ends at {limit}: bring it into range, or load another", format.name()
-    )]
-    BodyOutOfRange {
-        /// The body.
-        body: usize,
-        /// Position, orientation, linear or angular velocity.
-        field: &'static str,
-        /// Component of the field, 0 for x.
-        component: usize,
-        /// Its value.
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// Its largest number.
-        limit: f32,
-    },
-
-    /// A number of a collision is beyond what the bitstream's streams or arithmetic hold.
-    #[error(
-        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream holds \
-         collisions in {}, which ends at {limit}: bring it into range, or load another",
-        contact.map_or_else(String::new, |contact| format!(", contact point {contact}")),
-        format.name()
-    )]
-    CollisionOutOfRange {
-        /// The collision.
-        collision: usize,
-        /// The contact point, if it is a number of one.
-        contact: Option<usize>,
-        /// The streamed field: position of a body, offset from body A, normal, point or distance.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for the distance.
-        component: usize,
-        /// Its value as it would be streamed.
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// Its largest number.
-        limit: f32,
-    },
-
-    /// The constraint rows of a collision leave what the bitstream's arithmetic holds.
-    #[error(
-        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream computes \
-         constraint rows in binary16, which takes {smallest:e} to {largest}: bring it into range, \
-         or load another",
-        contact.map_or_else(String::new, |contact| format!(", contact point {contact}"))
-    )]
-    RowOutOfRange {
-        /// The collision.
-        collision: usize,
-        /// The contact point, if it is a number of one.
-        contact: Option<usize>,
-        /// Lever arm about a body, inverse effective mass, sum of the inverse masses or of the
-        /// contact points.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for a mass.
-        component: usize,
-        /// Its magnitude, with the most that rounding can add; m or 1/kg.
-        found: f32,
-        /// The smallest magnitude.
-        smallest: f32,
-        /// The largest magnitude that leaves room for the roundings.
-        largest: f32,
-    },
-
-    /// A parameter is beyond what the bitstream's arithmetic holds.
-    #[error(
-        "the {parameter} is {found:e}, but this bitstream computes in binary16, which takes \
-         {}{smallest:e} to {largest}: correct the step parameters, or load another",
-        if *zero { "0, or " } else { "" }
-    )]
-    ParameterOutOfRange {
-        /// The parameter; a gravity component with its axis.
-        parameter: &'static str,
-        /// Its value.
-        found: f32,
-        /// Whether 0 is taken as well.
-        zero: bool,
-        /// The smallest magnitude, 0 aside.
-        smallest: f32,
-        /// The largest magnitude.
-        largest: f32,
-    },
+    /// A number is out of the range of the bitstream's streams, arithmetic or arrays.
+    #[error("{0}")]
+    OutOfRange(OutOfRange),
 
     /// The inertia of a shape differs between its axes.
     #[error(
@@ -145,29 +63,6 @@ pub enum Excess {
         shape: usize,
         /// Its inverse inertia, 1/(kg m²).
         found: [f32; 3],
-    },
-
-    /// An inverse mass or inertia is beyond what the bitstream's arithmetic or streams hold.
-    #[error(
-        "shape {shape}: its {field}[{component}] is {found:e}, but this bitstream holds it in {}, \
-         from {smallest:e} to {largest}: give another shape, or load another bitstream",
-        format.name()
-    )]
-    ShapeOutOfRange {
-        /// The shape.
-        shape: usize,
-        /// Inverse mass or inverse inertia.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for the mass.
-        component: usize,
-        /// Its value, 1/kg or 1/(kg m²).
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// The smallest number above 0 that does not become 0.
-        smallest: f32,
-        /// The largest number.
-        largest: f32,
     },
 
     /// An order without hazards needs more entries, empty ones included, than the bitstream takes.
@@ -222,4 +117,85 @@ pub enum Excess {
         /// Places of the bitstream.
         places: u32,
     },
+}
+
+/// A number out of range, and its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct OutOfRange {
+    /// The item of the input that has the number.
+    pub item: InputItem,
+    /// Name of the number in the item.
+    pub field: &'static str,
+    /// Component of the field, 0 for x; 0 for a field of one number.
+    pub component: usize,
+    /// Its value as it is streamed; of rows its magnitude, with the most that rounding can add.
+    pub found: f32,
+    /// The narrowest format on its way.
+    pub format: StreamFormat,
+    /// The smallest magnitude above 0.
+    pub smallest: f32,
+    /// The largest magnitude.
+    pub largest: f32,
+}
+
+/// An item of the input, by its index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum InputItem {
+    /// A body.
+    Body(usize),
+    /// A collision, and the contact point if the number belongs to one.
+    Collision(usize, Option<usize>),
+    /// The constraint rows of a collision, and the contact point if the number belongs to one.
+    Rows(usize, Option<usize>),
+    /// A shape.
+    Shape(usize),
+    /// The step parameters.
+    Parameters {
+        /// Whether 0 is in range, too.
+        zero: bool,
+    },
+}
+
+impl fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { item, field, component, found, format, smallest, largest } = *self;
+        let format = format.name();
+        let of = |collision: usize, contact: Option<usize>| match contact {
+            Some(contact) => format!("collision {collision}, contact point {contact}"),
+            None => format!("collision {collision}"),
+        };
+        match item {
+            InputItem::Body(body) => write!(
+                f,
+                "body {body}: {field}[{component}] is {found}, but this bitstream holds bodies in \
+                 {format}, which ends at {largest}: bring it into range, or load another"
+            ),
+            InputItem::Collision(collision, contact) => write!(
+                f,
+                "{}: {field}[{component}] is {found}, but this bitstream holds collisions in \
+                 {format}, which ends at {largest}: bring it into range, or load another",
+                of(collision, contact)
+            ),
+            InputItem::Rows(collision, contact) => write!(
+                f,
+                "{}: {field}[{component}] is {found}, but this bitstream computes constraint rows in \
+                 {format}, which takes {smallest:e} to {largest}: bring it into range, or load another",
+                of(collision, contact)
+            ),
+            InputItem::Shape(shape) => write!(
+                f,
+                "shape {shape}: its {field}[{component}] is {found:e}, but this bitstream holds it \
+                 in {format}, from {smallest:e} to {largest}: give another shape, or load another \
+                 bitstream"
+            ),
+            InputItem::Parameters { zero } => write!(
+                f,
+                "the {field} is {found:e}, but this bitstream computes in {format}, which takes \
+                 {}{smallest:e} to {largest}: correct the step parameters, or load another",
+                if zero { "0, or " } else { "" }
+            ),
+        }
+    }
 }

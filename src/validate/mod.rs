@@ -20,7 +20,7 @@ mod shape;
 pub use capable_profiles::CapableProfiles;
 pub(crate) use capable_profiles::SceneNeeds;
 pub use error::InputError;
-pub use excess::Excess;
+pub use excess::{Excess, InputItem, OutOfRange};
 pub(crate) use look::Look;
 pub(crate) use quick::{Block, Quick};
 pub(crate) use reach::Locations;
@@ -32,6 +32,7 @@ use self::parameters::check_parameters;
 use self::range::{Held, check_range};
 use self::rows::Rows;
 use self::shape::check_shapes;
+use crate::control_block::Capabilities;
 use crate::record::relative::anchors;
 use crate::scene::{Bodies, Collision, Collisions, Shape, StepParameters};
 use pgs_interface::number::{Precision, StreamFormat};
@@ -59,6 +60,39 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
+    /// The limits of a bitstream.
+    pub(crate) fn of(capabilities: &Capabilities) -> Self {
+        let Capabilities { variant, flush_subnormals, .. } = *capabilities;
+        let Capabilities { collision_capacity, shape_capacity, .. } = *capabilities;
+        let Capabilities { memory_bytes, bytes_per_body, bytes_per_collision, .. } = *capabilities;
+        Self {
+            variant,
+            flush_subnormals,
+            // An index has to name every body, whatever capacity the bitstream reports.
+            body_capacity: capabilities.body_capacity.min(variant.body_capacity()),
+            collision_capacity,
+            shape_capacity,
+            memory_bytes,
+            bytes_per_body,
+            bytes_per_collision,
+        }
+    }
+
+    /// The limits of a bitstream that has room for every scene.
+    #[cfg(any(test, feature = "bench"))]
+    pub(crate) const fn roomy(variant: Variant) -> Self {
+        Self {
+            variant,
+            flush_subnormals: false,
+            body_capacity: u32::MAX,
+            collision_capacity: u32::MAX,
+            shape_capacity: u32::MAX,
+            memory_bytes: u32::MAX,
+            bytes_per_body: 0,
+            bytes_per_collision: 0,
+        }
+    }
+
     /// The number of collisions that fit beside `bodies` bodies.
     pub(crate) fn room_for_collisions(&self, bodies: usize) -> u32 {
         let for_bodies = (bodies as u64).saturating_mul(u64::from(self.bytes_per_body));
@@ -234,7 +268,17 @@ pub(crate) mod tests {
         bytes_per_body: 24,
         bytes_per_collision: 16,
     };
-    const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+    pub(crate) const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+    pub(crate) const NEEDS: SceneNeeds =
+        SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    pub(crate) const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
+    pub(crate) const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
+
+    /// The context of checks on a bitstream of `variant`.
+    pub(crate) fn scene_on(variant: &Variant, flush_subnormals: bool) -> Scene<'_> {
+        let held = Held::by(&variant.numbers);
+        Scene { shapes: &SHAPES, needs: NEEDS, variant, held, flush_subnormals }
+    }
 
     fn body(shape: u32) -> Body {
         Body {
@@ -407,17 +451,13 @@ pub(crate) mod tests {
         bodies[1].pose.position[2] = 7e4;
         assert_eq!(check(&bodies, &FLOAT), Ok(()));
         let refused = check(&bodies, &HALF).expect_err("beyond binary16");
-        let excess = refused.excess();
-        assert!(matches!(excess, Some(Excess::BodyOutOfRange { body: 1, .. })), "{refused}");
+        let of = |refused: &InputError| {
+            refused.out_of_range().map(|number| (number.item, number.component))
+        };
+        assert_eq!(of(&refused), Some((InputItem::Body(1), 2)), "{refused}");
         let refused = check(&bodies, &on(&profile::MIXED, Inertia::Isotropic));
         let refused = refused.expect_err("body B is far from A");
-        assert!(
-            matches!(
-                refused.excess(),
-                Some(Excess::CollisionOutOfRange { collision: 0, component: 2, .. })
-            ),
-            "{refused}"
-        );
+        assert_eq!(of(&refused), Some((InputItem::Collision(0, Some(0)), 2)), "{refused}");
     }
 
     /// 300,000 collisions, and a shape with three different inertias: `float` has no room for them.
@@ -450,13 +490,8 @@ pub(crate) mod tests {
         };
         assert_eq!(check(&FLOAT), Ok(()));
         let refused = check(&HALF).expect_err("1 + 1.5 x 300^2");
-        assert!(
-            matches!(
-                refused.excess(),
-                Some(Excess::RowOutOfRange { collision: 0, field: "inverse effective mass", .. })
-            ),
-            "{refused}"
-        );
+        let of = refused.out_of_range().map(|number| (number.item, number.field));
+        assert_eq!(of, Some((InputItem::Rows(0, Some(0)), "inverse effective mass")), "{refused}");
         assert_eq!(check(&on(&profile::MIXED, Inertia::Isotropic)), Ok(()));
     }
 

@@ -1,9 +1,10 @@
 //! Refuses step parameters outside their range.
 
 use pgs_interface::number::StreamFormat;
+use pgs_interface::profile::Variant;
 
 use super::range::{computes_short, smallest_short};
-use super::{Excess, InputError, Limits, SceneNeeds};
+use super::{Excess, InputError, InputItem, Limits, OutOfRange, SceneNeeds};
 use crate::scene::StepParameters;
 
 const TIME_STEP: &str = "time step";
@@ -43,19 +44,22 @@ pub(crate) fn check_parameters(
         }
     }
     if computes_short(&limits.variant.numbers) {
-        let largest = StreamFormat::Binary16.largest();
-        for (parameter, found, ..) in checks {
+        let (format, component) = (StreamFormat::Binary16, 0);
+        let largest = format.largest();
+        for (field, found, ..) in checks {
             let nonzero = smallest_short(limits.flush_subnormals);
-            let (zero, smallest) = match parameter {
+            let (zero, smallest) = match field {
                 // Its reciprocal must fit, too.
                 TIME_STEP => (false, nonzero.max(1.0 / largest)),
                 _ => (true, nonzero),
             };
             let fits = (smallest..=largest).contains(&found.abs()) || (zero && found == 0.0);
             if !fits {
-                let excess =
-                    Excess::ParameterOutOfRange { parameter, found, zero, smallest, largest };
-                return Err(needs.refuse(excess, |variant| !computes_short(&variant.numbers)));
+                let item = InputItem::Parameters { zero };
+                let number =
+                    OutOfRange { item, field, component, found, format, smallest, largest };
+                let holds = |variant: &Variant| !computes_short(&variant.numbers);
+                return Err(needs.refuse(Excess::OutOfRange(number), holds));
             }
         }
     }
@@ -71,11 +75,8 @@ pub(crate) fn check_parameters(
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{FLOAT, HALF};
+    use super::super::tests::{FLOAT, HALF, NEEDS};
     use super::*;
-    use pgs_interface::profile::Inertia;
-
-    const NEEDS: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     fn checked(parameters: &StepParameters) -> Result<(), InputError> {
         check_parameters(parameters, &NEEDS, &FLOAT)

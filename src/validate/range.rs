@@ -3,7 +3,7 @@
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Geometry, Variant};
 
-use super::{Excess, InputError, Scene};
+use super::{Excess, InputError, InputItem, OutOfRange, Scene};
 use crate::record::relative::difference;
 use crate::scene::{CONTACT_POINTS, Collision, Contact};
 
@@ -144,28 +144,17 @@ fn refused(
         .chain(of_contacts)
         .find(|(.., found)| found.is_nan() || found.abs() > limit)
         .unwrap_or((None, "normal", 0, collision.normal[0]));
-    let excess = Excess::CollisionOutOfRange {
-        collision: index,
-        contact,
-        field,
-        component,
-        found,
-        format,
-        limit,
-    };
-    scene.needs.refuse(excess, |variant| fits(variant, collision, positions))
+    let (item, smallest, largest) = (InputItem::Collision(index, contact), 0.0, limit);
+    let number = OutOfRange { item, field, component, found, format, smallest, largest };
+    scene.needs.refuse(Excess::OutOfRange(number), |variant| fits(variant, collision, positions))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{UNUSED, USED, scene_on};
     use super::*;
-    use crate::validate::SceneNeeds;
-    use pgs_interface::number::StreamFormat;
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile, WINDOWED16};
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, Profile, WINDOWED16};
 
-    const NEEDS: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
-    const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
-    const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
     const COLLISION: Collision = Collision {
         body_a: 0,
         body_b: 1,
@@ -179,11 +168,7 @@ mod tests {
         collision: &Collision,
         positions: [[f32; 3]; 2],
     ) -> Result<(), InputError> {
-        let variant = profile.default_variant();
-        let held = Held::by(&variant.numbers);
-        let scene =
-            Scene { shapes: &[], needs: NEEDS, variant: &variant, held, flush_subnormals: false };
-        check_range(7, collision, positions, &scene)
+        check_range(7, collision, positions, &scene_on(&profile.default_variant(), false))
     }
 
     fn far(contact: Contact) -> Collision {
@@ -224,17 +209,10 @@ mod tests {
         ];
         for (collision, positions, contact, field, component, found) in cases {
             let refused = check(&HALF, &collision, positions).expect_err(field);
-            let (format, limit) = (StreamFormat::Binary16, 65_504.0);
-            let expected = Excess::CollisionOutOfRange {
-                collision: 7,
-                contact,
-                field,
-                component,
-                found,
-                format,
-                limit,
-            };
-            assert_eq!(refused.excess(), Some(expected), "{refused}");
+            let (item, format) = (InputItem::Collision(7, contact), StreamFormat::Binary16);
+            let (smallest, largest) = (0.0, 65_504.0);
+            let expected = OutOfRange { item, field, component, found, format, smallest, largest };
+            assert_eq!(refused.out_of_range(), Some(expected), "{refused}");
             assert_eq!(check(&FLOAT, &collision, positions), Ok(()));
         }
     }

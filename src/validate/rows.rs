@@ -8,7 +8,7 @@ use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Variant;
 
 use super::range::{fits, origin, used};
-use super::{Excess, InputError, Scene};
+use super::{Excess, InputError, InputItem, OutOfRange, Scene};
 use crate::record::relative::difference;
 use crate::scene::{Collision, Contact, Shape};
 
@@ -128,17 +128,10 @@ impl Rows<'_> {
                 largest,
             ));
         // The sum of the masses has no upper limit of its own: the effective mass includes it.
-        let largest = largest.min(StreamFormat::Binary16.largest());
-        let excess = Excess::RowOutOfRange {
-            collision: self.index,
-            contact,
-            field,
-            component,
-            found,
-            smallest,
-            largest,
-        };
-        scene.needs.refuse(excess, |variant| {
+        let format = StreamFormat::Binary16;
+        let (item, largest) = (InputItem::Rows(self.index, contact), largest.min(format.largest()));
+        let number = OutOfRange { item, field, component, found, format, smallest, largest };
+        scene.needs.refuse(Excess::OutOfRange(number), |variant| {
             fits(variant, self.collision, self.positions) && self.fit(variant, flush)
         })
     }
@@ -164,26 +157,23 @@ fn add(sum: [f32; 3], point: [f32; 3]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::range::Held;
+    use super::super::tests::{UNUSED, scene_on};
     use super::*;
-    use crate::validate::SceneNeeds;
     use pgs_interface::number::Numbers;
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED};
+    use pgs_interface::profile::{FLOAT, HALF, MIXED};
 
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
     const GROUND: Shape = Shape::STATIC;
-    const NEEDS: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     /// Two used contact points, at the origin and at `point`; the other two are not numbers.
     fn collision(point: [f32; 3]) -> Collision {
-        let unused = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
         let at = |point| Contact { point, distance: 0.0 };
         Collision {
             body_a: 0,
             body_b: 1,
             normal: [0.0, -1.0, 0.0],
             count: 2,
-            contacts: [at([0.0; 3]), at(point), unused, unused],
+            contacts: [at([0.0; 3]), at(point), UNUSED, UNUSED],
         }
     }
 
@@ -194,11 +184,8 @@ mod tests {
         collision: &Collision,
         positions: [[f32; 3]; 2],
     ) -> Result<(), String> {
-        let held = Held::by(&variant.numbers);
-        let variant = &variant;
-        let scene = Scene { shapes: &[], needs: NEEDS, variant, held, flush_subnormals };
         let rows = Rows { index: 7, collision, positions, shapes };
-        rows.check(&scene).map_err(|error| error.to_string())
+        rows.check(&scene_on(&variant, flush_subnormals)).map_err(|error| error.to_string())
     }
 
     const HALF_BUILT: Variant = HALF.default_variant();

@@ -4,7 +4,7 @@ use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Inertia, Variant};
 
 use super::range::{computes_short, smallest_short};
-use super::{Excess, InputError, Limits, SceneNeeds, exceeds};
+use super::{Excess, InputError, InputItem, Limits, OutOfRange, SceneNeeds, exceeds};
 use crate::scene::Shape;
 
 const MASS: &str = "inverse mass";
@@ -64,17 +64,11 @@ pub(crate) fn check_shapes(
         };
         for (field, component, found) in fields {
             if let Some(format) = beyond(field, found, &limits.variant) {
-                let excess = Excess::ShapeOutOfRange {
-                    shape: index,
-                    field,
-                    component,
-                    found,
-                    format,
-                    smallest,
-                    largest: format.largest(),
-                };
+                let (item, largest) = (InputItem::Shape(index), format.largest());
+                let number =
+                    OutOfRange { item, field, component, found, format, smallest, largest };
                 let holds = |variant: &Variant| beyond(field, found, variant).is_none();
-                return Err(needs.refuse(excess, holds));
+                return Err(needs.refuse(Excess::OutOfRange(number), holds));
             }
         }
     }
@@ -191,8 +185,8 @@ mod tests {
 
     fn out_of_range(shape: Shape, limits: &Limits) -> String {
         let error = validate_shapes(&[Shape::STATIC, shape], limits).expect_err("out of range");
-        let excess = error.excess();
-        assert!(matches!(excess, Some(Excess::ShapeOutOfRange { shape: 1, .. })), "{error}");
+        let item = error.out_of_range().map(|number| number.item);
+        assert_eq!(item, Some(InputItem::Shape(1)), "{error}");
         error.to_string()
     }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use thiserror::Error;
-use zynq_pgs::{Excess, InputError};
+use zynq_pgs::{Excess, InputError, InputItem, OutOfRange};
 
 use crate::failure::Failure;
 use step_folder::folder::{
@@ -48,7 +48,9 @@ fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
         InputError::ShapeValue { shape, .. }
         | InputError::StaticShapeRotates { shape, .. }
         | InputError::BeyondBitstream {
-            excess: Excess::Anisotropic { shape, .. } | Excess::ShapeOutOfRange { shape, .. },
+            excess:
+                Excess::Anisotropic { shape, .. }
+                | Excess::OutOfRange(OutOfRange { item: InputItem::Shape(shape), .. }),
             ..
         } => Some(*shape),
         _ => None,
@@ -93,17 +95,22 @@ fn file_of(error: &InputError) -> &'static str {
 /// The array that holds a value beyond the bitstream.
 fn file_of_excess(excess: &Excess) -> &'static str {
     match excess {
-        Excess::BodyOutOfRange { field, .. } => file_of_body(field),
-        Excess::ShapeOutOfRange { field: "inverse mass", .. } => BODY_INVERSE_MASS,
-        Excess::Anisotropic { .. } | Excess::ShapeOutOfRange { .. } => BODY_INVERSE_INERTIA,
+        Excess::OutOfRange(OutOfRange { item, field, .. }) => match item {
+            InputItem::Body(_) => file_of_body(field),
+            InputItem::Shape(_) if *field == "inverse mass" => BODY_INVERSE_MASS,
+            InputItem::Shape(_) => BODY_INVERSE_INERTIA,
+            InputItem::Collision(_, Some(_)) => COLLISION_POINTS,
+            InputItem::Parameters { .. } => PARAMS,
+            // Positions of bodies, constraint rows. A normal of unit length is always in range.
+            _ => BODY_POSITION,
+        },
+        Excess::Anisotropic { .. } => BODY_INVERSE_INERTIA,
         Excess::TooManyCollisions { .. }
         | Excess::MemoryExceeded { .. }
         | Excess::OrderTooLong { .. }
         | Excess::SpanTooLong { .. }
         | Excess::TooManyLive { .. } => COLLISION_BODIES,
-        Excess::CollisionOutOfRange { contact: Some(_), .. } => COLLISION_POINTS,
-        Excess::ParameterOutOfRange { .. } => PARAMS,
-        // Too many bodies, and positions of bodies: a normal of unit length is always in range.
+        // Too many bodies.
         _ => BODY_POSITION,
     }
 }
