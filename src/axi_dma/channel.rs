@@ -140,10 +140,10 @@ impl Channel {
             (found.gone() || reached(found)).then_some(())
         });
         if found.gone() {
-            return Err(DmaError::Gone { channel: self.name.to_string() });
+            return Err(DmaError::Gone { channel: self.name });
         }
         seen.ok_or_else(|| DmaError::State {
-            channel: self.name.to_string(),
+            channel: self.name,
             awaited,
             limit: deadline.limit(),
             found: found.to_string(),
@@ -161,10 +161,10 @@ pub(crate) fn detect_length_width(channel: &mut Channel) -> Result<u32, DmaError
     channel.write(&LENGTH, 0);
     let width = found.trailing_ones();
     if found == u32::MAX {
-        return Err(DmaError::Gone { channel: channel.name.to_string() });
+        return Err(DmaError::Gone { channel: channel.name });
     }
     if width == 0 || width != found.count_ones() {
-        return Err(DmaError::NotALength { channel: channel.name.to_string(), found });
+        return Err(DmaError::NotALength { channel: channel.name, found });
     }
     Ok(width)
 }

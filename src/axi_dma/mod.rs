@@ -52,13 +52,13 @@ pub enum DmaError {
     #[error("{channel} reads all ones: is the bitstream still loaded and its clock running?")]
     Gone {
         /// Which channel.
-        channel: String,
+        channel: ChannelName,
     },
     /// A state was not reached in time.
     #[error("{channel} was expected to be {awaited} within {limit:?}, found {found}")]
     State {
         /// Which channel.
-        channel: String,
+        channel: ChannelName,
         /// The state that was awaited.
         awaited: &'static str,
         /// The time limit.
@@ -72,7 +72,7 @@ pub enum DmaError {
     )]
     NoScatterGather {
         /// Which channel.
-        channel: String,
+        channel: ChannelName,
         /// Its status, decoded.
         found: String,
     },
@@ -83,7 +83,7 @@ pub enum DmaError {
     )]
     LengthWidth {
         /// Which channel.
-        channel: String,
+        channel: ChannelName,
         /// Width by the capability register or by the caller, bits.
         expected: u32,
         /// Width as found, bits.
@@ -93,7 +93,7 @@ pub enum DmaError {
     #[error("{channel} LENGTH reads {found:#010x} after all ones were written: not an AXI DMA?")]
     NotALength {
         /// Which channel.
-        channel: String,
+        channel: ChannelName,
         /// Its value.
         found: u32,
     },

@@ -22,10 +22,10 @@ pub(crate) fn reset_core(
             (found.0 == u32::MAX || !found.resetting()).then_some(())
         });
         if found.0 == u32::MAX {
-            return Err(DmaError::Gone { channel: channel.name().to_string() });
+            return Err(DmaError::Gone { channel: channel.name() });
         }
         done.ok_or_else(|| DmaError::State {
-            channel: channel.name().to_string(),
+            channel: channel.name(),
             awaited: "out of reset",
             limit: deadline.limit(),
             found: found.to_string(),

@@ -42,7 +42,6 @@ impl Core {
     pub(crate) fn check_length_width(&mut self, expected: u32) -> Result<(), DmaError> {
         for (channel, found) in self.length_widths()? {
             if found != expected {
-                let channel = channel.to_string();
                 return Err(DmaError::LengthWidth { channel, expected, found });
             }
         }
@@ -81,12 +80,12 @@ pub(crate) fn connect(
 
 fn check_mode(channel: &Channel) -> Result<(), DmaError> {
     let status = channel.status();
-    let name = channel.name().to_string();
+    let channel = channel.name();
     if status.gone() {
-        return Err(DmaError::Gone { channel: name });
+        return Err(DmaError::Gone { channel });
     }
     if !status.scatter_gather() {
-        return Err(DmaError::NoScatterGather { channel: name, found: status.to_string() });
+        return Err(DmaError::NoScatterGather { channel, found: status.to_string() });
     }
     Ok(())
 }

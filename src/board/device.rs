@@ -308,8 +308,14 @@ impl Device {
         self.activity == Activity::Step
     }
 
-    /// Records that everything was reset and the buffers are back.
-    pub(crate) fn was_cleared(&mut self) {
+    /// Records that everything was reset, and takes the buffers back.
+    pub(crate) fn was_reset(&mut self) {
+        for port in self.ports_mut() {
+            // The next step replaces a buffer that does not come back.
+            if let Err(error) = port.was_reset() {
+                log::error!("a buffer was lost: {error}");
+            }
+        }
         self.activity = Activity::Idle;
     }
 
@@ -366,11 +372,7 @@ impl Drop for Device {
             if let Err(error) = self.reset() {
                 log::error!("the board could not be reset: {error}");
             } else {
-                for port in self.ports_mut() {
-                    if let Err(error) = port.was_reset() {
-                        log::error!("a buffer was lost: {error}");
-                    }
-                }
+                self.was_reset();
             }
         }
         let Self { mm2s, s2mm, platform, .. } = self;

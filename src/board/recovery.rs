@@ -109,13 +109,7 @@ impl Device {
         if let Some(changed) = self.fingerprint.difference(&found) {
             return Err(other_bitstream(changed));
         }
-        for port in self.ports_mut() {
-            // The next step replaces a buffer that does not come back.
-            if let Err(error) = port.was_reset() {
-                log::error!("a buffer was lost: {error}");
-            }
-        }
-        self.was_cleared();
+        self.was_reset();
         self.control.load_shapes(shapes, self.capabilities.variant.inertia);
         log::info!("the board was reset after a fault");
         Ok(())
