@@ -78,11 +78,16 @@ impl SceneNeeds {
         CapableProfiles { profiles, inertia: self.inertia }
     }
 
+    /// On-chip memory of the scene, bytes; saturates.
+    pub(crate) fn memory(&self, bytes_per_body: u32, bytes_per_collision: u32) -> u64 {
+        let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
+        bytes(self.bodies, bytes_per_body)
+            .saturating_add(bytes(self.collisions, bytes_per_collision))
+    }
+
     /// Whether the on-chip memory of a bitstream takes the scene.
     pub(crate) fn has_room(&self, variant: &Variant) -> bool {
-        let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
-        let needed = bytes(self.bodies, variant.bytes_per_body())
-            .saturating_add(bytes(self.collisions, variant.bytes_per_collision()));
+        let needed = self.memory(variant.bytes_per_body(), variant.bytes_per_collision());
         self.bodies as u64 <= u64::from(variant.body_capacity())
             && needed <= u64::from(variant.profile.memory.bytes)
     }

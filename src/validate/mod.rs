@@ -62,19 +62,16 @@ pub(crate) struct Limits {
 impl Limits {
     /// The limits of a bitstream.
     pub(crate) fn of(capabilities: &Capabilities) -> Self {
-        let Capabilities { variant, flush_subnormals, .. } = *capabilities;
-        let Capabilities { collision_capacity, shape_capacity, .. } = *capabilities;
-        let Capabilities { memory_bytes, bytes_per_body, bytes_per_collision, .. } = *capabilities;
         Self {
-            variant,
-            flush_subnormals,
+            variant: capabilities.variant,
+            flush_subnormals: capabilities.flush_subnormals,
             // An index has to name every body, whatever capacity the bitstream reports.
-            body_capacity: capabilities.body_capacity.min(variant.body_capacity()),
-            collision_capacity,
-            shape_capacity,
-            memory_bytes,
-            bytes_per_body,
-            bytes_per_collision,
+            body_capacity: capabilities.body_capacity.min(capabilities.variant.body_capacity()),
+            collision_capacity: capabilities.collision_capacity,
+            shape_capacity: capabilities.shape_capacity,
+            memory_bytes: capabilities.memory_bytes,
+            bytes_per_body: capabilities.bytes_per_body,
+            bytes_per_collision: capabilities.bytes_per_collision,
         }
     }
 
@@ -210,10 +207,7 @@ fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
     if exceeds(collisions, limit) {
         return refuse(Excess::TooManyCollisions { found: collisions, limit });
     }
-    // Neither product leaves 64 bits: both factors are below 2^32 by now.
-    let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
-    let for_bodies = bytes(bodies, limits.bytes_per_body);
-    let needed = for_bodies.saturating_add(bytes(collisions, limits.bytes_per_collision));
+    let needed = needs.memory(limits.bytes_per_body, limits.bytes_per_collision);
     let available = limits.memory_bytes;
     if needed > u64::from(available) {
         let fitting = limits.room_for_collisions(bodies);
