@@ -78,16 +78,7 @@ impl StepPacker {
     #[must_use]
     pub fn new(variant: Variant, threads: Option<usize>) -> Self {
         Self {
-            limits: Limits {
-                variant,
-                flush_subnormals: false,
-                body_capacity: variant.body_capacity(),
-                collision_capacity: u32::MAX,
-                shape_capacity: u32::MAX,
-                memory_bytes: variant.profile.memory.bytes,
-                bytes_per_body: variant.bytes_per_body(),
-                bytes_per_collision: variant.bytes_per_collision(),
-            },
+            limits: Limits::roomy(variant),
             velocities: Default::default(),
             collisions: Default::default(),
             poses: Default::default(),

@@ -13,7 +13,7 @@ use bitstream_model::{BoardConfig, Hazards};
 use scene::{Scene, SceneOptions, kinetic_energy};
 use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
 use zynq_pgs::order::{Order, OrderError, Ties};
-use zynq_pgs::{Body, Collision, Error, InputError, Shape, StepParameters, StepReport};
+use zynq_pgs::{Body, Collision, Error, Excess, InputError, Shape, StepParameters, StepReport};
 
 fn with(hazards: Hazards) -> BoardConfig {
     BoardConfig { hazards, ..BoardConfig::default() }
@@ -218,13 +218,15 @@ fn an_order_that_does_not_fit_is_refused_with_its_numbers() {
     assert!(
         matches!(
             error,
-            Error::Input(InputError::OrderTooLong {
-                collisions: 2_000,
-                bodies: 2_001,
-                limit: 259_142,
-                depth: 158,
-                body: 0,
-                uses: 2_000,
+            Error::Input(InputError::BeyondBitstream {
+                excess: Excess::OrderTooLong {
+                    collisions: 2_000,
+                    bodies: 2_001,
+                    limit: 259_142,
+                    depth: 158,
+                    body: 0,
+                    uses: 2_000,
+                },
                 ..
             })
         ),

@@ -18,7 +18,8 @@ use bitstream_model::{Bandwidth, BoardConfig};
 use scene::{Scene, SceneOptions, ShapesOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Body, Collision, Collisions, Error, InputError, Shape, StepParameters, StepReport, Velocity,
+    Body, Collision, Collisions, Error, Excess, InputError, Shape, StepParameters, StepReport,
+    Velocity,
 };
 
 fn of(profile: &'static Profile) -> BoardConfig {
@@ -197,15 +198,16 @@ fn refused(
     bodies: &mut [Body],
     collisions: &[Collision],
     order: Order,
-) -> (Error, String) {
+) -> (Excess, String) {
     let (board, mut windowed) = open(of(profile));
     windowed.set_shapes(&SHAPES).expect("they fit");
     let before = (bits(bodies), board.counts());
     let error = windowed.step(bodies, collisions, &ordered(order)).expect_err("it cannot be sent");
-    assert!(error.is_input(), "{error}");
     assert_eq!((bits(bodies), board.counts()), before);
-    let text = error.to_string();
-    (error, text)
+    let Error::Input(InputError::BeyondBitstream { excess, .. }) = error else {
+        panic!("{error:?}")
+    };
+    (excess, error.to_string())
 }
 
 /// A chain of cubes; two of them that lie far apart in it touch each other.
@@ -219,11 +221,8 @@ fn chain(links: u32) -> (Vec<Body>, Vec<Collision>) {
 #[test]
 fn a_body_that_lives_too_long_is_refused_with_the_profiles_that_could() {
     let (mut bodies, collisions) = chain(3_000);
-    let (error, text) = refused(&WINDOWED, &mut bodies, &collisions, Order::AsGiven);
-    assert!(
-        matches!(error, Error::Input(InputError::SpanTooLong { body: 0, lag: 2_816, .. })),
-        "{error:?}"
-    );
+    let (excess, text) = refused(&WINDOWED, &mut bodies, &collisions, Order::AsGiven);
+    assert!(matches!(excess, Excess::SpanTooLong { body: 0, lag: 2_816, .. }), "{excess:?}");
     // Body 0 is in the first entry and in the last.
     assert_eq!(
         text,
@@ -249,10 +248,8 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
     let mut scene = Scene::new(&options).expect("a small scene");
     let collisions = scene.detect().to_vec();
     let mut bodies = scene.bodies().to_vec();
-    let (error, text) = refused(few, &mut bodies, &collisions, Order::HazardFree);
-    let Error::Input(InputError::TooManyLive { held, alive, places: 16, .. }) = error else {
-        panic!("{error:?}")
-    };
+    let (excess, text) = refused(few, &mut bodies, &collisions, Order::HazardFree);
+    let Excess::TooManyLive { held, alive, places: 16 } = excess else { panic!("{excess:?}") };
     assert!((17..=64).contains(&held) && alive <= held, "{held} {alive}");
     assert!(text.contains(&format!("{held} moving bodies")), "{text}");
     assert!(text.contains("places for 16"), "{text}");
@@ -267,8 +264,8 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
     let report = windowed.step(&mut bodies, &collisions, &StepParameters::default());
     let report = report.unwrap_or_else(|error| panic!("{error:?}: {:?}", board.violations()));
     assert_eq!(report.live.expect("live bodies").most_held, held);
-    let (error, _) = refused(design(held - 1), &mut bodies, &collisions, Order::HazardFree);
-    assert!(matches!(error, Error::Input(InputError::TooManyLive { .. })), "{error:?}");
+    let (excess, _) = refused(design(held - 1), &mut bodies, &collisions, Order::HazardFree);
+    assert!(matches!(excess, Excess::TooManyLive { .. }), "{excess:?}");
 }
 
 /// Collisions, among them one that loses its contact points after the read `good_reads`, for good

@@ -134,7 +134,7 @@ fn a_status_that_never_reaches_memory_is_not_taken_for_a_channel_that_hangs() {
 fn a_status_that_is_late_costs_no_step_and_is_told_once() {
     let (board, tampered, mut accelerator) = Tampered::open();
     step(&mut accelerator, CUBES).0.expect("a good step");
-    assert!(!accelerator.device.oddities.told(Anomaly::LateStatus));
+    assert!(!accelerator.device.anomalies.told(Anomaly::LateStatus));
     let mut looks = 0;
     let mut seen = 0;
     // The driver does not see the bit at its first look; at the third look the bit is back.
@@ -160,7 +160,7 @@ fn a_status_that_is_late_costs_no_step_and_is_told_once() {
     let (result, bodies) = step(&mut accelerator, CUBES);
     result.expect("only late");
     assert_eq!(bits(&bodies), undisturbed(CUBES));
-    assert!(accelerator.device.oddities.told(Anomaly::LateStatus));
+    assert!(accelerator.device.anomalies.told(Anomaly::LateStatus));
     assert_eq!(board.violations(), []);
 }
 
@@ -344,7 +344,7 @@ fn odd(cubes: u32, interrupts: u32) -> (Result<StepReport, Error>, Accelerator, 
 fn interrupts_without_a_reason_cost_no_step_and_are_told_once() {
     let (result, accelerator, _) = odd(CUBES, 1);
     assert_eq!(result.expect("one spurious interrupt costs no step").interrupts, 2);
-    let told = |accelerator: &Accelerator, oddity| accelerator.device.oddities.told(oddity);
+    let told = |accelerator: &Accelerator, anomaly| accelerator.device.anomalies.told(anomaly);
     assert!(told(&accelerator, Anomaly::SpuriousInterrupt));
     assert!(!told(&accelerator, Anomaly::InterruptStorm));
 

@@ -4,7 +4,7 @@
 //! driver stored is put into the machine's memory; after one, what the engine stored is taken from
 //! there.
 //!
-//! Where QEMU's model is not what PG021 says, this file is, so that the driver need not be: a reset
+//! One difference between QEMU's model and PG021 is levelled here instead of in the driver: a reset
 //! of one direction resets the other, too.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -276,7 +276,8 @@ impl Platform for QtestPlatform {
 
     fn unmask_interrupt(&self) -> Result<(), PlatformError> {
         let mut board = self.board();
-        // What was seen is taken back first; an input that is still high comes again at once.
+        // The pending input is acknowledged first; an input that is still high is raised again at
+        // once.
         board.machine.write32(INTERRUPTS + IAR, DMA_INPUTS);
         board.machine.write32(INTERRUPTS + IER, DMA_INPUTS);
         Ok(())
