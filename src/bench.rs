@@ -73,21 +73,12 @@ pub struct StepPacker {
 }
 
 impl StepPacker {
-    /// For one bitstream, of the capacities of its profile; without memory of its own yet. As many
-    /// threads write as [`OpenOptions::pack_threads`](crate::OpenOptions::pack_threads) says.
+    /// A packer for one bitstream with the capacities of its profile; it has no memory yet.
+    /// `threads` is the same as in [`OpenOptions::pack_threads`](crate::OpenOptions::pack_threads).
     #[must_use]
     pub fn new(variant: Variant, threads: Option<usize>) -> Self {
         Self {
-            limits: Limits {
-                variant,
-                flush_subnormals: false,
-                body_capacity: variant.body_capacity(),
-                collision_capacity: u32::MAX,
-                shape_capacity: u32::MAX,
-                memory_bytes: variant.profile.memory.bytes,
-                bytes_per_body: variant.bytes_per_body(),
-                bytes_per_collision: variant.bytes_per_collision(),
-            },
+            limits: Limits::roomy(variant),
             velocities: Default::default(),
             collisions: Default::default(),
             poses: Default::default(),
@@ -139,8 +130,9 @@ impl StepPacker {
         Ok((bodies_good & good).then(|| of_bodies.wrapping_add(of_collisions)))
     }
 
-    /// Reads collisions and writes as many bytes as their records have, without making any; how many. Those at
-    /// the end that fill no unit of records are left out, and all that do not lie as structures.
+    /// Reads collisions, and writes as many bytes as their records have without making records;
+    /// returns the number of collisions. It leaves out an incomplete unit of records at the end, and
+    /// collisions that are not stored as structures.
     pub fn deal_bare<C: Collisions + ?Sized>(&mut self, collisions: &C) -> usize {
         let variant = self.limits.variant;
         let target = Target { variant: &variant, shapes: &[], quick: None };
@@ -149,7 +141,7 @@ impl StepPacker {
         bare::deal(&variant, collisions, &mut channels[..variant.profile.mm2s_widths.len()])
     }
 
-    /// Bytes of the records of so many bodies, and of so many collisions.
+    /// Bytes of the records of `bodies` bodies, and of `collisions` collisions.
     #[must_use]
     pub fn bytes(&self, bodies: usize, collisions: usize) -> [usize; 2] {
         let beats = |segment: Segment, records| segment.layout(&self.limits.variant).beats(records);
@@ -231,7 +223,7 @@ impl Unpacker {
         Self { variant, channels, statics, spare: Vec::new(), packers: PackPool::new(threads) }
     }
 
-    /// Bytes of so many results, once they are read: f32, whatever the format of the stream.
+    /// Bytes of the results of `bodies` bodies in the driver's memory: f32 for every stream format.
     #[must_use]
     pub const fn bytes(bodies: usize) -> usize {
         bodies * size_of::<Record>()
@@ -255,7 +247,7 @@ impl Unpacker {
     }
 }
 
-/// The channels of a segment, as long as they must be for so many records.
+/// The channels of a segment, each long enough for `records` records.
 fn channels<'a>(
     memory: &'a mut [Vec<Beat>; DMA_COUNT_MAX],
     segment: Segment,

@@ -26,13 +26,13 @@ pub enum Error {
         Aftermath::MustReopen => "the step failed and changed nothing; the board could not be reset: open it again",
     })]
     Step {
-        /// What went wrong.
+        /// The cause.
         #[source]
         fault: Box<Fault>,
-        /// How the board stands now.
+        /// The state of the board after the failure.
         aftermath: Aftermath,
-        /// How everything stood before the reset; `None` if the board had no part in it or
-        /// cannot be reached.
+        /// The state of every channel before the reset; `None` if the board had no part in the
+        /// failure or cannot be reached.
         diagnosis: Option<Box<Diagnosis>>,
     },
     /// An earlier fault could not be cleared.
@@ -40,7 +40,7 @@ pub enum Error {
     MustReopen,
 }
 
-/// How the board stands after a failed step.
+/// The state of the board after a failed step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Aftermath {
@@ -59,7 +59,7 @@ impl From<ShapeError> for Error {
 }
 
 impl Error {
-    /// What went wrong in a step, if it was a step that failed.
+    /// The cause of the failure, if a step failed.
     #[must_use]
     pub fn fault(&self) -> Option<&Fault> {
         match self {
@@ -68,7 +68,7 @@ impl Error {
         }
     }
 
-    /// How everything stood when a step had failed, before anything was reset.
+    /// The state of every channel when a step had failed, before the reset.
     #[must_use]
     pub fn diagnosis(&self) -> Option<&Diagnosis> {
         match self {
@@ -89,8 +89,8 @@ impl Error {
         matches!(self, Self::Step { aftermath: Aftermath::Ready, .. })
     }
 
-    /// What to do about a board that cannot be opened, where that depends on the kernel's answer and
-    /// is not in the messages.
+    /// The user's next step after a failure to open a board, if it depends on the kernel's answer
+    /// and is not in the messages.
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
         match self {
@@ -110,13 +110,13 @@ impl Error {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OpenError {
-    /// There is no node, and no emulated board to fall back to.
+    /// The system has no node of the board, and this build no emulated board.
     #[error(
         "{reason}, and this build has no emulated board: load the overlay, or build with the \
          feature `emulation`"
     )]
     NoEmulation {
-        /// What there is.
+        /// The missing node, in words.
         reason: String,
     },
     /// Memory was chosen for an emulated board.
@@ -132,7 +132,7 @@ pub enum OpenError {
     /// A length width that no DMA core can have.
     #[error("the length width must be {low} to {high} bits, found {found}")]
     LengthWidth {
-        /// What was asked for.
+        /// The requested width.
         found: u32,
         /// The narrowest.
         low: u32,

@@ -105,7 +105,7 @@ pub use scene::{
 pub use step::{
     Accelerator, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles, StepReport,
 };
-pub use validate::{CapableProfiles, InputError};
+pub use validate::{CapableProfiles, Excess, InputError, InputItem, OutOfRange};
 
 /// The examples of the documents, which are tests.
 #[cfg(all(doctest, feature = "emulation"))]

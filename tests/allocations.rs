@@ -241,8 +241,8 @@ impl Collisions for Watching<'_> {
 /// The count covers the caller's thread and the threads that help it to write records.
 #[test]
 fn steps_that_several_threads_pack_allocate_nothing_on_any_of_them() {
-    // The system decides which thread comes in time. The number of attempts is bounded for the case
-    // that there is no second thread.
+    // The system decides which thread comes in time. The number of attempts is bounded for a system
+    // without a second thread.
     const ATTEMPTS_MAX: usize = 10_000;
     let mut accelerator = open_for(BoardConfig::default(), Some(2));
     let (mut bodies, list) = scene();

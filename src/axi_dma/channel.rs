@@ -31,7 +31,7 @@ impl Channel {
         Self { window, name, address_width, control: Dmacr::STOPPED }
     }
 
-    /// Which channel this is.
+    /// The name of the channel.
     pub(crate) fn name(&self) -> ChannelName {
         self.name
     }
@@ -49,7 +49,7 @@ impl Channel {
         self.window.write32(register.offset + self.name.direction.offset(), value);
     }
 
-    /// Low half first: with addresses above 32 bits the upper half is what acts.
+    /// Low half first: with addresses above 32 bits, the write of the upper half starts the engine.
     fn write_address(&mut self, low: &Register, high: &Register, address: BusAddress) {
         self.write(low, address.low());
         if self.address_width > 32 {
@@ -96,7 +96,7 @@ impl Channel {
         first: BusAddress,
         control: Dmacr,
     ) -> Result<(), DmaError> {
-        // CURDESC can be written only now: it is ignored without a word while the channel runs.
+        // CURDESC can be written only now: a running channel silently ignores the write.
         self.wait_for(platform, "halted", Dmasr::halted)?;
         self.write_address(&CURDESC, &CURDESC_MSB, first);
         self.write(&DMACR, control.0);
@@ -111,7 +111,7 @@ impl Channel {
         self.wait_for(platform, "halted", Dmasr::halted)
     }
 
-    /// Takes note that the core was reset.
+    /// Records that the core was reset.
     pub(crate) fn was_reset(&mut self) {
         self.control = Dmacr::STOPPED;
     }
@@ -140,10 +140,10 @@ impl Channel {
             (found.gone() || reached(found)).then_some(())
         });
         if found.gone() {
-            return Err(DmaError::Gone { channel: self.name.to_string() });
+            return Err(DmaError::Gone { channel: self.name });
         }
         seen.ok_or_else(|| DmaError::State {
-            channel: self.name.to_string(),
+            channel: self.name,
             awaited,
             limit: deadline.limit(),
             found: found.to_string(),
@@ -151,7 +151,8 @@ impl Channel {
     }
 }
 
-/// The width of a halted channel's length register: all ones are written, what exists reads back.
+/// The width of a halted channel's length register: all ones are written, and the existing bits
+/// read back.
 ///
 /// A write while halted starts nothing (PG021, LENGTH); 0 is restored.
 pub(crate) fn detect_length_width(channel: &mut Channel) -> Result<u32, DmaError> {
@@ -160,10 +161,10 @@ pub(crate) fn detect_length_width(channel: &mut Channel) -> Result<u32, DmaError
     channel.write(&LENGTH, 0);
     let width = found.trailing_ones();
     if found == u32::MAX {
-        return Err(DmaError::Gone { channel: channel.name.to_string() });
+        return Err(DmaError::Gone { channel: channel.name });
     }
     if width == 0 || width != found.count_ones() {
-        return Err(DmaError::NotALength { channel: channel.name.to_string(), found });
+        return Err(DmaError::NotALength { channel: channel.name, found });
     }
     Ok(width)
 }

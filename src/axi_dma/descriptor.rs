@@ -23,7 +23,7 @@ pub(crate) fn pieces(bytes: u64, largest: u32) -> impl Iterator<Item = (u64, u32
     })
 }
 
-/// What a descriptor asks the engine for.
+/// One transfer for the engine: a buffer, and its place in a packet.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Descriptor {
     /// First byte.

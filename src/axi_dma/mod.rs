@@ -2,10 +2,10 @@
 
 mod channel;
 mod descriptor;
-// QEMU is started by the test itself, which as a Cortex-A53 would run under QEMU already.
 mod registers;
 mod reset;
 mod ring;
+// On x86-64 only: the tests start QEMU, and a build for the Cortex-A53 runs under QEMU already.
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests;
 
@@ -52,16 +52,16 @@ pub enum DmaError {
     #[error("{channel} reads all ones: is the bitstream still loaded and its clock running?")]
     Gone {
         /// Which channel.
-        channel: String,
+        channel: ChannelName,
     },
     /// A state was not reached in time.
     #[error("{channel} was expected to be {awaited} within {limit:?}, found {found}")]
     State {
         /// Which channel.
-        channel: String,
+        channel: ChannelName,
         /// The state that was awaited.
         awaited: &'static str,
-        /// How long.
+        /// The time limit.
         limit: Duration,
         /// The register that shows the state, decoded.
         found: String,
@@ -72,19 +72,19 @@ pub enum DmaError {
     )]
     NoScatterGather {
         /// Which channel.
-        channel: String,
+        channel: ChannelName,
         /// Its status, decoded.
         found: String,
     },
-    /// The length register has another width than was said.
+    /// The length register has another width than expected.
     #[error(
         "{channel} has a length register of {found} bits, {expected} were expected: correct the \
          bitstream's DMA capability register or the length width given at opening"
     )]
     LengthWidth {
         /// Which channel.
-        channel: String,
-        /// Width as given, bits.
+        channel: ChannelName,
+        /// Width by the capability register or by the caller, bits.
         expected: u32,
         /// Width as found, bits.
         found: u32,
@@ -93,11 +93,11 @@ pub enum DmaError {
     #[error("{channel} LENGTH reads {found:#010x} after all ones were written: not an AXI DMA?")]
     NotALength {
         /// Which channel.
-        channel: String,
-        /// What was read.
+        channel: ChannelName,
+        /// Its value.
         found: u32,
     },
-    /// Memory for descriptors.
+    /// The memory for descriptors failed.
     #[error(transparent)]
     Platform(#[from] PlatformError),
 }

@@ -3,10 +3,10 @@
 use super::{Channel, DmaError, STATE_CHANGE};
 use crate::platform::{Deadline, Platform, poll_until};
 
-/// Resets the core whose two channels these are, and waits until both say so.
+/// Resets the core of these two channels, and waits until both show the end of the reset.
 ///
-/// The reset is graceful: transfers that the memory has not answered hold it up, which is an error
-/// after [`STATE_CHANGE`].
+/// The reset is graceful: it waits for transfers that the memory has not answered. After
+/// [`STATE_CHANGE`] that is an error.
 pub(crate) fn reset_core(
     platform: &dyn Platform,
     mm2s: &mut Channel,
@@ -22,10 +22,10 @@ pub(crate) fn reset_core(
             (found.0 == u32::MAX || !found.resetting()).then_some(())
         });
         if found.0 == u32::MAX {
-            return Err(DmaError::Gone { channel: channel.name().to_string() });
+            return Err(DmaError::Gone { channel: channel.name() });
         }
         done.ok_or_else(|| DmaError::State {
-            channel: channel.name().to_string(),
+            channel: channel.name(),
             awaited: "out of reset",
             limit: deadline.limit(),
             found: found.to_string(),

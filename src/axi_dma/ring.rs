@@ -23,9 +23,9 @@ use crate::platform::{BusAddress, Platform, PlatformError, SharedWords};
 pub(crate) enum Progress {
     /// Descriptors are still outstanding.
     Running,
-    /// All are complete; so many bytes were moved.
+    /// All descriptors are complete.
     Complete {
-        /// Sum of the descriptors' byte counts.
+        /// Bytes moved: the sum of the descriptors' counts.
         bytes: u64,
         /// Whether a received packet ended with the last.
         packet_ended: bool,
@@ -57,7 +57,7 @@ pub(crate) struct ChainState {
     pub(crate) descriptors: usize,
     /// Descriptors complete from its head on.
     pub(crate) complete: usize,
-    /// Bytes that they, and the one after them, have moved.
+    /// Bytes moved by the complete descriptors and the descriptor after them.
     pub(crate) bytes_moved: u64,
     /// Bytes that the chain asks for.
     pub(crate) bytes_expected: u64,
@@ -118,7 +118,7 @@ impl Ring {
         self.used
     }
 
-    /// Starts a new chain after the last one, all of which is complete.
+    /// Starts a new chain after the last chain, whose descriptors are all complete.
     pub(crate) fn begin(&mut self) {
         self.first = (self.first + self.used) % self.count;
         self.used = 0;
@@ -177,7 +177,7 @@ impl Ring {
             if packet_ended && seen < self.used {
                 return Progress::Short;
             }
-            // The last one is looked at again on every call: it says whether the packet ended.
+            // The last descriptor is read again on every call: it shows whether the packet ended.
             if seen < self.used {
                 self.seen = (seen, bytes);
             }
@@ -185,7 +185,8 @@ impl Ring {
         Progress::Complete { bytes, packet_ended }
     }
 
-    /// Whether a received packet ended with a descriptor. Where packets are sent the bit is reserved.
+    /// Whether a received packet ended with a descriptor. Where packets are sent the bit is
+    /// reserved.
     fn ends_packet(&self, status: DescriptorStatus) -> bool {
         self.direction == Direction::S2mm && status.packet_ended()
     }
@@ -229,7 +230,7 @@ impl Ring {
         chain
     }
 
-    /// Leaves the memory to an engine that could not be stopped.
+    /// Leaves the ring's memory to an engine that could not be stopped.
     pub(crate) fn leave_to_device(&mut self) {
         self.words.leave_to_device();
     }

@@ -1,19 +1,19 @@
-//! Logs, once a board, every oddity that the driver has dealt with.
+//! Logs each kind of anomaly once per open board.
 
-/// Something odd that costs no step.
+/// An anomaly of the board that the driver survives: no step fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anomaly {
-    /// A step ended and no interrupt said so.
+    /// A step ended without an interrupt.
     MissedInterrupt,
-    /// Interrupts have not come for some steps.
+    /// Several steps in a row ended without an interrupt.
     NoInterrupts,
-    /// An interrupt came and no channel had anything to say.
+    /// An interrupt came while no channel and no error was pending.
     SpuriousInterrupt,
-    /// They come one after the other.
+    /// Interrupts follow each other without end.
     InterruptStorm,
-    /// A channel did not stop for a new ring.
+    /// A channel did not stop for its new ring.
     NoHalt,
-    /// A packet was complete, and its descriptors did not say so yet.
+    /// A channel reported a complete packet before its descriptors did.
     LateStatus,
 }
 
@@ -38,26 +38,26 @@ impl Anomaly {
     }
 }
 
-/// Which oddities were told.
+/// The anomalies that were logged, one bit each.
 #[derive(Debug, Default)]
 pub(crate) struct Anomalies(u32);
 
 impl Anomalies {
-    /// Tells of an oddity unless it was told before; whether it was told.
-    pub(crate) fn tell(&mut self, oddity: Anomaly) -> bool {
-        let bit = 1 << oddity as u32;
+    /// Logs an anomaly the first time; returns whether it did.
+    pub(crate) fn tell(&mut self, anomaly: Anomaly) -> bool {
+        let bit = 1 << anomaly as u32;
         let first = self.0 & bit == 0;
         if first {
             self.0 |= bit;
-            log::warn!("{}", oddity.text());
+            log::warn!("{}", anomaly.text());
         }
         first
     }
 
-    /// Whether an oddity was told.
+    /// Whether an anomaly was logged.
     #[cfg(test)]
-    pub(crate) fn told(&self, oddity: Anomaly) -> bool {
-        self.0 & (1 << oddity as u32) != 0
+    pub(crate) fn told(&self, anomaly: Anomaly) -> bool {
+        self.0 & (1 << anomaly as u32) != 0
     }
 }
 
@@ -66,10 +66,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_oddity_is_told_once() {
-        let mut oddities = Anomalies::default();
-        assert!(oddities.tell(Anomaly::LateStatus) && !oddities.tell(Anomaly::LateStatus));
-        assert!(oddities.tell(Anomaly::MissedInterrupt));
-        assert!(oddities.told(Anomaly::LateStatus) && !oddities.told(Anomaly::InterruptStorm));
+    fn an_anomaly_is_told_once() {
+        let mut anomalies = Anomalies::default();
+        assert!(anomalies.tell(Anomaly::LateStatus) && !anomalies.tell(Anomaly::LateStatus));
+        assert!(anomalies.tell(Anomaly::MissedInterrupt));
+        assert!(anomalies.told(Anomaly::LateStatus) && !anomalies.told(Anomaly::InterruptStorm));
     }
 }

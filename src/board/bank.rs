@@ -1,11 +1,11 @@
-//! The two banks of buffers: one is on the board, the other is packed.
+//! The two banks of buffers: the board works on one while the next step is packed into the other.
 //!
-//! Every port has a buffer in each. A step is packed into one bank and stays there; the next one may
-//! be packed into the other meanwhile. The second has no memory before a step is first prepared.
+//! Every port has a buffer in each bank. A step stays in the bank that it was packed into. The
+//! second bank gets its memory when a step is first prepared.
 
 use std::ops::{Index, IndexMut};
 
-/// One of the two.
+/// One of the two banks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bank {
     First,
@@ -15,7 +15,7 @@ pub(crate) enum Bank {
 impl Bank {
     pub(crate) const BOTH: [Self; 2] = [Self::First, Self::Second];
 
-    /// The other one.
+    /// The other bank.
     pub(crate) const fn other(self) -> Self {
         match self {
             Self::First => Self::Second,
@@ -24,7 +24,7 @@ impl Bank {
     }
 }
 
-/// What there is one of in each bank.
+/// One `T` per bank.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PerBank<T>([T; 2]);
 

@@ -1,5 +1,5 @@
-//! Brings a board up in stages: opening goes through them at once, the self-test one by
-//! one.
+//! Brings a board up in stages. Opening runs all of them; the self-test runs and reports one at a
+//! time.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -24,7 +24,7 @@ impl Core {
         reset_core(platform, &mut self.sender, &mut self.receiver)
     }
 
-    /// Checks that both channels, just reset, answer and have scatter-gather.
+    /// Checks that both channels answer after a reset, and have scatter-gather.
     pub(crate) fn check_mode(&self) -> Result<(), DmaError> {
         [&self.sender, &self.receiver].into_iter().try_for_each(check_mode)
     }
@@ -38,11 +38,10 @@ impl Core {
         Ok([width(sender)?, width(receiver)?])
     }
 
-    /// Checks that both length registers of a core that was just reset have so many bits.
+    /// Checks that both length registers of a core that was just reset have `expected` bits.
     pub(crate) fn check_length_width(&mut self, expected: u32) -> Result<(), DmaError> {
         for (channel, found) in self.length_widths()? {
             if found != expected {
-                let channel = channel.to_string();
                 return Err(DmaError::LengthWidth { channel, expected, found });
             }
         }
@@ -61,7 +60,7 @@ pub(crate) fn check_given_width(given: Option<u32>) -> Result<(), OpenError> {
     }
 }
 
-/// Maps the DMA cores of a bitstream. Nothing is read or written.
+/// Maps the DMA cores of a bitstream. No register is read or written.
 pub(crate) fn connect(
     platform: &dyn Platform,
     capabilities: &Capabilities,
@@ -69,8 +68,7 @@ pub(crate) fn connect(
 ) -> Result<Vec<Core>, PlatformError> {
     let width = capabilities.address_width;
     let core = |core| {
-        let registers = platform.dma_window(core)?;
-        let window = Arc::new(Window::new(registers, RegisterMap::Dma(core), Arc::clone(counts))?);
+        let window = Arc::new(Window::open(platform, RegisterMap::Dma(core), counts)?);
         Ok(Core {
             sender: Channel::new(Arc::clone(&window), core, Direction::Mm2s, width),
             receiver: Channel::new(window, core, Direction::S2mm, width),
@@ -81,17 +79,17 @@ pub(crate) fn connect(
 
 fn check_mode(channel: &Channel) -> Result<(), DmaError> {
     let status = channel.status();
-    let name = channel.name().to_string();
+    let channel = channel.name();
     if status.gone() {
-        return Err(DmaError::Gone { channel: name });
+        return Err(DmaError::Gone { channel });
     }
     if !status.scatter_gather() {
-        return Err(DmaError::NoScatterGather { channel: name, found: status.to_string() });
+        return Err(DmaError::NoScatterGather { channel, found: status.to_string() });
     }
     Ok(())
 }
 
-/// Takes an event from before, and lets the next one through.
+/// Consumes a pending interrupt, and unmasks the next one.
 pub(crate) fn drain_interrupt(platform: &dyn Platform) -> Result<(), PlatformError> {
     platform.wait_interrupt(Duration::ZERO)?;
     platform.unmask_interrupt()

@@ -3,33 +3,33 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Ends a step from elsewhere: another thread, the handler of a signal.
+/// Ends a step from another thread or from a signal handler.
 ///
-/// An accelerator that was [given](crate::Accelerator::set_cancellation) one looks at it before each
-/// step and, while it waits, every ten milliseconds: the step then fails with
-/// [`Fault::Cancelled`](crate::Fault::Cancelled), the board is reset, and the bodies are as they
-/// were. It holds for every step until it is [cleared](Self::clear). Clones are the same one.
+/// An accelerator checks the cancellation that it was [given](crate::Accelerator::set_cancellation)
+/// before each step, and every ten milliseconds while it waits. A cancelled step fails with
+/// [`Fault::Cancelled`](crate::Fault::Cancelled), the board is reset, and the bodies are unchanged.
+/// Every step fails so until the cancellation is [cleared](Self::clear). Clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct Cancellation(Arc<AtomicBool>);
 
 impl Cancellation {
-    /// One that nobody has asked for yet.
+    /// A cancellation that is not set.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Ends the step that is waited for, and those after it.
+    /// Ends the step that a caller waits for, and every later one.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Lets steps be made again.
+    /// Allows steps again.
     pub fn clear(&self) {
         self.0.store(false, Ordering::Relaxed);
     }
 
-    /// Whether it was asked for.
+    /// Whether it is set.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)

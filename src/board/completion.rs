@@ -16,42 +16,43 @@ use crate::control_block::time_of;
 use crate::fault::{Awaited, Fault};
 use crate::platform::{Deadline, acquire_from_device, poll_until};
 
-/// How long the status of descriptors is polled for after the interrupt, before registers are looked
-/// at again.
+/// How long the status of descriptors is polled after the interrupt, before the registers are read
+/// again.
 const GRACE: Duration = Duration::from_millis(1);
-/// Longer than a status ever takes to reach memory after the interrupt.
+/// A status that reaches memory later than this after the interrupt is an anomaly.
 const NOTICEABLE: Duration = Duration::from_micros(10);
-/// Shortest time to wait for an interrupt before looking by oneself.
+/// The shortest wait for an interrupt before the driver polls.
 const SHORTEST_SLICE: Duration = Duration::from_millis(10);
-/// How long a step that may be cancelled waits between two looks whether it was.
+/// How often a waiting step checks its cancellation.
 const CANCEL_LOOK: Duration = Duration::from_millis(10);
-/// After so many missing interrupts in a row the driver no longer relies on them.
+/// After this number of missing interrupts in a row the driver no longer relies on them.
 const MISSED_LIMIT: u32 = 2;
-/// After so many interrupts in one step that did not end it nobody waits for another: the line stays
-/// masked until its end, and the driver looks by itself.
+/// After this number of interrupts that did not end the step, the line stays masked until the step
+/// ends, and the driver polls.
 const STORM: u64 = 16;
 
-/// How all chains of a step were found.
+/// The state of all chains of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Chains {
-    /// Complete, at the first look.
+    /// Complete at the first look.
     Complete,
-    /// Complete, after a look at which they were not.
+    /// Complete at a later look.
     BecameComplete,
     /// Not complete.
     Running,
 }
 
 impl Device {
-    /// Waits until every chain of the step is complete; the number of interrupts that woke.
+    /// Waits until every chain of the step is complete; returns the number of interrupts that came.
     pub(crate) fn wait(&mut self, plan: &Plan, deadline: &Deadline) -> Result<u64, Symptom> {
         let completion = self.s2mm.len() - 1;
-        // Up to the last they ended nothing. A clock that stands still must not make them endless.
+        // No interrupt before the last ended the step. The limit holds even if the clock stands
+        // still.
         let mut interrupts = 0;
         let mut spurious = 0;
         let mut slice = self.first_slice(deadline.limit());
         loop {
-            // Asked before looking, so that there is one look after the deadline.
+            // Read first, so that one more look follows after the deadline.
             let remaining = deadline.remaining(&*self.platform);
             let time = slice.min(remaining);
             let woke = if interrupts < STORM {
@@ -77,7 +78,7 @@ impl Device {
                 if interrupts < STORM {
                     self.platform.unmask_interrupt()?;
                 }
-                // What came between reading and unmasking raised no interrupt.
+                // A completion between reading and unmasking raised no interrupt.
                 let channel = &mut self.s2mm[completion].channel;
                 let again = channel.status();
                 if channel.pending(again) != 0 {
@@ -86,19 +87,19 @@ impl Device {
                 packet |= again.complete();
             }
             let looked = self.platform.now();
-            // Of the time that is left now: the wait has taken some.
+            // The wait has taken some of the time that remained.
             let left = deadline.remaining(&*self.platform);
             let grace = if packet { GRACE.min(left) } else { Duration::ZERO };
             let chains = self.complete_within(plan, grace)?;
-            // A look at many descriptors takes its time, too.
+            // Reading many descriptors takes time, too: complete at the first look is never late.
             let waited = chains != Chains::Complete;
             if packet && waited && self.platform.now().saturating_sub(looked) > NOTICEABLE {
-                self.oddities.tell(Anomaly::LateStatus);
+                self.anomalies.tell(Anomaly::LateStatus);
             }
             let odd = woke && !pending;
             if chains != Chains::Running {
                 if odd {
-                    self.oddities.tell(Anomaly::SpuriousInterrupt);
+                    self.anomalies.tell(Anomaly::SpuriousInterrupt);
                 }
                 if !packet && self.acknowledge_completion()? {
                     interrupts += 1;
@@ -115,25 +116,25 @@ impl Device {
                 return Err(Symptom::Sticky(error));
             }
             if odd {
-                // Neither a channel nor the accelerator.
-                self.oddities.tell(Anomaly::SpuriousInterrupt);
+                // Neither a channel nor the accelerator raised it.
+                self.anomalies.tell(Anomaly::SpuriousInterrupt);
             }
             if interrupts >= STORM {
-                self.oddities.tell(Anomaly::InterruptStorm);
+                self.anomalies.tell(Anomaly::InterruptStorm);
             }
             if remaining.is_zero() {
                 return Err(Symptom::Late { awaited: Awaited::Results, limit: deadline.limit() });
             }
             slice = match packet || interrupts >= STORM {
                 true => GRACE,
-                // An interrupt that was none says nothing of how long it still takes.
+                // A spurious interrupt does not lengthen the next wait.
                 false if odd => slice,
                 false => (slice * 2).min(self.longest_slice(deadline)),
             };
         }
     }
 
-    /// Waits for the interrupt, at most that long, unless the caller cancels.
+    /// Waits for the interrupt, at most for `time`, unless the caller cancels.
     fn wait_interrupt(&self, time: Duration) -> Result<Option<u32>, Fault> {
         if self.cancellation.is_none() {
             return Ok(self.platform.wait_interrupt(time)?);
@@ -145,7 +146,7 @@ impl Device {
             let before = self.platform.now();
             let came = self.platform.wait_interrupt(piece)?;
             left -= piece;
-            // A platform without an interrupt comes back early, to let the caller look.
+            // A platform without an interrupt returns early, so that the caller polls.
             let early = self.platform.now().saturating_sub(before) < piece;
             if came.is_some() || early || left.is_zero() {
                 return Ok(came);
@@ -153,8 +154,8 @@ impl Device {
         }
     }
 
-    /// Acknowledges the completion of a step that was found complete before its interrupt was seen,
-    /// which would else be the next step's; whether it had reached the driver.
+    /// Acknowledges the completion of a step that polling found complete: its interrupt would be
+    /// taken for the next step's. Returns whether the interrupt had already come.
     fn acknowledge_completion(&mut self) -> Result<bool, Fault> {
         let Some(port) = self.s2mm.last_mut() else { return Ok(false) };
         let status = port.channel.status();
@@ -169,7 +170,7 @@ impl Device {
         Ok(came)
     }
 
-    /// Waits for the accelerator to say that it is done, then reads its counters.
+    /// Waits for the accelerator's done flag, then reads its counters.
     pub(crate) fn collect(&mut self, deadline: &Deadline) -> Result<Counters, Symptom> {
         let gone = || Symptom::Known(Fault::Gone { region: "the control block".to_owned() });
         let Self { control, cancellation, platform, .. } = self;
@@ -189,7 +190,7 @@ impl Device {
             return Err(Symptom::Sticky(error));
         }
         let counters = self.control.counters(&self.capabilities);
-        // No step takes two thousand years.
+        // All ones: no step takes two thousand years.
         if counters.cycles == u64::MAX {
             return Err(gone());
         }
@@ -198,12 +199,11 @@ impl Device {
         Ok(counters)
     }
 
-    /// How long to wait for the first interrupt before looking: twice what the step before took, so
-    /// that an interrupt that is lost costs a step, and no more.
+    /// How long to wait for the first interrupt before polling: twice the time of the step before,
+    /// so that a lost interrupt costs the time of one step.
     ///
-    /// Looking earlier costs register accesses and finds nothing, unless interrupts do not come at
-    /// all. Of the first step all that is known is that a quarter of the default deadline is what it
-    /// takes at worst.
+    /// Earlier polling costs register accesses and finds nothing, unless no interrupts come. The
+    /// time of the first step is unknown; a quarter of the default deadline is its upper limit.
     fn first_slice(&self, limit: Duration) -> Duration {
         if self.missed_interrupts >= MISSED_LIMIT {
             return GRACE;
@@ -224,13 +224,13 @@ impl Device {
         }
         self.missed_interrupts = self.missed_interrupts.saturating_add(1);
         if self.missed_interrupts == 1 {
-            self.oddities.tell(Anomaly::MissedInterrupt);
+            self.anomalies.tell(Anomaly::MissedInterrupt);
         } else if self.missed_interrupts == MISSED_LIMIT {
-            self.oddities.tell(Anomaly::NoInterrupts);
+            self.anomalies.tell(Anomaly::NoInterrupts);
         }
     }
 
-    /// Errors that the status registers show.
+    /// Fails on the first status register that shows an error.
     fn check(&self, statuses: &Statuses) -> Result<(), Symptom> {
         let statuses = statuses.iter().take(self.ports().count()).enumerate();
         for (place, status) in statuses {
@@ -248,7 +248,7 @@ impl Device {
         let mut next = 0;
         let mut found = Chains::Complete;
         let ended = poll_until(&**platform, &grace, || {
-            // Ports that were complete are not looked at again.
+            // A port that was complete is not read again.
             while next < s2mm.len() + mm2s.len() {
                 let place = next;
                 let (port, expected) = match s2mm.get_mut(place) {

@@ -35,12 +35,12 @@ pub(crate) struct Started {
     pub(crate) at: Duration,
 }
 
-/// What the engines are at.
+/// Whether the DMA engines may access buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Activity {
-    /// No engine has a buffer in work.
+    /// No engine works on a buffer.
     Idle,
-    /// A step was begun, and neither taken back nor cleared away.
+    /// A step was begun, and its buffers are not back yet.
     Step,
 }
 
@@ -52,28 +52,28 @@ pub(crate) struct Device {
     pub(crate) capabilities: Capabilities,
     pub(crate) counts: Arc<AccessCounts>,
     pub(crate) platform: Arc<dyn Platform>,
-    /// What the bitstream said of itself when it was opened.
+    /// The identity of the bitstream when the board was opened.
     pub(crate) fingerprint: Fingerprint,
     /// The step that was started last.
     pub(crate) started: Option<Started>,
-    /// What the last step took on the board, from its start to done, as it counted itself.
+    /// The time of the last step from start to done, by the accelerator's own cycle counter.
     pub(crate) took: Option<Duration>,
-    /// Interrupts that did not come although the work was done, in a row.
+    /// Steps in a row that were complete without an interrupt.
     pub(crate) missed_interrupts: u32,
-    /// What was told already.
-    pub(crate) oddities: Anomalies,
-    /// Whether a reset failed: nothing may be touched any more.
+    /// The anomalies that were logged.
+    pub(crate) anomalies: Anomalies,
+    /// Whether the board was given up: no register may be accessed any more.
     pub(crate) dead: bool,
     activity: Activity,
-    /// What ends a step early, if the caller gave it.
+    /// The caller's way to end a step early.
     pub(crate) cancellation: Option<Cancellation>,
     /// The longest piece that a descriptor carries, bytes.
     pub(crate) largest: u32,
-    /// Who writes the records and reads the results.
+    /// The threads that write records and read results.
     pub(crate) packers: PackPool,
-    /// The bodies of the step that is packed. Kept, so that a step allocates nothing.
+    /// The bodies of the step being packed; kept, so that a step allocates no memory.
     pub(crate) ends: Table,
-    /// Those of the step in each bank that never move, by their indices, upwards.
+    /// Indices of the static bodies of the step in each bank, ascending.
     pub(crate) statics: PerBank<Vec<u32>>,
 }
 
@@ -89,8 +89,7 @@ impl Device {
 
     fn identify(platform: Arc<dyn Platform>, length_width: Option<u32>) -> Result<Self, OpenError> {
         let counts = Arc::<AccessCounts>::default();
-        let window =
-            Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;
+        let window = Window::open(&*platform, RegisterMap::Control, &counts)?;
         let mut capabilities = identify(&window)?;
         check_given_width(length_width)?;
         capabilities.length_width = length_width.unwrap_or(capabilities.length_width);
@@ -106,7 +105,7 @@ impl Device {
         Ok(Self::assemble(platform, control, capabilities, counts, cores))
     }
 
-    /// A board of parts that were reset and checked.
+    /// Builds the device from parts that were reset and checked.
     pub(crate) fn assemble(
         platform: Arc<dyn Platform>,
         control: Control,
@@ -119,8 +118,8 @@ impl Device {
         let last = cores.len().saturating_sub(1);
         for (place, Core { sender, receiver }) in cores.into_iter().enumerate() {
             mm2s.push(Port::new(sender, Access::Read, Dmacr::RUNNING));
-            // Every step has results on the last channel, and they end within a beat of the others'
-            // (three channels: 4 B beats): its completion is taken for the step's.
+            // Every step has results on the last channel, and they end within a beat of the results
+            // on the others (three channels: 4 B beats): its interrupt stands for the step's end.
             let completion = place == last;
             let running = if completion { Dmacr::RUNNING_WITH_COMPLETION } else { Dmacr::RUNNING };
             s2mm.push(Port::new(receiver, Access::Write, running));
@@ -136,7 +135,7 @@ impl Device {
             started: None,
             took: None,
             missed_interrupts: 0,
-            oddities: Anomalies::default(),
+            anomalies: Anomalies::default(),
             dead: false,
             activity: Activity::Idle,
             cancellation: None,
@@ -147,7 +146,7 @@ impl Device {
         }
     }
 
-    /// Makes the buffers of a bank, which no engine has in work, large enough for a step.
+    /// Makes the buffers of a bank large enough for a step. No engine works on the bank.
     pub(crate) fn reserve_buffers(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
         self.take_back_unused(bank);
         let width = self.capabilities.address_width;
@@ -161,30 +160,30 @@ impl Device {
         Ok(())
     }
 
-    /// Takes back the buffers of a bank that no engine has in work: what was prepared is not
-    /// started any more.
+    /// Takes back the buffers of a bank that no engine works on. A step that was prepared there can
+    /// no longer start.
     pub(crate) fn take_back_unused(&mut self, bank: Bank) {
         for port in self.ports_mut() {
-            // It is made anew.
+            // The next step allocates another buffer.
             if let Err(error) = port.take_back(bank) {
                 log::error!("a buffer was lost: {error}");
             }
         }
     }
 
-    /// Frees the buffers of a bank that no engine has in work; whether there were any.
+    /// Frees the buffers of a bank that no engine works on; returns whether it had any.
     pub(crate) fn release_buffers(&mut self, bank: Bank) -> bool {
         self.take_back_unused(bank);
-        // All of them.
+        // No short circuit: every port frees its buffer.
         self.ports_mut().map(|port| port.drop_buffer(bank)).fold(false, std::ops::BitOr::bitor)
     }
 
-    /// Whether every port has a buffer in that bank, whoever holds it.
+    /// Whether every port has a buffer in the bank, held by the CPU or by the device.
     pub(crate) fn holds(&self, bank: Bank) -> bool {
         self.ports().all(|port| port.has_buffer(bank))
     }
 
-    /// Makes the rings large enough for a step. Nothing is in flight.
+    /// Makes the rings large enough for a step. No step is in flight.
     pub(crate) fn reserve_rings(&mut self, plan: &Plan) -> Result<(), Symptom> {
         self.started = None;
         let width = self.capabilities.address_width;
@@ -202,7 +201,7 @@ impl Device {
         Ok(())
     }
 
-    /// Whether the buffers of a bank, and the rings, are large enough for a step as they are.
+    /// Whether the buffers of a bank and the rings are already large enough for a step.
     pub(crate) fn has_room(&self, plan: &Plan, bank: Bank) -> bool {
         (0..self.mm2s.len()).all(|core| {
             let (mm2s, s2mm) = (&self.mm2s[core], &self.s2mm[core]);
@@ -214,14 +213,14 @@ impl Device {
         })
     }
 
-    /// Descriptors that a step takes of both channels of a core.
+    /// Descriptors of a step on both channels of a core: MM2S, S2MM.
     fn descriptors_of(&self, plan: &Plan, core: usize) -> [usize; 2] {
         let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
         let received = usize::try_from(received).unwrap_or(usize::MAX);
         [plan.descriptors(core, self.largest), received]
     }
 
-    /// Hands the buffers of a packed step over to the device, those that it does not have.
+    /// Hands the buffers of a packed step over to the device, unless it already holds them.
     pub(crate) fn hand_over(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
         for (channel, port) in self.s2mm.iter_mut().enumerate() {
             port.hand_over(bank, plan.results(channel))?;
@@ -232,8 +231,8 @@ impl Device {
         Ok(())
     }
 
-    /// Hands the buffers over, queues all descriptors and writes the arguments: everything but the
-    /// doorbells.
+    /// Hands the buffers over, queues all descriptors and writes the arguments. The doorbells
+    /// follow in [`start`](Self::start).
     pub(crate) fn arm(
         &mut self,
         plan: &Plan,
@@ -272,7 +271,7 @@ impl Device {
         Ok(())
     }
 
-    /// Starts what is armed; the number of doorbells.
+    /// Starts the armed step; returns the number of doorbells.
     pub(crate) fn start(&mut self) -> Result<u64, Symptom> {
         // Receivers first: otherwise the accelerator's output stalls, and with it the input.
         let mut doorbells = 1;
@@ -286,7 +285,7 @@ impl Device {
         Ok(doorbells)
     }
 
-    /// Takes the buffers of a step back whose chains are complete.
+    /// Takes back the buffers of a step whose chains are complete.
     pub(crate) fn take_back(&mut self, bank: Bank) -> Result<(), Symptom> {
         for port in self.ports_mut() {
             port.take_back(bank)?;
@@ -303,13 +302,19 @@ impl Device {
         }
     }
 
-    /// Whether a step was begun, and neither taken back nor cleared away.
+    /// Whether a step was begun, and its buffers are not back yet.
     pub(crate) fn in_flight(&self) -> bool {
         self.activity == Activity::Step
     }
 
-    /// Takes note that everything was reset and the buffers are back.
-    pub(crate) fn was_cleared(&mut self) {
+    /// Records that everything was reset, and takes the buffers back.
+    pub(crate) fn was_reset(&mut self) {
+        for port in self.ports_mut() {
+            // The next step replaces a buffer that does not come back.
+            if let Err(error) = port.was_reset() {
+                log::error!("a buffer was lost: {error}");
+            }
+        }
         self.activity = Activity::Idle;
     }
 
@@ -337,10 +342,10 @@ impl Device {
         statuses
     }
 
-    /// Resets all DMA cores, then the accelerator: a core that still runs would fill the streams of
-    /// an accelerator that was reset before it with the rest of a packet.
+    /// Resets all DMA cores, then the accelerator. In the other order, a core that still runs would
+    /// send the rest of a packet to the accelerator after its reset.
     pub(crate) fn reset(&mut self) -> Result<(), Fault> {
-        // Everything is tried, even if one part does not come back: the others stop moving data.
+        // Every part is reset, even if one fails: the others stop moving data.
         let mut result = Ok(());
         for (sender, receiver) in self.mm2s.iter_mut().zip(&mut self.s2mm) {
             let reset = reset_core(&*self.platform, &mut sender.channel, &mut receiver.channel);
@@ -354,22 +359,19 @@ impl Device {
 }
 
 impl Drop for Device {
-    /// Stops the engines before their memory goes; what cannot be stopped keeps its memory.
+    /// Stops the engines before their memory is freed. A channel that cannot be stopped keeps its
+    /// memory.
     fn drop(&mut self) {
         if self.dead {
             return;
         }
         if self.in_flight() {
-            // A step that was forgotten: the accelerator runs, too. What a reset does not reach
-            // is tried channel by channel.
+            // The caller has forgotten a step, so the accelerator runs, too. Channels that this
+            // reset does not stop are stopped one by one below.
             if let Err(error) = self.reset() {
                 log::error!("the board could not be reset: {error}");
             } else {
-                for port in self.ports_mut() {
-                    if let Err(error) = port.was_reset() {
-                        log::error!("a buffer was lost: {error}");
-                    }
-                }
+                self.was_reset();
             }
         }
         let Self { mm2s, s2mm, platform, .. } = self;

@@ -1,4 +1,4 @@
-//! An open board: opening, bring-up, its channels and control block, completion, recovery.
+//! An open board, from opening and bring-up over the start and end of a step to recovery.
 
 pub(crate) mod anomalies;
 pub(crate) mod bank;

@@ -1,4 +1,4 @@
-//! Opens a board: the one place that knows every kind.
+//! Opens a board. No other module knows every kind of board.
 
 use std::fmt;
 use std::sync::Arc;
@@ -11,28 +11,29 @@ use crate::platform::{
     DevMemWindows, HardwarePlatform, ManagerChoice, MemoryChoice, Platform, RegisterChoice, System,
 };
 
-/// How to open the accelerator. The default takes whatever board is there.
+/// How to open the accelerator. The default takes a real board, or else an emulated one.
 #[derive(Debug, Clone, Default)]
 pub struct OpenOptions {
     /// Which board.
     pub board: BoardChoice,
     /// Where a real board's memory for DMA comes from.
     pub memory: MemoryChoice,
-    /// Which FPGA manager is asked whether a real board's logic is programmed, before it is touched.
+    /// Which FPGA manager tells whether a real board's logic is programmed, before any access to
+    /// it.
     pub manager: ManagerChoice,
-    /// Width of the DMA cores' length registers, bits; `None` believes the bitstream. Either is
-    /// checked against the cores themselves.
+    /// Width of the DMA cores' length registers, bits; `None` takes the bitstream's own figure.
+    /// Both are checked against the cores.
     pub length_width: Option<u32>,
-    /// Threads that write the records of a step and read its results, the caller's among them: 1 to 64,
-    /// what is beyond is taken for the nearest. `None` takes as many as the machine has processors, at
-    /// most four. What is written and read does not depend on it. Up to about 2,000 bodies or collisions
-    /// are the caller's alone, and so are results where only live bodies are kept; the others are started
-    /// when there is more, and end with the accelerator.
+    /// Threads that write the records of a step and read its results, including the caller's: 1 to
+    /// 64; a number outside is clamped. `None` takes one per processor, at most four. Records and
+    /// results do not depend on the number. The caller's thread works alone on up to about 2,000
+    /// bodies or collisions, and on the results of a design that keeps live bodies alone. The other
+    /// threads start with the first larger step, and end with the accelerator.
     ///
-    /// [`Bodies`](crate::Bodies) and [`Collisions`](crate::Collisions) are asked from these threads
-    /// while the caller's waits for them. A container that needs the caller's own thread (what it
-    /// keeps per thread, a lock that the caller holds) wants `Some(1)`. How the caller's thread rounds
-    /// or flushes is of no account: all threads compute in the standard [floating-point
+    /// These threads call [`Bodies`](crate::Bodies) and [`Collisions`](crate::Collisions) while the
+    /// caller's thread waits. A container that depends on the caller's thread (thread-local data, a
+    /// lock that the caller holds) needs `Some(1)`. The rounding and flushing modes of the caller's
+    /// thread do not matter: all threads compute in the standard [floating-point
     /// environment](crate#the-floating-point-environment).
     pub pack_threads: Option<usize>,
 }
@@ -41,17 +42,17 @@ pub struct OpenOptions {
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub enum BoardChoice {
-    /// The UIO node `pgs`, or the nodes `pgs-control` and `pgs-dma0` to `pgs-dma3`, if there are
-    /// any; else an emulated board, which is said at warn level.
+    /// The UIO node `pgs`, or the nodes `pgs-control` and `pgs-dma0` to `pgs-dma3`, if they exist;
+    /// else an emulated board, with a log message at warn level.
     #[default]
     Automatic,
-    /// The UIO node of that name (`linux,uio-name`), or a node for each region: `<node>-control`, and
-    /// `<node>-dma0` to `<node>-dma3` as far as there are such cores.
+    /// The UIO node of this name (`linux,uio-name`), or a node for each region: `<node>-control`,
+    /// and `<node>-dma0` to `<node>-dma3`, one per DMA core.
     Uio {
         /// The name, as in `/sys/class/uio/uio*/name`.
         node: String,
     },
-    /// Registers through `/dev/mem`, inside these windows only. There is no interrupt this way.
+    /// Registers through `/dev/mem`, inside these windows only. This way has no interrupt.
     DevMem(DevMemWindows),
     /// An emulated board.
     #[cfg(feature = "emulation")]
@@ -66,7 +67,7 @@ pub enum BoardChoice {
     },
 }
 
-/// What kind of board was opened.
+/// The kind of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BoardKind {
@@ -84,7 +85,7 @@ pub enum BoardKind {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct BoardDescription {
-    /// What kind.
+    /// Its kind.
     pub kind: BoardKind,
     /// Its name: the UIO node, "/dev/mem", "emulated", or the socket.
     pub name: String,

@@ -1,4 +1,4 @@
-//! Tells which part of a step a descriptor belongs to.
+//! Maps a descriptor of a step to the phase that it belongs to.
 
 use pgs_interface::profile::Flow;
 
@@ -7,7 +7,7 @@ use crate::axi_dma::pieces;
 use crate::fault::Phase;
 use crate::scene::StepParameters;
 
-/// How the descriptors of a step are laid out.
+/// The layout of a step's descriptors.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Outline {
     plan: Plan,
@@ -17,12 +17,12 @@ pub(crate) struct Outline {
 }
 
 impl Outline {
-    /// That of a step whose descriptors carry at most `largest` bytes.
+    /// The outline of a step whose descriptors carry at most `largest` bytes.
     pub(crate) fn new(plan: &Plan, parameters: &StepParameters, largest: u32) -> Self {
         Self { plan: *plan, contact_passes: parameters.contact_iterations, largest }
     }
 
-    /// What a descriptor of an MM2S channel belongs to; behind the last one, the results.
+    /// The phase of a descriptor of an MM2S channel; results, for an index past the last.
     pub(crate) fn phase_of(&self, channel: usize, descriptor: usize) -> Phase {
         let segments = self.plan.segments(channel);
         let count = |beats: usize| pieces(bytes(beats), self.largest).count();

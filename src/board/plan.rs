@@ -1,11 +1,11 @@
-//! Lays out one step: where the segments lie in each channel's buffer, how many
-//! descriptors they take, and how long the step may last.
+//! Lays out one step: the place of each segment in the buffers of the channels, the number of
+//! descriptors, and the deadline.
 //!
 //! ```text
 //! MM2S buffer of a channel: | velocities | poses | collisions |    each from a multiple of 64 bytes
 //! ```
 //!
-//! Collisions come last, so that there may be fewer of them than room was made for.
+//! Collisions come last, so that a step may have fewer of them than its buffers have room for.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -19,20 +19,20 @@ use crate::control_block::Capabilities;
 use crate::control_block::time_of;
 use crate::scene::StepParameters;
 
-/// A memory slower than 100 MB/s is taken for one that does not answer.
+/// A memory slower than 100 MB/s counts as one that does not answer.
 const SLOWEST_BYTES_PER_MICROSECOND: u64 = 100;
 /// Beats to which segments are aligned: 64 bytes.
 const ALIGNMENT: usize = 64 / BEAT_BYTES;
 
-/// What a step streams.
+/// The number and layout of the records that a step streams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Plan {
-    /// Bodies of which there are records: where only live bodies are kept, those that move.
+    /// Records of bodies. A design that keeps live bodies alone has records of moving bodies only.
     pub(crate) bodies: usize,
     /// Records of collisions, padding included.
     pub(crate) collisions: usize,
     pub(crate) passes: u64,
-    /// How records lie on the channels.
+    /// Profile and formats: they decide how records lie on the channels.
     pub(crate) variant: Variant,
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct Segments {
 }
 
 impl Segments {
-    /// Beats up to the end of the last.
+    /// Beats up to the end of the last segment.
     pub(crate) const fn end(&self) -> usize {
         if self.collisions.start == self.collisions.end {
             self.poses.end
@@ -115,8 +115,9 @@ impl Plan {
         (0..self.channels()).map(|channel| bytes(self.results(channel))).sum()
     }
 
-    /// How long the step may last: four times what it takes if every collision waits for the one
-    /// before it, what its bytes take over the slowest memory, and 10 ms.
+    /// How long the step may last, unless the caller has set a deadline: four times the cycles of a
+    /// step whose every collision waits for the one before, the transfer of its bytes from the
+    /// slowest memory, and 10 ms.
     pub(crate) fn deadline(
         &self,
         parameters: &StepParameters,
@@ -184,8 +185,8 @@ mod tests {
         };
         let (bodies, collisions) = (38_881, 127_746);
         assert_eq!(bytes(NAIVE.default_variant()), (4 * bodies + 8 * 7 * collisions, 4 * bodies));
-        // A beat a record, filled up to five: 38,885. Two collisions in seven beats. 77,762 beats of
-        // results, filled up to five: 77,765.
+        // A beat a record, filled up to five: 38,885. Two collisions in seven beats. 77,762 beats
+        // of results, filled up to five: 77,765.
         assert_eq!(bytes(HALF.default_variant()), (2 * 38_885 + 8 * 7 * (collisions / 2), 77_765));
         assert_eq!(bytes(MIXED.default_variant()), (4 * bodies + 8 * 3 * collisions, 4 * bodies));
         // Twice the velocities: four beats a body in f32; in half two, 77,762 filled up to five.
@@ -230,8 +231,8 @@ mod tests {
         fake::describe(&registers);
         let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
         let mut parameters = StepParameters::default();
-        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.727066 s; 119,437,184 bytes in and out
-        // are 1.194371 s at 100 MB/s.
+        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.727066 s; 119,437,184 bytes in and
+        // out are 1.194371 s at 100 MB/s.
         let limit = FOUR.deadline(&parameters, &capabilities);
         assert_eq!(limit.as_micros(), 4_727_066 + 1_194_371 + 10_000);
         parameters.deadline = Some(Duration::from_millis(3));

@@ -1,4 +1,4 @@
-//! Joins what one DMA channel needs for a step: its buffers, its ring, its registers.
+//! A port: one DMA channel with its buffers and its ring.
 
 use std::sync::Arc;
 
@@ -11,14 +11,14 @@ use pgs_interface::record::Beat;
 /// Who holds a buffer.
 #[derive(Debug, Default)]
 enum Held {
-    /// There is none, or it was lost to a fault.
+    /// No buffer was allocated, or a fault has lost it.
     #[default]
     Nobody,
     Cpu(CpuBuffer),
     Device(DeviceBuffer),
 }
 
-/// One channel with its memory.
+/// One DMA channel with its memory.
 #[derive(Debug)]
 pub(crate) struct Port {
     pub(crate) channel: Channel,
@@ -30,12 +30,12 @@ pub(crate) struct Port {
 }
 
 impl Port {
-    /// A port of a channel that was reset; `control` is what it will run with.
+    /// A port of a channel that was reset; `control` is its DMACR while it runs.
     pub(crate) fn new(channel: Channel, access: Access, control: Dmacr) -> Self {
         Self { channel, control, access, ring: None, held: PerBank::default(), running: false }
     }
 
-    /// Makes a buffer hold `beats`. Grows with slack, never shrinks.
+    /// Makes a buffer hold `beats` beats. It grows with slack and never shrinks.
     pub(crate) fn reserve_beats(
         &mut self,
         platform: &Arc<dyn Platform>,
@@ -55,12 +55,12 @@ impl Port {
         Ok(())
     }
 
-    /// Whether there is a buffer, whoever holds it.
+    /// Whether the bank has a buffer, held by the CPU or by the device.
     pub(crate) fn has_buffer(&self, bank: Bank) -> bool {
         !matches!(self.held[bank], Held::Nobody)
     }
 
-    /// Frees a buffer, if the CPU holds it; whether it did.
+    /// Frees a buffer that the CPU holds; returns whether it held one.
     pub(crate) fn drop_buffer(&mut self, bank: Bank) -> bool {
         let held = &mut self.held[bank];
         let was_held = matches!(held, Held::Cpu(_));
@@ -70,7 +70,7 @@ impl Port {
         was_held
     }
 
-    /// Whether the ring takes a chain of so many descriptors.
+    /// Whether the ring takes a chain of `descriptors` descriptors.
     pub(crate) fn ring_takes(&self, descriptors: usize) -> bool {
         self.ring.as_ref().is_some_and(|ring| ring.capacity() >= descriptors)
     }
@@ -113,7 +113,8 @@ impl Port {
         }
     }
 
-    /// Gives a buffer to the device, which will touch its first `used` beats; nothing, if it has it.
+    /// Gives a buffer to the device, which accesses its first `used` beats. No change if the device
+    /// already has it.
     pub(crate) fn hand_over(&mut self, bank: Bank, used: usize) -> Result<(), PlatformError> {
         let held = &mut self.held[bank];
         match std::mem::take(held) {
@@ -123,7 +124,7 @@ impl Port {
         Ok(())
     }
 
-    /// Takes a buffer back, if the device has it. Only when its chain is complete or was never
+    /// Takes a buffer back, if the device has it. Allowed when its chain is complete or was never
     /// begun, or after a reset.
     pub(crate) fn take_back(&mut self, bank: Bank) -> Result<(), PlatformError> {
         let held = &mut self.held[bank];
@@ -134,7 +135,7 @@ impl Port {
         Ok(())
     }
 
-    /// Takes back what the device has of both banks.
+    /// Takes back the buffers of both banks.
     pub(crate) fn take_all_back(&mut self) -> Result<(), PlatformError> {
         let [first, second] = Bank::BOTH.map(|bank| self.take_back(bank));
         first.and(second)
@@ -145,7 +146,8 @@ impl Port {
         self.ring_mut().begin();
     }
 
-    /// Appends one packet, or a place for one, to the chain. A packet of no bytes is none.
+    /// Appends the descriptors of one packet to the chain: of its data for MM2S, of room for it for
+    /// S2MM. A packet of 0 bytes appends none.
     pub(crate) fn queue(
         &mut self,
         bank: Bank,
@@ -182,7 +184,7 @@ impl Port {
         Ok(())
     }
 
-    /// Lets the engine run to the end of the chain; whether there was anything to run.
+    /// Lets the engine run to the end of the chain; returns whether the chain has any descriptor.
     pub(crate) fn ring_doorbell(&mut self) -> Result<bool, PlatformError> {
         let tail = self.ring_mut().tail()?;
         if let Some(tail) = tail {
@@ -196,12 +198,12 @@ impl Port {
         self.ring.as_mut().expect("every step reserves the rings first")
     }
 
-    /// How the chain of the step stands, and which of its descriptors lies at `address`.
+    /// The state of the step's chain, and of its descriptor at `address`.
     pub(crate) fn survey(&self, address: u64) -> ChainState {
         self.ring.as_ref().map(|ring| ring.survey(address)).unwrap_or_default()
     }
 
-    /// Takes note that the core was reset, and takes the buffers back.
+    /// Records that the core was reset, and takes the buffers back.
     pub(crate) fn was_reset(&mut self) -> Result<(), PlatformError> {
         self.running = false;
         self.channel.was_reset();
@@ -211,8 +213,8 @@ impl Port {
         self.take_all_back()
     }
 
-    /// Gives up: an engine that could not be stopped may still reach ring and buffers. None is used
-    /// or freed any more, whoever holds it.
+    /// Leaves ring and buffers to an engine that could not be stopped and may still reach them.
+    /// Their memory is never used or freed again, even if the CPU holds it.
     pub(crate) fn leave_to_device(&mut self) {
         if let Some(ring) = &mut self.ring {
             ring.leave_to_device();
@@ -220,7 +222,7 @@ impl Port {
         for bank in Bank::BOTH {
             match std::mem::take(&mut self.held[bank]) {
                 Held::Cpu(buffer) => buffer.leave_to_device(),
-                // Not freed when dropped.
+                // Dropping a buffer of the device does not free it.
                 held @ (Held::Device(_) | Held::Nobody) => self.held[bank] = held,
             }
         }

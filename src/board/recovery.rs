@@ -1,4 +1,4 @@
-//! Leads from any fault to "the next step works" or "open again".
+//! Recovers from a fault: afterwards the next step works, or the board must be opened again.
 
 use super::anomalies::Anomaly;
 use super::bank::Bank;
@@ -12,17 +12,17 @@ use crate::fault::Fault;
 use crate::scene::Shape;
 
 impl Device {
-    /// Finds out why a step failed and brings the board back; the error to return.
+    /// Diagnoses a failed step and recovers the board; returns the caller's error.
     pub(crate) fn fail(&mut self, symptom: Symptom, shapes: &[Shape]) -> Error {
         let (mut fault, mut diagnosis) = self.diagnose(symptom);
         log::debug!("step failed: {fault}");
         let aftermath = match &fault {
-            // The board did its part: everything is complete and back. Or it was not asked yet.
+            // The board has completed the step, or was not started.
             Fault::NotFinite { .. } | Fault::NoMemory(_) => Aftermath::Untouched,
             Fault::Cancelled if !self.in_flight() => Aftermath::Untouched,
-            // What answers now is not to be written to: its registers may mean anything.
+            // No write to another bitstream: its registers may mean anything.
             Fault::OtherBitstream { .. } => self.give_up(&fault),
-            // Nothing that is written arrives.
+            // Writes no longer reach the board.
             Fault::Platform(_) if self.platform.lost().is_some() => self.give_up(&fault),
             _ => match self.recover(shapes) {
                 Ok(()) => Aftermath::Ready,
@@ -40,8 +40,8 @@ impl Device {
         Error::Step { fault: Box::new(fault), aftermath, diagnosis }
     }
 
-    /// As [`fail`](Self::fail), of a step whose results were found wrong when the next one was on the
-    /// board already: what stands there says nothing of this one.
+    /// Like [`fail`](Self::fail), for a step whose results are wrong while the next step is already
+    /// on the board: the state of the board does not explain this step, so it is not diagnosed.
     pub(crate) fn fail_overtaken(&mut self, fault: Fault, shapes: &[Shape]) -> Error {
         log::debug!("step failed: {fault}");
         let aftermath = match self.recover(shapes) {
@@ -51,7 +51,7 @@ impl Device {
         Error::Step { fault: Box::new(fault), aftermath, diagnosis: None }
     }
 
-    /// Stops a step that nobody will wait for; nothing, if there is none.
+    /// Stops the step in flight, if its caller has forgotten it.
     pub(crate) fn abandon(&mut self, shapes: &[Shape]) {
         if self.in_flight() && !self.dead {
             log::warn!("a step was not waited for: resetting the board");
@@ -61,7 +61,7 @@ impl Device {
         }
     }
 
-    /// Sees to a board that works on nothing: a step that was forgotten is stopped first.
+    /// Makes sure that the board is idle: a forgotten step is stopped first.
     pub(crate) fn settle(&mut self, shapes: &[Shape]) -> Result<(), Error> {
         self.abandon(shapes);
         if self.dead { Err(Error::MustReopen) } else { Ok(()) }
@@ -78,14 +78,14 @@ impl Device {
         self.rings_or_reset(plan, shapes)
     }
 
-    /// Makes the rings large enough for a step. A channel that does not stop for its new ring is
-    /// reset, with everything else.
+    /// Makes the rings large enough for a step. If a channel does not stop for its new ring, the
+    /// whole board is reset.
     pub(crate) fn rings_or_reset(&mut self, plan: &Plan, shapes: &[Shape]) -> Result<(), Symptom> {
         let mut reserved = self.reserve_rings(plan);
         if let Err(Symptom::Known(Fault::Core(error @ DmaError::State { .. }))) = &reserved {
             log::debug!("resetting the board: {error}");
             self.recover(shapes)?;
-            self.oddities.tell(Anomaly::NoHalt);
+            self.anomalies.tell(Anomaly::NoHalt);
             reserved = self.reserve_rings(plan);
         }
         reserved.map_err(|symptom| match symptom {
@@ -94,14 +94,14 @@ impl Device {
         })
     }
 
-    /// Resets everything and restores what a step relies on.
+    /// Resets the board, checks that its bitstream is the same, and restores buffers and shapes.
     fn recover(&mut self, shapes: &[Shape]) -> Result<(), Fault> {
         self.clear(shapes).map_err(|error| self.platform.lost().map_or(error, Fault::from))
     }
 
     fn clear(&mut self, shapes: &[Shape]) -> Result<(), Fault> {
         self.reset()?;
-        // Before the shapes are written, and anything is said of being ready.
+        // Checked before the shapes are written and the board counts as ready.
         let found = self.control.fingerprint();
         if found.identification() == u32::MAX {
             return Err(Fault::Gone { region: "the control block".to_owned() });
@@ -109,19 +109,13 @@ impl Device {
         if let Some(changed) = self.fingerprint.difference(&found) {
             return Err(other_bitstream(changed));
         }
-        for port in self.ports_mut() {
-            // A buffer that does not come back is replaced by the next step.
-            if let Err(error) = port.was_reset() {
-                log::error!("a buffer was lost: {error}");
-            }
-        }
-        self.was_cleared();
+        self.was_reset();
         self.control.load_shapes(shapes, self.capabilities.variant.inertia);
         log::info!("the board was reset after a fault");
         Ok(())
     }
 
-    /// Touches nothing any more. All memory stays with the engines, which may still reach it.
+    /// Gives the board up. All memory stays with the engines, which may still reach it.
     fn give_up(&mut self, error: &Fault) -> Aftermath {
         log::error!("the board is given up: {error}");
         self.dead = true;

@@ -13,8 +13,8 @@ use crate::fault::phase::Phase;
 use crate::fault::{AcceleratorError, Awaited, Fault, Subject};
 
 impl Device {
-    /// Finds the cause of a failure: the fault, and how everything stood if the board had a part in
-    /// it.
+    /// Finds the cause of a failure: the fault, and the state of the board, unless the board had no
+    /// part in it.
     pub(crate) fn diagnose(&mut self, symptom: Symptom) -> (Fault, Option<Box<Diagnosis>>) {
         use Fault::{Cancelled, NoMemory, NotFinite};
         if let Symptom::Known(fault @ (NotFinite { .. } | NoMemory(_))) = symptom {
@@ -28,7 +28,7 @@ impl Device {
             _ => None,
         };
         let diagnosis = self.snapshot(seen);
-        // Then there was nothing to read.
+        // A lost platform leaves nothing to read.
         if let Some(error) = self.platform.lost() {
             return (error.into(), None);
         }
@@ -40,7 +40,7 @@ impl Device {
 /// The one fault that the others follow from.
 fn root_cause(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
     match (replaced(diagnosis), symptom) {
-        // Whatever else failed: what answers now is not ours.
+        // Comes before every other cause: the registers belong to another design.
         (Some(fault @ Fault::OtherBitstream { .. }), _) => fault,
         (_, Symptom::Known(fault @ (Fault::Platform(_) | Fault::Cancelled))) => fault,
         (Some(fault), _) => fault,
@@ -48,7 +48,7 @@ fn root_cause(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
     }
 }
 
-/// The cause, among what the channels and the accelerator show.
+/// The cause that the channels and the accelerator show, or else the symptom's.
 fn standing(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
     let sticky = match &symptom {
         Symptom::Sticky(error) => Some(*error),
@@ -68,7 +68,7 @@ fn standing(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
                 phase: diagnosis.phase,
                 behind: behind(&diagnosis.channels),
             }),
-        // A chain that was wrong and is not any more; a status that was is in the diagnosis.
+        // A wrong chain that is right by now. A wrong status is kept in the diagnosis.
         (None, Symptom::Status { place, .. } | Symptom::Chain { place }) => {
             match diagnosis.channels.get(place) {
                 Some(state) => Fault::ShortPacket(Box::new(*state)),
@@ -81,7 +81,7 @@ fn standing(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
     }
 }
 
-/// Nothing answers any more, or something else.
+/// The fault if no board answers any more, or another bitstream.
 fn replaced(diagnosis: &Diagnosis) -> Option<Fault> {
     let gone = diagnosis.channels.iter().find(|state| state.status.gone());
     let gone = gone.map(|state| Fault::Gone { region: state.channel.to_string() });
@@ -94,7 +94,7 @@ fn replaced(diagnosis: &Diagnosis) -> Option<Fault> {
     }
 }
 
-/// Another bitstream answers.
+/// The fault of another bitstream that answers.
 pub(crate) fn other_bitstream(Changed { register, expected, found }: Changed) -> Fault {
     Fault::OtherBitstream { register, expected, found }
 }
@@ -102,7 +102,7 @@ pub(crate) fn other_bitstream(Changed { register, expected, found }: Changed) ->
 /// A fault of a channel that stopped.
 type Stopped = fn(Box<ChannelState>) -> Fault;
 
-/// The channel that stopped with an error; of several the one that was at the earliest phase.
+/// The channel that stopped with an error; among several, the channel at the earliest phase.
 fn stopped(diagnosis: &Diagnosis) -> Option<Fault> {
     let with_errors = diagnosis.channels.iter().filter(|state| state.status.errors() != 0);
     let state = with_errors.min_by_key(|state| state.phase)?;
@@ -118,7 +118,7 @@ fn stopped(diagnosis: &Diagnosis) -> Option<Fault> {
     if let Some((_, fault)) = kinds.into_iter().find(|(bit, _)| shows(*bit)) {
         return Some(fault(at));
     }
-    // A receiver whose buffers are full, none of them having failed, while the packet goes on.
+    // The receiver's buffers are full, no descriptor has failed, and the packet goes on.
     let overrun = state.channel.direction == Direction::S2mm
         && state.done()
         && state.descriptors > 0
@@ -127,7 +127,7 @@ fn stopped(diagnosis: &Diagnosis) -> Option<Fault> {
     Some(if overrun && !failed { Fault::LongPacket(at) } else { Fault::DmaInternal(at) })
 }
 
-/// The descriptor that failed while no channel says so.
+/// The descriptor that failed while no channel shows an error.
 fn failed_descriptor(diagnosis: &Diagnosis) -> Option<Fault> {
     let failed = diagnosis.channels.iter().filter_map(|state| {
         let errors = state.descriptor.map_or(0, |descriptor| descriptor.status.errors());
@@ -144,7 +144,7 @@ fn failed_descriptor(diagnosis: &Diagnosis) -> Option<Fault> {
     })
 }
 
-/// The accelerator's own error, as it stands or as it was seen.
+/// The accelerator's own error: the current one, or the one that was seen.
 fn accelerator(diagnosis: &Diagnosis, seen: Option<StickyError>) -> Option<Fault> {
     let standing = diagnosis
         .control
@@ -154,7 +154,8 @@ fn accelerator(diagnosis: &Diagnosis, seen: Option<StickyError>) -> Option<Fault
     Some(Fault::Accelerator(Box::new(decoded(error, diagnosis.phase))))
 }
 
-/// The registers of the sticky error; collisions and bodies as if they were sent in the given order.
+/// Decodes the registers of the sticky error. Indices assume that collisions and bodies were sent
+/// in the caller's order.
 pub(crate) fn decoded(StickyError { raw, detail }: StickyError, phase: Phase) -> AcceleratorError {
     let code = ErrorCode::from_register(raw);
     let stream = error::CHANNEL.of(raw) as usize;
@@ -181,7 +182,7 @@ pub(crate) fn decoded(StickyError { raw, detail }: StickyError, phase: Phase) ->
     AcceleratorError { code, raw, detail, channel, subject, phase }
 }
 
-/// A receiver whose packet has not the length of the results.
+/// The receiver whose packet does not have the length of the results.
 fn wrong_packet(diagnosis: &Diagnosis) -> Option<Fault> {
     let receivers =
         diagnosis.channels.iter().filter(|state| state.channel.direction == Direction::S2mm);
@@ -199,15 +200,15 @@ fn wrong_packet(diagnosis: &Diagnosis) -> Option<Fault> {
     })
 }
 
-/// A channel that says that it is done, and whose descriptors do not.
+/// The channel that is idle while its descriptors are not complete.
 fn status_missing(diagnosis: &Diagnosis, awaited: Awaited) -> Option<Fault> {
     let silent = |state: &&ChannelState| state.status.idle() && !state.done();
     let state = diagnosis.channels.iter().find(silent).filter(|_| awaited == Awaited::Results)?;
     Some(Fault::StatusMissing(Box::new(*state)))
 }
 
-/// The only channel that is behind all others of its direction: a sender that is at an earlier
-/// phase, else the one receiver that is not done.
+/// The one channel that is behind all others of its direction: the only sender at the earliest
+/// phase, else the only receiver that is not done.
 fn behind(channels: &[ChannelState]) -> Option<ChannelName> {
     let of = |direction| {
         channels

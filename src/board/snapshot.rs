@@ -1,4 +1,4 @@
-//! Takes down how everything stands when a step has failed, before anything is reset.
+//! Records the state of the board after a failed step, before anything is reset.
 
 use std::time::Duration;
 
@@ -11,10 +11,10 @@ use crate::axi_dma::{ChainState, ChannelName, Direction, Dmacr, Dmasr};
 use crate::fault::{ChannelState, ControlState, Diagnosis, Phase};
 
 impl Device {
-    /// Reads everything that tells why a step failed. The port at `seen` had that status before,
-    /// should it read another now.
+    /// Reads everything that may explain why a step failed. `seen` is a port and the status that it
+    /// showed before.
     pub(crate) fn snapshot(&mut self, seen: Option<(usize, Dmasr)>) -> Diagnosis {
-        // Before the reads that follow push them out.
+        // Taken first: the reads below would push them out of the log.
         let accesses = self.counts.recent();
         let mut channels = Vec::new();
         let outline = self.started.as_ref().map(|started| &started.outline);
@@ -25,11 +25,11 @@ impl Device {
             gone = state.status.gone();
             channels.push(state);
             if gone {
-                // Whatever else is read may hold the bus up.
+                // Further reads might block the bus.
                 break;
             }
         }
-        // What answers may be another design, which has nothing where the channels were.
+        // Another design may answer, without DMA cores at these addresses.
         let answers = !gone || self.control.read(&IDENTIFICATION) != u32::MAX;
         let control = answers.then(|| self.control_state());
         let senders = channels.iter().filter(|state| state.channel.direction == Direction::Mm2s);
@@ -62,20 +62,20 @@ fn channel_state(port: &Port, before: Option<Dmasr>, outline: Option<&Outline>) 
     let channel = &port.channel;
     let name = (channel.name(), channel.address_width());
     let now = channel.status();
-    // A status that was seen and is no longer shown is what the step failed of.
+    // An error that was seen and has gone since is the error that the step failed with.
     let status = before.filter(|_| now.errors() == 0).unwrap_or(now);
     if status.gone() {
         let chain = port.survey(u64::MAX);
         return state_of(name, (Dmacr(u32::MAX), status), (u64::MAX, u64::MAX), &chain, outline);
     }
     let current = channel.current_descriptor();
-    // Behind the status: a chain that became complete in between is not one that hangs.
+    // Read after the status: a chain that completes in between does not look stuck.
     let chain = port.survey(current);
     let registers = (channel.control(), status);
     state_of(name, registers, (current, channel.tail_descriptor()), &chain, outline)
 }
 
-/// A channel whose chain stands as `chain` says.
+/// The state of a channel, from its registers and its chain.
 fn state_of(
     (channel, address_width): (ChannelName, u32),
     (control, status): (Dmacr, Dmasr),

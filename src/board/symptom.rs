@@ -1,4 +1,5 @@
-//! The reason for giving a step up. The [diagnosis](crate::fault::diagnosis) finds its cause.
+//! The first sign of a fault, for which a step is given up. The
+//! [diagnosis](crate::fault::diagnosis) finds its cause.
 
 use std::time::Duration;
 
@@ -16,7 +17,7 @@ pub(crate) enum Symptom {
         place: usize,
         status: Dmasr,
     },
-    /// A chain ended in another way than it should.
+    /// A descriptor has failed, or a received packet does not end where it should.
     Chain {
         /// Place of the channel among all ports.
         place: usize,

@@ -1,4 +1,4 @@
-//! What is opened, what is refused, and what is left alone, on systems made of files.
+//! Tests which boards are opened, refused or left alone, on systems made of files.
 
 use std::fs;
 
@@ -8,8 +8,8 @@ use crate::control_block::fake as bitstream;
 use crate::error::OpenError;
 use crate::platform::fake::FakeRegisters;
 use crate::platform::{
-    Caching, DevMemWindows, ManagerChoice, MemoryChoice, PlatformError, System, ZYNQMP_MANAGER,
-    fpga_fake, uio_fake,
+    Caching, DevMemWindows, ManagerChoice, MemoryChoice, PlatformError, RegisterMap, System,
+    ZYNQMP_MANAGER, fpga_fake, uio_fake,
 };
 use crate::{Accelerator, Error};
 
@@ -25,7 +25,7 @@ fn uio(node: &str) -> BoardChoice {
     BoardChoice::Uio { node: node.to_owned() }
 }
 
-/// A system with the nodes `fabric` and `pgs`, whose control block says what `describe` makes it.
+/// A system with the nodes `fabric` and `pgs`; `describe` fills the control block of `pgs`.
 fn system_with(describe: impl Fn(&FakeRegisters)) -> (tempfile::TempDir, System) {
     let root = tempfile::tempdir().expect("a directory");
     let system = System::under(root.path());
@@ -87,10 +87,10 @@ fn a_real_board_is_identified_and_never_replaced_by_an_emulated_one() {
     let (_root, system) = system_with(bitstream::describe);
     add_memory(&system);
     for choice in [BoardChoice::Automatic, uio("pgs")] {
-        // The file of registers identifies itself; its cores do not come out of reset.
+        // The control block in the file identifies itself; the DMA cores stay in reset.
         let error = error_of(&choice, &system);
         assert!(
-            matches!(&error, OpenError::Core(DmaError::State { channel, .. }) if channel == "dma0 MM2S"),
+            matches!(&error, OpenError::Core(DmaError::State { channel, .. }) if channel.to_string() == "dma0 MM2S"),
             "{error}"
         );
     }
@@ -143,14 +143,14 @@ fn two_boards_do_not_share_memory() {
     let memory = MemoryChoice::Automatic;
     let first = find_in(&system, &uio("pgs"), &memory).expect("opened");
     assert_busy(find_in(&system, &uio("pgs2"), &memory), "uio7");
-    // Through /dev/mem it is the same memory.
+    // The same memory through /dev/mem is refused, too.
     uio_fake::write(system.dev.join("mem"), "");
     let window = MemoryChoice::DevMem { window: 0x6000_0000..0x6000_1000 };
     assert_busy(find_in(&system, &uio("pgs2"), &window), "uio7");
     drop(first);
     let second = find_in(&system, &uio("pgs2"), &memory).expect("the first is closed");
 
-    // With a buffer of its own it is another board.
+    // A board with another buffer is free.
     for (name, text) in [("phys_addr", "0x70000000"), ("size", "4096"), ("sync_mode", "2")] {
         uio_fake::write(system.u_dma_buf.join("own").join(name), text);
     }
@@ -194,9 +194,9 @@ fn dev_mem_carries_registers_and_memory_of_one_board() {
     let choice = BoardChoice::DevMem(windows);
     for memory in [MemoryChoice::Automatic, MemoryChoice::DevMem { window: 0xA_0000..0xB_0000 }] {
         let Found { platform, .. } = find_in(&system, &choice, &memory).expect("opened once");
-        platform.dma_window(3).expect("mapped").write32(4, 0x66);
+        platform.window(RegisterMap::Dma(3)).expect("mapped").write32(4, 0x66);
         assert_eq!(fs::read(system.dev.join("mem")).expect("read")[0x3_0004], 0x66);
-        let (address, _) = platform.allocate(4).expect("there is room");
+        let (address, _) = platform.memory().allocate(4).expect("there is room");
         let expected = if memory == MemoryChoice::Automatic { 0x8_0000 } else { 0xA_0000 };
         assert_eq!(address, expected);
         assert_busy(find_in(&system, &choice, &memory), "mem");
@@ -215,11 +215,11 @@ fn separate_nodes_are_a_board_and_an_absent_core_is_named() {
     let found = find_in(&system, &BoardChoice::Automatic, &MemoryChoice::Automatic);
     let Found { platform, description } = found.expect("a board");
     assert_eq!(description.to_string(), "pgs (its UIO node is there)");
-    assert_eq!(platform.control_window().expect("mapped").bytes(), 0x1000);
-    platform.dma_window(1).expect("mapped").write32(4, 0x55);
+    assert_eq!(platform.window(RegisterMap::Control).expect("mapped").bytes(), 0x1000);
+    platform.window(RegisterMap::Dma(1)).expect("mapped").write32(4, 0x55);
     assert_eq!(fs::read(system.dev.join("uio2")).expect("read")[4], 0x55);
     for core in [0, 2, 3, 4] {
-        let error = platform.dma_window(core).expect_err("absent").to_string();
+        let error = platform.window(RegisterMap::Dma(core)).expect_err("absent").to_string();
         assert!(error.contains("found: pgs-dma1, pgs-control"), "{error}");
     }
 }
@@ -311,17 +311,17 @@ fn nodes_of_any_name_are_opened_one_for_all_regions_or_one_for_each() {
     uio_fake::add_node(&system, 0, "pgs@a0000000", &regions);
     uio_fake::add_node(&system, 1, "second-control", &regions[4..]);
     uio_fake::add_node(&system, 2, "second-dma1", &regions[1..2]);
-    // Not of this board.
+    // A node of another board.
     uio_fake::add_node(&system, 3, "pgs-dma0", &regions[..1]);
     let find = |node: &str| find_in(&system, &uio(node), &MemoryChoice::Automatic);
     let one = find("pgs@a0000000").expect("one node");
     assert_eq!(one.description.to_string(), "pgs@a0000000 (asked for)");
-    assert_eq!(one.platform.control_window().expect("mapped").bytes(), 0x1000);
+    assert_eq!(one.platform.window(RegisterMap::Control).expect("mapped").bytes(), 0x1000);
     drop(one);
     let each = find("second").expect("two nodes");
-    each.platform.dma_window(1).expect("mapped").write32(4, 0x55);
+    each.platform.window(RegisterMap::Dma(1)).expect("mapped").write32(4, 0x55);
     assert_eq!(fs::read(system.dev.join("uio2")).expect("read")[4], 0x55);
-    let error = each.platform.dma_window(0).expect_err("another board's").to_string();
+    let error = each.platform.window(RegisterMap::Dma(0)).expect_err("another board's").to_string();
     assert!(error.contains("\"second-dma0\" (found: second-dma1, second-control)"), "{error}");
 }
 

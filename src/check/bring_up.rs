@@ -29,8 +29,7 @@ pub(super) fn bring_up(
     let Found { platform, description } = found;
     check_given_width(length_width)?;
     let counts = Arc::<AccessCounts>::default();
-    let window =
-        Window::new(platform.control_window()?, RegisterMap::Control, Arc::clone(&counts))?;
+    let window = Window::open(&*platform, RegisterMap::Control, &counts)?;
     let Some(mut capabilities) = identity(&window, lines) else { return Ok(None) };
 
     let mut cores = match connect(&*platform, &capabilities, &counts) {

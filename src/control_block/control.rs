@@ -46,7 +46,7 @@ fn arguments(
 #[derive(Debug)]
 pub(crate) struct Control {
     window: Window,
-    /// What the argument registers hold; `None` if that is not known.
+    /// Values in the argument registers; `None` if unknown.
     written: [Option<u32>; ARGUMENTS],
 }
 
@@ -56,17 +56,17 @@ impl Control {
         Self { window, written: [None; ARGUMENTS] }
     }
 
-    /// One register.
+    /// Reads one register.
     pub(crate) fn read(&self, register: &Register) -> u32 {
         self.window.read32(register.offset)
     }
 
-    /// One write, at an offset that may lie in the shape table.
+    /// Writes one word. The offset may lie in the shape table.
     pub(crate) fn write(&mut self, offset: u32, value: u32) {
         self.window.write32(offset, value);
     }
 
-    /// Writes the arguments that differ from what the accelerator holds.
+    /// Writes the arguments that differ from the values in the registers.
     pub(crate) fn set_arguments(
         &mut self,
         bodies: u32,
@@ -94,7 +94,7 @@ impl Control {
         (value != u32::MAX).then(|| ap_ctrl::DONE.is_set(value))
     }
 
-    /// Resets the accelerator, and lets its sticky error through to the interrupt line.
+    /// Resets the accelerator, and enables the interrupt of its sticky error.
     pub(crate) fn reset(&mut self, platform: &dyn Platform) -> Result<(), ControlError> {
         self.written = [None; ARGUMENTS];
         self.write(RESET.offset, reset::RESET.mask());

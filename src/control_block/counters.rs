@@ -13,32 +13,33 @@ use super::{Capabilities, Control};
 /// The accelerator's sticky error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct StickyError {
-    /// The register.
+    /// The register ERROR.
     pub(crate) raw: u32,
-    /// What it is about.
+    /// The register `ERROR_DETAIL`.
     pub(crate) detail: u32,
 }
 
-/// What was counted in the last step.
+/// The accelerator's counters of the last step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Counters {
-    /// From start to done.
+    /// Cycles from start to done.
     pub(crate) cycles: u64,
-    /// Of it, neither waiting for velocities nor for streams.
+    /// Cycles without stalls at hazards and without waits for streams.
     pub(crate) work: u32,
-    /// Of it, waiting for streams.
+    /// Cycles of waiting for streams.
     pub(crate) waits: u32,
     /// Collisions that met a hazard.
     pub(crate) hazards: u32,
     /// Sums of the words received and sent, if the bitstream has them.
     pub(crate) sums: Option<(u32, u32)>,
-    /// Sum of the accumulated normal impulses, N s, if the bitstream has it and it is known.
+    /// Sum of the accumulated normal impulses, N s, if the bitstream has it and it is below its
+    /// maximum.
     pub(crate) impulse_sum: Option<f64>,
-    /// Which of them stand at their maximum.
+    /// The counters that stand at their maximum.
     pub(crate) saturated: Saturated,
 }
 
-/// Counters of a step that stopped at their maximum: what they count is that or more.
+/// Counters of a step that stopped at their maximum: the true count is the maximum or more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct Saturated {
@@ -53,7 +54,7 @@ pub struct Saturated {
 }
 
 impl Saturated {
-    /// Whether the stalls are not known: they are what work and waits leave of all cycles.
+    /// Whether the stalls are unknown: they are all cycles less work and waits.
     #[must_use]
     pub const fn stalls(&self) -> bool {
         self.work || self.waits
@@ -64,11 +65,11 @@ impl Control {
     /// The sticky error, if one is set.
     pub(crate) fn sticky_error(&self) -> Option<StickyError> {
         let raw = self.read(&ERROR);
-        // The detail is read only where there is one: a good step costs one access.
+        // The detail is read only after an error: a good step costs one access.
         (raw != 0).then(|| StickyError { raw, detail: self.read(&ERROR_DETAIL) })
     }
 
-    /// What was counted in the step that has ended.
+    /// Reads the counters of the step that has ended.
     pub(crate) fn counters(&self, capabilities: &Capabilities) -> Counters {
         let wide = |high: u32, low: u32| (u64::from(high) << 32) | u64::from(low);
         let hazards = self.read(&HAZARDS);
@@ -98,7 +99,7 @@ pub(crate) const fn impulse(units: u64) -> f64 {
     units as f64 / (1_u64 << IMPULSE_SUM_FRACTION_BITS) as f64
 }
 
-/// `cycles` of a clock of `clock_khz`, rounded down to nanoseconds; zero for a clock of 0.
+/// The time of `cycles` at `clock_khz`, rounded down to nanoseconds; zero for a clock of 0.
 pub(crate) fn time_of(cycles: u64, clock_khz: u32) -> Duration {
     let nanoseconds =
         (u128::from(cycles) * 1_000_000).checked_div(u128::from(clock_khz)).unwrap_or(0);

@@ -9,7 +9,7 @@ use pgs_interface::register::Register;
 
 use super::Control;
 
-/// What a bitstream says of itself: registers that never change while it is loaded.
+/// The identification and capability registers, which never change while a bitstream is loaded.
 const CONSTANTS: [&Register; 20] = [
     &IDENTIFICATION,
     &VERSION,
@@ -37,7 +37,7 @@ const CONSTANTS: [&Register; 20] = [
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Fingerprint([u32; CONSTANTS.len()]);
 
-/// The first register that another bitstream answers otherwise.
+/// The first register whose value differs under another bitstream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Changed {
     pub(crate) register: &'static str,
@@ -46,12 +46,12 @@ pub(crate) struct Changed {
 }
 
 impl Fingerprint {
-    /// IDENTIFICATION, which is what tells one design from another.
+    /// IDENTIFICATION, which tells one design from another.
     pub(crate) fn identification(&self) -> u32 {
         self.0[0]
     }
 
-    /// The first register in which another bitstream differs from this one.
+    /// The first register that differs between this fingerprint and `found`.
     pub(crate) fn difference(&self, found: &Self) -> Option<Changed> {
         let pairs = self.0.iter().zip(&found.0).zip(CONSTANTS);
         pairs.filter(|((expected, found), _)| expected != found).map(changed).next()
@@ -63,7 +63,7 @@ fn changed(((expected, found), register): ((&u32, &u32), &Register)) -> Changed 
 }
 
 impl Control {
-    /// Reads what the bitstream says of itself.
+    /// Reads the fingerprint of the loaded bitstream.
     pub(crate) fn fingerprint(&self) -> Fingerprint {
         Fingerprint(CONSTANTS.map(|register| self.read(register)))
     }
@@ -84,7 +84,8 @@ mod tests {
         let before = control.fingerprint();
         assert_eq!(before.identification(), 0x5047_5331);
         assert_eq!(before.difference(&control.fingerprint()), None);
-        // The capabilities lie between IDENTIFICATION and WINDOW_CAPACITY (interface specification).
+        // The capabilities lie between IDENTIFICATION and WINDOW_CAPACITY (interface
+        // specification).
         for offset in (0x100..=0x14C).step_by(4) {
             let was = registers.with(|state| state.values.insert(offset, 0xABCD));
             let changed = before.difference(&control.fingerprint()).expect("it differs");

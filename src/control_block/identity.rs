@@ -17,7 +17,7 @@ use thiserror::Error;
 
 use crate::platform::Window;
 
-/// What a bitstream says of itself.
+/// The identity and the capabilities of a bitstream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Capabilities {
@@ -51,15 +51,15 @@ pub struct Capabilities {
     pub clock_khz: u32,
     /// Largest number of bodies.
     pub body_capacity: u32,
-    /// Largest number of collisions, were there no bodies.
+    /// Largest number of collisions in a scene without bodies.
     pub collision_capacity: u32,
     /// Entries of the shape table.
     pub shape_capacity: u32,
     /// On-chip memory that bodies and collisions share, bytes.
     pub memory_bytes: u32,
-    /// What a body takes of it, bytes.
+    /// Memory of a body, bytes.
     pub bytes_per_body: u32,
-    /// What a collision takes of it, bytes.
+    /// Memory of a collision, bytes.
     pub bytes_per_collision: u32,
     /// Width of the DMA cores' length registers, bits.
     pub length_width: u32,
@@ -71,7 +71,7 @@ pub struct Capabilities {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IdentityError {
-    /// All ones: nobody answers.
+    /// All ones: no device answers.
     #[error("the control block reads all ones: is a bitstream loaded and its clock running?")]
     Gone,
     /// Another design.
@@ -80,7 +80,7 @@ pub enum IdentityError {
          load the accelerator's bitstream, or correct the control block's address"
     )]
     Identification {
-        /// What was found.
+        /// The register.
         found: u32,
     },
     /// An interface that this driver does not know.
@@ -100,21 +100,22 @@ pub enum IdentityError {
         /// Identifier found.
         found: u32,
     },
-    /// A capability register that makes no sense, or asks for something that this driver cannot do.
+    /// A capability register is contradictory, or asks for a feature that this driver does not
+    /// have.
     #[error(
         "{register} is {found:#010x}, expected {expected}: the bitstream is not one for this driver"
     )]
     Capability {
         /// Which register.
         register: &'static str,
-        /// What it says.
+        /// Its value.
         found: u32,
-        /// What it may say.
+        /// The values that it may have.
         expected: &'static str,
     },
 }
 
-/// Reads and checks what a bitstream says of itself. Only reads.
+/// Reads and checks the identity and the capabilities of a bitstream. Nothing is written.
 pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let read = |register: &Register| window.read32(register.offset);
     match read(&IDENTIFICATION) {
@@ -130,7 +131,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let profile_id = read(&PROFILE);
     let profile = Profile::by_id(profile_id).ok_or(IdentityError::Profile { found: profile_id })?;
 
-    // Which stream a beat travels on is part of the profile.
+    // The stream of each beat is part of the profile.
     let streams =
         checked(window, &CHANNELS, "as many streams each way as the profile has", |word| {
             channels::MM2S.of(word) as usize == profile.mm2s_widths.len()
@@ -180,7 +181,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         }
     };
     let memory = checked(window, &MEMORY_PER_RECORD, "bytes above 0", |word| {
-        // What keeps live bodies alone has its memory whatever the scene.
+        // A design that keeps live bodies alone has memory of a fixed size.
         live.is_some()
             || (memory_per_record::BODY.of(word) > 0 && memory_per_record::COLLISION.of(word) > 0)
     })?;
@@ -214,7 +215,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     })
 }
 
-/// Units and room of a design that keeps live bodies alone.
+/// Reads the units, places and delay lines of a design that keeps live bodies alone.
 fn live_of(window: &Window) -> Result<Live, IdentityError> {
     let units = checked(window, &WINDOW, "at least one unit of each kind", |word| {
         window_units::CONTACT_UNITS.of(word) > 0 && window_units::FRICTION_UNITS.of(word) > 0
@@ -241,8 +242,8 @@ const fn coded(width: u32) -> u32 {
     (width / u8::BITS).ilog2()
 }
 
-/// The formats, which must be known, of the widths that the profile's stripes are made for, and fit
-/// its records.
+/// Reads the number formats. They must be known, as wide as the profile's stripes assume, and
+/// sufficient for its records.
 fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers, IdentityError> {
     let found = window.read32(NUMBERS.offset);
     let refused = |expected| IdentityError::Capability { register: NUMBERS.name, found, expected };
@@ -282,7 +283,7 @@ fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers
     Ok(numbers)
 }
 
-/// A capability register whose value passes `good`.
+/// Reads a capability register whose value must pass `good`.
 fn checked(
     window: &Window,
     register: &Register,
@@ -388,7 +389,7 @@ mod tests {
             (0x144, 0x0000_2000, "NUMBERS"),
             (0x144, 0x0002_0000, "NUMBERS"),
             (0x144, 0x0020_0000, "NUMBERS"),
-            // Sixteen bits on streams that are striped for thirty-two.
+            // Sixteen bits on streams whose stripes assume thirty-two.
             (0x144, 0x0000_0001, "NUMBERS"),
             (0x144, 0x0000_0020, "NUMBERS"),
             // Rows in f32 for updates in binary16.
@@ -438,7 +439,8 @@ mod tests {
         }
     }
 
-    /// Two units of each kind, 8,191 places and that of static bodies, delay lines of 2,816 entries.
+    /// Two units of each kind, 8,191 places and that of static bodies, delay lines of 2,816
+    /// entries.
     const WINDOWED_REGISTERS: [(u32, u32); 5] = [
         (0x108, 5),
         (0x11C, 0x0001_0002),

@@ -33,9 +33,9 @@ pub enum ControlError {
         "the accelerator was expected to be out of reset within {limit:?}, RESET reads {found:#010x}"
     )]
     Reset {
-        /// How long.
+        /// The time limit.
         limit: std::time::Duration,
-        /// What the register reads.
+        /// Value of the register.
         found: u32,
     },
     /// Its registers could not be reached.

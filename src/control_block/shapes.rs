@@ -1,4 +1,4 @@
-//! Loads the shape table.
+//! Writes the shape table.
 
 use pgs_interface::control::{
     SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,
@@ -9,8 +9,8 @@ use super::Control;
 use crate::scene::Shape;
 
 impl Control {
-    /// Loads shapes that were checked: to be not more than the table has entries, and isotropic
-    /// unless the inertia is streamed with the velocities, in which case the table has none.
+    /// Writes shapes that were checked: the table has room for them, and they are isotropic, unless
+    /// the inertia is streamed with the velocities and the table holds masses only.
     pub(crate) fn load_shapes(&mut self, shapes: &[Shape], inertia: Inertia) {
         for (entry, shape) in (SHAPE_TABLE..).step_by(SHAPE_STRIDE as usize).zip(shapes) {
             for offset in (0..SHAPE_STRIDE).step_by(4) {

@@ -12,29 +12,30 @@ use crate::axi_dma::{ChannelName, DescriptorState, Dmacr, Dmasr};
 use crate::control_block::Changed;
 use crate::platform::{Decoded, RegisterAccess, RegisterMap};
 
-/// How everything stood when a step had failed, before anything was reset.
+/// The state of the board when a step had failed, before anything was reset.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Diagnosis {
-    /// How far the step was, by what had left memory.
+    /// The phase of the step, by the data that had left memory.
     pub phase: Phase,
     /// Time since the step was started, on the board's clock.
     pub elapsed: Duration,
-    /// All channels, receivers first; up to the first that reads all ones.
+    /// All channels, receivers first, up to the first that reads all ones.
     pub channels: Vec<ChannelState>,
-    /// The control block; `None` if nothing answers any more.
+    /// The control block; `None` if no device answers any more.
     pub control: Option<ControlState>,
-    /// The last register accesses before, oldest first.
+    /// The last register accesses before the diagnosis, oldest first.
     pub accesses: Vec<RegisterAccess>,
-    /// Why the reset that followed failed, if it did.
+    /// The reason why the following reset failed, if it did.
     pub reset: Option<Box<Fault>>,
 }
 
-/// How a channel stood. As text: which, where in the step, at which descriptor, after how many bytes.
+/// The state of a channel. The text names the channel, its phase, its descriptor and the bytes
+/// moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ChannelState {
-    /// Which channel.
+    /// The channel.
     pub channel: ChannelName,
     /// Its control register.
     pub control: Dmacr,
@@ -44,25 +45,25 @@ pub struct ChannelState {
     pub current: u64,
     /// TAILDESC: bus address of the last descriptor of the step.
     pub tail: u64,
-    /// Which part of the step it was at.
+    /// The phase of the step that it had reached.
     pub phase: Phase,
     /// Descriptors of the step.
     pub descriptors: usize,
-    /// Of them, complete.
+    /// Descriptors that are complete.
     pub complete: usize,
-    /// Where the received packet ended, if it did: a descriptor of the step, from 0.
+    /// The descriptor in which the received packet ended, from 0, if it ended.
     pub packet_end: Option<usize>,
-    /// Bytes moved, as the descriptors say.
+    /// Bytes moved, by the descriptors' counts.
     pub bytes_moved: u64,
     /// Bytes that the step moves on this channel.
     pub bytes_expected: u64,
-    /// The descriptor that failed, or else the one in work.
+    /// The descriptor that failed, or else the descriptor in work.
     pub descriptor: Option<DescriptorState>,
     /// Bits of the bus addresses in its registers.
     pub(crate) address_width: u32,
 }
 
-/// How the control block stood.
+/// The state of the control block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ControlState {
@@ -74,7 +75,7 @@ pub struct ControlState {
     pub error_detail: u32,
     /// The register IDENTIFICATION.
     pub identification: u32,
-    /// A capability register that another bitstream answers.
+    /// The first identity register that differs from its value at opening.
     pub(crate) changed: Option<Changed>,
 }
 
@@ -95,12 +96,12 @@ impl fmt::Display for ChannelState {
 }
 
 impl ChannelState {
-    /// Whether the step is through with it.
+    /// Whether all descriptors of the step are complete.
     pub(crate) fn done(&self) -> bool {
         self.complete == self.descriptors
     }
 
-    /// Those that were read.
+    /// Offset and value of each register that was read.
     fn registers(&self) -> impl Iterator<Item = (u32, u32)> {
         let base = self.channel.direction.offset();
         #[allow(clippy::cast_possible_truncation, reason = "the other half is high()")]

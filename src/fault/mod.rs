@@ -1,4 +1,4 @@
-//! The faults of a step that has begun: one fault a cause, each with a stable name.
+//! The faults of a step that has begun: one per cause, each with a stable name.
 pub(crate) mod diagnosis;
 pub(crate) mod phase;
 
@@ -15,11 +15,11 @@ use crate::axi_dma::{ChannelName, Direction, DmaError};
 use crate::control_block::ControlError;
 use crate::platform::PlatformError;
 
-/// What went wrong in a step.
+/// The cause of a failed step.
 ///
-/// Where several things stand at once, this is the one that the others follow from: an error of a
-/// channel before one of a descriptor, that before the accelerator's own, that before a packet of a
-/// wrong length, and all of them before a deadline.
+/// Among several errors the fault is the one that explains the others. An error of a channel comes
+/// before an error of a descriptor, then the accelerator's own error, then a packet of a wrong
+/// length, and a deadline last.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Fault {
@@ -77,7 +77,7 @@ pub enum Fault {
          descriptors written by somebody else?"
     )]
     DescriptorDecode(Box<ChannelState>),
-    /// A channel is done, and its descriptors do not say so.
+    /// A channel is idle, and its descriptors are not complete.
     #[error(
         "no status in the descriptors of {0}, though the channel is idle: it did not reach memory in \
          time; the memory of the descriptors must not be cached: see `pgs check`"
@@ -88,46 +88,46 @@ pub enum Fault {
         "a packet that ended early on {0}: the accelerator's TLAST comes too soon, or beats were lost"
     )]
     ShortPacket(Box<ChannelState>),
-    /// A packet of results went on behind its last beat.
+    /// A packet of results went on after its last beat.
     #[error(
         "more than the results on {0}: the accelerator's TLAST comes too late, or beats were doubled"
     )]
     LongPacket(Box<ChannelState>),
-    /// A packet of results is complete and did not end.
+    /// A packet of results is complete and has no TLAST.
     #[error("no TLAST on {0}: is it connected between the accelerator and this channel?")]
     NoPacketEnd(Box<ChannelState>),
-    /// The accelerator gave up.
+    /// The accelerator stopped with an error.
     #[error("{0}")]
     Accelerator(Box<AcceleratorError>),
-    /// Nothing happened in time.
+    /// An awaited event did not come in time.
     #[error(
         "{awaited} did not come within {limit:?}, in {phase}{}: give the step a longer deadline, or \
          look at what the streams wait for", behind_text(*behind)
     )]
     Deadline {
-        /// What was awaited.
+        /// The event.
         awaited: Awaited,
-        /// How long.
+        /// The time limit.
         limit: Duration,
-        /// How far the step was.
+        /// The phase of the step.
         phase: Phase,
-        /// The one channel that is behind all others of its direction, if there is one.
+        /// The one channel that is behind all others of its direction, if any.
         behind: Option<ChannelName>,
     },
     /// The caller ended the step.
     #[error("the step was cancelled")]
     Cancelled,
-    /// Words were changed on the way.
+    /// The checksum shows that words changed on their way.
     #[error(
         "the words {} add up to {found:#010x}, expected {expected:#010x}: memory or a stream is \
          corrupt; see `pgs check`", way(*direction)
     )]
     Checksum {
-        /// [`Direction::Mm2s`] is the way to the accelerator.
+        /// The way: [`Direction::Mm2s`] leads to the accelerator.
         direction: Direction,
-        /// The sum of what was sent.
+        /// Sum of the words that were sent.
         expected: u32,
-        /// The sum of what arrived.
+        /// Sum of the words that arrived.
         found: u32,
     },
     /// A result is not a number.
@@ -144,7 +144,7 @@ pub enum Fault {
         "{region} reads all ones: is the bitstream still loaded, its power on and its clock running?"
     )]
     Gone {
-        /// Which register region.
+        /// The register region.
         region: String,
     },
     /// Another bitstream was loaded.
@@ -155,18 +155,18 @@ pub enum Fault {
     OtherBitstream {
         /// The first register that differs.
         register: &'static str,
-        /// What it read when the board was opened.
+        /// Its value when the board was opened.
         expected: u32,
-        /// What it reads now.
+        /// Its value now.
         found: u32,
     },
-    /// A DMA core did not follow.
+    /// A DMA core is not in the expected state.
     #[error(transparent)]
     Core(#[from] DmaError),
-    /// The control block did not follow.
+    /// The control block is not in the expected state.
     #[error(transparent)]
     Control(#[from] ControlError),
-    /// There is no DMA memory for a step of this size.
+    /// DMA memory does not suffice for a step of this size.
     #[error("no DMA memory for this step: give a smaller one, or reserve more")]
     NoMemory(#[source] PlatformError),
     /// Memory or the interrupt failed.
@@ -220,7 +220,7 @@ impl Fault {
         }
     }
 
-    /// The channel that it is about, if it is about one.
+    /// The channel that the fault concerns, if it concerns one.
     #[must_use]
     pub fn channel(&self) -> Option<ChannelName> {
         match self {
@@ -244,7 +244,7 @@ impl Fault {
     }
 }
 
-/// What a deadline was for.
+/// The event that a deadline is set for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Awaited {
@@ -275,13 +275,13 @@ pub struct AcceleratorError {
     pub detail: u32,
     /// The channel on which it was seen, for the codes that concern one.
     pub channel: Option<ChannelName>,
-    /// What the detail means.
+    /// The meaning of the detail.
     pub subject: Subject,
-    /// How far the step was, by what had left memory.
+    /// The phase of the step, by the data that had left memory.
     pub phase: Phase,
 }
 
-/// What an error of the accelerator is about.
+/// The subject of an accelerator's error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Subject {
@@ -289,14 +289,14 @@ pub enum Subject {
     Collision {
         /// Its entry in the order in which they were sent.
         sent: u32,
-        /// The caller's index; `None` for an entry that was left empty.
+        /// The caller's index; `None` for an empty entry.
         given: Option<usize>,
     },
     /// A body.
     Body {
         /// Its place in the order in which they were sent.
         sent: u32,
-        /// The caller's index; `None` for one that was not sent.
+        /// The caller's index; `None` for a record that belongs to no body.
         given: Option<usize>,
     },
     /// A beat of a packet, from 0.
@@ -305,7 +305,7 @@ pub enum Subject {
     Bytes(u32),
     /// The offset of an argument register.
     Argument(u32),
-    /// Nothing that this driver knows.
+    /// Unknown to this driver.
     Unknown,
 }
 
@@ -328,7 +328,7 @@ impl AcceleratorError {
         }
     }
 
-    /// What to look at.
+    /// The advice at the end of the message.
     fn advice(&self) -> &'static str {
         match self.code {
             Some(ErrorCode::TlastEarly | ErrorCode::TlastMissing | ErrorCode::PartialBeat) => {

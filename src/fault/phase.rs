@@ -1,7 +1,7 @@
-//! The phases of a step, which tell how far a failed step had come.
+//! The phases of a step, which tell how far a failed step has come.
 //!
-//! A descriptor is complete when its data has left memory. The accelerator may be behind by what its
-//! FIFOs hold: where a step is small that can be a whole phase.
+//! A descriptor is complete when its data has left memory. The accelerator may be behind by the
+//! content of its FIFOs, which in a small step can be a whole phase.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ pub enum Phase {
     Friction(u32),
     /// The poses go in.
     Poses,
-    /// All is sent, the results come out.
+    /// All data is sent; the results come out.
     Results,
 }
 

@@ -2,7 +2,7 @@
 //! by colour.
 //!
 //! Each collision takes the lowest colour that neither body has. A round searches 64 colours; a
-//! collision that finds none of them free waits for a further round.
+//! collision without a free colour waits for a further round.
 
 use super::{OrderInput, Schedule};
 

@@ -43,8 +43,8 @@ impl Interlock {
         issues.saturating_mul(self.interval).saturating_mul(passes)
     }
 
-    /// The least number of cycles that the passes spend on a body with `uses` collisions, each of
-    /// which waits for the one before.
+    /// The least number of cycles that the passes spend on a body with `uses` collisions: each one
+    /// waits for the one before.
     pub(crate) fn cycles_of_one_body(&self, uses: usize) -> u64 {
         let between = uses.saturating_sub(1) as u64;
         let window = self.of_all_passes(self.windows);

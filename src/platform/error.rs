@@ -1,22 +1,22 @@
-//! Why the platform could not do what it was asked for.
+//! Names each obstacle between the driver and a board's registers, memory and interrupt.
 //!
-//! A message says what to do, or [`PlatformError::next_step`] does where that depends on the kernel's
-//! answer.
+//! The message says what to do. Where that depends on the kernel's answer,
+//! [`PlatformError::next_step`] says it.
 
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Why the platform could not do what it was asked for.
+/// Why a request to the platform failed.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PlatformError {
-    /// Memory was refused.
+    /// The emulated board refused a request for its memory.
     #[error("cannot {act} DMA memory ({what} {value:#x})")]
     Memory {
-        /// What was tried.
+        /// The attempt, as a verb.
         act: &'static str,
-        /// What is known of the memory: its length in bytes, or its address.
+        /// The meaning of `value`: a length in bytes, or an address.
         what: &'static str,
         /// The length or the address.
         value: u64,
@@ -34,7 +34,7 @@ pub enum PlatformError {
         address: u64,
         /// Its length, bytes.
         bytes: u64,
-        /// What the cores can address, bits.
+        /// Width of the cores' addresses, bits.
         address_width: u32,
     },
     /// A range does not lie inside its buffer.
@@ -59,10 +59,10 @@ pub enum PlatformError {
         /// Bytes found.
         found: u64,
     },
-    /// A file of the kernel's could not be used.
+    /// The use of a file failed.
     #[error("cannot {act} {}", path.display())]
     File {
-        /// What was tried.
+        /// The attempt, as a verb.
         act: &'static str,
         /// Which file.
         path: PathBuf,
@@ -70,12 +70,12 @@ pub enum PlatformError {
         #[source]
         source: std::io::Error,
     },
-    /// A file of the kernel's says something else than a number.
+    /// A file of the kernel holds something else than a number.
     #[error("expected a number in {}, found {found:?}", path.display())]
     NotANumber {
         /// Which file.
         path: PathBuf,
-        /// What it says.
+        /// Its text.
         found: String,
     },
     /// There is no such UIO node.
@@ -84,9 +84,9 @@ pub enum PlatformError {
         if found.is_empty() { "none" } else { found }
     )]
     NoNode {
-        /// The name that was looked for.
+        /// The requested name.
         wanted: String,
-        /// The names that there are.
+        /// The names of all nodes.
         found: String,
     },
     /// Several UIO nodes have one name.
@@ -95,7 +95,7 @@ pub enum PlatformError {
          the device tree, or remove the overlay of the others"
     )]
     SeveralNodes {
-        /// The name that was looked for.
+        /// The requested name.
         wanted: String,
         /// The nodes that have it.
         devices: String,
@@ -111,7 +111,7 @@ pub enum PlatformError {
         node: String,
         /// Name of the missing map.
         map: String,
-        /// The names that there are.
+        /// The names of the node's maps.
         found: String,
     },
     /// A device file may not be opened.
@@ -119,7 +119,7 @@ pub enum PlatformError {
     Permission {
         /// Which file.
         path: PathBuf,
-        /// What the kernel says.
+        /// The kernel's answer.
         #[source]
         source: std::io::Error,
     },
@@ -136,9 +136,9 @@ pub enum PlatformError {
         path.display()
     )]
     NoBitstream {
-        /// Where the kernel says so.
+        /// The file with the manager's state.
         path: PathBuf,
-        /// What it says.
+        /// The state.
         found: String,
     },
     /// There is no such FPGA manager.
@@ -147,18 +147,18 @@ pub enum PlatformError {
         if found.is_empty() { "none" } else { found }
     )]
     NoManager {
-        /// The one that was looked for.
+        /// The requested manager.
         wanted: String,
-        /// Those that there are, with their names.
+        /// All managers, with their names.
         found: String,
     },
     /// Several FPGA managers may be the logic's own.
     #[error("several FPGA managers are named as the ZynqMP's own (found: {found})")]
     SeveralManagers {
-        /// Those that there are, with their names.
+        /// All managers, with their names.
         found: String,
     },
-    /// There are FPGA managers, and none is known to be the logic's own.
+    /// FPGA managers exist, and none is known to be the logic's own.
     #[error(
         "no FPGA manager is named {:?} (found: {found}): if one of those programs this logic, \
          name it with --manager, as fpga0; if the logic is known to be programmed, --manager none \
@@ -166,7 +166,7 @@ pub enum PlatformError {
         super::ZYNQMP_MANAGER
     )]
     OtherManagers {
-        /// Those that there are, with their names.
+        /// All managers, with their names.
         found: String,
     },
     /// A UIO node has no interrupt.
@@ -220,15 +220,15 @@ pub enum PlatformError {
         wanted: u64,
         /// The largest piece that is free, bytes.
         largest: u64,
-        /// All there is, bytes.
+        /// The whole pool, bytes.
         total: u64,
     },
-    /// Memory is not where it was thought to be.
+    /// A buffer is not in the state that a request presumes.
     #[error("the DMA buffer at {address:#x} is not {state}")]
     NotGivenOut {
         /// Its bus address.
         address: u64,
-        /// Where it should be.
+        /// The presumed state, as "with the CPU".
         state: &'static str,
     },
     /// There is no such u-dma-buf.
@@ -238,12 +238,12 @@ pub enum PlatformError {
         if found.is_empty() { "none" } else { found }
     )]
     NoUDmaBuf {
-        /// The name that was looked for.
+        /// The requested name.
         wanted: String,
-        /// The names that there are.
+        /// The names of all u-dma-buf buffers.
         found: String,
     },
-    /// A u-dma-buf cannot be mapped as it should be.
+    /// A u-dma-buf has the wrong mode, and the mode cannot be changed.
     #[error(
         "u-dma-buf {name:?} has sync_mode {found}, which cannot give {wanted}, and 2 cannot be \
          written to {}",
@@ -254,20 +254,20 @@ pub enum PlatformError {
         name: String,
         /// Its mode.
         found: u64,
-        /// What was wanted.
+        /// The required kinds of memory.
         wanted: &'static str,
-        /// Where to change it.
+        /// Where to change the mode.
         path: PathBuf,
-        /// What the kernel says.
+        /// The kernel's answer.
         #[source]
         source: std::io::Error,
     },
     /// The caches of a u-dma-buf cannot be maintained.
     #[error("cached DMA buffers need cache maintenance, which {} does not give", path.display())]
     NoMaintenance {
-        /// The attribute that asks for it.
+        /// The attribute that requests maintenance.
         path: PathBuf,
-        /// What the kernel says.
+        /// The kernel's answer.
         #[source]
         source: std::io::Error,
     },
@@ -280,16 +280,16 @@ pub enum PlatformError {
     SyncModeRefused {
         /// Name of the buffer.
         name: String,
-        /// What was written.
+        /// The written mode.
         written: u64,
-        /// What stands there.
+        /// The mode that the attribute shows afterwards.
         found: String,
-        /// What was wanted.
+        /// The required kinds of memory.
         wanted: &'static str,
-        /// Where.
+        /// The attribute.
         path: PathBuf,
     },
-    /// A memory region is of no use.
+    /// A memory region cannot serve as DMA memory.
     #[error("memory {region} of {bytes} bytes at {address:#x} cannot be used: {reason}")]
     UnusableMemory {
         /// Name of the region.
@@ -307,12 +307,12 @@ pub enum PlatformError {
          add one (see device-tree/README.md), or name another with --memory"
     )]
     NoMemory {
-        /// The u-dma-buf that was looked for.
+        /// Name of the missing u-dma-buf.
         u_dma_buf: &'static str,
-        /// The UIO node that was looked for.
+        /// Name of the missing UIO node.
         node: &'static str,
     },
-    /// Somebody else has a device file.
+    /// Another user holds the lock of a device file.
     #[error(
         "{} is locked: another program, or another part of this one, uses it; end that first",
         path.display()
@@ -329,12 +329,12 @@ pub enum PlatformError {
         /// Name of the map.
         map: String,
     },
-    /// A property of the device tree is not what it should be.
+    /// A property of the device tree has an unusable value.
     #[error("expected {expected} in {}, found {found:02x?}: correct the device tree", path.display())]
     DeviceTree {
         /// Which property.
         path: PathBuf,
-        /// What it should hold.
+        /// The expected value, in words.
         expected: &'static str,
         /// Its bytes.
         found: Vec<u8>,
@@ -353,24 +353,24 @@ pub enum PlatformError {
         /// Length by the device tree, if it has that region.
         found: Option<u64>,
     },
-    /// `/dev/mem` was not given.
+    /// The kernel refuses an access through `/dev/mem`.
     #[error(
         "the kernel does not let {} be {act} at {address:#x}: it needs root, and a kernel with \
          STRICT_DEVMEM gives only what it does not use; prefer a UIO node",
         path.display()
     )]
     DevMemRefused {
-        /// What was tried.
+        /// The refused act, as a participle.
         act: &'static str,
         /// Where.
         address: u64,
         /// The file.
         path: PathBuf,
-        /// What the kernel says.
+        /// The kernel's answer.
         #[source]
         source: std::io::Error,
     },
-    /// A range lies outside what was configured for `/dev/mem`.
+    /// A range lies outside the windows that were configured for `/dev/mem`.
     #[error(
         "{bytes} bytes at {address:#x} lie in none of the windows configured for /dev/mem; \
          refusing to map them"
@@ -381,7 +381,7 @@ pub enum PlatformError {
         /// Number of bytes asked for.
         bytes: u64,
     },
-    /// A window for `/dev/mem` overlaps memory of the kernel's.
+    /// A window for `/dev/mem` overlaps memory that the kernel uses.
     #[error(
         "the window at {address:#x} overlaps the kernel's memory {ram}: reserve it with `no-map` \
          in the device tree first"
@@ -389,15 +389,15 @@ pub enum PlatformError {
     KernelMemory {
         /// First byte of the window.
         address: u64,
-        /// What it overlaps.
+        /// The memory, as `/proc/iomem` lists it.
         ram: String,
     },
-    /// There is no way to a board at a socket.
+    /// The connection to a board's socket failed.
     #[error("cannot connect to a board at {}", socket.display())]
     NoServer {
         /// The socket.
         socket: PathBuf,
-        /// What the kernel says.
+        /// The kernel's answer.
         #[source]
         source: std::io::Error,
     },
@@ -416,23 +416,23 @@ pub enum PlatformError {
     ServerSilent {
         /// The socket.
         socket: PathBuf,
-        /// How long it may take.
+        /// The longest time for an answer.
         limit: std::time::Duration,
     },
-    /// The file of a served board's memory could not be used.
+    /// The use of the file with a served board's memory failed.
     #[error("cannot {act} {}, the memory of the board served at {}", memory.display(), socket.display())]
     ServedMemory {
-        /// What was tried.
+        /// The attempt, as a verb.
         act: &'static str,
         /// The file.
         memory: PathBuf,
         /// The socket.
         socket: PathBuf,
-        /// What the kernel says.
+        /// The kernel's answer.
         #[source]
         source: std::io::Error,
     },
-    /// Whoever serves at a socket says other messages.
+    /// The process that serves a board speaks another version of the messages.
     #[error(
         "{} serves version {found} of the messages, expected {expected}: serve the board with the \
          `pgs` of this driver",
@@ -458,7 +458,7 @@ pub enum PlatformError {
         /// The file.
         memory: PathBuf,
     },
-    /// The process that serves a board is gone, or makes no sense any more.
+    /// The process that serves a board is gone, or sends nonsense.
     #[error("the board served at {} is lost: serve it again, and open it again", socket.display())]
     ServerLost {
         /// The socket.

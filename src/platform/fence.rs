@@ -1,4 +1,4 @@
-//! Orders the CPU's memory accesses against those of the device.
+//! Orders memory accesses of the CPU against accesses of the device.
 //!
 //! A doorbell must not overtake the stores to the buffers and descriptors that it announces, and no
 //! load from a buffer may overtake the load that saw its completion. The DMA cores lie outside the

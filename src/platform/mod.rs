@@ -1,7 +1,7 @@
-//! Registers, memory, interrupts and time, as a board gives them; the only folder with `unsafe`.
+//! Reaches the registers, memory, interrupt and clock of a board, on Linux or emulated.
 //!
-//! What is public here works with any UIO node that has registers, an interrupt, and memory for
-//! DMA. The accelerator's driver is built on it:
+//! The public types work with any UIO node that has registers, an interrupt and memory for DMA.
+//! The accelerator's driver is built on them:
 //!
 //! ```no_run
 //! use std::time::Duration;
@@ -60,6 +60,7 @@ pub use linux::uio::{NodePart, UioMap, UioNode};
 pub use linux::uio_device::UioDevice;
 pub use linux::uio_listing::{UioListing, UnreadableNode, uio_listing, uio_nodes};
 pub use linux::uio_window::UioWindow;
+pub(crate) use memory::DmaMemorySource;
 pub(crate) use memory::buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
 pub use memory::reserved::ReservedMemory;
 pub use memory::u_dma_buf::{Caching, try_u_dma_buf, u_dma_buf_names};
@@ -74,7 +75,7 @@ pub(crate) use {
     linux::fpga::fake as fpga_fake, linux::uio::fake as uio_fake, registers::window::fake,
 };
 
-/// What the device will do with a buffer.
+/// The device's use of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Access {
     /// Read it (MM2S).
@@ -84,30 +85,11 @@ pub(crate) enum Access {
 }
 
 /// A board: its register windows, its memory, its one interrupt, its clock.
-///
-/// Memory is addressed by the bus address of its first byte, as `allocate` returned it.
 pub(crate) trait Platform: fmt::Debug + Send + Sync {
-    /// The registers of AXI DMA `core`.
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError>;
-    /// The registers of the accelerator.
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError>;
-
-    /// Contiguous memory, aligned to 64 bytes on the bus, owned by the CPU.
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError>;
-    /// Coherent words that both sides may touch at any time.
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError>;
-    /// Gives memory to the device, which will touch its first `used` beats.
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError>;
-    /// Takes memory back that the device has finished with.
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError>;
-    /// Frees memory that the CPU owns, or shared words that no engine runs on.
-    fn release(&self, address: u64) -> Result<(), PlatformError>;
+    /// The registers of an AXI DMA or of the accelerator.
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError>;
+    /// The memory for DMA.
+    fn memory(&self) -> &dyn DmaMemorySource;
 
     /// Time since an arbitrary moment.
     fn now(&self) -> Duration;

@@ -1,4 +1,4 @@
-//! Says what to do next, by the error number or the state that the kernel gives.
+//! Tells the user what to do after a failure, by the kernel's error number or state.
 
 use std::io;
 use std::path::Path;
@@ -8,8 +8,7 @@ use nix::errno::Errno;
 use super::PlatformError;
 
 impl PlatformError {
-    /// What to do about it, where that depends on the kernel's answer; `None` where the message says
-    /// it.
+    /// The user's next step, if it depends on the kernel's answer; `None` if the message names it.
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
         match self {
@@ -40,14 +39,14 @@ impl PlatformError {
     }
 }
 
-/// How an FPGA manager is named.
+/// How the user names an FPGA manager.
 const MANAGER: &str =
     "with --manager, as fpga1 (`OpenOptions::manager`); `pgs list` shows them with their states";
 
-/// The kernel says that the logic does not run.
+/// After a state in which the logic does not run.
 fn of_state(state: &str) -> String {
     match state {
-        // What was loaded past the kernel leaves its state as it was.
+        // A bitstream that was loaded past the kernel does not change this state.
         "unknown" | "power off" | "power up" => {
             "load a bitstream, for example with `pgs load`; if one was loaded past the kernel, as by \
              JTAG, say so with --manager none (`OpenOptions::manager`): an access to logic that is \
@@ -64,7 +63,7 @@ fn errno(source: &io::Error) -> Option<Errno> {
     source.raw_os_error().map(Errno::from_raw)
 }
 
-/// A device file or an attribute could not be used.
+/// After a failure at a device file or an attribute.
 fn of_file(path: &Path, source: &io::Error) -> String {
     let path = path.display();
     match errno(source) {
@@ -104,7 +103,7 @@ fn of_file(path: &Path, source: &io::Error) -> String {
     }
 }
 
-/// Physical memory could not be reached.
+/// After a failure at physical memory.
 fn of_dev_mem(source: &io::Error) -> String {
     let node = "apply the overlay, and use its UIO node instead (--board uio)";
     match errno(source) {
@@ -116,7 +115,7 @@ fn of_dev_mem(source: &io::Error) -> String {
     }
 }
 
-/// A board's socket could not be connected to.
+/// After a failed connection to a board's socket.
 fn of_socket(socket: &Path, source: &io::Error) -> String {
     let path = socket.display();
     let serve = format!("start one with `pgs serve --socket {path}`");
@@ -148,7 +147,7 @@ fn of_socket(socket: &Path, source: &io::Error) -> String {
     }
 }
 
-/// The memory's file of a served board could not be used.
+/// After a failure at the file with a served board's memory.
 fn of_served_memory(memory: &Path, source: &io::Error) -> String {
     let path = memory.display();
     match errno(source) {
@@ -167,10 +166,10 @@ fn of_served_memory(memory: &Path, source: &io::Error) -> String {
     }
 }
 
-/// What to do where a process has too many files open.
+/// The way out for a process with too many open files.
 const FEWER_FILES: &str = "close files, or raise the limit on open ones (ulimit -n)";
 
-/// The caches of a u-dma-buf cannot be maintained; without caches it can still be used.
+/// After a failure to maintain the caches of a u-dma-buf, which still works without caches.
 fn of_maintenance(path: &Path, source: &io::Error) -> String {
     let name = path.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
     let without =
@@ -193,7 +192,7 @@ fn of_maintenance(path: &Path, source: &io::Error) -> String {
     }
 }
 
-/// The mode of a u-dma-buf does not suit and cannot be changed.
+/// After a failure to change the unsuitable mode of a u-dma-buf.
 fn of_mode(path: &Path, source: &io::Error) -> String {
     let tree = "set `sync-mode = <2>` in its device-tree node";
     let write = format!("echo 2 > {}", path.display());

@@ -33,13 +33,13 @@ impl Deadline {
     }
 }
 
-/// First pause between two looks; each further one is twice as long.
+/// First pause between two polls; each further one is twice as long.
 const FIRST_PAUSE: Duration = Duration::from_micros(1);
-/// Longest pause between two looks.
+/// Longest pause between two polls.
 const LONGEST_PAUSE: Duration = Duration::from_millis(1);
 
-/// Looks until there is something to see: `Some` at the first success of `look`, `None` if it has
-/// still nothing at the deadline. It is called at least once, and once after the deadline.
+/// Polls `look` until it succeeds; `None` if it still fails at the deadline. It is called at least
+/// once, and once after the deadline.
 pub(crate) fn poll_until<T>(
     platform: &dyn Platform,
     deadline: &Deadline,
@@ -47,7 +47,7 @@ pub(crate) fn poll_until<T>(
 ) -> Option<T> {
     let mut pause = FIRST_PAUSE;
     loop {
-        // Asked before looking: a process that was not scheduled for long still looks once more.
+        // Read before `look`: a process that was not scheduled for long still polls once more.
         let last = deadline.expired(platform);
         if let Some(seen) = look() {
             return Some(seen);

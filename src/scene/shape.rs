@@ -19,7 +19,7 @@ pub struct ShapeError {
 
 /// Mass properties shared by bodies.
 ///
-/// The axes of the inertia are those of the body: its orientation turns them into the world.
+/// The axes of the inertia are the body's axes: its orientation turns them into the world.
 ///
 /// ```
 /// use zynq_pgs::Shape;

@@ -96,21 +96,10 @@ impl Accelerator {
             version.0,
             version.1
         );
-        let limits = Limits {
-            variant,
-            flush_subnormals: device.capabilities.flush_subnormals,
-            // An index has to name every body, whatever the bitstream says.
-            body_capacity: device.capabilities.body_capacity.min(variant.body_capacity()),
-            collision_capacity: device.capabilities.collision_capacity,
-            shape_capacity: device.capabilities.shape_capacity,
-            memory_bytes: device.capabilities.memory_bytes,
-            bytes_per_body: device.capabilities.bytes_per_body,
-            bytes_per_collision: device.capabilities.bytes_per_collision,
-        };
         Self {
             board,
+            limits: Limits::of(&device.capabilities),
             device,
-            limits,
             shapes: Vec::new(),
             shapes_loaded: 0,
             bank: Bank::First,

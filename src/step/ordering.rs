@@ -14,8 +14,7 @@ use crate::order::{
     OrderInput, OrderReport, Orderer, Room, Schedule,
 };
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
-use crate::validate::{InputError, SceneNeeds};
-use crate::validate::{Limits, needed};
+use crate::validate::{Excess, InputError, Limits, SceneNeeds, needed};
 
 /// Orders the collisions of steps, keeping its memory from one to the next.
 #[derive(Debug, Default)]
@@ -69,8 +68,8 @@ impl Ordering {
     /// indices in bodies and collisions were not, and are checked here.
     ///
     /// # Errors
-    /// [`InputError::OrderTooLong`], [`InputError::Order`]; where only live bodies are kept,
-    /// [`InputError::SpanTooLong`] and [`InputError::TooManyLive`].
+    /// [`Excess::OrderTooLong`], [`InputError::Order`]; where only live bodies are kept,
+    /// [`Excess::SpanTooLong`] and [`Excess::TooManyLive`].
     pub(super) fn order<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
@@ -220,7 +219,8 @@ fn too_long(
     let most = uses.iter().copied().enumerate().rev().max_by_key(|(_, uses)| *uses);
     let (body, uses) = most.unwrap_or_default();
     let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
-    let carriers = needs.carriers(|variant| {
+    let excess = Excess::OrderTooLong { collisions, bodies, limit, depth, body, uses };
+    needs.refuse(excess, |variant| {
         let Ok(window) = IssueWindow::of_profile(variant.profile, parameters) else { return false };
         let apart = window.depth() as usize * window.per_issue() as usize;
         let of_body = uses.saturating_sub(1).saturating_mul(apart).saturating_add(1);
@@ -232,8 +232,7 @@ fn too_long(
         let as_here = if window.depth() >= depth { limit.saturating_add(1) } else { 0 };
         let entries = collisions.max(of_body).max(as_here);
         SceneNeeds { collisions: entries, ..needs }.has_room(variant)
-    });
-    InputError::OrderTooLong { collisions, bodies, limit, depth, body, uses, carriers }
+    })
 }
 
 /// The error of an order in which bodies live too long, or too many at once.
@@ -247,25 +246,18 @@ fn too_crowded(
 ) -> InputError {
     let (bodies, collisions) = (input.moving.len(), input.pairs.len());
     let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
-    let held = match error {
-        LiveError::SpanTooLong { .. } => 0,
-        LiveError::TooFewPlaces { held } => held,
+    let at = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
+    let (excess, held) = match error {
+        LiveError::SpanTooLong { body, first, last } => {
+            let (body, first, last) = (at(body), at(first), at(last));
+            (Excess::SpanTooLong { body, first, last, lag: room.lag }, 0)
+        }
+        LiveError::TooFewPlaces { held } => {
+            (Excess::TooManyLive { held, alive, places: room.places }, held)
+        }
     };
-    let carriers = needs.carriers(|variant| match variant.profile.flow {
+    needs.refuse(excess, |variant| match variant.profile.flow {
         Flow::Passes => true,
         Flow::Window(window) => window.lag > longest_span && window.slots > held,
-    });
-    let at = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
-    match error {
-        LiveError::SpanTooLong { body, first, last } => InputError::SpanTooLong {
-            body: at(body),
-            first: at(first),
-            last: at(last),
-            lag: room.lag,
-            carriers,
-        },
-        LiveError::TooFewPlaces { held } => {
-            InputError::TooManyLive { held, alive, places: room.places, carriers }
-        }
-    }
+    })
 }

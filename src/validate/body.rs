@@ -1,17 +1,15 @@
-//! Refuses bodies that cannot be solved.
+//! Refuses bodies that no bitstream can solve, or that this one cannot hold.
 
 use pgs_interface::number::StreamFormat;
-use pgs_interface::profile::Variant;
 
-use super::InputError;
 use super::range::Held;
-use super::{Scene, all_within, first};
+use super::{Excess, InputError, InputItem, OutOfRange, Scene, all_within, first};
 use crate::scene::Body;
 
 const LINEAR: &str = "linear velocity";
 const ANGULAR: &str = "angular velocity";
 
-/// What of one body a step refuses.
+/// Checks one body.
 #[inline]
 pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result<(), InputError> {
     for (field, values, format) in fields(body, &scene.held) {
@@ -39,10 +37,10 @@ pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result
     Ok(())
 }
 
-/// Numbers of a body: name, values, format.
+/// A field of a body: name, values, format.
 type Field<'a> = (&'static str, &'a [f32], StreamFormat);
 
-/// The numbers of a body that are streamed.
+/// The streamed fields of a body.
 #[inline]
 fn fields<'a>(body: &'a Body, held: &Held) -> [Field<'a>; 4] {
     [
@@ -53,7 +51,7 @@ fn fields<'a>(body: &'a Body, held: &Held) -> [Field<'a>; 4] {
     ]
 }
 
-/// Names the number of a field that is known not to be finite or to be out of range.
+/// Names the number that puts a field out of range.
 #[cold]
 fn number_refused(
     index: usize,
@@ -67,26 +65,26 @@ fn number_refused(
     }
     let limit = format.largest();
     let (component, found) = first(values, |value| value.abs() > limit);
-    let carriers = scene.demand.carriers(|variant: &Variant| {
+    let (item, smallest, largest) = (InputItem::Body(index), 0.0, limit);
+    let number = OutOfRange { item, field, component, found, format, smallest, largest };
+    scene.needs.refuse(Excess::OutOfRange(number), |variant| {
         let fields = fields(body, &Held::by(&variant.numbers));
         fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
-    });
-    InputError::BodyOutOfRange { body: index, field, component, found, format, limit, carriers }
+    })
 }
 
-/// A body's shape as an index; an index that this machine cannot address is in no table.
+/// The shape of a body as an index. An index beyond `usize` saturates, and is in no table.
 pub(crate) fn shape_of(body: &Body) -> usize {
     usize::try_from(body.shape).unwrap_or(usize::MAX)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::scene_on;
     use super::*;
-    use crate::scene::{Pose, Shape, Velocity};
-    use crate::validate::SceneNeeds;
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
+    use crate::scene::{Pose, Velocity};
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, Profile};
 
-    const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
     const MOVING: Body = Body {
         pose: Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] },
         velocity: Velocity { linear: [4.0, 5.0, 6.0], angular: [7.0, 8.0, 9.0] },
@@ -94,11 +92,7 @@ mod tests {
     };
 
     fn check_on(profile: &'static Profile, body: &Body) -> Result<(), InputError> {
-        let demand = SceneNeeds { bodies: 8, collisions: 0, inertia: Inertia::Isotropic };
-        let variant = &profile.default_variant();
-        let held = Held::by(&variant.numbers);
-        let scene = Scene { shapes: &SHAPES, demand, variant, held, flush_subnormals: false };
-        check_body(7, body, &scene)
+        check_body(7, body, &scene_on(&profile.default_variant(), false))
     }
 
     fn check(body: &Body) -> Result<(), InputError> {
@@ -118,19 +112,9 @@ mod tests {
         body.velocity.angular[1] = -65_504.0_f32.next_up();
         assert_eq!(check_on(&MIXED, &body), Ok(()), "bodies are f32 there");
         let refused = check_on(&HALF, &body).expect_err("beyond binary16");
-        assert!(
-            matches!(
-                refused,
-                InputError::BodyOutOfRange {
-                    body: 7,
-                    field: "angular velocity",
-                    component: 1,
-                    format: StreamFormat::Binary16,
-                    ..
-                }
-            ),
-            "{refused}"
-        );
+        let number = refused.out_of_range().expect("out of range");
+        assert_eq!((number.item, number.field), (InputItem::Body(7), "angular velocity"));
+        assert_eq!((number.component, number.format), (1, StreamFormat::Binary16));
         assert_eq!(
             refused.to_string(),
             "body 7: angular velocity[1] is -65504.004, but this bitstream holds bodies in \

@@ -1,11 +1,13 @@
-//! Finds the profiles that can take a scene which this bitstream refuses.
+//! Finds the profiles that take a scene which this bitstream refuses.
 
 use std::fmt;
 
 use pgs_interface::profile::{Inertia, PROFILES, Profile, Variant};
 
-/// The profiles, as they are built unless other formats are chosen, that could carry what was
-/// refused, in a scene of as many bodies and collisions.
+use super::{Excess, InputError};
+
+/// The profiles, built with their default formats, that take a refused scene: its refused value and
+/// its number of bodies and collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CapableProfiles {
     /// Bit k is profile k of the table.
@@ -22,7 +24,7 @@ impl CapableProfiles {
         (0..).zip(PROFILES).filter(move |(at, _)| bits >> at & 1 != 0).map(|(_, profile)| *profile)
     }
 
-    /// How they must be built to know the inertia of the scene's bodies.
+    /// The inertia with which they must be built for the shapes of the scene.
     #[must_use]
     pub const fn inertia(&self) -> Inertia {
         self.inertia
@@ -47,21 +49,27 @@ impl fmt::Display for CapableProfiles {
     }
 }
 
-/// What a scene asks of any bitstream.
+/// The demands of a scene on any bitstream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SceneNeeds {
     /// Number of bodies.
     pub(crate) bodies: usize,
     /// Number of collisions.
     pub(crate) collisions: usize,
-    /// The least that its shapes need.
+    /// The least inertia that its shapes need.
     pub(crate) inertia: Inertia,
 }
 
 impl SceneNeeds {
-    /// The profiles that have room for the scene and fulfil a condition.
+    /// The error of a scene that exceeds a bitstream; `can` tells whether another would take the
+    /// excess.
     #[cold]
-    pub(crate) fn carriers(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
+    pub(crate) fn refuse(&self, excess: Excess, can: impl Fn(&Variant) -> bool) -> InputError {
+        InputError::BeyondBitstream { excess, capable: self.capable(can) }
+    }
+
+    /// The profiles that have room for the scene and satisfy `can`.
+    pub(crate) fn capable(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
         let mut profiles = 0;
         for (at, profile) in PROFILES.iter().enumerate() {
             let variant = Variant { inertia: self.inertia, ..profile.default_variant() };
@@ -70,11 +78,16 @@ impl SceneNeeds {
         CapableProfiles { profiles, inertia: self.inertia }
     }
 
+    /// On-chip memory of the scene, bytes; saturates.
+    pub(crate) fn memory(&self, bytes_per_body: u32, bytes_per_collision: u32) -> u64 {
+        let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
+        bytes(self.bodies, bytes_per_body)
+            .saturating_add(bytes(self.collisions, bytes_per_collision))
+    }
+
     /// Whether the on-chip memory of a bitstream takes the scene.
     pub(crate) fn has_room(&self, variant: &Variant) -> bool {
-        let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
-        let needed = bytes(self.bodies, variant.bytes_per_body())
-            .saturating_add(bytes(self.collisions, variant.bytes_per_collision()));
+        let needed = self.memory(variant.bytes_per_body(), variant.bytes_per_collision());
         self.bodies as u64 <= u64::from(variant.body_capacity())
             && needed <= u64::from(variant.profile.memory.bytes)
     }
@@ -82,33 +95,32 @@ impl SceneNeeds {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::NEEDS as SMALL;
     use super::*;
 
-    fn names(demand: SceneNeeds, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
-        demand.carriers(can).profiles().map(|profile| profile.name).collect()
+    fn names(needs: SceneNeeds, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
+        needs.capable(can).profiles().map(|profile| profile.name).collect()
     }
-
-    const SMALL: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     #[test]
     fn profiles_are_named_in_the_order_of_the_table() {
         let all = ["naive", "float", "half", "mixed", "windowed", "windowed16"];
         assert_eq!(names(SMALL, |_| true), all);
-        let text = SMALL.carriers(|variant| variant.profile.name != "half").to_string();
+        let text = SMALL.capable(|variant| variant.profile.name != "half").to_string();
         assert_eq!(text, "profiles that could: naive, float, mixed, windowed, windowed16");
-        assert_eq!(SMALL.carriers(|_| false).to_string(), "no profile could");
+        assert_eq!(SMALL.capable(|_| false).to_string(), "no profile could");
         let world = SceneNeeds { inertia: Inertia::World, ..SMALL };
-        let text = world.carriers(|variant| variant.profile.id == 1).to_string();
+        let text = world.capable(|variant| variant.profile.id == 1).to_string();
         assert_eq!(text, "profiles that could, built with world inertia: float");
         assert_eq!(
-            world.carriers(|_| false).to_string(),
+            world.capable(|_| false).to_string(),
             "no profile could, built with world inertia"
         );
     }
 
     #[test]
     fn a_profile_without_room_for_the_scene_is_left_out() {
-        // 16-bit indices end at 65,535. What keeps no more than is alive has room for any number.
+        // 16-bit indices end at 65,535. A design that keeps live bodies alone takes 2^20 bodies.
         let bodies = |bodies| SceneNeeds { bodies, ..SMALL };
         assert_eq!(names(bodies(65_536), |_| true).len(), 6);
         let windowed = ["windowed", "windowed16"];

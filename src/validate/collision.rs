@@ -1,10 +1,10 @@
-//! Refuses collisions that cannot be solved.
+//! Refuses collisions that no bitstream can solve.
 
 use super::InputError;
 use super::{all_within, first};
 use crate::scene::{CONTACT_POINTS, Collision, Contact};
 
-/// Checks what a collision says by itself; returns the indices of its two bodies.
+/// Checks a collision without its bodies; returns their indices.
 #[inline]
 pub(crate) fn check_collision(
     index: usize,
@@ -45,10 +45,10 @@ pub(crate) fn check_collision(
     Ok(pair)
 }
 
-/// Says what is wrong with the length of a normal.
+/// The error for a normal that is not of unit length.
 #[cold]
 fn normal_length(collision: usize, normal: [f32; 3]) -> InputError {
-    // The squares of small numbers are 0 in f32, and those of large ones infinite.
+    // In f32 the square of a small number is 0, and the square of a large number is infinite.
     let [x, y, z] = normal.map(f64::from);
     let length = (x * x + y * y + z * z).sqrt();
     if length == 0.0 {
@@ -59,8 +59,8 @@ fn normal_length(collision: usize, normal: [f32; 3]) -> InputError {
     InputError::NormalLength { collision, length }
 }
 
-/// Names the number of these contact points that is known not to be finite. A refusal stands even if
-/// none is found.
+/// Names the number of the used contact points that is not finite. If none is found, the refusal
+/// stands.
 #[cold]
 fn contact_not_finite(collision: usize, contacts: &[Contact]) -> InputError {
     let mut values =
@@ -76,10 +76,9 @@ fn contact_not_finite(collision: usize, contacts: &[Contact]) -> InputError {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{UNUSED, USED};
     use super::*;
 
-    const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
-    const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
     const COLLISION: Collision = Collision {
         body_a: 2,
         body_b: 0,

@@ -1,12 +1,11 @@
-//! Lists everything that a step refuses before anything is sent.
+//! The reasons for which a step refuses its input, before anything is sent.
 
-use super::CapableProfiles;
+use super::{CapableProfiles, Excess, OutOfRange};
 use crate::order::OrderError;
 use crate::scene::ShapeError;
-use pgs_interface::number::StreamFormat;
 use pgs_interface::record::CONTACT_POINTS;
 
-/// Why input was refused. Nothing was sent, and nothing of the caller's was changed.
+/// Why input was refused. Nothing was sent, and the caller's data is unchanged.
 ///
 /// Indices are positions in the arrays that the caller gave.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -16,35 +15,16 @@ pub enum InputError {
     #[error("a step needs at least one body, found none: give all bodies, static ones included")]
     NoBodies,
 
-    /// More bodies than the bitstream has room for, whatever the memory.
-    #[error(
-        "found {found} bodies, the bitstream takes at most {limit}: give fewer, or load another \
-         ({carriers})"
-    )]
-    TooManyBodies {
-        /// Bodies given.
-        found: usize,
-        /// Bodies that the bitstream takes.
-        limit: u32,
-        /// Who takes them.
-        carriers: CapableProfiles,
+    /// The input exceeds this bitstream; another may take it.
+    #[error("{excess} ({capable})")]
+    BeyondBitstream {
+        /// The part of the input that exceeds it.
+        excess: Excess,
+        /// Profiles that take the step.
+        capable: CapableProfiles,
     },
 
-    /// More collisions than the bitstream has room for, whatever the memory.
-    #[error(
-        "found {found} collisions, the bitstream takes at most {limit}: give fewer, or load another \
-         ({carriers})"
-    )]
-    TooManyCollisions {
-        /// Collisions given.
-        found: usize,
-        /// Collisions that the bitstream takes.
-        limit: u32,
-        /// Who takes them.
-        carriers: CapableProfiles,
-    },
-
-    /// Other bodies than those that the step was started with.
+    /// The number of bodies differs from the number that the step was started with.
     #[error(
         "the step was started with {expected} bodies, {found} wait for its results: give the same \
          bodies; the step was stopped"
@@ -56,28 +36,28 @@ pub enum InputError {
         expected: usize,
     },
 
-    /// A prepared step whose records are not there any more.
+    /// The records of a prepared step are no longer in its buffers.
     #[error(
         "the prepared step is not in its buffers any more, because another was packed in its \
          place, or it was prepared by another accelerator: prepare it again"
     )]
     NotPrepared,
 
-    /// What was refused while it was packed was right when it was looked at again.
+    /// The input changed during the call: packing refused it, and validation then accepted it.
     #[error(
         "bodies or collisions were wrong when they were packed, and right when they were looked at \
          again: what is given must stay as it is until the call returns"
     )]
     Unsteady,
 
-    /// More collisions were written than room was made for.
+    /// More collisions were written than were announced.
     #[error("more than the {announced} collisions that were announced were written: announce more")]
     MoreThanAnnounced {
         /// Collisions announced.
         announced: usize,
     },
 
-    /// Collisions that are written one by one go to the board as they come.
+    /// Collisions that are written one by one cannot be reordered, verified or placed.
     #[error(
         "collisions that are written one by one cannot be put into another order, verified, or \
          placed on a bitstream that keeps live bodies alone: ask for the order as given, \
@@ -85,36 +65,15 @@ pub enum InputError {
     )]
     WrittenInOrder,
 
-    /// A prepared step that was checked and packed with other shapes.
+    /// The prepared step was checked and packed with other shapes.
     #[error("the shapes were replaced after the step was prepared: prepare it again")]
     ShapesChanged,
 
-    /// Separate arrays of different lengths.
+    /// The separate arrays of one kind differ in length.
     #[error("the arrays of the {what} have different lengths: give every array for all {what}")]
     UnequalLengths {
         /// "bodies" or "collisions".
         what: &'static str,
-    },
-
-    /// Bodies and collisions together exceed the on-chip memory.
-    #[error(
-        "{bodies} bodies and {collisions} collisions need {needed} bytes of on-chip memory, there \
-         are {available}: with so many bodies at most {fitting} collisions fit; give fewer, or load \
-         another bitstream ({carriers})"
-    )]
-    MemoryExceeded {
-        /// Bodies given.
-        bodies: usize,
-        /// Collisions given.
-        collisions: usize,
-        /// What they need, bytes.
-        needed: u64,
-        /// What there is, bytes.
-        available: u32,
-        /// Collisions that fit beside the bodies; 0 if the bodies alone are too many.
-        fitting: u32,
-        /// Who has room for both.
-        carriers: CapableProfiles,
     },
 
     /// A number of a body is NaN or infinite.
@@ -130,29 +89,7 @@ pub enum InputError {
         found: f32,
     },
 
-    /// A number of a body is beyond what the bitstream's streams, arithmetic or arrays hold.
-    #[error(
-        "body {body}: {field}[{component}] is {found}, but this bitstream holds bodies in {}, \
-         which ends at {limit}: bring it into range, or load another ({carriers})", format.name()
-    )]
-    BodyOutOfRange {
-        /// The body.
-        body: usize,
-        /// Position, orientation, linear or angular velocity.
-        field: &'static str,
-        /// Component of the field, 0 for x.
-        component: usize,
-        /// Its value.
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// Its largest number.
-        limit: f32,
-        /// Who carries the body.
-        carriers: CapableProfiles,
-    },
-
-    /// A quaternion that stands for no rotation.
+    /// The quaternion of a body is no rotation.
     #[error(
         "body {body}: the orientation has length {length:e}, which cannot be normalised (at least \
          {limit:e} and finite): give a unit quaternion x, y, z, w",
@@ -165,7 +102,7 @@ pub enum InputError {
         length: f32,
     },
 
-    /// A static body moves.
+    /// A static body has a velocity.
     #[error(
         "body {body} is static (its shape has inverse mass 0) but its {field}[{component}] is \
          {found}: set its velocity to 0, or give it a shape with a mass"
@@ -211,7 +148,7 @@ pub enum InputError {
         bodies: usize,
     },
 
-    /// A collision of a body with itself.
+    /// A body collides with itself.
     #[error("collision {collision}: bodies A and B are both {body}: remove the collision")]
     SelfCollision {
         /// The collision.
@@ -220,7 +157,7 @@ pub enum InputError {
         body: u32,
     },
 
-    /// A collision between bodies that cannot move.
+    /// Both bodies of a collision are static.
     #[error(
         "collision {collision}: bodies {body_a} and {body_b} are both static, nothing can move: \
          remove the collision"
@@ -234,7 +171,7 @@ pub enum InputError {
         body_b: u32,
     },
 
-    /// A number of contact points outside 1 to [`CONTACT_POINTS`].
+    /// The number of contact points is not within 1 to [`CONTACT_POINTS`].
     #[error(
         "collision {collision}: its count is {found}, expected 1 to {CONTACT_POINTS} contact \
          points: remove the collision if there are none, reduce them if there are more"
@@ -283,7 +220,7 @@ pub enum InputError {
         length: f32,
     },
 
-    /// A number of a contact point in use is NaN or infinite.
+    /// A number of a used contact point is NaN or infinite.
     #[error(
         "collision {collision}, contact point {contact}: {field}[{component}] is {found}, expected \
          a finite number: correct it, or lower the count if the point is not in use"
@@ -301,124 +238,11 @@ pub enum InputError {
         found: f32,
     },
 
-    /// A number of a collision is beyond what the bitstream's streams or arithmetic hold.
-    #[error(
-        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream holds \
-         collisions in {}, which ends at {limit}: bring it into range, or load another ({carriers})",
-        contact.map_or_else(String::new, |contact| format!(", contact point {contact}")),
-        format.name()
-    )]
-    CollisionOutOfRange {
-        /// The collision.
-        collision: usize,
-        /// The contact point, if it is a number of one.
-        contact: Option<usize>,
-        /// What is streamed: position of a body, offset from body A, normal, distance.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for the distance.
-        component: usize,
-        /// Its value as it would be streamed.
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// Its largest number.
-        limit: f32,
-        /// Who carries the collision.
-        carriers: CapableProfiles,
-    },
-
-    /// The collisions cannot be ordered, or have hazards although the order was to be verified.
+    /// The collisions cannot be ordered, or their order has hazards and was to be verified.
     #[error(
         "the collisions cannot be sent in this order: ask for another, or do not have it verified"
     )]
     Order(#[from] OrderError),
-
-    /// An order without hazards has so many empty entries that the bitstream has no room for it.
-    #[error(
-        "{collisions} collisions without a hazard, at a depth of {depth} issue slots, take more \
-         than the {limit} entries that fit beside {bodies} bodies (body {body} alone has {uses} of \
-         the collisions): give fewer, ask for another order, or load another bitstream ({carriers})"
-    )]
-    OrderTooLong {
-        /// Collisions given.
-        collisions: usize,
-        /// Bodies given.
-        bodies: usize,
-        /// Entries that fit beside the bodies.
-        limit: usize,
-        /// Hazard window, issue slots.
-        depth: u32,
-        /// The moving body with the most collisions.
-        body: usize,
-        /// Its collisions.
-        uses: usize,
-        /// Who could have room for it.
-        carriers: CapableProfiles,
-    },
-
-    /// A body lives longer than the bitstream lets it.
-    #[error(
-        "in this order body {body} is used first in entry {first} and last in entry {last}, and the \
-         bitstream's delay lines take spans of less than {lag}: ask for another order (hazard-free \
-         keeps spans short unless a body has dozens of collisions), or load another bitstream \
-         ({carriers})"
-    )]
-    SpanTooLong {
-        /// The body with the longest span.
-        body: usize,
-        /// Entry of its first use.
-        first: usize,
-        /// Entry of its last use.
-        last: usize,
-        /// Length of the delay lines.
-        lag: u32,
-        /// Who could take it.
-        carriers: CapableProfiles,
-    },
-
-    /// More bodies are alive than the bitstream has places for.
-    #[error(
-        "in this order {held} moving bodies are on their way through the passes at once ({alive} of \
-         them with collisions to come), the bitstream has places for {places}: ask for \
-         another order, or load another bitstream ({carriers})"
-    )]
-    TooManyLive {
-        /// Most bodies that need a place at once.
-        held: u32,
-        /// Most bodies between their first and their last use.
-        alive: u32,
-        /// Places that there are.
-        places: u32,
-        /// Who could take them.
-        carriers: CapableProfiles,
-    },
-
-    /// The constraint rows of a collision leave what the bitstream's arithmetic holds.
-    #[error(
-        "collision {collision}{}: {field}[{component}] is {found}, but this bitstream computes \
-         constraint rows in binary16, which takes {smallest:e} to {largest}: bring it into range, \
-         or load another ({carriers})",
-        contact.map_or_else(String::new, |contact| format!(", contact point {contact}"))
-    )]
-    RowOutOfRange {
-        /// The collision.
-        collision: usize,
-        /// The contact point, if it is a number of one.
-        contact: Option<usize>,
-        /// Lever arm about a body, inverse effective mass, sum of the inverse masses or of the
-        /// contact points.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for a mass.
-        component: usize,
-        /// Its magnitude, or the most that rounding can make of it; m or 1/kg.
-        found: f32,
-        /// The smallest magnitude.
-        smallest: f32,
-        /// The largest magnitude that leaves room for the roundings.
-        largest: f32,
-        /// Who computes the rows.
-        carriers: CapableProfiles,
-    },
 
     /// A parameter is outside its range.
     #[error("the {parameter} is {found}, expected {expected}: correct the step parameters")]
@@ -431,28 +255,7 @@ pub enum InputError {
         expected: &'static str,
     },
 
-    /// A parameter is beyond what the bitstream's arithmetic holds.
-    #[error(
-        "the {parameter} is {found:e}, but this bitstream computes in binary16, which takes \
-         {}{smallest:e} to {largest}: correct the step parameters, or load another ({carriers})",
-        if *zero { "0, or " } else { "" }
-    )]
-    ParameterOutOfRange {
-        /// The parameter; a gravity component with its axis.
-        parameter: &'static str,
-        /// Its value.
-        found: f32,
-        /// Whether 0 is taken as well.
-        zero: bool,
-        /// The smallest magnitude, 0 aside.
-        smallest: f32,
-        /// The largest magnitude.
-        largest: f32,
-        /// Who computes with it.
-        carriers: CapableProfiles,
-    },
-
-    /// More passes than a step takes.
+    /// A solver has more iterations than a step takes.
     #[error(
         "{found} {solver} iterations, a step takes at most {limit}: give fewer, or take several \
          steps",
@@ -484,7 +287,7 @@ pub enum InputError {
         limit: u32,
     },
 
-    /// An inverse mass or inertia is no mass or inertia.
+    /// An inverse mass or inertia is negative, subnormal or not finite.
     #[error(
         "shape {shape}: its {field}[{component}] is {found:e}, expected 0 or a finite number of at \
          least {limit:e}: correct it",
@@ -501,50 +304,11 @@ pub enum InputError {
         found: f32,
     },
 
-    /// A shape whose inertia differs between axes.
-    #[error(
-        "shape {shape}: its inverse inertia is {found:?}, but this bitstream takes only shapes with \
-         three equal components (cube, sphere): give such a shape, or load another ({carriers})"
-    )]
-    Anisotropic {
-        /// The shape.
-        shape: usize,
-        /// Its inverse inertia, 1/(kg m²).
-        found: [f32; 3],
-        /// Who takes it.
-        carriers: CapableProfiles,
-    },
-
-    /// An inverse mass or inertia is beyond what the bitstream's arithmetic or streams hold.
-    #[error(
-        "shape {shape}: its {field}[{component}] is {found:e}, but this bitstream holds it in {}, \
-         from {smallest:e} to {largest}: give another shape, or load another bitstream ({carriers})",
-        format.name()
-    )]
-    ShapeOutOfRange {
-        /// The shape.
-        shape: usize,
-        /// Inverse mass or inverse inertia.
-        field: &'static str,
-        /// Component of the field, 0 for x; 0 for the mass.
-        component: usize,
-        /// Its value, 1/kg or 1/(kg m²).
-        found: f32,
-        /// The narrowest format on its way.
-        format: StreamFormat,
-        /// The smallest number above 0 that does not become 0.
-        smallest: f32,
-        /// The largest number.
-        largest: f32,
-        /// Who carries it.
-        carriers: CapableProfiles,
-    },
-
-    /// A shape was asked for that has no mass properties.
+    /// The mass or the size of a shape gives no valid mass properties.
     #[error(transparent)]
     Shape(#[from] ShapeError),
 
-    /// A static shape that could rotate.
+    /// A static shape has an inverse inertia.
     #[error(
         "shape {shape} is static (inverse mass 0) but its inverse inertia is {found}: set that to \
          0 too, or give the shape a mass"
@@ -558,10 +322,28 @@ pub enum InputError {
 }
 
 impl InputError {
-    /// Length below which a quaternion stands for no rotation.
+    /// The part of the input that exceeds the bitstream, if that is the reason.
+    #[must_use]
+    pub fn excess(&self) -> Option<Excess> {
+        match self {
+            Self::BeyondBitstream { excess, .. } => Some(*excess),
+            _ => None,
+        }
+    }
+
+    /// The number that is out of the bitstream's range, if that is the reason.
+    #[must_use]
+    pub fn out_of_range(&self) -> Option<OutOfRange> {
+        match self.excess() {
+            Some(Excess::OutOfRange(number)) => Some(number),
+            _ => None,
+        }
+    }
+
+    /// Length of the shortest quaternion that counts as a rotation.
     pub const SHORTEST_ORIENTATION: f32 = 1e-6;
     /// How far from 1 a normal's length may be.
     pub const NORMAL_TOLERANCE: f32 = 1e-3;
-    /// Passes of each solver that a step takes.
+    /// The most iterations of each solver.
     pub const MAX_ITERATIONS: u32 = pgs_interface::control::ITERATIONS_MAX;
 }

@@ -1,13 +1,14 @@
 //! Refuses bad input before anything is sent.
 //!
-//! One pass over the bodies, one over the collisions ([`validate`]). What passes here, a board of
-//! the same capacities accepts. A step looks at its input while it packs it ([`Quick`]), and comes
-//! here for the words of what it has found.
+//! [`validate`] makes one pass over the bodies and one over the collisions. A board of the same
+//! capacities accepts every step that passes. Packing screens its input block by block ([`Quick`])
+//! and calls [`validate`] only for the error of a block that it refuses.
 
 mod body;
 pub(crate) mod capable_profiles;
 mod collision;
 pub(crate) mod error;
+mod excess;
 mod look;
 mod parameters;
 mod quick;
@@ -19,6 +20,7 @@ mod shape;
 pub use capable_profiles::CapableProfiles;
 pub(crate) use capable_profiles::SceneNeeds;
 pub use error::InputError;
+pub use excess::{Excess, InputItem, OutOfRange};
 pub(crate) use look::Look;
 pub(crate) use quick::{Block, Quick};
 pub(crate) use reach::Locations;
@@ -30,12 +32,13 @@ use self::parameters::check_parameters;
 use self::range::{Held, check_range};
 use self::rows::Rows;
 use self::shape::check_shapes;
+use crate::control_block::Capabilities;
 use crate::record::relative::anchors;
 use crate::scene::{Bodies, Collision, Collisions, Shape, StepParameters};
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Geometry, Variant};
 
-/// What a bitstream carries.
+/// The capacities and formats of a bitstream, as far as they limit the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Limits {
     /// Its profile, formats and inertia.
@@ -50,27 +53,57 @@ pub(crate) struct Limits {
     pub(crate) shape_capacity: u32,
     /// On-chip memory that bodies and collisions share, bytes.
     pub(crate) memory_bytes: u32,
-    /// What a body takes of it, bytes.
+    /// Memory of a body, bytes.
     pub(crate) bytes_per_body: u32,
-    /// What a collision takes of it, bytes.
+    /// Memory of a collision, bytes.
     pub(crate) bytes_per_collision: u32,
 }
 
 impl Limits {
-    /// Collisions that fit beside so many bodies.
+    /// The limits of a bitstream.
+    pub(crate) fn of(capabilities: &Capabilities) -> Self {
+        Self {
+            variant: capabilities.variant,
+            flush_subnormals: capabilities.flush_subnormals,
+            // An index has to name every body, whatever capacity the bitstream reports.
+            body_capacity: capabilities.body_capacity.min(capabilities.variant.body_capacity()),
+            collision_capacity: capabilities.collision_capacity,
+            shape_capacity: capabilities.shape_capacity,
+            memory_bytes: capabilities.memory_bytes,
+            bytes_per_body: capabilities.bytes_per_body,
+            bytes_per_collision: capabilities.bytes_per_collision,
+        }
+    }
+
+    /// The limits of a bitstream that has room for every scene.
+    #[cfg(any(test, feature = "bench"))]
+    pub(crate) const fn roomy(variant: Variant) -> Self {
+        Self {
+            variant,
+            flush_subnormals: false,
+            body_capacity: u32::MAX,
+            collision_capacity: u32::MAX,
+            shape_capacity: u32::MAX,
+            memory_bytes: u32::MAX,
+            bytes_per_body: 0,
+            bytes_per_collision: 0,
+        }
+    }
+
+    /// The number of collisions that fit beside `bodies` bodies.
     pub(crate) fn room_for_collisions(&self, bodies: usize) -> u32 {
         let for_bodies = (bodies as u64).saturating_mul(u64::from(self.bytes_per_body));
         let Some(free) = u64::from(self.memory_bytes).checked_sub(for_bodies) else { return 0 };
-        // Where they take nothing there is room for all that can be counted.
+        // Collisions that take no memory are limited by their capacity alone.
         let fitting = free.checked_div(u64::from(self.bytes_per_collision)).unwrap_or(u64::MAX);
         u32::try_from(fitting).unwrap_or(u32::MAX).min(self.collision_capacity)
     }
 }
 
-/// Everything a step refuses before anything is sent.
+/// Checks the whole input of a step.
 ///
-/// `shapes` is the table as [`validate_shapes`] has accepted it; a shape of inverse mass 0 is
-/// static. Of several mistakes of one kind the one with the lowest index is reported.
+/// `shapes` is a table that [`validate_shapes`] has accepted; a shape of inverse mass 0 is static.
+/// Among several mistakes of one kind, the mistake with the lowest index is reported.
 pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     bodies: &B,
     collisions: &C,
@@ -79,7 +112,7 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     limits: &Limits,
 ) -> Result<(), InputError> {
     let scene = preflight(bodies, collisions, shapes, parameters, limits)?;
-    for index in 0..scene.demand.bodies {
+    for index in 0..scene.needs.bodies {
         check_body(index, &bodies.body(index), &scene)?;
     }
     // A body without a shape was refused above.
@@ -87,14 +120,14 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         let body = bodies.body(index);
         (body.pose.position, shapes.get(shape_of(&body)).unwrap_or(&Shape::STATIC))
     };
-    for index in 0..scene.demand.collisions {
+    for index in 0..scene.needs.collisions {
         check_whole(index, &collisions.collision(index), end, &scene)?;
     }
     Ok(())
 }
 
-/// What a step refuses whatever its bodies and collisions hold: the first part of [`validate`].
-/// Returns what the rest looks at.
+/// The first part of [`validate`]: checks parameters, counts and shapes, before any body or
+/// collision. Returns the context of the checks that follow.
 pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     bodies: &B,
     collisions: &C,
@@ -109,17 +142,17 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
             return Err(InputError::UnequalLengths { what });
         }
     }
-    let demand =
+    let needs =
         SceneNeeds { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
-    check_parameters(parameters, &demand, limits)?;
-    check_room(&demand, limits)?;
-    check_shapes(shapes, &demand, limits)?;
+    check_parameters(parameters, &needs, limits)?;
+    check_room(&needs, limits)?;
+    check_shapes(shapes, &needs, limits)?;
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
-    Ok(Scene { shapes, demand, variant: &limits.variant, held, flush_subnormals })
+    Ok(Scene { shapes, needs, variant: &limits.variant, held, flush_subnormals })
 }
 
-/// What of one collision a step refuses; `end` is the position and the shape of a body.
+/// Checks one collision; `end` returns the position and the shape of a body.
 #[inline]
 fn check_whole<'a>(
     index: usize,
@@ -127,7 +160,7 @@ fn check_whole<'a>(
     end: impl Fn(usize) -> ([f32; 3], &'a Shape),
     scene: &Scene<'_>,
 ) -> Result<(), InputError> {
-    let (body_a, body_b) = check_collision(index, collision, scene.demand.bodies)?;
+    let (body_a, body_b) = check_collision(index, collision, scene.needs.bodies)?;
     let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
     let (mut positions, shapes) = ([a, b], [shape_a, shape_b]);
     let moves = shapes.map(|shape| !shape.is_static());
@@ -135,7 +168,7 @@ fn check_whole<'a>(
         let Collision { body_a, body_b, .. } = *collision;
         return Err(InputError::BothStatic { collision: index, body_a, body_b });
     }
-    // What is finite in world coordinates is in the range of f32 as it is.
+    // World coordinates in f32 are in range if they are finite, which is already checked.
     let geometry = scene.variant.profile.geometry;
     if scene.held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute {
         return Ok(());
@@ -150,63 +183,52 @@ fn check_whole<'a>(
     Ok(())
 }
 
-/// What the checks of single bodies and collisions look at beside them.
+/// The context in which bodies and collisions are checked.
 #[derive(Debug)]
 pub(crate) struct Scene<'a> {
     shapes: &'a [Shape],
-    demand: SceneNeeds,
+    needs: SceneNeeds,
     variant: &'a Variant,
     held: Held,
     flush_subnormals: bool,
 }
 
-fn check_room(demand: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
-    let SceneNeeds { bodies, collisions, .. } = *demand;
+fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
+    let SceneNeeds { bodies, collisions, .. } = *needs;
     if bodies == 0 {
         return Err(InputError::NoBodies);
     }
-    let carriers = || demand.carriers(|_| true);
-    if exceeds(bodies, limits.body_capacity) {
-        let (limit, carriers) = (limits.body_capacity, carriers());
-        return Err(InputError::TooManyBodies { found: bodies, limit, carriers });
+    let refuse = |excess| Err(needs.refuse(excess, |_| true));
+    let limit = limits.body_capacity;
+    if exceeds(bodies, limit) {
+        return refuse(Excess::TooManyBodies { found: bodies, limit });
     }
-    if exceeds(collisions, limits.collision_capacity) {
-        let (limit, carriers) = (limits.collision_capacity, carriers());
-        return Err(InputError::TooManyCollisions { found: collisions, limit, carriers });
+    let limit = limits.collision_capacity;
+    if exceeds(collisions, limit) {
+        return refuse(Excess::TooManyCollisions { found: collisions, limit });
     }
-    // Neither product leaves 64 bits: both factors are below 2^32 by now.
-    let bytes = |records: usize, each: u32| (records as u64).saturating_mul(u64::from(each));
-    let for_bodies = bytes(bodies, limits.bytes_per_body);
-    let needed = for_bodies.saturating_add(bytes(collisions, limits.bytes_per_collision));
+    let needed = needs.memory(limits.bytes_per_body, limits.bytes_per_collision);
     let available = limits.memory_bytes;
     if needed > u64::from(available) {
         let fitting = limits.room_for_collisions(bodies);
-        let carriers = carriers();
-        return Err(InputError::MemoryExceeded {
-            bodies,
-            collisions,
-            needed,
-            available,
-            fitting,
-            carriers,
-        });
+        return refuse(Excess::MemoryExceeded { bodies, collisions, needed, available, fitting });
     }
     Ok(())
 }
 
-/// Whether a number of things is above a limit of the hardware.
+/// Whether a count exceeds a limit of the hardware.
 fn exceeds(found: usize, limit: u32) -> bool {
     !u32::try_from(found).is_ok_and(|found| found <= limit)
 }
 
-/// Whether all are numbers of at most that magnitude. Without a branch per number: these loops see
+/// Whether every value is a number of at most this magnitude. No branch per value: these loops read
 /// every number of a step.
 fn all_within(values: &[f32], limit: f32) -> bool {
     values.iter().fold(true, |within, value| within & (value.abs() <= limit))
 }
 
-/// The first value that is wrong, and where it stands. The caller has found one to exist; should
-/// that not be so, the refusal stands, and blames the first.
+/// The index of the first wrong value, and the value. The caller knows that one exists; if none is
+/// found, the refusal stands with index 0 and NaN.
 #[cold]
 fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
     let mut values = values.iter().copied().enumerate();
@@ -219,7 +241,7 @@ pub(crate) mod tests {
     use crate::scene::{Body, BodyArrays, CollisionArrays, Contact, Pose, Velocity};
     use pgs_interface::profile::{self, Inertia, Profile};
 
-    /// What a bitstream of that profile reports.
+    /// The limits of a bitstream of `profile`, with the capacities of [`FLOAT`].
     pub(crate) const fn on(profile: &'static Profile, inertia: Inertia) -> Limits {
         Limits { variant: Variant { profile, numbers: profile.numbers, inertia }, ..FLOAT }
     }
@@ -240,7 +262,17 @@ pub(crate) mod tests {
         bytes_per_body: 24,
         bytes_per_collision: 16,
     };
-    const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+    pub(crate) const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+    pub(crate) const NEEDS: SceneNeeds =
+        SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
+    pub(crate) const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
+    pub(crate) const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
+
+    /// The context of checks on a bitstream of `variant`.
+    pub(crate) fn scene_on(variant: &Variant, flush_subnormals: bool) -> Scene<'_> {
+        let held = Held::by(&variant.numbers);
+        Scene { shapes: &SHAPES, needs: NEEDS, variant, held, flush_subnormals }
+    }
 
     fn body(shape: u32) -> Body {
         Body {
@@ -320,7 +352,7 @@ pub(crate) mod tests {
             "found 131073 bodies, the bitstream takes at most 131072: give fewer, or load another \
              (profiles that could: windowed, windowed16)"
         );
-        // Indices of sixteen bits name fewer.
+        // Indices of sixteen bits name fewer bodies.
         assert_eq!(room(65_536, 0, &HALF), Ok(()));
         let text = room(65_537, 0, &HALF).expect_err("one too many").to_string();
         assert!(text.contains("found 65537 bodies") && text.contains("at most 65536"), "{text}");
@@ -335,20 +367,14 @@ pub(crate) mod tests {
         // (4,194,304 - 38,881 * 24) / 16 = 203,822.5
         assert_eq!(room(38_881, 203_822, &FLOAT), Ok(()));
         let refused = room(38_881, 203_823, &FLOAT).expect_err("one too many");
-        assert!(
-            matches!(
-                refused,
-                InputError::MemoryExceeded {
-                    bodies: 38_881,
-                    collisions: 203_823,
-                    needed: 4_194_312,
-                    available: 4_194_304,
-                    fitting: 203_822,
-                    ..
-                }
-            ),
-            "{refused}"
-        );
+        let expected = Excess::MemoryExceeded {
+            bodies: 38_881,
+            collisions: 203_823,
+            needed: 4_194_312,
+            available: 4_194_304,
+            fitting: 203_822,
+        };
+        assert_eq!(refused.excess(), Some(expected), "{refused}");
         let text = refused.to_string();
         for number in ["38881", "203823", "4194312", "4194304", "203822"] {
             assert!(text.contains(number), "{text}");
@@ -359,15 +385,14 @@ pub(crate) mod tests {
     #[test]
     fn bodies_that_fill_the_memory_alone_leave_room_for_no_collision() {
         let small = Limits { memory_bytes: 47, ..FLOAT };
-        assert!(matches!(
-            room(2, 0, &small),
-            Err(InputError::MemoryExceeded { needed: 48, available: 47, fitting: 0, .. })
-        ));
         let free = Limits { bytes_per_collision: 0, ..small };
-        assert!(matches!(
-            room(2, 9, &free),
-            Err(InputError::MemoryExceeded { needed: 48, fitting: 0, .. })
-        ));
+        for (collisions, limits) in [(0, &small), (9, &free)] {
+            let refused = room(2, collisions, limits).expect_err("48 bytes");
+            let (bodies, needed, available, fitting) = (2, 48, 47, 0);
+            let expected =
+                Excess::MemoryExceeded { bodies, collisions, needed, available, fitting };
+            assert_eq!(refused.excess(), Some(expected), "{refused}");
+        }
     }
 
     #[test]
@@ -375,10 +400,7 @@ pub(crate) mod tests {
         let free = Limits { bytes_per_collision: 0, collision_capacity: 9, ..FLOAT };
         assert_eq!(room(1, 9, &free), Ok(()));
         let refused = room(1, 10, &free).expect_err("one too many");
-        assert!(
-            matches!(refused, InputError::TooManyCollisions { found: 10, limit: 9, .. }),
-            "{refused}"
-        );
+        assert_eq!(refused.excess(), Some(Excess::TooManyCollisions { found: 10, limit: 9 }));
     }
 
     #[test]
@@ -411,7 +433,7 @@ pub(crate) mod tests {
         assert_eq!(check(&[0, 1], &[]), unequal("collisions"));
     }
 
-    /// A number that is right by itself, in a scene that a stream of sixteen bits does not carry.
+    /// 70,000 m are in the range of f32, and beyond the range of a stream of sixteen bits.
     #[test]
     fn ranges_are_checked_where_the_streams_are_narrow() {
         let mut bodies = [body(0), body(1)];
@@ -423,16 +445,16 @@ pub(crate) mod tests {
         bodies[1].pose.position[2] = 7e4;
         assert_eq!(check(&bodies, &FLOAT), Ok(()));
         let refused = check(&bodies, &HALF).expect_err("beyond binary16");
-        assert!(matches!(refused, InputError::BodyOutOfRange { body: 1, .. }), "{refused}");
+        let of = |refused: &InputError| {
+            refused.out_of_range().map(|number| (number.item, number.component))
+        };
+        assert_eq!(of(&refused), Some((InputItem::Body(1), 2)), "{refused}");
         let refused = check(&bodies, &on(&profile::MIXED, Inertia::Isotropic));
         let refused = refused.expect_err("body B is far from A");
-        assert!(
-            matches!(refused, InputError::CollisionOutOfRange { collision: 0, component: 2, .. }),
-            "{refused}"
-        );
+        assert_eq!(of(&refused), Some((InputItem::Collision(0, Some(0)), 2)), "{refused}");
     }
 
-    /// 300,000 collisions and shapes with axes: `half` alone has room for the first.
+    /// 300,000 collisions, and a shape with three different inertias: `float` has no room for them.
     #[test]
     fn shapes_are_refused_with_the_profiles_that_have_room_for_the_scene() {
         let shapes = [Shape::STATIC, Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 2.0, 3.0] }];
@@ -451,7 +473,7 @@ pub(crate) mod tests {
         );
     }
 
-    /// Each number of it has its place in binary16, and what is made of them has none.
+    /// Every number of the collision fits binary16, and its effective mass does not.
     #[test]
     fn rows_are_checked_where_they_are_computed_in_sixteen_bits() {
         let mut bodies = [body(0), body(1)];
@@ -462,13 +484,8 @@ pub(crate) mod tests {
         };
         assert_eq!(check(&FLOAT), Ok(()));
         let refused = check(&HALF).expect_err("1 + 1.5 x 300^2");
-        assert!(
-            matches!(
-                refused,
-                InputError::RowOutOfRange { collision: 0, field: "inverse effective mass", .. }
-            ),
-            "{refused}"
-        );
+        let of = refused.out_of_range().map(|number| (number.item, number.field));
+        assert_eq!(of, Some((InputItem::Rows(0, Some(0)), "inverse effective mass")), "{refused}");
         assert_eq!(check(&on(&profile::MIXED, Inertia::Isotropic)), Ok(()));
     }
 

@@ -1,23 +1,23 @@
 //! Refuses step parameters outside their range.
 
 use pgs_interface::number::StreamFormat;
+use pgs_interface::profile::Variant;
 
-use super::Limits;
 use super::range::{computes_short, smallest_short};
-use super::{InputError, SceneNeeds};
+use super::{Excess, InputError, InputItem, Limits, OutOfRange, SceneNeeds};
 use crate::scene::StepParameters;
 
 const TIME_STEP: &str = "time step";
 
-/// What of the parameters themselves a step refuses.
+/// Checks the step parameters against their ranges, and against the bitstream's arithmetic.
 pub(crate) fn check_parameters(
     parameters: &StepParameters,
-    demand: &SceneNeeds,
+    needs: &SceneNeeds,
     limits: &Limits,
 ) -> Result<(), InputError> {
     let finite = |value: f32| value.is_finite();
     let not_negative = |value: f32| value.is_finite() && value >= 0.0;
-    // Its reciprocal is computed, and that of a subnormal is infinite.
+    // The accelerator computes its reciprocal, which is infinite for a subnormal number.
     let positive = |value: f32| value.is_normal() && value > 0.0;
     let [x, y, z] = parameters.gravity;
     let StepParameters { time_step, position_drift, position_coefficient, .. } = *parameters;
@@ -44,25 +44,22 @@ pub(crate) fn check_parameters(
         }
     }
     if computes_short(&limits.variant.numbers) {
-        let largest = StreamFormat::Binary16.largest();
-        for (parameter, found, ..) in checks {
+        let (format, component) = (StreamFormat::Binary16, 0);
+        let largest = format.largest();
+        for (field, found, ..) in checks {
             let nonzero = smallest_short(limits.flush_subnormals);
-            let (zero, smallest) = match parameter {
-                // Its reciprocal is computed.
+            let (zero, smallest) = match field {
+                // Its reciprocal must fit, too.
                 TIME_STEP => (false, nonzero.max(1.0 / largest)),
                 _ => (true, nonzero),
             };
             let fits = (smallest..=largest).contains(&found.abs()) || (zero && found == 0.0);
             if !fits {
-                let carriers = demand.carriers(|variant| !computes_short(&variant.numbers));
-                return Err(InputError::ParameterOutOfRange {
-                    parameter,
-                    found,
-                    zero,
-                    smallest,
-                    largest,
-                    carriers,
-                });
+                let item = InputItem::Parameters { zero };
+                let number =
+                    OutOfRange { item, field, component, found, format, smallest, largest };
+                let holds = |variant: &Variant| !computes_short(&variant.numbers);
+                return Err(needs.refuse(Excess::OutOfRange(number), holds));
             }
         }
     }
@@ -78,14 +75,11 @@ pub(crate) fn check_parameters(
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{FLOAT, HALF};
+    use super::super::tests::{FLOAT, HALF, NEEDS};
     use super::*;
-    use pgs_interface::profile::Inertia;
-
-    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
     fn checked(parameters: &StepParameters) -> Result<(), InputError> {
-        check_parameters(parameters, &DEMAND, &FLOAT)
+        check_parameters(parameters, &NEEDS, &FLOAT)
     }
 
     const NOT_FINITE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
@@ -172,7 +166,7 @@ mod tests {
     fn what_binary16_does_not_hold_is_refused_where_it_computes() {
         let mut parameters = StepParameters::default();
         let check = |parameters: &StepParameters, limits: &Limits| {
-            check_parameters(parameters, &DEMAND, limits).map_err(|error| error.to_string())
+            check_parameters(parameters, &NEEDS, limits).map_err(|error| error.to_string())
         };
         assert_eq!(check(&parameters, &HALF), Ok(()));
         parameters.gravity[2] = -7e4;
@@ -210,7 +204,7 @@ mod tests {
             let check = |value, limits| {
                 let mut parameters = StepParameters::default();
                 set(&mut parameters, value);
-                check_parameters(&parameters, &DEMAND, limits).map_err(|error| error.to_string())
+                check_parameters(&parameters, &NEEDS, limits).map_err(|error| error.to_string())
             };
             for (limits, smallest) in [(&HALF, subnormal), (&flush, normal)] {
                 assert_eq!(check(0.0, limits), Ok(()), "{name}");

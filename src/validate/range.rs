@@ -1,30 +1,28 @@
-//! The range of the numbers that a bitstream keeps from stream to solver; refuses collisions with
-//! numbers outside it.
+//! Refuses collisions with numbers outside the range that a bitstream keeps from stream to solver.
 
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Geometry, Variant};
 
-use super::InputError;
-use super::Scene;
+use super::{Excess, InputError, InputItem, OutOfRange, Scene};
 use crate::record::relative::difference;
 use crate::scene::{CONTACT_POINTS, Collision, Contact};
 
-/// Formats of what a step is given, each the narrowest on its way: stream, arithmetic, array.
+/// The narrowest format of each input on its way through stream, arithmetic and array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Held {
     /// Positions and orientations.
     pub(crate) poses: StreamFormat,
     /// Linear and angular velocities.
     pub(crate) velocities: StreamFormat,
-    /// Everything of a collision.
+    /// All numbers of a collision.
     pub(crate) collisions: StreamFormat,
 }
 
 impl Held {
-    /// What a bitstream of these formats holds.
+    /// The narrowest formats of a bitstream.
     pub(crate) const fn by(numbers: &Numbers) -> Self {
         Self {
-            // Streamed in f32 they are integrated in f32.
+            // Poses that are streamed in f32 are integrated in f32.
             poses: numbers.poses,
             velocities: narrower(narrower(numbers.bodies, numbers.updates), numbers.velocities),
             collisions: narrower(numbers.collisions, numbers.rows),
@@ -32,7 +30,7 @@ impl Held {
     }
 }
 
-/// The format in which a number survives a stream and what lies behind it.
+/// The narrower of the format on a stream and the precision behind it.
 const fn narrower(stream: StreamFormat, behind: Precision) -> StreamFormat {
     match (stream, behind) {
         (StreamFormat::F32, Precision::Binary16) => StreamFormat::Binary16,
@@ -40,24 +38,26 @@ const fn narrower(stream: StreamFormat, behind: Precision) -> StreamFormat {
     }
 }
 
-/// Whether constants of the arithmetic, masses and step parameters, meet sixteen bits.
+/// Whether masses and step parameters enter arithmetic of sixteen bits.
 pub(crate) const fn computes_short(numbers: &Numbers) -> bool {
     !matches!((numbers.rows, numbers.updates), (Precision::F32, Precision::F32))
 }
 
-/// The smallest magnitude that binary16 does not take for 0.
+/// The smallest magnitude that binary16 does not round or flush to 0.
 pub(crate) const fn smallest_short(flush_subnormals: bool) -> f32 {
     // 2^-14, or the subnormal 2^-24.
     if flush_subnormals { 1.0 / 16_384.0 } else { 1.0 / 16_777_216.0 }
 }
 
-/// What of a collision a bitstream streams, by geometry: name and value.
+/// The number of vectors that [`vectors`] lists.
 const VECTORS: usize = 3;
 
-/// Checks every number of a collision that is otherwise right, as it would be streamed.
+/// Checks every number of a collision as it is streamed. [`check_collision`] has accepted it.
 ///
-/// `positions` are those of bodies A and B.
-// Out of the loop, which most streams leave without it.
+/// `positions` belong to bodies A and B.
+///
+/// [`check_collision`]: super::collision::check_collision
+// Not inlined: collisions in f32 and world coordinates never reach it.
 #[inline(never)]
 pub(crate) fn check_range(
     index: usize,
@@ -71,7 +71,7 @@ pub(crate) fn check_range(
     Err(refused(index, collision, positions, scene))
 }
 
-/// Whether a bitstream carries every number of a collision.
+/// Whether every number of a collision is in a bitstream's range.
 pub(crate) fn fits(variant: &Variant, collision: &Collision, positions: [[f32; 3]; 2]) -> bool {
     let limit = Held::by(&variant.numbers).collisions.largest();
     let within = |vector: [f32; 3]| {
@@ -87,7 +87,7 @@ pub(crate) fn fits(variant: &Variant, collision: &Collision, positions: [[f32; 3
     fit
 }
 
-/// The vectors of a collision as they are streamed, its contact points aside.
+/// The streamed vectors of a collision, contact points excluded: name and value.
 fn vectors(
     geometry: Geometry,
     collision: &Collision,
@@ -102,7 +102,7 @@ fn vectors(
     }
 }
 
-/// What contact points are streamed relative to.
+/// The point that streamed contact points are relative to.
 pub(crate) fn origin(geometry: Geometry, [a, _]: [[f32; 3]; 2]) -> [f32; 3] {
     match geometry {
         Geometry::Absolute => [0.0; 3],
@@ -110,13 +110,13 @@ pub(crate) fn origin(geometry: Geometry, [a, _]: [[f32; 3]; 2]) -> [f32; 3] {
     }
 }
 
-/// The contact points in use.
+/// The used contact points.
 pub(crate) fn used(collision: &Collision) -> &[Contact] {
     let used = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS).min(CONTACT_POINTS);
     &collision.contacts[..used]
 }
 
-/// Names the number that is known to be out of range.
+/// Names the number that is out of range.
 #[cold]
 fn refused(
     index: usize,
@@ -144,29 +144,17 @@ fn refused(
         .chain(of_contacts)
         .find(|(.., found)| found.is_nan() || found.abs() > limit)
         .unwrap_or((None, "normal", 0, collision.normal[0]));
-    let carriers = scene.demand.carriers(|variant| fits(variant, collision, positions));
-    InputError::CollisionOutOfRange {
-        collision: index,
-        contact,
-        field,
-        component,
-        found,
-        format,
-        limit,
-        carriers,
-    }
+    let (item, smallest, largest) = (InputItem::Collision(index, contact), 0.0, limit);
+    let number = OutOfRange { item, field, component, found, format, smallest, largest };
+    scene.needs.refuse(Excess::OutOfRange(number), |variant| fits(variant, collision, positions))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{UNUSED, USED, scene_on};
     use super::*;
-    use crate::validate::SceneNeeds;
-    use pgs_interface::number::StreamFormat;
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile, WINDOWED16};
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, Profile, WINDOWED16};
 
-    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
-    const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
-    const USED: Contact = Contact { point: [1.0, 2.0, 3.0], distance: -0.01 };
     const COLLISION: Collision = Collision {
         body_a: 0,
         body_b: 1,
@@ -180,11 +168,7 @@ mod tests {
         collision: &Collision,
         positions: [[f32; 3]; 2],
     ) -> Result<(), InputError> {
-        let variant = profile.default_variant();
-        let held = Held::by(&variant.numbers);
-        let scene =
-            Scene { shapes: &[], demand: DEMAND, variant: &variant, held, flush_subnormals: false };
-        check_range(7, collision, positions, &scene)
+        check_range(7, collision, positions, &scene_on(&profile.default_variant(), false))
     }
 
     fn far(contact: Contact) -> Collision {
@@ -225,21 +209,10 @@ mod tests {
         ];
         for (collision, positions, contact, field, component, found) in cases {
             let refused = check(&HALF, &collision, positions).expect_err(field);
-            let InputError::CollisionOutOfRange { carriers, .. } = refused else {
-                panic!("{refused}")
-            };
-            let (format, limit) = (StreamFormat::Binary16, 65_504.0);
-            let expected = InputError::CollisionOutOfRange {
-                collision: 7,
-                contact,
-                field,
-                component,
-                found,
-                format,
-                limit,
-                carriers,
-            };
-            assert_eq!(refused, expected);
+            let (item, format) = (InputItem::Collision(7, contact), StreamFormat::Binary16);
+            let (smallest, largest) = (0.0, 65_504.0);
+            let expected = OutOfRange { item, field, component, found, format, smallest, largest };
+            assert_eq!(refused.out_of_range(), Some(expected), "{refused}");
             assert_eq!(check(&FLOAT, &collision, positions), Ok(()));
         }
     }

@@ -1,44 +1,43 @@
-//! Refuses collisions whose constraint rows leave the range of binary16, on a bitstream that computes
-//! rows in binary16.
+//! Refuses collisions whose constraint rows leave the range of binary16, on a bitstream that
+//! computes rows in binary16.
 //!
-//! An effective mass that overflows there is 0, and the accelerator leaves the contact out without
-//! a word; a lever arm that overflows makes NaN of the row, even that of a static body.
+//! If the inverse effective mass overflows, the effective mass is 0 and the accelerator silently
+//! ignores the contact. If a lever arm overflows, even one of a static body, the row is NaN.
 
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Variant;
 
-use super::InputError;
-use super::Scene;
 use super::range::{fits, origin, used};
+use super::{Excess, InputError, InputItem, OutOfRange, Scene};
 use crate::record::relative::difference;
 use crate::scene::{Collision, Contact, Shape};
 
-/// A component of a moment is two products of the lever arm with a unit normal: at most sqrt(2)
-/// times its longest component. 65504 less that, and less what the roundings add.
+/// The longest component of a lever arm, m. A component of a moment is two products of lever arm
+/// and unit normal: at most sqrt(2) times this, which stays below 65504 with the roundings added.
 pub(crate) const LONGEST_ARM: f32 = 43_000.0;
-/// 65504 less what the roundings on the way add, 2 %: for effective inverse masses, their
-/// reciprocals, and the sum of the contact points.
+/// 65504 less 2 % for the roundings on the way: the limit of inverse effective masses, of their
+/// reciprocals, and of the sum of the contact points.
 pub(crate) const LARGEST: f32 = 64_000.0;
-/// The same of 2^14, whose reciprocal is the smallest that is not flushed.
+/// 2^14 less 2 %, where subnormal numbers are flushed: 2^-14 is the smallest reciprocal left.
 const LARGEST_FLUSHED: f32 = 16_000.0;
-/// The most that a coordinate loses on its way, as a share of it: cut off, or rounded twice.
+/// The relative error of a coordinate on its way: truncated once, or rounded twice.
 pub(crate) const LOSS: f32 = 1.0 / 1024.0;
 
-/// What the rows of a collision are made of.
+/// The input from which the constraint rows of a collision are computed.
 pub(crate) struct Rows<'a> {
     pub(crate) index: usize,
     pub(crate) collision: &'a Collision,
-    /// Of bodies A and B, as they are streamed.
+    /// Positions of bodies A and B, as they are streamed.
     pub(crate) positions: [[f32; 3]; 2],
     pub(crate) shapes: [&'a Shape; 2],
 }
 
-/// A number that the rows come upon: contact point, name, component, value, and its range.
+/// A number on the way to the rows: contact point, name, component, value, smallest, largest.
 type Found = (Option<usize>, &'static str, usize, f32, f32, f32);
 
 impl Rows<'_> {
-    /// Refuses what leaves the range.
-    // Out of the loop, which most streams leave without it.
+    /// Refuses a collision with a number out of range.
+    // Not inlined: collisions whose rows are computed in f32 never reach it.
     #[inline(never)]
     pub(crate) fn check(&self, scene: &Scene<'_>) -> Result<(), InputError> {
         if self.fit(scene.variant, scene.flush_subnormals) {
@@ -47,7 +46,7 @@ impl Rows<'_> {
         Err(self.refused(scene))
     }
 
-    /// Whether a bitstream computes every row.
+    /// Whether every row stays in the range of a bitstream's arithmetic.
     pub(crate) fn fit(&self, variant: &Variant, flush: bool) -> bool {
         if variant.numbers.rows == Precision::F32 {
             return true;
@@ -71,7 +70,7 @@ impl Rows<'_> {
         self.shapes[0].inverse_mass + self.shapes[1].inverse_mass
     }
 
-    /// The most that it can be for these lever arms, whatever the direction of the row, 1/kg.
+    /// The largest inverse effective mass for these lever arms, over all directions of a row, 1/kg.
     fn inverse_effective_mass(&self, arms: [[f32; 3]; 2]) -> f32 {
         let turning = |side: usize| {
             let [x, y, z] = self.shapes[side].inverse_inertia;
@@ -81,7 +80,7 @@ impl Rows<'_> {
         self.inverse_mass() + turning(0) + turning(1)
     }
 
-    /// Everything that is held against a limit, in the order of the record.
+    /// Every number that has a limit, in the order of the record.
     fn numbers(&self, variant: &Variant, flush: bool) -> Vec<Found> {
         let origin = origin(variant.profile.geometry, self.positions);
         let positions = self.positions.map(|position| difference(position, origin));
@@ -111,7 +110,7 @@ impl Rows<'_> {
         numbers
     }
 
-    /// Names the number that is known to be out of range.
+    /// Names the number that is out of range.
     #[cold]
     fn refused(&self, scene: &Scene<'_>) -> InputError {
         let flush = scene.flush_subnormals;
@@ -128,21 +127,13 @@ impl Rows<'_> {
                 smallest,
                 largest,
             ));
-        let carriers = scene.demand.carriers(|variant| {
+        // The sum of the masses has no upper limit of its own: the effective mass includes it.
+        let format = StreamFormat::Binary16;
+        let (item, largest) = (InputItem::Rows(self.index, contact), largest.min(format.largest()));
+        let number = OutOfRange { item, field, component, found, format, smallest, largest };
+        scene.needs.refuse(Excess::OutOfRange(number), |variant| {
             fits(variant, self.collision, self.positions) && self.fit(variant, flush)
-        });
-        // What bounds a sum of masses from above is the effective mass.
-        let largest = largest.min(StreamFormat::Binary16.largest());
-        InputError::RowOutOfRange {
-            collision: self.index,
-            contact,
-            field,
-            component,
-            found,
-            smallest,
-            largest,
-            carriers,
-        }
+        })
     }
 }
 
@@ -151,7 +142,7 @@ pub(crate) const fn largest(flush: bool) -> f32 {
     if flush { LARGEST_FLUSHED } else { LARGEST }
 }
 
-/// The most that each component of a lever arm can be, whatever rounding does to its two ends.
+/// The largest magnitude of each component of a lever arm, over all roundings of its two ends.
 fn arm(point: [f32; 3], position: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|k| {
         let (x, p) = (point[k], position[k]);
@@ -166,26 +157,23 @@ fn add(sum: [f32; 3], point: [f32; 3]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::range::Held;
+    use super::super::tests::{UNUSED, scene_on};
     use super::*;
-    use crate::validate::SceneNeeds;
     use pgs_interface::number::Numbers;
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED};
+    use pgs_interface::profile::{FLOAT, HALF, MIXED};
 
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
     const GROUND: Shape = Shape::STATIC;
-    const DEMAND: SceneNeeds = SceneNeeds { bodies: 2, collisions: 1, inertia: Inertia::Isotropic };
 
-    /// Two contact points, at `point` and at the origin; those that are not used do not matter.
+    /// Two used contact points, at the origin and at `point`; the other two are not numbers.
     fn collision(point: [f32; 3]) -> Collision {
-        let unused = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
         let at = |point| Contact { point, distance: 0.0 };
         Collision {
             body_a: 0,
             body_b: 1,
             normal: [0.0, -1.0, 0.0],
             count: 2,
-            contacts: [at([0.0; 3]), at(point), unused, unused],
+            contacts: [at([0.0; 3]), at(point), UNUSED, UNUSED],
         }
     }
 
@@ -196,11 +184,8 @@ mod tests {
         collision: &Collision,
         positions: [[f32; 3]; 2],
     ) -> Result<(), String> {
-        let held = Held::by(&variant.numbers);
-        let variant = &variant;
-        let scene = Scene { shapes: &[], demand: DEMAND, variant, held, flush_subnormals };
         let rows = Rows { index: 7, collision, positions, shapes };
-        rows.check(&scene).map_err(|error| error.to_string())
+        rows.check(&scene_on(&variant, flush_subnormals)).map_err(|error| error.to_string())
     }
 
     const HALF_BUILT: Variant = HALF.default_variant();
@@ -218,7 +203,7 @@ mod tests {
         assert!(text.starts_with(expected), "{text}");
         assert!(text.contains("in binary16, which takes 1.5625e-5 to 64000"), "{text}");
         assert!(text.ends_with("(profiles that could: naive, float, mixed, windowed)"), "{text}");
-        // Of both bodies together, by the largest of their inertias.
+        // The sum over both bodies, each with its largest inverse inertia.
         assert_eq!(check([&GROUND, &CUBE], [150.0, 0.0, 0.0]), Ok(()));
         assert!(check([&CUBE, &CUBE], [150.0, 0.0, 0.0]).is_err());
         let flat = Shape { inverse_mass: 1.0, inverse_inertia: [0.1, 0.1, 1.5] };
@@ -230,7 +215,7 @@ mod tests {
         }
     }
 
-    /// Rounding its ends may make an arm of 1 m one of 32 m at 16 km.
+    /// At 16 km, rounding of both ends may turn a lever arm of 1 m into 32 m.
     #[test]
     fn what_is_lost_of_the_coordinates_counts() {
         let light = Shape::isotropic(1.0, 100.0);
@@ -283,7 +268,7 @@ mod tests {
         assert!(text.contains("lever arm about body B[0]"), "{text}");
     }
 
-    /// The friction passes need their centre.
+    /// The friction passes compute the centre of the contact points.
     #[test]
     fn the_sum_of_the_contact_points_is_held_against_the_limit() {
         let point_mass = Shape::isotropic(1.0, 0.0);

@@ -4,25 +4,24 @@ use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Inertia, Variant};
 
 use super::range::{computes_short, smallest_short};
-use super::{InputError, SceneNeeds};
-use super::{Limits, exceeds};
+use super::{Excess, InputError, InputItem, Limits, OutOfRange, SceneNeeds, exceeds};
 use crate::scene::Shape;
 
 const MASS: &str = "inverse mass";
 const INERTIA: &str = "inverse inertia";
 
-/// What the shape table refuses, whatever scene it is for.
+/// Checks a shape table before any scene uses it.
 pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), InputError> {
-    let demand = SceneNeeds { bodies: 0, collisions: 0, inertia: needed(shapes) };
-    check_shapes(shapes, &demand, limits)
+    let needs = SceneNeeds { bodies: 0, collisions: 0, inertia: needed(shapes) };
+    check_shapes(shapes, &needs, limits)
 }
 
-/// What the shape table of a scene refuses.
+/// Checks the shape table of a scene.
 ///
 /// A moving shape of inverse inertia 0 is legal: it does not rotate.
 pub(crate) fn check_shapes(
     shapes: &[Shape],
-    demand: &SceneNeeds,
+    needs: &SceneNeeds,
     limits: &Limits,
 ) -> Result<(), InputError> {
     if shapes.is_empty() {
@@ -34,7 +33,8 @@ pub(crate) fn check_shapes(
             limit: limits.shape_capacity,
         });
     }
-    // A subnormal would be 0 to a bitstream that flushes them: static there, moving here.
+    // A bitstream that flushes subnormal numbers takes a subnormal inverse mass for 0: the body
+    // would be static there, and moving in the driver.
     let usable = |value: f32| value == 0.0 || (value > 0.0 && value.is_normal());
     for (index, shape) in shapes.iter().enumerate() {
         let [x, y, z] = shape.inverse_inertia;
@@ -50,8 +50,8 @@ pub(crate) fn check_shapes(
             return Err(InputError::StaticShapeRotates { shape: index, found });
         }
         if limits.variant.inertia == Inertia::Isotropic && !shape.is_isotropic() {
-            let (found, carriers) = (shape.inverse_inertia, demand.carriers(|_| true));
-            return Err(InputError::Anisotropic { shape: index, found, carriers });
+            let excess = Excess::Anisotropic { shape: index, found: shape.inverse_inertia };
+            return Err(needs.refuse(excess, |_| true));
         }
         let smallest = smallest_short(limits.flush_subnormals);
         let beyond = |field: &'static str, found: f32, variant: &Variant| {
@@ -64,24 +64,19 @@ pub(crate) fn check_shapes(
         };
         for (field, component, found) in fields {
             if let Some(format) = beyond(field, found, &limits.variant) {
-                return Err(InputError::ShapeOutOfRange {
-                    shape: index,
-                    field,
-                    component,
-                    found,
-                    format,
-                    smallest,
-                    largest: format.largest(),
-                    carriers: demand.carriers(|variant| beyond(field, found, variant).is_none()),
-                });
+                let (item, largest) = (InputItem::Shape(index), format.largest());
+                let number =
+                    OutOfRange { item, field, component, found, format, smallest, largest };
+                let holds = |variant: &Variant| beyond(field, found, variant).is_none();
+                return Err(needs.refuse(Excess::OutOfRange(number), holds));
             }
         }
     }
     Ok(())
 }
 
-/// The narrowest format of an inverse mass or inertia on its way: the shape table has f32, the
-/// inertia about world axes comes with the velocities and stays beside them.
+/// The narrowest format of an inverse mass or inertia on its way. The shape table holds f32; the
+/// inertia about world axes is streamed and stored with the velocities.
 fn held(field: &'static str, variant: &Variant) -> StreamFormat {
     let numbers = &variant.numbers;
     let streamed = field == INERTIA && variant.inertia == Inertia::World;
@@ -93,7 +88,7 @@ fn held(field: &'static str, variant: &Variant) -> StreamFormat {
     }
 }
 
-/// The least that shapes need to be told of their bodies' inertia.
+/// The least inertia that a bitstream must be built with for these shapes.
 pub(crate) fn needed(shapes: &[Shape]) -> Inertia {
     let isotropic = shapes.iter().all(Shape::is_isotropic);
     if isotropic { Inertia::Isotropic } else { Inertia::World }
@@ -172,7 +167,7 @@ mod tests {
             let found = shape.inverse_inertia;
             let error = refused(shape);
             assert!(
-                matches!(error, InputError::Anisotropic { shape: 1, found: of, .. }
+                matches!(error.excess(), Some(Excess::Anisotropic { shape: 1, found: of })
                     if of.map(f32::to_bits) == found.map(f32::to_bits)),
                 "{error}"
             );
@@ -190,7 +185,8 @@ mod tests {
 
     fn out_of_range(shape: Shape, limits: &Limits) -> String {
         let error = validate_shapes(&[Shape::STATIC, shape], limits).expect_err("out of range");
-        assert!(matches!(error, InputError::ShapeOutOfRange { shape: 1, .. }), "{error}");
+        let item = error.out_of_range().map(|number| number.item);
+        assert_eq!(item, Some(InputItem::Shape(1)), "{error}");
         error.to_string()
     }
 

@@ -5,13 +5,13 @@
 #![allow(clippy::print_stdout, reason = "the figures are the output of the test")]
 
 use crate::common;
-use crate::common::{bits, open, ordered};
+use crate::common::{at_rest, bits, open, ordered};
 use bitstream_model::{Bandwidth, BoardConfig, Hazards};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Body, Collision, Contact, OrderChoice, Pose, Shape, StepParameters, StepReport, Velocity,
+    Body, Collision, Contact, OrderChoice, Shape, StepParameters, StepReport, Velocity,
 };
 
 const SHAPES: [Shape; 3] =
@@ -22,9 +22,9 @@ const PLATFORM: u32 = 2;
 
 /// A body at rest, or a cube that falls.
 fn body(position: [f32; 3], shape: u32) -> Body {
-    let pose = Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] };
     let fall = if shape == CUBE { -0.2 } else { 0.0 };
-    Body { pose, velocity: Velocity { linear: [0.0, fall, 0.0], angular: [0.0; 3] }, shape }
+    let velocity = Velocity { linear: [0.0, fall, 0.0], angular: [0.0; 3] };
+    Body { velocity, ..at_rest(position, shape) }
 }
 
 /// Four points around the middle of a face of a cube of 2 m, whose normal leads to A.

@@ -84,8 +84,8 @@ impl Pile {
         }
         let slow = Velocity { linear: [1e-39, 0.0, 0.0], angular: [0.0, -3e-40, 0.0] };
         bodies.extend((0..40_u8).map(|k| {
-            let (position, orientation) = ([3.1 * f32::from(k), 40.0, -3.0], [0.0, 0.0, 0.0, 1.0]);
-            Body { pose: Pose { position, orientation }, velocity: slow, shape: 1 }
+            let position = [3.1 * f32::from(k), 40.0, -3.0];
+            Body { velocity: slow, ..common::at_rest(position, 1) }
         }));
         assert!(bodies.len() >= SEVERAL && collisions.len() >= SEVERAL);
         Self { shapes, bodies, collisions }
@@ -93,13 +93,7 @@ impl Pile {
 
     /// Opens a board with `threads` threads, for the board and for the driver.
     fn open(&self, config: BoardConfig, threads: usize) -> (EmulatedBoard, Accelerator) {
-        let board = EmulatedBoard::new(BoardConfig { threads, ..config }).expect("a board");
-        let choice = BoardChoice::Emulated(board.cpu_port());
-        let pack_threads = Some(threads);
-        let options = OpenOptions { board: choice, pack_threads, ..OpenOptions::default() };
-        let mut accelerator = Accelerator::open(options).expect("a board that opens");
-        accelerator.set_shapes(&self.shapes).expect("they fit");
-        (board, accelerator)
+        common::open_with(BoardConfig { threads, ..config }, Some(threads), &self.shapes)
     }
 
     /// The outcome of one step.
@@ -318,14 +312,7 @@ fn what_else_computes_is_the_same_in_every_environment() {
     // A column along z of subnormal height: with flushed subnormals, all of its bodies are at one
     // place.
     let bodies: Vec<Body> = (0..40_u32)
-        .map(|k| Body {
-            pose: Pose {
-                position: [0.0, 0.0, f32::from_bits(1 + 7 * k % 40 * 1000)],
-                orientation: [0.0, 0.0, 0.0, 1.0],
-            },
-            velocity: Velocity::default(),
-            shape: k % 2,
-        })
+        .map(|k| common::at_rest([0.0, 0.0, f32::from_bits(1 + 7 * k % 40 * 1000)], k % 2))
         .collect();
     let pairs = |k: u32| [[k, (k + 1) % 40], [k, (k + 7) % 40]];
     let pairs: Vec<[u32; 2]> = (0..40).flat_map(pairs).collect();

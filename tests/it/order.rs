@@ -7,15 +7,13 @@
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the figures are the output of the test")]
 
-use crate::common::{bits, by_hand, open, ordered};
+use crate::common::{at_rest, bits, by_hand, open, ordered};
 use crate::vectors;
 use bitstream_model::{BoardConfig, Hazards};
 use scene::{Scene, SceneOptions, kinetic_energy};
 use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
 use zynq_pgs::order::{Order, OrderError, Ties};
-use zynq_pgs::{
-    Body, Collision, Error, InputError, Pose, Shape, StepParameters, StepReport, Velocity,
-};
+use zynq_pgs::{Body, Collision, Error, Excess, InputError, Shape, StepParameters, StepReport};
 
 fn with(hazards: Hazards) -> BoardConfig {
     BoardConfig { hazards, ..BoardConfig::default() }
@@ -201,13 +199,9 @@ fn an_order_that_does_not_fit_is_refused_with_its_numbers() {
     let (board, mut accelerator) = open(with(Hazards::Unchecked));
     let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
     accelerator.set_shapes(&shapes).expect("they fit");
-    let body = |x: u16| Body {
-        pose: Pose { position: [f32::from(x), 0.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity: Velocity::default(),
-        shape: 1,
-    };
-    let spokes = 2_000;
-    let mut bodies: Vec<Body> = (0..=spokes).map(body).collect();
+    let spokes = 2_000_u16;
+    let mut bodies: Vec<Body> =
+        (0..=spokes).map(|x| at_rest([f32::from(x), 0.0, 0.0], 1)).collect();
     let collisions: Vec<Collision> = (1..=u32::from(spokes))
         .map(|other| Collision {
             body_a: 0,
@@ -224,13 +218,15 @@ fn an_order_that_does_not_fit_is_refused_with_its_numbers() {
     assert!(
         matches!(
             error,
-            Error::Input(InputError::OrderTooLong {
-                collisions: 2_000,
-                bodies: 2_001,
-                limit: 259_142,
-                depth: 158,
-                body: 0,
-                uses: 2_000,
+            Error::Input(InputError::BeyondBitstream {
+                excess: Excess::OrderTooLong {
+                    collisions: 2_000,
+                    bodies: 2_001,
+                    limit: 259_142,
+                    depth: 158,
+                    body: 0,
+                    uses: 2_000,
+                },
                 ..
             })
         ),

@@ -10,10 +10,10 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
+use crate::common::{bits, open_with, row};
 use bitstream_model::{BoardConfig, CpuPort, EmulatedBoard};
 use zynq_pgs::{
-    Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, Contact, OpenOptions, Pose,
-    Shape, StepParameters, Velocity,
+    Accelerator, Bodies, Body, Collision, Collisions, Pose, Shape, StepParameters, Velocity,
 };
 
 /// A world with the host's times to pack it and to store its results, on the board's clock.
@@ -82,30 +82,8 @@ impl Bodies for World {
 impl World {
     /// Cubes that fall on the ground, each touching the next one too.
     fn new(cubes: u16, speed: f32, port: &CpuPort) -> Self {
-        let body = |x: f32, y, shape, speed| Body {
-            pose: Pose { position: [x, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-            velocity: Velocity { linear: [0.1 * speed, speed, 0.0], angular: [0.0; 3] },
-            shape,
-        };
-        let mut bodies = vec![body(0.0, -400.0, 0, 0.0)];
-        let mut collisions = Vec::new();
-        for cube in 1..=cubes {
-            let x = 2.0 * f32::from(cube);
-            bodies.push(body(x, 0.99, 1, speed));
-            let corner = |dx, dz| Contact { point: [x + dx, -0.01, dz], distance: -0.01 };
-            collisions.push(Collision {
-                body_a: 0,
-                body_b: cube.into(),
-                normal: [0.0, -1.0, 0.0],
-                count: 4,
-                contacts: [
-                    corner(-1.0, -1.0),
-                    corner(1.0, -1.0),
-                    corner(-1.0, 1.0),
-                    corner(1.0, 1.0),
-                ],
-            });
-        }
+        let velocity = Velocity { linear: [0.1 * speed, speed, 0.0], angular: [0.0; 3] };
+        let (bodies, collisions) = row(cubes, 2.0, |_| velocity);
         let (packing, storing) = Default::default();
         Self { bodies, collisions, packing, storing, port: port.clone() }
     }
@@ -116,22 +94,12 @@ impl World {
 
     /// The bits of its bodies.
     fn bits(&self) -> Vec<u32> {
-        let numbers = |body: &Body| {
-            let (pose, velocity) = (body.pose, body.velocity);
-            let places = pose.position.into_iter().chain(pose.orientation);
-            places.chain(velocity.linear).chain(velocity.angular).collect::<Vec<_>>()
-        };
-        self.bodies.iter().flat_map(numbers).map(f32::to_bits).collect()
+        bits(&self.bodies)
     }
 }
 
 fn open() -> (EmulatedBoard, Accelerator) {
-    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
-    let options =
-        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
-    let mut accelerator = Accelerator::open(options).expect("the emulated board");
-    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("they fit");
-    (board, accelerator)
+    open_with(BoardConfig::default(), None, &[Shape::STATIC, Shape::isotropic(1.0, 0.4)])
 }
 
 /// Steps of each of the two worlds.

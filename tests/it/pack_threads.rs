@@ -7,14 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
-use crate::common::{bits, ordered};
+use crate::common::{bits, open_with, ordered};
 use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED, WINDOWED16};
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::order::Order;
-use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Collision, Collisions, OpenOptions, Shape, StepReport,
-};
+use zynq_pgs::{Accelerator, Body, Collision, Collisions, Shape, StepReport};
 
 /// Number of bodies and collisions from which several threads share the work.
 const SEVERAL: usize = 3 * 2_048;
@@ -43,13 +41,7 @@ impl Pile {
     }
 
     fn open(&self, config: BoardConfig, threads: Option<usize>) -> (EmulatedBoard, Accelerator) {
-        let board = EmulatedBoard::new(config).expect("a board that can be built");
-        let choice = BoardChoice::Emulated(board.cpu_port());
-        let options =
-            OpenOptions { board: choice, pack_threads: threads, ..OpenOptions::default() };
-        let mut accelerator = Accelerator::open(options).expect("a board that opens");
-        accelerator.set_shapes(&self.shapes).expect("they fit");
-        (board, accelerator)
+        open_with(config, threads, &self.shapes)
     }
 
     /// Runs two steps, the second prepared during the first. Returns the outcome of each.
@@ -173,7 +165,7 @@ fn what_is_refused_is_refused_in_the_same_words_with_any_number_of_threads() {
     }
 }
 
-/// Collisions, one of which panics when it is read.
+/// Collisions, among them one that panics when it is read.
 struct Torn<'a> {
     list: &'a [Collision],
     at: usize,

@@ -7,12 +7,13 @@ use std::collections::BTreeMap;
 use std::mem::ManuallyDrop;
 use std::time::Duration;
 
+use crate::common::{open_with, row};
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault, FaultKind};
 use proptest::prelude::*;
 use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Collision, Contact, Error, InFlight, InputError, OpenOptions,
-    Pose, Prepared, Shape, StepParameters, Velocity,
+    Accelerator, Body, Collision, Error, InFlight, InputError, Prepared, Shape, StepParameters,
+    Velocity,
 };
 
 /// The end of a step that has been on the board for some clocks.
@@ -67,36 +68,14 @@ const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
 
 /// Cubes that fall on the ground, each with its own speed.
 fn scene(cubes: u8) -> (Vec<Body>, Vec<Collision>) {
-    let body = |position, shape, velocity| Body {
-        pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity,
-        shape,
-    };
-    let mut bodies = vec![body([0.0, -400.0, 0.0], 0, Velocity::default())];
-    let mut collisions = Vec::new();
-    for cube in 1..=cubes {
-        let x = 2.2 * f32::from(cube);
-        let velocity = Velocity { linear: [0.1 * x, -1.0 - x, 0.3], angular: [0.2, 0.0, -0.1 * x] };
-        bodies.push(body([x, 0.99, 0.0], 1, velocity));
-        let corner = |dx, dz| Contact { point: [x + dx, -0.01, dz], distance: -0.01 };
-        collisions.push(Collision {
-            body_a: 0,
-            body_b: cube.into(),
-            normal: [0.0, -1.0, 0.0],
-            count: 4,
-            contacts: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)],
-        });
-    }
-    (bodies, collisions)
+    row(cubes.into(), 2.2, |x| Velocity {
+        linear: [0.1 * x, -1.0 - x, 0.3],
+        angular: [0.2, 0.0, -0.1 * x],
+    })
 }
 
 fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
-    let board = EmulatedBoard::new(config).expect("a board that can be built");
-    let options =
-        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
-    let mut accelerator = Accelerator::open(options).expect("the emulated board");
-    accelerator.set_shapes(&SHAPES).expect("they fit");
-    (board, accelerator)
+    open_with(config, None, &SHAPES)
 }
 
 /// A driver of one board, and the test's knowledge of its prepared steps.

@@ -2,7 +2,7 @@
 //! costs of each, and the refusals of each.
 #![cfg(feature = "emulation")]
 
-use crate::common::{bits, open, ordered};
+use crate::common::{at_rest, bits, open, ordered, standing};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{
@@ -11,8 +11,7 @@ use bitstream_model::interface::profile::{
 use scene::{Scene, SceneOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Aftermath, Body, Collision, Contact, Error, Fault, Pose, Shape, StepParameters, StepReport,
-    Velocity,
+    Aftermath, Body, Collision, Contact, Error, Fault, Shape, StepParameters, StepReport, Velocity,
 };
 
 /// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
@@ -177,24 +176,13 @@ fn any_number_of_bodies_and_collisions_goes_through_every_profile() {
 }
 
 fn row(cubes: u32) -> (Vec<Body>, Vec<Collision>) {
-    let body = |position, shape, linear| Body {
-        pose: Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity: Velocity { linear, angular: [0.0; 3] },
-        shape,
-    };
-    let mut bodies = vec![body([0.0, -4.0, 0.0], 0, [0.0; 3])];
+    let velocity = Velocity { linear: [0.0, -1.0, 0.0], angular: [0.0; 3] };
+    let mut bodies = vec![at_rest([0.0, -4.0, 0.0], 0)];
     let mut collisions = Vec::new();
     for cube in 1..=cubes {
         let x = 0.25 * f32::from(u16::try_from(cube).expect("a small scene"));
-        bodies.push(body([x, 1.0, 0.0], 1, [0.0, -1.0, 0.0]));
-        let corner = |dx, dz| Contact { point: [x + dx, 0.0, dz], distance: 0.0 };
-        collisions.push(Collision {
-            body_a: 0,
-            body_b: cube,
-            normal: [0.0, -1.0, 0.0],
-            count: 4,
-            contacts: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)],
-        });
+        bodies.push(Body { velocity, ..at_rest([x, 1.0, 0.0], 1) });
+        collisions.push(standing([0, cube], x, 0.0, 0.0));
     }
     (bodies, collisions)
 }

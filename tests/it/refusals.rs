@@ -5,28 +5,24 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bitstream_model::{BoardConfig, EmulatedBoard};
+use crate::common::{at_rest, open_with};
+use bitstream_model::BoardConfig;
 use zynq_pgs::interface::profile::{FLOAT, Flow, HALF, MIXED, Profile, WINDOWED, WINDOWED16};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, Contact, Error, InputError,
-    OpenOptions, Pose, Shape, StepParameters, Structures, Velocity,
+    Accelerator, Bodies, Body, Collision, Collisions, Contact, Error, InputError, Pose, Shape,
+    StepParameters, Structures, Velocity,
 };
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
 
 /// A row of cubes on the ground, each in contact with the next.
 fn scene() -> (Vec<Body>, Vec<Collision>) {
-    let body = |x, y, shape| Body {
-        pose: Pose { position: [x, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity: Velocity::default(),
-        shape,
-    };
-    let mut bodies = vec![body(0.0, -1.0, 0)];
+    let mut bodies = vec![at_rest([0.0, -1.0, 0.0], 0)];
     let mut collisions = Vec::new();
     let mut x = 0.0;
     for cube in 1..100 {
-        bodies.push(body(x, 0.99, 1));
+        bodies.push(at_rest([x, 0.99, 0.0], 1));
         let contact = Contact { point: [x - 1.0, 0.5, 0.25], distance: -0.01 };
         let normal = if cube == 1 { [0.0, -1.0, 0.0] } else { [-1.0, 0.0, 0.0] };
         let (body_a, body_b) = (cube - 1, cube);
@@ -37,13 +33,7 @@ fn scene() -> (Vec<Body>, Vec<Collision>) {
 }
 
 fn open(profile: &'static Profile) -> Accelerator {
-    let config = BoardConfig { profile, ..BoardConfig::default() };
-    let board = EmulatedBoard::new(config).expect("a board that can be built");
-    let board = BoardChoice::Emulated(board.cpu_port());
-    let options = OpenOptions { board, ..OpenOptions::default() };
-    let mut accelerator = Accelerator::open(options).expect("the emulated board");
-    accelerator.set_shapes(&SHAPES).expect("they fit");
-    accelerator
+    open_with(BoardConfig { profile, ..BoardConfig::default() }, None, &SHAPES).1
 }
 
 type Mistake = (&'static str, fn(&mut Vec<Body>, &mut Vec<Collision>));

@@ -12,6 +12,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crate::common::{bits, row};
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::remote::{
@@ -20,43 +21,13 @@ use bitstream_model::remote::{
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault, FaultKind};
 use pgs_interface::message::{ANSWER_BYTES, Answer, Request, Status, VERSION};
 use zynq_pgs::{
-    Accelerator, BoardChoice, BoardKind, Body, Collision, Contact, Error, MemoryChoice, OpenError,
-    OpenOptions, PlatformError, Pose, Shape, StepParameters, StepReport, Velocity,
+    Accelerator, BoardChoice, BoardKind, Body, Collision, Error, MemoryChoice, OpenError,
+    OpenOptions, PlatformError, Shape, StepParameters, StepReport, Velocity,
 };
 
 /// A row of cubes on the ground.
 fn scene(cubes: u16) -> (Vec<Body>, Vec<Collision>) {
-    let at = |x, y, shape, velocity| Body {
-        pose: Pose { position: [x, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity,
-        shape,
-    };
-    let mut bodies = vec![at(0.0, -400.0, 0, Velocity::default())];
-    let mut collisions = Vec::new();
-    for cube in 1..=cubes {
-        let x = 2.2 * f32::from(cube);
-        let velocity = Velocity { linear: [0.1, -1.0 - x, 0.0], angular: [0.0, 0.1, 0.0] };
-        bodies.push(at(x, 0.99, 1, velocity));
-        let corner = |dx, dz| Contact { point: [x + dx, -0.01, dz], distance: -0.01 };
-        collisions.push(Collision {
-            body_a: 0,
-            body_b: u32::from(cube),
-            normal: [0.0, -1.0, 0.0],
-            count: 4,
-            contacts: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)],
-        });
-    }
-    (bodies, collisions)
-}
-
-fn bits(bodies: &[Body]) -> Vec<[u32; 13]> {
-    let numbers = |body: &Body| {
-        let Pose { position: p, orientation: q } = body.pose;
-        let Velocity { linear: l, angular: a } = body.velocity;
-        [p[0], p[1], p[2], q[0], q[1], q[2], q[3], l[0], l[1], l[2], a[0], a[1], a[2]]
-            .map(f32::to_bits)
-    };
-    bodies.iter().map(numbers).collect()
+    row(cubes, 2.2, |x| Velocity { linear: [0.1, -1.0 - x, 0.0], angular: [0.0, 0.1, 0.0] })
 }
 
 /// A board served by another thread.
@@ -121,7 +92,7 @@ fn at(socket: &Path) -> OpenOptions {
     OpenOptions { board, ..OpenOptions::default() }
 }
 
-fn steps(accelerator: &mut Accelerator, cubes: u16) -> (Vec<[u32; 13]>, Vec<StepReport>) {
+fn steps(accelerator: &mut Accelerator, cubes: u16) -> (Vec<u32>, Vec<StepReport>) {
     let (mut bodies, collisions) = scene(cubes);
     let step = |_| {
         let parameters = StepParameters::default();

@@ -7,13 +7,11 @@
 //! rotation matrix.
 #![cfg(feature = "emulation")]
 
+use crate::common::{self, at_rest};
 use bitstream_model::interface::profile::Inertia;
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use zynq_pgs::order::Order;
-use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Collision, Contact, OpenOptions, Pose, Shape, StepParameters,
-    Velocity,
-};
+use zynq_pgs::{Accelerator, Body, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 
 type Vec3 = [f32; 3];
 
@@ -324,12 +322,7 @@ fn shapes() -> [Shape; 5] {
 
 fn scene(seed: u64) -> (Vec<Body>, Vec<Collision>) {
     let mut random = Random(seed);
-    let ground = Body {
-        pose: Pose { position: [0.0, -50.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity: Velocity::default(),
-        shape: 0,
-    };
-    let mut bodies = vec![ground];
+    let mut bodies = vec![at_rest([0.0, -50.0, 0.0], 0)];
     for index in 1..BODIES {
         let [x, y, z] = random.direction();
         let w = random.within(-1.0, 1.0);
@@ -374,11 +367,7 @@ fn bits(bodies: &[Body]) -> Vec<[u32; 13]> {
 }
 
 fn open(inertia: Inertia) -> (EmulatedBoard, Accelerator) {
-    let config = BoardConfig { inertia, ..BoardConfig::default() };
-    let board = EmulatedBoard::new(config).expect("a board that can be built");
-    let options =
-        OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
-    (board, Accelerator::open(options).expect("a board that opens"))
+    common::open(BoardConfig { inertia, ..BoardConfig::default() })
 }
 
 #[test]

@@ -9,7 +9,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::common::{bits, by_hand, open, ordered};
+use crate::common::{at_rest, bits, by_hand, open, ordered, standing};
 use crate::vectors;
 use bitstream_model::interface::profile::{
     FLOAT, Flow, HALF, Inertia, MIXED, Profile, WINDOWED, WINDOWED16, Window,
@@ -18,8 +18,8 @@ use bitstream_model::{Bandwidth, BoardConfig};
 use scene::{Scene, SceneOptions, ShapesOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Body, Collision, Collisions, Contact, Error, InputError, Pose, Shape, StepParameters,
-    StepReport, Velocity,
+    Body, Collision, Collisions, Error, Excess, InputError, Shape, StepParameters, StepReport,
+    Velocity,
 };
 
 fn of(profile: &'static Profile) -> BoardConfig {
@@ -44,7 +44,7 @@ const FINE: f32 = 512.0;
 const COARSE: f32 = 2.0;
 
 /// Moves bodies and contact points to a grid of `grid` points a metre. On it lever arms are the
-/// same numbers from world coordinates and from offsets. Of three contact points two remain, since
+/// same numbers from world coordinates and from offsets. Two of three contact points remain, since
 /// a third is not exact.
 fn snap(bodies: &mut [Body], collisions: &mut [Collision], grid: f32) {
     let snap = |point: &mut [f32; 3]| {
@@ -123,25 +123,13 @@ fn a_pile_of_shapes_gives_the_bits_of_one_collision_after_the_other() {
 }
 
 fn body(x: f32, shape: u32) -> Body {
-    Body {
-        pose: Pose { position: [x, 1.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity: Velocity {
-            linear: [0.0, if shape == 0 { 0.0 } else { -1.0 }, 0.0],
-            ..Velocity::default()
-        },
-        shape,
-    }
+    let linear = [0.0, if shape == 0 { 0.0 } else { -1.0 }, 0.0];
+    let velocity = Velocity { linear, ..Velocity::default() };
+    Body { velocity, ..at_rest([x, 1.0, 0.0], shape) }
 }
 
 fn touch(body_a: u32, body_b: u32) -> Collision {
-    let corner = |dx, dz| Contact { point: [dx, 0.0, dz], distance: -0.01 };
-    Collision {
-        body_a,
-        body_b,
-        normal: [0.0, -1.0, 0.0],
-        count: 4,
-        contacts: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)],
-    }
+    standing([body_a, body_b], 0.0, 0.0, -0.01)
 }
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 0.5)];
@@ -210,15 +198,16 @@ fn refused(
     bodies: &mut [Body],
     collisions: &[Collision],
     order: Order,
-) -> (Error, String) {
+) -> (Excess, String) {
     let (board, mut windowed) = open(of(profile));
     windowed.set_shapes(&SHAPES).expect("they fit");
     let before = (bits(bodies), board.counts());
     let error = windowed.step(bodies, collisions, &ordered(order)).expect_err("it cannot be sent");
-    assert!(error.is_input(), "{error}");
     assert_eq!((bits(bodies), board.counts()), before);
-    let text = error.to_string();
-    (error, text)
+    let Error::Input(InputError::BeyondBitstream { excess, .. }) = error else {
+        panic!("{error:?}")
+    };
+    (excess, error.to_string())
 }
 
 /// A chain of cubes; two of them that lie far apart in it touch each other.
@@ -232,11 +221,8 @@ fn chain(links: u32) -> (Vec<Body>, Vec<Collision>) {
 #[test]
 fn a_body_that_lives_too_long_is_refused_with_the_profiles_that_could() {
     let (mut bodies, collisions) = chain(3_000);
-    let (error, text) = refused(&WINDOWED, &mut bodies, &collisions, Order::AsGiven);
-    assert!(
-        matches!(error, Error::Input(InputError::SpanTooLong { body: 0, lag: 2_816, .. })),
-        "{error:?}"
-    );
+    let (excess, text) = refused(&WINDOWED, &mut bodies, &collisions, Order::AsGiven);
+    assert!(matches!(excess, Excess::SpanTooLong { body: 0, lag: 2_816, .. }), "{excess:?}");
     // Body 0 is in the first entry and in the last.
     assert_eq!(
         text,
@@ -262,10 +248,8 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
     let mut scene = Scene::new(&options).expect("a small scene");
     let collisions = scene.detect().to_vec();
     let mut bodies = scene.bodies().to_vec();
-    let (error, text) = refused(few, &mut bodies, &collisions, Order::HazardFree);
-    let Error::Input(InputError::TooManyLive { held, alive, places: 16, .. }) = error else {
-        panic!("{error:?}")
-    };
+    let (excess, text) = refused(few, &mut bodies, &collisions, Order::HazardFree);
+    let Excess::TooManyLive { held, alive, places: 16 } = excess else { panic!("{excess:?}") };
     assert!((17..=64).contains(&held) && alive <= held, "{held} {alive}");
     assert!(text.contains(&format!("{held} moving bodies")), "{text}");
     assert!(text.contains("places for 16"), "{text}");
@@ -280,12 +264,12 @@ fn more_live_bodies_than_places_are_refused_with_the_profiles_that_could() {
     let report = windowed.step(&mut bodies, &collisions, &StepParameters::default());
     let report = report.unwrap_or_else(|error| panic!("{error:?}: {:?}", board.violations()));
     assert_eq!(report.live.expect("live bodies").most_held, held);
-    let (error, _) = refused(design(held - 1), &mut bodies, &collisions, Order::HazardFree);
-    assert!(matches!(error, Error::Input(InputError::TooManyLive { .. })), "{error:?}");
+    let (excess, _) = refused(design(held - 1), &mut bodies, &collisions, Order::HazardFree);
+    assert!(matches!(excess, Excess::TooManyLive { .. }), "{excess:?}");
 }
 
-/// Collisions, one of which loses its contact points after the read `good_reads`, for good or for
-/// one read.
+/// Collisions, among them one that loses its contact points after the read `good_reads`, for good
+/// or for one read.
 struct Unsteady<'a> {
     list: &'a [Collision],
     which: usize,

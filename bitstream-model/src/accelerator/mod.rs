@@ -69,7 +69,7 @@ pub(crate) enum Phase {
     Failed,
 }
 
-/// What [`Accelerator::run`] did.
+/// The outcome of [`Accelerator::run`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Ran {
     /// Clock cycles that passed in it.
@@ -276,7 +276,7 @@ impl Accelerator {
                     let deferral = deferral.as_deref_mut();
                     self.integrate(poses, results, inputs, outputs, memory, deferral)
                 }
-                // All that has arrived is worked on.
+                // The window has taken every beat that has arrived.
                 Phase::Window if ran.cycles > 0 => break,
                 Phase::Window => self.windowed(left, inputs, outputs),
                 Phase::Ending => {

@@ -322,7 +322,7 @@ impl Accelerator {
         Ok(stall)
     }
 
-    /// What the decoder refuses; the mass properties of both bodies otherwise.
+    /// The mass properties of both bodies, or the reason to refuse the collision.
     #[inline]
     fn checked<I: inertia::Inertia>(
         &self,

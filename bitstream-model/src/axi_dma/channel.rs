@@ -1,4 +1,4 @@
-//! Registers of one DMA channel, and the effects of reads and writes.
+//! Models the registers of one DMA channel, with the effects of reads and writes.
 
 use super::Build;
 use super::faults::FaultEffects;
@@ -113,7 +113,7 @@ impl Channel {
         matches!(self.work, Work::None)
     }
 
-    /// Whether it has to wait for beats, for space or for work, and nothing else can happen in it.
+    /// Whether the channel waits for beats, for space or for work, and no other change is due in it.
     #[inline]
     pub(super) fn cannot_move(&self, stream: &Stream) -> bool {
         let waits = match self.direction {
@@ -278,7 +278,7 @@ impl Channel {
         let (core, direction) = (build.core, self.direction);
         let mask = u32::MAX >> (32 - build.length_width);
         if self.halted {
-            // A driver writes all ones to learn the register's width, and 0 to undo that.
+            // A driver writes all ones to learn the register's width, and then 0 to restore it.
             self.length = value & mask;
             if value != u32::MAX && value != 0 {
                 log.violation(ViolationKind::DoorbellWhileHalted { core, direction });

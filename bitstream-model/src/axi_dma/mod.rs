@@ -1,9 +1,9 @@
-//! The emulated AXI DMA core: two channels, one reset.
+//! Emulates an AXI DMA core: two channels, one reset.
 //!
 //! `channel.rs` holds the registers of one channel and their side effects, `mover.rs` the engine
-//! that fetches descriptors and moves beats, `faults.rs` what faults do to both. Both directions are
-//! one piece of code. `undisturbed.rs` is a seam: the core says when nothing but beats flows, and can
-//! be told that many of them have.
+//! that fetches descriptors and moves beats, `faults.rs` the effects of faults on both. Both
+//! directions are one piece of code. `undisturbed.rs` is the interface for the short cuts: it finds
+//! channels in which only beats flow, and moves many beats on such a channel at once.
 //!
 //! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
 
@@ -23,7 +23,7 @@ use pgs_interface::axi_dma::{DMACR, Direction, S2MM_OFFSET, dmacr};
 
 use channel::{Channel, Work};
 
-/// How a core was built.
+/// The build options of a core.
 #[derive(Debug, Clone, Copy)]
 struct Build {
     core: usize,
@@ -38,7 +38,7 @@ struct Build {
 }
 
 impl Build {
-    /// Clocks that pass in a time.
+    /// Clock cycles in `ns` nanoseconds.
     fn cycles(&self, ns: u64) -> u64 {
         cycles_of(ns, self.clock_khz)
     }
@@ -51,7 +51,8 @@ pub struct PacketCount {
     pub core: usize,
     /// Which channel.
     pub direction: Direction,
-    /// What it carried; the first contact pass, where the collisions are streamed once for all.
+    /// The phase that it belongs to: the first contact pass, if the design streams the collisions
+    /// once.
     pub phase: Option<StepPhase>,
     /// Its beats.
     pub beats: u64,
@@ -59,7 +60,7 @@ pub struct PacketCount {
     pub descriptors: u32,
 }
 
-/// What the engines of all cores have done, for the observer.
+/// Counts of the work of all engines, for the observer.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Moved {
     /// The packets of this step.
@@ -92,7 +93,7 @@ pub(crate) struct Core {
 impl Core {
     pub(crate) fn new(core: usize, config: &BoardConfig) -> Self {
         let profile = config.profile;
-        // A direction without a stream never moves a beat: any number will do.
+        // A direction without a stream never moves a beat, and its shift has no effect.
         let shift =
             |widths: &[u32]| widths.get(core).map_or(0, |width| beat_cycles(*width).ilog2());
         let build = Build {
@@ -131,7 +132,7 @@ impl Core {
         }
     }
 
-    /// Reads a register; `None` where there is none.
+    /// Reads a register; `None` if the offset has no register.
     pub(crate) fn read(&mut self, offset: u32) -> Option<u32> {
         let (direction, at) = Self::decode(offset);
         let resetting = self.reset_until.is_some();
@@ -140,7 +141,8 @@ impl Core {
         Some(if resetting && at == DMACR.offset { value | dmacr::RESET.mask() } else { value })
     }
 
-    /// Writes a register. Returns whether it was a doorbell, or `None` where there is no register.
+    /// Writes a register. Returns whether it was a doorbell, or `None` if the offset has no
+    /// register.
     pub(crate) fn write(
         &mut self,
         now: u64,
@@ -191,7 +193,7 @@ impl Core {
         self.s2mm.tick(now);
     }
 
-    /// When the next state changes by time alone.
+    /// The cycle of the next change by time alone.
     pub(crate) fn next_event(&self) -> Option<u64> {
         [self.reset_until, self.mm2s.next_event(), self.s2mm.next_event()]
             .into_iter()
@@ -210,8 +212,8 @@ impl Core {
         self.reset_until.is_none() && (self.mm2s.interrupt() || self.s2mm.interrupt())
     }
 
-    /// Moves up to `limit` beats of one channel until the clock shows `end`; returns how many, and
-    /// whether anything happened at all.
+    /// Moves up to `limit` beats of one channel until cycle `end`. Returns their number, and whether
+    /// any state changed.
     #[inline]
     pub(crate) fn run(
         &mut self,

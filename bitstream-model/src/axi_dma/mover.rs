@@ -1,8 +1,8 @@
-//! The engine of a channel: it fetches descriptors, moves beats and writes status back.
+//! Runs the engine of a channel: it fetches descriptors, moves beats and writes status back.
 //!
-//! An engine moves at most one beat a clock, as its port does; on a stream of less than 128 bits a beat
-//! takes several clocks. It keeps a clock of its own that follows the board's, so that it moves the
-//! beats of many clocks in a few block copies.
+//! An engine moves at most one beat a clock, as its port does; on a stream of less than 128 bits a
+//! beat takes several clocks. It keeps a clock of its own that follows the board's, so that it
+//! moves the beats of many clocks in a few block copies.
 
 use super::channel::{Channel, Descriptor, Work};
 use super::faults::Next;
@@ -31,7 +31,7 @@ struct Part {
     at: u64,
     /// Bytes.
     left: u32,
-    /// Whether its end is the packet's.
+    /// Whether its end is the end of the packet.
     last: bool,
 }
 
@@ -39,9 +39,9 @@ struct Part {
 #[derive(Debug, Clone, Copy)]
 enum Transferred {
     Nothing,
-    /// None were moved, but the state of the channel changed.
+    /// No beat moved, but the state of the channel changed.
     Stopped,
-    /// `n` were moved; whether the packet ended with them.
+    /// `n` beats moved; `ended` if the packet ended with them.
     Beats {
         n: usize,
         ended: bool,
@@ -49,7 +49,7 @@ enum Transferred {
 }
 
 impl Channel {
-    /// Moves up to `limit` beats between the clocks `start` and `end`. Returns how many, and
+    /// Moves up to `limit` beats between the clocks `start` and `end`. Returns their number, and
     /// whether any state changed.
     pub(super) fn run(
         &mut self,
@@ -221,8 +221,8 @@ impl Channel {
         Transferred::Beats { n, ended }
     }
 
-    /// Moves `n` beats and inverts the bits of `mask` in their first word. Returns whether the packet
-    /// ended, or `None` after an error, on which the channel has failed.
+    /// Moves `n` beats and inverts the bits of `mask` in their first word. Returns whether the
+    /// packet ended, or `None` after an error, which stops the channel.
     fn transfer(
         &mut self,
         build: &Build,
@@ -294,7 +294,7 @@ impl Channel {
         Some(whole && last)
     }
 
-    /// MM2S: puts beats on the stream by reference, if nobody can change them in their buffer.
+    /// MM2S: puts beats on the stream, by reference unless their memory may change at any time.
     fn refer(
         &self,
         at: u64,
@@ -318,7 +318,8 @@ impl Channel {
         }
     }
 
-    /// An access to data has failed: reports it in the descriptor, if that can be written, and fails.
+    /// Reports a failed access to data in the descriptor, if it can be written, and stops the
+    /// channel.
     fn data_error(
         &mut self,
         build: &Build,
@@ -403,8 +404,8 @@ impl Channel {
         });
     }
 
-    /// A packet may end before its buffer does. The device must be granted the rest of the buffer all
-    /// the same: the next packet could be longer.
+    /// Checks that the rest of a buffer is granted to the device, if the packet ends before the
+    /// buffer: the next packet could be longer.
     fn check_rest(&self, build: &Build, bd: &Descriptor, with: &mut Surroundings<'_>) {
         if self.direction == Direction::Mm2s || bd.moved == bd.length {
             return;
@@ -421,7 +422,7 @@ impl Channel {
         }
     }
 
-    /// A descriptor is done: writes its status and goes on, or pauses at the tail.
+    /// Writes the status of a finished descriptor and goes on, or pauses at the tail.
     fn complete(
         &mut self,
         build: &Build,
@@ -465,12 +466,12 @@ impl Channel {
             self.idle = true;
             self.work = Work::None;
         } else {
-            // Fetched ahead while the data of this one moved.
+            // The engine fetched it ahead while the data of this one moved.
             self.work = Work::Fetch { address: bd.next, ready_at: self.time };
         }
     }
 
-    /// Writes the status of a descriptor; returns whether it could.
+    /// Writes the status of a descriptor; returns whether the write succeeded.
     pub(super) fn put_status(
         &mut self,
         build: &Build,
@@ -486,7 +487,7 @@ impl Channel {
         false
     }
 
-    /// Counts a packet that has ended, and ends the faults that last as long as it.
+    /// Counts a finished packet, and ends the faults that last as long as the packet.
     fn packet_ended(&mut self, build: &Build, with: &mut Surroundings<'_>) {
         let (core, direction) = (build.core, self.direction);
         let (beats, descriptors) = (self.beats, self.descriptors);

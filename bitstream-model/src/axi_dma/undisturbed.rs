@@ -1,5 +1,4 @@
-//! What a core can tell of a stretch of time in which nothing but beats flows, and how it passes
-//! one at once.
+//! Finds channels in which only beats flow, and passes many of their beats at once.
 //!
 //! A channel is undisturbed while it moves beats in the middle of a descriptor, or waits for beats:
 //! no fault has touched it, and no timer of its own runs out.
@@ -12,7 +11,7 @@ use pgs_interface::axi_dma::{Direction, dmacr};
 use pgs_interface::record::BEAT_BYTES;
 
 impl Channel {
-    /// Whether it works as it should, and its clock is not ahead by more than a beat.
+    /// Whether the channel is undisturbed, and its clock is not ahead by more than a beat.
     fn undisturbed(&self, now: u64, beat_shift: u32) -> bool {
         let plain = !dmacr::KEYHOLE.is_set(self.control) && self.time < now + (1 << beat_shift);
         plain && self.next_event().is_none() && self.faulty.none()
@@ -20,8 +19,8 @@ impl Channel {
 }
 
 impl Core {
-    /// Where an undisturbed channel goes on in its descriptor's buffer, and how many beats are left
-    /// there.
+    /// The address of the next beat of an undisturbed channel, and the beats left in its
+    /// descriptor's buffer.
     pub(crate) fn undisturbed(&self, direction: Direction, now: u64) -> Option<(u64, usize)> {
         let (channel, beat_shift) = match direction {
             Direction::Mm2s => (&self.mm2s, self.build.mm2s_beat_shift),
@@ -35,7 +34,7 @@ impl Core {
         (whole && channel.undisturbed(now, beat_shift)).then_some((at, beats))
     }
 
-    /// S2MM: whether it does nothing as long as no beat comes.
+    /// S2MM: whether the channel does nothing until a beat arrives.
     pub(crate) fn rests_without_beats(&self, now: u64) -> bool {
         let fetches = matches!(self.s2mm.work, Work::Fetch { .. });
         self.reset_until.is_none()
@@ -48,7 +47,7 @@ impl Core {
         self.build.mm2s_beat_shift
     }
 
-    /// MM2S: by how many clocks it is ahead with the last beat.
+    /// MM2S: the clocks from `now` to the end of the last beat.
     pub(crate) fn ahead(&self, now: u64) -> u64 {
         self.mm2s.time.saturating_sub(now)
     }
@@ -60,7 +59,7 @@ impl Core {
         }
     }
 
-    /// A channel has moved beats: fewer than its descriptor had left.
+    /// Moves beats of a channel, fewer than its descriptor has left.
     pub(crate) fn pass_over(&mut self, direction: Direction, beats: usize) {
         if beats == 0 {
             return;

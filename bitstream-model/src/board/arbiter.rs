@@ -1,5 +1,4 @@
-//! Shares the memory between the DMA engines: a burst each in turn, for as long as its bandwidth
-//! lasts.
+//! Shares the memory's bandwidth between the DMA engines: a burst each in turn.
 
 use crate::cast::index;
 use crate::config::{Bandwidth, BoardConfig};
@@ -8,18 +7,18 @@ use pgs_interface::record::BEAT_BYTES;
 /// Beats that an engine moves before the next one has its turn: an AXI burst.
 const BURST_BEATS: u64 = 16;
 
-/// What the memory delivers, in bytes times the clock in kHz.
+/// The memory's bandwidth, in bytes times the clock in kHz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Supply {
-    /// Each cycle.
+    /// Income of a cycle.
     income: u64,
-    /// For a beat.
+    /// Cost of a beat.
     beat_cost: u64,
-    /// What is kept from one stretch of cycles to the next, at most.
+    /// Largest credit that one stretch of cycles leaves to the next.
     reserve: u64,
 }
 
-/// How the engines get at the memory.
+/// The turns of the engines at the memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Arbiter {
     /// MM2S and S2MM of each core, in that order.
@@ -28,10 +27,10 @@ pub(crate) struct Arbiter {
     supply: Option<Supply>,
 }
 
-/// What one stretch of cycles leaves to the next.
+/// The arbiter's state between two stretches of cycles.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Turn {
-    /// What the memory can still deliver at once.
+    /// Bandwidth that is left over.
     credit: u64,
     /// The engine that has the first turn.
     engine: usize,
@@ -52,9 +51,9 @@ impl Arbiter {
         Self { engines, supply }
     }
 
-    /// Gives every engine a burst in turn for some cycles, until none has beats to move or the
-    /// memory delivers no more. `burst` lets an engine move up to that many beats and returns how
-    /// many it has moved. Returns whether the bandwidth holds the engines up.
+    /// Gives every engine a burst in turn for some cycles, until no engine has beats to move or the
+    /// bandwidth is used up. `burst(engine, limit)` moves up to `limit` beats and returns their
+    /// number. Returns whether the bandwidth holds the engines up.
     #[inline(always)]
     pub(crate) fn share(
         &self,
@@ -94,7 +93,7 @@ mod tests {
         Arbiter::new(&BoardConfig { bandwidth, profile: &FLOAT, ..BoardConfig::default() }, 2)
     }
 
-    /// Shares cycles among engines that have these beats; returns what each has left.
+    /// Shares cycles among engines with these beats; returns the beats that each has left.
     fn share(arbiter: Arbiter, turn: &mut Turn, cycles: u64, mut left: [usize; 4]) -> [usize; 4] {
         arbiter.share(turn, cycles, |engine, limit| {
             let moved = limit.min(left[engine]);
@@ -116,9 +115,9 @@ mod tests {
         let bytes = 2 * 16 * u64::from(FLOAT.clock_khz) * 1000;
         let arbiter = arbiter(Bandwidth::BytesPerSecond(bytes));
         let mut turn = Turn::default();
-        // 40 beats: 16 and 16, then 8 of the first one's.
+        // 40 beats: 16 and 16, then 8 of the first engine.
         assert_eq!(share(arbiter, &mut turn, 20, [100, 0, 100, 0]), [76, 0, 84, 0]);
-        // The turn goes on behind it.
+        // The next engine has its turn.
         assert_eq!(share(arbiter, &mut turn, 8, [100, 0, 100, 0]), [100, 0, 84, 0]);
     }
 

@@ -1,15 +1,15 @@
-//! Decodes physical register addresses: which region, which offset.
+//! Decodes physical register addresses into regions and offsets.
 
 use pgs_interface::address_map::{CONTROL_BASE, CONTROL_BYTES, DMA_BYTES, DMA_COUNT_MAX, dma_base};
 
-/// What answers at an address.
+/// The part that answers at an address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Target {
     /// Register of an AXI DMA.
     Dma { core: usize, offset: u32 },
     /// Register of the control block.
     Control { offset: u32 },
-    /// Nobody.
+    /// No part answers.
     Nothing,
     /// Not a multiple of 4.
     Unaligned,

@@ -1,4 +1,4 @@
-//! The one level interrupt: all sources OR-ed, and the UIO driver that waits for it.
+//! Models the one level interrupt: all sources OR-ed, and the UIO driver that waits for it.
 
 /// The interrupt line and the kernel's view of it.
 #[derive(Debug, Default)]
@@ -6,7 +6,7 @@ pub(crate) struct InterruptLine {
     /// The level of the sources, and the level that arrives at the processor.
     source: bool,
     level: bool,
-    /// Until when a rising edge is withheld by a fault; forever means until the line falls.
+    /// Cycle until which a fault withholds a rising edge; `u64::MAX` means until the line falls.
     withheld: Option<u64>,
     /// Interrupts without a source that are still to come.
     spurious: u32,
@@ -23,7 +23,7 @@ impl InterruptLine {
         source && !self.source
     }
 
-    /// Withholds the next edge until then.
+    /// Withholds the next edge until cycle `until`.
     pub(crate) fn withhold(&mut self, until: u64) {
         self.withheld = Some(until);
     }
@@ -44,7 +44,7 @@ impl InterruptLine {
         self.level = level;
     }
 
-    /// When a withheld level arrives.
+    /// The cycle at which a withheld level arrives.
     pub(crate) fn next_event(&self) -> Option<u64> {
         self.withheld
     }
@@ -122,7 +122,7 @@ mod tests {
             line.unmask();
         }
         assert_eq!((line.take(), line.rising_edges), (None, 0));
-        // Beside one that has a source it is one more.
+        // An interrupt without a source adds to one with a source.
         line.disturb(1);
         line.set(true, 0);
         assert!(line.take().is_some());

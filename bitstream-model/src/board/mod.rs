@@ -1,7 +1,7 @@
-//! The emulated board: DMAs, streams, accelerator, memory, one clock.
+//! Runs the emulated board: DMAs, streams, accelerator and memory on one virtual clock.
 //!
-//! Time is virtual. It passes with each register access, and when the CPU waits; nothing happens
-//! inside a register write. The clock is the accelerator's; the DMAs run on it too.
+//! Time passes with each register access, and while the CPU waits; nothing happens inside a
+//! register write. The clock is the accelerator's; the DMAs run on it too.
 
 pub(crate) mod arbiter;
 mod bus;
@@ -25,10 +25,10 @@ use pgs_interface::axi_dma::Direction;
 use pgs_interface::control::IDENTIFICATION;
 use pgs_interface::record::Beat;
 
-/// Cycles after which an accelerator that waits looks at its streams again.
+/// Cycles between two polls of the streams by a waiting accelerator.
 pub(crate) const STARVED_CYCLES: u64 = 64;
 
-/// What happened on a board since it was built.
+/// Events on a board since it was built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct Counts {
@@ -46,7 +46,7 @@ pub struct Counts {
     pub beats_written: u64,
     /// Descriptors completed.
     pub descriptors: u64,
-    /// Violations, recorded in the log or not.
+    /// Violations, in the log or beyond its capacity.
     pub violations: u64,
     /// Clock cycles since the board was built.
     pub cycles: u64,
@@ -73,7 +73,7 @@ pub(crate) struct Board {
     counts: Counts,
     arbiter: Arbiter,
     turn: Turn,
-    /// `None`: everything is moved and computed slice by slice.
+    /// `None`: the board moves and computes everything slice by slice.
     short_cut: Option<Box<dyn ShortCut>>,
 }
 
@@ -149,7 +149,8 @@ impl Board {
         &self.moved.packets
     }
 
-    /// Applies the due faults of the board as a whole, with the ones of a register access if `access`.
+    /// Applies the due faults of the board as a whole; with `access`, also the faults of a register
+    /// access.
     fn apply_due_faults(&mut self, access: bool) {
         match self.faults.of_board(access) {
             Some(FaultKind::PowerLost) => self.powerless = true,
@@ -173,7 +174,7 @@ impl Board {
         self.accelerator.running() || self.cores.iter().any(Core::running)
     }
 
-    /// A strict board is dead after its first violation, and any without power.
+    /// Whether the board is dead: without power, or strict and after its first violation.
     fn dead(&self) -> bool {
         self.powerless || self.config.strict && self.log.count > 0
     }
@@ -268,7 +269,7 @@ impl Board {
         self.interrupt.set(level, self.now);
     }
 
-    /// Lets time pass until `until`, or until the interrupt wants attention if `watch` says so.
+    /// Lets time pass until `until`; with `watch`, only until an interrupt is pending.
     pub(crate) fn advance(&mut self, until: u64, watch: bool) {
         while self.now < until && !(watch && self.interrupt.pending()) {
             self.log.at(self.now);
@@ -308,7 +309,8 @@ impl Board {
         self.log.at(self.now);
     }
 
-    /// Takes the short cut until shortly before `until`, if there is one and nothing else can happen.
+    /// Takes the short cut until shortly before `until`, if the board has one and only beats and
+    /// records flow.
     fn fast_forward(&mut self, until: u64) {
         let Some(short_cut) = &mut self.short_cut else { return };
         let undisturbed = self.faults.none()
@@ -337,19 +339,20 @@ impl Board {
         }
     }
 
-    /// Moves a buffer back to the CPU; beats of it that are on the way are there already.
+    /// Moves a buffer back to the CPU. Beats of it that are still referenced are copied into their
+    /// streams first.
     pub(crate) fn take_back(&mut self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
         self.fetch();
         self.memory.take_back(address)
     }
 
-    /// Gives memory back.
+    /// Frees memory.
     pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
         self.fetch();
         self.memory.release(address)
     }
 
-    /// Lets all beats that are on the way be in the streams themselves.
+    /// Copies the beats that the streams reference into the streams.
     fn fetch(&mut self) {
         for stream in &mut self.inputs {
             stream.fetch(stream.len(), &self.memory);
@@ -365,7 +368,7 @@ impl Board {
         }
     }
 
-    /// The next time after now at which something changes by itself.
+    /// The next cycle after now at which a state changes by time alone.
     fn next_event(&self) -> Option<u64> {
         self.cores
             .iter()
@@ -386,7 +389,7 @@ impl Board {
             moved
         });
         self.turn = turn;
-        // Where the bandwidth holds the engines up, time alone brings progress.
+        // While the bandwidth holds the engines up, time alone brings progress.
         any || held_up
     }
 

@@ -1,7 +1,7 @@
-//! The seam through which a board may save time of its host.
+//! Lets a board save time of its host through one interface.
 //!
 //! A board without a [`ShortCut`] is the reference: it moves beats and computes records slice by
-//! slice. One with a short cut must show the same to everybody who looks.
+//! slice. A short cut must not change any state that a driver or a test can observe.
 
 use std::fmt;
 
@@ -17,8 +17,8 @@ pub(crate) trait ShortCut: fmt::Debug + Send {
     /// The accelerator's part of the short cut.
     fn defer(&mut self) -> &mut (dyn Defer + 'static);
 
-    /// Lets whole slices of a stretch pass, as long as nothing but beats and records flows in them.
-    /// Returns the cycles that have passed, and everything in the stretch is as it is after them.
+    /// Lets whole slices of a stretch pass while only beats and records flow. Returns the number of
+    /// cycles; the parts in `stretch` are in their state after these cycles.
     fn fast_forward(&mut self, stretch: Stretch<'_>) -> u64;
 }
 
@@ -27,10 +27,10 @@ pub(crate) trait ShortCut: fmt::Debug + Send {
 #[derive(Debug)]
 pub(crate) struct Stretch<'a> {
     pub(crate) now: u64,
-    /// The host does something then.
+    /// The cycle of the host's next act.
     pub(crate) until: u64,
     pub(crate) accelerator: &'a mut Accelerator,
-    /// As many as there are inputs.
+    /// One core for each input.
     pub(crate) cores: &'a mut [Core],
     pub(crate) inputs: &'a mut [Stream],
     pub(crate) outputs: &'a mut [Stream],

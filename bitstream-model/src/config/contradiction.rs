@@ -3,7 +3,8 @@
 use pgs_interface::profile::{Geometry, Profile, Window};
 use pgs_interface::record::live;
 
-/// What is wrong with a profile that streams the collisions once, and what is expected.
+/// The contradiction in a profile that streams the collisions once, as the expected state; `None`
+/// if the profile is sound.
 pub(crate) fn contradiction(profile: &Profile, window: &Window) -> Option<&'static str> {
     let units = 1..=0xFF;
     let stripes = &profile.stripes;

@@ -1,5 +1,5 @@
-//! How an emulated board can be built: the choices that a bitstream, a block design and a device tree
-//! fix on a real one.
+//! Configures an emulated board: the choices that a bitstream, a block design and a device tree fix
+//! on a real one.
 
 pub(crate) mod contradiction;
 pub(crate) mod quirks;
@@ -17,7 +17,7 @@ use pgs_interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Var
 use pgs_interface::record::BEAT_BYTES;
 use pgs_interface::stripe::Stripe;
 
-/// The most beats of a group of a stripe.
+/// Upper limit of the beats in a group of a stripe.
 pub(crate) const GROUP_MAX: usize = 8;
 
 /// Clock cycles that a beat takes on a stream of `width` bits.
@@ -25,17 +25,17 @@ pub(crate) const fn beat_cycles(width: u32) -> u64 {
     8 * BEAT_BYTES as u64 / width as u64
 }
 
-/// What the pipeline does when a collision needs a velocity that is still being computed.
+/// The pipeline's behaviour when a collision needs a velocity that is still being computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hazards {
-    /// It waits: right, and slow on an unfavourable order.
+    /// It waits: correct, and slow on an unfavourable order.
     Interlocked,
     /// It reads the stale velocity, and the later write-back overwrites the earlier one, as in the
     /// thesis (§5.4.4).
     Unchecked,
 }
 
-/// What the arithmetic does with subnormal numbers.
+/// The treatment of subnormal numbers in the arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Subnormals {
     /// IEEE 754.
@@ -45,7 +45,7 @@ pub enum Subnormals {
     Flush,
 }
 
-/// What the memory delivers to all streams together.
+/// Bandwidth of the memory, shared by all streams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bandwidth {
     /// Every stream always has data, as the thesis assumes.
@@ -57,14 +57,14 @@ pub enum Bandwidth {
 impl Bandwidth {
     /// Peak of the ZCU102 preset, DDR4-2133 at 64 bit: 17.07 GB/s.
     pub const ZCU102_PEAK: Self = Self::BytesPerSecond(17_070_000_000);
-    /// What a published measurement sustains on the ZCU102, about 75 % of the peak: 12.8 GB/s.
+    /// Sustained bandwidth of a published measurement on the ZCU102, about 75 % of the peak:
+    /// 12.8 GB/s.
     pub const ZCU102_SUSTAINED: Self = Self::BytesPerSecond(12_800_000_000);
 }
 
-/// Delays and depths of the emulated parts, clock cycles unless said otherwise.
+/// Delays and depths of the emulated parts, in clock cycles unless noted.
 ///
-/// None of them is a property of a real board that somebody measured: they are there so that a
-/// driver meets every intermediate state.
+/// The defaults are not measured on a real board: they make a driver meet every intermediate state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Delays {
     /// A register access by the CPU, ns (AXI-Lite through the HPM port: 100 to 200 ns).
@@ -91,20 +91,20 @@ impl Default for Delays {
     }
 }
 
-/// Clocks of that many kHz that pass in a time.
+/// Cycles of a clock of `clock_khz` in `ns` nanoseconds.
 pub(crate) fn cycles_of(ns: u64, clock_khz: u32) -> u64 {
     let cycles = u128::from(ns) * u128::from(clock_khz) / 1_000_000;
     u64::try_from(cycles).unwrap_or(u64::MAX)
 }
 
-/// Copies, clocks and collisions of an issue that a profile may have.
+/// Upper limit of a profile's velocity copies, block RAM clocks and collisions of an issue.
 const SIZE_MAX: u32 = 16;
-/// Shapes that the control block has room for.
+/// Shapes that fit into the control block.
 pub(crate) const SHAPES_MAX: u32 = (CONTROL_BYTES - SHAPE_TABLE) / SHAPE_STRIDE;
 /// 32-bit words of a beat.
 const BEAT_WORDS: u32 = 4;
 
-/// Threads of [`BoardConfig::threads`], at most; more than a few have nothing to do.
+/// Upper limit of [`BoardConfig::threads`]; more than a few threads have no work.
 pub const THREADS_MAX: usize = 31;
 const THREADS_DEFAULT_MAX: usize = 4;
 
@@ -115,7 +115,7 @@ pub struct BoardConfig {
     pub profile: &'static Profile,
     /// Its formats, instead of the profile's own; of the same widths on the streams.
     pub numbers: Option<Numbers>,
-    /// How it knows the inertia of its bodies.
+    /// Form in which it gets the inertia of its bodies.
     pub inertia: Inertia,
     /// Behaviour on read-after-write hazards.
     pub hazards: Hazards,
@@ -131,20 +131,20 @@ pub struct BoardConfig {
     pub address_width: u32,
     /// Whether the DMAs have the scatter-gather engine.
     pub scatter_gather: bool,
-    /// Whether the board goes dead after the first violation, as a test wants it.
+    /// Whether the board goes dead after the first violation, so that a test cannot miss it.
     pub strict: bool,
     /// Delays and depths.
     pub delays: Delays,
-    /// What is built wrongly.
+    /// Mistakes in the build.
     pub quirks: Quirks,
-    /// Threads of the host that the short cuts' arithmetic may take, the caller's among them. Like the
-    /// next two options without any influence on results, counters and cycles.
+    /// Threads of the host for the short cuts' arithmetic, with the caller's thread. Like the next
+    /// two options it changes no result, counter or cycle.
     pub threads: usize,
-    /// Whether collisions that have no body in common, and bodies, are computed side by side, where the
-    /// host can.
+    /// Whether SIMD lanes compute collisions without a common body, and bodies, if the host has
+    /// them.
     pub lanes: bool,
-    /// Whether the board takes its short cuts where the design has them: collisions are decoded once a
-    /// step, passes are computed many collisions at a time, and undisturbed time passes at once.
+    /// Whether the board takes the short cuts of its design: collisions are decoded once a step,
+    /// passes compute many collisions at a time, and undisturbed time passes at once.
     pub shortcuts: bool,
 }
 
@@ -173,7 +173,7 @@ impl Default for BoardConfig {
     }
 }
 
-/// Threads that are worth their while here.
+/// The host's processors, up to the default limit.
 fn threads_of_host() -> usize {
     static THREADS: OnceLock<usize> = OnceLock::new();
     *THREADS.get_or_init(|| {
@@ -192,12 +192,12 @@ pub enum ConfigError {
     StreamFormat {
         /// Which records.
         stream: &'static str,
-        /// Bits of the format asked for.
+        /// Bits of the requested format.
         found: u32,
         /// Bits of the profile's format.
         expected: u32,
     },
-    /// A format that has no word for the distance of a contact point that is not there.
+    /// A format without infinity, the distance of an unused contact point.
     #[error(
         "collisions relative to body A in thesis16, which has no infinity to mark an unused contact \
          point with; expected f32 or binary16"
@@ -209,7 +209,7 @@ pub enum ConfigError {
          expected f32 or binary16"
     )]
     NoZero,
-    /// Rows of more precision than what is computed with them.
+    /// Constraint rows of higher precision than the updates that use them.
     #[error(
         "constraint rows in f32 and updates in binary16, which cannot take them; expected updates \
          in f32, or both in binary16"
@@ -224,12 +224,12 @@ pub enum ConfigError {
         /// The profile.
         name: &'static str,
     },
-    /// A profile that is not one of the table's and contradicts itself.
+    /// A profile of the caller's own that contradicts itself.
     #[error("profile {name:?}: {what}")]
     Profile {
         /// Its name.
         name: &'static str,
-        /// What is wrong, and what is expected.
+        /// The expected state.
         what: &'static str,
     },
     /// A number outside its range.
@@ -237,7 +237,7 @@ pub enum ConfigError {
     OutOfRange {
         /// Which number.
         what: &'static str,
-        /// What was asked for.
+        /// The requested value.
         found: u64,
         /// Smallest value.
         low: u64,
@@ -247,7 +247,7 @@ pub enum ConfigError {
 }
 
 impl BoardConfig {
-    /// The profile with what was chosen.
+    /// The profile with the chosen formats and inertia.
     #[must_use]
     pub fn variant(&self) -> Variant {
         Variant {
@@ -257,8 +257,7 @@ impl BoardConfig {
         }
     }
 
-    /// Depth of one kind of pass as this board has it: a pass ends no sooner than its last
-    /// write-back.
+    /// Depth of one kind of pass on this board: a pass ends no sooner than its last write-back.
     pub(crate) fn depth(&self, profile: Depth) -> Depth {
         let window = match self.window_slots {
             Some(slots) => slots.saturating_mul(self.profile.initiation_interval),
@@ -267,7 +266,7 @@ impl BoardConfig {
         Depth { fill: profile.fill.max(window), window }
     }
 
-    /// Clocks that pass in a time.
+    /// Clock cycles in `ns` nanoseconds.
     pub(crate) fn cycles(&self, ns: u64) -> u64 {
         cycles_of(ns, self.profile.clock_khz)
     }
@@ -321,7 +320,7 @@ impl BoardConfig {
         Ok(())
     }
 
-    /// What registers, tables and FIFOs have room for.
+    /// Checks the sizes that registers, tables and FIFOs limit.
     fn check_sizes(
         &self,
         range: impl Fn(&'static str, u64, u64, u64) -> Result<(), ConfigError>,
@@ -335,7 +334,7 @@ impl BoardConfig {
         ] {
             range(what, found.into(), 1, high.into())?;
         }
-        // An issue enters the pipeline when all of it is there.
+        // An issue enters the pipeline once all of its beats have arrived.
         let words = self.variant().words().collision * profile.collisions_per_issue;
         let beats = words.div_ceil(BEAT_WORDS);
         range("beats of an issue", beats.into(), 1, self.delays.fifo_beats as u64)
@@ -367,7 +366,7 @@ impl BoardConfig {
     }
 }
 
-/// A caller may bring a profile of its own.
+/// Checks the profile, which may be the caller's own.
 fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
     let streams = [profile.mm2s_widths, profile.s2mm_widths];
     let stripe = |stripe: &Stripe, widths: &[u32]| {

@@ -1,5 +1,5 @@
-//! The ways to build an emulated board wrongly: mistakes of a block design, a device tree or a boot
-//! image that a driver's self-test must find.
+//! Builds an emulated board wrongly: mistakes of a block design, a device tree or a boot image that
+//! a driver's self-test must find.
 //!
 //! Unlike a [`Fault`](crate::Fault), which happens once, they last as long as the board.
 
@@ -16,26 +16,25 @@ pub enum InterruptWiring {
     Connected,
     /// Nowhere: no source reaches the processor.
     Disconnected,
-    /// It is high whatever the sources say.
+    /// Nowhere: the processor sees a high level at all times.
     StuckHigh,
 }
 
 /// Whether caches and memory agree on a buffer that was handed over.
 ///
-/// `from_byte` is where in each buffer the disagreement begins: what lies before is as it should
-/// be. The first hand-over of a buffer is in order too, for the caches hold none of it yet.
+/// `from_byte` is the beginning of the disagreement in each buffer: the bytes before it are
+/// coherent. The first hand-over of a buffer is coherent too, because no cache holds it yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Coherency {
     /// They agree.
     #[default]
     Coherent,
-    /// The device reads what the buffer held at its previous hand-over: the caches were not
-    /// written back.
+    /// The device reads the content of the previous hand-over: the caches were not written back.
     StaleReads {
         /// First byte of each buffer that is stale.
         from_byte: usize,
     },
-    /// The CPU finds what it handed over itself instead of what the device has written: the caches
+    /// The CPU reads the content that it handed over itself, not the device's stores: the caches
     /// were not invalidated.
     StaleWrites {
         /// First byte of each buffer that is stale.
@@ -52,15 +51,15 @@ pub enum Resettable {
     Accelerator,
 }
 
-/// How a board is built wrongly. The default is: not at all.
+/// The mistakes in the build of a board. The default is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quirks {
-    /// What IDENTIFICATION reads: another design was loaded.
+    /// Value of IDENTIFICATION: another one means another design.
     pub identification: u32,
-    /// What VERSION reads: a bitstream of another interface version.
+    /// Value of VERSION: another one means a bitstream of another interface version.
     pub version: u32,
-    /// Width of the cores' length registers, where it is not what the DMA register says. An AXI DMA
-    /// has 14 bits unless it is told otherwise.
+    /// True width of the cores' length registers, if the control block's DMA register gives another
+    /// one. The default of an AXI DMA is 14 bits.
     pub length_register: Option<u32>,
     /// The interrupt line.
     pub interrupt: InterruptWiring,
@@ -87,9 +86,9 @@ impl Default for Quirks {
 }
 
 impl Quirks {
-    /// What has a range: name, value, smallest and largest value.
+    /// The quirks with a range: name, value, smallest and largest value.
     pub(crate) fn ranges(&self) -> impl Iterator<Item = (&'static str, u64, u64, u64)> {
-        // Below what an AXI DMA can have too: what answers there may be none.
+        // Also below the 8 bits of an AXI DMA: another core may answer there.
         let (low, high) = (1, LENGTH_WIDTH_MAX.into());
         self.length_register
             .into_iter()
@@ -97,7 +96,7 @@ impl Quirks {
     }
 }
 
-/// `beats` with what `stale` holds from that byte on.
+/// `beats` with the beats of `stale` from byte `from_byte` on.
 pub(crate) fn stale_from(
     from_byte: usize,
     mut beats: Box<[Beat]>,

@@ -15,9 +15,9 @@ use super::sg::{Failure, Flight, Machine, Outcome};
 /// The designs that have short cuts.
 pub(crate) const PROFILES: [&Profile; 3] = [&FLOAT, &HALF, &MIXED];
 
-/// Designs of nobody that have short cuts too: two, three and six beats of a collision on each of
-/// three, two and one streams; one whose bodies have none; one with narrow streams; and one of pairs
-/// of collisions on other streams than `half`'s.
+/// Designs of no table that have short cuts too: two, three and six beats of a collision on each of
+/// three, two and one streams; one without a short cut for bodies; one with narrow streams; and one
+/// with pairs of collisions on other streams than in `half`.
 pub(crate) const OTHERS: [&Profile; 6] =
     [&ON_THREE, &ON_TWO, &ON_ONE, &BODIES_APART, &NARROW, &PAIRS];
 
@@ -56,7 +56,8 @@ const fn in_turn(streams: &'static [u8]) -> Stripes {
     Stripes::new(stripe, stripe)
 }
 
-/// Bodies as bits; cycles, stalls, waits, impulse sum and hazards; sums of what was received and sent.
+/// Bodies as bits; cycles, stalls, waits, impulse sum and hazards; sums of the received and sent
+/// words.
 pub(crate) type Visible = (Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2]);
 
 /// Everything that a host can see of some steps.
@@ -71,7 +72,7 @@ pub(crate) struct Seen {
     pub(crate) faults: u64,
 }
 
-/// What can be seen of an outcome.
+/// The visible part of an outcome.
 pub(crate) fn visible(outcome: &Outcome) -> Visible {
     let Outcome { cycles, stalls, waits, impulse_sum, .. } = *outcome;
     (

@@ -94,7 +94,7 @@ fn other_bytes_in_a_later_pass_are_noticed() {
                 assert_ne!(bodies(&changed), bodies(&usual), "{case}");
             }
         }
-        // What the decoder refuses is refused in the pass that brings it.
+        // The decoder refuses a wrong record in the pass that brings it.
         let refused = run(&|stream, packet, beats| {
             if stream == 0 && packet == 6 {
                 match (profile.geometry, contact.half) {
@@ -298,8 +298,8 @@ fn a_buffer_of_bodies_that_changes_hands_is_noticed() {
     };
     for (profile, moments) in MOMENTS {
         for (moment, pauses) in moments {
-            // Stream 2 brings odd bodies of `float`, two of three of `mixed`; the static ones' velocities
-            // are not looked at. Of every result it takes a row away.
+            // Stream 2 carries the odd bodies of `float`, and two of three of `mixed`, without the
+            // velocities of static bodies, which the board ignores; and one row of every result.
             let all = match (moment, profile.geometry) {
                 (Moment::Load | Moment::Poses, Geometry::Absolute) => 1500,
                 (Moment::Load, Geometry::Relative) => 1750,
@@ -343,7 +343,7 @@ fn a_buffer_of_bodies_that_is_gone_or_shorter_is_noticed() {
                 }
                 let waited = machine.wait(&flight, LONG);
                 if let Some(kept) = kept {
-                    // Whoever notices it, and when: nothing was written where nothing was granted.
+                    // Whether and when an error is seen: the device wrote nothing outside its grant.
                     assert_eq!(machine.host.take(address)[granted..], kept, "{moment:?} {pause}");
                 }
                 waited?;

@@ -175,16 +175,7 @@ mod tests {
         let variant = HALF.default_variant();
         for (count, fits) in [(1 << 16, true), ((1 << 16) + 1, false)] {
             let bodies = vec![body; count];
-            let limits = Limits {
-                variant,
-                flush_subnormals: false,
-                body_capacity: u32::MAX,
-                collision_capacity: u32::MAX,
-                shape_capacity: u32::MAX,
-                memory_bytes: u32::MAX,
-                bytes_per_body: 1,
-                bytes_per_collision: 1,
-            };
+            let limits = Limits::roomy(variant);
             let list = vec![collision; BLOCK];
             let parameters = StepParameters::default();
             let scene = preflight(&bodies, &list, &shapes, &parameters, &limits);

@@ -25,20 +25,6 @@ use pgs_interface::record::Beat;
 const SHAPES: [Shape; 3] = [Shape::STATIC, Shape::isotropic(1.0, 1.5), Shape::isotropic(2.0, 0.3)];
 const SEGMENTS: [Segment; 3] = [Segment::Velocities, Segment::Poses, Segment::Collisions];
 
-/// A bitstream that takes everything.
-fn limits(variant: Variant) -> Limits {
-    Limits {
-        variant,
-        flush_subnormals: false,
-        body_capacity: u32::MAX,
-        collision_capacity: u32::MAX,
-        shape_capacity: u32::MAX,
-        memory_bytes: u32::MAX,
-        bytes_per_body: 0,
-        bytes_per_collision: 0,
-    }
-}
-
 /// Small numbers without an end.
 struct Numbers(u64);
 
@@ -270,7 +256,7 @@ prop_compose! {
         if let Some(collision) = collision.filter(|_| !collisions.is_empty()) {
             collision.get_mut(&mut collisions).normal = [0.5; 3];
         }
-        Input { limits: limits(variant), bodies, collisions, order, words, places }
+        Input { limits: Limits::roomy(variant), bodies, collisions, order, words, places }
     }
 }
 
@@ -304,7 +290,7 @@ fn one_wrong_record_is_noticed_in_whichever_range() {
     let bodies: Vec<Body> = (0..2 * RANGE + 5).map(|_| numbers.body(0)).collect();
     let collisions = (0..2 * RANGE + 7).map(|_| numbers.collision(4000, 2)).collect();
     for profile in PROFILES {
-        let limits = limits(profile.default_variant());
+        let limits = Limits::roomy(profile.default_variant());
         let (bodies, collisions) = (bodies.clone(), Vec::clone(&collisions));
         let (order, places) = (vec![], vec![]);
         let mut input = Input { limits, bodies, collisions, order, words: None, places };

@@ -50,16 +50,7 @@ fn shapes(limits: &Limits) -> &'static [Shape] {
 }
 
 pub(crate) fn limits(variant: Variant, flush_subnormals: bool) -> Limits {
-    Limits {
-        variant,
-        flush_subnormals,
-        body_capacity: variant.body_capacity(),
-        collision_capacity: 1000,
-        shape_capacity: 64,
-        memory_bytes: u32::MAX,
-        bytes_per_body: 1,
-        bytes_per_collision: 1,
-    }
+    Limits { flush_subnormals, ..Limits::roomy(variant) }
 }
 
 /// Buffers for so many records.

@@ -1,27 +1,25 @@
-//! The platform over the emulated board.
+//! Drives the emulated board: the platform without hardware.
 
 use std::time::Duration;
 
 use bitstream_model::{CpuPort, DeviceAccess};
-use pgs_interface::address_map;
 use pgs_interface::record::BEAT_BYTES;
 
-use crate::platform::{Access, DmaMemory, Platform, PlatformError, RegisterWindow, SharedMemory};
+use crate::platform::{
+    Access, DmaMemory, DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow,
+    SharedMemory,
+};
 
-/// The emulated board, as its processor sees it.
+/// The emulated board from the side of its processor.
 #[derive(Debug)]
 pub(crate) struct EmulatedPlatform {
     port: CpuPort,
 }
 
 impl EmulatedPlatform {
-    /// The platform of that board.
+    /// The board behind this port.
     pub(crate) fn new(port: CpuPort) -> Self {
         Self { port }
-    }
-
-    fn window(&self, base: u64, bytes: u32) -> Box<dyn RegisterWindow> {
-        Box::new(EmulatedWindow { port: self.port.clone(), base, bytes })
     }
 }
 
@@ -55,15 +53,7 @@ fn refused<E: std::error::Error + Send + Sync + 'static>(
     move |source| PlatformError::Memory { act, what, value, source: Box::new(source) }
 }
 
-impl Platform for EmulatedPlatform {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        Ok(self.window(address_map::dma_base(core), address_map::DMA_BYTES))
-    }
-
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        Ok(self.window(address_map::CONTROL_BASE, address_map::CONTROL_BYTES))
-    }
-
+impl DmaMemorySource for EmulatedPlatform {
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let bytes = beats.saturating_mul(BEAT_BYTES) as u64;
         let allocated = self.port.allocate(beats);
@@ -106,6 +96,17 @@ impl Platform for EmulatedPlatform {
 
     fn release(&self, address: u64) -> Result<(), PlatformError> {
         self.port.release(address).map_err(refused("free", "address", address))
+    }
+}
+
+impl Platform for EmulatedPlatform {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let (base, bytes) = map.place();
+        Ok(Box::new(EmulatedWindow { port: self.port.clone(), base, bytes }))
+    }
+
+    fn memory(&self) -> &dyn DmaMemorySource {
+        self
     }
 
     fn now(&self) -> Duration {

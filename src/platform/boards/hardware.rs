@@ -1,4 +1,4 @@
-//! The platform of a real board: its registers, its memory, its interrupt.
+//! Drives a real board: finds and maps its registers and memory, and waits for its interrupt.
 
 use std::ops::Range;
 #[cfg(feature = "emulation")]
@@ -15,8 +15,8 @@ use crate::platform::linux::uio_listing::uio_listing;
 use crate::platform::memory::pool::{Pool, Region};
 use crate::platform::memory::u_dma_buf::{Caching, UDmaBuf};
 use crate::platform::{
-    Access, DmaMemory, ManagerChoice, Platform, PlatformError, RegisterWindow, ReservedMemory,
-    SharedMemory, System, UioDevice, require_bitstream,
+    DmaMemorySource, ManagerChoice, Platform, PlatformError, RegisterMap, RegisterWindow,
+    ReservedMemory, System, UioDevice, require_bitstream,
 };
 
 /// Where a real board's memory for DMA comes from.
@@ -47,14 +47,14 @@ pub enum MemoryChoice {
     /// A file: the memory of a board in another process, if it is not the file beside its socket.
     #[cfg(feature = "emulation")]
     File {
-        /// Which.
+        /// The file.
         path: PathBuf,
     },
 }
 
-/// How long to sleep in place of an interrupt that there is not.
+/// Time to sleep between two polls of a board without an interrupt.
 const WITHOUT_INTERRUPT: Duration = Duration::from_millis(1);
-/// Pauses up to this are spent spinning: the kernel cannot sleep that short.
+/// Shorter pauses spin: the kernel cannot sleep for less.
 const SPIN: Duration = Duration::from_micros(20);
 
 /// How the registers are reached.
@@ -64,7 +64,7 @@ enum Registers {
     OneNode(UioDevice),
     /// Each region has a node of its own; absent DMAs have none.
     Nodes { board: String, control: UioDevice, dma: Vec<(usize, UioDevice)> },
-    /// Through `/dev/mem`, at these places.
+    /// Through `/dev/mem`, at these addresses.
     DevMem(DevMem, DevMemWindows),
 }
 
@@ -81,14 +81,15 @@ pub(crate) struct HardwarePlatform {
 /// How to reach a real board's registers.
 #[derive(Debug, Clone)]
 pub(crate) enum RegisterChoice {
-    /// One node of that name, or a node for each region if there is no such one.
+    /// The node of that name; without one, the nodes of the single regions.
     Uio(String),
     /// These windows of `/dev/mem`.
     DevMem(DevMemWindows),
 }
 
 impl HardwarePlatform {
-    /// Opens registers and memory. No register is touched; the programmable logic is programmed.
+    /// Opens registers and memory, once the kernel knows that the logic is programmed. No register
+    /// is touched.
     pub(crate) fn open(
         system: &System,
         registers: RegisterChoice,
@@ -105,7 +106,7 @@ impl HardwarePlatform {
         let registers = match registers {
             RegisterChoice::Uio(node) => open_uio(system, &node)?,
             RegisterChoice::DevMem(windows) => {
-                // Opened once for both: it has one user at a time.
+                // One opening serves registers and memory: the file has one user at a time.
                 let wanted = windows.registers().into_iter().chain(window.clone()).collect();
                 Registers::DevMem(DevMem::open(system, wanted)?, windows)
             }
@@ -160,7 +161,7 @@ fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
     let control = part_name(name, UIO_CONTROL_MAP);
     if listing.has(name) || !listing.has(&control) {
         let node = listing.node(name)?;
-        // What lacks a control block is another device.
+        // A node without a control block is another device.
         node.map(UIO_CONTROL_MAP)?;
         return Ok(Registers::OneNode(UioDevice::of_node(system, node)?));
     }
@@ -175,8 +176,8 @@ fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
     Ok(Registers::Nodes { board: name.to_owned(), control, dma })
 }
 
-/// Opens memory that does not come from `/dev/mem`. Whichever it is, its device file is locked as
-/// long as the region, or a piece of it, exists.
+/// Opens a u-dma-buf or the memory of a UIO node. Its device file is locked as long as the region,
+/// or a piece of it, exists.
 fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>, PlatformError> {
     let u_dma_buf = |name: &str, caching| -> Result<Box<dyn Region>, PlatformError> {
         Ok(Box::new(UDmaBuf::open(system, name, caching)?))
@@ -194,60 +195,40 @@ fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>
 }
 
 impl Platform for HardwarePlatform {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        let map = UIO_DMA_MAPS.get(core).copied().unwrap_or_default();
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let region = match map {
+            RegisterMap::Dma(core) => UIO_DMA_MAPS.get(core).copied().unwrap_or_default(),
+            RegisterMap::Control => UIO_CONTROL_MAP,
+        };
         match &self.registers {
-            Registers::OneNode(device) => Ok(device.window(map)?.into()),
+            Registers::OneNode(device) => Ok(device.window(region)?.into()),
             Registers::Nodes { board, control, dma } => {
-                let present = dma.iter().find(|(number, _)| *number == core);
-                let (_, device) = present.ok_or_else(|| {
+                let device = match map {
+                    RegisterMap::Control => Some(control),
+                    RegisterMap::Dma(core) => {
+                        dma.iter().find(|(number, _)| *number == core).map(|(_, device)| device)
+                    }
+                };
+                let device = device.ok_or_else(|| {
                     let devices = dma.iter().map(|(_, device)| device).chain([control]);
                     let names: Vec<_> = devices.map(|device| device.node().name.as_str()).collect();
                     PlatformError::NoNode {
-                        wanted: part_name(board, &format!("dma{core}")),
+                        wanted: part_name(board, &map.to_string()),
                         found: names.join(", "),
                     }
                 })?;
-                Ok(device.map(device.node().map_or_only(map)?)?.into())
+                Ok(device.map(device.node().map_or_only(region)?)?.into())
             }
-            Registers::DevMem(mem, windows) => map_registers(mem, windows.dma(core)),
+            Registers::DevMem(mem, windows) => {
+                let window = windows.window(map);
+                let missing = PlatformError::OutOfWindows { address: u64::MAX, bytes: 0 };
+                Ok(Box::new(mem.map(&window.ok_or(missing)?)?))
+            }
         }
     }
 
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        match &self.registers {
-            Registers::OneNode(device) => Ok(device.window(UIO_CONTROL_MAP)?.into()),
-            Registers::Nodes { control, .. } => {
-                Ok(control.map(control.node().map_or_only(UIO_CONTROL_MAP)?)?.into())
-            }
-            Registers::DevMem(mem, windows) => map_registers(mem, windows.control()),
-        }
-    }
-
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
-        self.pool.allocate(beats)
-    }
-
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
-        self.pool.allocate_shared(words)
-    }
-
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
-        self.pool.hand_over(address, memory, used, access)
-    }
-
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
-        self.pool.take_back(address)
-    }
-
-    fn release(&self, address: u64) -> Result<(), PlatformError> {
-        self.pool.release(address)
+    fn memory(&self) -> &dyn DmaMemorySource {
+        &self.pool
     }
 
     fn now(&self) -> Duration {
@@ -275,12 +256,4 @@ impl Platform for HardwarePlatform {
     fn unmask_interrupt(&self) -> Result<(), PlatformError> {
         self.with_interrupt(UioDevice::unmask).map(|_| ())
     }
-}
-
-fn map_registers(
-    mem: &DevMem,
-    window: Option<Range<u64>>,
-) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-    let window = window.ok_or(PlatformError::OutOfWindows { address: u64::MAX, bytes: 0 })?;
-    Ok(Box::new(mem.map(&window)?))
 }

@@ -1,4 +1,5 @@
-//! The three kinds of board: hardware, emulated, served by another process.
+//! Implements the platform three times: for hardware, for the emulated board, and for a board that
+//! another process serves.
 
 #[cfg(feature = "emulation")]
 pub(crate) mod emulated;

@@ -1,9 +1,8 @@
-//! The platform over a board in another process: registers, interrupt and time through its socket,
-//! memory for DMA in the file that both processes have open.
+//! Drives a board in another process: registers, interrupt and time through a socket, memory for
+//! DMA in a file that both processes have open.
 //!
-//! The file is locked like every device file: the board has one driver at a time. Time is the
-//! board's, which is virtual; it passes with what is asked of the board, and each answer says how
-//! far it has come.
+//! The file is locked like every device file: the board has one driver at a time. The clock is the
+//! board's and virtual: it advances with each request, and each answer carries its time.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -16,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bitstream_model::remote::{connect, mark};
-use pgs_interface::address_map;
+
 use pgs_interface::message::{
     ANSWER_BYTES, Answer, LONGEST_WAIT, MEMORY_SUFFIX, Request, Status, VERSION,
 };
@@ -25,17 +24,17 @@ use crate::platform::linux::lock::LockedFile;
 use crate::platform::linux::mapped::Mapping;
 use crate::platform::memory::pool::Pool;
 use crate::platform::{
-    Access, DmaMemory, Platform, PlatformError, RegisterWindow, ReservedMemory, SharedMemory,
+    DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow, ReservedMemory,
 };
 
-/// How long an answer may take. The board's process computes what the board does meanwhile, at most
-/// [`LONGEST_WAIT`] of its time.
+/// Longest real time for an answer, in which the board's process computes at most [`LONGEST_WAIT`]
+/// of the board's time.
 const ANSWER_LIMIT: Duration = Duration::from_secs(60);
 
-/// How long a board that nobody has may take to let a driver in, which is the answer to its hello.
+/// Longest real time in which a free board answers the hello of a driver.
 const HELLO_LIMIT: Duration = Duration::from_secs(10);
 
-/// The file that is a served board's memory, if nobody says otherwise.
+/// The default file for the memory of a board served at `socket`.
 pub(crate) fn memory_beside(socket: &Path) -> PathBuf {
     let mut path = OsString::from(socket);
     path.push(MEMORY_SUFFIX);
@@ -56,7 +55,7 @@ impl RemotePlatform {
         Self::open_within(socket, memory, HELLO_LIMIT)
     }
 
-    /// The same for a board that lets its driver in within `limit`.
+    /// The same for a board that answers the hello within `limit`.
     fn open_within(socket: &Path, memory: &Path, limit: Duration) -> Result<Self, PlatformError> {
         let line = Line::connect(socket, limit)?;
         let error = |act| {
@@ -109,25 +108,21 @@ impl RemotePlatform {
         log::info!("memory for DMA: {} bytes at {:#x}", memory.bytes(), memory.address());
         Ok(Self { line: Arc::new(line), pool: Pool::new(Box::new(memory)) })
     }
-
-    fn window(&self, base: u64, bytes: u32) -> Box<dyn RegisterWindow> {
-        Box::new(RemoteWindow { line: Arc::clone(&self.line), base, bytes })
-    }
 }
 
-/// The socket to a board.
+/// The connection to a board.
 struct Line {
     socket: PathBuf,
     state: Mutex<State>,
 }
 
-/// What is known of the other side.
+/// The state of a connection.
 struct State {
     stream: UnixStream,
-    /// How long an answer may take.
+    /// Longest real time for an answer.
     limit: Duration,
-    /// The board's time at its last answer. A board that is lost has no time: there it is that of
-    /// our waits, so that these end.
+    /// The board's time at its last answer. A lost board has no clock: our own waits advance this
+    /// time then, so that they end.
     now: Duration,
     lost: Option<Arc<io::Error>>,
 }
@@ -157,7 +152,7 @@ impl Line {
             .map_err(|source| self.lost_to(Arc::new(source)))
     }
 
-    /// The first request. A board that does not answer it is not lost: it was never had.
+    /// The first request. A board that does not answer it is silent, not lost: no step has begun.
     fn hello(&self, limit: Duration) -> Result<Answer, PlatformError> {
         self.ask(Request::Hello { version: VERSION }).map_err(|error| match &error {
             PlatformError::ServerLost { socket, source }
@@ -170,11 +165,11 @@ impl Line {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // Nothing in here panics between two changes that belong together.
+        // No code under the lock panics between two changes that belong together.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// One request and its answer. Once that has failed the board is lost for good.
+    /// One request and its answer. After the first failure the board is lost for good.
     fn ask(&self, request: Request) -> Result<Answer, PlatformError> {
         let mut state = self.state();
         if state.lost.is_none() {
@@ -204,17 +199,17 @@ impl Line {
         PlatformError::ServerLost { socket: self.socket.clone(), source }
     }
 
-    /// What a register reads: all ones from a board that is lost, as from one without power.
+    /// The value of a register: all ones if the board is lost, like a board without power.
     fn read(&self, address: u64) -> u32 {
         self.ask(Request::Read { address }).map_or(u32::MAX, |answer| answer.value)
     }
 }
 
-/// Sends a request and reads its answer, in bounded time: a part that comes late counts as late.
+/// Sends a request and reads its answer. The whole answer must arrive within `limit`.
 fn exchange(stream: &mut UnixStream, request: Request, limit: Duration) -> io::Result<Answer> {
     let until = Instant::now() + limit;
     let late = || io::Error::new(io::ErrorKind::TimedOut, format!("no answer within {limit:?}"));
-    // What the kernel calls a transfer that has timed out.
+    // The kernel reports a transfer that has timed out as `WouldBlock`.
     let timed = |error: io::Error| match error.kind() {
         io::ErrorKind::WouldBlock => late(),
         _ => error,
@@ -264,44 +259,19 @@ impl RegisterWindow for RemoteWindow {
     }
 
     fn write32(&self, at: u32, value: u32) {
-        // A write to a board that is lost goes nowhere; the next wait says so.
+        // A write to a lost board goes nowhere; the next wait reports the loss.
         let _ = self.line.ask(Request::Write { address: self.base + u64::from(at), value });
     }
 }
 
 impl Platform for RemotePlatform {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        Ok(self.window(address_map::dma_base(core), address_map::DMA_BYTES))
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let (base, bytes) = map.place();
+        Ok(Box::new(RemoteWindow { line: Arc::clone(&self.line), base, bytes }))
     }
 
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        Ok(self.window(address_map::CONTROL_BASE, address_map::CONTROL_BYTES))
-    }
-
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
-        self.pool.allocate(beats)
-    }
-
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
-        self.pool.allocate_shared(words)
-    }
-
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
-        self.pool.hand_over(address, memory, used, access)
-    }
-
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
-        self.pool.take_back(address)
-    }
-
-    fn release(&self, address: u64) -> Result<(), PlatformError> {
-        self.pool.release(address)
+    fn memory(&self) -> &dyn DmaMemorySource {
+        &self.pool
     }
 
     fn now(&self) -> Duration {
@@ -367,7 +337,7 @@ mod tests {
         // From here on nothing is sent, and no time of ours passes.
         let (_root, memory) = reserved(0x6000_0000, 1 << 16);
         let platform = RemotePlatform { line: Arc::new(line), pool: Pool::new(Box::new(memory)) };
-        let window = platform.control_window().expect("a window");
+        let window = platform.window(RegisterMap::Control).expect("a window");
         assert_eq!(window.read32(0), u32::MAX);
         assert!(matches!(platform.lost(), Some(PlatformError::ServerLost { .. })));
         window.write32(0, 1);
@@ -383,7 +353,7 @@ mod tests {
         assert_eq!(sent, Request::Unmask.encode());
     }
 
-    /// A folder with a socket that somebody has bound, and with a file for the memory.
+    /// A folder with a bound socket and a file for the memory.
     fn bound() -> (tempfile::TempDir, PathBuf, PathBuf, UnixListener) {
         let folder = tempfile::tempdir().expect("a directory");
         let (socket, memory) = (folder.path().join("board"), folder.path().join("memory"));

@@ -1,11 +1,10 @@
-//! Maps physical memory through `/dev/mem`: only on request, and only inside windows that
-//! were configured.
+//! Maps physical memory through `/dev/mem`: only on request, and only inside configured windows.
 //!
-//! `/dev/mem` is locked, and with it every device file that shows memory of these windows too: who
-//! opens a UIO node or a u-dma-buf has it alone, whichever way the other one comes.
+//! `/dev/mem` is locked, and with it every device file that shows memory of these windows too: a
+//! register or a buffer has one user, through `/dev/mem` or through its own device file.
 //!
-//! There is no interrupt this way. What the kernel does not map (registers, memory reserved with
-//! `no-map`) is Device memory.
+//! `/dev/mem` gives no interrupt. Memory that the kernel does not map (registers, memory reserved
+//! with `no-map`) is mapped as Device memory.
 //!
 //! Source: Linux `Documentation/arch/arm64/memory.rst`, `drivers/char/mem.c`.
 
@@ -23,9 +22,9 @@ use super::sysfs::{is_gone, read_if_present, read_number};
 use super::system::page_bytes;
 use super::uio_listing::uio_listing;
 use crate::platform::memory::u_dma_buf::directory;
-use crate::platform::{PlatformError, ReservedMemory, System, u_dma_buf_names};
+use crate::platform::{PlatformError, RegisterMap, ReservedMemory, System, u_dma_buf_names};
 
-/// What may be reached through `/dev/mem`. The default is the address map of the interface.
+/// The windows that a board may use of `/dev/mem`. The default is the address map of the interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DevMemWindows {
     /// Physical address of each AXI DMA, whose registers take 64 KiB.
@@ -47,25 +46,20 @@ impl Default for DevMemWindows {
 }
 
 impl DevMemWindows {
-    /// The registers of AXI DMA `core`.
-    pub(crate) fn dma(&self, core: usize) -> Option<Range<u64>> {
-        self.dma.get(core).and_then(|start| range(*start, u64::from(DMA_BYTES)))
-    }
-
-    /// The registers of the accelerator.
-    pub(crate) fn control(&self) -> Option<Range<u64>> {
-        range(self.control, u64::from(CONTROL_BYTES))
+    /// The registers of an AXI DMA or of the accelerator.
+    pub(crate) fn window(&self, map: RegisterMap) -> Option<Range<u64>> {
+        let (start, bytes) = match map {
+            RegisterMap::Dma(core) => (*self.dma.get(core)?, DMA_BYTES),
+            RegisterMap::Control => (self.control, CONTROL_BYTES),
+        };
+        Some(start..start.checked_add(u64::from(bytes))?)
     }
 
     /// All registers.
     pub(crate) fn registers(&self) -> Vec<Range<u64>> {
-        let dma = (0..DMA_COUNT_MAX).map(|core| self.dma(core));
-        dma.chain([self.control()]).flatten().collect()
+        let maps = (0..DMA_COUNT_MAX).map(RegisterMap::Dma).chain([RegisterMap::Control]);
+        maps.filter_map(|map| self.window(map)).collect()
     }
-}
-
-fn range(start: u64, bytes: u64) -> Option<Range<u64>> {
-    Some(start..start.checked_add(bytes)?)
 }
 
 fn overlap(a: &Range<u64>, b: &Range<u64>) -> bool {
@@ -76,14 +70,14 @@ fn overlap(a: &Range<u64>, b: &Range<u64>) -> bool {
 #[derive(Debug)]
 pub(crate) struct DevMem {
     file: Arc<LockedFile>,
-    /// What may be mapped.
+    /// Ranges that may be mapped.
     windows: Vec<Range<u64>>,
-    /// What the kernel uses as its own, as far as it says.
+    /// Ranges that the kernel lists as its own, with its lines for them.
     kernel: Vec<(Range<u64>, String)>,
 }
 
 impl DevMem {
-    /// Opens it, to map these windows and nothing else.
+    /// Opens `/dev/mem` to map these windows and nothing else.
     pub(crate) fn open(system: &System, windows: Vec<Range<u64>>) -> Result<Self, PlatformError> {
         let first = windows.first().map_or(0, |window| window.start);
         let file = LockedFile::open(&system.dev.join("mem"), nix::libc::O_SYNC)
@@ -121,15 +115,15 @@ impl DevMem {
     }
 }
 
-/// Locks the device files that show memory of these windows too. One whose file is not there nobody
-/// can open.
+/// Locks the device files that show memory of these windows too. A device without a file cannot be
+/// opened and needs no lock.
 fn lock_others(system: &System, windows: &[Range<u64>]) -> Result<Vec<LockedFile>, PlatformError> {
     let shown = |start: u64, bytes: u64| {
         let shown = start..start.saturating_add(bytes);
         windows.iter().any(|window| overlap(window, &shown))
     };
     let listing = uio_listing(&system.uio)?;
-    // Nobody knows what a node shows that cannot be read.
+    // A node with an unreadable description may show memory of the windows.
     let mut names: Vec<_> = listing.unreadable.into_iter().map(|node| node.device).collect();
     for node in listing.nodes {
         if node.maps.iter().any(|map| shown(map.address, map.bytes)) {
@@ -171,7 +165,7 @@ fn refused(act: &'static str, address: u64, error: PlatformError) -> PlatformErr
     }
 }
 
-/// The lines of `/proc/iomem` that are memory of the kernel's. Without rights it shows zeros.
+/// The lines of `/proc/iomem` for the kernel's own memory. A reader without rights sees zeros.
 fn kernel_memory(iomem: &str) -> Vec<(Range<u64>, String)> {
     let parse = |line: &str| {
         let (addresses, name) = line.trim().split_once(" : ")?;
@@ -190,7 +184,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, write};
+    use crate::platform::uio_fake::{add_node, empty_system, write};
     use crate::platform::{RegisterWindow, UioDevice, release_to_device};
     use pgs_interface::record::Beat;
 
@@ -203,8 +197,7 @@ mod tests {
 
     /// A `/dev/mem` of 1 MiB with registers at its start and memory at 0x40040.
     fn memory() -> (tempfile::TempDir, System, DevMemWindows) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         let path = system.dev.join("mem");
         write(path.clone(), "");
         File::create(path).and_then(|file| file.set_len(1 << 20)).expect("resized");
@@ -219,16 +212,16 @@ mod tests {
     #[test]
     fn the_default_windows_are_those_of_the_interface() {
         let windows = DevMemWindows::default();
-        assert_eq!(windows.dma(3), Some(0xA003_0000..0xA004_0000));
-        assert_eq!(windows.dma(4), None);
-        assert_eq!(windows.control(), Some(0xA004_0000..0xA004_1000));
+        assert_eq!(windows.window(RegisterMap::Dma(3)), Some(0xA003_0000..0xA004_0000));
+        assert_eq!(windows.window(RegisterMap::Dma(4)), None);
+        assert_eq!(windows.window(RegisterMap::Control), Some(0xA004_0000..0xA004_1000));
         assert_eq!(windows.memory, 0x5000_0000..0x5400_0000);
     }
 
     #[test]
     fn a_window_is_mapped_where_it_lies_and_need_not_begin_on_a_page() {
         let (_root, system, windows) = memory();
-        let control = windows.control().expect("no overflow");
+        let control = windows.window(RegisterMap::Control).expect("no overflow");
         let memory_window = windows.memory.clone();
         let mem = open(&system, &windows).expect("opened");
         mem.map(&control).expect("mapped").write32(8, 0x0403_0201);
@@ -263,7 +256,8 @@ mod tests {
         let mem = open(&system, &windows).expect("opened");
         let error = open(&system, &windows).expect_err("in use");
         assert!(matches!(&error, PlatformError::Busy { path } if path.ends_with("mem")), "{error}");
-        let control = mem.map(&windows.control().expect("no overflow")).expect("mapped");
+        let control =
+            mem.map(&windows.window(RegisterMap::Control).expect("no overflow")).expect("mapped");
         let memory = mem.memory(&windows.memory).expect("mapped");
         // Either keeps it.
         drop((mem, control));
@@ -339,7 +333,7 @@ mod tests {
                      00080000-00080fff : a0040000.control\n";
         write(system.iomem.clone(), iomem);
         let memory = windows.memory.clone();
-        let control = windows.control().expect("no overflow");
+        let control = windows.window(RegisterMap::Control).expect("no overflow");
         let mem = open(&system, &windows).expect("opened");
         let error = mem.memory(&memory).expect_err("overlaps");
         assert!(

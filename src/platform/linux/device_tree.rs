@@ -1,8 +1,8 @@
 //! Reads the lengths of a device's regions from the device tree.
 //!
 //! `uio_pdrv_genirq` rounds every region up to whole pages; the node's `reg` is exact. The regions
-//! are the entries of `reg`, in its order. Each is an address and a length of as many big-endian
-//! cells as the parent's `#address-cells` and `#size-cells` say.
+//! are the entries of `reg`, in its order. An entry is an address and a length in big-endian cells,
+//! whose numbers are the parent's `#address-cells` and `#size-cells`.
 //!
 //! Source: Devicetree Specification 0.4, 2.3.5 and 2.3.6; Linux `drivers/of/platform.c`,
 //! `drivers/uio/uio_pdrv_genirq.c`.
@@ -13,12 +13,12 @@ use std::path::{Path, PathBuf};
 
 use crate::platform::PlatformError;
 
-/// Lengths of the regions in the `reg` of a device-tree node, a folder, by number. `None` if there
-/// is no such node or it has no `reg`: the device does not come from a device tree.
+/// Lengths of the regions in the `reg` of a device-tree node, a folder, by number. `None` without a
+/// node or a `reg`: the device does not come from a device tree.
 pub(crate) fn region_lengths(node: &Path) -> Result<Option<Vec<u64>>, PlatformError> {
     let path = node.join("reg");
     let Some(reg) = bytes(&path)? else { return Ok(None) };
-    // Through the link: the parent in the tree.
+    // `..` after the link is the parent in the tree.
     let cells = |name: &str, default| -> Result<usize, PlatformError> {
         let path = node.join("..").join(name);
         let Some(found) = bytes(&path)? else { return Ok(default) };
@@ -38,7 +38,7 @@ pub(crate) fn region_lengths(node: &Path) -> Result<Option<Vec<u64>>, PlatformEr
     Ok(Some(reg.chunks_exact(address + length).map(number).collect()))
 }
 
-/// What a property holds, if it is there.
+/// The bytes of a property, if it exists.
 fn bytes(path: &Path) -> Result<Option<Vec<u8>>, PlatformError> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
@@ -77,7 +77,7 @@ mod tests {
         assert_eq!(lengths, Some(vec![0x1_0000, 0x1_0000_1000]));
         let (_root, link) = node(Some((1, 1)), &[0xA000_0000, 0x1_0000, 0xA004_0000, 0x1004]);
         assert_eq!(region_lengths(&link).expect("as it should be"), Some(vec![0x1_0000, 0x1004]));
-        // Without: two cells of address and one of length.
+        // The default: two cells of address and one of length.
         let (_root, link) = node(None, &[8, 0, 0x800]);
         assert_eq!(region_lengths(&link).expect("as it should be"), Some(vec![0x800]));
     }

@@ -1,7 +1,8 @@
-//! Asks the kernel whether the programmable logic carries a bitstream, and which FPGA manager knows.
+//! Asks the kernel whether the programmable logic carries a bitstream.
 //!
-//! An access to a register that is not there hangs the CPU: so the question comes before every
-//! first access. A board may have managers of other chips; the logic's own is known by its name.
+//! An access to a register of logic that is not programmed hangs the CPU: the question comes
+//! before the first access. The answer is the state of the logic's FPGA manager, which is known by
+//! its name: a board may have managers of other chips.
 //!
 //! Source: Linux `Documentation/ABI/testing/sysfs-class-fpga-manager`, `drivers/fpga/zynqmp-fpga.c`.
 
@@ -11,9 +12,9 @@ use std::path::{Path, PathBuf};
 use super::sysfs::{numbered, read, read_if_present};
 use crate::platform::{PlatformError, System};
 
-/// The state of a programmable logic that is ready.
+/// The state of programmable logic that is ready.
 const OPERATING: &str = "operating";
-/// How the kernel names the manager of the chip's own logic.
+/// The kernel's name for the manager of the chip's own logic.
 pub const ZYNQMP_MANAGER: &str = "Xilinx ZynqMP FPGA Manager";
 
 /// Which FPGA manager knows whether the logic of a real board is programmed.
@@ -39,7 +40,7 @@ pub enum ManagerChoice {
 pub struct FpgaManager {
     /// The kernel's name, `fpga0`.
     pub device: String,
-    /// What its driver calls itself; empty if that cannot be read.
+    /// The name that its driver gives it; empty if it cannot be read.
     pub name: String,
     /// Its attributes.
     pub directory: PathBuf,
@@ -74,10 +75,11 @@ pub fn fpga_managers(class: &Path) -> Result<Vec<FpgaManager>, PlatformError> {
     Ok(numbered(class, "fpga")?.into_iter().map(manager).collect())
 }
 
-/// The manager of choice; `None` if the kernel has none, or none is to be asked.
+/// The manager of choice; `None` if the kernel has no manager, or for [`ManagerChoice::Unasked`].
 ///
 /// # Errors
-/// The one asked for is not there, several have the name of the chip's own, or none of those there has.
+/// The requested manager does not exist; or, for [`ManagerChoice::Automatic`], several managers
+/// have the name of the chip's own, or none has it.
 pub fn find_manager(
     class: &Path,
     choice: &ManagerChoice,
@@ -106,9 +108,8 @@ pub fn find_manager(
     }
 }
 
-/// Refuses a programmable logic that the kernel says is not programmed, or that a manager knows of
-/// which is not known to be the logic's own. A kernel that has no managers cannot say, which is
-/// logged.
+/// Refuses logic that is not programmed by the state of its manager, and logic whose manager cannot
+/// be identified. Without managers the kernel has no state, and the log says so.
 ///
 /// # Errors
 /// [`PlatformError::NoBitstream`], as [`find_manager`], or the state cannot be read.
@@ -123,7 +124,7 @@ pub fn require_bitstream(system: &System, choice: &ManagerChoice) -> Result<(), 
         return Ok(());
     };
     let path = manager.directory.join("state");
-    // Some kernels' managers have no state to ask for.
+    // The managers of some kernels have no state.
     match read_if_present(&path)? {
         Some(state) if state == OPERATING => Ok(()),
         Some(found) => Err(PlatformError::NoBitstream { path, found }),
@@ -153,14 +154,9 @@ pub(crate) mod fake {
 mod tests {
     use super::fake::add_manager;
     use super::*;
+    use crate::platform::uio_fake::empty_system;
 
     const SELECT_MAP: &str = "Xilinx Slave SelectMap FPGA Manager";
-
-    fn system() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        (root, system)
-    }
 
     fn ask(system: &System) -> Result<(), PlatformError> {
         require_bitstream(system, &ManagerChoice::Automatic)
@@ -168,7 +164,7 @@ mod tests {
 
     #[test]
     fn only_an_operating_logic_or_one_nobody_knows_of_is_touched() {
-        let (_root, system) = system();
+        let (_root, system) = empty_system();
         ask(&system).expect("cannot be asked for");
         add_manager(&system, 0, ZYNQMP_MANAGER, "operating");
         ask(&system).expect("operating");
@@ -185,7 +181,7 @@ mod tests {
 
     #[test]
     fn the_manager_of_another_chip_does_not_answer_for_this_one() {
-        let (_root, system) = system();
+        let (_root, system) = empty_system();
         add_manager(&system, 0, SELECT_MAP, "unknown");
         add_manager(&system, 1, ZYNQMP_MANAGER, "operating");
         ask(&system).expect("fpga1 runs");
@@ -197,7 +193,7 @@ mod tests {
 
     #[test]
     fn where_several_fit_or_none_the_caller_is_asked() {
-        let (_root, system) = system();
+        let (_root, system) = empty_system();
         add_manager(&system, 0, ZYNQMP_MANAGER, "operating");
         add_manager(&system, 2, ZYNQMP_MANAGER, "unknown");
         let error = ask(&system).expect_err("which?");

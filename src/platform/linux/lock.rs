@@ -1,10 +1,10 @@
 //! Opens a device file for one user alone.
 //!
-//! The lock is that of `flock(2)`: it belongs to one opening of the file, so that a second opening
-//! is refused whether it is made by another program or by another part of this one. Every device
-//! file that this folder maps is opened here, and a [`Mapping`](super::mapped::Mapping) keeps the
-//! lock as long as it exists. That is what makes a mapping the only one of its memory. It binds
-//! those who ask for the lock; a second device file of the same device (`mknod`) has another one.
+//! The lock is `flock(2)`. It belongs to one opening of the file: a second opening is refused,
+//! whether another program makes it or another part of this one. Every device file that this folder
+//! maps is opened here, and a [`Mapping`](super::mapped::Mapping) holds the lock as long as it
+//! exists, which makes it the only mapping of its memory. The lock binds only programs that ask for
+//! it, and a second device file of the same device (`mknod`) has a lock of its own.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -15,24 +15,24 @@ use nix::fcntl::{Flock, FlockArg};
 use super::system::open_device;
 use crate::platform::PlatformError;
 
-/// A device file that nobody else who asks can open; until this is dropped.
+/// An open device file with its lock, which is released on drop.
 #[derive(Debug)]
 pub(crate) struct LockedFile {
     file: Flock<File>,
     path: PathBuf,
-    /// Other device files that show the same, held for the same time.
+    /// Other device files that show the same memory, locked for the same time.
     others: Vec<LockedFile>,
 }
 
 impl LockedFile {
     /// Opens and locks a device file to read and write; `flags` as for `open`.
     ///
-    /// [`PlatformError::Busy`] if somebody else has it.
+    /// [`PlatformError::Busy`] if the file is locked already.
     pub(crate) fn open(path: &Path, flags: i32) -> Result<Self, PlatformError> {
         Self::of_file(open_device(path, flags)?, path)
     }
 
-    /// Locks a file that is open.
+    /// Locks an open file.
     pub(crate) fn of_file(file: File, path: &Path) -> Result<Self, PlatformError> {
         let path = path.to_owned();
         match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
@@ -80,8 +80,8 @@ mod tests {
         assert!(matches!(&error, PlatformError::Busy { path: busy } if busy == path), "{error}");
     }
 
-    /// Free within ten seconds: a program that another test starts has copies of all open files, and so of
-    /// the lock, from its fork to its first instruction.
+    /// Free within ten seconds: a program that another test starts has copies of all open files,
+    /// and so of the lock, from its fork to its first instruction.
     fn assert_free(path: &Path) {
         let until = Instant::now() + Duration::from_secs(10);
         while let Err(error) = LockedFile::open(path, 0) {

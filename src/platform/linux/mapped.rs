@@ -1,4 +1,4 @@
-//! Maps device files, and accesses the mapping: registers, and memory for DMA.
+//! Maps device files, and accesses the registers and the memory for DMA in the mapping.
 #![allow(unsafe_code, reason = "what is mapped is reached through raw pointers only")]
 
 use std::fs::File;
@@ -14,28 +14,28 @@ use crate::platform::{PlatformError, RegisterWindow};
 
 /// A region of a device file, mapped readable and writable and shared with the device.
 ///
-/// The region begins on a multiple of 16 of the address space. The only references to it are those
-/// of [`MappedBeats`](crate::platform::memory::volatile::MappedBeats).
+/// The region begins on a multiple of 16 of the address space. Only
+/// [`MappedBeats`](crate::platform::memory::volatile::MappedBeats) makes references to it.
 ///
-/// Invariant, on which every access here relies: it has one owner, in whose hands no access to a
-/// word meets a store to the same word from another thread. The lock keeps other mappings of the
-/// device file away, those of this process included. The owners see to the rest: the public types
-/// ask for `&mut self` to store, the accelerator for `&mut self` to step, and the pool gives each
-/// piece of memory to one holder. The device's own accesses are not the language's concern: words
-/// and doublewords are volatile and aligned, and beats are handed over.
+/// Every access here relies on one invariant: a region has one owner, and under that owner no
+/// access to a word meets a store to the same word from another thread. The lock keeps other
+/// mappings of the device file away, also mappings of this process. The owners do the rest: the
+/// public types store through `&mut self`, the accelerator steps through `&mut self`, and the pool
+/// gives each piece of memory to one holder. The device's own accesses are not the language's
+/// concern: words and doublewords are volatile and aligned, and beats are handed over.
 #[derive(Debug)]
 pub(crate) struct Mapping {
     map: MmapRaw,
     /// Where the region begins in the mapping, a multiple of 16.
     start: usize,
     bytes: usize,
-    /// Dropped after the map: while there is one, nobody else opens the device file.
+    /// Dropped after the map: the device file is locked as long as it is mapped.
     _lock: Arc<LockedFile>,
 }
 
 impl Mapping {
     /// Maps `start + bytes` bytes at `file_offset` of a locked device file, a multiple of the page
-    /// size; the region is what follows the first `start` of them.
+    /// size; the region is the last `bytes` of them.
     pub(crate) fn new(
         lock: &Arc<LockedFile>,
         file_offset: u64,
@@ -73,7 +73,7 @@ impl Mapping {
         self.bytes
     }
 
-    /// A pointer to `bytes` at `at`, of which `at` is a multiple.
+    /// A pointer to `bytes` bytes at `at`, a multiple of `bytes`.
     fn pointer(&self, at: usize, bytes: usize) -> *mut u8 {
         assert!(
             at.is_multiple_of(bytes) && at.checked_add(bytes).is_some_and(|end| end <= self.bytes),
@@ -93,7 +93,7 @@ impl Mapping {
         self.pointer(at, 8).cast()
     }
 
-    /// Insists that `beats` beats from byte `at` lie inside the region, on multiples of 16.
+    /// Panics unless `beats` beats from byte `at` lie inside the region, on multiples of 16.
     pub(crate) fn check_beats(&self, at: usize, beats: usize) {
         let end = beats.checked_mul(BEAT_BYTES).and_then(|bytes| bytes.checked_add(at));
         assert!(
@@ -102,7 +102,7 @@ impl Mapping {
         );
     }
 
-    /// Where the beat at byte `at` lies, a multiple of 16 inside the region or its end.
+    /// A pointer to the beat at byte `at`, a multiple of 16 inside the region or its end.
     #[allow(clippy::cast_ptr_alignment, reason = "a page, plus start and at: multiples of 16")]
     pub(crate) fn beat(&self, at: usize) -> *mut Beat {
         self.check_beats(at, 0);
@@ -226,7 +226,7 @@ mod tests {
             other.beats_mut().fill(Beat([2; 4]));
         });
         assert_eq!((one.beats()[7], other.beats()[0]), (Beat([1; 4]), Beat([2; 4])));
-        // Handed over and back, as the pool does it: the slices are gone, the words are there.
+        // After a hand-over as in the pool the slices are gone, and the words are still there.
         drop((one, other));
         assert_eq!([0x7C, 0x80].map(|at| region.load_word(at)), [1, 2]);
     }

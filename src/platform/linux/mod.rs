@@ -1,4 +1,4 @@
-//! What the kernel shows of a board: UIO, /dev/mem, sysfs, the device tree.
+//! Finds and opens a board through the kernel: UIO, `/dev/mem`, sysfs and the device tree.
 
 pub(crate) mod dev_mem;
 pub(crate) mod device_tree;

@@ -61,7 +61,7 @@ pub(crate) fn read_number(path: &Path) -> Result<u64, PlatformError> {
     number.map_err(|_| PlatformError::NotANumber { path: path.to_owned(), found: text })
 }
 
-/// Whether a file is not there any more: removed, or of a device that was.
+/// Whether a file is gone: it was removed, or its device was.
 pub(crate) fn is_gone(error: &PlatformError) -> bool {
     matches!(error, PlatformError::File { source, .. } if source.kind() == io::ErrorKind::NotFound
         || source.raw_os_error() == Some(Errno::ENODEV as i32))

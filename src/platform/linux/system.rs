@@ -1,4 +1,4 @@
-//! Says where Linux shows devices, in one place, so that a test can show others.
+//! Knows the paths at which Linux shows devices, in one type, so that a test can use others.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -18,13 +18,13 @@ pub struct System {
     pub uio: PathBuf,
     /// Descriptions of the u-dma-buf buffers.
     pub u_dma_buf: PathBuf,
-    /// The same of a module from before it was renamed.
+    /// The same for the older module, udmabuf.
     pub udmabuf: PathBuf,
     /// The FPGA managers, which know the state of programmable logic.
     pub fpga_manager: PathBuf,
     /// Device files.
     pub dev: PathBuf,
-    /// What lies where in physical memory.
+    /// The map of physical memory, `/proc/iomem`.
     pub iomem: PathBuf,
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn obstacle(path: &Path, source: io::Error) -> PlatformError {
     }
 }
 
-/// The system's page size; `path` is what it is wanted for.
+/// The system's page size; an error names `path`, the file to be mapped.
 pub(crate) fn page_bytes(path: &Path) -> Result<u64, PlatformError> {
     let bytes = nix::unistd::sysconf(nix::unistd::SysconfVar::PAGE_SIZE);
     let source = match bytes {

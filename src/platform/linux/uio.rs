@@ -1,7 +1,7 @@
-//! Says what a UIO node is: its names, its regions, and which part of the accelerator they are.
+//! Describes a UIO node: its names, its regions, and the part of the accelerator that they are.
 //!
-//! The kernel numbers the nodes as it meets them; what stays is the name (`linux,uio-name` of the
-//! device tree). A node says where its regions lie in `maps/map*/{name,addr,size,offset}`.
+//! The kernel numbers the nodes as it meets them, so that only the name (`linux,uio-name` of the
+//! device tree) is stable. The regions of a node lie in `maps/map*/{name,addr,size,offset}`.
 //!
 //! Source: Linux `Documentation/driver-api/uio-howto.rst`.
 
@@ -44,7 +44,7 @@ impl UioNode {
     /// The region of that name.
     ///
     /// # Errors
-    /// [`PlatformError::NoMap`], which lists those that there are.
+    /// [`PlatformError::NoMap`], which lists the names of all regions.
     pub fn map(&self, name: &str) -> Result<&UioMap, PlatformError> {
         self.maps.iter().find(|map| map.name == name).ok_or_else(|| {
             let names: Vec<_> = self.maps.iter().map(|map| map.name.as_str()).collect();
@@ -56,7 +56,7 @@ impl UioNode {
         })
     }
 
-    /// The region of that name, or the only one that there is, whatever its name.
+    /// The region of that name, or the only region of the node, whatever its name.
     pub(crate) fn map_or_only(&self, name: &str) -> Result<&UioMap, PlatformError> {
         match self.maps.as_slice() {
             [only] => Ok(only),
@@ -71,7 +71,7 @@ impl UioNode {
 pub enum NodePart {
     /// The control block and DMA cores.
     Accelerator,
-    /// The same by their addresses; the regions have not the names by which they are found.
+    /// The same by their addresses; the regions lack the names that the driver looks for.
     Unnamed,
     /// One region: the control block, or a DMA core.
     Region(&'static str),
@@ -86,7 +86,7 @@ impl UioNode {
         self.maps.iter().any(UioMap::is_in_logic)
     }
 
-    /// What of the accelerator its regions are, by their names, else by their addresses.
+    /// The part of the accelerator that its regions are, by their names, else by their addresses.
     #[must_use]
     pub fn part(&self) -> Option<NodePart> {
         let logic: Vec<_> = self.maps.iter().filter(|map| map.is_in_logic()).collect();
@@ -152,6 +152,20 @@ pub(crate) mod fake {
         fs::write(path, format!("{text}\n")).expect("written");
     }
 
+    /// A system without devices; it lasts as long as the folder.
+    pub(crate) fn empty_system() -> (tempfile::TempDir, System) {
+        let root = tempfile::tempdir().expect("a directory");
+        let system = System::under(root.path());
+        (root, system)
+    }
+
+    /// A system with the accelerator as node `uio3`.
+    pub(crate) fn accelerator() -> (tempfile::TempDir, System) {
+        let (root, system) = empty_system();
+        add_node(&system, 3, "pgs", &regions());
+        (root, system)
+    }
+
     /// Adds the node `uio<number>` with these regions; its device file is of zeros, and long enough
     /// for pages of up to 64 KiB.
     pub(crate) fn add_node(system: &System, number: u32, name: &str, maps: &[Map<'_>]) {
@@ -189,12 +203,11 @@ pub(crate) mod fake {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::platform::{System, uio_nodes};
+    use crate::platform::uio_nodes;
 
     #[test]
     fn a_region_is_found_by_name_whatever_its_number() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (_root, system) = fake::empty_system();
         let mut regions = fake::regions();
         regions.swap(0, 4);
         regions.remove(2);
@@ -209,8 +222,7 @@ mod tests {
 
     #[test]
     fn the_only_region_of_a_node_needs_no_name() {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (_root, system) = fake::empty_system();
         fake::add_node(&system, 0, "pgs-dma0", &[("dma@a0000000", 0xA000_0000, 0x1_0000)]);
         let node = uio_nodes(&system.uio).expect("readable").remove(0);
         assert_eq!(node.map_or_only("dma0").expect("the only one").address, 0xA000_0000);

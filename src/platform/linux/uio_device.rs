@@ -1,8 +1,8 @@
 //! Opens a UIO node, for one user alone, and waits for its interrupt.
 //!
-//! The kernel's handler masks the interrupt and counts it; reading four bytes gives the count since
-//! the device was registered, writing a 1 lets the next one through. A count that jumps is no
-//! error: only that it changed matters.
+//! The kernel's handler masks the interrupt and counts it. A read of four bytes gives the count
+//! since the device was registered; a written 1 unmasks the interrupt. A count that jumps is no
+//! error: only the change matters.
 //!
 //! Source: Linux `Documentation/driver-api/uio-howto.rst`, `drivers/uio/uio_pdrv_genirq.c`.
 
@@ -23,9 +23,9 @@ use crate::platform::{PlatformError, System, UioMap, UioNode, UioWindow};
 
 /// An open UIO node.
 ///
-/// The interrupt protocol of a level-triggered device: acknowledge it in the device, then
-/// [`unmask`](Self::unmask), then look at the device once more (what came in between raised no
-/// interrupt), then [`wait_interrupt`](Self::wait_interrupt).
+/// The interrupt protocol of a level-triggered device: acknowledge the interrupt in the device,
+/// then [`unmask`](Self::unmask), then read the device's status once more (an event in between
+/// raised no interrupt), then [`wait_interrupt`](Self::wait_interrupt).
 #[derive(Debug)]
 pub struct UioDevice {
     node: UioNode,
@@ -38,15 +38,15 @@ pub struct UioDevice {
 impl UioDevice {
     /// Opens the node of that name (`linux,uio-name`) on this system. No register is touched.
     ///
-    /// It is locked (`flock`) until this and all that it mapped is dropped: who opens it meanwhile
-    /// by this library, in this program or another, is refused.
+    /// It is locked (`flock`) until the device and all of its windows are dropped: meanwhile this
+    /// library refuses to open it again, in this program or another.
     ///
     /// A node whose registers lie in the programmable logic must be opened only once that is
     /// programmed: see [`require_bitstream`](crate::platform::require_bitstream).
     ///
     /// # Errors
-    /// No such node, no device file, no right to open it, no right to list the nodes, somebody else
-    /// has it ([`PlatformError::Busy`]): each its own variant of [`PlatformError`].
+    /// No such node, no device file, no right to open it, no right to list the nodes, another user
+    /// ([`PlatformError::Busy`]): each its own variant of [`PlatformError`].
     pub fn open(name: &str) -> Result<Self, PlatformError> {
         Self::open_in(&System::default(), name)
     }
@@ -59,15 +59,16 @@ impl UioDevice {
         Self::of_node(system, uio_listing(&system.uio)?.node(name)?)
     }
 
-    /// Opens a node that was found.
+    /// Opens a node of the listing.
     pub(crate) fn of_node(system: &System, node: UioNode) -> Result<Self, PlatformError> {
-        // Without O_NONBLOCK a wake-up that somebody else took would block for ever.
+        // Without O_NONBLOCK the read would block for ever if another reader takes the interrupt
+        // after `poll`.
         let file = LockedFile::open(&system.dev.join(&node.device), nix::libc::O_NONBLOCK)?;
         let tree = system.uio.join(&node.device).join("device/of_node");
         Ok(Self { node, tree, file: Arc::new(file), claims: Claims::default() })
     }
 
-    /// What the kernel says of it.
+    /// The kernel's description of the node.
     #[must_use]
     pub fn node(&self) -> &UioNode {
         &self.node
@@ -76,8 +77,8 @@ impl UioDevice {
     /// Maps the registers of that name.
     ///
     /// # Errors
-    /// [`PlatformError::NoMap`], which lists the names that there are;
-    /// [`PlatformError::MappedAlready`] while there is another window of the map; or the kernel
+    /// [`PlatformError::NoMap`], which lists the names of all regions;
+    /// [`PlatformError::MappedAlready`] while another window of the map exists; or the kernel
     /// refuses.
     pub fn window(&self, map: &str) -> Result<UioWindow, PlatformError> {
         self.map(self.node.map(map)?)
@@ -88,8 +89,8 @@ impl UioDevice {
         UioWindow::new(&self.file, &self.node, map, &self.tree, &self.claims)
     }
 
-    /// Waits until the interrupt comes: its count since the device was registered. `None` if
-    /// `timeout` passes first. Afterwards it is masked.
+    /// Waits for the interrupt and returns its count since the device was registered; `None` if
+    /// `timeout` passes first. The interrupt is masked afterwards.
     ///
     /// # Errors
     /// [`PlatformError::NoInterrupt`] if the node has none.
@@ -107,7 +108,7 @@ impl UioDevice {
                     let source = io::Error::new(io::ErrorKind::UnexpectedEof, text);
                     return Err(self.error("read", source));
                 }
-                // Somebody else took it, or a signal came.
+                // Another reader took the interrupt, or a signal came.
                 Err(error)
                     if matches!(
                         error.kind(),
@@ -167,7 +168,7 @@ fn wait_readable(file: &File, timeout: Duration) -> Result<bool, Errno> {
     let started = Instant::now();
     loop {
         let remaining = timeout.saturating_sub(started.elapsed());
-        // Rounded up: less than a millisecond would be no wait at all, over and over.
+        // Rounded up: less than a millisecond would poll without a wait, over and over.
         let milliseconds = remaining.as_micros().div_ceil(1000);
         let slice = u16::try_from(milliseconds).unwrap_or(u16::MAX);
         let mut files = [PollFd::new(file.as_fd(), PollFlags::POLLIN)];
@@ -187,7 +188,7 @@ mod tests {
     use std::os::unix::net::UnixStream;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, regions};
+    use crate::platform::uio_fake::accelerator;
 
     const SHORT: Duration = Duration::from_millis(5);
     const LONG: Duration = Duration::from_secs(30);
@@ -207,7 +208,7 @@ mod tests {
         let (device, mut kernel) = with_interrupt();
         assert_eq!(device.wait_interrupt(Duration::ZERO).expect("none yet"), None);
         assert_eq!(device.wait_interrupt(SHORT).expect("none yet"), None);
-        // The count jumps: others came while nobody looked.
+        // The count jumps if several interrupts come between two reads.
         for count in [7_u32, 9, u32::MAX] {
             kernel.write_all(&count.to_ne_bytes()).expect("written");
             assert_eq!(device.wait_interrupt(LONG).expect("there is one"), Some(count));
@@ -265,16 +266,9 @@ mod tests {
         assert!(matches!(other, PlatformError::File { .. }), "{other}");
     }
 
-    fn system() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        add_node(&system, 3, "pgs", &regions());
-        (root, system)
-    }
-
     #[test]
     fn each_obstacle_is_an_error_of_its_own() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let error = UioDevice::open_in(&system, "pgs2").expect_err("no such node");
         assert!(matches!(error, PlatformError::NoNode { .. }), "{error}");
         let device = UioDevice::open_in(&system, "pgs").expect("opened");

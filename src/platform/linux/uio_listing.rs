@@ -1,4 +1,4 @@
-//! Lists the UIO nodes of a system: one that cannot be read hides no other.
+//! Lists the UIO nodes of a system; an unreadable node hides no other.
 
 use std::path::Path;
 
@@ -23,9 +23,9 @@ pub struct UnreadableNode {
 #[derive(Debug, Default)]
 #[non_exhaustive]
 pub struct UioListing {
-    /// Nodes that can be read.
+    /// Readable nodes.
     pub nodes: Vec<UioNode>,
-    /// Nodes that cannot.
+    /// Nodes whose description cannot be read.
     pub unreadable: Vec<UnreadableNode>,
 }
 
@@ -35,7 +35,7 @@ pub(crate) fn part_name(board: &str, region: &str) -> String {
 }
 
 impl UioListing {
-    /// Whether there is a node of that name, readable or not.
+    /// Whether a node has that name, readable or not.
     pub(crate) fn has(&self, name: &str) -> bool {
         let unreadable = self.unreadable.iter().any(|node| node.name.as_deref() == Some(name));
         unreadable || self.nodes.iter().any(|node| node.name == name)
@@ -69,10 +69,10 @@ impl UioListing {
         names.join(", ")
     }
 
-    /// Whether there are nodes of the board `board`: one of that name, or `<board>-control`.
+    /// Whether the board `board` has nodes: one of that name, or `<board>-control`.
     ///
     /// # Errors
-    /// There are none, but a node has a name that cannot be read: it may be that board.
+    /// No node has such a name, but the name of a node cannot be read: it may be that board.
     pub fn has_board(&mut self, board: &str) -> Result<bool, PlatformError> {
         if self.has(board) || self.has(&part_name(board, UIO_CONTROL_MAP)) {
             return Ok(true);
@@ -83,7 +83,7 @@ impl UioListing {
         }
     }
 
-    /// What there is where there are no nodes of the board `board`.
+    /// Says that the board `board` has no nodes, and names a node that looks like it.
     #[must_use]
     pub fn without_board(&self, board: &str) -> String {
         let none = format!("there is no UIO node named {board:?}");
@@ -102,8 +102,8 @@ impl UioListing {
     }
 }
 
-/// The UIO nodes under `class` (normally [`UIO_CLASS`](crate::platform::UIO_CLASS)). A node that goes away
-/// meanwhile is not among them; a system without UIO has none.
+/// The UIO nodes under `class` (normally [`UIO_CLASS`](crate::platform::UIO_CLASS)). A node that
+/// goes away meanwhile is left out; a system without UIO has no nodes.
 ///
 /// # Errors
 /// The directory cannot be listed.
@@ -131,7 +131,7 @@ pub fn uio_listing(class: &Path) -> Result<UioListing, PlatformError> {
     Ok(listing)
 }
 
-/// The nodes of [`uio_listing`] that can be read; the others are logged.
+/// The readable nodes of [`uio_listing`]; the others are logged.
 ///
 /// # Errors
 /// As [`uio_listing`].
@@ -164,11 +164,10 @@ mod tests {
 
     use super::*;
     use crate::platform::System;
-    use crate::platform::uio_fake::{add_node, regions};
+    use crate::platform::uio_fake::{add_node, empty_system, regions};
 
     fn system() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         add_node(&system, 10, "pgs", &regions());
         add_node(&system, 2, "axi-pmon", &[("pmon", 0xFD0B_0000, 0x1000)]);
         (root, system)

@@ -15,15 +15,15 @@ use crate::platform::{PlatformError, RegisterWindow, UioMap, UioNode};
 /// A mapped region of registers.
 ///
 /// Each access is one aligned 32-bit load or store, in program order with the others of the region.
-/// There is one window of a region at a time, and a store takes it alone: no two threads meet at a
-/// register. What the device does upon a store is up to whoever stores: an engine that is told the
-/// address of memory that is not its own will write there.
+/// A region has one window at a time, and a store needs `&mut self`: no two threads meet at a
+/// register. The caller answers for the effect of a store on the device: an engine that gets the
+/// address of foreign memory writes there.
 #[derive(Debug)]
 pub struct UioWindow {
     mapping: Mapping,
     name: String,
     address: u64,
-    /// Given back after the region is unmapped.
+    /// Released after the region is unmapped.
     _claim: Claim,
 }
 
@@ -61,8 +61,8 @@ impl UioWindow {
         self.address
     }
 
-    /// Length of the region, bytes, as the device tree gives it; of a device that does not come
-    /// from a device tree, as the kernel gives it.
+    /// Length of the region, bytes, by the device tree; for a device without a node in the device
+    /// tree, by the kernel.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.mapping.bytes() as u64
@@ -78,7 +78,7 @@ impl UioWindow {
 
     /// Writes the register at byte `at`.
     ///
-    /// Memory that was written before is visible to the device before the register is.
+    /// Earlier stores to memory are visible to the device before the register changes.
     ///
     /// # Errors
     /// [`PlatformError::OutOfRegion`] if `at` is not a multiple of 4 inside the region.
@@ -101,13 +101,13 @@ impl UioWindow {
         })
     }
 
-    /// The mapping, for callers that check on their own.
+    /// The mapping, for callers with their own checks.
     pub(crate) fn into_mapping(self) -> Mapping {
         self.mapping
     }
 }
 
-/// A window of the driver's own: who has the accelerator has it alone.
+/// A window of the open accelerator, which is its only user.
 #[derive(Debug)]
 struct Owned(UioWindow);
 
@@ -131,8 +131,8 @@ impl From<UioWindow> for Box<dyn RegisterWindow> {
     }
 }
 
-/// Length of a region: exact by the device tree, else what the kernel says. Its number counts from
-/// the start of the first page, and is whole pages.
+/// Length of a region: exact by the device tree, else by the kernel, which counts whole pages from
+/// the start of the first page.
 fn length(map: &UioMap, name: &str, tree: &Path, page: u64) -> Result<u64, PlatformError> {
     let kernel = map.bytes.saturating_sub(map.offset);
     let bytes = match region_lengths(tree)? {
@@ -154,7 +154,7 @@ fn length(map: &UioMap, name: &str, tree: &Path, page: u64) -> Result<u64, Platf
     Ok(bytes)
 }
 
-/// Which maps of an open node are mapped, by number.
+/// The numbers of the maps of an open node that are mapped.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Claims(Arc<Mutex<BTreeSet<u32>>>);
 
@@ -163,7 +163,7 @@ impl Claims {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The right to map that number; `None` if it is given.
+    /// The right to map that number; `None` if it is taken.
     fn claim(&self, number: u32) -> Option<Claim> {
         self.numbers().insert(number).then(|| Claim { claims: self.clone(), number })
     }
@@ -187,19 +187,12 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, add_reg, regions};
-    use crate::platform::{System, UioDevice};
-
-    fn system() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
-        add_node(&system, 3, "pgs", &regions());
-        (root, system)
-    }
+    use crate::platform::UioDevice;
+    use crate::platform::uio_fake::{accelerator, add_reg};
 
     #[test]
     fn a_window_is_the_map_at_its_number_of_pages() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let page = usize::try_from(page_bytes(&system.dev).expect("a size")).expect("fits");
         let path = system.dev.join("uio3");
         let mut file = fs::read(&path).expect("read");
@@ -221,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_region_has_one_window_at_a_time() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let device = UioDevice::open_in(&system, "pgs").expect("opened");
         let control = device.window("control").expect("mapped");
         device.window("dma0").expect("another region");
@@ -242,14 +235,14 @@ mod tests {
 
     #[test]
     fn a_region_ends_where_the_device_tree_says_and_not_with_its_page() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let page = page_bytes(&system.dev).expect("a size");
         let window = |map: &str, regions: &[(u64, u64)]| {
             add_reg(&system, 3, regions);
             let map = UioDevice::open_in(&system, "pgs").expect("opened").window(map)?;
             Ok((map.address(), map.bytes()))
         };
-        // Lengths of the kernel's: four times 0x1_0000, and 0x1000.
+        // The kernel's lengths: four times 0x1_0000, and 0x1000.
         let mut regions = [(0xA000_0000, 0x1_0000); 5];
         regions[4] = (0xA004_0000, 0xFF0);
         let control = window("control", &regions).expect("less than a page less");
@@ -272,7 +265,7 @@ mod tests {
 
     #[test]
     fn a_region_that_begins_inside_its_page_ends_with_the_pages() {
-        let (_root, system) = system();
+        let (_root, system) = accelerator();
         let map = system.uio.join("uio3/maps/map0");
         fs::write(map.join("offset"), "0x40\n").expect("written");
         let device = UioDevice::open_in(&system, "pgs").expect("opened");

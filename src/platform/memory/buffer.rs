@@ -42,7 +42,7 @@ enum Owner {
     Device,
 }
 
-/// Memory of the platform's, released when dropped unless the device owns it.
+/// Memory of the platform, released on drop unless the device owns it.
 #[derive(Debug)]
 struct Allocation {
     platform: Arc<dyn Platform>,
@@ -82,7 +82,7 @@ impl Drop for Allocation {
         let Self { address, bytes, .. } = *self;
         match self.owner {
             Owner::Cpu => {
-                if let Err(error) = self.platform.release(address) {
+                if let Err(error) = self.platform.memory().release(address) {
                     log::error!("cannot free {bytes} bytes of DMA memory at {address:#x}: {error}");
                 }
             }
@@ -97,7 +97,7 @@ impl Drop for Allocation {
 /// A buffer that the CPU owns.
 #[derive(Debug)]
 pub(crate) struct CpuBuffer {
-    // Dropped before the allocation, which makes the memory free for others.
+    // Dropped before the allocation, whose drop frees the memory for others.
     memory: DmaMemory,
     allocation: Allocation,
 }
@@ -109,7 +109,7 @@ impl CpuBuffer {
         beats: usize,
         address_width: u32,
     ) -> Result<Self, PlatformError> {
-        let (address, memory) = platform.allocate(beats)?;
+        let (address, memory) = platform.memory().allocate(beats)?;
         let bytes = (memory.beats().len() as u64) * BEAT_BYTES as u64;
         let allocation = Allocation::new(platform, address, bytes, address_width)?;
         Ok(Self { memory, allocation })
@@ -138,7 +138,8 @@ impl CpuBuffer {
     ) -> Result<DeviceBuffer, PlatformError> {
         let Self { memory, mut allocation } = self;
         allocation.owner = Owner::Device;
-        allocation.platform.hand_over(allocation.address, memory, used, access)?;
+        let source = allocation.platform.memory();
+        source.hand_over(allocation.address, memory, used, access)?;
         release_to_device();
         Ok(DeviceBuffer { allocation })
     }
@@ -161,7 +162,7 @@ impl DeviceBuffer {
     pub(crate) fn into_cpu(self) -> Result<CpuBuffer, PlatformError> {
         let Self { mut allocation } = self;
         acquire_from_device();
-        let memory = allocation.platform.take_back(allocation.address)?;
+        let memory = allocation.platform.memory().take_back(allocation.address)?;
         allocation.owner = Owner::Cpu;
         Ok(CpuBuffer { memory, allocation })
     }
@@ -181,7 +182,7 @@ impl SharedWords {
         words: usize,
         address_width: u32,
     ) -> Result<Self, PlatformError> {
-        let (address, memory) = platform.allocate_shared(words)?;
+        let (address, memory) = platform.memory().allocate_shared(words)?;
         let bytes = (memory.len() as u64) * 4;
         let allocation = Allocation::new(platform, address, bytes, address_width)?;
         let this = Self { words: memory, allocation };
@@ -206,7 +207,7 @@ impl SharedWords {
         self.allocation.range(index as u64 * 4, count as u64 * 4)
     }
 
-    /// Where a word lies on the bus, to compare with what an engine says.
+    /// Bus address of a word, to compare with an engine's CURDESC.
     pub(crate) fn address(&self, index: usize) -> u64 {
         self.allocation.address.saturating_add(index as u64 * 4)
     }

@@ -1,4 +1,8 @@
-//! Memory for DMA: buffers, where they come from, and who owns them.
+//! Provides memory for DMA: buffers with an owner, and the memory that they are cut from.
+
+use std::fmt;
+
+use super::{Access, DmaMemory, PlatformError, SharedMemory};
 
 pub(crate) mod buffer;
 pub(crate) mod copy;
@@ -7,3 +11,25 @@ pub(crate) mod reserved;
 pub(crate) mod sync_mode;
 pub(crate) mod u_dma_buf;
 pub(crate) mod volatile;
+
+/// Memory for DMA, in pieces that belong to the CPU or to the device.
+///
+/// A piece is addressed by the bus address of its first byte, as `allocate` returned it.
+pub(crate) trait DmaMemorySource: fmt::Debug + Send + Sync {
+    /// Contiguous memory, aligned to 64 bytes on the bus, owned by the CPU.
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError>;
+    /// Coherent words that both sides may touch at any time.
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError>;
+    /// Gives memory to the device, which will touch its first `used` beats.
+    fn hand_over(
+        &self,
+        address: u64,
+        memory: DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError>;
+    /// Takes memory back that the device has finished with.
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError>;
+    /// Frees memory that the CPU owns, or shared words that no engine runs on.
+    fn release(&self, address: u64) -> Result<(), PlatformError>;
+}

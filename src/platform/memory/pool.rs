@@ -1,7 +1,7 @@
-//! Allocates buffers from the memory for DMA.
+//! Allocates buffers from a region of memory for DMA.
 //!
-//! First fit; every piece begins on a cache line of the bus and is whole lines long, so that no two
-//! share one. Handing over and taking back allocate nothing.
+//! First fit. Every piece begins on a cache line and is whole lines long, so that no two pieces
+//! share a line. Handing over and taking back allocate nothing.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,9 +10,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pgs_interface::record::BEAT_BYTES;
 
-use crate::platform::{Access, DmaMemory, PlatformError, SharedMemory};
+use crate::platform::{Access, DmaMemory, DmaMemorySource, PlatformError, SharedMemory};
 
-/// Bytes of a cache line, which every piece begins on and fills.
+/// Bytes of a cache line, the alignment and the unit of a piece.
 const LINE: u64 = 64;
 
 /// Contiguous physical memory for DMA. Offsets count from its first byte.
@@ -21,12 +21,12 @@ pub(crate) trait Region: fmt::Debug + Send + Sync {
     fn address(&self) -> u64;
     /// Length, bytes.
     fn bytes(&self) -> u64;
-    /// The CPU's side of `beats` beats at `at`, which nobody else has: the pool cuts no two pieces
-    /// that overlap, and makes no second one of a piece before it is released.
+    /// The CPU's side of `beats` beats at `at`. The caller is the only holder: the pool cuts pieces
+    /// that do not overlap, and gives a piece out again only after its release.
     fn memory(&self, at: usize, beats: usize) -> Result<DmaMemory, PlatformError>;
     /// `words` words at `at` that both sides see at any time.
     fn shared(&self, at: usize, words: usize) -> Result<SharedMemory, PlatformError>;
-    /// Makes the first `used` beats of what was written to `memory` visible to the device.
+    /// Makes the first `used` beats of `memory` visible to the device.
     fn to_device(
         &self,
         at: usize,
@@ -34,7 +34,7 @@ pub(crate) trait Region: fmt::Debug + Send + Sync {
         used: usize,
         access: Access,
     ) -> Result<(), PlatformError>;
-    /// Makes the first `used` beats of what the device wrote visible in `memory`.
+    /// Makes the first `used` beats that the device wrote visible in `memory`.
     fn to_cpu(
         &self,
         at: usize,
@@ -44,19 +44,19 @@ pub(crate) trait Region: fmt::Debug + Send + Sync {
     ) -> Result<(), PlatformError>;
 }
 
-/// A piece that was given out.
+/// A piece in use.
 #[derive(Debug)]
 struct Piece {
     range: Range<u64>,
-    /// What the device holds of it.
+    /// The memory, the used beats and their use, while the device holds the piece.
     handed_over: Option<(DmaMemory, usize, Access)>,
 }
 
 #[derive(Debug)]
 struct State {
-    /// What is free, by address; no two ranges touch.
+    /// Free ranges, by address; no two of them touch.
     free: Vec<Range<u64>>,
-    /// What is not, by its address.
+    /// Pieces in use, by address.
     pieces: BTreeMap<u64, Piece>,
 }
 
@@ -68,7 +68,7 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
-    /// All of a region.
+    /// A pool of a whole region.
     pub(crate) fn new(region: Box<dyn Region>) -> Self {
         let end = region.address().saturating_add(region.bytes());
         let free = lines(region.address()..end).into_iter().collect();
@@ -76,11 +76,11 @@ impl Pool {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // Nothing in here panics between two changes that belong together.
+        // No code under the lock panics between two changes that belong together.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Cuts out a piece; its address, and where it begins in the region.
+    /// Cuts out a piece; returns its address and its offset in the region.
     fn cut(&self, bytes: u64) -> Result<(u64, usize), PlatformError> {
         let mut state = self.state();
         let wanted = bytes.max(1).checked_next_multiple_of(LINE);
@@ -114,7 +114,7 @@ impl Pool {
             .ok_or(PlatformError::NotGivenOut { address, state: "in the pool" })
     }
 
-    /// Gives out what `make` makes of a piece, or nothing.
+    /// Cuts out a piece and makes a value of it; if `make` fails, the piece is free again.
     fn give<T>(
         &self,
         bytes: u64,
@@ -129,24 +129,20 @@ impl Pool {
             }
         }
     }
+}
 
-    /// Memory for `beats` beats.
-    pub(crate) fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+impl DmaMemorySource for Pool {
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
         self.give(bytes, |at| self.region.memory(at, beats))
     }
 
-    /// Memory for `words` shared words.
-    pub(crate) fn allocate_shared(
-        &self,
-        words: usize,
-    ) -> Result<(u64, SharedMemory), PlatformError> {
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
         let bytes = (words as u64).saturating_mul(4);
         self.give(bytes, |at| self.region.shared(at, words))
     }
 
-    /// Gives a piece to the device.
-    pub(crate) fn hand_over(
+    fn hand_over(
         &self,
         address: u64,
         memory: DmaMemory,
@@ -165,8 +161,7 @@ impl Pool {
         }
     }
 
-    /// Takes a piece back from the device.
-    pub(crate) fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
         let at = self.offset(address)?;
         let mut state = self.state();
         let piece = state.pieces.get_mut(&address);
@@ -179,8 +174,8 @@ impl Pool {
         Ok(memory)
     }
 
-    /// Makes a piece free for others. What the device holds is not: it may still write.
-    pub(crate) fn release(&self, address: u64) -> Result<(), PlatformError> {
+    /// Refuses a piece with the device, which may still write it.
+    fn release(&self, address: u64) -> Result<(), PlatformError> {
         let mut state = self.state();
         match state.pieces.get(&address) {
             Some(Piece { handed_over: None, .. }) => {}

@@ -1,6 +1,6 @@
 //! Opens memory that the device tree reserves for DMA and the kernel does not map.
 //!
-//! It is Device memory for the CPU: whole aligned beats only, through [`super::copy`].
+//! The CPU maps it as Device memory: whole aligned beats only, through [`super::copy`].
 
 use std::sync::Arc;
 
@@ -17,8 +17,8 @@ use crate::platform::{
 
 /// A contiguous piece of physical memory for DMA, mapped as Device memory.
 ///
-/// As long as it exists nobody else opens its device file, and a store takes it alone: no two
-/// threads meet at a beat.
+/// Its device file is locked as long as it exists, and a store needs `&mut self`: no two threads
+/// meet at a beat.
 #[derive(Debug)]
 pub struct ReservedMemory {
     mapping: Arc<Mapping>,
@@ -32,7 +32,7 @@ impl ReservedMemory {
     ///
     /// # Errors
     /// As [`UioDevice::open`], [`PlatformError::Misaligned`] for memory between beats, and
-    /// [`PlatformError::RegionLength`] if it is not known where the memory ends.
+    /// [`PlatformError::RegionLength`] if the end of the memory is not known.
     pub fn open(name: &str) -> Result<Self, PlatformError> {
         Self::open_in(&System::default(), name)
     }
@@ -56,7 +56,7 @@ impl ReservedMemory {
         Ok(Self { mapping: Arc::new(mapping), address, name })
     }
 
-    /// Physical address of its first byte: what a DMA engine is given.
+    /// Physical address of its first byte, for a DMA engine.
     #[must_use]
     pub fn address(&self) -> u64 {
         self.address
@@ -68,8 +68,8 @@ impl ReservedMemory {
         self.mapping.bytes() as u64
     }
 
-    /// Copies `beats` to byte `at`, a multiple of 16. The device sees them once a register was
-    /// written after that.
+    /// Copies `beats` to byte `at`, a multiple of 16. The device sees them after the next register
+    /// write.
     ///
     /// # Errors
     /// [`PlatformError::OutOfRegion`] if they do not lie in the memory, or between its beats.
@@ -77,7 +77,7 @@ impl ReservedMemory {
         self.store(at, beats)
     }
 
-    /// For a holder of these beats alone.
+    /// For the only holder of these beats.
     fn store(&self, at: u64, beats: &[Beat]) -> Result<(), PlatformError> {
         let at = self.checked(at, beats.len())?;
         store_beats(&*self.mapping, at, beats);
@@ -85,8 +85,8 @@ impl ReservedMemory {
         Ok(())
     }
 
-    /// Copies `beats` from byte `at`, a multiple of 16: what the device wrote before a register
-    /// said so.
+    /// Copies `beats` from byte `at`, a multiple of 16: the device's stores up to the completion
+    /// that a register has shown.
     ///
     /// # Errors
     /// [`PlatformError::OutOfRegion`] if they do not lie in the memory, or between its beats.
@@ -112,9 +112,9 @@ impl ReservedMemory {
     }
 }
 
-/// The CPU works on the heap; what changes hands is copied. Shared words take aligned 32-bit
-/// accesses, which Device memory does too. The pool gives each piece to one holder: no two threads
-/// meet at a beat here either.
+/// The CPU works on the heap, and a hand-over copies. Shared words take aligned 32-bit accesses,
+/// which Device memory allows. The pool gives each piece to one holder: no two threads meet at a
+/// beat here either.
 impl Region for ReservedMemory {
     fn address(&self) -> u64 {
         self.address
@@ -164,9 +164,9 @@ pub(crate) mod fake {
     //! Reserved memory that is a file.
 
     use super::*;
-    use crate::platform::uio_fake::add_node;
+    use crate::platform::uio_fake::{add_node, empty_system};
 
-    /// The same memory once more, as the device has it.
+    /// The same memory from the side of the device.
     pub(crate) fn as_the_device(memory: &ReservedMemory) -> ReservedMemory {
         let ReservedMemory { mapping, address, name } = memory;
         ReservedMemory { mapping: Arc::clone(mapping), address: *address, name: name.clone() }
@@ -174,8 +174,7 @@ pub(crate) mod fake {
 
     /// Memory of `bytes` bytes at `address`; it lasts as long as the folder.
     pub(crate) fn reserved(address: u64, bytes: u64) -> (tempfile::TempDir, ReservedMemory) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         add_node(&system, 0, "pgs-memory", &[("memory", address, bytes)]);
         let memory = ReservedMemory::open_in(&system, "pgs-memory").expect("mapped");
         (root, memory)
@@ -187,11 +186,10 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::platform::uio_fake::{add_node, add_reg};
+    use crate::platform::uio_fake::{add_node, add_reg, empty_system};
 
     fn memory() -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         add_node(&system, 0, "other", &[("memory", 0x1000_0000, 0x1000)]);
         add_node(&system, 1, "pgs-memory", &[("buffer@60000000", 0x6000_0000, 0x2000)]);
         (root, system)
@@ -236,7 +234,7 @@ mod tests {
             "{error}"
         );
         ReservedMemory::open_in(&system, "other").expect("another one");
-        // What the pool gave out keeps it, too.
+        // A piece from the pool keeps it, too.
         let words = memory.shared(0, 4).expect("inside");
         drop(memory);
         ReservedMemory::open_in(&system, "pgs-memory").expect_err("a ring is left");

@@ -1,4 +1,4 @@
-//! Sees to the mode of a u-dma-buf in which its two mappings are what they are meant to be.
+//! Sets the `sync_mode` of a u-dma-buf, which decides how its two mappings are cached.
 //!
 //! Source: README and source of u-dma-buf 5.
 
@@ -17,7 +17,8 @@ const MODE_WRITE_COMBINING: u64 = 2;
 /// Bit of `sync_mode`: the mode holds without `O_SYNC` too.
 const MODE_ALWAYS: u64 = 4;
 
-/// Sees to a mode in which the two ways to open give the two mappings that are wanted.
+/// Makes sure of a mode in which the device file, opened with and without `O_SYNC`, gives the
+/// mappings that `caching` needs.
 pub(crate) fn set_mode(
     name: &str,
     buffer: &Path,
@@ -27,7 +28,7 @@ pub(crate) fn set_mode(
     let path = buffer.join("sync_mode");
     let found = read_number(&path)?;
     let (suits, wanted) = match caching {
-        // O_SYNC must not be cached; no O_SYNC must be.
+        // With O_SYNC the mapping must be uncached, without it cached.
         Caching::Cached => (
             (found & MODE_ALWAYS == 0 && (found != MODE_CACHED || coherent))
                 || (coherent && found == MODE_ALWAYS | MODE_CACHED),
@@ -50,7 +51,7 @@ pub(crate) fn set_mode(
     };
     log::info!("u-dma-buf {name:?}: changing sync_mode from {found} to {MODE_WRITE_COMBINING}");
     fs::write(&path, format!("{MODE_WRITE_COMBINING}\n")).map_err(refused)?;
-    // A driver may take the write and keep its mode: what is mapped depends on what it kept.
+    // A driver may accept the write and keep its mode, and the mapping depends on the kept mode.
     let kept = read(&path)?;
     if kept.parse() == Ok(MODE_WRITE_COMBINING) {
         return Ok(());

@@ -1,7 +1,8 @@
-//! Takes memory for DMA from the kernel module u-dma-buf, also from before it was renamed.
+//! Takes memory for DMA from the kernel module u-dma-buf, formerly udmabuf.
 //!
-//! The device file is locked, and mapped twice. Buffers: cached, with maintenance by range when they change
-//! hands, or write-combining. Shared words: with `O_SYNC`, which the module maps uncached.
+//! The device file is locked, and mapped twice. Buffers: cached, with maintenance by range when
+//! they change hands, or write-combining. Shared words: with `O_SYNC`, which the module maps
+//! uncached.
 //!
 //! Maintenance is one write of a number to `sync_for_device` or `sync_for_cpu`:
 //!
@@ -10,11 +11,11 @@
 //! | first byte    | bytes / 16   | direction | 0 | 1 |     1 to the device, 2 from it
 //! ```
 //!
-//! It carries its range always: the attributes `sync_offset` and `sync_size` are shared by all who
-//! use the buffer.
+//! The number always carries its range: the attributes `sync_offset` and `sync_size` are shared by
+//! all users of the buffer.
 //!
-//! Before the module was renamed its class was `udmabuf`, with the same attributes. The oldest versions
-//! take no range, and refuse the number.
+//! The class of the older module is `udmabuf`, with the same attributes. The oldest versions take
+//! no range, and refuse the number.
 //!
 //! Source: README and source of u-dma-buf 5 and of udmabuf 1.4.
 #![allow(unsafe_code, reason = "beats in mapped memory promise that no others overlap")]
@@ -49,23 +50,23 @@ pub enum Caching {
 
 /// The number carries 32 bits of length, in multiples of 16.
 const BYTES_MAX: u64 = 0xFFFF_FFF0;
-/// Maintenance is of whole cache lines; the pool's pieces are too.
+/// Maintenance works on whole cache lines, and the pool's pieces are whole lines.
 const LINE: usize = 64;
 
-/// A buffer of the module's.
+/// An open u-dma-buf.
 #[derive(Debug)]
 pub(crate) struct UDmaBuf {
     address: u64,
     bytes: u64,
-    /// Where buffers are.
+    /// The mapping for buffers.
     data: Arc<Mapping>,
-    /// Where shared words are.
+    /// The mapping for shared words.
     words: Arc<Mapping>,
-    /// None where the CPU's accesses need no maintenance.
+    /// `None` if the CPU's accesses need no maintenance.
     sync: Option<Sync>,
 }
 
-/// The two files that ask for maintenance.
+/// The two attributes that request maintenance.
 #[derive(Debug)]
 struct Sync {
     for_device: (PathBuf, File),
@@ -85,7 +86,7 @@ impl Sync {
     }
 }
 
-/// The number that asks for maintenance of a range.
+/// The number that requests maintenance of a range.
 fn command(at: usize, bytes: usize, access: Access) -> u64 {
     let bytes = bytes.next_multiple_of(LINE) as u64;
     let direction: u64 = match access {
@@ -137,7 +138,7 @@ impl UDmaBuf {
         }
         let length = usize::try_from(bytes).map_err(|_| unusable("make it smaller"))?;
         let coherent = is_coherent(&buffer)?;
-        // The lock comes first: the mode is for all who map the buffer.
+        // The lock comes first: the mode holds for all users of the buffer.
         let path = system.dev.join(name);
         let lock = Arc::new(LockedFile::open(&path, nix::libc::O_SYNC)?);
         set_mode(name, &buffer, caching, coherent)?;
@@ -171,7 +172,7 @@ pub(crate) fn directory(system: &System, name: &str) -> Result<PathBuf, Platform
     })
 }
 
-/// The names of the u-dma-buf buffers that there are.
+/// The names of all u-dma-buf buffers.
 #[must_use]
 pub fn u_dma_buf_names(system: &System) -> Vec<String> {
     let mut names: Vec<_> = [&system.u_dma_buf, &system.udmabuf]
@@ -211,12 +212,12 @@ impl Region for UDmaBuf {
 
     fn memory(&self, at: usize, beats: usize) -> Result<DmaMemory, PlatformError> {
         let mapping = Arc::clone(&self.data);
-        // SAFETY: `set_mode` saw to a mapping that is normal memory. The device file is locked as
-        // long as the mapping exists (`LockedFile`, held by both mappings): no other pool, of this
-        // program or another, has this buffer. This one gives each piece out once until it is
+        // SAFETY: `set_mode` made sure that the mapping is normal memory. The device file is locked
+        // as long as the mapping exists (`LockedFile`, held by both mappings): no other pool, of
+        // this program or another, has this buffer. This one gives each piece out once until it is
         // released, after its memory was dropped, and pieces do not overlap; the shared words are
         // pieces too. The device writes a piece only between `to_device` and `to_cpu`, when the
-        // pool holds the value and nobody has a slice of it.
+        // pool holds the value and no slice of it exists.
         let memory = unsafe { MappedBeats::new(mapping, at, beats) };
         Ok(DmaMemory::Mapped(memory))
     }
@@ -262,13 +263,13 @@ mod tests {
     use pgs_interface::record::Beat;
 
     use super::*;
+    use crate::platform::DmaMemorySource as _;
     use crate::platform::memory::pool::Pool;
-    use crate::platform::uio_fake::write;
+    use crate::platform::uio_fake::{empty_system, write};
 
     /// A system with the buffer `pgs` of 64 KiB, in that mode.
     fn system(mode: &str, coherent: &str) -> (tempfile::TempDir, System) {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = empty_system();
         let file = |name: &str, text: &str| write(system.u_dma_buf.join("pgs").join(name), text);
         file("phys_addr", "0x0000000070000000");
         file("size", "65536");

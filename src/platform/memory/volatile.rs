@@ -1,4 +1,4 @@
-//! Memory for DMA that the CPU holds, mapped or allocated.
+//! Gives the CPU access to memory for DMA, mapped or on the heap.
 #![allow(unsafe_code, reason = "a slice of mapped memory is made from a raw pointer")]
 
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use crate::platform::linux::mapped::Mapping;
 /// Beats for DMA, held by the CPU.
 #[derive(Debug)]
 pub(crate) enum DmaMemory {
-    /// On the heap: of the emulated board, which takes and returns it whole; or the CPU's side of
-    /// device-mapped memory, which is copied when it changes hands.
+    /// On the heap: memory of the emulated board, which takes and returns it whole; or the CPU's
+    /// copy of device-mapped memory, which a hand-over copies.
     Heap(Box<[Beat]>),
-    /// Where the device reaches them.
+    /// In memory that the device reaches.
     Mapped(MappedBeats),
 }
 
@@ -37,8 +37,7 @@ impl DmaMemory {
     }
 }
 
-/// A range of mapped normal memory that nobody else touches while this exists and is not handed
-/// over.
+/// A range of mapped normal memory with one holder, until it is handed over.
 #[derive(Debug)]
 pub(crate) struct MappedBeats {
     mapping: Arc<Mapping>,
@@ -63,9 +62,9 @@ impl MappedBeats {
         let first = self.mapping.beat(self.at);
         // SAFETY: `new` checked that `beats` beats from `at` lie inside the mapping, which is
         // readable and alive as long as `self`; `beat` is aligned to 16 bytes; every bit pattern is
-        // a beat. Nobody writes them meanwhile: not the CPU, as `new`'s caller promised that no
-        // other range overlaps, the device file's lock keeps other mappings away, and `&self` keeps
-        // `beats_mut` out; not the device, as promised too.
+        // a beat. They are not written meanwhile: not by the CPU, as `new`'s caller promised that
+        // no other range overlaps, the device file's lock keeps other mappings away, and `&self`
+        // keeps `beats_mut` out; not by the device, as promised too.
         unsafe { std::slice::from_raw_parts(first, self.beats) }
     }
 
@@ -79,7 +78,7 @@ impl MappedBeats {
 /// Coherent 32-bit words that CPU and device may both touch at any time.
 #[derive(Debug)]
 pub(crate) enum SharedMemory {
-    /// Of the emulated board.
+    /// Words of the emulated board.
     #[cfg(any(test, feature = "emulation"))]
     Heap(Arc<[AtomicU32]>),
     /// Mapped uncached or write-combining: the words from byte `at` of a mapping.
@@ -94,7 +93,7 @@ pub(crate) enum SharedMemory {
 }
 
 impl SharedMemory {
-    /// How many words there are.
+    /// Number of words.
     pub(crate) fn len(&self) -> usize {
         match self {
             #[cfg(any(test, feature = "emulation"))]

@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 
 use super::window::{Decoded, RegisterMap};
 
-/// Accesses that are kept.
+/// Number of accesses in the ring.
 const KEPT: usize = 64;
 
-/// What was done to a register.
+/// The direction of a register access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AccessKind {
     /// It was read.
@@ -20,18 +20,18 @@ pub enum AccessKind {
     Write,
 }
 
-/// One access to a register. As text: `dma2 S2MM DMASR -> 0x00011002 Idle IOC_Irq ...`, with `<-` for
-/// a write.
+/// One access to a register. As text: `dma2 S2MM DMASR -> 0x00011002 Idle IOC_Irq ...`, with `<-`
+/// for a write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct RegisterAccess {
-    /// When, on the host's clock, since the board was opened.
+    /// Time of the access on the host's clock, since the board was opened.
     pub at: Duration,
     /// Whether it was read or written.
     pub kind: AccessKind,
     /// Offset in its region, bytes.
     pub offset: u32,
-    /// What was read or written.
+    /// The value that was read or written.
     pub value: u32,
     pub(crate) map: RegisterMap,
 }

@@ -1,4 +1,4 @@
-//! Register windows and the log of their accesses.
+//! Reads and writes registers, and keeps a log of the accesses.
 
 pub(crate) mod access_log;
 pub(crate) mod window;

@@ -1,14 +1,14 @@
-//! The only way to a register: bounds-checked, counted, logged 32-bit accesses.
+//! Makes every register access a checked, counted and logged access of 32 bits.
 
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use pgs_interface::register::Register;
-use pgs_interface::{axi_dma, control};
+use pgs_interface::{address_map, axi_dma, control};
 
 use super::access_log::{AccessKind, AccessLog, RegisterAccess};
-use crate::platform::PlatformError;
+use crate::platform::{Platform, PlatformError};
 
 /// One register region of a board: aligned 32-bit accesses inside `bytes`.
 pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
@@ -20,7 +20,7 @@ pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
     fn write32(&self, at: u32, value: u32);
 }
 
-/// Register accesses of a board, all regions together: how many, and the last ones.
+/// Register accesses of a board, all regions together: their number, and the last ones.
 #[derive(Debug, Default)]
 pub(crate) struct AccessCounts {
     reads: AtomicU64,
@@ -45,10 +45,10 @@ impl AccessCounts {
     }
 }
 
-/// What the registers of a region are called.
+/// The kind of a register region, which names its registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RegisterMap {
-    /// AXI DMA of that number.
+    /// The AXI DMA of this number.
     Dma(usize),
     /// The accelerator's control block.
     Control,
@@ -64,11 +64,20 @@ impl fmt::Display for RegisterMap {
 }
 
 impl RegisterMap {
+    /// Physical address of the region by the address map, and its length in bytes.
+    #[cfg(feature = "emulation")]
+    pub(crate) fn place(self) -> (u64, u32) {
+        match self {
+            Self::Dma(core) => (address_map::dma_base(core), address_map::DMA_BYTES),
+            Self::Control => (address_map::CONTROL_BASE, address_map::CONTROL_BYTES),
+        }
+    }
+
     /// Bytes that the driver may touch.
     const fn bytes(self) -> u32 {
         match self {
             Self::Dma(_) => 2 * axi_dma::S2MM_OFFSET,
-            Self::Control => pgs_interface::address_map::CONTROL_BYTES,
+            Self::Control => address_map::CONTROL_BYTES,
         }
     }
 
@@ -126,7 +135,7 @@ pub(crate) struct Window {
 
 impl Window {
     /// Refuses a region that is shorter than the registers in it.
-    pub(crate) fn new(
+    fn new(
         registers: Box<dyn RegisterWindow>,
         map: RegisterMap,
         counts: Arc<AccessCounts>,
@@ -139,6 +148,15 @@ impl Window {
             });
         }
         Ok(Self { registers, map, counts })
+    }
+
+    /// Opens a region of a board.
+    pub(crate) fn open(
+        platform: &dyn Platform,
+        map: RegisterMap,
+        counts: &Arc<AccessCounts>,
+    ) -> Result<Self, PlatformError> {
+        Self::new(platform.window(map)?, map, Arc::clone(counts))
     }
 
     fn check(&self, at: u32) {
@@ -177,7 +195,7 @@ pub(crate) mod fake {
     use std::time::Duration;
 
     use super::*;
-    use crate::platform::{Access, DmaMemory, Platform, SharedMemory};
+    use crate::platform::{Access, DmaMemory, DmaMemorySource, SharedMemory};
     use std::sync::atomic::AtomicU32;
 
     /// Registers that keep what is written, with a script for reads: a queue of values per offset.
@@ -189,7 +207,7 @@ pub(crate) mod fake {
         pub(crate) values: BTreeMap<u32, u32>,
         pub(crate) scripted: BTreeMap<u32, Vec<u32>>,
         pub(crate) writes: Vec<(u32, u32)>,
-        /// What a write leaves behind, where that is not what was written.
+        /// The bits that a write changes, for offsets where it does not change all.
         pub(crate) kept_bits: BTreeMap<u32, u32>,
     }
 
@@ -242,15 +260,7 @@ pub(crate) mod fake {
         }
     }
 
-    impl Platform for FakePlatform {
-        fn dma_window(&self, _: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-            Ok(Box::new(FakeRegisters::default()))
-        }
-
-        fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-            Ok(Box::new(FakeRegisters::default()))
-        }
-
+    impl DmaMemorySource for FakePlatform {
         fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
             let memory = DmaMemory::Heap(vec![Default::default(); beats].into());
             Ok((self.address(beats * 16), memory))
@@ -280,6 +290,16 @@ pub(crate) mod fake {
         fn release(&self, address: u64) -> Result<(), PlatformError> {
             self.released.lock().expect("no test panics with the lock").push(address);
             Ok(())
+        }
+    }
+
+    impl Platform for FakePlatform {
+        fn window(&self, _: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+            Ok(Box::new(FakeRegisters::default()))
+        }
+
+        fn memory(&self) -> &dyn DmaMemorySource {
+            self
         }
 
         fn now(&self) -> Duration {

@@ -8,7 +8,7 @@ use bitstream_model::{
 };
 use pgs_interface::control::ErrorCode;
 
-use super::tampered::{CONTROL, Tamper, Tampered};
+use super::tampered::{CONTROL_BLOCK, Tamper, Tampered};
 use super::{bits, open, scene, step, undisturbed};
 use crate::board::anomalies::Anomaly;
 use crate::{
@@ -134,7 +134,7 @@ fn a_status_that_never_reaches_memory_is_not_taken_for_a_channel_that_hangs() {
 fn a_status_that_is_late_costs_no_step_and_is_told_once() {
     let (board, tampered, mut accelerator) = Tampered::open();
     step(&mut accelerator, CUBES).0.expect("a good step");
-    assert!(!accelerator.device.oddities.told(Anomaly::LateStatus));
+    assert!(!accelerator.device.anomalies.told(Anomaly::LateStatus));
     let mut looks = 0;
     let mut seen = 0;
     // The driver does not see the bit at its first look; at the third look the bit is back.
@@ -160,14 +160,14 @@ fn a_status_that_is_late_costs_no_step_and_is_told_once() {
     let (result, bodies) = step(&mut accelerator, CUBES);
     result.expect("only late");
     assert_eq!(bits(&bodies), undisturbed(CUBES));
-    assert!(accelerator.device.oddities.told(Anomaly::LateStatus));
+    assert!(accelerator.device.anomalies.told(Anomaly::LateStatus));
     assert_eq!(board.violations(), []);
 }
 
 #[test]
 fn an_accelerator_that_is_never_done_is_not_one_whose_results_are_late() {
     let (_, tampered, mut accelerator) = Tampered::open();
-    tampered.tamper(CONTROL, 0, Tamper::Clear(2));
+    tampered.tamper(CONTROL_BLOCK, 0, Tamper::Clear(2));
     let error = failed(&tampered, &mut accelerator);
     assert_eq!(fault_of(&error).name(), "no-done", "{error:?}");
     assert_eq!(error.diagnosis().expect("taken down").phase, Phase::Results);
@@ -206,7 +206,7 @@ fn the_cause_is_told_and_not_what_follows_from_it() {
         |wires: &Tampered| wires.after_wait(|rings| rings.change(1, 0, |status| status - 16));
     assert_eq!(
         named(&|wires| {
-            wires.tamper(CONTROL, ERROR, sticky);
+            wires.tamper(CONTROL_BLOCK, ERROR, sticky);
             broken(wires);
             stopped(wires);
         }),
@@ -214,14 +214,14 @@ fn the_cause_is_told_and_not_what_follows_from_it() {
     );
     assert_eq!(
         named(&|wires| {
-            wires.tamper(CONTROL, ERROR, sticky);
+            wires.tamper(CONTROL_BLOCK, ERROR, sticky);
             broken(wires);
         }),
         "descriptor-decode-error"
     );
     assert_eq!(
         named(&|wires| {
-            wires.tamper(CONTROL, ERROR, sticky);
+            wires.tamper(CONTROL_BLOCK, ERROR, sticky);
             short(wires);
         }),
         "accelerator-body-index"
@@ -240,8 +240,8 @@ fn the_cause_is_told_and_not_what_follows_from_it() {
 #[test]
 fn an_error_of_the_accelerator_names_the_stream_or_the_collision() {
     let (_, tampered, mut accelerator) = Tampered::open();
-    tampered.tamper(CONTROL, 0x180, Tamper::Value(0x0203));
-    tampered.tamper(CONTROL, 0x184, Tamper::Value(17));
+    tampered.tamper(CONTROL_BLOCK, 0x180, Tamper::Value(0x0203));
+    tampered.tamper(CONTROL_BLOCK, 0x184, Tamper::Value(17));
     let error = failed(&tampered, &mut accelerator);
     let fault = fault_of(&error);
     assert_eq!(fault.name(), "accelerator-tlast-early");
@@ -249,14 +249,14 @@ fn an_error_of_the_accelerator_names_the_stream_or_the_collision() {
     assert!(text.contains("on the stream of dma2 MM2S, beat 17 of the packet"), "{text}");
     recovered(&mut accelerator, &error);
 
-    tampered.tamper(CONTROL, 0x180, Tamper::Value(ErrorCode::ContactCount as u32));
-    tampered.tamper(CONTROL, 0x184, Tamper::Value(17));
+    tampered.tamper(CONTROL_BLOCK, 0x180, Tamper::Value(ErrorCode::ContactCount as u32));
+    tampered.tamper(CONTROL_BLOCK, 0x184, Tamper::Value(17));
     let error = failed(&tampered, &mut accelerator);
     let text = fault_of(&error).to_string();
     assert!(text.contains("collision 17 (sent as entry 17)"), "{text}");
     recovered(&mut accelerator, &error);
 
-    tampered.tamper(CONTROL, 0x180, Tamper::Value(0xEE));
+    tampered.tamper(CONTROL_BLOCK, 0x180, Tamper::Value(0xEE));
     let error = failed(&tampered, &mut accelerator);
     assert_eq!(fault_of(&error).name(), "accelerator-unknown");
 }
@@ -269,7 +269,7 @@ fn another_bitstream_is_found_at_the_fault_and_after_the_reset() {
         let (board, tampered, mut accelerator) = Tampered::open();
         step(&mut accelerator, CUBES).0.expect("a good step");
         board.inject(Injected::new(FaultKind::Stall).on(0, Side::Mm2s));
-        tampered.tamper(CONTROL, at, Tamper::Value(value));
+        tampered.tamper(CONTROL_BLOCK, at, Tamper::Value(value));
         let error = step(&mut accelerator, CUBES).0.expect_err("another bitstream");
         assert!(
             matches!(fault_of(&error), Fault::OtherBitstream { found, .. } if *found == value),
@@ -292,7 +292,7 @@ fn another_bitstream_without_these_channels_is_not_a_board_that_is_gone() {
         tampered.tamper(core, DMASR, Tamper::Value(u32::MAX));
         tampered.tamper(core, S2MM + DMASR, Tamper::Value(u32::MAX));
     }
-    tampered.tamper(CONTROL, 0x100, Tamper::Value(0x1234_5678));
+    tampered.tamper(CONTROL_BLOCK, 0x100, Tamper::Value(0x1234_5678));
     let error = failed(&tampered, &mut accelerator);
     assert!(error.must_reopen());
     // The channels did not start, and the driver found it when it read their registers again.
@@ -306,7 +306,7 @@ fn a_reset_that_never_ends_leaves_all_memory_to_the_engines() {
         step(&mut accelerator, CUBES).0.expect("a good step");
         // The check at the end reads the bit when the CPU owns all buffers again.
         tampered.tamper(core, 0, Tamper::Set(1 << 2));
-        tampered.tamper(CONTROL, 0, Tamper::Clear(2));
+        tampered.tamper(CONTROL_BLOCK, 0, Tamper::Clear(2));
         let error = step(&mut accelerator, CUBES).0.expect_err("never done");
         assert!(error.must_reopen(), "{error}");
         assert_eq!(fault_of(&error).name(), "no-done", "the error still names the cause");
@@ -344,7 +344,7 @@ fn odd(cubes: u32, interrupts: u32) -> (Result<StepReport, Error>, Accelerator, 
 fn interrupts_without_a_reason_cost_no_step_and_are_told_once() {
     let (result, accelerator, _) = odd(CUBES, 1);
     assert_eq!(result.expect("one spurious interrupt costs no step").interrupts, 2);
-    let told = |accelerator: &Accelerator, oddity| accelerator.device.oddities.told(oddity);
+    let told = |accelerator: &Accelerator, anomaly| accelerator.device.anomalies.told(anomaly);
     assert!(told(&accelerator, Anomaly::SpuriousInterrupt));
     assert!(!told(&accelerator, Anomaly::InterruptStorm));
 

@@ -13,11 +13,12 @@ use bitstream_model::{
 use pgs_interface::control;
 use pgs_interface::profile::{FLOAT, Profile};
 
-use super::{BadlyWired, MEMORY, bits, open, options, scene, undisturbed};
+use super::tampered::{CONTROL_BLOCK, MEMORY, Tampered};
+use super::{SHAPES, bits, open, options, scene, undisturbed};
 use crate::order::Order;
 use crate::{
     Accelerator, Aftermath, Bodies, Body, Cancellation, Collision, Collisions, Error, Fault,
-    InputError, Pose, Shape, StepParameters, Velocity,
+    InputError, Pose, StepParameters, Velocity,
 };
 
 const CUBES: u32 = 20;
@@ -126,8 +127,7 @@ fn a_step_that_was_forgotten_is_stopped_by_the_next_call() {
 
         // The shapes are loaded into a board that has been stopped.
         let _forgotten = ManuallyDrop::new(start(&board, &mut accelerator, clocks));
-        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        accelerator.set_shapes(&SHAPES).expect("shapes that fit");
         assert_works(&board, &mut accelerator, &after);
 
         // The driver makes no further call. The next opening of the board stops it.
@@ -137,7 +137,7 @@ fn a_step_that_was_forgotten_is_stopped_by_the_next_call() {
         board.cpu_port().pause(Duration::from_millis(1));
         assert_eq!(board.counts().beats_read + board.counts().beats_written, moved, "{after}");
         let mut accelerator = Accelerator::open(options(&board)).expect("opened again");
-        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        accelerator.set_shapes(&SHAPES).expect("shapes that fit");
         assert_works(&board, &mut accelerator, &after);
     }
 }
@@ -261,31 +261,29 @@ fn whoever_opens_a_board_that_runs_stops_it_before_memory_is_touched() {
     // As after a SIGKILL: the step is not waited for, and its buffers are not taken back.
     let _left = ManuallyDrop::new(start(&board, &mut accelerator, 1_000));
     assert!(board.is_running());
-    let wired = BadlyWired::new(&board);
-    let mut accelerator = wired.open();
+    let (tampered, mut accelerator) = Tampered::on(&board);
     assert!(!board.is_running(), "opening stops it");
     assert_works(&board, &mut accelerator, "left by another");
 
-    let writes = wired.writes.lock().expect("unpoisoned");
-    let first = |wanted| writes.iter().position(|write| *write == wanted);
+    let wires = tampered.wires();
+    let first = |wanted| wires.writes.iter().position(|write| *write == wanted);
     let memory = first((MEMORY, 0)).expect("a step allocates");
     // DMACR of the four cores, then RESET of the control block.
-    let resets = [(0, 0), (1, 0), (2, 0), (3, 0), (4, control::RESET.offset)];
+    let resets = [(0, 0), (1, 0), (2, 0), (3, 0), (CONTROL_BLOCK, control::RESET.offset)];
     let resets = resets.map(|reset| first(reset).expect("every part is reset"));
     assert!(resets.is_sorted() && resets[4] < memory, "{resets:?}, memory {memory}");
 }
 
 #[test]
 fn a_step_is_cancelled_while_the_board_stalls_and_changes_nothing() {
-    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
-    let wired = BadlyWired::new(&board);
-    let mut accelerator = wired.open();
-    accelerator.set_cancellation(wired.cancellation.clone());
+    let (board, tampered, mut accelerator) = Tampered::open();
+    let cancellation = tampered.wires().cancellation.clone();
+    accelerator.set_cancellation(cancellation.clone());
     let hour = Duration::from_secs(3600);
     let parameters = StepParameters { deadline: Some(hour), ..StepParameters::default() };
     for waits in [1, 2, 30] {
         board.inject(Injected::new(FaultKind::Stall).on(3, Direction::S2mm));
-        wired.cancel_at.store(waits, Ordering::Relaxed);
+        tampered.wires().cancel_at = waits;
         let before = board.cpu_port().now();
         let (mut bodies, collisions) = scene(CUBES);
         let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("stalls");
@@ -305,7 +303,7 @@ fn a_step_is_cancelled_while_the_board_stalls_and_changes_nothing() {
         assert!(matches!(**fault, Fault::Cancelled), "{fault}");
         assert_eq!(*aftermath, Aftermath::Untouched);
         assert_eq!(board.counts(), counts);
-        wired.cancellation.clear();
+        cancellation.clear();
         assert_works(&board, &mut accelerator, "cancelled");
     }
 }

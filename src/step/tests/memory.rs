@@ -14,14 +14,15 @@ use std::time::Duration;
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use pgs_interface::record::Beat;
 
-use super::{bits, scene, undisturbed};
-use crate::board::open::{BoardDescription, BoardKind, Found};
+use super::{bits, found, open_on, scene, undisturbed};
+
 use crate::check::check_found;
 use crate::platform::{
-    Access, Caching, DmaMemory, EmulatedPlatform, HardwarePlatform, ManagerChoice, MemoryChoice,
-    Platform, PlatformError, RegisterChoice, RegisterWindow, SharedMemory, System, uio_fake,
+    Access, Caching, DmaMemory, DmaMemorySource, EmulatedPlatform, HardwarePlatform, ManagerChoice,
+    MemoryChoice, Platform, PlatformError, RegisterChoice, RegisterMap, RegisterWindow,
+    SharedMemory, uio_fake,
 };
-use crate::{Accelerator, Aftermath, Error, Fault, InputError, Outcome, Shape, StepParameters};
+use crate::{Accelerator, Aftermath, Error, Fault, InputError, Outcome, StepParameters};
 
 const BASE: u64 = 0x6000_0000;
 const BYTES: u64 = 1 << 20;
@@ -38,7 +39,7 @@ struct Piece {
 #[derive(Debug)]
 struct Composed {
     engines: EmulatedPlatform,
-    memory: HardwarePlatform,
+    real: HardwarePlatform,
     /// The device's view of the real memory.
     physical: File,
     pieces: Mutex<BTreeMap<u64, Piece>>,
@@ -49,8 +50,7 @@ struct Composed {
 
 impl Composed {
     fn new(board: &EmulatedBoard, choice: &MemoryChoice) -> Self {
-        let root = tempfile::tempdir().expect("a directory");
-        let system = System::under(root.path());
+        let (root, system) = uio_fake::empty_system();
         uio_fake::add_node(&system, 0, "pgs", &uio_fake::regions());
         let file = match choice {
             MemoryChoice::UDmaBuf { name, .. } => {
@@ -73,11 +73,11 @@ impl Composed {
         let physical = File::options().read(true).write(true).open(&file).expect("opened");
         physical.set_len(BYTES).expect("resized");
         let registers = RegisterChoice::Uio("pgs".to_owned());
-        let memory = HardwarePlatform::open(&system, registers, choice, &ManagerChoice::Automatic)
+        let real = HardwarePlatform::open(&system, registers, choice, &ManagerChoice::Automatic)
             .expect("opened");
         let engines = EmulatedPlatform::new(board.cpu_port());
         let (pieces, twins) = Default::default();
-        Self { engines, memory, physical, pieces, twins, _root: root }
+        Self { engines, real, physical, pieces, twins, _root: root }
     }
 
     fn piece(&self, address: u64) -> Piece {
@@ -89,17 +89,9 @@ impl Composed {
     }
 }
 
-impl Platform for Composed {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        self.engines.dma_window(core)
-    }
-
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        self.engines.control_window()
-    }
-
+impl DmaMemorySource for Composed {
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
-        let (real, memory) = self.memory.allocate(beats)?;
+        let (real, memory) = self.real.memory().allocate(beats)?;
         let (address, twin) = self.engines.allocate(beats)?;
         let piece = Piece { real, beats, access: Access::Read };
         self.pieces.lock().expect("unpoisoned").insert(address, piece);
@@ -119,7 +111,7 @@ impl Platform for Composed {
         access: Access,
     ) -> Result<(), PlatformError> {
         let piece = self.piece(address);
-        self.memory.hand_over(piece.real, memory, used, access)?;
+        self.real.memory().hand_over(piece.real, memory, used, access)?;
         let mut twin = self.twin(address);
         for (index, beat) in twin.beats_mut()[..piece.beats].iter_mut().enumerate() {
             let mut bytes = [0; 16];
@@ -143,16 +135,26 @@ impl Platform for Composed {
             }
         }
         self.twins.lock().expect("unpoisoned").insert(address, twin);
-        self.memory.take_back(piece.real)
+        self.real.memory().take_back(piece.real)
     }
 
     fn release(&self, address: u64) -> Result<(), PlatformError> {
         let piece = self.pieces.lock().expect("unpoisoned").remove(&address);
         if let Some(piece) = piece {
             drop(self.twin(address));
-            self.memory.release(piece.real)?;
+            self.real.memory().release(piece.real)?;
         }
         self.engines.release(address)
+    }
+}
+
+impl Platform for Composed {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        self.engines.window(map)
+    }
+
+    fn memory(&self) -> &dyn DmaMemorySource {
+        self
     }
 
     fn now(&self) -> Duration {
@@ -174,16 +176,10 @@ impl Platform for Composed {
 
 #[test]
 fn steps_through_the_memory_of_a_real_board_give_the_same_bits() {
-    for choice in [
-        MemoryChoice::Uio { node: "pgs-memory".to_owned() },
-        u_dma_buf(Caching::Cached),
-        u_dma_buf(Caching::WriteCombining),
-    ] {
+    for choice in choices() {
         let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
         let platform = Arc::new(Composed::new(&board, &choice));
-        let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
-        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        let mut accelerator = open_on(Arc::clone(&platform) as _);
         // Buffers grow, are used in part, and are replaced.
         for cubes in [3, 40, 2, 90, 7] {
             let (mut bodies, collisions) = scene(cubes);
@@ -196,7 +192,7 @@ fn steps_through_the_memory_of_a_real_board_give_the_same_bits() {
         assert_eq!(board.violations(), []);
         // The pool has all its memory back, in one piece.
         let whole = usize::try_from(BYTES / 16).expect("fits");
-        platform.memory.allocate(whole).expect("all of it is free");
+        platform.real.memory().allocate(whole).expect("all of it is free");
     }
 }
 
@@ -204,34 +200,26 @@ fn u_dma_buf(caching: Caching) -> MemoryChoice {
     MemoryChoice::UDmaBuf { name: "pgs".to_owned(), caching }
 }
 
-fn found(platform: &Arc<Composed>) -> Found {
-    let description = BoardDescription {
-        kind: BoardKind::Uio,
-        name: "composed".to_owned(),
-        reason: "a test".to_owned(),
-    };
-    Found { platform: Arc::clone(platform) as _, description }
+fn choices() -> [MemoryChoice; 3] {
+    let uio = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
+    [uio, u_dma_buf(Caching::Cached), u_dma_buf(Caching::WriteCombining)]
 }
 
 #[test]
 fn the_self_test_passes_through_the_memory_of_a_real_board_and_says_when_it_is_too_small() {
-    for choice in [
-        MemoryChoice::Uio { node: "pgs-memory".to_owned() },
-        u_dma_buf(Caching::Cached),
-        u_dma_buf(Caching::WriteCombining),
-    ] {
+    for choice in choices() {
         let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
         let platform = Arc::new(Composed::new(&board, &choice));
-        let report = check_found(found(&platform), None).expect("reachable");
+        let report = check_found(found(Arc::clone(&platform) as _), None).expect("reachable");
         assert!(
             report.lines.iter().all(|line| matches!(line.outcome, Outcome::Ok { .. })),
             "{choice:?}: {report:#?}"
         );
         assert_eq!(board.violations(), []);
         let whole = usize::try_from(BYTES / 16).expect("fits");
-        platform.memory.allocate(whole).expect("all of it came back");
+        platform.real.memory().allocate(whole).expect("all of it came back");
         // The pool is empty now.
-        let report = check_found(found(&platform), None).expect("reachable");
+        let report = check_found(found(Arc::clone(&platform) as _), None).expect("reachable");
         let echo = report.lines.iter().find(|line| line.name == "echo").expect("it");
         assert!(
             matches!(&echo.outcome, Outcome::Failed { found, next, .. }
@@ -247,10 +235,12 @@ fn memory_that_is_too_small_is_an_error_and_a_smaller_step_still_works() {
     let choice = MemoryChoice::Uio { node: "pgs-memory".to_owned() };
     let platform = Arc::new(Composed::new(&board, &choice));
     // The rest of the memory takes three cubes.
-    platform.memory.allocate(usize::try_from((BYTES - 8192) / 16).expect("fits")).expect("room");
-    let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
-    let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-    accelerator.set_shapes(&shapes).expect("shapes that fit");
+    platform
+        .real
+        .memory()
+        .allocate(usize::try_from((BYTES - 8192) / 16).expect("fits"))
+        .expect("room");
+    let mut accelerator = open_on(Arc::clone(&platform) as _);
     let mut step = |cubes| {
         let (mut bodies, collisions) = scene(cubes);
         let result = accelerator.step(&mut bodies, &collisions, &StepParameters::default());
@@ -300,7 +290,7 @@ fn steps_prepared_through_the_memory_of_a_real_board_give_the_same_bits() {
         drop(accelerator);
         assert_eq!(board.violations(), []);
         let whole = usize::try_from(BYTES / 16).expect("fits");
-        platform.memory.allocate(whole).expect("all of it came back");
+        platform.real.memory().allocate(whole).expect("all of it came back");
     }
 }
 
@@ -348,10 +338,8 @@ fn composed(choice: &MemoryChoice, in_use: u64) -> (EmulatedBoard, Arc<Composed>
     let platform = Arc::new(Composed::new(&board, choice));
     if in_use > 0 {
         let beats = usize::try_from(in_use / 16).expect("fits");
-        platform.memory.allocate(beats).expect("there is room");
+        platform.real.memory().allocate(beats).expect("there is room");
     }
-    let mut accelerator = Accelerator::on(found(&platform), None).expect("a board that opens");
-    let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-    accelerator.set_shapes(&shapes).expect("shapes that fit");
+    let accelerator = open_on(Arc::clone(&platform) as _);
     (board, platform, accelerator)
 }

@@ -10,28 +10,42 @@ mod tampered;
 mod wait;
 mod written;
 
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, FaultKind};
 use pgs_interface::control::ErrorCode;
 use pgs_interface::profile::PROFILES;
 
+use self::tampered::{CONTROL_BLOCK, MEMORY, Tampered};
 use crate::board::open::{BoardDescription, BoardKind, Found};
-use crate::platform::{
-    Access, DmaMemory, EmulatedPlatform, Platform, PlatformError, RegisterWindow, SharedMemory,
-};
+use crate::platform::{Access, Platform};
 use crate::{
-    Accelerator, Aftermath, Awaited, BoardChoice, Body, Cancellation, Collision, Contact, Error,
-    Fault, OpenError, OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
+    Accelerator, Aftermath, Awaited, BoardChoice, Body, Collision, Contact, Error, Fault,
+    OpenError, OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
 };
 
 pub(super) fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
     let board = EmulatedBoard::new(config).expect("a board that can be built");
     let mut accelerator = Accelerator::open(options(&board)).expect("a board that opens");
-    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
+    accelerator.set_shapes(&SHAPES).expect("shapes that fit");
     (board, accelerator)
+}
+
+/// The ground's shape and the cubes'.
+const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+
+/// A board behind a test's own platform.
+fn found(platform: Arc<dyn Platform>) -> Found {
+    let (name, reason) = ("between".to_owned(), "a test".to_owned());
+    Found { platform, description: BoardDescription { kind: BoardKind::Emulated, name, reason } }
+}
+
+/// Opens a board behind a test's own platform.
+fn open_on(platform: Arc<dyn Platform>) -> Accelerator {
+    let mut accelerator = Accelerator::on(found(platform), None).expect("a board that opens");
+    accelerator.set_shapes(&SHAPES).expect("shapes that fit");
+    accelerator
 }
 
 pub(super) fn options(board: &EmulatedBoard) -> OpenOptions {
@@ -317,177 +331,23 @@ fn every_sticky_error_of_the_accelerator_is_decoded_and_survived() {
     }
 }
 
-/// An emulated board behind bad wiring.
-#[derive(Debug)]
-pub(super) struct BadlyWired {
-    inner: EmulatedPlatform,
-    /// Interrupts never arrive.
-    interrupts_lost: AtomicBool,
-    /// The number of the wait for an interrupt in which the caller cancels; 0 for no wait.
-    pub(super) cancel_at: AtomicU32,
-    pub(super) cancellation: Cancellation,
-    /// Flips this bit of the first word of the next buffer that goes to the device, or comes from
-    /// it.
-    flip_to_device: AtomicU32,
-    flip_from_device: AtomicU32,
-    /// Every register write: region (the control block is 4) and offset. An allocation of memory,
-    /// or its hand-over, counts as region 5.
-    pub(super) writes: Writes,
-}
-
-/// The region number that stands for memory.
-pub(super) const MEMORY: usize = 5;
-
-type Writes = Arc<Mutex<Vec<(usize, u32)>>>;
-
-/// A register region that records all writes.
-#[derive(Debug)]
-struct Noted {
-    inner: Box<dyn RegisterWindow>,
-    region: usize,
-    writes: Writes,
-}
-
-impl RegisterWindow for Noted {
-    fn bytes(&self) -> u64 {
-        self.inner.bytes()
-    }
-
-    fn read32(&self, at: u32) -> u32 {
-        self.inner.read32(at)
-    }
-
-    fn write32(&self, at: u32, value: u32) {
-        self.writes.lock().expect("no test panics with the lock").push((self.region, at));
-        self.inner.write32(at, value);
-    }
-}
-
-impl BadlyWired {
-    fn note_memory(&self) {
-        self.writes.lock().expect("no test panics with the lock").push((MEMORY, 0));
-    }
-
-    pub(super) fn new(board: &EmulatedBoard) -> Arc<Self> {
-        Arc::new(Self {
-            inner: EmulatedPlatform::new(board.cpu_port()),
-            interrupts_lost: AtomicBool::default(),
-            cancel_at: AtomicU32::default(),
-            cancellation: Cancellation::new(),
-            flip_to_device: AtomicU32::default(),
-            flip_from_device: AtomicU32::default(),
-            writes: Writes::default(),
-        })
-    }
-
-    pub(super) fn open(self: &Arc<Self>) -> Accelerator {
-        let description = BoardDescription {
-            kind: BoardKind::Emulated,
-            name: "badly wired".to_owned(),
-            reason: "a test".to_owned(),
-        };
-        let platform: Arc<dyn Platform> = Arc::clone(self) as _;
-        let mut accelerator =
-            Accelerator::on(Found { platform, description }, None).expect("a board that opens");
-        accelerator
-            .set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)])
-            .expect("shapes that fit");
-        accelerator
-    }
-}
-
-impl Platform for BadlyWired {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        let (inner, writes) = (self.inner.dma_window(core)?, Arc::clone(&self.writes));
-        Ok(Box::new(Noted { inner, region: core, writes }))
-    }
-
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        let (inner, writes) = (self.inner.control_window()?, Arc::clone(&self.writes));
-        Ok(Box::new(Noted { inner, region: 4, writes }))
-    }
-
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
-        self.note_memory();
-        self.inner.allocate(beats)
-    }
-
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
-        self.note_memory();
-        self.inner.allocate_shared(words)
-    }
-
-    fn hand_over(
-        &self,
-        address: u64,
-        mut memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
-        if access == Access::Read {
-            memory.beats_mut()[0].0[0] ^= self.flip_to_device.swap(0, Ordering::Relaxed);
-        }
-        self.note_memory();
-        self.inner.hand_over(address, memory, used, access)
-    }
-
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
-        let mut memory = self.inner.take_back(address)?;
-        memory.beats_mut()[0].0[0] ^= self.flip_from_device.swap(0, Ordering::Relaxed);
-        Ok(memory)
-    }
-
-    fn release(&self, address: u64) -> Result<(), PlatformError> {
-        self.inner.release(address)
-    }
-
-    fn now(&self) -> Duration {
-        self.inner.now()
-    }
-
-    fn pause(&self, duration: Duration) {
-        self.inner.pause(duration);
-    }
-
-    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
-        let waits = self.cancel_at.load(Ordering::Relaxed);
-        if waits > 0 {
-            self.cancel_at.store(waits - 1, Ordering::Relaxed);
-            if waits == 1 {
-                self.cancellation.cancel();
-            }
-        }
-        if !self.interrupts_lost.load(Ordering::Relaxed) {
-            return self.inner.wait_interrupt(timeout);
-        }
-        self.inner.pause(timeout);
-        Ok(None)
-    }
-
-    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
-        self.inner.unmask_interrupt()
-    }
-}
-
 #[test]
 fn without_interrupts_steps_are_found_by_looking_and_soon_more_often() {
-    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
-    let wired = BadlyWired::new(&board);
-    let mut accelerator = wired.open();
-    wired.interrupts_lost.store(true, Ordering::Relaxed);
+    let (board, tampered, mut accelerator) = Tampered::open();
+    tampered.wires().wait_limit = Some(Duration::MAX);
     let mut times = Vec::new();
     for _ in 0..4 {
-        let before = wired.now();
+        let before = tampered.now();
         let (result, bodies) = step(&mut accelerator, 20);
         assert_eq!(result.expect("found by looking").interrupts, 0);
         assert_eq!(bits(&bodies), undisturbed(20));
-        times.push(wired.now() - before);
+        times.push(tampered.now() - before);
     }
     // The first step takes one polling interval; later steps no longer rely on the interrupt.
     assert!(times[0] >= Duration::from_millis(10) && times[0] < Duration::from_millis(12));
     assert!(times[3] < Duration::from_millis(2), "{times:?}");
     // The interrupt comes back, and the driver relies on it again.
-    wired.interrupts_lost.store(false, Ordering::Relaxed);
+    tampered.wires().wait_limit = None;
     step(&mut accelerator, 20).0.expect("a step");
     let report = step(&mut accelerator, 20).0.expect("a step");
     assert_eq!((report.interrupts, report.register_reads + report.register_writes), (1, 38));
@@ -496,31 +356,28 @@ fn without_interrupts_steps_are_found_by_looking_and_soon_more_often() {
 
 #[test]
 fn receivers_start_before_the_accelerator_and_it_before_the_senders() {
-    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
-    let wired = BadlyWired::new(&board);
-    let mut accelerator = wired.open();
+    let (_, tampered, mut accelerator) = Tampered::open();
     step(&mut accelerator, 20).0.expect("the first step");
-    wired.writes.lock().expect("unpoisoned").clear();
+    tampered.wires().writes.clear();
     step(&mut accelerator, 20).0.expect("a step");
     // The low word, then the upper word, which starts the engine; last the acknowledgement of the
     // completion.
     let tails = |low, high| (0..4).flat_map(move |core| [(core, low), (core, high)]);
-    let expected: Vec<_> =
-        tails(0x40, 0x44).chain([(4, 0x00)]).chain(tails(0x10, 0x14)).chain([(3, 0x34)]).collect();
-    let mut writes = wired.writes.lock().expect("unpoisoned").clone();
+    let expected: Vec<_> = tails(0x40, 0x44)
+        .chain([(CONTROL_BLOCK, 0x00)])
+        .chain(tails(0x10, 0x14))
+        .chain([(3, 0x34)])
+        .collect();
+    let mut writes = tampered.wires().writes.clone();
     writes.retain(|(region, _)| *region != MEMORY);
     assert_eq!(writes, expected);
 }
 
 #[test]
 fn a_bit_that_flips_on_the_way_is_found_by_the_sums() {
-    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
-    let wired = BadlyWired::new(&board);
-    let mut accelerator = wired.open();
-    for (flip, way) in
-        [(&wired.flip_to_device, Direction::Mm2s), (&wired.flip_from_device, Direction::S2mm)]
-    {
-        flip.store(1 << 4, Ordering::Relaxed);
+    let (_, tampered, mut accelerator) = Tampered::open();
+    for (access, way) in [(Access::Read, Direction::Mm2s), (Access::Write, Direction::S2mm)] {
+        tampered.wires().flip = Some((access, 1 << 4));
         let (result, bodies) = step(&mut accelerator, 20);
         let error = result.expect_err("a flipped bit");
         let Error::Step { fault, .. } = &error else { panic!("{error}") };

@@ -76,14 +76,14 @@ fn planned_faults_are_named_with_channel_and_phase() {
 }
 
 #[test]
-fn planned_oddities_cost_no_step_and_are_told() {
+fn planned_anomalies_cost_no_step_and_are_told() {
     let cases = [
         ("irq-drop", Some(Anomaly::MissedInterrupt)),
         ("irq-spurious,access=10", Some(Anomaly::SpuriousInterrupt)),
         ("late-cmplted=400000@dma3.s2mm", Some(Anomaly::LateStatus)),
         ("slow=50@dma1.mm2s", None),
     ];
-    for (line, oddity) in cases {
+    for (line, anomaly) in cases {
         let (board, mut accelerator) = open(BoardConfig::default());
         step(&mut accelerator, CUBES).0.expect("a good step");
         board.inject(line.parse::<FaultPlan>().expect(line));
@@ -91,8 +91,8 @@ fn planned_oddities_cost_no_step_and_are_told() {
         result.expect(line);
         assert_eq!((bits(&bodies), board.faults()), (undisturbed(CUBES), 1), "{line}");
         for other in [Anomaly::MissedInterrupt, Anomaly::SpuriousInterrupt, Anomaly::LateStatus] {
-            let told = accelerator.device.oddities.told(other);
-            assert_eq!(told, Some(other) == oddity, "{line}: {other:?}");
+            let told = accelerator.device.anomalies.told(other);
+            assert_eq!(told, Some(other) == anomaly, "{line}: {other:?}");
         }
         assert_eq!(board.violations(), [], "{line}");
     }
@@ -133,7 +133,7 @@ fn a_channel_that_does_not_stop_for_its_new_ring_is_reset() {
     let (result, bodies) = step(&mut accelerator, 60);
     result.expect("reset, and no step lost");
     assert_eq!((bits(&bodies), board.faults()), (undisturbed(60), 1));
-    assert!(accelerator.device.oddities.told(Anomaly::NoHalt));
+    assert!(accelerator.device.anomalies.told(Anomaly::NoHalt));
     drop(accelerator);
     assert_eq!(board.violations(), []);
 }

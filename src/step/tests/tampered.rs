@@ -1,5 +1,5 @@
-//! The emulated board with a fault injector between it and the driver. Tests change register
-//! values, register writes, descriptor words and interrupts.
+//! Places a fault injector between the driver and the emulated board. Tests change register values,
+//! descriptor words, beats and interrupts, and read the driver's register writes.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,14 +10,25 @@ use std::time::Duration;
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use pgs_interface::descriptor::{STATUS, WORDS};
 
-use crate::Accelerator;
-use crate::board::open::{BoardDescription, BoardKind, Found};
+use super::open_on;
 use crate::platform::{
-    Access, DmaMemory, EmulatedPlatform, Platform, PlatformError, RegisterWindow, SharedMemory,
+    Access, DmaMemory, DmaMemorySource, EmulatedPlatform, Platform, PlatformError, RegisterMap,
+    RegisterWindow, SharedMemory,
 };
+use crate::{Accelerator, Cancellation};
 
 /// The number of the control block among the regions.
-pub(crate) const CONTROL: usize = 4;
+pub(crate) const CONTROL_BLOCK: usize = 4;
+/// The number that stands for memory among the regions.
+pub(crate) const MEMORY: usize = 5;
+
+/// The number of a region.
+pub(crate) fn number(map: RegisterMap) -> usize {
+    match map {
+        RegisterMap::Dma(core) => core,
+        RegisterMap::Control => CONTROL_BLOCK,
+    }
+}
 
 /// The change to a register's value when it is read.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +62,22 @@ pub(crate) struct Wires {
     pub(crate) clock_read: Duration,
     /// The longest wait for the interrupt; it then ends without one.
     pub(crate) wait_limit: Option<Duration>,
+    /// The number of the wait for an interrupt in which the caller cancels; 0 for no wait.
+    pub(crate) cancel_at: u32,
+    pub(crate) cancellation: Cancellation,
+    /// Flips these bits in the first word of the next buffer that the device reads, or has written.
+    pub(crate) flip: Option<(Access, u32)>,
+    /// Every register write: region and offset. An allocation of memory, or its hand-over, counts
+    /// as a write to [`MEMORY`].
+    pub(crate) writes: Vec<(usize, u32)>,
+}
+
+impl Wires {
+    fn flip(&mut self, memory: &mut DmaMemory, access: Access) {
+        if let Some((_, bits)) = self.flip.take_if(|(wanted, _)| *wanted == access) {
+            memory.beats_mut()[0].0[0] ^= bits;
+        }
+    }
 }
 
 /// The rings of descriptors, in the order in which the driver makes them: MM2S and S2MM of each
@@ -85,20 +112,16 @@ impl Tampered {
     /// Opens a default board.
     pub(crate) fn open() -> (EmulatedBoard, Arc<Self>, Accelerator) {
         let board = EmulatedBoard::new(BoardConfig::default()).expect("a board that can be built");
+        let (tampered, accelerator) = Self::on(&board);
+        (board, tampered, accelerator)
+    }
+
+    /// Opens this board.
+    pub(crate) fn on(board: &EmulatedBoard) -> (Arc<Self>, Accelerator) {
         let inner = EmulatedPlatform::new(board.cpu_port());
         let tampered = Arc::new(Self { inner, wires: Arc::default() });
-        let description = BoardDescription {
-            kind: BoardKind::Emulated,
-            name: "tampered".to_owned(),
-            reason: "a test".to_owned(),
-        };
-        let platform: Arc<dyn Platform> = Arc::clone(&tampered) as _;
-        let mut accelerator =
-            Accelerator::on(Found { platform, description }, None).expect("a board that opens");
-        accelerator
-            .set_shapes(&[crate::Shape::STATIC, crate::Shape::isotropic(1.0, 0.4)])
-            .expect("shapes that fit");
-        (board, tampered, accelerator)
+        let accelerator = open_on(Arc::clone(&tampered) as _);
+        (tampered, accelerator)
     }
 
     pub(crate) fn wires(&self) -> MutexGuard<'_, Wires> {
@@ -120,10 +143,6 @@ impl Tampered {
         let mut wires = self.wires();
         wires.reads.clear();
         wires.after_wait = None;
-    }
-
-    fn window(&self, inner: Box<dyn RegisterWindow>, region: usize) -> Box<dyn RegisterWindow> {
-        Box::new(Wired { inner, region, wires: Arc::clone(&self.wires) })
     }
 }
 
@@ -161,27 +180,23 @@ impl RegisterWindow for Wired {
     }
 
     fn write32(&self, at: u32, value: u32) {
+        lock(&self.wires).writes.push((self.region, at));
         self.inner.write32(at, value);
     }
 }
 
-impl Platform for Tampered {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        Ok(self.window(self.inner.dma_window(core)?, core))
-    }
-
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        Ok(self.window(self.inner.control_window()?, CONTROL))
-    }
-
+impl DmaMemorySource for Tampered {
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+        self.wires().writes.push((MEMORY, 0));
         self.inner.allocate(beats)
     }
 
     fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
         let (address, memory) = self.inner.allocate_shared(words)?;
+        let mut wires = self.wires();
+        wires.writes.push((MEMORY, 0));
         if let SharedMemory::Heap(words) = &memory {
-            self.wires().shared.push(Arc::clone(words));
+            wires.shared.push(Arc::clone(words));
         }
         Ok((address, memory))
     }
@@ -189,20 +204,37 @@ impl Platform for Tampered {
     fn hand_over(
         &self,
         address: u64,
-        memory: DmaMemory,
+        mut memory: DmaMemory,
         used: usize,
         access: Access,
     ) -> Result<(), PlatformError> {
+        if access == Access::Read {
+            self.wires().flip(&mut memory, access);
+        }
+        self.wires().writes.push((MEMORY, 0));
         self.inner.hand_over(address, memory, used, access)
     }
 
     fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
-        self.inner.take_back(address)
+        let mut memory = self.inner.take_back(address)?;
+        self.wires().flip(&mut memory, Access::Write);
+        Ok(memory)
     }
 
     fn release(&self, address: u64) -> Result<(), PlatformError> {
         self.wires().released.push(address);
         self.inner.release(address)
+    }
+}
+
+impl Platform for Tampered {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        let (inner, wires) = (self.inner.window(map)?, Arc::clone(&self.wires));
+        Ok(Box::new(Wired { inner, region: number(map), wires }))
+    }
+
+    fn memory(&self) -> &dyn DmaMemorySource {
+        self
     }
 
     fn now(&self) -> Duration {
@@ -215,7 +247,14 @@ impl Platform for Tampered {
     }
 
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
-        let wait_limit = self.wires().wait_limit;
+        let wait_limit = {
+            let mut wires = self.wires();
+            if wires.cancel_at == 1 {
+                wires.cancellation.cancel();
+            }
+            wires.cancel_at = wires.cancel_at.saturating_sub(1);
+            wires.wait_limit
+        };
         if let Some(wait_limit) = wait_limit {
             self.inner.pause(wait_limit.min(timeout));
             return Ok(None);

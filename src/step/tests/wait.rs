@@ -9,7 +9,7 @@ use pgs_interface::axi_dma::dmasr;
 use pgs_interface::profile::Profile;
 
 use super::fault::{CUBES, fault_of};
-use super::tampered::{CONTROL, Tamper, Tampered};
+use super::tampered::{CONTROL_BLOCK, Tamper, Tampered};
 use super::{bits, open, scene, step, undisturbed};
 use crate::board::anomalies::Anomaly;
 use crate::{Aftermath, Cancellation, Error, InputError, StepParameters};
@@ -29,7 +29,7 @@ fn a_look_that_takes_its_time_is_not_a_status_that_is_late() {
     let (result, bodies) = step(&mut accelerator, CUBES);
     result.expect("only slow");
     assert_eq!(bits(&bodies), undisturbed(CUBES));
-    assert!(!accelerator.device.oddities.told(Anomaly::LateStatus));
+    assert!(!accelerator.device.anomalies.told(Anomaly::LateStatus));
     assert_eq!(board.violations(), []);
 }
 
@@ -62,7 +62,7 @@ fn what_the_caller_does_meanwhile_is_not_what_a_step_takes() {
     let (mut bodies, collisions) = scene(CUBES);
     accelerator.step(&mut bodies, &collisions, &long_deadline()).expect("found by looking");
     let took = board.cpu_port().now() - before;
-    assert!(accelerator.device.oddities.told(Anomaly::MissedInterrupt));
+    assert!(accelerator.device.anomalies.told(Anomaly::MissedInterrupt));
     assert!(took < Duration::from_millis(12), "{took:?}");
 }
 
@@ -78,7 +78,7 @@ fn a_completion_that_was_not_seen_is_not_left_to_the_next_step() {
     assert_eq!(status & dmasr::IOC_IRQ.mask(), 0, "{status:#x}");
     let report = step(&mut accelerator, CUBES).0.expect("the next step");
     assert_eq!((report.interrupts, report.register_reads + report.register_writes), (1, 38));
-    assert!(!accelerator.device.oddities.told(Anomaly::SpuriousInterrupt));
+    assert!(!accelerator.device.anomalies.told(Anomaly::SpuriousInterrupt));
     assert_eq!(board.violations(), []);
 }
 
@@ -96,7 +96,7 @@ fn interrupts_that_end_nothing_are_a_storm_though_a_channel_asks_for_them() {
     let parameters = StepParameters { deadline, ..StepParameters::default() };
     let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("it stalls");
     assert_eq!(fault_of(&error).name(), "deadline");
-    assert!(accelerator.device.oddities.told(Anomaly::InterruptStorm));
+    assert!(accelerator.device.anomalies.told(Anomaly::InterruptStorm));
     // The driver takes one more after the reset.
     let taken = u32::MAX - tampered.wires().storm;
     assert!((16..=17).contains(&taken), "{taken}");
@@ -170,11 +170,11 @@ fn a_board_that_is_gone_before_a_larger_step_did_not_fail_to_stop() {
             tampered.tamper(core, base + DMASR, Tamper::Value(u32::MAX));
         }
     }
-    tampered.tamper(CONTROL, 0x100, Tamper::Value(u32::MAX));
+    tampered.tamper(CONTROL_BLOCK, 0x100, Tamper::Value(u32::MAX));
     let error = step(&mut accelerator, CUBES).0.expect_err("nothing answers");
     assert_eq!(fault_of(&error).name(), "gone");
     assert!(error.must_reopen(), "{error}");
-    assert!(!accelerator.device.oddities.told(Anomaly::NoHalt));
+    assert!(!accelerator.device.anomalies.told(Anomaly::NoHalt));
 }
 
 #[test]

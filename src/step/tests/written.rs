@@ -10,7 +10,8 @@ use super::life::windowed;
 use super::{bits, open, scene};
 use crate::order::Order;
 use crate::{
-    Accelerator, Body, Collision, Error, InputError, Prepared, StepParameters, Velocity, Writer,
+    Accelerator, Body, Collision, Error, Excess, InputError, Prepared, StepParameters, Velocity,
+    Writer,
 };
 
 /// More than three blocks of records.
@@ -147,7 +148,7 @@ fn nothing_is_written_beyond_what_was_announced() {
         }
     }
     let written = accelerator.write(&bodies, 1 << 30, &parameters(), |_| {});
-    assert!(matches!(refusal(written), InputError::TooManyCollisions { .. }));
+    assert!(matches!(refusal(written).excess(), Some(Excess::TooManyCollisions { .. })));
     assert_works(&mut accelerator, "after too many");
     drop(accelerator);
     assert_eq!(board.violations(), []);

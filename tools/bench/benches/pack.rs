@@ -12,16 +12,15 @@
 //! (`--input`; or else `full_step186` of the folder that the environment variable `PGS_VECTORS`
 //! names). One thread does everything, unless `--threads` asks for more. Each item is measured
 //! alone: it and a `memcpy` from warm memory to warm memory run in turn. The first runs of a
-//! stretch do not count, so that the caches hold as much of the item's buffers as they can. The
-//! output has the bytes written, medians, GB/s of these bytes, and the throughput relative to that
-//! of `memcpy`.
+//! stretch fill the caches with the item's buffers and do not count. The output has the bytes
+//! written, medians, GB/s of these bytes, and the throughput relative to that of `memcpy`.
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
 //! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the
 //!   one that is the default on a bitstream that does not wait, or `--order`, in the window of
 //!   `float`
-//! - `bare, ...`: the same collisions read and as many bytes written to as many channels, in the
-//!   same loops, and nothing made of them: about the least that packing can take
+//! - `bare, ...`: the same collisions read, and the same number of bytes written to the same
+//!   channels, in the same loops but without making records: about the least that packing can take
 //! - `step, ...`: bodies, then collisions
 //! - `checked, ...`: the same with the validation of everything on the way, as a step does it
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
@@ -210,13 +209,7 @@ impl Row {
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    bench::exit_code(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -300,8 +293,8 @@ fn measure(
         _ => Vec::new(),
     };
     let mut moved = bodies.clone();
-    // What a collision needs of its bodies, what is committed, and what one cannot say something of:
-    // it is refused, and would be measured as it is refused.
+    // The packed bodies and the unpacked results are inputs of later items. A refused scene stops
+    // here: otherwise the benchmark would measure the refusal.
     for unpacker in &mut unpackers {
         unpacker.unpack(bodies).ok_or("the results are refused")?;
     }

@@ -16,13 +16,24 @@ pub mod options;
 pub mod step;
 pub mod yardstick;
 
+use std::error::Error;
 use std::ffi::OsString;
+use std::io::{self, Write as _};
+use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use nix::time::{ClockId, clock_gettime};
 
 /// A timed run; the caller keeps its result from being optimised away.
 pub type Run<'a> = Box<dyn FnMut() + 'a>;
+
+/// Ends a benchmark: code 0, or code 2 after the error on stderr.
+#[must_use]
+pub fn exit_code(outcome: Result<(), Box<dyn Error>>) -> ExitCode {
+    let Err(error) = outcome else { return ExitCode::SUCCESS };
+    let _ = writeln!(io::stderr(), "error: {error}");
+    ExitCode::from(2)
+}
 
 /// Reads a variable of the environment; a blank one counts as unset.
 #[must_use]
@@ -74,8 +85,8 @@ pub const STRETCH: usize = WARMING + MEASURED;
 
 /// Runs all in turn, in `stretches` stretches each; returns the median time of each.
 ///
-/// In a stretch, one run has the machine to itself: the caches hold as much of its memory as they
-/// can, and nothing of the others'. The first runs of a stretch do not count.
+/// In a stretch, one run has the machine and its caches to itself. The first runs of a stretch fill
+/// the caches and do not count.
 pub fn warm_medians(stretches: usize, clock: Clock, contestants: &mut [Run<'_>]) -> Vec<Duration> {
     let mut times = vec![Vec::with_capacity(stretches * MEASURED); contestants.len()];
     for _ in 0..stretches {

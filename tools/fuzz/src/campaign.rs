@@ -57,7 +57,7 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// What is missing of the plan, in words; `None` if nothing is.
+    /// The missing threads, in words; `None` if all of them ran.
     #[must_use]
     pub fn missing(&self) -> Option<String> {
         let error = self.refused.as_ref()?;
@@ -69,7 +69,7 @@ impl Threads {
 /// Starts a thread, or says why the system gives none.
 type Start = fn(Box<dyn FnOnce() + Send>) -> io::Result<()>;
 
-/// As the system does it. Nobody waits for the thread.
+/// Starts a thread of the system that is never joined.
 fn start(work: Box<dyn FnOnce() + Send>) -> io::Result<()> {
     thread::Builder::new().name("fuzz".to_owned()).spawn(work).map(drop)
 }
@@ -190,7 +190,7 @@ fn run_on(
     let mut used = Threads { ran: 0, refused: None, watched: true };
     while used.ran < threads {
         let (shared, ended, thread) = (Arc::clone(&shared), ended.clone(), used.ran);
-        // After a hang nobody receives the result.
+        // After a hang the caller does not wait for this thread.
         let work = move || {
             shared.work(thread);
             drop(ended);

@@ -10,8 +10,8 @@ use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnorma
 use serde_json::{Value, json};
 use zynq_pgs::platform::{System, uio_listing};
 use zynq_pgs::{
-    Accelerator, BoardChoice, BoardKind, DevMemWindows, Fault, InputError, MemoryChoice,
-    OpenOptions, StepParameters,
+    Accelerator, BoardChoice, BoardKind, DevMemWindows, Excess, Fault, MemoryChoice, OpenOptions,
+    StepParameters,
 };
 
 use crate::common::{AcceleratorChoice, BoardName, CommonArgs};
@@ -226,7 +226,7 @@ impl OpenBoard {
     /// Makes a failure of an error of the driver.
     pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {
         if let zynq_pgs::Error::Input(input) = &error {
-            let anisotropic = matches!(input, InputError::Anisotropic { .. });
+            let anisotropic = matches!(input.excess(), Some(Excess::Anisotropic { .. }));
             let failure = Failure::input(error);
             return match anisotropic && self.observer.is_some() {
                 true => failure.next(WORLD_INERTIA),

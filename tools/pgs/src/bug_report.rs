@@ -15,15 +15,15 @@ use crate::failure::Failure;
 use crate::options::ordering;
 use crate::output::SCHEMA;
 
-/// What to do when a step fails.
+/// The arguments for a failed step.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "When a step fails")]
 pub(crate) struct FaultArgs {
     /// Repeat a failed step up to N times, if the board is ready for it after its reset
     #[arg(long, value_name = "N", default_value_t = 0)]
     retries: u32,
-    /// Write to FILE what a bug report needs: version, board, parameters, registers, last accesses.
-    /// Nothing is written without a fault
+    /// Write the data for a bug report to FILE after a fault: version, board, parameters, registers,
+    /// last accesses
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }

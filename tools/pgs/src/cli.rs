@@ -20,7 +20,7 @@ Examples:
   pgs order --input vectors/full_step186
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
-  pgs check                            test the board; --board emulated where there is none
+  pgs check                            test the board; with --board emulated the emulated one
   pgs faults                           every fault at every place, and the driver's reaction
   pgs serve --socket /tmp/board        and elsewhere: pgs --board socket:/tmp/board
 

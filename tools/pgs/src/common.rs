@@ -43,10 +43,10 @@ pub(crate) struct CommonOptions {
     memory: Option<MemoryChoice>,
     /// FPGA manager of a real board's logic.
     #[arg(
-        help = "FPGA manager of a real board's logic, which says whether it is programmed: auto (the \
-                ZynqMP's own, by its name), a device as fpga1, or none (do not ask: for logic that \
-                the kernel did not load, as by JTAG. WARNING: an access to logic that is not \
-                programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
+        help = "FPGA manager that knows whether a real board's logic is programmed: auto (the \
+                ZynqMP's own, by its name), a device such as fpga1, or none (no check, for logic \
+                that the kernel did not load, for example by JTAG. WARNING: an access to logic that \
+                is not programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
         long,
         global = true,
         value_name = "MANAGER",

@@ -180,7 +180,7 @@ impl From<io::Error> for Failure {
 pub(crate) fn report_usage(message: &clap::Error) -> ExitCode {
     let printed = message.print().and_then(|()| io::stdout().flush());
     match printed {
-        // If nobody can be told of a usage error, the code still says it.
+        // Without a stream to print a usage error, the exit code still shows it.
         _ if message.use_stderr() => ExitCode::from(2),
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => Failure::from(error).report(&mut io::stderr().lock()),

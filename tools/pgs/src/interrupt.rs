@@ -1,8 +1,8 @@
 //! Ends a command at Ctrl-C: between two steps, or inside one, which the driver then stops and
 //! undoes. A hang-up of the terminal and a request to terminate count as Ctrl-C.
 //!
-//! A signal that the process was told to ignore stays ignored: SIGHUP under `nohup`, SIGINT in a
-//! script's background job.
+//! A signal that the parent process has set to ignored stays ignored: SIGHUP under `nohup`, SIGINT
+//! in a script's background job.
 
 use std::fs;
 use std::io;
@@ -39,8 +39,8 @@ fn ignored_of(status: &str) -> Option<u64> {
     u64::from_str_radix(mask.trim(), 16).ok()
 }
 
-/// Starts the thread that does `act` at each of those signals. The thread takes the signals over
-/// itself: where there is none, they end the program as before.
+/// Starts a thread that calls `act` at each of the signals. The thread itself installs the handlers:
+/// if it does not start, the signals end the program as before.
 fn handle(signals: Vec<i32>, mut act: impl FnMut() + Send + 'static) -> io::Result<()> {
     let (tell, told) = mpsc::sync_channel(1);
     thread::Builder::new().name("interrupt".to_owned()).spawn(move || {

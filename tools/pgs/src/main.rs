@@ -2,7 +2,7 @@
 //! or emulated.
 //!
 //! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to
-//! both. The exit codes are those of [`failure`].
+//! both. [`failure`] defines the exit codes.
 
 #![forbid(unsafe_code)]
 
@@ -44,10 +44,10 @@ fn log_to_stderr() {
         .init();
 }
 
-/// Has a write past the limit on the size of files (`ulimit -f`) fail with an error that is told,
-/// where the system would end the program.
+/// Makes a write past the limit on the size of files (`ulimit -f`) fail with an error; by default
+/// the system would end the program.
 fn survive_file_limit() {
-    // Nobody asks the flag: the write says it.
+    // The flag is not read: the failed write reports the limit.
     if let Err(error) = flag::register(SIGXFSZ, Arc::default()) {
         log::warn!("a file that grows past the limit will end the program: {error}");
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use thiserror::Error;
-use zynq_pgs::InputError;
+use zynq_pgs::{Excess, InputError, InputItem, OutOfRange};
 
 use crate::failure::Failure;
 use step_folder::folder::{
@@ -46,9 +46,13 @@ fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
     let file = folder.join(file_of(error)).display().to_string();
     let shape = match error {
         InputError::ShapeValue { shape, .. }
-        | InputError::Anisotropic { shape, .. }
-        | InputError::ShapeOutOfRange { shape, .. }
-        | InputError::StaticShapeRotates { shape, .. } => Some(*shape),
+        | InputError::StaticShapeRotates { shape, .. }
+        | InputError::BeyondBitstream {
+            excess:
+                Excess::Anisotropic { shape, .. }
+                | Excess::OutOfRange(OutOfRange { item: InputItem::Shape(shape), .. }),
+            ..
+        } => Some(*shape),
         _ => None,
     };
     match shape.and_then(|shape| shape_bodies.get(shape)) {
@@ -60,44 +64,63 @@ fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {
 /// The array that holds a refused value.
 fn file_of(error: &InputError) -> &'static str {
     match error {
-        InputError::BodyNotFinite { field, .. }
-        | InputError::BodyOutOfRange { field, .. }
-        | InputError::StaticBodyMoves { field, .. } => match *field {
-            "orientation" => BODY_ORIENTATION,
-            "linear velocity" => BODY_LINEAR,
-            "angular velocity" => BODY_ANGULAR,
-            _ => BODY_POSITION,
-        },
+        InputError::BeyondBitstream { excess, .. } => file_of_excess(excess),
+        InputError::BodyNotFinite { field, .. } | InputError::StaticBodyMoves { field, .. } => {
+            file_of_body(field)
+        }
         InputError::Orientation { .. } => BODY_ORIENTATION,
         InputError::ShapeIndex { .. }
         | InputError::NoShapes
         | InputError::TooManyShapes { .. }
-        | InputError::ShapeOutOfRange { field: "inverse mass", .. }
         | InputError::ShapeValue { field: "inverse mass", .. } => BODY_INVERSE_MASS,
-        InputError::ShapeValue { .. }
-        | InputError::Anisotropic { .. }
-        | InputError::ShapeOutOfRange { .. }
-        | InputError::StaticShapeRotates { .. } => BODY_INVERSE_INERTIA,
-        InputError::TooManyCollisions { .. }
-        | InputError::MemoryExceeded { .. }
-        | InputError::BodyIndex { .. }
+        InputError::ShapeValue { .. } | InputError::StaticShapeRotates { .. } => {
+            BODY_INVERSE_INERTIA
+        }
+        InputError::BodyIndex { .. }
         | InputError::SelfCollision { .. }
         | InputError::BothStatic { .. }
-        | InputError::Order(_)
-        | InputError::OrderTooLong { .. }
-        | InputError::SpanTooLong { .. }
-        | InputError::TooManyLive { .. } => COLLISION_BODIES,
+        | InputError::Order(_) => COLLISION_BODIES,
         InputError::ContactCount { .. } => COLLISION_COUNT,
         InputError::NormalNotFinite { .. }
         | InputError::NormalZero { .. }
         | InputError::NormalLength { .. } => COLLISION_NORMAL,
-        InputError::ContactNotFinite { .. }
-        | InputError::CollisionOutOfRange { contact: Some(_), .. } => COLLISION_POINTS,
-        // The positions of the bodies; a normal of unit length is always in range.
-        InputError::CollisionOutOfRange { contact: None, .. } => BODY_POSITION,
-        InputError::Parameter { .. } | InputError::ParameterOutOfRange { .. } => PARAMS,
+        InputError::ContactNotFinite { .. } => COLLISION_POINTS,
+        InputError::Parameter { .. } => PARAMS,
         InputError::TooManyIterations { .. } => ITERATIONS,
-        // No bodies, too many bodies, and errors of later versions of the driver.
+        // No bodies, and errors of later versions of the driver.
+        _ => BODY_POSITION,
+    }
+}
+
+/// The array that holds a value beyond the bitstream.
+fn file_of_excess(excess: &Excess) -> &'static str {
+    match excess {
+        Excess::OutOfRange(OutOfRange { item, field, .. }) => match item {
+            InputItem::Body(_) => file_of_body(field),
+            InputItem::Shape(_) if *field == "inverse mass" => BODY_INVERSE_MASS,
+            InputItem::Shape(_) => BODY_INVERSE_INERTIA,
+            InputItem::Collision(_, Some(_)) => COLLISION_POINTS,
+            InputItem::Parameters { .. } => PARAMS,
+            // Positions of bodies, constraint rows. A normal of unit length is always in range.
+            _ => BODY_POSITION,
+        },
+        Excess::Anisotropic { .. } => BODY_INVERSE_INERTIA,
+        Excess::TooManyCollisions { .. }
+        | Excess::MemoryExceeded { .. }
+        | Excess::OrderTooLong { .. }
+        | Excess::SpanTooLong { .. }
+        | Excess::TooManyLive { .. } => COLLISION_BODIES,
+        // Too many bodies.
+        _ => BODY_POSITION,
+    }
+}
+
+/// The array that holds a field of the bodies.
+fn file_of_body(field: &str) -> &'static str {
+    match field {
+        "orientation" => BODY_ORIENTATION,
+        "linear velocity" => BODY_LINEAR,
+        "angular velocity" => BODY_ANGULAR,
         _ => BODY_POSITION,
     }
 }

@@ -19,8 +19,8 @@ const CUBE_SHAPE: u32 = 1;
 /// The inverse inertia of the cubes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Inertia {
-    /// Bullet's value on registering the cube: 0.36761099 1/(kg m²). Bullet enlarges the box by its
-    /// margin, and takes the full size in place of half of it.
+    /// Bullet's value on registering the cube: 0.36761099 1/(kg m²). Bullet enlarges the box by
+    /// its margin, and takes the full size in place of half of it.
     #[default]
     Bullet,
     /// The value of a cube of 1 kg and 2 m: 1.5 1/(kg m²).

@@ -21,18 +21,18 @@ use tempfile::TempDir;
 const QEMU: &str = "qemu-system-microblazeel";
 /// How long QEMU may take to start, to answer, or to put a frame on the cable.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// How often QEMU is started, at most: somebody else may take the port that was found free.
+/// The most attempts to start QEMU: another program may take the port that was found free.
 const STARTS: usize = 3;
 
 /// The cable's end in the test, and the machine at its other end.
 pub(crate) type Started = (Machine, UdpSocket);
 
-/// A machine without a program: whatever happens to it comes over qtest.
+/// A machine without a program: qtest alone controls it.
 #[derive(Debug)]
 pub(crate) struct Machine {
     qemu: Qemu,
     lines: BufReader<UnixStream>,
-    /// What has come of the next line.
+    /// The received part of the next line.
     line: Vec<u8>,
     interrupt: bool,
 }
@@ -45,7 +45,7 @@ struct Qemu {
 }
 
 impl Qemu {
-    /// What it wrote for people.
+    /// Its output on stderr.
     fn said(&self) -> String {
         std::fs::read_to_string(self.folder.path().join("stderr")).unwrap_or_default()
     }
@@ -139,7 +139,7 @@ impl Machine {
         self.interrupt
     }
 
-    /// Waits until the interrupt is raised; whether it is.
+    /// Waits until the interrupt is raised; returns whether it is.
     pub(crate) fn wait_interrupt(&mut self, timeout: Duration) -> bool {
         let until = Instant::now() + timeout;
         while !self.interrupt {
@@ -170,7 +170,7 @@ impl Machine {
         }
     }
 
-    /// Takes note of a line about the interrupt; whether it was one.
+    /// Records a line about the interrupt; returns whether the line is one.
     fn notice(&mut self, line: &str) -> bool {
         match line.strip_prefix("IRQ ") {
             Some(change) => {
@@ -199,7 +199,7 @@ impl Machine {
     }
 }
 
-/// Whether a program is there and does what it is told.
+/// Whether a program exists and succeeds.
 fn answers(command: &mut Command) -> bool {
     command
         .stdout(Stdio::null())

@@ -41,7 +41,7 @@ struct Core {
 }
 
 impl Core {
-    /// `None`, and said, if QEMU is not installed.
+    /// `None`, with a message, if QEMU is not installed.
     fn new() -> Option<Self> {
         let Some(qemu) = QtestPlatform::start() else {
             // Past the harness, which keeps what passing tests print.
@@ -51,9 +51,8 @@ impl Core {
         };
         let qemu = Arc::new(qemu);
         let platform: Arc<dyn Platform> = Arc::clone(&qemu) as _;
-        let registers = platform.dma_window(0).expect("one core");
-        let window = Window::new(registers, RegisterMap::Dma(0), Arc::default());
-        let window = Arc::new(window.expect("long enough"));
+        let window = Window::open(&*platform, RegisterMap::Dma(0), &Arc::default());
+        let window = Arc::new(window.expect("one core"));
         let channel = |direction| Channel::new(Arc::clone(&window), 0, direction, ADDRESS_WIDTH);
         let (mm2s, s2mm) = (channel(Direction::Mm2s), channel(Direction::S2mm));
         let mut core = Self { qemu, platform, mm2s, s2mm };
@@ -153,7 +152,7 @@ fn push_places(ring: &mut Ring, buffer: &DeviceBuffer, bytes: u32, count: u64) {
     }
 }
 
-/// What a buffer holds that the device has finished with.
+/// The content of a buffer that the device has finished with.
 fn received(buffer: DeviceBuffer) -> Vec<u8> {
     let buffer = buffer.into_cpu().expect("handed over before");
     buffer.beats().iter().flat_map(|beat| beat.0).flat_map(u32::to_le_bytes).collect()
@@ -162,7 +161,8 @@ fn received(buffer: DeviceBuffer) -> Vec<u8> {
 /// STATUS of a descriptor with a whole packet in it, without the byte count.
 const WHOLE: u32 = status::CMPLTED.mask() | status::RXSOF.mask() | status::RXEOF.mask();
 
-/// The STATUS words of the first descriptors of a ring's chain, as they lie in the machine's memory.
+/// The STATUS words of the first descriptors of a ring's chain, as they lie in the machine's
+/// memory.
 fn statuses<const N: usize>(core: &Core, ring: &Ring) -> [u32; N] {
     let first = u64::from(ring.start().expect("inside").low());
     std::array::from_fn(|index| {
@@ -260,7 +260,7 @@ fn a_packet_that_ends_before_its_chain_is_seen_and_a_reset_gets_the_buffer_back(
     core.reset();
     assert_eq!(received(buffer)[..short.len()], short);
 
-    // The ring begins anew, at descriptors of which one was complete.
+    // The ring begins anew. One of its descriptors was complete.
     ring.rewind();
     let buffer = core.incoming(3 * 128);
     push_places(&mut ring, &buffer, 128, 3);

@@ -4,7 +4,7 @@
 //! driver stored is put into the machine's memory; after one, what the engine stored is taken from
 //! there.
 //!
-//! Where QEMU's model is not what PG021 says, this file is, so that the driver need not be: a reset
+//! One difference between QEMU's model and PG021 is levelled here instead of in the driver: a reset
 //! of one direction resets the other, too.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,13 +13,15 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use pgs_interface::address_map;
 use pgs_interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 use pgs_interface::record::{BEAT_BYTES, Beat};
 use pgs_support::chunks::Chunks;
 
 use super::machine::Machine;
-use crate::platform::{Access, DmaMemory, Platform, PlatformError, RegisterWindow, SharedMemory};
+use crate::platform::{
+    Access, DmaMemory, DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow,
+    SharedMemory,
+};
 
 /// Where the machine's parts lie.
 const RAM: u64 = 0x5000_0000;
@@ -188,17 +190,7 @@ impl RegisterWindow for DmaWindow {
     }
 }
 
-impl Platform for QtestPlatform {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        assert_eq!(core, 0, "the machine has one AXI DMA");
-        Ok(Box::new(DmaWindow(Arc::clone(&self.board))))
-    }
-
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        let expected = address_map::CONTROL_BYTES;
-        Err(PlatformError::ShortRegion { region: "control".to_owned(), expected, found: 0 })
-    }
-
+impl DmaMemorySource for QtestPlatform {
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let address = self.board().allocate((beats * BEAT_BYTES) as u64);
         Ok((address, DmaMemory::Heap(vec![Beat::default(); beats].into())))
@@ -252,6 +244,17 @@ impl Platform for QtestPlatform {
         assert!(board.allocated.remove(&address), "{address:#x} was allocated");
         Ok(())
     }
+}
+
+impl Platform for QtestPlatform {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        assert_eq!(map, RegisterMap::Dma(0), "the machine has one AXI DMA");
+        Ok(Box::new(DmaWindow(Arc::clone(&self.board))))
+    }
+
+    fn memory(&self) -> &dyn DmaMemorySource {
+        self
+    }
 
     fn now(&self) -> Duration {
         self.started.elapsed()
@@ -273,7 +276,8 @@ impl Platform for QtestPlatform {
 
     fn unmask_interrupt(&self) -> Result<(), PlatformError> {
         let mut board = self.board();
-        // What was seen is taken back first; an input that is still high comes again at once.
+        // The pending input is acknowledged first; an input that is still high is raised again at
+        // once.
         board.machine.write32(INTERRUPTS + IAR, DMA_INPUTS);
         board.machine.write32(INTERRUPTS + IER, DMA_INPUTS);
         Ok(())

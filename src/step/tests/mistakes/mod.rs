@@ -43,10 +43,9 @@ use std::sync::Arc;
 
 use bitstream_model::BoardConfig;
 
-use super::{bits, scene, undisturbed};
-use crate::board::open::{BoardDescription, BoardKind, Found};
-use crate::platform::Platform;
-use crate::{Accelerator, Body, Error, Shape, StepParameters, StepReport};
+use super::{SHAPES, bits, scene, undisturbed};
+use crate::board::open::Found;
+use crate::{Accelerator, Body, Error, StepParameters, StepReport};
 use kinds::{Mistake, Trouble};
 use planted::Planted;
 
@@ -79,13 +78,7 @@ struct Bench {
 }
 
 fn found(planted: &Planted) -> Found {
-    let description = BoardDescription {
-        kind: BoardKind::Emulated,
-        name: "with a mistake".to_owned(),
-        reason: "a test".to_owned(),
-    };
-    let platform: Arc<dyn Platform> = Arc::new(planted.clone());
-    Found { platform, description }
+    super::found(Arc::new(planted.clone()))
 }
 
 impl Bench {
@@ -97,9 +90,7 @@ impl Bench {
         let planted = Planted::new(config, mistake, trouble);
         let mut accelerator =
             Accelerator::on(found(&planted), None).map_err(|error| chain_of(&error))?;
-        accelerator
-            .set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)])
-            .map_err(|error| chain_of(&error))?;
+        accelerator.set_shapes(&SHAPES).map_err(|error| chain_of(&error))?;
         planted.opened();
         Ok(Self { planted, accelerator })
     }

@@ -21,12 +21,13 @@ use super::chain::{Bd, Descriptors, Place};
 use super::kinds::{ChannelId, Event, Mistake, Trouble};
 use super::region::PlantedRegion;
 use crate::platform::{
-    Access, DmaMemory, EmulatedPlatform, Platform, PlatformError, RegisterWindow, SharedMemory,
+    Access, DmaMemory, DmaMemorySource, EmulatedPlatform, Platform, PlatformError, RegisterMap,
+    RegisterWindow, SharedMemory,
 };
+use crate::step::tests::tampered::{CONTROL_BLOCK, number};
 
 const BEAT: u32 = 16;
-/// The number of the control block among the register regions.
-pub(crate) const CONTROL_BLOCK: usize = 4;
+
 /// Number of waits, each up to a millisecond or to an interrupt, that counts as endless.
 const ENDLESS: u32 = 20_000;
 
@@ -144,7 +145,7 @@ impl Planted {
 
     fn status(&self, core: usize, direction: Direction) -> u32 {
         let offset = if direction == Direction::S2mm { S2MM_OFFSET } else { 0 };
-        let window = self.inner.dma_window(core).expect("a core");
+        let window = self.inner.window(RegisterMap::Dma(core)).expect("a core");
         window.read32(offset + DMASR.offset)
     }
 
@@ -171,11 +172,11 @@ impl Planted {
     pub(crate) fn pass_on(&self, state: &mut State, writes: Vec<(usize, u32, u32)>) {
         for (region, at, value) in writes {
             state.events.push(Event::Write(region, at, value));
-            let window = match region {
-                CONTROL_BLOCK => self.inner.control_window(),
-                core => self.inner.dma_window(core),
+            let map = match region {
+                CONTROL_BLOCK => RegisterMap::Control,
+                core => RegisterMap::Dma(core),
             };
-            window.expect("a region").write32(at, value);
+            self.inner.window(map).expect("a region").write32(at, value);
         }
     }
 
@@ -298,17 +299,7 @@ impl Planted {
     }
 }
 
-impl Platform for Planted {
-    fn dma_window(&self, core: usize) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        let inner = self.inner.dma_window(core)?;
-        Ok(Box::new(PlantedRegion::new(self, inner, core)))
-    }
-
-    fn control_window(&self) -> Result<Box<dyn RegisterWindow>, PlatformError> {
-        let inner = self.inner.control_window()?;
-        Ok(Box::new(PlantedRegion::new(self, inner, CONTROL_BLOCK)))
-    }
-
+impl DmaMemorySource for Planted {
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let (address, memory) = self.inner.allocate(beats)?;
         let bytes = (memory.beats().len() * BEAT_BYTES) as u64;
@@ -366,6 +357,16 @@ impl Platform for Planted {
             state.freed.push(address);
         }
         self.inner.release(address)
+    }
+}
+
+impl Platform for Planted {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        Ok(Box::new(PlantedRegion::new(self, self.inner.window(map)?, number(map))))
+    }
+
+    fn memory(&self) -> &dyn DmaMemorySource {
+        self
     }
 
     fn now(&self) -> Duration {

@@ -7,8 +7,9 @@ use pgs_interface::axi_dma::{
 use pgs_interface::control::{self, AP_CTRL, ap_ctrl, reset};
 
 use super::kinds::{ChannelId, Event, Mistake, Trouble};
-use super::planted::{CONTROL_BLOCK, Planted, State};
+use super::planted::{Planted, State};
 use crate::platform::RegisterWindow;
+use crate::step::tests::tampered::CONTROL_BLOCK;
 
 /// The length width that [`Mistake::LengthWidthAssumed`] assumes, bits.
 const ASSUMED_WIDTH: u32 = 26;

@@ -12,8 +12,8 @@ use step_folder::digest;
 
 use crate::{Options, Outcome};
 
-/// Ways of computing a step, with the same bits: the number of threads, and whether the board takes its
-/// short cuts.
+/// Ways of computing a step, with the same bits: the number of threads, and whether the board takes
+/// its short cuts.
 const WAYS: [(&str, usize, bool); 3] =
     [("the long way", 1, false), ("1 thread", 1, true), ("2 threads", 2, true)];
 

@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::dtype;
 use super::{Dimensions, ROWS_MAX};
 
-/// What is wrong with a file.
+/// The defect of a file.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Problem {

@@ -16,7 +16,7 @@ use crate::tally::Tally;
 /// Size of a board's shape table.
 const SHAPES: u32 = 64;
 
-/// Name, type and row of each array; `true` for one row a body, or a collision, or none of both.
+/// Name, type and row of each array.
 const FILES: [(&str, Kind, &[usize]); 12] = [
     (PARAMS, Kind::Numbers, &[8]),
     (ITERATIONS, Kind::Counts, &[2]),

@@ -1,5 +1,5 @@
 //! Keeps bodies and collisions in one array of numbers each, as an engine with records of its own
-//! does: fields anywhere in a record, and words between them that nobody may change.
+//! does: fields anywhere in a record, and words between them that must not change.
 
 use pgs_support::chunks::Chunks;
 use zynq_pgs::{Bodies, Body, CONTACT_POINTS, Collision, Collisions, Contact, Pose, Velocity};

@@ -1,8 +1,8 @@
 //! Memory that checks every access, independently of the board.
 //!
 //! The board keeps a record of grants; this is a second one. The device may read or write only in a
-//! granted range, and only what a descriptor or a direct transfer asked for: a descriptor that it
-//! fetched from this memory, or a direct transfer that was [announced](Space::announce).
+//! granted range, and only at the request of a descriptor that it fetched from this memory, or of a
+//! direct transfer that was [announced](Space::announce).
 
 use std::io;
 use std::ops::Range;
@@ -14,7 +14,7 @@ use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 
 /// Words of a beat.
 const LANES: usize = BEAT_BYTES / 4;
-/// The value of words that nobody may change.
+/// The value of words that must not change.
 const CANARY: u32 = 0xC0DE_CAFE;
 
 /// One range of memory, partly granted.

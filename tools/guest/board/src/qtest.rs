@@ -79,7 +79,7 @@ impl Line for QtestLine {
         self.stream.set_nonblocking(false)?;
         match found {
             Ok((ended, length)) => {
-                // Nothing was asked: these lines are notices, which are dropped.
+                // No request is open: these lines are notices, which are dropped.
                 self.answers.consume(length);
                 Ok(!ended)
             }

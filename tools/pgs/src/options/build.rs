@@ -23,8 +23,8 @@ pub(crate) struct BuildArgs {
     /// Numbers on streams of 16 bits [default: binary16]
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatName>,
-    /// Precision of the pipeline's operators; storage keeps the width of the profile [default: that
-    /// of the profile]
+    /// Precision of the pipeline's operators; storage keeps the width of the profile [default: the
+    /// profile's]
     #[arg(long, value_enum)]
     pub(crate) arithmetic: Option<ArithmeticName>,
     /// Inertia of a body: equal about every axis, or any (boxes, capsules), streamed with every
@@ -34,7 +34,7 @@ pub(crate) struct BuildArgs {
     /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
     #[arg(long, value_enum)]
     pub(crate) hazards: Option<HazardsName>,
-    /// Hazard window in issue slots [default: that of the profile]
+    /// Hazard window in issue slots [default: the profile's]
     #[arg(long, value_name = "SLOTS", value_parser = window)]
     pub(crate) window: Option<u32>,
     /// Keep subnormal numbers or flush them to zero [default: keep]
@@ -50,11 +50,11 @@ pub(crate) struct BuildArgs {
     #[arg(long, value_name = "BITS", value_parser = address_width)]
     pub(crate) address_width: Option<u32>,
     /// Threads of this machine for the emulated board's arithmetic, for collision detection, and
-    /// for packing and unpacking a step; no result depends on their number [default: one a
+    /// for packing and unpacking a step; no result depends on their number [default: one per
     /// processor, at most 4]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub(crate) threads: Option<usize>,
-    /// Compute independent collisions side by side; no result depends on it [default: on]
+    /// Compute independent collisions in SIMD lanes; no result depends on it [default: on]
     #[arg(long, value_enum)]
     pub(crate) lanes: Option<LanesName>,
 }
@@ -101,7 +101,7 @@ macro_rules! choice {
 choice!(FormatName means StreamFormat:
     /// IEEE 754, rounded to nearest even
     Binary16 is StreamFormat::Binary16,
-    /// The thesis' own, cut off; it has no zero
+    /// The thesis' own, rounded by truncation; it has no zero
     Thesis16 is StreamFormat::Thesis16,
 );
 choice!(ArithmeticName means Precision:

@@ -19,16 +19,15 @@ pub(crate) struct OrderingArgs {
 /// An order of the collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OrderName {
-    /// Fewest cycles on the board: hazard-free-nearby (without empty entries where the pipeline
-    /// waits on hazards), or as-given where that takes fewer cycles; hazard-free where the chip
-    /// keeps live bodies only
+    /// Fewest cycles on the board: hazard-free-nearby (without empty entries if the pipeline waits
+    /// on hazards), or as-given if it takes fewer cycles; hazard-free if the chip keeps live bodies
+    /// only
     Auto,
     /// As detected, which is Bullet's order: many hazards
     AsGiven,
     /// No hazards, few bodies alive, few empty entries
     HazardFree,
-    /// No hazards, near the order as given, few empty entries (falls back to hazard-free where they
-    /// would be many)
+    /// No hazards, near the order as given, few empty entries (otherwise falls back to hazard-free)
     HazardFreeNearby,
     /// The thesis' Algorithm 3, ties by the lowest index: few bodies alive, nearly all hazardous
     BodyByBody,
@@ -41,7 +40,7 @@ pub(crate) enum OrderName {
 }
 
 impl OrderName {
-    /// The order that the driver is asked for.
+    /// The driver's order of this name.
     fn order(self) -> Option<Order> {
         match self {
             Self::Auto => None,
@@ -98,7 +97,7 @@ impl OrderingArgs {
     }
 }
 
-/// Whether the board's results equal those of solving one collision after the other, in any order.
+/// Whether the board's results equal a solution of one collision after the other, in any order.
 pub(crate) fn is_sequential(capabilities: &Capabilities) -> bool {
     capabilities.interlocked && capabilities.window.is_none()
 }

@@ -12,8 +12,8 @@ use zynq_pgs::StepParameters;
 #[command(next_help_heading = "Emulated board")]
 pub(crate) struct PlannedArgs {
     /// Make the board fail: `KIND[=VALUE][@PLACE][,phase=,beat=,bd=,access=,n=,step=,times=]`,
-    /// several faults separated by `;`, or `seed:N` for random ones. `pgs faults --list` shows
-    /// thousands
+    /// several faults separated by `;`, or `seed:N` for random ones. `pgs faults --list` prints
+    /// thousands of plans
     #[arg(long, value_name = "PLAN")]
     fault: Option<Planned>,
 }
@@ -53,7 +53,7 @@ impl PlannedArgs {
         })
     }
 
-    /// Whether any fault is asked for.
+    /// Whether the command line requests faults.
     pub(crate) fn is_given(&self) -> bool {
         self.fault.is_some()
     }

@@ -42,7 +42,7 @@ enum QuirkName {
     Identity,
     /// Interface version 2.0
     Version,
-    /// Length registers of 14 bits where the bitstream says another width
+    /// Length registers of 14 bits, although the bitstream states another width
     Length14,
     /// The interrupt line is not connected
     NoInterrupt,

@@ -42,7 +42,7 @@ pub(crate) struct ServeArgs {
     /// --memory names another.
     #[arg(long, value_name = "PATH")]
     pub(crate) socket: PathBuf,
-    /// Length of the memory, MiB [default: that of the file; 64 for a new file]
+    /// Length of the memory, MiB [default: the length of the file; 64 for a new file]
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024))]
     memory_mib: Option<u64>,
     #[command(flatten)]

@@ -80,7 +80,7 @@ pub(crate) struct SolveArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Compare bit by bit with the expected results in the folder; exit code 1 on a difference.
-    /// With --no-integrate, compare with the velocities after that many iterations.
+    /// With --no-integrate, compare with the folder's velocities after the iterations taken.
     #[arg(long)]
     compare: bool,
     /// Print the digest of the final state alone.

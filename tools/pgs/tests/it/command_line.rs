@@ -427,7 +427,7 @@ fn a_full_stdout_is_named_and_ends_with_2() {
             ran.stderr
         );
     }
-    // The same for what a folder of arrays makes of it, and for a command line that is wrong.
+    // The same for the results of a folder of arrays, and for a wrong command line.
     let full = || std::fs::File::options().write(true).open("/dev/full").expect("a full device");
     let digest = pgs().args(["solve", "--digest"]).arg(golden("one_cube")).stdout(full()).output();
     let ran = Ran::from(digest.expect("it starts"));

@@ -143,8 +143,8 @@ fn a_pile_of_shapes_takes_world_inertia_and_loses_its_energy() {
 /// Largest deviation of a board's energy from float's in any row, as a share of the start's.
 /// Measured: 0.004 %.
 const ENERGY: f64 = 0.000_5;
-/// Largest gain of any energy over the start's, as a share of it: explicit integration adds g² dt t
-/// / 2 J/kg to a fall of t seconds, 0.8 % here.
+/// Largest gain of any energy over the start's, as a share of it: explicit integration adds
+/// g² dt t / 2 J/kg to a fall of t seconds, 0.8 % here.
 const GAIN: f64 = 0.01;
 /// Largest deviation from float's in the share of unmoved position components.
 const UNMOVED: f64 = 0.01;

@@ -1,5 +1,5 @@
-//! The commands of `README.md` and of the pages in `docs` print the output that stands below them, and
-//! the figures there come from these commands.
+//! Tests that the commands of `README.md` and of the pages in `docs` print the output that stands
+//! below them, and that the figures there come from these commands.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -209,7 +209,8 @@ fn every_link_of_the_documents_leads_to_a_file_and_to_a_heading() {
     assert!(links > 40, "{links}");
 }
 
-/// The rows of the tables whose first column has the heading `figure`, with their first three cells.
+/// The rows of the tables whose first column has the heading `figure`, with their first three
+/// cells.
 fn figures(document: &str) -> Vec<Vec<String>> {
     let text = text(document);
     let rows = text.lines().skip_while(|line| !line.starts_with("| figure |")).skip(2);

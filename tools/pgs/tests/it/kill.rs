@@ -1,7 +1,8 @@
 //! A driver that is killed at any moment leaves a board that the next driver can use: with the same
 //! digest as on a fresh board, and undisturbed by the transfers of the killed one.
 //!
-//! `PGS_KILLS=200 cargo test --release -p pgs --test it kill:: -- --nocapture` kills two hundred times.
+//! `PGS_KILLS=200 cargo test --release -p pgs --test it kill:: -- --nocapture` kills two hundred
+//! times.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::Path;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The folders of the repository whose paths are looked for.
+/// The folders of the repository whose paths must exist.
 const ROOTS: [&str; 7] = ["bitstream-model", "device-tree", "docs", "src", "tests", "tools", ".ci"];
 
 fn root() -> PathBuf {

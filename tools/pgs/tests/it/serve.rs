@@ -133,7 +133,7 @@ fn where_no_board_is_served_there_is_none() {
     }
 }
 
-/// Leaves a socket that nobody serves.
+/// Leaves a socket without a server.
 fn left(path: &Path) {
     drop(UnixListener::bind(path).expect("bound"));
 }

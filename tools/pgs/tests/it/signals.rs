@@ -43,7 +43,7 @@ fn run_ignoring(signals: &str) -> (Tied, BufReader<std::process::ChildStdout>) {
     (child, lines)
 }
 
-/// Reads at least so many bytes, up to the end of a step's row.
+/// Reads at least `bytes` bytes, up to the end of a step's row.
 fn read_row(lines: &mut impl std::io::BufRead, bytes: usize) {
     let (mut read, mut is_row) = (0, false);
     while read < bytes || !is_row {
@@ -55,7 +55,7 @@ fn read_row(lines: &mut impl std::io::BufRead, bytes: usize) {
     }
 }
 
-/// The rest of what it says, and how it ended.
+/// The rest of its output, and its exit code.
 fn ended(mut child: Tied, mut lines: impl std::io::Read) -> Ran {
     let (mut stdout, mut stderr) = (String::new(), String::new());
     lines.read_to_string(&mut stdout).expect("text");

@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::common::{Ran, golden, pgs, run, skipped};
 
 /// `command`, for a user who may have one process and no more. Root has no such limit, and becomes
-/// nobody first.
+/// the user 65534 first.
 fn limited(command: &Command) -> Command {
     let mut limited = Command::new("setpriv");
     let id = Command::new("id").arg("-u").output();

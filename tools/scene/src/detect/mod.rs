@@ -99,8 +99,8 @@ impl Detector {
         }
     }
 
-    /// Replaces `collisions` by those of `bodies`, sorted by body A, then body B. Body 0 is the ground
-    /// and takes no part in pairs.
+    /// Replaces `collisions` by the collisions of `bodies`, sorted by body A, then body B. Body 0 is
+    /// the ground and takes no part in pairs.
     pub(crate) fn detect(
         &mut self,
         bodies: &[Body],

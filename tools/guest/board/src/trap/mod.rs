@@ -1,8 +1,8 @@
 //! Runs a program and forwards its accesses to a board's registers to the host.
 //!
 //! The program is traced. Its mappings of a register region of a UIO node are made without rights;
-//! each access then stops the program, and the host makes it in its place. The program is unchanged
-//! and notices none of this.
+//! each access then stops the program, and the host makes it in its place. The program needs no
+//! change and does not notice the trap.
 
 mod regions;
 #[cfg(all(target_arch = "aarch64", target_os = "linux"))]

@@ -1,5 +1,5 @@
-//! Other users of the logic are recognised by what they are and not by their names; and the manager
-//! that programs the logic.
+//! Tests how `load` recognises other users of the logic, whatever their names, and the manager that
+//! programs it.
 
 use super::*;
 

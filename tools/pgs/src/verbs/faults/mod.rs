@@ -97,8 +97,8 @@ pub(crate) fn run(
     Ok(if failed { Verdict::Differs } else { Verdict::Done })
 }
 
-/// Tries the cells on all processors, or on as many as the system gives threads for; the results are
-/// in the order of the cells.
+/// Tries the cells on all processors, or with fewer threads if the system gives no more; the
+/// results are in the order of the cells.
 fn try_all(bench: &Bench, cells: Vec<Cell>) -> Vec<(Cell, CellResult)> {
     let bar: ProgressBar = progress_bar(u32::try_from(cells.len()).unwrap_or(u32::MAX));
     bar.set_message(bench.config.profile.name);

@@ -33,12 +33,13 @@ Examples:
   pgs formats --grid 10x10x10 --step 70 --json
 
 The numbers are the ones that a step streams to the board, without unused contact points, indices
-and counts. \"as streamed\" has the positions of both bodies with every collision, \"each once\" only
-with the bodies. Relative numbers have the position of body A subtracted, as the profile mixed
-streams them; a static body counts as being at the other one's position. They are in neither sum.
+and counts. The sum \"as streamed\" has the positions of both bodies with every collision, the sum
+\"each once\" has the position of each body once. Relative numbers have the position of body A
+subtracted, as the profile mixed streams them; a static body counts as being at the other body's
+position. Neither sum includes the relative numbers.
 
-Relative errors are |read back - number| / |number|. Zeros have none, and are not in the share
-below 3e-5 either. The driver refuses a number that a format cannot carry.";
+Relative errors are |read back - number| / |number|. A zero has no relative error, and does not
+count as below 3e-5. The driver refuses a number that a format cannot carry.";
 
 /// Show the sizes of a step's numbers, and their errors in 16-bit formats.
 #[derive(Debug, Clone, Args)]

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::deviation::share;
 use crate::narrow::NarrowFormat;
 
-/// Numbers below this count as small: thesis16 has none of them but 2^-15 = 3.05e-5.
+/// Numbers below this count as small; the smallest number of thesis16 is 2^-15 = 3.05e-5.
 const SMALL: f32 = 3e-5;
 /// Largest error with which a number counts as the same.
 const ONE_PERCENT: f64 = 0.01;

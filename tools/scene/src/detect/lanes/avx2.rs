@@ -73,7 +73,7 @@ impl Numbers for Eight {
     #[inline(always)]
     fn row(self) -> Row {
         let mut row = Row::default();
-        // SAFETY: the processor has AVX2, as there is a number; eight numbers fit into a row.
+        // SAFETY: a number exists, so the processor has AVX2; eight numbers fit into a row.
         unsafe { _mm256_storeu_ps(row.0.as_mut_ptr(), self.0) };
         row
     }

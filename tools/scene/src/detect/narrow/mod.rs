@@ -21,7 +21,7 @@ pub(super) struct Narrow {
 }
 
 impl Narrow {
-    /// Adds the collisions of those pairs of `bodies` that have one, in the order of the pairs.
+    /// Adds the collision of every pair of `bodies` that has one, in the order of the pairs.
     pub(super) fn collide(
         &mut self,
         bodies: &[Body],
