@@ -3,8 +3,10 @@
 //! The board keeps a model beside it, which computes nothing: it knows which registers exist, which
 //! accesses are violations, and which packets a step has, so that faults can be placed in them.
 
+mod model;
 mod process;
 
+pub use model::ModelAccelerator;
 pub use process::SimulatorProcess;
 
 use std::fmt;
@@ -91,7 +93,9 @@ pub enum ExternalError {
         seconds: u64,
     },
     /// Its answer contradicts the request.
-    #[error("the simulator answers {what} {found}, expected at most {most}; is it one of this version?")]
+    #[error(
+        "the simulator answers {what} {found}, expected at most {most}; is it one of this version?"
+    )]
     Answer {
         /// What the answer counts.
         what: &'static str,
@@ -341,10 +345,6 @@ impl Installed {
         if external.starts() {
             self.model.shadow_start(faults);
         }
-        if external.busy() {
-            external.run(limit, inputs, outputs, memory)
-        } else {
-            Ran::default()
-        }
+        if external.busy() { external.run(limit, inputs, outputs, memory) } else { Ran::default() }
     }
 }

@@ -57,7 +57,16 @@ impl SimulatorProcess {
     /// # Errors
     /// [`ExternalError::Start`] if the program cannot be started.
     pub fn start(path: &Path) -> Result<Self, ExternalError> {
-        let started = Command::new(path).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+        Self::start_with(path, &[])
+    }
+
+    /// Starts a simulator with arguments of its own.
+    ///
+    /// # Errors
+    /// As for [`start`](Self::start).
+    pub fn start_with(path: &Path, arguments: &[String]) -> Result<Self, ExternalError> {
+        let mut command = Command::new(path);
+        let started = command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
         let start = |source| ExternalError::Start { path: path.display().to_string(), source };
         let mut child = started.map_err(start)?;
         let (sender, answers) = mpsc::sync_channel(4);

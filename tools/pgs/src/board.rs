@@ -2,9 +2,9 @@
 
 use std::io::{self, Write};
 
+use bitstream_model::external::SimulatorProcess;
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
-use bitstream_model::external::SimulatorProcess;
 use bitstream_model::interface::profile::{FLOAT, PROFILES, Variant};
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};

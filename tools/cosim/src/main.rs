@@ -1,0 +1,229 @@
+//! Command line of the co-simulation. `--help` lists the verbs.
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stderr, reason = "a program says what it does")]
+
+use std::error::Error;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use bitstream_model::external::{ExternalAccelerator, ModelAccelerator, SimulatorProcess};
+use bitstream_model::{BoardConfig, Hazards, Subnormals};
+use clap::{Parser, Subcommand, ValueEnum};
+use cosim::mutation::MUTATIONS;
+use cosim::outcome::{self, Outcome, difference};
+use cosim::packets::packets;
+use cosim::{random, recorded};
+use rtlgen::design::{Design, Parameters};
+use rtlgen::{emit, simulator, verify};
+use step_folder::folder::Folder;
+
+/// Runs the generated Verilog beside the model, beat by beat.
+#[derive(Debug, Parser)]
+#[command(name = "cosim", version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  rtlgen simulator --out target/rtl    build the simulator target/rtl/pgs-rtl
+  cosim recorded --simulator target/rtl/pgs-rtl tests/golden/*/
+  cosim random --simulator target/rtl/pgs-rtl --cases 1000
+  cosim random --simulator target/rtl/pgs-rtl --gaps 300 --stalls 700
+  cosim mutations                      builds a simulator for each: about a minute and a half each
+
+Exit codes: 0 done; 1 a difference, or a mutation that nothing found; 2 wrong usage or an error; 77 a
+tool that the verb needs is not installed.";
+
+/// What the hardware does on a hazard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum HazardMode {
+    /// Waits for the velocity.
+    Interlocked,
+    /// Reads the stale velocity, and counts.
+    Unchecked,
+}
+
+/// A simulator and how its streams behave.
+#[derive(Debug, Clone, clap::Args)]
+struct SimulatorArgs {
+    /// The simulator that `rtlgen simulator` built
+    #[arg(long, value_name = "PATH")]
+    simulator: PathBuf,
+    /// The mode for which it was built
+    #[arg(long, value_enum, default_value_t = HazardMode::Interlocked)]
+    hazards: HazardMode,
+    /// Cycles in a thousand in which a stream into the accelerator has no beat
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    gaps: u32,
+    /// Cycles in a thousand in which a stream out of the accelerator takes no beat
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    stalls: u32,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Recorded steps: the results against the folders' own, counters against the model
+    Recorded {
+        #[command(flatten)]
+        simulator: SimulatorArgs,
+        /// Folders of recorded steps
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+    },
+    /// Random steps of every kind, sound and faulty, against the model
+    Random {
+        #[command(flatten)]
+        simulator: SimulatorArgs,
+        /// Steps
+        #[arg(long, value_name = "N", default_value_t = 500)]
+        cases: u64,
+        /// Seed of the first step
+        #[arg(long, value_name = "S", default_value_t = 1)]
+        seed: u64,
+    },
+    /// Seeded mistakes in the Verilog: each must be found
+    Mutations {
+        /// Steps that look for each
+        #[arg(long, value_name = "N", default_value_t = 300)]
+        cases: u64,
+    },
+}
+
+const USAGE: u8 = 2;
+const SKIPPED: u8 = 77;
+
+type Failure = Box<dyn Error>;
+
+fn main() -> ExitCode {
+    let mut out = io::stdout().lock();
+    let done = act(&Cli::parse().verb, &mut out);
+    let Err(error) = done else { return done.unwrap_or(ExitCode::SUCCESS) };
+    if let Some(missing @ verify::Error::Missing { .. }) = error.downcast_ref() {
+        eprintln!("skipped: {missing}");
+        return ExitCode::from(SKIPPED);
+    }
+    eprintln!("error: {error}");
+    ExitCode::from(USAGE)
+}
+
+fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
+    let good = match verb {
+        Verb::Recorded { simulator, folders } => run_recorded(simulator, folders, out)?,
+        Verb::Random { simulator, cases, seed } => {
+            let mut bench = Bench::new(simulator)?;
+            match first_difference(&mut bench, *seed, *cases)? {
+                None => {
+                    writeln!(out, "{cases} random steps from seed {seed}: the model's outcomes")?;
+                    true
+                }
+                Some(difference) => {
+                    writeln!(out, "{difference}")?;
+                    false
+                }
+            }
+        }
+        Verb::Mutations { cases } => run_mutations(*cases, out)?,
+    };
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// The Verilog and the model side by side.
+struct Bench {
+    rtl: Box<dyn ExternalAccelerator>,
+    model: Box<dyn ExternalAccelerator>,
+}
+
+impl Bench {
+    fn new(args: &SimulatorArgs) -> Result<Self, Failure> {
+        let SimulatorArgs { simulator, hazards, gaps, stalls } = args;
+        let disturbance = [*gaps, *stalls, 1].map(|number| number.to_string());
+        let rtl = SimulatorProcess::start_with(simulator, &disturbance)?;
+        let hazards = match hazards {
+            HazardMode::Interlocked => Hazards::Interlocked,
+            HazardMode::Unchecked => Hazards::Unchecked,
+        };
+        let config = BoardConfig { hazards, subnormals: Subnormals::Flush, ..Default::default() };
+        Ok(Self { rtl: Box::new(rtl), model: Box::new(ModelAccelerator::new(&config)?) })
+    }
+}
+
+fn run_recorded(
+    args: &SimulatorArgs,
+    folders: &[PathBuf],
+    out: &mut dyn Write,
+) -> Result<bool, Failure> {
+    let mut bench = Bench::new(args)?;
+    let mut good = true;
+    for path in folders {
+        let folder = Folder::load(path)?;
+        let scene = recorded::scene(&folder);
+        let beats = packets(&scene, None);
+        let rtl = outcome::run(&mut *bench.rtl, &scene, &beats)?;
+        let model = outcome::run(&mut *bench.model, &scene, &beats)?;
+        let name = path.file_name().map_or(Path::new("."), Path::new).display();
+        if args.hazards == HazardMode::Interlocked {
+            let (differ, all) = recorded::differences(&folder, &rtl)?;
+            writeln!(out, "{name}: {differ} of {all} recorded values differ")?;
+            good &= differ == 0;
+        }
+        writeln!(out, "  {}", counters(&rtl, &model))?;
+        if let Some(difference) = difference(&model, &rtl) {
+            writeln!(out, "  not the model's: {difference}")?;
+            good = false;
+        }
+    }
+    Ok(good)
+}
+
+fn counters(rtl: &Outcome, model: &Outcome) -> String {
+    format!(
+        "work {} (model {}), stalls {} ({}), hazards {} ({}), waits {} ({})",
+        rtl.work,
+        model.work,
+        rtl.stalls(),
+        model.stalls(),
+        rtl.hazards,
+        model.hazards,
+        rtl.waits,
+        model.waits
+    )
+}
+
+/// The first random step on which the Verilog and the model differ.
+fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<String>, Failure> {
+    for seed in seed..seed + cases {
+        let case = random::case(seed);
+        let beats = packets(&case.scene, case.fault);
+        let model = outcome::run(&mut *bench.model, &case.scene, &beats)?;
+        let rtl = outcome::run(&mut *bench.rtl, &case.scene, &beats)?;
+        if let Some(difference) = difference(&model, &rtl) {
+            return Ok(Some(format!("seed {seed}: {difference}")));
+        }
+    }
+    Ok(None)
+}
+
+fn run_mutations(cases: u64, out: &mut dyn Write) -> Result<bool, Failure> {
+    let files = emit::files(&Design::new(Parameters::default()));
+    let mut all_found = true;
+    for mutation in MUTATIONS {
+        let folder = tempfile::tempdir()?;
+        let mutant = mutation.apply(&files).ok_or("the text of a mutation is not in its file")?;
+        let program = simulator::build_files(&mutant, folder.path())?;
+        let simulator = SimulatorArgs {
+            simulator: program,
+            hazards: HazardMode::Interlocked,
+            gaps: 0,
+            stalls: 0,
+        };
+        let found = first_difference(&mut Bench::new(&simulator)?, 1, cases)?;
+        let by = found.as_deref().unwrap_or("NOT FOUND");
+        writeln!(out, "{}: {by}", mutation.name)?;
+        out.flush()?;
+        all_found &= found.is_some();
+    }
+    Ok(all_found)
+}

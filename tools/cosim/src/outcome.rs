@@ -1,0 +1,194 @@
+//! What an accelerator makes of a step: its results and its counters.
+
+use bitstream_model::external::{ExternalAccelerator, ExternalError, Offer, StreamBeat};
+use pgs_interface::control::{
+    self, ANGULAR_DAMPING, AP_CTRL, BODIES, COLLISIONS, CONTACT_ITERATIONS, CYCLES_LO, ERROR,
+    ERROR_DETAIL, FLAGS, FRICTION, FRICTION_ITERATIONS, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS,
+    IMPULSE_SUM_HI, IMPULSE_SUM_LO, POSITION_COEFFICIENT, POSITION_DRIFT, RESET, SHAPE_STRIDE,
+    SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, WAIT_CYCLES, WORK_CYCLES, ap_ctrl,
+};
+
+use crate::packets::{Beats, STREAMS};
+use crate::scene::Scene;
+
+/// Clocks between two exchanges of beats.
+const BATCH: u32 = 64;
+/// Beats of each stream that are offered at once.
+const OFFERED: usize = 128;
+/// Clocks after which a step that has not ended is given up.
+const CLOCKS_MAX: u64 = 400_000_000;
+
+/// What a step leaves behind.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outcome {
+    /// The beats of each result stream.
+    pub results: [Vec<StreamBeat>; STREAMS],
+    /// ERROR and `ERROR_DETAIL`.
+    pub error: [u32; 2],
+    /// Whether the step ended at all.
+    pub ended: bool,
+    /// The formula's cycles, the cycles of waiting for a stream, and all others.
+    pub work: u32,
+    /// The cycles of waiting for a stream.
+    pub waits: u32,
+    /// All cycles, bits 31:0.
+    pub cycles: u32,
+    /// Collisions that met a hazard.
+    pub hazards: u32,
+    /// Sums of the words received and sent.
+    pub sums: [u32; 2],
+    /// Sum of the impulses, 2^-20 N s.
+    pub impulses: u64,
+}
+
+impl Outcome {
+    /// Cycles of the interlock.
+    #[must_use]
+    pub fn stalls(&self) -> u32 {
+        self.cycles.wrapping_sub(self.work).wrapping_sub(self.waits)
+    }
+}
+
+/// Runs a step on an accelerator, which is reset first.
+///
+/// # Errors
+/// The accelerator does not answer.
+pub fn run(
+    accelerator: &mut dyn ExternalAccelerator,
+    scene: &Scene,
+    beats: &Beats,
+) -> Result<Outcome, ExternalError> {
+    reset(accelerator)?;
+    set_up(accelerator, scene)?;
+    accelerator.write(AP_CTRL.offset, ap_ctrl::START.mask())?;
+    let mut at = [0; STREAMS];
+    let mut results: [Vec<StreamBeat>; STREAMS] = Default::default();
+    let mut clocks = 0_u64;
+    let mut busy = true;
+    while busy && clocks < CLOCKS_MAX {
+        let offered = |stream: usize| {
+            let beats = &beats[stream][at[stream]..];
+            beats[..beats.len().min(OFFERED)].to_vec()
+        };
+        let offer = Offer { beats: (0..STREAMS).map(offered).collect(), space: vec![256; STREAMS] };
+        let clocked = accelerator.run(BATCH, &offer)?;
+        for (at, taken) in at.iter_mut().zip(&clocked.taken) {
+            *at += taken;
+        }
+        for (results, sent) in results.iter_mut().zip(clocked.sent) {
+            results.extend(sent);
+        }
+        busy = clocked.busy;
+        clocks += u64::from(clocked.clocks);
+    }
+    let mut read = |offset: u32| accelerator.read(offset);
+    Ok(Outcome {
+        results,
+        error: [read(ERROR.offset)?, read(ERROR_DETAIL.offset)?],
+        ended: !busy,
+        work: read(WORK_CYCLES.offset)?,
+        waits: read(WAIT_CYCLES.offset)?,
+        cycles: read(CYCLES_LO.offset)?,
+        hazards: read(HAZARDS.offset)?,
+        sums: [read(SUM_RECEIVED.offset)?, read(SUM_SENT.offset)?],
+        impulses: u64::from(read(IMPULSE_SUM_HI.offset)?) << 32
+            | u64::from(read(IMPULSE_SUM_LO.offset)?),
+    })
+}
+
+fn reset(accelerator: &mut dyn ExternalAccelerator) -> Result<(), ExternalError> {
+    const EXCHANGES: usize = 100;
+    accelerator.write(RESET.offset, control::reset::RESET.mask())?;
+    for _ in 0..EXCHANGES {
+        accelerator.run(BATCH, &Offer::default())?;
+        if accelerator.read(RESET.offset)? == 0 {
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn set_up(accelerator: &mut dyn ExternalAccelerator, scene: &Scene) -> Result<(), ExternalError> {
+    let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    let arguments = &scene.arguments;
+    let [time_step, drift, coefficient, friction, damping] = arguments.numbers;
+    let [x, y, z] = arguments.gravity;
+    let words = [
+        (BODIES, count(scene.bodies.len())),
+        (COLLISIONS, count(scene.collisions.len())),
+        (CONTACT_ITERATIONS, arguments.contact_iterations),
+        (FRICTION_ITERATIONS, arguments.friction_iterations),
+        (FLAGS, control::flags::INTEGRATE.put(0, arguments.integrate.into())),
+        (TIME_STEP, time_step),
+        (POSITION_DRIFT, drift),
+        (POSITION_COEFFICIENT, coefficient),
+        (FRICTION, friction),
+        (ANGULAR_DAMPING, damping),
+        (GRAVITY_X, x),
+        (GRAVITY_Y, y),
+        (GRAVITY_Z, z),
+    ];
+    for (register, value) in words {
+        accelerator.write(register.offset, value)?;
+    }
+    for (index, shape) in scene.shapes.iter().enumerate() {
+        let at = SHAPE_TABLE + SHAPE_STRIDE * count(index);
+        accelerator.write(at + control::SHAPE_INVERSE_MASS, shape.inverse_mass)?;
+        accelerator.write(at + control::SHAPE_INVERSE_INERTIA, shape.inverse_inertia)?;
+    }
+    Ok(())
+}
+
+/// The first difference between two outcomes of one step, if there is one. A NaN equals any other
+/// NaN, and with one of them in the results their sum means nothing.
+#[must_use]
+pub fn difference(expected: &Outcome, found: &Outcome) -> Option<String> {
+    let differs = |what: &str, expected: &dyn std::fmt::Debug, found: &dyn std::fmt::Debug| {
+        Some(format!("{what}: expected {expected:x?}, found {found:x?}"))
+    };
+    if !found.ended {
+        return Some("the step does not end".into());
+    }
+    if expected.error != found.error {
+        return differs("error and detail", &expected.error, &found.error);
+    }
+    if expected.error[0] != 0 {
+        return None;
+    }
+    let mut nan = false;
+    for (stream, (expected, found)) in expected.results.iter().zip(&found.results).enumerate() {
+        if expected.len() != found.len() {
+            let what = format!("beats of results on stream {stream}");
+            return differs(&what, &expected.len(), &found.len());
+        }
+        for (body, (expected, found)) in expected.iter().zip(found).enumerate() {
+            if expected.last != found.last {
+                let what = format!("TLAST of body {body} on stream {stream}");
+                return differs(&what, &expected.last, &found.last);
+            }
+            for (word, (e, f)) in expected.beat.0.into_iter().zip(found.beat.0).enumerate() {
+                let is_nan = |bits: u32| f32::from_bits(bits).is_nan();
+                nan |= is_nan(e);
+                if e != f && !(is_nan(e) && is_nan(f)) {
+                    let what = format!("word {word} of body {body} on stream {stream}");
+                    return differs(&what, &e, &f);
+                }
+            }
+        }
+    }
+    let [received, sent] = expected.sums;
+    let pairs = [
+        ("sum of the words received", received, found.sums[0]),
+        ("sum of the words sent", if nan { found.sums[1] } else { sent }, found.sums[1]),
+        ("hazards", expected.hazards, found.hazards),
+    ];
+    for (what, expected, found) in pairs {
+        if expected != found {
+            return differs(what, &expected, &found);
+        }
+    }
+    if expected.impulses != found.impulses {
+        return differs("sum of the impulses", &expected.impulses, &found.impulses);
+    }
+    None
+}

@@ -1,0 +1,222 @@
+//! Random scenes of every kind that the interface permits, and of kinds that it refuses.
+
+use pgs_interface::record::CONTACT_POINTS;
+use rtlgen::verify::random::SplitMix64;
+
+use crate::packets::{Fault, FaultAt, STREAMS};
+use crate::scene::{Arguments, Body, Collision, Scene, Shape};
+
+/// A step, and what is wrong with its packets.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// The step.
+    pub scene: Scene,
+    /// A fault in its packets.
+    pub fault: Option<FaultAt>,
+}
+
+const SUBNORMAL: u32 = 0x0040_0001;
+const NEGATIVE_ZERO: u32 = 0x8000_0000;
+const NAN: u32 = 0x7FC0_1234;
+
+struct Draw(SplitMix64);
+
+impl Draw {
+    /// A number below `limit`.
+    fn below(&mut self, limit: u32) -> u32 {
+        self.0.below(limit)
+    }
+
+    /// True once in `n` times.
+    fn one_in(&mut self, n: u32) -> bool {
+        self.below(n) == 0
+    }
+
+    /// A number from -`size` to `size`.
+    fn number(&mut self, size: f32) -> f32 {
+        let unit = f64::from(self.0.bits()) / f64::from(u32::MAX);
+        #[expect(clippy::cast_possible_truncation, reason = "any f32 will do")]
+        let number = ((2.0 * unit - 1.0) * f64::from(size)) as f32;
+        number
+    }
+
+    /// A component of a velocity or a position; now and then a special one.
+    fn component(&mut self, size: f32) -> u32 {
+        match self.below(24) {
+            0 => 0,
+            1 => NEGATIVE_ZERO,
+            2 => SUBNORMAL | (self.below(2) << 31),
+            _ => self.number(size).to_bits(),
+        }
+    }
+
+    fn vector(&mut self, size: f32) -> [u32; 3] {
+        [0; 3].map(|_| self.component(size))
+    }
+
+    /// A unit vector, along an axis or anywhere.
+    fn unit(&mut self) -> [u32; 3] {
+        if self.one_in(3) {
+            let mut axis = [0.0_f32; 3];
+            axis[self.below(3) as usize] = if self.one_in(2) { 1.0 } else { -1.0 };
+            return axis.map(f32::to_bits);
+        }
+        let vector = [0; 3].map(|_| self.number(1.0));
+        let length = vector.map(|x| x * x).iter().sum::<f32>().sqrt().max(1e-3);
+        vector.map(|x| (x / length).to_bits())
+    }
+
+    fn shape(&mut self, moves: bool) -> Shape {
+        let inverse_mass = match (moves, self.below(12)) {
+            (false, _) => 0,
+            // It moves, and counts as 0 in arithmetic.
+            (true, 0) => SUBNORMAL,
+            (true, _) => (self.number(2.0).abs() + 0.01).to_bits(),
+        };
+        let inverse_inertia =
+            if moves && !self.one_in(8) { (self.number(3.0).abs() + 0.01).to_bits() } else { 0 };
+        Shape { inverse_mass, inverse_inertia }
+    }
+
+    fn body(&mut self, shapes: u32) -> Body {
+        let speed = if self.one_in(6) { 300.0 } else { 3.0 };
+        Body {
+            linear: self.vector(speed),
+            angular: self.vector(speed),
+            position: self.vector(5.0),
+            orientation: self.orientation(),
+            shape: self.below(shapes),
+        }
+    }
+
+    fn orientation(&mut self) -> [u32; 4] {
+        let parts = [0; 4].map(|_| self.number(1.0));
+        let length = parts.map(|x| x * x).iter().sum::<f32>().sqrt().max(1e-3);
+        parts.map(|x| (x / length).to_bits())
+    }
+
+    /// A collision of two bodies, at least one of which moves; unused slots hold anything.
+    fn collision(&mut self, scene: &Scene) -> Collision {
+        let count = if self.one_in(12) { 0 } else { 1 + self.below(4) };
+        let bodies = self.pair(scene);
+        let position = |body: u32| scene.bodies[body as usize].position;
+        let mut points = [[0; 4]; CONTACT_POINTS];
+        for (slot, point) in points.iter_mut().enumerate() {
+            let used = slot < count as usize;
+            let [x, y, z] = self.vector(5.0);
+            *point = match (used, self.one_in(2)) {
+                (false, true) => [NAN, self.0.bits(), NAN | NEGATIVE_ZERO, self.0.bits()],
+                _ => [x, y, z, self.number(0.05).to_bits()],
+            };
+        }
+        let normal = self.unit();
+        Collision { bodies, positions: bodies.map(position), normal, count, points }
+    }
+
+    fn pair(&mut self, scene: &Scene) -> [u32; 2] {
+        let bodies = u32::try_from(scene.bodies.len()).unwrap_or(1);
+        let moves = |body: u32| {
+            let shape = scene.bodies[body as usize].shape as usize;
+            scene.shapes[shape].inverse_mass != 0
+        };
+        // Few bodies: the pairs meet hazards.
+        let few = if self.one_in(2) { bodies } else { bodies.min(6) };
+        for _ in 0..1_000 {
+            let pair = [self.below(few), self.below(bodies)];
+            if pair[0] != pair[1] && (moves(pair[0]) || moves(pair[1])) {
+                return pair;
+            }
+        }
+        [0, 1]
+    }
+
+    /// Something that the accelerator refuses.
+    fn spoil(&mut self, case: &mut Case) {
+        let scene = &mut case.scene;
+        let bodies = u32::try_from(scene.bodies.len()).unwrap_or(1);
+        let collisions = u32::try_from(scene.collisions.len()).unwrap_or(0);
+        let at = if collisions > 0 { self.below(collisions) as usize } else { 0 };
+        match (self.below(7), scene.collisions.get_mut(at)) {
+            (0, Some(collision)) => collision.bodies[1] = bodies + self.below(3),
+            (1, Some(collision)) => collision.count = 5 + self.below(200),
+            (2, Some(collision)) => collision.bodies = [collision.bodies[0]; 2],
+            (3, _) => {
+                let body = self.below(bodies) as usize;
+                scene.bodies[body].shape = 64 + self.below(1 << 20);
+            }
+            (kind, _) => {
+                let fault = [Fault::EarlyLast, Fault::NoLast, Fault::Partial][kind as usize % 3];
+                let segments = 2 + scene.arguments.contact_iterations;
+                case.fault = Some(FaultAt {
+                    fault,
+                    segment: self.below(segments) as usize,
+                    stream: self.below(4) as usize % STREAMS,
+                    beat: self.below(1 << 20) as usize,
+                });
+            }
+        }
+    }
+}
+
+/// A case; the same for the same seed.
+#[must_use]
+pub fn case(seed: u64) -> Case {
+    let mut draw = Draw(SplitMix64::new(seed));
+    let iterations = |draw: &mut Draw| if draw.one_in(5) { 0 } else { 1 + draw.below(3) };
+    let arguments = Arguments {
+        contact_iterations: iterations(&mut draw),
+        friction_iterations: iterations(&mut draw),
+        integrate: !draw.one_in(5),
+        numbers: [
+            (1.0_f32 / 60.0).to_bits(),
+            draw.number(0.02).abs().to_bits(),
+            draw.number(1.0).abs().to_bits(),
+            draw.number(1.0).abs().to_bits(),
+            (1.0 - draw.number(0.1).abs()).to_bits(),
+        ],
+        gravity: [draw.number(1.0).to_bits(), (-9.8_f32).to_bits(), draw.component(1.0)],
+    };
+    let mut shapes: Vec<Shape> = vec![draw.shape(true), draw.shape(false)];
+    for _ in 0..draw.below(5) {
+        let moves = !draw.one_in(4);
+        shapes.push(draw.shape(moves));
+    }
+    let bodies = if draw.one_in(10) { 1 + draw.below(3) } else { 2 + draw.below(40) };
+    let shape_count = u32::try_from(shapes.len()).unwrap_or(1);
+    let mut scene = Scene { shapes, bodies: Vec::new(), collisions: Vec::new(), arguments };
+    scene.bodies = (0..bodies).map(|_| draw.body(shape_count)).collect();
+    // One body at least moves, and a collision needs a second one.
+    scene.bodies[0].shape = 0;
+    if bodies > 1 && !draw.one_in(10) {
+        let collisions = 1 + draw.below(60);
+        scene.collisions = (0..collisions).map(|_| draw.collision(&scene)).collect();
+    }
+    let mut case = Case { scene, fault: None };
+    if draw.one_in(6) {
+        draw.spoil(&mut case);
+    }
+    case
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seed_gives_the_same_case_and_another_one_another() {
+        assert_eq!(case(7).scene, case(7).scene);
+        assert_ne!(case(7).scene, case(8).scene);
+    }
+
+    #[test]
+    fn every_kind_comes_up() {
+        let cases: Vec<Case> = (0..400).map(case).collect();
+        assert!(cases.iter().any(|case| case.fault.is_some()));
+        assert!(cases.iter().any(|case| case.scene.collisions.is_empty()));
+        assert!(cases.iter().any(|case| case.scene.bodies.len() == 1));
+        for count in 0..=5 {
+            let has = |collision: &Collision| collision.count.min(5) == count;
+            assert!(cases.iter().any(|case| case.scene.collisions.iter().any(has)), "{count}");
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! A step as words, as an accelerator of profile `float` takes it; nothing in it need make sense.
+
+use pgs_interface::record::CONTACT_POINTS;
+
+/// An entry of the shape table, as bits of f32.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shape {
+    /// Inverse mass.
+    pub inverse_mass: u32,
+    /// Isotropic inverse inertia.
+    pub inverse_inertia: u32,
+}
+
+/// A body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Body {
+    /// Linear velocity, as bits of f32.
+    pub linear: [u32; 3],
+    /// Angular velocity.
+    pub angular: [u32; 3],
+    /// Position.
+    pub position: [u32; 3],
+    /// Orientation.
+    pub orientation: [u32; 4],
+    /// Index of its shape.
+    pub shape: u32,
+}
+
+/// A collision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Collision {
+    /// Indices of bodies A and B.
+    pub bodies: [u32; 2],
+    /// Positions of bodies A and B, as bits of f32.
+    pub positions: [[u32; 3]; 2],
+    /// Normal from B to A.
+    pub normal: [u32; 3],
+    /// Number of contact points; 0 is padding.
+    pub count: u32,
+    /// Points and distances; those from `count` on mean nothing.
+    pub points: [[u32; 4]; CONTACT_POINTS],
+}
+
+/// The arguments of a step but for the numbers of bodies and collisions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Arguments {
+    /// Contact passes.
+    pub contact_iterations: u32,
+    /// Friction passes.
+    pub friction_iterations: u32,
+    /// Whether the bodies are integrated.
+    pub integrate: bool,
+    /// Time step, drift, position coefficient, friction, angular damping, as bits of f32.
+    pub numbers: [u32; 5],
+    /// Gravity.
+    pub gravity: [u32; 3],
+}
+
+/// A whole step.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Scene {
+    /// The shape table.
+    pub shapes: Vec<Shape>,
+    /// All bodies.
+    pub bodies: Vec<Body>,
+    /// All collisions.
+    pub collisions: Vec<Collision>,
+    /// The rest.
+    pub arguments: Arguments,
+}
