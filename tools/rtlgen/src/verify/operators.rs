@@ -25,7 +25,7 @@ fn pair(low: u32, high: u32) -> u64 {
 }
 
 /// The operators of `operators_top.v`.
-pub const OPERATORS: [Operator; 13] = [
+pub static OPERATORS: [Operator; 13] = [
     Operator {
         name: "add",
         latency: 7,
@@ -143,9 +143,8 @@ pub fn verify(
     seed: u64,
     mut progress: impl FnMut(u64),
 ) -> Result<Vec<Tally>, Error> {
-    static ALL: [Operator; 13] = OPERATORS;
     let mut tallies: Vec<Tally> =
-        ALL.iter().map(|operator| Tally { operator, wrong: 0, first: None }).collect();
+        OPERATORS.iter().map(|operator| Tally { operator, wrong: 0, first: None }).collect();
     // More vectors push the last results out, to the end of a batch.
     let batch = BATCH as u64;
     let clocked = (vectors + LONGEST as u64).next_multiple_of(batch);
