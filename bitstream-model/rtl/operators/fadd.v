@@ -13,6 +13,8 @@
 // Subnormals: an operand counts as a zero of its sign, a subnormal result becomes one. Sums of
 // normal numbers are multiples of 2^-149, so that a subnormal sum is exact: no rounding can lift it
 // to the smallest normal number. NaN results are 7fc00000.
+//
+// Rules: bitstream-model/README.md, section 7.
 `default_nettype none
 
 module fadd (
