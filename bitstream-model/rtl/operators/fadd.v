@@ -13,6 +13,8 @@
 // Subnormals: an operand counts as a zero of its sign, a subnormal result becomes one. Sums of
 // normal numbers are multiples of 2^-149, so that a subnormal sum is exact: no rounding can lift it
 // to the smallest normal number. NaN results are 7fc00000.
+//
+// Rules: bitstream-model/README.md, section 7.
 `default_nettype none
 
 module fadd (
@@ -77,11 +79,11 @@ module fadd (
   wire [26:0] shifted_2s = shifted_8s >> {distance_s2[2:1], 1'b0};
   wire [26:0] shifted    = shifted_2s >> distance_s2[0];
   wire        lost_in_8s = ((|distance_s2[4:3]) & (|unshifted[7:0]))
-                          | (distance_s2[4] & (|unshifted[15:8]))
-                          | ((&distance_s2[4:3]) & (|unshifted[23:16]));
+                         | (distance_s2[4] & (|unshifted[15:8]))
+                         | ((&distance_s2[4:3]) & (|unshifted[23:16]));
   wire        lost_in_2s = ((|distance_s2[2:1]) & (|shifted_8s[1:0]))
-                          | (distance_s2[2] & (|shifted_8s[3:2]))
-                          | ((&distance_s2[2:1]) & (|shifted_8s[5:4]));
+                         | (distance_s2[2] & (|shifted_8s[3:2]))
+                         | ((&distance_s2[2:1]) & (|shifted_8s[5:4]));
   wire        lost_in_1 = distance_s2[0] & shifted_2s[0];
   wire        sticky    = shifted[0] | lost_in_8s | lost_in_2s | lost_in_1;
   wire [26:0] aligned   = too_far_s2 ? {26'd0, |unshifted} : {shifted[26:1], sticky};

@@ -15,6 +15,9 @@
 // subnormal numbers, and becomes a zero of its sign if it is still subnormal; a fraction of ones
 // just below the smallest normal number rounds up to it (00ffffff / 2 = 00800000, see fmul.v), and
 // with SMALLEST_NORMAL = 0 becomes a zero. NaN results are 7fc00000.
+//
+// Rules: bitstream-model/README.md, section 7.
+// Rows: Ercegovac and Lang, Division and Square Root (1994), non-restoring, radix 2.
 `default_nettype none
 
 module fdiv #(

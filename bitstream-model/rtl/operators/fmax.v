@@ -3,6 +3,8 @@
 // Latency 1. The form decides the rest: equal operands, zeros of both signs among them, give b, and
 // so does a NaN in either operand. Subnormals: an operand counts as a zero of its sign, also as the
 // result.
+//
+// Rules: bitstream-model/README.md, section 7.
 `default_nettype none
 
 module fmax (

@@ -14,6 +14,8 @@
 // half way to that number or above, and rounds up to it (00ffffff * 0.5 = 00800000). With
 // SMALLEST_NORMAL = 0 such a result is rounded as if the exponent had no lower end, and is a zero
 // unless that alone reaches the smallest normal number. NaN results are 7fc00000.
+//
+// Rules: bitstream-model/README.md, section 7.
 `default_nettype none
 
 module fmul #(

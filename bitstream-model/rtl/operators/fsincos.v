@@ -23,6 +23,9 @@
 //
 // Subnormals: an argument counts as a zero of its sign. NaN and infinity give 7fc00000 twice.
 // Beyond pi/8 the results are not defined.
+//
+// Polynomials: FreeBSD's msun, k_sinf.c and k_cosf.c, as in the crate libm. The definition above in
+// integers, and its comparison with libm: tools/rtlgen/src/verify/sincos.rs.
 `default_nettype none
 
 module fsincos (

@@ -11,6 +11,9 @@
 //
 // Subnormals: an operand counts as a zero of its sign; results are never subnormal. The root of -0
 // is -0, NaN results (of other negative operands, too) are 7fc00000.
+//
+// Rules: bitstream-model/README.md, section 7.
+// Rows: Ercegovac and Lang, Division and Square Root (1994), non-restoring, radix 2.
 `default_nettype none
 
 module fsqrt (

@@ -20,14 +20,14 @@ pub const MUTATIONS: &[Mutation] = &[
     Mutation {
         name: "a delay of the contact pipeline is one slot short",
         file: "contact.v",
-        right: "delay #(.WIDTH(32), .SLOTS(21)) delay_linear_a_x_d21",
-        wrong: "delay #(.WIDTH(32), .SLOTS(20)) delay_linear_a_x_d21",
+        right: "delay #(.WIDTH(32), .SLOTS(36)) delay_linear_a_x_d36",
+        wrong: "delay #(.WIDTH(32), .SLOTS(35)) delay_linear_a_x_d36",
     },
     Mutation {
         name: "an operand of the friction pipeline is bound to another value",
         file: "friction.v",
-        right: "wire [31:0] fmin_0_b = ",
-        wrong: "wire [31:0] fmin_0_b = friction & ",
+        right: "fmin_0_b = phase0_fmin_0 ? limit_product_d37 : limit_product_d1;",
+        wrong: "fmin_0_b = phase0_fmin_0 ? limit_product_d1 : limit_product_d37;",
     },
     Mutation {
         name: "the gate of an unused contact point is lost",

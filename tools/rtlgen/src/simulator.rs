@@ -31,7 +31,7 @@ pub fn write(folder: &Path, files: &[File]) -> Result<(), Error> {
 ///
 /// # Errors
 ///
-/// A tool is missing, or the build fails: Verilator's warnings are errors.
+/// A tool is missing, or the build fails.
 pub fn build(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
     build_files(&emit::files(design), folder)
 }

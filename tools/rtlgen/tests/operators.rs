@@ -4,19 +4,20 @@
 
 use rtlgen::sources::{OPERATORS, Source};
 use rtlgen::verify::Error;
-use rtlgen::verify::operators::{Tally, verify};
+use rtlgen::verify::operators::{self, Tally, verify};
 use rtlgen::verify::simulation::Simulator;
+use rtlgen::verify::vectors::Vectors;
 
 const VECTORS: u64 = 20_000;
 
 /// The wrong results by operator, or nothing if a tool is missing.
-fn tallies(operators: &[Source<'_>]) -> Result<Vec<Tally>, Error> {
-    match Simulator::build_from(operators) {
+fn tallies(sources: &[Source<'_>]) -> Result<Vec<Tally>, Error> {
+    match Simulator::build_from(sources) {
         Err(missing @ Error::Missing { .. }) => {
             eprintln!("skipped: {missing}");
             Ok(Vec::new())
         }
-        simulator => verify(&simulator?, VECTORS, 1, |_| ()),
+        simulator => verify(&simulator?, &operators::OPERATORS, Vectors::new(1), VECTORS, |_| ()),
     }
 }
 

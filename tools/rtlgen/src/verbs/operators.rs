@@ -5,9 +5,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
-use rtlgen::verify::operators::{self, Tally, Wrong};
+use rtlgen::verify::operators::{OPERATORS, Tally, Wrong, verify};
 use rtlgen::verify::simulation::Simulator;
-use rtlgen::verify::vectors::Vector;
+use rtlgen::verify::vectors::{Vector, Vectors};
 use serde_json::{Value, json};
 
 use super::{Error, progress_bar};
@@ -35,8 +35,9 @@ pub(crate) fn run(args: &Operators, out: &mut dyn Write) -> Result<ExitCode, Err
     let simulator = Simulator::build()?;
     let build = start.elapsed();
     let bar = progress_bar(args.vectors, "vectors");
+    let vectors = Vectors::new(args.seed);
     let tallies =
-        operators::verify(&simulator, args.vectors, args.seed, |done| bar.set_position(done))?;
+        verify(&simulator, &OPERATORS, vectors, args.vectors, |done| bar.set_position(done))?;
     bar.finish_and_clear();
     let seconds = start.elapsed().as_secs_f64();
     if args.json {
@@ -64,7 +65,7 @@ pub(crate) fn run(args: &Operators, out: &mut dyn Write) -> Result<ExitCode, Err
     Ok(if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn describe(wrong: &Wrong) -> String {
+pub(super) fn describe(wrong: &Wrong) -> String {
     let Wrong { vector: Vector { a, b, radicand, argument }, expected, found } = wrong;
     format!(
         "a {a:08x}, b {b:08x}, radicand {radicand:08x}, argument {argument:08x}: \

@@ -3,7 +3,7 @@
 use std::iter;
 
 use super::simulation::{BATCH, Outputs, Simulator};
-use super::vectors::{Vector, Vectors};
+use super::vectors::Vector;
 use super::{Error, reference};
 
 /// An operator: what its output is to be, how many cycles after its operands.
@@ -25,7 +25,7 @@ fn pair(low: u32, high: u32) -> u64 {
 }
 
 /// The operators of `operators_top.v`.
-pub const OPERATORS: [Operator; 13] = [
+pub static OPERATORS: [Operator; 13] = [
     Operator {
         name: "add",
         latency: 7,
@@ -109,6 +109,12 @@ pub const OPERATORS: [Operator; 13] = [
     },
 ];
 
+/// Sine and cosine alone.
+#[must_use]
+pub fn sincos() -> &'static [Operator] {
+    &OPERATORS[4..5]
+}
+
 /// A result that is not the reference's.
 #[derive(Debug, Clone, Copy)]
 pub struct Wrong {
@@ -131,25 +137,26 @@ pub struct Tally {
     pub first: Option<Wrong>,
 }
 
-/// Feeds vectors to all operators and counts the results that are wrong. `progress` is called with
-/// the number of vectors compared so far.
+/// Feeds the first `count` vectors to the operators and counts the wrong results of each operator
+/// in `compared`. `progress` is called with the number of vectors compared so far.
 ///
 /// # Errors
 ///
 /// The simulator ends early.
 pub fn verify(
     simulator: &Simulator,
-    vectors: u64,
-    seed: u64,
+    compared: &'static [Operator],
+    vectors: impl Iterator<Item = Vector> + Send,
+    count: u64,
     mut progress: impl FnMut(u64),
 ) -> Result<Vec<Tally>, Error> {
-    static ALL: [Operator; 13] = OPERATORS;
     let mut tallies: Vec<Tally> =
-        ALL.iter().map(|operator| Tally { operator, wrong: 0, first: None }).collect();
+        compared.iter().map(|operator| Tally { operator, wrong: 0, first: None }).collect();
     // More vectors push the last results out, to the end of a batch.
     let batch = BATCH as u64;
-    let clocked = (vectors + LONGEST as u64).next_multiple_of(batch);
-    let operands = iter::zip(0..clocked, Vectors::new(seed)).map(|(_, vector)| vector);
+    let clocked = (count + LONGEST as u64).next_multiple_of(batch);
+    let padded = vectors.chain(iter::repeat(Vector::default()));
+    let operands = iter::zip(0..clocked, padded).map(|(_, vector)| vector);
     // The vectors of the batch, behind the last ones of the batch before.
     let mut recent: Vec<Vector> = Vec::new();
     let mut before: u64 = 0;
@@ -162,7 +169,7 @@ pub fn verify(
             for (cycle, outputs) in outputs.iter().enumerate() {
                 let now = before + cycle as u64;
                 let delay = latency - 1;
-                if now < delay as u64 || now - delay as u64 >= vectors {
+                if now < delay as u64 || now - delay as u64 >= count {
                     continue;
                 }
                 let vector = recent[kept + cycle - delay];
@@ -174,7 +181,7 @@ pub fn verify(
             }
         }
         before += batch.len() as u64;
-        progress(before.min(vectors));
+        progress(before.min(count));
     })?;
     Ok(tallies)
 }
@@ -182,6 +189,11 @@ pub fn verify(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sine_and_cosine_are_alone() {
+        assert_eq!(sincos().iter().map(|operator| operator.name).collect::<Vec<_>>(), ["sincos"]);
+    }
 
     #[test]
     fn the_longest_latency_is_the_longest() {

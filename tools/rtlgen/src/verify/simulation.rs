@@ -42,7 +42,7 @@ impl Simulator {
     ///
     /// # Errors
     ///
-    /// A tool is missing, or the build fails: Verilator's warnings are errors.
+    /// A tool is missing, or the build fails.
     pub fn build() -> Result<Self, Error> {
         Self::build_from(sources::OPERATORS)
     }

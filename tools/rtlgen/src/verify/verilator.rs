@@ -35,7 +35,7 @@ pub fn require(purpose: &'static str) -> Result<(), Error> {
     }
 }
 
-/// Builds `obj/V<top>` in a folder. Verilator's warnings are errors.
+/// Builds `obj/V<top>` in a folder. Warnings do not stop it: a seeded mistake may cause one.
 ///
 /// # Errors
 ///
@@ -43,7 +43,7 @@ pub fn require(purpose: &'static str) -> Result<(), Error> {
 pub fn build(folder: &Path, build: &Build<'_>) -> Result<(), Error> {
     let output = Command::new("verilator")
         .current_dir(folder)
-        .args(["--cc", "--exe", "--build", "-Wall", "-O3", "--noassert"])
+        .args(["--cc", "--exe", "--build", "-Wno-fatal", "-O3", "--noassert"])
         .args(["--x-assign", "fast", "--x-initial", "fast"])
         // Smaller files of C++, which make compiles side by side.
         .args(["--output-split", "20000", "-j", "0"])
