@@ -181,6 +181,7 @@ pub fn difference(expected: &Outcome, found: &Outcome) -> Option<String> {
         ("sum of the words received", received, found.sums[0]),
         ("sum of the words sent", if nan { found.sums[1] } else { sent }, found.sums[1]),
         ("hazards", expected.hazards, found.hazards),
+        ("cycles by the formula", expected.work, found.work),
     ];
     for (what, expected, found) in pairs {
         if expected != found {
