@@ -132,9 +132,7 @@ impl Design {
     /// body through the integration, and the control around the step.
     #[must_use]
     pub fn step_fill(&self) -> u32 {
-        unsigned(self.integration.schedule.depth)
-            + self.parameters.read_latency()
-            + AROUND_A_STEP
+        unsigned(self.integration.schedule.depth) + self.parameters.read_latency() + AROUND_A_STEP
     }
 }
 
