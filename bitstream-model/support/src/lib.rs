@@ -20,6 +20,7 @@
 
 pub mod chunks;
 pub mod float_env;
+pub mod lanes;
 #[cfg(test)]
 mod tests;
 

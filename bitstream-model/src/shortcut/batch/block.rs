@@ -12,7 +12,7 @@ use crate::config::THREADS_MAX;
 use pgs_interface::record::{CONTACT_POINTS, WORD_LANE, collision};
 
 /// Collisions of a block.
-pub(crate) const LANES: usize = 16;
+pub(crate) use pgs_support::lanes::LANES;
 
 /// One word of the collisions of a block.
 pub(crate) type Words<T = f32> = [T; LANES];

@@ -6,10 +6,10 @@
 //! blocks are full and the order is the one received.
 
 use super::block::{LANES, Words, kind};
-use super::lanes::prefetch;
 use crate::cast::register;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::record::CONTACT_POINTS;
+use pgs_support::lanes::prefetch;
 
 /// No block, no collision.
 const NONE: u32 = u32::MAX;

@@ -5,7 +5,6 @@
 //! half beats the first takes the sum of the words of both, and what pads the last one up.
 
 use super::Batch;
-use super::lanes::{Lanes, Work};
 use super::records::{BEATS, STREAMS};
 use crate::accelerator::records::array::{Row, half_of};
 use crate::accelerator::records::decode::{self, Collision};
@@ -17,6 +16,7 @@ use crate::shortcut::deferred::eligible::Layout;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{Beat, LANES, WORD_LANE, collision, relative};
 use pgs_support::chunks::Chunks;
+use pgs_support::lanes::{Instructions, Work};
 
 /// Records that are translated at once.
 const TOGETHER: usize = 4096;
@@ -119,9 +119,11 @@ struct Part<'a> {
 }
 
 impl Work for Part<'_> {
-    /// The same instructions, of which the processor has more.
+    type Output = ();
+
+    /// The same code: the compiler vectorises it.
     #[inline(always)]
-    fn with<L: Lanes>(self, _: L) {
+    fn run(self, _: impl Instructions) {
         self.translate();
     }
 }
