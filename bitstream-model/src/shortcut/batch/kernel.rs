@@ -1,8 +1,8 @@
 //! The passes over the collisions of a block, side by side: the formulae and the order of evaluation of
 //! `solver.rs`, SIMD lane by SIMD lane.
 //!
-//! What a lane's collision lacks (a contact point, a static body's answer) is computed and not
-//! taken.
+//! A contact point that a lane's collision lacks, or the answer of a static body, is computed and
+//! discarded.
 
 #![allow(unsafe_code, reason = "rows of velocities are shared by threads")]
 
@@ -15,7 +15,7 @@ use pgs_support::lanes::{F32x16, Instructions, LANES, Mask, Quad};
 
 use crate::accelerator::solver::SolverParameters;
 
-/// What memory holds of a body: the linear velocity and the inverse mass, then the angular velocity
+/// A body in memory: the linear velocity and the inverse mass, then the angular velocity
 /// and the inverse inertia.
 pub(crate) type BodyRow = [Quad; 2];
 
@@ -149,7 +149,7 @@ fn unit<N: Numbers>(a: Vector<N>) -> Vector<N> {
     times(a, N::splat(1.0) / dot(a, a).sqrt())
 }
 
-/// What a pass needs beside the collisions.
+/// The input of a pass beside the collisions.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pass<'a> {
     pub(crate) stage: Stage,
@@ -175,7 +175,7 @@ fn tested(block: &Block, bit: u32) -> Mask {
 ///
 /// # Safety
 ///
-/// The rows exist, and nobody writes them at the same time.
+/// The rows exist, and no other thread writes them at the same time.
 #[inline(always)]
 unsafe fn side<N: Numbers>(
     instructions: impl Instructions,
@@ -198,7 +198,7 @@ unsafe fn side<N: Numbers>(
 ///
 /// # Safety
 ///
-/// The rows exist, and nobody accesses them at the same time.
+/// The rows exist, and no other thread accesses them at the same time.
 #[inline(always)]
 unsafe fn put_side<N: Numbers>(
     instructions: impl Instructions,
@@ -221,8 +221,8 @@ unsafe fn put_side<N: Numbers>(
 ///
 /// # Safety
 ///
-/// The rows of the block and the spare one exist. Nobody writes the block's rows while this runs, and
-/// nobody reads the rows of its moving bodies or the spare one.
+/// The rows of the block and the spare one exist. While this runs, no other thread writes the block's
+/// rows, and none reads the rows of its moving bodies or the spare one.
 #[inline(always)]
 pub(crate) unsafe fn solve<N: Numbers>(
     instructions: impl Instructions,
@@ -233,9 +233,9 @@ pub(crate) unsafe fn solve<N: Numbers>(
     let moves = kind::MOVES.map(|bit| tested(block, bit));
     let counts = F32x16::from_fn(|lane| (block.kind[lane] & kind::COUNT) as f32);
     let counts = N::of(counts);
-    // SAFETY: the caller promises that the rows exist and nobody writes them.
+    // SAFETY: the caller promises that the rows exist and that no other thread writes them.
     let mut a = unsafe { side(instructions, bodies, &block.rows[0]) };
-    // SAFETY: the caller promises that the rows exist and nobody writes them.
+    // SAFETY: the caller promises that the rows exist and that no other thread writes them.
     let mut b = unsafe { side(instructions, bodies, &block.rows[1]) };
     if pass.stage.contact {
         contact(pass, block, counts, &mut a, &mut b);
@@ -249,8 +249,8 @@ pub(crate) unsafe fn solve<N: Numbers>(
                 *row = if kind & kind::MOVES[each] == 0 { pass.spare } else { *row };
             }
         }
-        // SAFETY: the rows are of moving bodies, or the spare one: the caller promises that nobody
-        // else accesses them.
+        // SAFETY: the rows are of moving bodies, or the spare one: the caller promises that no other
+        // thread accesses them.
         unsafe { put_side(instructions, bodies, &written, side) };
     }
 }
@@ -354,7 +354,7 @@ fn friction<N: Numbers>(
     let spins = if pass.finds {
         let apart = unit(sub(position_b, position_a));
         let cosine = dot(apart, unit(arm_a));
-        // By the numbers that it computes with: a small inverse mass may be none in sixteen bits.
+        // By the rounded inverse mass: a small one may be zero in sixteen bits.
         let static_side = taken.and(a.m.is_zero().either(b.m.is_zero()));
         let spins = cosine.above(N::splat(SPIN_COSINE)).either(static_side);
         let bits = spins.bits();

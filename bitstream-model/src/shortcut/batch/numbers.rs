@@ -182,7 +182,7 @@ mod tests {
         if number.is_nan() { f32::NAN.to_bits() } else { number.to_bits() }
     }
 
-    /// Compares binary16 operations on pairs with those of `number.rs`.
+    /// Compares binary16 operations on pairs with the operations of `number.rs`.
     struct Pairs<'a>(&'a [(f32, f32)]);
 
     impl Work for Pairs<'_> {

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! So the collisions are read from memory once for several passes, and threads take different ones.
-//! Each thread takes the next few passes that nobody has. While these have to wait for the pass before
-//! them, and when there are no more, it helps with the passes of others, the last ones first.
+//! Each thread takes the next few passes that no thread has. While they have to wait for the pass
+//! before them, and when none are left, it helps with the passes of others, the last ones first.
 
 #![allow(unsafe_code, reason = "threads share blocks and rows and take turns by passes")]
 
@@ -50,7 +50,7 @@ struct Progress {
     taken: AtomicBool,
 }
 
-/// What the fronts are made of, kept from step to step.
+/// The order, the reach and the progress of the fronts, kept from step to step.
 #[derive(Debug, Default)]
 pub(crate) struct Fronts {
     order: Order,
@@ -68,7 +68,7 @@ pub(crate) struct Passes<'a> {
     pub(crate) finding: Option<u32>,
     pub(crate) parameters: &'a SolverParameters,
     pub(crate) width: Width,
-    /// Of the arithmetic.
+    /// Precision of the arithmetic.
     pub(crate) precision: Precision,
 }
 
@@ -142,7 +142,7 @@ impl Line {
     }
 }
 
-/// What the threads of a run share.
+/// The state that the threads of a run share.
 struct Field<'a> {
     passes: Passes<'a>,
     blocks: *mut Block,
@@ -151,7 +151,7 @@ struct Field<'a> {
     bodies: *mut BodyRow,
     needs: &'a [u32],
     progress: &'a [Progress],
-    /// The next pass that nobody has taken.
+    /// The next pass that no thread has taken.
     next: AtomicUsize,
     sum: AtomicU64,
     /// A thread has panicked: its fronts stand still.
@@ -161,11 +161,11 @@ struct Field<'a> {
 }
 
 // SAFETY: blocks and rows are accessed in `chunk` alone, for the next chunk of a pass that one thread
-// has taken. Those of the pass before over the same bodies or blocks have ended, which `progress` says
-// with release and acquire, and so have those of this pass that came before.
+// has taken. The chunks of the pass before over the same bodies or blocks have ended, and so have this
+// pass's earlier chunks: `progress` tells it with release and acquire.
 unsafe impl Sync for Field<'_> {}
 
-/// Marks the field as broken when it goes, unless it was taken off before.
+/// Marks the field as broken when dropped, unless it was cleared before.
 struct Breaks<'a>(Option<&'a AtomicBool>);
 
 impl Drop for Breaks<'_> {
@@ -177,7 +177,7 @@ impl Drop for Breaks<'_> {
 }
 
 impl Field<'_> {
-    /// What a thread does: takes passes while there are any, then helps.
+    /// The work of a thread: takes passes while any are left, then helps.
     fn work(&self, thread: usize) {
         let mut breaks = Breaks(Some(&self.broken));
         let mut own = 0..0;
@@ -206,7 +206,7 @@ impl Field<'_> {
         breaks.0 = None;
     }
 
-    /// The next passes that nobody has.
+    /// The next passes that no thread has.
     fn next_bundle(&self) -> Range<usize> {
         let count = self.progress.len();
         if self.next.load(Ordering::Relaxed) >= count {
@@ -329,7 +329,7 @@ impl<F: Computed> Work for ChunkWork<'_, F> {
             let block = unsafe { &mut *block };
             if block.serial() {
                 // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
-                // has the chunk those of its bodies are its own: see `Sync`.
+                // has the chunk, the rows of its bodies are its own: see `Sync`.
                 let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.bodies) };
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
@@ -353,7 +353,7 @@ impl<F: Computed> ChunkWork<'_, F> {
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
             // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
-            // has the chunk those of its bodies are its own: see `Sync`.
+            // has the chunk, the rows of its bodies are its own: see `Sync`.
             let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.bodies) };
             *self.sum = self.sum.saturating_add(sum);
         }
@@ -370,7 +370,8 @@ fn counted<F: Computed>(block: &Block) -> u64 {
 ///
 /// # Safety
 ///
-/// The rows of the block exist. Nobody writes those while this runs, nor reads those of moving bodies.
+/// The rows of the block exist. While this runs, no other thread writes them, and none reads the rows
+/// of moving bodies.
 unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, bodies: *mut BodyRow) -> u64 {
     let mut sum = 0_u64;
     for lane in 0..LANES {

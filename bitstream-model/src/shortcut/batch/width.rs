@@ -12,7 +12,7 @@ pub(crate) enum Width {
 }
 
 impl Width {
-    /// All that the processor has, the fastest first.
+    /// Every width, the fastest first.
     #[cfg(test)]
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         InstructionSet::all().map(Self::Lanes).chain([Self::One])

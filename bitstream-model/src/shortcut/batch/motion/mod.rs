@@ -1,8 +1,8 @@
 //! Integrates bodies side by side: the formulae and the order of evaluation of `integrate.rs`, SIMD
 //! lane by SIMD lane.
 //!
-//! The bodies come and go on streams that take turns: the first body of each period is found at every
-//! so many beats of its streams, the next one likewise.
+//! The bodies come and go on streams that take turns. Bodies at the same place in successive periods
+//! lie at a constant distance on their streams.
 
 use std::mem;
 use std::ops::Range;
@@ -33,7 +33,7 @@ fn added(rows: &[Row]) -> u32 {
     rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
 }
 
-/// Bodies and what becomes of them, if anything does.
+/// Bodies, and their integration if they are integrated.
 #[derive(Clone, Copy)]
 struct Bodies<'a> {
     integration: Option<&'a Integration>,
@@ -64,7 +64,7 @@ impl Bodies<'_> {
         }
     }
 
-    /// The same from and to so many streams.
+    /// The same, from and to `STREAMS` streams.
     fn results_on<const STREAMS: usize>(
         &self,
         bodies: Range<usize>,
@@ -72,7 +72,7 @@ impl Bodies<'_> {
     ) -> [u32; 2] {
         let turns = Turns { streams: STREAMS };
         let period = const { period(STREAMS) };
-        // Those of each place in a period fill the widest lanes.
+        // In a group, the bodies at each place of a period fill all lanes.
         let group = period * LANES;
         let mut sums = [0; 2];
         let Range { start, end } = bodies;
@@ -91,7 +91,7 @@ impl Bodies<'_> {
         sums
     }
 
-    /// Whole groups of bodies, of which the first one begins a period.
+    /// Whole groups of bodies; the first body begins a period.
     fn groups<'a, const STREAMS: usize>(
         &'a self,
         integration: &'a Integration,
@@ -140,7 +140,7 @@ impl Bodies<'_> {
     }
 }
 
-/// Bodies side by side: those of the same place in a period, as many as fill the lanes.
+/// Bodies side by side: the lanes hold bodies at the same place in their periods.
 struct Groups<'a, const STREAMS: usize> {
     integration: &'a Integration,
     /// Two quads of a body.
@@ -151,7 +151,7 @@ struct Groups<'a, const STREAMS: usize> {
     sums: &'a mut [u32; 2],
 }
 
-/// What is the same for all bodies.
+/// The constants of an integration.
 #[derive(Clone, Copy)]
 struct Constants {
     zero: F32x16,
@@ -159,7 +159,7 @@ struct Constants {
     half: F32x16,
     time_step: F32x16,
     damping: F32x16,
-    /// What gravity adds to the velocity.
+    /// The change of the velocity by gravity.
     fall: [F32x16; 3],
     rotation_limit: F32x16,
     speed_limit: F32x16,
@@ -188,8 +188,7 @@ impl Constants {
         }
     }
 
-    /// By what the angular velocity is multiplied to give the rotation, and the cosine of half its
-    /// angle.
+    /// The factor from the angular velocity to the rotation, and the cosine of half the angle.
     #[inline(always)]
     fn rotation(&self, w: [F32x16; 3]) -> [F32x16; 2] {
         let Self { half, time_step, .. } = *self;
@@ -285,9 +284,9 @@ impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
 }
 
 impl Batch {
-    /// Integrates bodies, or only sends them back, where the places have room. The velocities
-    /// are those that were entered or that passes have left. Returns the sums of the words of their
-    /// poses and of their results.
+    /// Integrates bodies, or only sends them back, into the room that `places` has. The velocities are
+    /// the entered ones as the passes have left them. Returns the sums of the words of the poses and of
+    /// the results.
     pub(crate) fn integrate(
         &mut self,
         integration: Option<&Integration>,
