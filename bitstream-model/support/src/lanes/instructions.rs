@@ -52,7 +52,7 @@ pub trait Instructions: Copy + Debug {
     }
 }
 
-/// What every processor of the target has.
+/// The instructions that every processor of the target has.
 #[derive(Debug, Clone, Copy)]
 struct Target;
 
@@ -69,7 +69,7 @@ impl Instructions for Target {
     }
 }
 
-/// Instructions of x86-64 with registers of which `$parts` hold all lanes.
+/// Defines a set of x86-64 instructions; `$parts` of its registers hold all lanes.
 #[cfg(target_arch = "x86_64")]
 macro_rules! instructions {
     (
@@ -88,6 +88,10 @@ macro_rules! instructions {
             }
 
             /// Exchanges rows and columns of each four lanes.
+            #[allow(
+                clippy::incompatible_msrv,
+                reason = "AVX-512 is left out where the compiler is too old for it"
+            )]
             #[inline]
             #[target_feature(enable = $features)]
             fn transposed_part([a, b, c, d]: [$register; 4]) -> [$register; 4] {
@@ -165,7 +169,7 @@ enum Kind {
 }
 
 impl InstructionSet {
-    /// All that the processor has, the fastest first.
+    /// The sets that the processor has, the fastest first.
     pub fn all() -> impl Iterator<Item = Self> {
         let target = Some(Kind::Target(Target));
         #[cfg(target_arch = "x86_64")]
@@ -204,7 +208,8 @@ impl InstructionSet {
     }
 }
 
-/// Has the processor fetch a value into its cache, if it can be asked to. The value is not read.
+/// Prefetches a value into the cache, on processors with such an instruction. The address may be
+/// invalid.
 #[inline(always)]
 pub fn prefetch<T>(value: *const T) {
     #[cfg(target_arch = "x86_64")]
