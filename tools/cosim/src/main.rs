@@ -37,7 +37,7 @@ Examples:
 Exit codes: 0 done; 1 a difference, or a mutation that nothing found; 2 wrong usage or an error; 77 a
 tool that the verb needs is not installed.";
 
-/// What the hardware does on a hazard.
+/// The behaviour of the hardware on a hazard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum HazardMode {
     /// Waits for the velocity.

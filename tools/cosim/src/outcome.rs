@@ -1,4 +1,4 @@
-//! What an accelerator makes of a step: its results and its counters.
+//! The outcome of a step on an accelerator: results and counters.
 
 use bitstream_model::external::{ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use pgs_interface::control::{
@@ -18,7 +18,7 @@ const OFFERED: usize = 128;
 /// Clocks after which a step that has not ended is given up.
 const CLOCKS_MAX: u64 = 400_000_000;
 
-/// What a step leaves behind.
+/// Results, error and counters of a step.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
     /// The beats of each result stream.

@@ -7,7 +7,7 @@ use crate::equations;
 use crate::graph::Graph;
 use crate::schedule::Schedule;
 
-/// What a user chooses.
+/// The choices of a build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Parameters {
     /// Bodies that the memories hold.
