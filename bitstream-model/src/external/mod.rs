@@ -59,7 +59,7 @@ pub struct Clocked {
 #[non_exhaustive]
 pub enum ExternalError {
     /// It cannot be started.
-    #[error("the simulator {path} cannot be started; build it with `tools/scripts/rtl`")]
+    #[error("the simulator {path} cannot be started ({source}); build one with `rtlgen simulator`")]
     Start {
         /// Its path.
         path: String,
@@ -81,6 +81,17 @@ pub enum ExternalError {
         act: &'static str,
         /// The deadline.
         seconds: u64,
+    },
+    /// It answers, and is no accelerator of this interface.
+    #[error(
+        "the simulator's IDENTIFICATION is {found:#010x}, expected {expected:#010x}: it is no \
+         accelerator; build one with `rtlgen simulator`"
+    )]
+    Identification {
+        /// The register's value.
+        found: u32,
+        /// The value of every accelerator.
+        expected: u32,
     },
     /// Its answer contradicts the request.
     #[error(

@@ -23,6 +23,7 @@ use std::thread;
 use std::time::Duration;
 
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
+use pgs_interface::control::{IDENTIFICATION, IDENTIFICATION_VALUE};
 use pgs_interface::record::Beat;
 
 const STREAMS: usize = 4;
@@ -52,10 +53,10 @@ pub struct SimulatorProcess {
 }
 
 impl SimulatorProcess {
-    /// Starts a simulator.
+    /// Starts a simulator and reads its IDENTIFICATION.
     ///
     /// # Errors
-    /// [`ExternalError::Start`] if the program cannot be started.
+    /// [`ExternalError`] if the program cannot be started or does not answer as an accelerator.
     pub fn start(path: &Path) -> Result<Self, ExternalError> {
         Self::start_with(path, &[])
     }
@@ -89,7 +90,12 @@ impl SimulatorProcess {
                 }
             });
         }
-        Ok(Self { child, requests, answers, rest: Vec::new() })
+        let mut process = Self { child, requests, answers, rest: Vec::new() };
+        let expected = IDENTIFICATION_VALUE;
+        match process.read(IDENTIFICATION.offset)? {
+            found if found == expected => Ok(process),
+            found => Err(ExternalError::Identification { found, expected }),
+        }
     }
 
     fn request(&mut self, words: &[u32], act: &'static str) -> Result<(), ExternalError> {

@@ -5,6 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod accelerator;
 mod arrays;
 mod bad_input;
 mod check;
