@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! cycles = load + passes x (ceil(C / collisions per issue) x II + fill)
-//!        + max(pose in, result out)
+//!        + max(pose in, result out) + integration fill
 //! ```
 //!
 //! A design that streams the collisions once has a formula of its own ([`window`](super::window)).
 //!
-//! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; fill is this project's.
+//! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; the fills are this project's.
 
 use super::traffic::{Records, StepTraffic};
 use super::window::{WindowCycles, WindowStep};
@@ -58,6 +58,8 @@ pub struct StepCycles {
     pub pose_in: u64,
     /// Results out; 0 where they leave beside the passes.
     pub result_out: u64,
+    /// Fill of the integration: from the last body in to the end of the step.
+    pub integration_fill: u64,
     /// All together.
     pub total: u64,
 }
@@ -78,7 +80,8 @@ impl StepCycles {
                 fill: window.behind.saturating_add(window.fill),
                 pose_in: 0,
                 result_out: 0,
-                total: window.passes,
+                integration_fill: window.integration_fill,
+                total: window.passes.saturating_add(window.integration_fill),
             };
         }
         let traffic = StepTraffic::new(variant, records, step);
@@ -93,15 +96,17 @@ impl StepCycles {
         };
         let (load, pose_in, result_out) =
             (traffic.velocities.cycles, traffic.poses.cycles, traffic.results.cycles);
+        let integration_fill = u64::from(profile.integration_fill);
         let total = pass
             .saturating_mul(step.passes())
             .saturating_add(load)
             .saturating_add(fill)
-            .saturating_add(pose_in.max(result_out));
-        Self { load, pass, fill, pose_in, result_out, total }
+            .saturating_add(pose_in.max(result_out))
+            .saturating_add(integration_fill);
+        Self { load, pass, fill, pose_in, result_out, integration_fill, total }
     }
 
-    /// Poses in or results out, the longer of the two.
+    /// Poses in or results out, the longer of the two, without fill.
     #[must_use]
     pub fn integration(&self) -> u64 {
         self.pose_in.max(self.result_out)

@@ -51,7 +51,7 @@ pub struct StepTime {
     pub load: PartTime,
     /// One pass over the collisions, without fill.
     pub pass: PartTime,
-    /// Fill of all passes together, s.
+    /// Fill of all passes together and of the integration, s.
     pub fill_seconds: f64,
     /// Poses in and results out.
     pub integration: PartTime,
@@ -95,7 +95,7 @@ impl StepTime {
         let load = part(cycles.load, first, PartLimit::Streams);
         let pass = part(cycles.pass, each, interval_limit(variant));
         let integration = part(cycles.integration(), last, PartLimit::Streams);
-        let fill_seconds = cycles.fill as f64 / clock_hz;
+        let fill_seconds = cycles.fill.saturating_add(cycles.integration_fill) as f64 / clock_hz;
         let passes = traffic.collision_streams as f64 * pass.seconds;
         let seconds = load.seconds + passes + fill_seconds + integration.seconds;
         Self { load, pass, fill_seconds, integration, seconds, bytes: traffic.bytes() }

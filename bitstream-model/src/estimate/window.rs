@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! cycles = (C + (P - 1) x lag) x T + fill of the last pass + 2 x bodies without a collision
+//!        + integration fill
 //! ```
 //!
 //! C counts empty entries too. T is the [cycles of a slot](Window::slot_cycles). The lag is the
@@ -74,6 +75,8 @@ pub struct WindowCycles {
     pub integration: u64,
     /// Load and integration of the bodies in no collision, after the passes.
     pub exposed: u64,
+    /// Fill of the integration: from the last body in to the end of the step.
+    pub integration_fill: u64,
     /// All together.
     pub total: u64,
 }
@@ -101,8 +104,20 @@ impl WindowCycles {
         let (load, integration) = side(shape.bodies);
         let (rest_in, rest_out) = side(step.untouched);
         let exposed = rest_in.max(rest_out);
-        let total = solver.saturating_add(exposed);
-        Some(Self { slot, stream, behind, fill, passes: solver, load, integration, exposed, total })
+        let integration_fill = u64::from(profile.integration_fill);
+        let total = solver.saturating_add(exposed).saturating_add(integration_fill);
+        Some(Self {
+            slot,
+            stream,
+            behind,
+            fill,
+            passes: solver,
+            load,
+            integration,
+            exposed,
+            integration_fill,
+            total,
+        })
     }
 }
 
