@@ -172,7 +172,7 @@ mod tests {
         // Velocities 77,760 beats, passes of 381,000, poses 77,760, results 155,520.
         assert_eq!(time.bytes, 16 * (77_760 + 8 * 381_000 + 77_760 + 155_520));
         let expected =
-            25_920.0 / 250e6 + 8.0 * 127_000.0 / 250e6 + 2_680.0 / 250e6 + 3_732_480.0 / 12.8e9;
+            25_920.0 / 250e6 + 8.0 * 127_000.0 / 250e6 + 2_944.0 / 250e6 + 3_732_480.0 / 12.8e9;
         assert!((time.seconds - expected).abs() < 1e-12, "{} s", time.seconds);
         assert!((time.cycles(&MIXED.default_variant()) - expected * 250e6).abs() < 1e-3);
     }
