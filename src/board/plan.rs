@@ -231,10 +231,10 @@ mod tests {
         fake::describe(&registers);
         let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
         let mut parameters = StepParameters::default();
-        // 4 x 8 x 127,746 x (2 + 316) cycles at 275 MHz are 4.727066 s; 119,437,184 bytes in and
+        // 4 x 8 x 127,746 x (2 + 324) cycles at 275 MHz are 4.845986 s; 119,437,184 bytes in and
         // out are 1.194371 s at 100 MB/s.
         let limit = FOUR.deadline(&parameters, &capabilities);
-        assert_eq!(limit.as_micros(), 4_727_066 + 1_194_371 + 10_000);
+        assert_eq!(limit.as_micros(), 4_845_986 + 1_194_371 + 10_000);
         parameters.deadline = Some(Duration::from_millis(3));
         assert_eq!(FOUR.deadline(&parameters, &capabilities), Duration::from_millis(3));
     }

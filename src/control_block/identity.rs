@@ -315,8 +315,8 @@ pub(crate) mod fake {
                 (0x114, 0x4444),
                 (0x118, 0x4444),
                 (0x11C, 0x0001_0002),
-                (0x120, (316 << 16) | 364),
-                (0x124, (182 << 16) | 306),
+                (0x120, (324 << 16) | 374),
+                (0x124, (190 << 16) | 314),
                 (0x128, 275_000),
                 (0x12C, 131_072),
                 (0x130, 262_144),
@@ -353,7 +353,7 @@ mod tests {
         assert!(found.checksums && found.interlocked && found.impulse_sum);
         assert!(!found.flush_subnormals);
         assert_eq!((found.mm2s_channels, found.s2mm_channels), (4, 4));
-        assert_eq!(found.contact, Depth { fill: 364, window: 316 });
+        assert_eq!(found.contact, Depth { fill: 374, window: 324 });
         assert_eq!((found.bytes_per_body, found.bytes_per_collision), (24, 16));
         assert_eq!((found.length_width, found.address_width), (26, 40));
     }

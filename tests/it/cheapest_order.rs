@@ -200,7 +200,7 @@ fn the_default_is_the_sequential_solve_of_its_order() {
     assert!(waited.empty == 0 && waited.cycles.stalls > 0);
     let (bodies, collisions) = wall();
     let sequential = BoardConfig { window_slots: Some(1), ..BoardConfig::default() };
-    let in_order = common::by_hand(Order::HazardFreeNearby, &bodies, &collisions, &SHAPES, 158);
+    let in_order = common::by_hand(Order::HazardFreeNearby, &bodies, &collisions, &SHAPES, 162);
     let (report, expected) = step(sequential, (bodies, in_order), &ordered(Order::AsGiven));
     assert_eq!(report.cycles.stalls, 0);
     assert_eq!(found, expected);

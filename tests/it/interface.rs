@@ -278,8 +278,9 @@ fn float_is_the_profile_of_the_thesis() {
     assert_eq!(float.mm2s_widths, [128; 4]);
     assert_eq!(float.s2mm_widths, [128; 4]);
     assert_eq!((float.initiation_interval, float.collisions_per_issue), (2, 1));
-    assert_eq!((float.contact.fill, float.contact.window), (364, 316));
-    assert_eq!((float.friction.fill, float.friction.window), (306, 182));
+    assert_eq!((float.contact.fill, float.contact.window), (374, 324));
+    assert_eq!((float.friction.fill, float.friction.window), (314, 190));
+    assert!(profile::PROFILES.iter().all(|profile| profile.integration_fill == 264));
     assert_eq!(float.clock_khz, 275_000);
     assert_eq!(
         (float.default_variant().bytes_per_body(), float.default_variant().bytes_per_collision()),

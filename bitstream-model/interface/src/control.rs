@@ -309,7 +309,8 @@ pub const BODY_CAPACITY: Register = read_only("BODY_CAPACITY", 0x12C, &[]);
 pub const COLLISION_CAPACITY: Register = read_only("COLLISION_CAPACITY", 0x130, &[]);
 /// Entries of the shape table.
 pub const SHAPE_CAPACITY: Register = read_only("SHAPE_CAPACITY", 0x134, &[]);
-/// On-chip memory that bodies and collisions share, bytes.
+/// On-chip memory of bodies and collisions, bytes: shared by them, or the sum of an array for each,
+/// whose capacities are then the limits.
 pub const MEMORY_BYTES: Register = read_only("MEMORY_BYTES", 0x138, &[]);
 /// Bytes of [`MEMORY_BYTES`] that a body takes, and that a collision takes.
 pub const MEMORY_PER_RECORD: Register =

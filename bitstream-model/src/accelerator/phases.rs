@@ -385,8 +385,12 @@ impl Accelerator {
         self.received(received);
         self.sent(sent);
         self.debt += cycles(&poses, &results) - before;
-        let finished = poses.finished();
-        self.phase = if finished { Phase::Ending } else { Phase::Integrate { poses, results } };
+        self.phase = if poses.finished() {
+            self.debt += u64::from(self.variant.profile.integration_fill);
+            Phase::Ending
+        } else {
+            Phase::Integrate { poses, results }
+        };
         Ok(true)
     }
 

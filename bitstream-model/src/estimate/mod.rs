@@ -17,7 +17,7 @@ mod window;
 
 pub use blocks::{BLOCK_BITS, BLOCKS, BlockShape, ShapedBlocks};
 pub use cycles::{StepCycles, StepShape};
-pub use ports::{LoadPorts, MemoryKind, OnChipArray, PORTS, PortAccount, PortUse};
+pub use ports::{LoadPorts, OnChipArray, PORTS, PortAccount, PortUse};
 pub use resources::{ArrayUse, MemoryUse};
 pub use schedule::{Access, AccessKind, Schedule, Slot};
 pub use time::{PartLimit, PartTime, StepTime};

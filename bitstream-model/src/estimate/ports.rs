@@ -34,7 +34,7 @@ use super::traffic::{Records, StepTraffic};
 use super::window;
 use pgs_interface::profile::{Flow, Inertia, Variant};
 
-/// Ports of a block RAM, and of a distributed RAM in its dual-port form.
+/// Ports of a block RAM.
 pub const PORTS: u32 = 2;
 
 /// An array that stays on chip while a step runs.
@@ -75,33 +75,11 @@ impl OnChipArray {
     }
 }
 
-/// The kind of memory that holds an array.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MemoryKind {
-    /// Block RAM.
-    Block,
-    /// Distributed RAM, made of lookup tables.
-    Distributed,
-}
-
-impl MemoryKind {
-    /// Name in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Block => "block RAM",
-            Self::Distributed => "distributed RAM",
-        }
-    }
-}
-
 /// Use of the ports of one array during a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PortUse {
     /// The array.
     pub array: OnChipArray,
-    /// Its kind of memory.
-    pub memory: MemoryKind,
     /// Rows that a collision reads.
     pub reads: u32,
     /// Rows that a collision writes.
@@ -151,8 +129,7 @@ impl PortUse {
 /// Writes to an array of bodies while the velocities come in, against the ports that write them.
 ///
 /// Each record is one row of every array of bodies, in every copy. Block RAM writes a row on each
-/// of its ports, distributed RAM on one of them. If that is too slow, the array needs banks by body
-/// number. Banks take no more bits, and the passes lose nothing: at worst all accesses of an issue
+/// of its ports. If that is too slow, the array needs banks by body number. Banks take no more bits, and the passes lose nothing: at worst all accesses of an issue
 /// go to one bank, which has the ports of the undivided array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LoadPorts {
@@ -185,7 +162,6 @@ impl PortAccount {
         let memory = profile.memory;
         let velocities = PortUse {
             array: OnChipArray::Velocities,
-            memory: MemoryKind::Block,
             reads: 2,
             writes: 2,
             collisions: profile.collisions_per_issue,
@@ -207,9 +183,7 @@ impl PortAccount {
             arrays.push(PortUse { array: OnChipArray::Inertia, writes: 0, ..plain });
         }
         if memory.shape_index_bytes > 0 {
-            let distributed = MemoryKind::Distributed;
-            let array = OnChipArray::ShapeIndices;
-            arrays.push(PortUse { array, memory: distributed, writes: 0, ..plain });
+            arrays.push(PortUse { array: OnChipArray::ShapeIndices, writes: 0, ..plain });
         }
         Self { arrays, by_streams: stream_interval(variant), claimed: profile.initiation_interval }
     }
@@ -241,11 +215,7 @@ impl PortAccount {
         let of_bodies = self.arrays.iter().filter(|ports| ports.array.is_of_bodies());
         of_bodies
             .map(|ports| {
-                let writers = match ports.memory {
-                    MemoryKind::Block => PORTS,
-                    MemoryKind::Distributed => 1,
-                };
-                let by_ports = bodies.div_ceil(u64::from(writers * ports.pump.max(1)));
+                let by_ports = bodies.div_ceil(u64::from(PORTS * ports.pump.max(1)));
                 let banks = by_ports.div_ceil(by_streams.max(1)).max(1);
                 LoadPorts { array: ports.array, by_streams, by_ports, banks }
             })
@@ -322,11 +292,11 @@ mod tests {
         let half = load(&HALF);
         assert_eq!((half[0].array, half[0].by_streams), (OnChipArray::Velocities, 15_552));
         assert_eq!((half[0].by_ports, half[0].banks), (19_440, 2));
-        assert_eq!((half[1].array, half[1].by_ports), (OnChipArray::ShapeIndices, 38_880));
+        assert_eq!((half[1].array, half[1].by_ports), (OnChipArray::ShapeIndices, 19_440));
         let banks = |profile| load(profile).iter().map(|load| load.banks).collect::<Vec<_>>();
         assert_eq!(banks(&NAIVE), [1, 1]);
-        assert_eq!(banks(&FLOAT), [1, 2]);
-        assert_eq!(banks(&HALF), [2, 3]);
-        assert_eq!(banks(&MIXED), [1, 2]);
+        assert_eq!(banks(&FLOAT), [1, 1]);
+        assert_eq!(banks(&HALF), [2, 2]);
+        assert_eq!(banks(&MIXED), [1, 1]);
     }
 }

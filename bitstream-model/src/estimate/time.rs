@@ -51,7 +51,7 @@ pub struct StepTime {
     pub load: PartTime,
     /// One pass over the collisions, without fill.
     pub pass: PartTime,
-    /// Fill of all passes together, s.
+    /// Fill of all passes together and of the integration, s.
     pub fill_seconds: f64,
     /// Poses in and results out.
     pub integration: PartTime,
@@ -95,7 +95,7 @@ impl StepTime {
         let load = part(cycles.load, first, PartLimit::Streams);
         let pass = part(cycles.pass, each, interval_limit(variant));
         let integration = part(cycles.integration(), last, PartLimit::Streams);
-        let fill_seconds = cycles.fill as f64 / clock_hz;
+        let fill_seconds = cycles.fill.saturating_add(cycles.integration_fill) as f64 / clock_hz;
         let passes = traffic.collision_streams as f64 * pass.seconds;
         let seconds = load.seconds + passes + fill_seconds + integration.seconds;
         Self { load, pass, fill_seconds, integration, seconds, bytes: traffic.bytes() }
@@ -172,7 +172,7 @@ mod tests {
         // Velocities 77,760 beats, passes of 381,000, poses 77,760, results 155,520.
         assert_eq!(time.bytes, 16 * (77_760 + 8 * 381_000 + 77_760 + 155_520));
         let expected =
-            25_920.0 / 250e6 + 8.0 * 127_000.0 / 250e6 + 2_680.0 / 250e6 + 3_732_480.0 / 12.8e9;
+            25_920.0 / 250e6 + 8.0 * 127_000.0 / 250e6 + 2_944.0 / 250e6 + 3_732_480.0 / 12.8e9;
         assert!((time.seconds - expected).abs() < 1e-12, "{} s", time.seconds);
         assert!((time.cycles(&MIXED.default_variant()) - expected * 250e6).abs() < 1e-3);
     }

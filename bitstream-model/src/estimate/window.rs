@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! cycles = (C + (P - 1) x lag) x T + fill of the last pass + 2 x bodies without a collision
+//!        + integration fill
 //! ```
 //!
 //! C counts empty entries too. T is the [cycles of a slot](Window::slot_cycles). The lag is the
@@ -74,6 +75,8 @@ pub struct WindowCycles {
     pub integration: u64,
     /// Load and integration of the bodies in no collision, after the passes.
     pub exposed: u64,
+    /// Fill of the integration: from the last body in to the end of the step.
+    pub integration_fill: u64,
     /// All together.
     pub total: u64,
 }
@@ -101,8 +104,20 @@ impl WindowCycles {
         let (load, integration) = side(shape.bodies);
         let (rest_in, rest_out) = side(step.untouched);
         let exposed = rest_in.max(rest_out);
-        let total = solver.saturating_add(exposed);
-        Some(Self { slot, stream, behind, fill, passes: solver, load, integration, exposed, total })
+        let integration_fill = u64::from(profile.integration_fill);
+        let total = solver.saturating_add(exposed).saturating_add(integration_fill);
+        Some(Self {
+            slot,
+            stream,
+            behind,
+            fill,
+            passes: solver,
+            load,
+            integration,
+            exposed,
+            integration_fill,
+            total,
+        })
     }
 }
 
@@ -226,7 +241,7 @@ mod tests {
     }
 
     /// By hand: (127,891 + 7 x 2,581) x 4 + 306 and (128,101 + 7 x 2,827) x 3 + 306, then two
-    /// cycles for each of 1,630 bodies.
+    /// cycles for each of 1,630 bodies, and the fill of the integration.
     #[test]
     fn the_formula_is_entries_and_lags_by_slots() {
         let shape = |entries| StepShape::new(38_880, entries);
@@ -239,7 +254,7 @@ mod tests {
         assert_eq!((step.lag, float.slot), (2_581, 4));
         assert_eq!(float.passes, 511_564 + 72_268 + 306);
         assert_eq!((float.load, float.integration, float.exposed), (77_760, 77_760, 3_260));
-        assert_eq!(float.total, 584_138 + 3_260);
+        assert_eq!(float.total, 584_138 + 3_260 + 264);
         let step = WindowStep { shape: shape(128_101), ..lag(&WINDOWED16, 2_720, 3) };
         let half = cycles(&WINDOWED16, &step);
         assert_eq!((step.lag, half.slot), (2_827, 3));
@@ -255,7 +270,7 @@ mod tests {
             let variant = profile.default_variant();
             let step = StepCycles::new(&variant, Records::Streamed, &shape);
             assert_eq!((step.load, step.integration()), (0, 0), "both are beside the passes");
-            assert_eq!(step.total, (127_000 + 7 * 2_816) * slot + 306);
+            assert_eq!(step.total, (127_000 + 7 * 2_816) * slot + 306 + 264);
         }
     }
 
@@ -264,7 +279,7 @@ mod tests {
         let shape =
             StepShape { contact_iterations: 0, friction_iterations: 0, ..StepShape::new(9, 5) };
         let found = cycles(&WINDOWED, &WindowStep { shape, lag: 2_816, untouched: 9 });
-        assert_eq!((found.passes, found.total), (0, 18));
+        assert_eq!((found.passes, found.total), (0, 18 + 264));
     }
 
     /// 3 lines of 28 words, 4 of 24, 2,816 entries long, and 8,192 velocities.

@@ -187,7 +187,8 @@ impl Step {
             .zip(depths)
             .map(|(passes, depth)| u64::from(passes) * (pass + u64::from(depth.fill)))
             .sum();
-        inputs(0) + if collisions == 0 { 0 } else { passes } + inputs(2).max(results)
+        let integration = inputs(2).max(results) + u64::from(profile.integration_fill);
+        inputs(0) + if collisions == 0 { 0 } else { passes } + integration
     }
 }
 

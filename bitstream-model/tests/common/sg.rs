@@ -262,8 +262,8 @@ impl Machine {
         }
     }
 
-    /// Whether the accelerator sets `ap_done`, which may come a few cycles after the results.
-    fn is_done(&self) -> bool {
+    /// Whether the accelerator sets `ap_done`, which may come some hundred cycles after the results.
+    pub(crate) fn is_done(&self) -> bool {
         (0..16).any(|_| {
             let done = ap_ctrl::DONE.is_set(self.host.control(control::AP_CTRL));
             if !done {

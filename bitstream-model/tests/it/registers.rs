@@ -412,8 +412,8 @@ fn misread_identity_is_impossible_on_a_live_board() {
     assert_eq!(host.control(control::MM2S_WIDTHS), 0x4444);
     assert_eq!(host.control(control::S2MM_WIDTHS), 0x4444);
     assert_eq!(host.control(control::ISSUE), 0x0001_0002);
-    assert_eq!(host.control(control::CONTACT_DEPTH), (316 << 16) | 364);
-    assert_eq!(host.control(control::FRICTION_DEPTH), (182 << 16) | 306);
+    assert_eq!(host.control(control::CONTACT_DEPTH), (324 << 16) | 374);
+    assert_eq!(host.control(control::FRICTION_DEPTH), (190 << 16) | 314);
     assert_eq!(host.control(control::CLOCK_KHZ), 275_000);
     assert_eq!(host.control(control::MEMORY_BYTES), 4 << 20);
     assert_eq!(host.control(control::MEMORY_PER_RECORD), (16 << 16) | 24);

@@ -123,7 +123,7 @@ fn the_next_step_is_on_the_board_while_results_are_read() {
     assert_eq!(bits(&bodies), undisturbed(CUBES));
     assert!(board.is_running());
     let report = report.expect("a good step");
-    assert_eq!((report.bodies, report.cycles.total), (u64::from(CUBES) + 1, 3_491));
+    assert_eq!((report.bodies, report.cycles.total), (u64::from(CUBES) + 1, 3_827));
     assert_ends(started.expect("it started"), OTHER, "the next");
     assert_eq!(board.violations(), []);
 }
@@ -165,7 +165,7 @@ fn a_prepared_step_costs_39_accesses_and_preparing_none() {
 
 #[test]
 fn preparing_at_any_moment_disturbs_nothing() {
-    for clocks in [0, 50, 500, 2_000, 3_480, 200_000] {
+    for clocks in [0, 50, 500, 2_000, 3_816, 200_000] {
         let (board, mut accelerator) = open(BoardConfig::default());
         let mut flight = submit(&mut accelerator, CUBES);
         board.cpu_port().pause(Duration::from_nanos(clocks * 1_000_000 / 275_000));

@@ -128,8 +128,8 @@ pub struct OnChipMemory {
     /// Clock of the block RAM as a multiple of the accelerator's: a port serves this number of
     /// accesses a cycle.
     pub pump: u32,
-    /// Shape index of a body, bytes; kept in distributed RAM, not in the block RAM above. The
-    /// thesis has one shape and needs none.
+    /// Shape index of a body, bytes. It has a block RAM of its own, which [`bytes`](Self::bytes)
+    /// does not count. The thesis has one shape and needs none.
     pub shape_index_bytes: u32,
 }
 
@@ -161,6 +161,9 @@ pub struct Profile {
     pub contact: Depth,
     /// Friction pipeline.
     pub friction: Depth,
+    /// Fill of the integration, clock cycles: from the last body in to the end of the step, the
+    /// control around the pipeline included. It is the same for every step.
+    pub integration_fill: u32,
     /// Clock of accelerator and streams, kHz.
     pub clock_khz: u32,
     /// On-chip memory.

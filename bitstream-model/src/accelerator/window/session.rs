@@ -255,6 +255,7 @@ impl Accelerator {
         if window.finished() {
             // The last result is under way.
             now = now.max(window.leave_due);
+            self.debt += u64::from(self.variant.profile.integration_fill);
             self.phase = Phase::Ending;
             progressed = true;
         }

@@ -81,6 +81,7 @@ fn estimate(scene: &Scene, variant: &Variant, records: Records) -> Value {
             "fill": cycles.fill,
             "pose_in": cycles.pose_in,
             "result_out": cycles.result_out,
+            "integration_fill": cycles.integration_fill,
         },
         "times": times,
     })

@@ -76,7 +76,6 @@ fn arrays(scene: &Scene) -> Table {
         &[
             ("profile", "profile"),
             ("array", "array"),
-            ("memory", "in"),
             ("row_bytes", "row"),
             ("rows", "rows"),
             ("copies", "copies"),
@@ -93,16 +92,13 @@ fn arrays(scene: &Scene) -> Table {
             table.row([
                 text(variant.profile.name),
                 text(array.array.name()),
-                text(array.memory.name()),
                 Cell::Whole(array.row_bytes.into()),
                 Cell::Whole(array.rows),
                 Cell::Whole(array.copies.into()),
                 Cell::Whole(array.bytes()),
-                shaped.map_or(Cell::Missing, |_| Cell::Whole(array.ideal_blocks())),
-                shaped.map_or(Cell::Missing, |shaped| Cell::Whole(shaped.blocks)),
-                shaped.map_or(Cell::Missing, |shaped| {
-                    text(format!("{} x {}", shaped.shape.rows, shaped.shape.bits))
-                }),
+                Cell::Whole(array.ideal_blocks()),
+                Cell::Whole(shaped.blocks),
+                text(format!("{} x {}", shaped.shape.rows, shaped.shape.bits)),
                 Kind::Modelled.cell(),
             ]);
         }

@@ -222,8 +222,7 @@ fn load(scene: &Scene) -> Table {
     }
     table.note(
         "The cycle formula takes the streams. Where the ports of one bank are slower the bodies need \
-         banks by number: no more bits, by shape a few blocks more, and the passes lose nothing. \
-         Distributed RAM has one port that writes.",
+         banks by number: no more bits, by shape a few blocks more, and the passes lose nothing.",
     );
     table
 }

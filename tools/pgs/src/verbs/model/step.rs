@@ -25,6 +25,7 @@ fn cycles(scene: &Scene) -> Table {
             ("pass", "one pass"),
             ("fill", "fill"),
             ("integration", "integration"),
+            ("integration_fill", "its fill"),
             ("total", "total"),
             ("thesis", "thesis"),
             ("difference_percent", "difference"),
@@ -42,6 +43,7 @@ fn cycles(scene: &Scene) -> Table {
                 Cell::Whole(cycles.pass),
                 Cell::Whole(cycles.fill),
                 Cell::Whole(cycles.integration()),
+                Cell::Whole(cycles.integration_fill),
                 Cell::Whole(cycles.total),
                 design.map_or(Cell::Missing, |design| Cell::Whole(design.cycles)),
                 design.map_or(Cell::Missing, |design| {
@@ -53,7 +55,7 @@ fn cycles(scene: &Scene) -> Table {
     }
     table.note(format!(
         "One formula for every profile that runs one pass after the other: load + {} passes + fill + integration, the longer of poses in \
-         and results out. A step that stalls on hazards takes longer.",
+         and results out, + its fill, from the last body in to the end of the step. A step that stalls on hazards takes longer.",
         scene.step.passes()
     ));
     if scene.variants.iter().any(|variant| has_window(&variant.profile.flow)) {

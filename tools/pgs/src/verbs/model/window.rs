@@ -45,6 +45,7 @@ fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
             ("passes", "solver"),
             ("load", "load beside it"),
             ("integration", "integration"),
+            ("integration_fill", "its fill"),
             ("kind", "kind"),
         ],
     );
@@ -62,6 +63,7 @@ fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
             Cell::Whole(cycles.passes),
             Cell::Whole(cycles.load),
             Cell::Whole(cycles.integration),
+            Cell::Whole(cycles.integration_fill),
             Kind::Modelled.cell(),
         ]);
         table.note(format!(
@@ -77,7 +79,7 @@ fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
     }
     table.note(
         "Slot: cycles in which every pass issues one entry. Load and integration run in parallel to the \
-         passes; bodies without a collision follow, two cycles each. In the formula the passes take \
+         passes; bodies without a collision follow, two cycles each, and the fill of the integration at the end. In the formula the passes take \
          turns. The emulated board has a scoreboard, which usually needs fewer cycles: a unit takes up \
          another pass when one has to wait.",
     );
