@@ -76,7 +76,7 @@ script=zcu102.tcl
 {
 	plant "a stream twice" $script 's|accelerator/s${k}_axis|accelerator/s0_axis|' \
 		"accelerator/s0_axis is connected twice"
-	plant "a missing interrupt" $script '/wire dma$k\/s2mm_introut/d' "interrupts/s2mm0 hangs"
+	plant "a missing interrupt" $script '/wire dma$k\/s2mm_introut/d' "dma0/s2mm_introut hangs"
 	plant "an interrupt that is not passed on" pgs_interrupts.v 's/ | s2mm3//' "not the OR of all inputs"
 	plant "the interrupt nowhere" $script '/wire interrupts\/irq/d' "hangs"
 	plant "a wrong address of a core" $script 's/$pgs(dma_addresses) $k/$pgs(dma_addresses) 1/' \
@@ -91,8 +91,8 @@ script=zcu102.tcl
 	plant "a bus without an end" $script '/link dma$k\/M_AXI_SG/d' "hangs: a bus without its other end"
 	plant "two masters" $script 's|link dma$k/M_AXI_SG memory$k/S00_AXI|link dma$k/M_AXI_SG memory$k/M00_AXI|' \
 		"are both masters"
-	plant "a stream at a memory bus" $script 's|link dma$k/M_AXI_SG memory|link dma$k/M_AXIS_MM2S memory|' \
-		"is a stream bus"
+	plant "a memory bus at a stream" $script 's|link dma$k/M_AXIS_MM2S|link dma$k/M_AXI_SG|' \
+		"dma0/M_AXI_SG is a memory bus, accelerator/s0_axis a stream bus"
 	plant "a narrow stream" $script 's/c_m_axis_mm2s_tdata_width $in/c_m_axis_mm2s_tdata_width 64/' \
 		"has 64 bits, accelerator/s0_axis has 128"
 	plant "channels that are swapped" $script 's|link accelerator/m${k}_axis|link accelerator/m[expr {$k ^ 1}]_axis|' \
@@ -101,7 +101,7 @@ script=zcu102.tcl
 		"c_sg_length_width is 23, not 26"
 	plant "a parameter that is misspelt" $script 's/c_addr_width/c_address_width/' "axi_dma has no parameter"
 	plant "a second clock" $script 's|clocked memory$k aclk|wire processor/pl_clk0 memory$k/aclk; clocked memory$k {}|' \
-		"memory0/aclk is on processor/pl_clk0"
+		"dma0/M_AXI_MM2S runs on clock/clk_out1, memory0/S01_AXI on processor/pl_clk0"
 	plant "a wrong rate" $script 's/$khz \/ 1000.0/$khz \/ 1001.0/' "not 275000"
 	plant "a port without its clock" $script 's/PSU__USE__M_AXI_GP1 0/PSU__USE__M_AXI_GP1 1/' \
 		"processor/maxihpm1_fpd_aclk hangs"

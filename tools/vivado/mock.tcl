@@ -404,8 +404,8 @@ proc connect_bd_net args {
 }
 proc connect_bd_intf_net {a b} {
 	global peer
-	foreach name [list $a $b] {
-		if {[info exists peer($name)]} { refuse "$name is connected twice, with $peer($name) and [list $a $b]" }
+	foreach {name other} [list $a $b $b $a] {
+		if {[info exists peer($name)]} { refuse "$name is connected twice, with $peer($name) and $other" }
 	}
 	lassign [bus $a] side protocol bits
 	lassign [bus $b] other_side other_protocol other_bits
@@ -501,7 +501,7 @@ proc clock_of {bus} {
 # Both ends of a bus run on one clock, and a reset belongs to the clock of its cell.
 proc check_clocks {} {
 	global peer driver cells
-	foreach {a b} [array get peer] {
+	foreach {a b} [lsort -stride 2 [array get peer]] {
 		if {[clock_of $a] ne [clock_of $b]} { refuse "$a runs on [clock_of $a], $b on [clock_of $b]" }
 	}
 	foreach name [all pins] {
@@ -617,7 +617,7 @@ proc check_addresses {} {
 			}
 		}
 	}
-	foreach key [array names assigned] {
+	foreach key [lsort [array names assigned]] {
 		if {![dict exists $expected $key]} { refuse "[lindex $key 0] has an address for [lindex $key 1] without a way there" }
 	}
 	# Registers lie in the window of their master, as UG1085 has it.

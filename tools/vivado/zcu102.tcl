@@ -38,8 +38,8 @@ proc zcu102::options {arguments} {
 	foreach {name value} $arguments {
 		# Options with two dashes do as well.
 		regsub {^--} $name - name
-		if {![dict exists $options $name]} { error "no option $name\n[usage]" }
-		if {$value eq ""} { error "$name has no value\n[usage]" }
+		if {![dict exists $options $name]} { error "no option $name; -help lists them" }
+		if {$value eq ""} { error "$name has no value" }
 		dict set options $name $value
 	}
 	foreach {name values} {-until {design synthesis route bitstream} -negative-slack {refuse allow}} {
@@ -274,9 +274,11 @@ proc zcu102::write_bif {out} {
 # Everything. `here` is the folder of this script.
 proc zcu102::main {arguments here} {
 	global pgs
-	if {[lindex $arguments 0] in {-h -help --help}} {
-		puts [usage]
-		return
+	foreach help {-h -help --help} {
+		if {$help in $arguments} {
+			puts [usage]
+			return
+		}
 	}
 	set options [options $arguments]
 	set rtl [file normalize [dict get $options -rtl]]
