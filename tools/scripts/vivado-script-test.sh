@@ -105,6 +105,8 @@ script=zcu102.tcl
 	plant "a wrong rate" $script 's/$khz \/ 1000.0/$khz \/ 1001.0/' "not 275000"
 	plant "a port without its clock" $script 's/PSU__USE__M_AXI_GP1 0/PSU__USE__M_AXI_GP1 1/' \
 		"processor/maxihpm1_fpd_aclk hangs"
+	plant "a module that is missing" $script 's/foreach module $modules/foreach module [lrange $modules 1 end]/' \
+		"uses fadd, which is not in the project"
 	plant "a header that is missing" $script 's/-directory $rtl \*.vh/-directory $rtl pgs_o*.vh/' \
 		"which is not in the project"
 	plant "a design that is not validated" $script '/^\tvalidate_bd_design/d' "before it is valid"
