@@ -78,8 +78,11 @@ const FPD_128: u32 = 2 << 8 | 2 << 10;
 /// The profile of the overlays.
 const PROFILE: &Profile = &FLOAT;
 
+/// Rate of the accelerator's clock, Hz.
+const RATE: u32 = PROFILE.clock_khz * 1000;
+
 /// Compares the clock and the ports of an overlay with the profile.
-fn check_fabric(tree: &Tree, parent: &str) -> Result<(), String> {
+fn check_fabric(tree: &Tree, parent: &str, rate: u32) -> Result<(), String> {
     let node = format!("{parent}/pgs-clock");
     let compatible = |node: &str| tree.strings(node, "compatible").unwrap_or_default().concat();
     equal(&node, "compatible", compatible(&node), "xlnx,fclk".to_owned())?;
@@ -89,8 +92,7 @@ fn check_fabric(tree: &Tree, parent: &str) -> Result<(), String> {
     for property in ["clocks", "assigned-clocks"] {
         equal(&node, property, tree.cells(&node, property), Some(clock.clone()))?;
     }
-    let rate = Some(vec![PROFILE.clock_khz * 1000]);
-    equal(&node, "rate", tree.cells(&node, "assigned-clock-rates"), rate)?;
+    equal(&node, "rate", tree.cells(&node, "assigned-clock-rates"), Some(vec![rate]))?;
 
     let node = format!("{parent}/pgs-ports");
     equal(&node, "compatible", compatible(&node), "xlnx,afi-fpga".to_owned())?;
@@ -156,7 +158,7 @@ fn every_overlay_keeps_the_clock_at_the_profiles_rate_and_sets_the_ports_to_128_
     for (overlay, parent) in
         [("zynq-pgs.dtso", ""), ("zynq-pgs-region.dtso", "/fpga-full"), ("zynq-pgs-nodes.dtso", "")]
     {
-        check_fabric(&Tree::with_overlay(overlay, as_shipped), parent)
+        check_fabric(&Tree::with_overlay(overlay, as_shipped), parent, RATE)
             .unwrap_or_else(|error| panic!("{overlay}: {error}"));
     }
     for (original, mutant, noticed) in [
@@ -167,10 +169,24 @@ fn every_overlay_keeps_the_clock_at_the_profiles_rate_and_sets_the_ports_to_128_
         ("\"xlnx,fclk\"", "\"fixed-clock\"", "compatible"),
     ] {
         let mutate = |text: String| text.replace(original, mutant);
-        let error = check_fabric(&Tree::with_overlay("zynq-pgs.dtso", mutate), "")
+        let error = check_fabric(&Tree::with_overlay("zynq-pgs.dtso", mutate), "", RATE)
             .expect_err("a difference");
         assert!(error.contains(noticed), "{original} -> {mutant}: {error}");
     }
+}
+
+#[test]
+fn the_overlay_of_the_vivado_script_has_the_pl_clock_that_the_script_asks_for() {
+    let script = sources().join("../tools/vivado/zcu102.tcl");
+    let script = fs::read_to_string(script).expect("the script");
+    let (_, asked) = script.split_once("PL0_REF_CTRL__FREQMHZ ").expect("the PL clock 0");
+    let asked: u32 = asked.split_whitespace().next().and_then(|mhz| mhz.parse().ok()).expect("MHz");
+    if !tools_found() {
+        return;
+    }
+    let tree = Tree::with_overlay("zynq-pgs-vivado.dtso", as_shipped);
+    check_single(&tree, "").expect("as the interface");
+    check_fabric(&tree, "", asked * 1_000_000).expect("as the script");
 }
 
 #[test]

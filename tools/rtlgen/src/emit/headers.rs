@@ -130,9 +130,9 @@ fn capabilities(text: &mut Text, design: &Design) {
 }
 
 /// Width of the AXI DMAs' length registers (specification, section 5).
-const LENGTH_BITS: u32 = 26;
+pub(super) const LENGTH_BITS: u32 = 26;
 /// Width of the AXI DMAs' addresses: both parts of the ZCU102's DDR.
-const ADDRESS_BITS: u32 = 40;
+pub(super) const ADDRESS_BITS: u32 = 40;
 
 /// Bits of an index below `count`.
 fn address_bits(count: u32) -> i64 {

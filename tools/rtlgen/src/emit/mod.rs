@@ -1,9 +1,10 @@
 //! Writes a design as Verilog-2001: a module for each pipeline, and headers with the facts that the
-//! hand-written modules need of it.
+//! hand-written modules need of it. The block design of Vivado gets its numbers likewise.
 
 mod headers;
 mod pipeline;
 mod text;
+mod vivado;
 
 use crate::design::Design;
 use crate::sources;
@@ -20,8 +21,8 @@ pub struct File {
 /// Name of the top module.
 pub const TOP: &str = "pgs_top";
 
-/// All files of a design, ready for a tool: hand-written and generated modules, headers, and
-/// `pgs.f`, the list of the modules.
+/// All files of a design, ready for a tool: hand-written and generated modules, headers, `pgs.f`, the
+/// list of the modules, and `pgs_vivado.tcl`, the numbers of a block design.
 #[must_use]
 pub fn files(design: &Design) -> Vec<File> {
     let file = |name: &str, text: String| File { name: name.into(), text };
@@ -41,5 +42,6 @@ pub fn files(design: &Design) -> Vec<File> {
     let list: String = modules.iter().map(|module| format!("{}\n", module.name)).collect();
     files.append(&mut modules);
     files.push(file("pgs.f", list));
+    files.push(file("pgs_vivado.tcl", vivado::numbers(design)));
     files
 }

@@ -1,0 +1,325 @@
+# The accelerator on a ZCU102: from the generated Verilog to a bitstream, with Vivado.
+#
+# THIS SCRIPT WAS NEVER RUN WITH VIVADO: none was at hand. tools/vivado/mock.tcl runs it in tclsh and checks
+# the structure of the block design. Names of parameters and pins of Vivado's IP come from their documentation
+# and from public designs; docs/bitstream.md lists what only Vivado can tell.
+#
+#   vivado -mode batch -source tools/vivado/zcu102.tcl -tclargs [OPTION VALUE]...
+#
+#                    one SmartConnect
+#   HPM0_FPD ---------> registers -----> S_AXI_LITE of dma0..dma3, s_axi of the accelerator
+#   HP0..HP3 <--------- memory0..3 <---- SG, MM2S and S2MM of dma0..dma3
+#                                        dma0..dma3 <===> s0_axis..s3_axis, m0_axis..m3_axis
+#   pl_ps_irq0[0] <---- interrupts <---- both channels of dma0..dma3, the accelerator
+#   pl_clk0 (100 MHz) -> clock (MMCM) -> everything
+#
+# There is one clock domain and no pin of the board: the clocks' constraints come with the IP, and the design
+# needs no constraint file.
+
+# A namespace of its own, because Vivado has commands of many names.
+namespace eval zcu102 {}
+
+proc zcu102::usage {} {
+	return {usage: vivado -mode batch -source tools/vivado/zcu102.tcl -tclargs [OPTION VALUE]...
+
+  -rtl FOLDER           the Verilog, as `rtlgen generate --out FOLDER` writes it (rtl)
+  -out FOLDER           reports, bitstream and hardware platform (vivado-out)
+  -jobs NUMBER          processes that Vivado may use (4)
+  -clock-khz KHZ        clock of the logic; by default the one that CLOCK_KHZ of the design reports
+  -until STEP           stop after "design", "synthesis" or "route" ("bitstream": go on to the end)
+  -negative-slack WHAT  "refuse" to write a bitstream that misses its timing, or "allow" it (refuse)
+  -help                 this text}
+}
+
+# The values of the options.
+proc zcu102::options {arguments} {
+	set options [dict create -rtl rtl -out vivado-out -jobs 4 -clock-khz {} -until bitstream \
+		-negative-slack refuse]
+	foreach {name value} $arguments {
+		# Options with two dashes do as well.
+		regsub {^--} $name - name
+		if {![dict exists $options $name]} { error "no option $name; -help lists them" }
+		if {$value eq ""} { error "$name has no value" }
+		dict set options $name $value
+	}
+	foreach {name values} {-until {design synthesis route bitstream} -negative-slack {refuse allow}} {
+		if {[dict get $options $name] ni $values} { error "$name is one of: $values" }
+	}
+	foreach name {-jobs -clock-khz} {
+		set value [dict get $options $name]
+		if {$value ne "" && (![string is integer -strict $value] || $value <= 0)} {
+			error "$name is a whole number, not $value"
+		}
+	}
+	return $options
+}
+
+# The numbers of the design, which rtlgen writes beside the Verilog: the array `pgs`.
+proc zcu102::read_numbers {rtl} {
+	global pgs
+	set file [file join $rtl pgs_vivado.tcl]
+	if {![file exists $file]} {
+		error "no $file: cargo run --release -p rtlgen -- generate --out $rtl"
+	}
+	uplevel #0 [list source $file]
+	# pgs_interrupts.v is wired for four cores.
+	if {[llength $pgs(dma_addresses)] != 4} { error "this script wires four AXI DMAs" }
+	if {$pgs(interrupt_bit) != 0} { error "this script wires bit 0 of pl_ps_irq0" }
+}
+
+# ---------------------------------------------------------------------------------------------------------
+# Shorthand
+
+# Adds an IP in the newest version that this Vivado has.
+proc zcu102::add_ip {name cell {parameters {}}} {
+	set found [get_ipdefs -all -filter "VLNV =~ xilinx.com:ip:$name:* && UPGRADE_VERSIONS == \"\""]
+	if {[llength $found] != 1} { error "this Vivado has [llength $found] IPs named $name: $found" }
+	create_bd_cell -type ip -vlnv $found $cell
+	configure $cell $parameters
+}
+
+proc zcu102::configure {cell parameters} {
+	set properties {}
+	foreach {name value} $parameters { lappend properties CONFIG.$name $value }
+	if {[llength $properties] > 0} { set_property -dict $properties [get_bd_cells $cell] }
+}
+
+# Connects an output with inputs.
+proc zcu102::wire {from args} {
+	set pins [list [get_bd_pins $from]]
+	foreach pin $args { lappend pins [get_bd_pins $pin] }
+	connect_bd_net {*}$pins
+}
+
+# Connects a master with a slave.
+proc zcu102::link {master slave} {
+	connect_bd_intf_net [get_bd_intf_pins $master] [get_bd_intf_pins $slave]
+}
+
+# Puts everything behind these clock pins on the one clock, and these reset pins on its reset.
+proc zcu102::clocked {cell clocks resets} {
+	foreach pin $clocks { wire clock/clk_out1 $cell/$pin }
+	foreach pin $resets { wire reset/peripheral_aresetn $cell/$pin }
+}
+
+# The one segment of this name.
+proc zcu102::segment {pattern} {
+	set found [get_bd_addr_segs $pattern]
+	if {[llength $found] != 1} { error "[llength $found] address segments are $pattern: $found" }
+	return $found
+}
+
+proc zcu102::place {space segment offset range} {
+	assign_bd_address -offset $offset -range $range -target_address_space [get_bd_addr_spaces $space] \
+		[segment $segment]
+}
+
+# ---------------------------------------------------------------------------------------------------------
+# The block design
+
+proc zcu102::add_processor {} {
+	add_ip zynq_ultra_ps_e processor
+	apply_bd_automation -rule xilinx.com:bd_rule:zynq_ultra_ps_e -config {apply_board_preset "1"} \
+		[get_bd_cells processor]
+	# M_AXI_GP0 is M_AXI_HPM0_FPD. S_AXI_GP2 to 5 are S_AXI_HP0_FPD to HP3. The widths are those that the node
+	# pgs-ports of the overlays sets.
+	configure processor {
+		PSU__USE__M_AXI_GP0 1 PSU__USE__M_AXI_GP1 0 PSU__USE__M_AXI_GP2 0
+		PSU__MAXIGP0__DATA_WIDTH 128
+		PSU__USE__S_AXI_GP2 1 PSU__USE__S_AXI_GP3 1 PSU__USE__S_AXI_GP4 1 PSU__USE__S_AXI_GP5 1
+		PSU__SAXIGP2__DATA_WIDTH 128 PSU__SAXIGP3__DATA_WIDTH 128
+		PSU__SAXIGP4__DATA_WIDTH 128 PSU__SAXIGP5__DATA_WIDTH 128
+		PSU__USE__IRQ0 1
+		PSU__FPGA_PL0_ENABLE 1 PSU__CRL_APB__PL0_REF_CTRL__FREQMHZ 100
+	}
+}
+
+# The PLLs of the processing system of the board's preset do not make 275 MHz. An MMCM makes the clock from
+# 100 MHz, which they do make.
+proc zcu102::add_clock {khz} {
+	add_ip clk_wiz clock [list PRIM_SOURCE No_buffer CLKOUT1_REQUESTED_OUT_FREQ [expr {$khz / 1000.0}] \
+		USE_LOCKED true USE_RESET true RESET_TYPE ACTIVE_LOW]
+	add_ip proc_sys_reset reset
+	wire processor/pl_clk0 clock/clk_in1
+	wire processor/pl_resetn0 clock/resetn reset/ext_reset_in
+	wire clock/locked reset/dcm_locked
+	wire clock/clk_out1 reset/slowest_sync_clk
+}
+
+proc zcu102::add_accelerator {} {
+	global pgs
+	create_bd_cell -type module -reference $pgs(top) accelerator
+	clocked accelerator aclk aresetn
+	create_bd_cell -type module -reference pgs_interrupts interrupts
+	wire accelerator/irq interrupts/accelerator
+	wire interrupts/irq processor/pl_ps_irq0
+}
+
+# The registers: all slaves behind one SmartConnect.
+proc zcu102::add_registers {} {
+	global pgs
+	set cores [llength $pgs(dma_addresses)]
+	add_ip smartconnect registers [list NUM_SI 1 NUM_MI [expr {$cores + 1}]]
+	clocked registers aclk aresetn
+	clocked processor maxihpm0_fpd_aclk {}
+	link processor/M_AXI_HPM0_FPD registers/S00_AXI
+	for {set k 0} {$k < $cores} {incr k} { link registers/M0${k}_AXI dma$k/S_AXI_LITE }
+	link registers/M0${cores}_AXI accelerator/s_axi
+	for {set k 0} {$k < $cores} {incr k} {
+		place processor/Data dma$k/S_AXI_LITE/* [lindex $pgs(dma_addresses) $k] $pgs(dma_bytes)
+	}
+	place processor/Data accelerator/s_axi/* $pgs(control_address) $pgs(control_bytes)
+}
+
+# AXI DMA k with stream k of the accelerator in both directions, and its three masters at port HP k.
+proc zcu102::add_dma {k} {
+	global pgs
+	set in [lindex $pgs(mm2s_stream_bits) $k]
+	set out [lindex $pgs(s2mm_stream_bits) $k]
+	add_ip axi_dma dma$k [list c_include_sg 1 c_sg_include_stscntrl_strm 0 c_micro_dma 0 \
+		c_sg_length_width $pgs(dma_length_bits) c_addr_width $pgs(dma_address_bits) \
+		c_include_mm2s 1 c_m_axi_mm2s_data_width $in c_m_axis_mm2s_tdata_width $in \
+		c_include_mm2s_dre 0 c_mm2s_burst_size 16 \
+		c_include_s2mm 1 c_m_axi_s2mm_data_width $out c_s_axis_s2mm_tdata_width $out \
+		c_include_s2mm_dre 0 c_s2mm_burst_size 16]
+	clocked dma$k {s_axi_lite_aclk m_axi_sg_aclk m_axi_mm2s_aclk m_axi_s2mm_aclk} axi_resetn
+	link dma$k/M_AXIS_MM2S accelerator/s${k}_axis
+	link accelerator/m${k}_axis dma$k/S_AXIS_S2MM
+	wire dma$k/mm2s_introut interrupts/mm2s$k
+	wire dma$k/s2mm_introut interrupts/s2mm$k
+
+	add_ip smartconnect memory$k {NUM_SI 3 NUM_MI 1}
+	clocked memory$k aclk aresetn
+	clocked processor saxihp${k}_fpd_aclk {}
+	link dma$k/M_AXI_SG memory$k/S00_AXI
+	link dma$k/M_AXI_MM2S memory$k/S01_AXI
+	link dma$k/M_AXI_S2MM memory$k/S02_AXI
+	link memory$k/M00_AXI processor/S_AXI_HP${k}_FPD
+	# A core reaches both parts of the DDR, and neither the on-chip memory nor the flash. A segment that this
+	# version of the processing system does not have needs no exclusion.
+	set port processor/SAXIGP[expr {$k + 2}]/HP$k
+	foreach space [list dma$k/Data_SG dma$k/Data_MM2S dma$k/Data_S2MM] {
+		place $space ${port}_DDR_LOW {*}$pgs(ddr_low)
+		place $space ${port}_DDR_HIGH {*}$pgs(ddr_high)
+		foreach other {LPS_OCM QSPI} {
+			catch {
+				exclude_bd_addr_seg -target_address_space [get_bd_addr_spaces $space] \
+					[segment ${port}_$other]
+			}
+		}
+	}
+}
+
+proc zcu102::build_design {khz} {
+	global pgs
+	create_bd_design pgs
+	add_processor
+	add_clock $khz
+	add_accelerator
+	for {set k 0} {$k < [llength $pgs(dma_addresses)]} {incr k} { add_dma $k }
+	add_registers
+	validate_bd_design
+	save_bd_design
+}
+
+# ---------------------------------------------------------------------------------------------------------
+# The project, from the Verilog to the files for the board
+
+proc zcu102::open_project_with {rtl out here} {
+	global pgs
+	create_project -force pgs [file join $out project] -part xczu9eg-ffvb1156-2-e
+	set boards [get_board_parts -quiet xilinx.com:zcu102:part0:*]
+	if {[llength $boards] == 0} { error "this Vivado has no board files of the ZCU102" }
+	set_property board_part [lindex [lsort -dictionary $boards] end] [current_project]
+	set list [open [file join $rtl pgs.f]]
+	set modules [split [string trim [read $list]] \n]
+	close $list
+	foreach module $modules { add_files -norecurse [file join $rtl $module] }
+	foreach header [lsort [glob -directory $rtl *.vh]] {
+		add_files -norecurse $header
+		set_property file_type {Verilog Header} [get_files [file tail $header]]
+	}
+	add_files -norecurse [file join $here pgs_interrupts.v]
+	update_compile_order -fileset sources_1
+}
+
+# Runs a step to its end.
+proc zcu102::run_to_end {name args} {
+	launch_runs $name {*}$args
+	wait_on_run $name
+	if {[get_property PROGRESS [get_runs $name]] ne "100%"} {
+		error "$name: [get_property STATUS [get_runs $name]]"
+	}
+}
+
+proc zcu102::report_route {out} {
+	open_run impl_1
+	report_timing_summary -max_paths 20 -file [file join $out timing.rpt]
+	report_high_fanout_nets -timing -max_nets 50 -file [file join $out fanout.rpt]
+	report_utilization -file [file join $out utilization.rpt]
+	report_utilization -hierarchical -file [file join $out utilization-hierarchical.rpt]
+	report_ram_utilization -file [file join $out ram.rpt]
+	report_methodology -file [file join $out methodology.rpt]
+}
+
+# Writes what bootgen reads, and says what to do with it.
+proc zcu102::write_bif {out} {
+	set file [open [file join $out zynq-pgs.bif] w]
+	puts $file "all: { zynq-pgs.bit }"
+	close $file
+	puts "next: cd $out && bootgen -image zynq-pgs.bif -arch zynqmp -process_bitstream bin -w"
+	puts "which makes zynq-pgs.bit.bin; docs/bitstream.md goes on from there"
+}
+
+# Everything. `here` is the folder of this script.
+proc zcu102::main {arguments here} {
+	global pgs
+	foreach help {-h -help --help} {
+		if {$help in $arguments} {
+			puts [usage]
+			return
+		}
+	}
+	set options [options $arguments]
+	set rtl [file normalize [dict get $options -rtl]]
+	set out [file normalize [dict get $options -out]]
+	set jobs [dict get $options -jobs]
+	set until [dict get $options -until]
+	read_numbers $rtl
+	set khz [dict get $options -clock-khz]
+	if {$khz eq ""} { set khz $pgs(clock_khz) }
+	if {$khz != $pgs(clock_khz)} {
+		puts "warning: the clock is $khz kHz and CLOCK_KHZ says $pgs(clock_khz): rtlgen generate --clock-khz $khz"
+	}
+	file mkdir $out
+	open_project_with $rtl $out $here
+	build_design $khz
+	if {$until eq "design"} { return }
+
+	make_wrapper -files [get_files pgs.bd] -top -import
+	set_property top pgs_wrapper [current_fileset]
+	run_to_end synth_1 -jobs $jobs
+	open_run synth_1
+	report_utilization -file [file join $out utilization-synthesis.rpt]
+	close_design
+	if {$until eq "synthesis"} { return }
+
+	set_property strategy Performance_ExplorePostRoutePhysOpt [get_runs impl_1]
+	run_to_end impl_1 -jobs $jobs
+	report_route $out
+	set setup [get_property STATS.WNS [get_runs impl_1]]
+	set hold [get_property STATS.WHS [get_runs impl_1]]
+	puts "slack at $khz kHz: $setup ns setup, $hold ns hold; [file join $out timing.rpt]"
+	if {$until eq "route"} { return }
+	if {($setup < 0 || $hold < 0) && [dict get $options -negative-slack] eq "refuse"} {
+		error "the design misses its timing, and would miscalculate without a word; see docs/bitstream.md"
+	}
+
+	run_to_end impl_1 -to_step write_bitstream -jobs $jobs
+	file copy -force [file join [get_property DIRECTORY [get_runs impl_1]] pgs_wrapper.bit] \
+		[file join $out zynq-pgs.bit]
+	write_hw_platform -fixed -include_bit -force -file [file join $out zynq-pgs.xsa]
+	write_bif $out
+}
+
+zcu102::main $argv [file dirname [file normalize [info script]]]
