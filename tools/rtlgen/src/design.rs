@@ -152,6 +152,7 @@ mod tests {
         let design = Design::new(Parameters::default());
         assert_eq!(design.depth(&design.contact), FLOAT.contact);
         assert_eq!(design.depth(&design.friction), FLOAT.friction);
+        assert_eq!(design.step_fill(), FLOAT.integration_fill);
     }
 
     /// Nothing waits for the numbers that `step/constants.v` computes while bodies load.
