@@ -1,8 +1,8 @@
 //! The yardstick of the packing benchmark: deals collisions out without making records of them.
 //!
-//! Every word of each is read, and as many bytes as its record has go to the channels, through the loops of
-//! [units](super::pack::unrolled); no body is looked up, nothing is masked, converted or looked at. About that is the
-//! least that packing can take.
+//! The loops of [units](super::pack::unrolled) read every word of a collision and write as many
+//! bytes as its record has. They look up no body, and mask, convert and check nothing. Packing can
+//! hardly take less time.
 
 use pgs_interface::profile::{Geometry, Variant};
 use pgs_interface::record::{Beat, LANES, collision, relative};
@@ -17,17 +17,18 @@ use crate::record::{Record, Row, Rows};
 use crate::scene::{Collision, Collisions, Structures};
 use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
 
-/// Deals out all collisions but those at the end that fill no unit; how many were dealt out. None are of a
-/// stripe that no profile has, or where they do not lie as structures.
+/// Deals out all collisions except a rest at the end that fills no unit, and returns their number.
+/// Returns 0 for a stripe of no profile, and for collisions that do not lie in memory as
+/// structures.
 ///
-/// Shape: each channel is as long as [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel)
-/// says of their records.
+/// Shape: each channel is as long as
+/// [`Layout::beats_on_channel`](super::stripe::Layout::beats_on_channel) says for these collisions.
 pub(crate) fn deal<C: Collisions + ?Sized>(
     variant: &Variant,
     collisions: &C,
     channels: &mut [&mut [Beat]],
 ) -> usize {
-    // Others are not as many as there is room for.
+    // The channels have room for `collisions.len()` records, and for no other number.
     match collisions.structures().filter(|all| all.len() == collisions.len()) {
         Some(Structures::Array(all)) => dealt(variant, Contiguous(all), channels),
         Some(Structures::Ordered { all, order }) => {
@@ -101,7 +102,7 @@ impl Join for Alone {
     }
 }
 
-/// Two rows are a beat, one over the other: all of both is read for it.
+/// The bitwise OR of two rows is a beat, so that all words of both rows are read.
 struct Folded;
 
 impl Join for Folded {
@@ -113,7 +114,7 @@ impl Join for Folded {
     }
 }
 
-/// The words of collisions as they lie, in so many rows.
+/// The words of collisions as they lie in memory, in `ROWS` rows each.
 #[derive(Clone, Copy)]
 struct AsTheyLie<L>(L);
 
@@ -134,7 +135,7 @@ impl<'p, L: CollisionSource<'p>, const ROWS: usize> Records<ROWS> for AsTheyLie<
 /// Words of a collision.
 const WORDS: usize = size_of::<Collision>() / 4;
 
-/// All of them, and the last ones once more in the rows that are more than these.
+/// All words of a collision. A row that would pass the end holds the last four words.
 #[inline(always)]
 fn rows<const ROWS: usize>(collision: &Collision) -> [Lanes; ROWS] {
     const { assert!(ROWS * LANES >= WORDS, "all are there") };
@@ -183,7 +184,7 @@ mod tests {
                 "{}",
                 profile.name
             );
-            // Whichever of a unit it is.
+            // The last five collisions cover every position in a unit.
             for (nth, word) in
                 (COUNT - 5..COUNT).flat_map(|nth| (0..WORDS).map(move |it| (nth, it)))
             {
@@ -195,7 +196,7 @@ mod tests {
         }
     }
 
-    /// Near to where they lie and far from there.
+    /// One order reverses the list, the other swaps neighbours.
     #[test]
     fn collisions_in_an_order_are_dealt_out_in_it() {
         const MANY: u32 = 12_000;

@@ -10,51 +10,52 @@ use crate::record::sixteen::Sixteen;
 use crate::record::{Row, Rows};
 use crate::simd::{Lanes, Vectors};
 
-/// Records on their way.
+/// Records that are made on demand.
 ///
-/// `some` is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation. A loop has
-/// a copy of its own, which no pointer leads to: it lies in registers. Whoever takes such a copy puts it back:
-/// what was seen of the records on their way is in it.
+/// `some` becomes a part of the calling loop: every implementation carries `#[inline(always)]`. A
+/// loop works on its own copy of the value. No pointer leads to the copy, so it stays in registers.
+/// The copy also collects the checks of the records: the loop must write it back.
 pub(crate) trait Records<const ROWS: usize>: Copy {
-    /// How many there are.
+    /// The number of records.
     fn len(&self) -> usize;
 
-    /// Gives the rows of the `nth` so many of them, `ROWS` each, to `to`, one after the other; none if there
-    /// are fewer. Each is asked for once, in their order.
+    /// Gives the rows of the `nth` chunk of `N` records to `to`, `ROWS` rows a record, in order.
+    /// `None` if the chunk is incomplete. The caller requests each record once, in order.
     ///
-    /// What a row becomes is made before the next record is begun: more than one in f32 are in want of
-    /// registers.
+    /// The rows of a record become beats before the next record starts: two f32 records at once
+    /// need too many registers.
     fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()>;
 }
 
-/// What beats are made of rows.
+/// How rows become beats.
 pub(crate) trait Join {
     /// Rows of a beat.
     const PER_BEAT: usize;
 
-    /// The beat of so many rows, the first of these. An `#[inline(always)]` belongs to every implementation.
+    /// The beat of the first `PER_BEAT` of these rows. Every implementation carries
+    /// `#[inline(always)]`.
     fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat;
 }
 
-/// What rows become in a stream.
+/// The format of a stream's words.
 pub(crate) trait Format: Join {
-    /// What its words are, if they have sixteen bits.
+    /// The 16-bit format of the words; `None` for f32.
     const SIXTEEN: Option<Sixteen>;
 
-    /// Where bodies are looked up whose indices are sent in it.
+    /// The table for look-ups of the bodies whose indices the stream carries.
     type Among<'a>: Lookup<'a>;
 
-    /// The rows that these beats hold, in f32. An `#[inline(always)]` belongs to every implementation.
+    /// The rows of these beats, as f32. Every implementation carries `#[inline(always)]`.
     fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS];
 }
 
-/// Rows of which beats are made.
+/// Joins rows into beats.
 ///
-/// All of it is a part of the loop that gives them: no row goes through memory.
+/// The compiler inlines all of it into the loop that gives the rows: no row goes through memory.
 pub(crate) struct Beats<V, F> {
     vectors: V,
     format: PhantomData<F>,
-    /// That which fills no beat alone.
+    /// The first row of a beat that waits for its second row.
     waiting: Row,
     half: bool,
 }
@@ -65,7 +66,7 @@ impl<V: Vectors, F: Join> Beats<V, F> {
         Self { vectors, format: PhantomData, waiting: Row::zero(), half: false }
     }
 
-    /// The beat that is full with one more.
+    /// Adds a row; the beat that it completes.
     #[inline(always)]
     pub(crate) fn with(&mut self, row: Row) -> Option<Beat> {
         const { assert!(F::PER_BEAT <= 2, "one waits at most") };
@@ -80,7 +81,7 @@ impl<V: Vectors, F: Join> Beats<V, F> {
         Some(F::beat(self.vectors, [self.waiting, row]))
     }
 
-    /// The last one, if it is not full; zeros are beside its row.
+    /// The last beat, if it is half full. Zeros fill its other half.
     #[inline(always)]
     pub(crate) fn last(self) -> Option<Beat> {
         self.half.then(|| F::beat(self.vectors, [self.waiting, Row::zero()]))
@@ -90,7 +91,7 @@ impl<V: Vectors, F: Join> Beats<V, F> {
 /// Does `$work` in the format that the words of a stream have, which it knows as `$name`.
 macro_rules! in_format {
     ($format:expr, $name:ident => $work:expr) => {
-        // One loop each, in which nothing is asked of the format.
+        // A loop for each format, so that no loop tests the format.
         match $format {
             None => {
                 type $name = $crate::beat::format::Whole;

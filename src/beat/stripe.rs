@@ -28,7 +28,7 @@ use pgs_interface::profile::Variant;
 use pgs_interface::record::{LANES, pose, result};
 use pgs_interface::stripe::Stripe;
 
-/// What a segment of beats carries.
+/// The records that a segment carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Segment {
     /// Velocity of each body.
@@ -50,7 +50,7 @@ pub(crate) struct Place {
     pub(crate) slot: usize,
 }
 
-/// How the records of a segment become beats, and these go to the channels.
+/// How the records of a segment become beats, and how the beats spread over the channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Layout {
     /// Rows of a record.
@@ -62,7 +62,7 @@ pub(crate) struct Layout {
 }
 
 impl Segment {
-    /// How this bitstream has the segment.
+    /// The layout of the segment in this bitstream.
     pub(crate) const fn layout(self, variant: &Variant) -> Layout {
         let (stripes, numbers) = (&variant.profile.stripes, &variant.numbers);
         let (rows, format, stripe) = match self {
@@ -82,14 +82,14 @@ impl Layout {
         (u32::BITS / self.format.bits()) as usize
     }
 
-    /// Beats that so many records take on all channels, padding included.
+    /// Beats of `records` records on all channels, padding included.
     pub(crate) const fn beats(&self, records: usize) -> usize {
         let filled = (records * self.rows).div_ceil(self.rows_per_beat());
         if self.stripe.padded { filled.next_multiple_of(self.stripe.streams.len()) } else { filled }
     }
 
-    /// Beats that so many records put on one channel, padding included; 0 means that the segment
-    /// has no packet there.
+    /// Beats of `records` records on one channel, padding included; 0 means that the segment has no
+    /// packet there.
     pub(crate) fn beats_on_channel(&self, records: usize, channel: usize) -> usize {
         let (group, beats) = (self.stripe.streams, self.beats(records));
         let rest = &group[..beats % group.len()];
@@ -98,7 +98,8 @@ impl Layout {
 
     /// Where a beat of the segment goes.
     ///
-    /// This is the definition. What packs and unpacks without its divisions is tested against it.
+    /// This is the definition. The packer and the reader work without its divisions, and tests hold
+    /// both against it.
     pub(crate) fn place(&self, beat: usize) -> Place {
         let group = self.stripe.streams;
         let at = beat % group.len();
@@ -246,7 +247,7 @@ mod tests {
         );
     }
 
-    /// What the packer takes for granted of every profile.
+    /// The packer relies on this for every profile.
     #[test]
     fn zeros_pad_whole_issues_of_every_profile() {
         for profile in PROFILES {
@@ -265,7 +266,7 @@ mod tests {
                 assert_eq!(profile.geometry, Geometry::Absolute, "{}: 0 is a count", profile.name);
             }
             if profile.flow != Flow::Passes {
-                // A unit takes what there is.
+                // The units of a windowed design take any number of collisions.
                 continue;
             }
             let issue = profile.collisions_per_issue as usize;

@@ -1,13 +1,14 @@
 //! Writes the velocity and pose segments of a step into the channels' buffers.
 //!
-//! The buffers may be write-combining memory of a board, so they are written once, each thread's range
-//! of them upwards, in whole beats, and never read: the sum that the accelerator is checked with is
-//! taken from the values on their way.
+//! The buffers may be write-combining memory of a board. Each thread therefore writes its range of
+//! them once, upwards, in whole beats, and never reads it: the sum for the check of the accelerator
+//! is taken from the values on their way.
 //!
-//! A range goes by blocks of bodies that lie in the cache, for each is read more than once: what the
-//! caller has is looked at and made rows of ([`record`](crate::record)), which are dealt out to the
-//! channels in the format of the stream ([`StripeWriter`](super::stripe_writer::StripeWriter)). What is wrong with the input is
-//! not said here, only that something is.
+//! A range goes by blocks of bodies that fit in the cache, as the packer reads each body more than
+//! once. It checks the caller's bodies, makes their rows ([`record`](crate::record)), and writes
+//! these to the channels in the format of the stream
+//! ([`StripeWriter`](super::stripe_writer::StripeWriter)). It reports that the input is wrong, but
+//! not the cause.
 
 use std::mem;
 use std::ops::Range;
@@ -23,8 +24,8 @@ use crate::record::body_table::{End, Survey, Tags};
 use crate::scene::{Bodies, Body, Pose, Velocity};
 use crate::simd::{Vectors, Work, in_wide_vectors};
 
-/// Looks at all bodies and remembers what their collisions' records are made from, and which never
-/// move; whether validation refuses none.
+/// Checks all bodies, and keeps the values that collision records need and the indices of static
+/// bodies; returns whether validation accepts all bodies.
 pub(crate) fn survey<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
@@ -37,11 +38,12 @@ pub(crate) fn survey<B: Bodies + ?Sized>(
     good
 }
 
-/// Surveys `count` bodies and writes their velocity and pose records, the first with their inertia
-/// where the bitstream wants it; the sums of both, modulo 2^32, and whether validation refuses
-/// none.
+/// Surveys `count` bodies and writes their velocity and pose records, velocities with the inertia
+/// where the bitstream wants it; the sums of both, modulo 2^32, and whether validation accepts all
+/// bodies.
 ///
-/// Shape: each channel is as long as [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says.
+/// Shape: each channel is as long as
+/// [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says.
 pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
@@ -55,10 +57,11 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     pack(target, bodies, count, wanted, packers)
 }
 
-/// Writes the velocity records of `count` bodies, and their inertia where the bitstream wants it; the
-/// sum of the words written, modulo 2^32, and whether validation refuses none of what is read for it.
+/// Writes the velocity records of `count` bodies, with their inertia where the bitstream wants it;
+/// the sum of the words written, modulo 2^32, and whether validation accepts the bodies.
 ///
-/// Shape: each channel is as long as [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says.
+/// Shape: each channel is as long as
+/// [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says.
 pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
@@ -84,15 +87,15 @@ pub(crate) fn pack_poses<B: Bodies + ?Sized>(
     (sum, good)
 }
 
-/// What is wanted of bodies.
+/// The outputs that a caller wants of bodies.
 struct Wanted<'a> {
     into: Option<Survey<'a>>,
     velocities: Option<Piece<'a>>,
     poses: Option<Piece<'a>>,
 }
 
-/// Surveys `count` bodies and writes their records, whatever of it is wanted; the sums of velocity and
-/// of pose records, and whether validation refuses none.
+/// Surveys `count` bodies and writes their records, as far as wanted; the sums of velocity and of
+/// pose records, and whether validation accepts all bodies.
 fn pack<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
@@ -113,7 +116,7 @@ fn pack<B: Bodies + ?Sized>(
     (velocities, poses, good)
 }
 
-/// A range of bodies, and where that goes which is wanted of them.
+/// A range of bodies, and the destinations of the wanted outputs.
 struct Part<'a> {
     range: Range<usize>,
     ends: Option<&'a mut [End]>,
@@ -143,8 +146,8 @@ fn parts<'a>(
     })
 }
 
-/// What comes of bodies: the sums of the words written, whether validation refuses none, and between
-/// which indices those are that never move.
+/// The result of packing: the sums of the words written, whether validation accepts all bodies, and
+/// a range of indices that contains all static bodies.
 struct Outcome {
     velocities: u32,
     poses: u32,
@@ -152,7 +155,7 @@ struct Outcome {
     still: Range<usize>,
 }
 
-/// Around it and another range is the other.
+/// The empty range: [`around`] of it and another range is the other range.
 const NONE: Range<usize> = Range { start: usize::MAX, end: 0 };
 
 impl Default for Outcome {
@@ -170,14 +173,14 @@ impl Outcome {
     }
 }
 
-/// The least range with both in it.
+/// The smallest range that contains both.
 fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
     one.start.min(other.start)..one.end.max(other.end)
 }
 
-/// Does with one part what is wanted.
+/// Makes the wanted outputs of one part.
 ///
-/// Here is only what depends on the caller's container: where the bodies of a block lie.
+/// Only this function depends on the caller's container: it finds where the bodies of a block lie.
 fn pack_part<B: Bodies + ?Sized>(target: Target<'_>, bodies: &B, mut part: Part<'_>) -> Outcome {
     let Part { range, .. } = &part;
     let (first, until) = (range.start, range.end);
@@ -196,11 +199,11 @@ fn pack_part<B: Bodies + ?Sized>(target: Target<'_>, bodies: &B, mut part: Part<
     packer.finish()
 }
 
-/// Surveys bodies and writes their records, whatever of it is wanted, a block at a time.
+/// Surveys bodies and writes their records, as far as wanted, a block at a time.
 struct BodyPacker<'a, 'b> {
     target: Target<'a>,
     tags: Tags<'a>,
-    /// The index of the next.
+    /// The index of the next body.
     next: usize,
     /// The ends that are not written yet.
     ends: Option<&'a mut [End]>,
@@ -226,7 +229,7 @@ impl<'a, 'b> BodyPacker<'a, 'b> {
         }
     }
 
-    /// Does it with the next bodies, at most [`BODIES`].
+    /// Packs the next bodies, at most [`BODIES`].
     fn write(&mut self, bodies: &[Body]) {
         in_wide_vectors(Writing { packer: self, bodies });
     }
@@ -265,7 +268,8 @@ impl Work for Writing<'_, '_, '_> {
                 *still = around(still, &range);
             }
         } else if let Some(quick) = quick {
-            // Read anew they may be others.
+            // The caller may have changed the bodies since the survey, so their ends are made
+            // again.
             let mut ends = [End::MISSING; BODIES];
             let any_still = tags.ends(bodies, &mut ends);
             *good &= quick.bodies(range.start, bodies, &ends, any_still);
@@ -279,7 +283,7 @@ impl Work for Writing<'_, '_, '_> {
     }
 }
 
-/// Some of the bodies, in an order of their own: a view of what is packed.
+/// Some of the bodies, in an order of their own: a view for packing.
 #[derive(Debug)]
 pub(crate) struct Chosen<'a, B: ?Sized> {
     pub(crate) bodies: &'a B,
@@ -300,7 +304,7 @@ impl<B: Bodies + ?Sized> Bodies for Chosen<'_, B> {
     fn commit(&mut self, _: usize, _: Pose, _: Velocity) {}
 }
 
-/// What a block of bodies holds before it is read.
+/// The initial content of a block of copies.
 const NOBODY: Body = Body {
     pose: Pose { position: [0.0; 3], orientation: [0.0; 4] },
     velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] },

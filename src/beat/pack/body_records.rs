@@ -89,7 +89,7 @@ impl Records<{ velocity::ROWS }> for Isotropic<'_> {
     }
 }
 
-/// The same, with their inertia.
+/// The velocity records of bodies, with their inertia.
 #[derive(Clone, Copy)]
 struct World<'a> {
     bodies: &'a [Body],
@@ -126,7 +126,7 @@ impl Records<{ pose::ROWS }> for OfPoses<'_> {
     }
 }
 
-/// Gives the rows of the `nth` so many bodies to `to`: of what `record` makes of each.
+/// Gives the rows of the `nth` chunk of `N` bodies to `to`; `record` makes the record of a body.
 #[inline(always)]
 fn give<const ROWS: usize, const N: usize>(
     bodies: &[Body],

@@ -1,7 +1,7 @@
 //! Writes the collision segments of a step into the channels' buffers.
 //!
-//! As [`bodies`](super::bodies) writes theirs: by ranges for several threads, and in these block by block,
-//! once, upwards, never read back.
+//! The method is the one of [`bodies`](super::bodies): threads take ranges, each range goes block
+//! by block, and the packer writes each beat once, upwards, and never reads it back.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -26,23 +26,24 @@ use crate::validate::{Block, Look, Quick};
 #[derive(Debug)]
 pub(crate) struct Entries<'a, C: ?Sized> {
     pub(crate) collisions: &'a C,
-    /// Records, those that an order added included.
+    /// Number of records, with the entries that an order added.
     pub(crate) count: usize,
-    /// How many were added by the order that was made for them; `None` if there is none.
+    /// Number of entries that the order added; `None` without an order.
     pub(crate) added: Option<usize>,
-    /// What stands in place of the bodies' indices, of each record. Only for
-    /// [`Geometry::Relative`].
+    /// Two words for each record, in place of the bodies' indices. Only for [`Geometry::Relative`].
     pub(crate) words: Option<&'a [[u32; 2]]>,
 }
 
 /// Writes the records of collisions; the sum of the words written, modulo 2^32, and whether
-/// validation refuses none.
+/// validation accepts all of them.
 ///
-/// A body that does not exist has its position written as zeros, and one without a shape is static. Where
-/// indices are sent in sixteen bits, the lower halves of them count; of more bodies than these name nothing
-/// is written, and any is refused.
-/// Should a caller's [`Collisions`] answer differently from one look to the next, validation looks at
-/// what is written; of what looks like padding it refuses more than the order added.
+/// A body that does not exist has a position of zeros, and a body without a shape is static. Where
+/// indices are sent in sixteen bits, their lower halves count. If sixteen bits do not name all
+/// bodies, the packer writes nothing and refuses every collision.
+///
+/// A caller's [`Collisions`] may answer differently from one read to the next. The check applies to
+/// the collisions as written, and the number that look like padding must be the number that the
+/// order added.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
@@ -67,20 +68,21 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     (sum, good & as_many)
 }
 
-/// What was seen of collisions on their way.
+/// The result of the checks of collisions.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen {
-    /// Whether validation refuses none.
+    /// Whether validation accepts all of them.
     pub(crate) good: bool,
-    /// How many look like padding, where an order may have added some.
+    /// The number that look like padding, where an order may have added some.
     paddings: usize,
 }
 
 impl Seen {
-    /// Of none.
+    /// The result for no collisions.
     const NOTHING: Self = Self { good: true, paddings: 0 };
 
-    /// Of what is not written: there are more bodies than the stream's indices name, or none was looked at.
+    /// The result for collisions that are not written: the stream's indices do not name all bodies,
+    /// or no survey of the bodies has run.
     const REFUSED: Self = Self { good: false, paddings: 0 };
 
     fn and(self, other: Self) -> Self {
@@ -90,8 +92,9 @@ impl Seen {
 
 /// Writes the records of a range of collisions, otherwise as [`pack_collisions`].
 ///
-/// Here is only what depends on the caller's container: where they lie. Those that lie nowhere as
-/// structures, or are not as many there, are asked for one by one.
+/// Only this function depends on the caller's container: it finds where the collisions lie. It
+/// copies them one by one if they do not lie in memory as structures, or if the number of
+/// structures is another.
 fn pack_range<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
@@ -116,7 +119,7 @@ fn pack_range<C: Collisions + ?Sized>(
                 range.clone().step_by(BLOCK).map(|first| first..range.end.min(first + BLOCK));
             blocks.fold(Seen::NOTHING, |seen, block| {
                 let copies = &mut copies[..block.len()];
-                // All of a block are on their way while the first are copied.
+                // Prefetches the whole block before the first collision is copied.
                 block.clone().for_each(|index| collisions.prefetch(index));
                 for (to, index) in copies.iter_mut().zip(block) {
                     *to = collisions.collision(index);
@@ -129,36 +132,37 @@ fn pack_range<C: Collisions + ?Sized>(
     (packer.finish(), seen)
 }
 
-/// What is said of collisions beside what they hold.
+/// Properties of collisions beside their own values.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Marks<'a> {
-    /// Whether they are in an order that was made for them, which may have added some.
+    /// Whether they are in an order that was made for them, which may have added entries.
     pub(crate) scheduled: bool,
     /// As in [`Entries`].
     pub(crate) words: Option<&'a [[u32; 2]]>,
 }
 
-/// Writes collisions that lie somewhere.
+/// Writes collisions that lie in memory.
 ///
-/// It knows nothing of the caller's container, so that it is compiled once, with the driver.
+/// It is independent of the caller's container, so that it is compiled once, with the driver.
 pub(crate) struct CollisionPacker<'a, 'b> {
     quick: Option<&'a Quick<'a>>,
     ends: Ends<'a>,
     marks: Marks<'a>,
     dealer: StripeWriter<'a, 'b>,
     geometry: Geometry,
-    /// The index of the next.
+    /// The index of the next collision.
     next: usize,
-    /// Whether most collisions are expected to have all contact points, as those written last have. Of the first
-    /// ones it is expected.
+    /// Whether most collisions are expected to have all contact points. The last block decides; for
+    /// the first block it is true.
     most_full: bool,
 }
 
 impl<'a, 'b> CollisionPacker<'a, 'b> {
-    /// From collision `first` on, with which a group begins.
+    /// Begins with collision `first`, which begins a group.
     ///
-    /// Shape: each channel is as long as [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel)
-    /// says of what is written.
+    /// Shape: each channel is as long as
+    /// [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says for the
+    /// collisions that are written.
     pub(crate) fn new(
         target: Target<'a>,
         ends: Ends<'a>,
@@ -172,24 +176,24 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         Self { quick: target.quick, ends, marks, dealer, geometry, next: first, most_full: true }
     }
 
-    /// The same, but that it is expected of the first ones that few have all contact points.
+    /// As before, but few of the first collisions are expected to have all contact points.
     #[cfg(test)]
     pub(crate) const fn expecting_few_full(mut self) -> Self {
         self.most_full = false;
         self
     }
 
-    /// Writes the next collisions. Their number is divisible by [`BLOCK`], unless they are the last.
+    /// Writes the next collisions. Their number is divisible by [`BLOCK`], except for the last ones.
     pub(crate) fn write(&mut self, collisions: Contiguous<'_>) -> Seen {
         self.write_lying(collisions)
     }
 
-    /// The same.
+    /// As [`Self::write`], for collisions in any order.
     fn write_ordered(&mut self, collisions: Indexed<'_>) -> Seen {
         self.write_lying(collisions)
     }
 
-    /// The same.
+    /// As [`Self::write`], for collisions in an order that is close to the order in memory.
     fn write_nearby(&mut self, collisions: InNearbyOrder<'_>) -> Seen {
         self.write_lying(collisions)
     }
@@ -224,7 +228,7 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
     }
 }
 
-/// Collisions, and where they go.
+/// Collisions, and the writer that they go to.
 struct Writing<'p, 'a, 'b, K, L, const ROWS: usize> {
     kind: K,
     rows: PhantomData<[Lanes; ROWS]>,
@@ -246,13 +250,15 @@ impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Work
 }
 
 impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Writing<'p, '_, '_, K, L, ROWS> {
-    /// Whether a loop that looks jumps where all contact points are used: in loops of f32, and in those that do not
-    /// look, that costs what the masks do; what is cut to the thesis' format takes far longer than either.
+    /// Whether a loop with checks branches around the masks where all contact points are used. In
+    /// loops of f32, and in loops without checks, the branch costs as much as the masks. The
+    /// conversion to the thesis' format takes far longer than either.
     const fn jumps<F: Format>() -> bool {
         matches!(F::SIXTEEN, Some(Sixteen::Binary16))
     }
 
-    /// Encodes, looks at and deals out, block by block. Those behind are on their way meanwhile.
+    /// Encodes, checks and writes the collisions block by block, and prefetches later ones
+    /// meanwhile.
     #[inline(always)]
     fn run_as<V: Vectors, F: Format>(self, vectors: V) -> Seen {
         let Self { kind, quick, all, dealer, most_full, .. } = self;
@@ -260,13 +266,13 @@ impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Writing<'p, '
             return Seen::REFUSED;
         };
         let mut seen = Seen::NOTHING;
-        // Validation goes by blocks. Without it, as packing alone is measured, there is nothing to be done
-        // for each that is worth it.
+        // Validation goes by blocks. Packing without validation, as in a benchmark of packing
+        // alone, has no work that would be worth a block of its own.
         let size = if quick.is_some() { CHECKED } else { MANY };
         for at in (0..all.collisions.len()).step_by(size) {
             let collisions = all.collisions.part(at..at + size);
             let block = Block { first: all.first + at, collisions, ..all };
-            // One loop each, in which nothing is asked of what is looked for.
+            // A loop for each kind of check, so that no loop tests for it.
             macro_rules! written {
                 ($witness:expr, $most_full:literal) => {{
                     let mut records =
@@ -293,7 +299,7 @@ impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Writing<'p, '
                 Some(quick) if quick.asks_how_far() => looked_at!(quick, true),
                 Some(quick) => looked_at!(quick, false),
             };
-            // For the next block: of that nothing is in a cache yet.
+            // This block predicts the next one, which is in no cache yet.
             if const { Self::jumps::<F>() } {
                 *most_full = most_are_full(collisions);
             }

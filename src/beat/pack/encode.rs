@@ -11,12 +11,13 @@ use crate::scene::Collision;
 use crate::simd::{Integer, Lanes};
 use crate::validate::{Block, Locations, Look, Quick};
 
-/// Every so many collisions one is looked at to find out whether most have all contact points: eight of a block
-/// that is looked at, two of one that a caller's collisions are copied to.
+/// The sampling distance of [`most_are_full`]: eight samples in a block that is checked, two in a
+/// block of copies of a caller's collisions.
 const SAMPLED: usize = 15;
 
-/// Whether most of these have all contact points, a few of which tell: of eight one may be another, as a jump
-/// that is not foreseen costs about as much as eight times the masks.
+/// Whether most of these collisions have all contact points, according to a sample. One sample in
+/// eight may have fewer, as a mispredicted branch costs about as much as the masks of eight
+/// collisions.
 #[inline(always)]
 pub(crate) fn most_are_full<'p>(collisions: impl CollisionSource<'p>) -> bool {
     let sampled = (0..collisions.len()).step_by(SAMPLED);
@@ -28,16 +29,16 @@ pub(crate) fn most_are_full<'p>(collisions: impl CollisionSource<'p>) -> bool {
 
 /// A kind of collision record of `ROWS` rows.
 pub(crate) trait Kind<const ROWS: usize>: Copy {
-    /// Where the bodies of a collision are looked up whose record is sent in a format.
+    /// The table for look-ups of a collision's bodies, if the record is sent in format `F`.
     type Among<'a, F: Format>: Lookup<'a>;
 
-    /// The ends that a record is made from, given those of the collision's bodies.
+    /// The ends that a record is made from, given the ends of the collision's bodies.
     fn anchors(ends: [&End; 2]) -> [&End; 2];
 
     /// The record of collision `index`, from its [anchors](Self::anchors).
     fn encode(self, index: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<ROWS>;
 
-    /// The locations that it holds.
+    /// The locations that the record holds.
     fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations;
 }
 
@@ -101,24 +102,25 @@ impl Kind<{ relative::ROWS }> for Relative {
 /// The ends that a relative record is made from.
 #[inline(always)]
 fn anchored([a, b]: [&End; 2]) -> [&End; 2] {
-    // Whether one never moves is mostly foreseen, as few collisions are with what never moves or nearly all
-    // are: a jump costs less then than to choose.
+    // Either few collisions have a static body, or nearly all have one, so the processor mostly
+    // predicts this branch. A predicted branch costs less than a select.
     if a.is_static() | b.is_static() { one_still(a, b) } else { [a, b] }
 }
 
-/// The same of bodies one of which never moves.
+/// As [`anchored`], if a body is static.
 #[cold]
 #[inline(never)]
 fn one_still<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
     record::relative::anchors([a, b], [!a.is_static(), !b.is_static()])
 }
 
-/// Records relative to body A, with these words in place of the indices of each one's bodies.
+/// Records relative to body A, with a pair of words in place of each collision's body indices.
 #[derive(Clone, Copy)]
 pub(crate) struct Worded<'a>(pub(crate) &'a [[u32; 2]]);
 
 impl Kind<{ relative::ROWS }> for Worded<'_> {
-    /// The words are short and the indices are not: there may be more bodies than sixteen bits name.
+    /// The words have sixteen bits, but the indices have more: sixteen bits may not name all
+    /// bodies.
     type Among<'a, F: Format> = Ends<'a>;
 
     #[inline(always)]
@@ -163,11 +165,11 @@ fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
     [ends.get(collision.body_a), ends.get(collision.body_b)]
 }
 
-/// The records of a block of collisions, seen by a witness on their way. What is behind it is fetched
-/// meanwhile.
+/// The records of a block of collisions. A witness sees each record, and later collisions are
+/// prefetched.
 ///
-/// `MOST_FULL` says whether most have all contact points: where all that are made together have, nothing is
-/// masked. That is a jump, which is foreseen then.
+/// `MOST_FULL` says that most collisions have all contact points. A chunk in which every collision
+/// has all of them is encoded without masks. The branch for this is then mostly predicted.
 #[derive(Clone, Copy)]
 pub(crate) struct Encoding<K, L, E, W, const MOST_FULL: bool> {
     kind: K,
@@ -180,7 +182,7 @@ pub(crate) struct Encoding<K, L, E, W, const MOST_FULL: bool> {
 impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, W, const MOST_FULL: bool>
     Encoding<K, L, E, W, MOST_FULL>
 {
-    /// Those of a block, whose bodies are looked up here.
+    /// The records of a block. Their bodies are looked up in `ends`.
     #[inline(always)]
     pub(crate) fn new(kind: K, block: &Block<'p, L>, ends: E, witness: W) -> Self {
         let Block { first, collisions, .. } = *block;
@@ -188,10 +190,10 @@ impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, W, const MOST_FULL: bool>
     }
 }
 
-/// Who sees the records on their way. An `#[inline(always)]` belongs to every implementation.
+/// Observes the records as they are made. Every implementation carries `#[inline(always)]`.
 pub(crate) trait Witness: Copy {
-    /// Sees the collision of one, the ends of its bodies as they were looked up, and those that the record is
-    /// made from.
+    /// Sees a collision, the ends of its bodies as they were looked up, and the ends that its
+    /// record is made from.
     fn see<K: Kind<ROWS>, const ROWS: usize>(
         &mut self,
         of: Counted<'_>,
@@ -200,7 +202,7 @@ pub(crate) trait Witness: Copy {
     );
 }
 
-/// Nobody.
+/// Packs without a check.
 impl Witness for () {
     #[inline(always)]
     fn see<K: Kind<ROWS>, const ROWS: usize>(
@@ -212,7 +214,7 @@ impl Witness for () {
     }
 }
 
-/// Whoever looks at them as validation does.
+/// Checks collisions as validation does.
 impl<const REACHES: bool> Witness for Look<REACHES> {
     #[inline(always)]
     fn see<K: Kind<ROWS>, const ROWS: usize>(
@@ -228,8 +230,8 @@ impl<const REACHES: bool> Witness for Look<REACHES> {
 impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, const REACHES: bool, const MOST_FULL: bool>
     Encoding<K, L, E, Look<REACHES>, MOST_FULL>
 {
-    /// Whether validation refuses none of the block, all of whose records were taken; and how many of it look
-    /// like padding, if the block is scheduled.
+    /// Whether validation accepts the whole block, whose records must all be made before the call;
+    /// and the number of collisions that look like padding, if the block is scheduled.
     #[inline(always)]
     pub(crate) fn good<const ROWS: usize>(
         self,
@@ -240,7 +242,8 @@ impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, const REACHES: bool, const MO
         K: Kind<ROWS>,
     {
         let Self { ends, witness, .. } = self;
-        // These are asked for only where every record was made of its own bodies' ends, or is padding.
+        // The witness reads these only if every record was made from its own bodies' ends, or is
+        // padding.
         let locations = block
             .collisions
             .iter()
@@ -249,15 +252,15 @@ impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, const REACHES: bool, const MO
     }
 }
 
-/// Does something with each of so many. A loop of so much is not unrolled, and its rows would go through
-/// memory.
+/// Does `$work` for each index below `$count`, written out. The compiler does not unroll a loop of
+/// this size, and the rows would go through memory.
 macro_rules! each {
     ($count:ident, $at:ident => $work:expr) => {
         each!($count, $at => $work; 0 1 2 3 4)
     };
     ($count:ident, $at:ident => $work:expr; $($nth:literal)*) => {
         const { assert!($count <= [$($nth),*].len(), "all of them are written out") };
-        // What there is not is not compiled.
+        // An index beyond the count is not compiled.
         $(if const { $nth < $count } {
             let $at = $nth;
             $work;
@@ -268,7 +271,7 @@ macro_rules! each {
 pub(crate) use each;
 
 impl<'p, K, L, E: Lookup<'p>, W: Witness, const MOST_FULL: bool> Encoding<K, L, E, W, MOST_FULL> {
-    /// The record of one of the block, which the witness sees.
+    /// The record of one collision of the block, which the witness sees.
     #[inline(always)]
     fn record<const ROWS: usize>(&mut self, at: usize, of: Counted<'_>) -> Record<ROWS>
     where

@@ -10,7 +10,7 @@ pub(crate) enum Pattern {
     FloatCollisions,
     HalfCollisions,
     HalfBodies,
-    /// A beat for each of so many channels, in their order.
+    /// A beat for each channel, in order; the name is the number of channels.
     One,
     Two,
     Three,
@@ -25,7 +25,7 @@ pub(crate) trait Places<const BEATS: usize> {
 macro_rules! places {
     ($($pattern:ident: $streams:expr;)*) => {
         impl Pattern {
-            /// That of a group, if it is one of these, and its first channel.
+            /// The pattern of a group, if a profile has it, and the first channel of the group.
             pub(crate) fn of(group: &[u8]) -> Option<(Self, usize)> {
                 let first = *group.iter().min()?;
                 let is = |streams: &[u8]| {
@@ -55,8 +55,9 @@ places! {
     Four: FLOAT.stripes.poses.streams;
 }
 
-/// Units of a pattern: so many records, which are so many beats, and on each channel so many of them.
-/// Each is told to the macro `each`, which returns if it is the one.
+/// The units of a pattern. `HalfBodies: 5 are 10: a 4, b 4, c 2` means that 5 records are 10 beats,
+/// 4 on the first channel, 4 on the second and 2 on the third. The macro `each` receives each unit,
+/// and returns if the unit fits.
 macro_rules! units {
     ($pattern:expr, $each:ident) => {
         match $pattern {
@@ -91,7 +92,7 @@ macro_rules! units {
 }
 pub(crate) use units;
 
-/// Where beats go that are dealt out in groups.
+/// The places of beats that are dealt out in groups.
 const fn dealt<const BEATS: usize>(streams: &[u8]) -> [Place; BEATS] {
     let mut places = [Place { channel: 0, slot: 0 }; BEATS];
     let mut at = 0;

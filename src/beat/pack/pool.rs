@@ -1,7 +1,8 @@
 //! Splits the records of a segment into ranges, and packs or reads the ranges on several threads.
 //!
-//! A range is whole blocks, but for the last, so that it begins with a group of every stripe: on each
-//! channel its beats lie by themselves. Only the last range ends within a group, and is padded.
+//! Every range except the last consists of whole blocks. Each range therefore begins with a group
+//! of every stripe, and its beats are one piece of each channel. Only the last range ends within a
+//! group, and is padded.
 
 use std::num::NonZero;
 use std::ops::Range;
@@ -16,38 +17,39 @@ use super::stripe_writer::BLOCK;
 use crate::beat::stripe::Layout;
 use crate::platform::{acquire_from_device, release_to_device};
 
-/// Records of a range: so few that nobody waits long for a thread that took the last one, so many that
-/// taking one costs nothing beside it. As many are not worth waking a thread.
+/// Records of a range. A range is short enough that the last thread does not keep the others
+/// waiting, and long enough that handing it out costs next to nothing. A segment of one range is
+/// not worth another thread.
 pub(crate) const RANGE: usize = 68 * BLOCK;
 const _: () = assert!(RANGE.is_multiple_of(BLOCK));
-/// Threads that are taken unasked, at most: what several write is soon as much as the memory takes.
+/// Limit of the default number of threads: a few threads saturate the memory.
 const UNASKED: usize = 4;
-/// Threads at most.
+/// Limit of the number of threads.
 const MOST: usize = 64;
 
 /// The threads that write records and read results.
 #[derive(Debug)]
 pub(crate) struct PackPool {
-    /// How many there may be, the caller's among them; as many as are worth it, if nobody said it.
+    /// Number of threads at most, the caller's thread included; `None` for the default.
     threads: Option<usize>,
-    /// They are started when there is something for them.
+    /// The other threads, which start with the first segment of more than one range.
     crew: Option<Crew>,
 }
 
 impl PackPool {
-    /// At most so many threads, of which one is the caller's; as many as are worth it for `None`.
+    /// At most `threads` threads, the caller's thread included; `None` for the default.
     pub(crate) const fn new(threads: Option<usize>) -> Self {
         Self { threads, crew: None }
     }
 
-    /// Nobody but the caller.
+    /// The caller's thread alone.
     #[cfg(any(test, feature = "bench"))]
     pub(crate) const fn alone() -> Self {
         Self::new(Some(1))
     }
 
-    /// Does the work of `count` records, cut into ranges of as many records as `cut` is told; what
-    /// comes of each is joined, in no particular order.
+    /// Cuts `count` records into ranges of the size that `cut` receives, does the work of each
+    /// range, and joins the results in no particular order.
     pub(crate) fn each<T, R, I: Iterator<Item = T> + Send>(
         &mut self,
         count: usize,
@@ -56,23 +58,23 @@ impl PackPool {
         mut join: impl FnMut(R) + Send,
     ) {
         let Some(crew) = self.crew_for(count) else {
-            // All of it is one range.
+            // The whole segment is one range.
             let whole = cut(count.next_multiple_of(BLOCK).max(BLOCK));
             return whole.for_each(|range| join(work(range)));
         };
         let join = Mutex::new(join);
         crew.each(cut(RANGE), |range| {
-            // The caller's own barriers, after the board has told and before it is told, are of what the caller
-            // loads and stores.
+            // The caller has barriers of its own, but they order only the loads and stores of its
+            // own thread.
             acquire_from_device();
             let done = work(range);
             release_to_device();
-            // After a panic nothing that was joined is used.
+            // After a panic no joined result is used.
             join.lock().unwrap_or_else(PoisonError::into_inner)(done);
         });
     }
 
-    /// The threads for so many records; none if the caller does it alone.
+    /// The threads for `count` records; `None` if the caller works alone.
     fn crew_for(&mut self, count: usize) -> Option<&mut Crew> {
         if count <= RANGE || self.threads == Some(1) {
             return None;
@@ -93,7 +95,7 @@ fn start(threads: Option<usize>) -> Crew {
     crew
 }
 
-/// The records of each range.
+/// The record indices of each range.
 pub(crate) fn ranges(
     count: usize,
     size: usize,
@@ -101,11 +103,11 @@ pub(crate) fn ranges(
     (0..count).step_by(size).map(move |first| first..count.min(first + size))
 }
 
-/// Beats on each channel; none on those that there are not.
+/// Beats of each channel; empty for a channel that the board does not have.
 type PieceOf<S> = [S; DMA_COUNT_MAX];
-/// Those that are written.
+/// Beats to write.
 pub(crate) type Piece<'a> = PieceOf<&'a mut [Beat]>;
-/// Those that are read.
+/// Beats to read.
 pub(crate) type PieceRead<'a> = PieceOf<&'a [Beat]>;
 
 /// All beats of a segment, to be written.
@@ -126,9 +128,9 @@ pub(crate) fn whole_read<'a>(channels: &[&'a [Beat]]) -> PieceRead<'a> {
     whole
 }
 
-/// Beats one behind the other on a channel.
+/// Consecutive beats of a channel.
 pub(crate) trait Stretch: Default {
-    /// So many of them, or as many as there are, and what is behind.
+    /// The first `beats` beats, or all if there are fewer; and the rest.
     fn parted(self, beats: usize) -> (Self, Self);
 }
 
@@ -147,7 +149,7 @@ impl Stretch for &[Beat] {
 /// The channels of a segment, cut into ranges.
 #[derive(Debug)]
 pub(crate) struct ChannelChunks<S> {
-    /// Beats of a range.
+    /// Beats of a range on each channel.
     beats: [usize; DMA_COUNT_MAX],
     rest: PieceOf<S>,
 }
@@ -161,11 +163,11 @@ impl<S: Stretch> ChannelChunks<S> {
         Self { beats, rest: channels }
     }
 
-    /// The next range's; nothing behind the last.
+    /// The beats of the next range; empty after the last range.
     pub(crate) fn cut(&mut self) -> PieceOf<S> {
         let mut piece = PieceOf::default();
         for ((piece, rest), beats) in piece.iter_mut().zip(&mut self.rest).zip(self.beats) {
-            // The last one may be shorter.
+            // The last range may be shorter.
             (*piece, *rest) = std::mem::take(rest).parted(beats);
         }
         piece

@@ -1,9 +1,9 @@
 //! Deals the records of a segment out to its channels.
 //!
-//! They go by units ([`unit`](mod@unit)), from registers, and beat by beat what is left at a segment's end, or has
-//! a stripe that no profile has: in whole beats, on each channel upwards, as memory that combines
-//! writes wants them. Nothing is read back: the sum that the accelerator is checked with is taken on
-//! the way.
+//! Whole units go from registers to the channels ([`unrolled`]). The rest at a segment's end, and a
+//! stripe that no profile has, go beat by beat. Each channel is written upwards in whole beats, as
+//! write-combining memory needs. The writer reads nothing back: it takes the sum for the check of
+//! the accelerator on the way.
 
 use std::mem;
 
@@ -18,25 +18,26 @@ use crate::record::sixteen::Sixteen;
 use crate::record::{Row, Rows};
 use crate::simd::{Lanes, Vectors};
 
-/// Records of a block. Divisible by the records of a group of every stripe, so that each block
-/// begins with a group; and so few that those of a block and those fetched meanwhile lie in the innermost
-/// cache.
+/// Records of a block. The number is divisible by the records of a group of every stripe, so that
+/// each block begins with a group. A block and the collisions that are prefetched meanwhile fit in
+/// the L1 cache.
 pub(crate) const BLOCK: usize = 30;
 
-/// Records of many blocks: so many that beginning one costs next to nothing a record.
+/// Records of many blocks: at this number the start of a run costs next to nothing a record.
 pub(crate) const MANY: usize = 32 * BLOCK;
 
-/// Collisions in an array that are looked at together: as many as lie in the innermost cache, should they be
-/// looked at again.
+/// Collisions of an array that are checked together: they fit in the L1 cache, in case of a second
+/// check.
 pub(crate) const CHECKED: usize = 4 * BLOCK;
 
-/// Bodies of a block, as [`BLOCK`]: more, as they are small and lie one behind the other.
+/// Bodies of a block. The number is larger than [`BLOCK`], as bodies are small and adjacent in
+/// memory.
 pub(crate) const BODIES: usize = 120;
 const _: () = assert!(BODIES.is_multiple_of(BLOCK), "so that each begins with a group");
 
 /// Writes the records of one segment.
 pub(crate) struct StripeWriter<'a, 'b> {
-    /// What is not written yet.
+    /// The beats that are not written yet.
     channels: &'a mut [&'b mut [Beat]],
     format: Option<Sixteen>,
     /// The stripe, if it is known, and its first channel.
@@ -61,7 +62,7 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
         }
     }
 
-    /// Writes the next records; only the last block may be one that is not whole.
+    /// Writes the next records; only the last block may be incomplete.
     #[inline(always)]
     pub(crate) fn write<V: Vectors, R: Records<ROWS>, const ROWS: usize>(
         &mut self,
@@ -77,7 +78,7 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
         self.format
     }
 
-    /// As [`Self::write`], in this format, which is [`Self::format`].
+    /// As [`Self::write`], in the format `F`, which is [`Self::format`].
     #[inline(always)]
     pub(crate) fn write_as<V: Vectors, F: Format, R: Records<ROWS>, const ROWS: usize>(
         &mut self,
@@ -94,7 +95,7 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
             _ => 0,
         };
         self.sum = sum;
-        // What is left of them fills no unit.
+        // The units did not take these records.
         let mut rest = Rest { dealer: self, beats: Beats::<V, F>::new(vectors) };
         for at in done..records.len() {
             if records.some::<1>(at, &mut rest).is_none() {
@@ -107,7 +108,8 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
         }
     }
 
-    /// Writes the next beat. Where it becomes a part of the loops of units these are in want of registers.
+    /// Writes the next beat. Inlined into the loops of units, it would leave them too few
+    /// registers.
     #[inline(never)]
     fn put(&mut self, beat: Beat) {
         let channel = self.deal.next();
@@ -127,7 +129,7 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
     }
 }
 
-/// Where rows go whose beats are written one by one.
+/// Takes rows whose beats are written one by one.
 struct Rest<'d, 'a, 'b, V, F> {
     dealer: &'d mut StripeWriter<'a, 'b>,
     beats: Beats<V, F>,
@@ -190,7 +192,7 @@ mod tests {
     }
 
     proptest! {
-        /// Of stripes that no profile has, and of some that one has.
+        /// Covers stripes that no profile has, and some that a profile has.
         #[test]
         fn every_beat_goes_where_the_definition_says(
             records in prop::collection::vec(prop::array::uniform3(any::<[u32; LANES]>()), 0..100),
@@ -203,7 +205,7 @@ mod tests {
             ]),
         ) {
             let layout = Layout { rows: ROWS, format, stripe: Stripe { streams, padded } };
-            // Full of ones, so that a beat left out is seen.
+            // The segments are full of ones, so that a missing beat shows.
             let mut segments: Vec<Vec<Beat>> = (0..4)
                 .map(|channel| vec![Beat([u32::MAX; LANES]); layout.beats_on_channel(records.len(), channel)])
                 .collect();

@@ -5,11 +5,11 @@ use pgs_interface::profile::Variant;
 use crate::scene::Shape;
 use crate::validate::Quick;
 
-/// What records are packed for.
+/// The target that records are packed for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Target<'a> {
     pub(crate) variant: &'a Variant,
     pub(crate) shapes: &'a [Shape],
-    /// Looks at everything on its way; without it nothing is wrong.
+    /// The check of everything that is packed; `None` packs unchecked.
     pub(crate) quick: Option<&'a Quick<'a>>,
 }

@@ -1,7 +1,7 @@
 //! Writes records to the channels, stripe by stripe, in loops that the compiler unrolls.
 //!
-//! A *unit* is as many records as fill whole groups of a stripe. Its rows go from registers to their
-//! places in whole beats, on each channel upwards, with nothing in between.
+//! A *unit* is a number of records that fills whole groups of a stripe. Its rows go from registers
+//! to their places in whole beats, on each channel upwards, with nothing in between.
 
 use std::mem;
 
@@ -14,8 +14,9 @@ use crate::beat::stripe::Place;
 use crate::record::{Row, Rows};
 use crate::simd::{Lanes, Vectors};
 
-/// Writes as many records as fill whole units, and adds the words written to `sum`; how many records
-/// these are. `rest` is what is not written yet of the channels, from the first of the stripe on.
+/// Writes records as long as they fill whole units, and adds the words written to `sum`; returns
+/// the number of these records. `rest` is the unwritten part of the channels, from the first
+/// channel of the stripe on.
 #[inline(always)]
 pub(crate) fn write<V: Vectors, F: Join, R: Records<ROWS>, const ROWS: usize>(
     pattern: Pattern,
@@ -27,7 +28,8 @@ pub(crate) fn write<V: Vectors, F: Join, R: Records<ROWS>, const ROWS: usize>(
     macro_rules! unit {
         ($places:ident: $records:literal are $beats:literal: $($channel:ident $share:literal),*) => {
             if const { $records * ROWS == $beats * F::PER_BEAT } {
-                // As a part of all the others this loop would have hardly a register.
+                // Inlined together with the loops of all other units, this loop would have hardly a
+                // register.
                 let begin = (*records, *sum);
                 let written;
                 (*records, *sum, written) = vectors.apart(move || {
@@ -96,12 +98,12 @@ fn unit<
     }
 }
 
-/// The beats of a unit, to be kept in registers: while none is written, what records are made from is read
-/// where it is needed.
+/// The beats of a unit, in registers. No beat is stored before the unit is complete, so the
+/// compiler may load the sources of a record where it needs them.
 struct Made<'a, V, F> {
     beats: Beats<V, F>,
     to: &'a mut [Beat],
-    /// How many there are.
+    /// The number of beats so far.
     at: usize,
 }
 
@@ -127,7 +129,7 @@ mod tests {
     use crate::record::sixteen::Sixteen;
     use crate::simd::{Work, in_wide_vectors};
 
-    /// The places that a pattern has for so many beats.
+    /// The places of the first `BEATS` beats of a pattern.
     fn places<const BEATS: usize>(pattern: Pattern) -> [Place; BEATS] {
         match pattern {
             Pattern::FloatCollisions => pattern::FloatCollisions::PLACES,
@@ -174,7 +176,7 @@ mod tests {
         }
     }
 
-    /// How many of them a layout has written by units.
+    /// Counts the records that a layout writes by units.
     struct Written<const ROWS: usize>(Layout);
 
     impl<const ROWS: usize> Work for Written<ROWS> {
@@ -193,7 +195,7 @@ mod tests {
         }
     }
 
-    /// Otherwise they would be as right, and slower.
+    /// Records outside of units would be as right, and slower.
     #[test]
     fn all_records_of_the_profiles_are_written_by_units() {
         for profile in PROFILES {

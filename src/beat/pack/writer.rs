@@ -40,10 +40,10 @@ impl fmt::Debug for Writer<'_> {
 }
 
 impl<'a> Writer<'a> {
-    /// From the first collision on, with room for so many.
+    /// Begins with the first collision and has room for `room` collisions.
     ///
-    /// Shape: each channel is as long as [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel)
-    /// says for `room`.
+    /// Shape: each channel is as long as
+    /// [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says for `room`.
     pub(crate) fn new(
         target: Target<'a>,
         ends: Ends<'a>,
@@ -62,11 +62,11 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Writes the next collision. Its index is that of [`Self::len`] before.
+    /// Writes the next collision. Its index is the value of [`Self::len`] before the call.
     ///
-    /// Whether it is right is looked at a little later: what is wrong with one is said when all are
-    /// written, and what comes after it is left out ([`Self::is_refused`]): the length stands still.
-    /// Whatever the caller's floating-point environment is, the records are the same.
+    /// Validation follows a little later, and its error comes when all collisions are written. Once
+    /// [`Self::is_refused`], the writer drops every further collision, and the length stands still.
+    /// The records do not depend on the caller's floating-point environment.
     #[inline]
     pub fn push(&mut self, collision: &Collision) {
         if self.is_refused() {
@@ -95,7 +95,8 @@ impl<'a> Writer<'a> {
         self.len() == 0
     }
 
-    /// Whether a collision was found to be wrong: the step is refused, whatever is written after it.
+    /// Whether a collision was found to be wrong. The step is then refused, whatever is written
+    /// later.
     #[must_use]
     pub fn is_refused(&self) -> bool {
         self.refused.is_some()
@@ -103,12 +104,13 @@ impl<'a> Writer<'a> {
 
     #[cold]
     fn overfull(&mut self) {
-        // What was wrong before is said first.
+        // An earlier error takes precedence.
         self.flush();
         self.refused.get_or_insert(InputError::MoreThanAnnounced { announced: self.room });
     }
 
-    /// Makes the records of what is held: all that a writer computes, called from the caller's narrow phase.
+    /// Makes the records of the held collisions. All computation of a writer happens here, on the
+    /// call of the caller's narrow phase.
     fn flush(&mut self) {
         standard(|| self.make_records());
     }
@@ -123,17 +125,17 @@ impl<'a> Writer<'a> {
             let ends = self.ends;
             let block = Block { first, collisions, ends, scheduled: false };
             let found = self.quick.and_then(|quick| quick.refusal(&block).err());
-            // What was not written is never sent.
+            // A block that was not written is never sent.
             self.refused = Some(found.unwrap_or(InputError::Unsteady));
         }
     }
 
-    /// Ends the segment; the sum of the words written, modulo 2^32, and how many collisions there are.
+    /// Ends the segment; the sum of the words written, modulo 2^32, and the number of collisions.
     ///
     /// # Errors
-    /// What validation refuses of the first collision that is wrong;
-    /// [`InputError::MoreThanAnnounced`]; [`InputError::Unsteady`] of what was not written although nothing is
-    /// wrong with it, which the driver's limits on bodies rule out.
+    /// The refusal of the first wrong collision by validation; [`InputError::MoreThanAnnounced`];
+    /// [`InputError::Unsteady`] if collisions were not written although nothing is wrong with them,
+    /// which the driver's limits on bodies rule out.
     pub(crate) fn finish(mut self) -> Result<(u32, usize), InputError> {
         self.flush();
         match self.refused {
@@ -159,7 +161,7 @@ mod tests {
     use crate::validate::{Limits, preflight};
     use pgs_interface::profile::HALF;
 
-    /// The driver's limits on bodies rule it out; that such a step is refused does not rest on them.
+    /// The driver's limits on bodies rule this case out, but the refusal does not rest on them.
     #[test]
     fn what_is_not_written_is_refused() {
         let shapes = [Shape::isotropic(1.0, 1.0)];

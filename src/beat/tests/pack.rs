@@ -1,5 +1,5 @@
-//! What the packer writes, read back by a decoder that was written from the specification's tables
-//! and shares nothing with it: no stripe, no record, no conversion.
+//! Reads the packer's beats back with a decoder that was written from the specification's tables
+//! and shares nothing with the packer: no stripe, no record, no conversion.
 
 use bytemuck::Zeroable as _;
 use proptest::prelude::*;
@@ -19,7 +19,8 @@ use pgs_interface::number::{Numbers, StreamFormat};
 use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16};
 use pgs_interface::record::Beat;
 
-/// Collisions that lie in an order of their own; beyond the list are some without contact points.
+/// Collisions in an order of their own. An index beyond the list is a collision without contact
+/// points.
 struct Placed<'a> {
     list: &'a [Collision],
     order: &'a [u32],
@@ -39,7 +40,7 @@ impl Collisions for Placed<'_> {
     }
 }
 
-/// Collisions that do not lie anywhere.
+/// Collisions that do not lie in memory as structures.
 struct Given<'a>(&'a [Collision]);
 
 impl Collisions for Given<'_> {
@@ -203,7 +204,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Checks that there are as many beats as so many rows need.
+    /// Checks that the beats are as many as `needed` rows take.
     fn new(
         spec: &Spec,
         group: &[usize],
@@ -256,7 +257,7 @@ fn packed(
     buffers
 }
 
-/// Shapes that every bitstream takes but the last.
+/// Shapes. Every bitstream takes all of them except the last.
 const SHAPES: [Shape; 3] = [
     Shape::STATIC,
     Shape::isotropic(1.0, 1.5),
@@ -417,7 +418,7 @@ proptest! {
             let ends = [collision.body_a, collision.body_b].map(|index| bodies[index as usize]);
             let [mut a, mut b] = ends.map(|body| body.pose.position);
             if spec.relative {
-                // What does not move is where the other body is.
+                // A static body takes the position of the other body.
                 let [a_moves, b_moves] =
                     ends.map(|body| SHAPES[body.shape as usize].inverse_mass != 0.0);
                 a = if a_moves { a } else { b };
@@ -445,7 +446,7 @@ proptest! {
         reader.end();
     }
 
-    /// Places and marks stand where the indices do elsewhere; the rest is as it is without them.
+    /// Places and marks replace the indices, and nothing else changes.
     #[test]
     fn marks_arrive_in_place_of_indices(
         short in any::<bool>(),
@@ -476,7 +477,7 @@ proptest! {
         reader.end();
     }
 
-    /// Of several blocks.
+    /// The orders reach over several blocks.
     #[test]
     fn collisions_arrive_wherever_they_lie(
         spec in any_spec(),
@@ -496,7 +497,8 @@ proptest! {
         prop_assert_eq!(&collisions(&spec, &bodies, &Given(&copied)), &expected);
     }
 
-    /// Of several blocks: they do not lie one behind the other, and each is asked for.
+    /// The picks reach over several blocks. The chosen bodies are not adjacent in memory, so the
+    /// packer copies each of them.
     #[test]
     fn chosen_bodies_arrive_in_their_own_order(
         spec in any_spec(),
@@ -568,7 +570,8 @@ fn a_body_that_does_not_exist_is_sent_with_a_position_of_zeros() {
     assert_eq!(buffers[2][0], Beat([0, 0, 0, u32::MAX]));
 }
 
-/// Where sixteen bits do not name all bodies, a profile sends all bits of an index or another word for it.
+/// Where sixteen bits do not name all bodies, a profile sends all bits of an index, or another word
+/// in its place.
 #[test]
 fn bodies_beyond_sixteen_bits_are_looked_up_by_all_their_bits() {
     let count = (1 << 16) + 2;
@@ -604,7 +607,8 @@ fn bodies_beyond_sixteen_bits_are_looked_up_by_all_their_bits() {
     }
 }
 
-/// No profile has room for them; should one come here nevertheless, nothing of them is sent.
+/// No profile has room for these bodies. If they come here nevertheless, the packer writes no
+/// collision.
 #[test]
 fn more_bodies_than_a_stream_has_indices_for_are_refused() {
     let list = [Collision::NOTHING; BLOCK];
@@ -628,7 +632,7 @@ fn more_bodies_than_a_stream_has_indices_for_are_refused() {
     }
 }
 
-/// A shape that turns with its body, and one that is not there.
+/// The shape of the first body turns with it. The second body has a shape that does not exist.
 #[test]
 fn world_inertia_is_that_of_the_bodys_shape_about_world_axes() {
     let variant = Variant { inertia: Inertia::World, ..FLOAT.default_variant() };

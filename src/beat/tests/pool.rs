@@ -1,4 +1,4 @@
-//! That records are the same however many threads write them, and results however many read them.
+//! Packs and reads on several threads: their number changes neither records nor results.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -25,12 +25,12 @@ use pgs_interface::record::Beat;
 const SHAPES: [Shape; 3] = [Shape::STATIC, Shape::isotropic(1.0, 1.5), Shape::isotropic(2.0, 0.3)];
 const SEGMENTS: [Segment; 3] = [Segment::Velocities, Segment::Poses, Segment::Collisions];
 
-/// Small numbers without an end.
+/// An endless source of small pseudo-random numbers.
 struct Numbers(u64);
 
 impl Numbers {
     fn below(&mut self, limit: u16) -> u16 {
-        // Of a linear congruence the upper bits are good.
+        // The upper bits of a linear congruential generator are the good ones.
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         u16::try_from((self.0 >> 48) % u64::from(limit)).expect("below a u16")
@@ -44,7 +44,7 @@ impl Numbers {
         [self.number(), self.number(), self.number()]
     }
 
-    /// One body in `still_of` never moves; none for 0.
+    /// One body in `still_of` is static; none for 0.
     fn body(&mut self, still_of: u16) -> Body {
         let still = still_of > 0 && self.below(still_of) == 0;
         let moving = Velocity { linear: self.vec3(), angular: self.vec3() };
@@ -55,7 +55,7 @@ impl Numbers {
         }
     }
 
-    /// One of so many has any number of contact points, the others have all.
+    /// One collision in `others` has any number of contact points; the rest have four.
     fn collision(&mut self, bodies: u16, others: u16) -> Collision {
         let body_a = self.below(bodies);
         let body_b = (body_a + 1 + self.below(bodies - 1)) % bodies;
@@ -69,7 +69,7 @@ impl Numbers {
     }
 }
 
-/// What is packed of one step.
+/// The input of one step.
 #[derive(Debug)]
 struct Input {
     limits: Limits,
@@ -78,11 +78,11 @@ struct Input {
     /// Some of the bodies, in an order of their own.
     order: Vec<u32>,
     words: Option<Vec<[u32; 2]>>,
-    /// As many places of collisions, some of which are not there.
+    /// An order as long as `collisions`. Some of its indices name no collision.
     places: Vec<u32>,
 }
 
-/// Collisions in an order.
+/// Collisions in an order, which may name collisions that do not exist.
 struct Placed<'a> {
     list: &'a [Collision],
     order: &'a [u32],
@@ -108,7 +108,7 @@ impl Collisions for Placed<'_> {
     }
 }
 
-/// All that comes of packing it.
+/// The whole output of packing.
 #[derive(Debug, PartialEq)]
 struct Packed {
     channels: Vec<Vec<Beat>>,
@@ -119,14 +119,14 @@ struct Packed {
 }
 
 impl Input {
-    /// Packs all of it.
+    /// Packs the whole input.
     fn pack(&self, packers: &mut PackPool) -> Packed {
         let Self { limits, bodies, collisions, order, places, .. } = self;
         let parameters = StepParameters::default();
         let quick = preflight(bodies, collisions, &SHAPES, &parameters, limits).map(Quick::new);
         let quick = quick.expect("nothing else is wrong");
         let target = Target { variant: &limits.variant, shapes: &SHAPES, quick: Some(&quick) };
-        // What an earlier step has left is longer or shorter.
+        // An earlier step has left a longer or a shorter table.
         let mut ends = [Table::default(), Table::default()];
         Survey { ends: &mut ends[0], statics: &mut Vec::new() }.ends(3000).fill(End::at([7.0; 3]));
         let mut statics = [vec![7; 3000], vec![]];
@@ -152,7 +152,8 @@ impl Input {
 
         let ends_of = ends[0].ends();
         let (records, (of_records, good)) = self.records(target, ends_of, collisions, packers);
-        // In an order, whether they are looked at or not, they are those copied in it.
+        // Collisions in an order give the same records as copies in that order, with and without
+        // checks.
         let unchecked = Target { quick: None, ..target };
         let placed = Placed { list: collisions, order: places };
         let copied: Vec<Collision> = (0..places.len()).map(|at| placed.copy(at)).collect();
@@ -199,7 +200,7 @@ fn views(buffers: &mut [Vec<Beat>]) -> Vec<&mut [Beat]> {
     buffers.iter_mut().map(Vec::as_mut_slice).collect()
 }
 
-/// So many records: none, few, and some around the ends of blocks and ranges.
+/// Numbers of records: none, few, and some around the ends of blocks and ranges.
 fn any_count() -> impl Strategy<Value = usize> {
     let around = |at: usize| at.saturating_sub(2)..at + 3;
     prop_oneof![
@@ -225,11 +226,11 @@ prop_compose! {
         bodies in any_count(),
         collisions in any_count(),
         chosen in any_count(),
-        // How far from where it would be a collision lies at most.
+        // The width of the window around its own index that a collision strays in.
         stray in prop::sample::select(vec![1, 900, u16::MAX]),
         still_of in prop::sample::select(vec![0, 1, 2, 50, 3000]),
         others in prop::sample::select(vec![1, 40]),
-        // What validation refuses.
+        // A body and a collision that validation refuses.
         wrong in prop::array::uniform2(prop::option::weighted(0.3, any::<prop::sample::Index>())),
         seed in any::<u64>(),
     ) -> Input {
@@ -275,14 +276,14 @@ proptest! {
             let sum = expected.sums.into_iter().fold(0, u32::wrapping_add);
             prop_assert_eq!(sum, words.into_iter().fold(0, u32::wrapping_add));
             for packers in &mut crews {
-                // Not in words, which nobody could read.
+                // `prop_assert_eq` would print all words.
                 prop_assert!(input.pack(packers) == expected, "{packers:?}");
             }
         }
     }
 }
 
-/// Or the property above would hold of nothing.
+/// The property above is not vacuous: packing notices each wrong record.
 #[test]
 fn one_wrong_record_is_noticed_in_whichever_range() {
     let mut packers = PackPool::new(Some(3));
@@ -312,7 +313,7 @@ fn one_wrong_record_is_noticed_in_whichever_range() {
     }
 }
 
-/// Each range has its threads' attention, and few records the caller's alone.
+/// The threads take one range each, and the caller alone takes few records.
 #[test]
 fn ranges_are_for_all_threads_and_few_records_for_the_caller() {
     let caller = thread::current().id();
@@ -328,7 +329,7 @@ fn ranges_are_for_all_threads_and_few_records_for_the_caller() {
     let mut joined = vec![];
     let until = Instant::now() + Duration::from_secs(60);
     let work = |range: std::ops::Range<usize>| {
-        // Of three ranges everyone gets one.
+        // The threads wait for each other, so that each takes one of the three ranges.
         here.fetch_add(1, Ordering::Relaxed);
         while here.load(Ordering::Relaxed) < 3 && Instant::now() < until {
             thread::yield_now();
@@ -343,14 +344,14 @@ fn ranges_are_for_all_threads_and_few_records_for_the_caller() {
     assert!(a != b && b != c && c != a && [a, b, c].contains(&caller));
 }
 
-/// One that is not finite is found in whichever range it is, and padding is counted once.
+/// A number that is not finite is found in every range, and padding is counted once.
 #[test]
 fn results_are_read_the_same_by_any_number_of_threads() {
     let crews = &mut [Some(1), Some(2), Some(3), None].map(PackPool::new);
     for profile in PROFILES {
         let layout = Segment::Results.layout(&profile.default_variant());
         for count in [0, 1, RANGE, RANGE + 1, 3 * RANGE + BLOCK + 1] {
-            // Finite as one number and as two.
+            // The word is finite as one number and as two.
             let word = |at: usize| 0x2000_2000 + u32::try_from(at % 0x1000).expect("few");
             let mut buffers: Vec<Vec<Beat>> = (0..profile.s2mm_widths.len())
                 .map(|channel| {

@@ -1,4 +1,4 @@
-//! What is said of the input while it is packed, against what validation says of it.
+//! Compares the packer's checks of the input with validation.
 
 use std::sync::atomic::Ordering;
 
@@ -28,22 +28,23 @@ const SHAPES: [Shape; 4] = [
 ];
 pub(crate) const BODIES: usize = 40;
 
-/// Of a body.
+/// The pose of a body.
 const POSE: Pose = Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] };
 
-/// One that is at rest, and may move.
+/// A body that is at rest, and may move.
 pub(crate) const BODY: Body =
     Body { pose: POSE, velocity: Velocity { linear: [0.0; 3], angular: [0.0; 3] }, shape: 1 };
 
-/// Near it.
+/// A contact point near the body.
 const CONTACT: Contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
 
-/// Of two such bodies, right wherever both may move.
+/// A collision of two such bodies. It is right if both may move.
 const COLLISION: Collision =
     Collision { body_a: 3, body_b: 4, normal: [0.0, 1.0, 0.0], count: 3, contacts: [CONTACT; 4] };
 
-/// All that a bitstream takes: the last is too heavy for one that flushes. As long as it is in the table
-/// no block of rows in sixteen bits is found right at once.
+/// The shapes that a bitstream takes. Only world inertia without flushing takes the last one: it is
+/// too heavy for a bitstream that flushes subnormals. With it in the table, 16-bit rows need a
+/// check of each collision.
 fn shapes(limits: &Limits) -> &'static [Shape] {
     let light = limits.flush_subnormals || limits.variant.inertia == Inertia::Isotropic;
     if light { &SHAPES[..3] } else { &SHAPES }
@@ -53,7 +54,7 @@ pub(crate) fn limits(variant: Variant, flush_subnormals: bool) -> Limits {
     Limits { flush_subnormals, ..Limits::roomy(variant) }
 }
 
-/// Buffers for so many records.
+/// Buffers for `records` records.
 fn buffers(variant: &Variant, segment: Segment, records: usize) -> Vec<Vec<Beat>> {
     let layout = segment.layout(variant);
     let channels = variant.profile.mm2s_widths.len();
@@ -66,7 +67,7 @@ fn views(buffers: &mut [Vec<Beat>]) -> Vec<&mut [Beat]> {
     buffers.iter_mut().map(Vec::as_mut_slice).collect()
 }
 
-/// Whether packing refuses none of these, whose beats are the same when nobody looks.
+/// Whether packing accepts these entries. Packing without checks must write the same beats.
 fn looked_at<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
@@ -79,7 +80,7 @@ fn looked_at<C: Collisions + ?Sized>(
         ((channels, sum), good)
     };
     let (beats, good) = packed(target);
-    // In the other loop, which a scene of few contact points is packed in.
+    // The other loop packs a scene with few contact points.
     let list: Vec<_> = (0..entries.count).map(|at| entries.collisions.collision(at)).collect();
     let mut channels = buffers(target.variant, Segment::Collisions, entries.count);
     let mut views = views(&mut channels);
@@ -87,7 +88,7 @@ fn looked_at<C: Collisions + ?Sized>(
     let packer = CollisionPacker::new(target, ends, marks, 0, &mut views);
     let mut packer = packer.expecting_few_full();
     let seen = packer.write(Contiguous(&list));
-    // What looks like padding is counted of all of them, elsewhere.
+    // `pack_collisions` compares the number of paddings over all blocks; this loop does not.
     assert!(marks.scheduled || seen.good == good, "found good as in the other loop: {}", seen.good);
     let sum = packer.finish();
     assert!((channels, sum) == beats, "the same beats in either loop");
@@ -95,10 +96,10 @@ fn looked_at<C: Collisions + ?Sized>(
     good
 }
 
-/// What packing says of a step, and what validation does.
+/// The verdict of packing on a step, and that of validation.
 pub(crate) type Said = (bool, Result<(), InputError>);
 
-/// What packing and validation say, unless the step is refused whatever it holds.
+/// The verdicts of packing and of validation; `None` if the preflight check refuses the step.
 pub(crate) fn said(
     limits: &Limits,
     bodies: &Vec<Body>,
@@ -108,8 +109,8 @@ pub(crate) fn said(
     said_and_doubted(limits, bodies, collisions, schedule).map(|(said, _)| said)
 }
 
-/// The same, and how many blocks packing found good or not only after it had looked at them as validation
-/// does.
+/// As [`said`], with the number of blocks that failed the quick check, so that packing checked them
+/// exactly.
 fn said_and_doubted(
     limits: &Limits,
     bodies: &Vec<Body>,
@@ -140,12 +141,12 @@ fn said_and_doubted(
     let (mut other_ends, mut other_statics) = (Table::default(), vec![7]);
     let into = Survey { ends: &mut other_ends, statics: &mut other_statics };
     assert_eq!(survey(target, bodies, count, into, &mut PackPool::alone()), bodies_good);
-    // As bytes: a position may be no number.
+    // The comparison is by bytes, as a position may be NaN.
     let bytes = |ends: &Table| bytemuck::cast_slice::<_, u8>(ends.of_bodies()).to_vec();
     assert_eq!((bytes(&other_ends), other_statics), (bytes(&ends), statics));
     let count = schedule.map_or(collisions.len(), Schedule::len);
     let added = schedule.map(Schedule::empty);
-    // A window has places of its own in place of indices, always.
+    // A windowed design always sends places instead of indices.
     let places = vec![[8, 9]; count];
     let words = matches!(variant.profile.flow, Flow::Window(_)).then_some(&places[..]);
     let good = match schedule {
@@ -159,7 +160,8 @@ fn said_and_doubted(
     Some(((bodies_good & good, valid), quick.doubted.load(Ordering::Relaxed)))
 }
 
-/// What is ordinary is found good at once, whatever the bitstream: to look twice would be as right, and slow.
+/// An ordinary scene passes the quick check of every bitstream. A second check would be as right,
+/// and slow.
 #[test]
 fn a_pile_is_found_good_at_once() {
     let body = |x: f32, shape| Body {
@@ -167,7 +169,7 @@ fn a_pile_is_found_good_at_once() {
         velocity: Velocity { linear: [0.1, -9.0, 0.0], angular: [0.0; 3] },
         shape,
     };
-    // A ground whose centre is far away.
+    // The centre of the ground is far away.
     let ground = Body { velocity: Velocity::default(), ..body(-400.0, 0) };
     let moving = (0..299).map(|at| body(at as f32 / 4.0, 1));
     let bodies: Vec<Body> = std::iter::once(ground).chain(moving).collect();
@@ -185,7 +187,8 @@ fn a_pile_is_found_good_at_once() {
         };
         (1..299).map(collision).collect()
     };
-    // Of any number of contact points, and nearly all of all.
+    // Collisions have one to four contact points in the first pile, and nearly always four in the
+    // second.
     let piles = [pile(|at| 1 + at % 4), pile(|at| if at % 60 == 0 { 2 } else { 4 })];
     let entries = (0..298).map(|at| (at % 90 != 89).then_some(at));
     let schedule: Schedule = entries.chain((0..298).filter(|at| at % 90 == 89).map(Some)).collect();
@@ -203,7 +206,8 @@ fn a_pile_is_found_good_at_once() {
                     for (schedule, collisions) in
                         ordered.into_iter().flat_map(|it| piles.iter().map(move |pile| (it, pile)))
                     {
-                        // Without the heaviest of the shapes, beside which nothing is found at once.
+                        // These limits exclude the heaviest shape, with which a block never passes
+                        // at once.
                         let limits = limits(variant, true);
                         let ((good, valid), doubted) =
                             said_and_doubted(&limits, &bodies, collisions, schedule)
@@ -218,7 +222,7 @@ fn a_pile_is_found_good_at_once() {
     }
 }
 
-/// Or the properties would hold of nothing: both happen, of every kind of geometry and rows.
+/// The properties are not vacuous: both verdicts occur for every geometry and width of rows.
 #[test]
 fn a_good_scene_is_good_and_one_wrong_number_is_not() {
     let bodies: Vec<Body> = (0..BODIES)
@@ -231,7 +235,7 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
     let mut collision = COLLISION;
     collision.contacts[3] = Contact { point: [f32::NAN; 3], distance: f32::NAN };
     let full = Collision { count: 4, ..COLLISION };
-    // Most have all contact points, or none has.
+    // No collision of the first pile has all contact points, and most of the second have.
     let piles = [vec![collision; 2 * CHECKED + 1], {
         let mut collisions = vec![full; 2 * CHECKED + 1];
         collisions.iter_mut().step_by(50).for_each(|some| *some = collision);
@@ -262,11 +266,11 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
     }
 }
 
-/// A block with padding among its collisions is looked at again, by another way.
+/// A block with padding among its collisions takes a second check, on another path.
 #[test]
 fn what_is_wrong_beside_padding_is_noticed() {
     let body = |shape| Body { pose: POSE, velocity: Velocity::default(), shape };
-    // The one that padding names is static, and so is the last.
+    // Padding names body 0, which is static, and so is the last body.
     let bodies = [vec![body(0)], vec![body(1); BODIES], vec![body(0)]].concat();
     let still = u32::try_from(BODIES + 1).expect("few");
     let on_ground = Collision { body_b: still, ..COLLISION };
@@ -311,13 +315,14 @@ fn what_is_wrong_beside_padding_is_noticed() {
                 assert!(!said(Some(wrong), at, empty), "{} {empty:?}: {what}", profile.name);
             }
         }
-        // What only looks like padding is counted.
+        // A collision that only looks like padding counts as padding.
         let alike = Collision { body_b: 3, count: 0, ..COLLISION };
         assert!(!said(Some(alike), 50, &[40]), "{}", profile.name);
     }
 }
 
-/// The lower halves of their indices are those of others, which are as right or wrong as these are not.
+/// The lower halves of the indices name other bodies. These are right where the named bodies are
+/// wrong, and wrong where the named bodies are right.
 #[test]
 fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
     let low = 1 << 16;
@@ -331,7 +336,7 @@ fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
     };
     for profile in [&NAIVE, &FLOAT, &WINDOWED, &WINDOWED16] {
         let limits = limits(profile.default_variant(), false);
-        // Two that never move, and all others do.
+        // Two bodies are static, and all others move.
         for still in [[0, 1], [low, low + 1]] {
             let mut bodies = vec![body(1); low + 2];
             still.iter().for_each(|at| bodies[*at] = body(0));
@@ -345,7 +350,8 @@ fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
     }
 }
 
-/// A lever arm that one body turns about, and the other may: of the last contact point alone.
+/// Only the last contact point has too long a lever arm about a body that turns. The other body may
+/// turn, too.
 #[test]
 fn an_arm_that_is_too_long_is_noticed_about_whichever_body() {
     let at = |x, shape| Body {
@@ -361,7 +367,7 @@ fn an_arm_that_is_too_long_is_noticed_about_whichever_body() {
         for (near, far) in [(2, 2), (1, 2), (2, 1), (0, 2), (2, 0)] {
             let bodies = vec![at(1.0, near), at(17.0, far)];
             for (body_a, count) in (0..8).map(|case| (case % 2, 1 + case / 2)) {
-                // Of those in the middle there may be any number.
+                // All other used contact points lie midway between the bodies.
                 let mut contacts = [contact(9.0); 4];
                 let (used, unused) = contacts.split_at_mut(count as usize);
                 used[used.len() - 1] = contact(1.0);

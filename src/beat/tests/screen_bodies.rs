@@ -1,5 +1,4 @@
-//! What is said of bodies, and of collisions with bodies far away, while they are packed, against what
-//! validation says of them.
+//! Compares the packer's checks of bodies, and of collisions with bodies far away, with validation.
 
 use super::screen::{BODY, limits, said};
 use crate::scene::{Body, Collision, Contact};
@@ -8,7 +7,7 @@ use crate::validate::Limits;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Geometry, HALF, MIXED, PROFILES, Profile, WINDOWED16};
 
-/// Whether packing and validation find these bodies right, which have no collisions, in a profile.
+/// Whether packing and validation accept these bodies in a profile, without collisions.
 fn said_of(profile: &'static Profile, bodies: &Vec<Body>) -> bool {
     let limits = limits(profile.default_variant(), true);
     let (good, valid) = said(&limits, bodies, &Vec::new(), None).expect("nothing else wrong");
@@ -33,7 +32,7 @@ fn a_static_body_that_moves_in_any_direction_is_noticed() {
     }
 }
 
-/// By the length that it has as much as by the numbers that a stream holds.
+/// Both the shortest length and the largest number that a stream holds are limits.
 #[test]
 fn an_orientation_that_is_too_short_or_too_long_is_noticed() {
     for profile in PROFILES {
@@ -59,8 +58,9 @@ fn an_orientation_that_is_too_short_or_too_long_is_noticed() {
     }
 }
 
-/// What packing and validation find good of two bodies in contact, one of which has this shape and is so far
-/// away: as body A and as body B, along each axis. Each comes with a description of its case.
+/// The verdicts of packing and of validation on two bodies in contact. One body has this shape and
+/// lies at this distance, as body A and as body B, along each axis. Each verdict comes with a
+/// description of its case.
 fn said_of_far(limits: &Limits, distance: f32, shape: u32) -> Vec<((bool, bool), String)> {
     let contact = Contact { point: BODY.pose.position, distance: -0.01 };
     let pairs = [[0, 1], [1, 0]].into_iter();
@@ -78,8 +78,8 @@ fn said_of_far(limits: &Limits, distance: f32, shape: u32) -> Vec<((bool, bool),
     cases.map(said).collect()
 }
 
-/// The arm is computed although a static body does not turn; relative records have the position of the other
-/// body in place of its own.
+/// The arm is computed although a static body does not turn. In relative records the position of
+/// the other body replaces that of the static body.
 #[test]
 fn a_static_body_that_is_too_far_is_noticed_whichever_it_is() {
     for profile in [&HALF, &MIXED, &WINDOWED16] {
@@ -94,7 +94,8 @@ fn a_static_body_that_is_too_far_is_noticed_whichever_it_is() {
     }
 }
 
-/// It is beyond what collisions hold and within what poses hold, and rows are f32: no arm is refused first.
+/// The position is beyond the range of collisions and within the range of poses. Rows are f32, so
+/// that no arm is refused first.
 #[test]
 fn a_position_that_collisions_do_not_hold_is_noticed_whichever_body_it_is_of() {
     for profile in [&HALF, &MIXED, &WINDOWED16] {

@@ -1,4 +1,4 @@
-//! What is said of any input while it is packed, against what validation says of it.
+//! Compares the packer's checks of any input with validation.
 
 use proptest::prelude::*;
 
@@ -23,7 +23,8 @@ fn any_limits() -> impl Strategy<Value = Limits> {
             let mut variant = profile.default_variant();
             if let Some((rows, format)) = other {
                 let numbers = Numbers { rows, collisions: format, ..variant.numbers };
-                // Sixteen bits have half as many beats: of these the stripe has to know.
+                // A 16-bit format halves the beats, and the stripe of a profile fits one size of
+                // word.
                 let same = format.bits() == variant.numbers.collisions.bits();
                 variant.numbers = if same { numbers } else { Numbers { rows, ..variant.numbers } };
             }
@@ -32,7 +33,7 @@ fn any_limits() -> impl Strategy<Value = Limits> {
         })
 }
 
-/// Numbers at which a check may turn over, and others.
+/// Numbers at the limits of the checks, and others.
 fn any_f32() -> impl Strategy<Value = f32> {
     let edges = [
         0.0,
@@ -95,7 +96,7 @@ prop_compose! {
             300 => (0_u32..40, 1_u32..40).prop_map(|(a, by)| [a, (a + by) % 40]),
             1 => [0_u32..42, 0_u32..42],
             1 => [any::<u32>(), any::<u32>()],
-            // Whose lower halves are those of bodies that there are.
+            // The lower halves of these indices name existing bodies.
             1 => (0_u32..40, 1_u32..40, 1_u32..4).prop_map(|(a, by, beyond)| {
                 let [a, b] = [a, (a + by) % 40];
                 [a | (beyond & 1) << 16, b | (beyond & 2) << 30]
@@ -130,7 +131,7 @@ prop_compose! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1500))]
 
-    /// In either order: what is refused is noticed, and nothing else is.
+    /// With and without an order, packing refuses a step exactly if validation does.
     #[test]
     fn packing_notices_what_validation_refuses(
         limits in any_limits(),
@@ -139,14 +140,14 @@ proptest! {
         order in any::<Option<u64>>(),
     ) {
         let schedule: Option<Schedule> = order.map(|seed| {
-            // Somewhere an empty entry, all others backwards.
+            // One entry is empty, and the others run backwards.
             let mut entries: Vec<Option<u32>> =
                 (0..u32::try_from(collisions.len()).expect("few")).rev().map(Some).collect();
             let at = usize::try_from(seed % (collisions.len() as u64 + 1)).expect("few");
             entries.insert(at, None);
             entries.into_iter().collect()
         });
-        // Of these an order is never made.
+        // No order is ever made for a collision of a body with itself.
         let alike = collisions.iter().any(|it| it.body_a == it.body_b);
         prop_assume!(schedule.is_none() || !alike);
         if let Some((good, valid)) = said(&limits, &bodies, &collisions, schedule.as_ref()) {
@@ -158,7 +159,8 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6000))]
 
-    /// Alone in its block, so that no other's mistake hides what is not noticed of it.
+    /// The collision is alone in its block, so that no other mistake hides a check that fails to
+    /// notice its own.
     #[test]
     fn packing_notices_what_validation_refuses_of_one(
         limits in any_limits(),

@@ -1,8 +1,8 @@
 //! Reads the results out of the channels' beats.
 //!
-//! The memory may be slow to read, so each beat is read once, and what is to be known of it is found out
-//! on the way. They come by units ([`collect`]), and beat by beat what is left at a segment's end, or has
-//! a stripe that no profile has.
+//! The memory may be slow to read, so each beat is read once, and the sum and the check for finite
+//! numbers are made on the way. Whole units come first ([`stripe_reader`]). The rest at a segment's
+//! end, and a stripe that no profile has, come beat by beat.
 
 use pgs_interface::record::{Beat, result};
 
@@ -17,8 +17,9 @@ use crate::record::result::Record;
 use crate::record::sixteen::Sixteen;
 use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
 
-/// Reads the results of all these records from the result segments, one a channel, on several threads where
-/// they are many; the sum as [`Reader::finish`] gives it, and whether all their numbers are finite.
+/// Reads the results of all records from the result segments, one a channel, on several threads if
+/// the records are many; the sum as [`Reader::finish`] gives it, and whether all numbers are
+/// finite.
 ///
 /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
 pub(crate) fn read_all(
@@ -49,7 +50,7 @@ pub(crate) fn read_all(
 ///
 /// A number that the accelerator could not hold is not finite.
 pub(crate) struct Reader<'a> {
-    /// What is not read yet.
+    /// The beats that are not read yet.
     channels: PieceRead<'a>,
     format: Option<Sixteen>,
     /// The stripe, if it is known, and its first channel.
@@ -72,7 +73,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads the next records. Whether all their numbers are finite.
+    /// Reads the next records; whether all their numbers are finite.
     pub(crate) fn read(&mut self, records: &mut [Record]) -> bool {
         in_wide_vectors(Reading { reader: self, records })
     }
@@ -87,7 +88,7 @@ impl<'a> Reader<'a> {
             }
             _ => 0,
         };
-        // What is left of them fills no unit.
+        // The units did not take these records.
         for record in records.iter_mut().skip(done) {
             let mut beats = [Beat::default(); result::ROWS];
             let beats = &mut beats[..result::ROWS / F::PER_BEAT];
@@ -108,8 +109,8 @@ impl<'a> Reader<'a> {
         beat[0]
     }
 
-    /// The sum of all 32-bit words of the segments, modulo 2^32, of those that fill the last group too:
-    /// what the accelerator counts of what it sent.
+    /// The sum of all 32-bit words of the segments, modulo 2^32, padding included. The accelerator
+    /// computes the same sum of the words that it sends.
     pub(crate) fn finish(self) -> u32 {
         total(self.channels.iter().copied().flatten().fold(self.sum, plus))
     }
@@ -141,7 +142,7 @@ fn plus(sum: Lanes, beat: &Beat) -> Lanes {
     sum.plus((*beat).into())
 }
 
-/// The lanes' sums in one.
+/// The sum of the lanes' sums.
 pub(crate) fn total(sum: Lanes) -> u32 {
     sum.words().into_iter().fold(0, u32::wrapping_add)
 }
@@ -162,7 +163,7 @@ mod tests {
     use pgs_interface::profile::{HALF, PROFILES, Variant};
     use proptest::prelude::*;
 
-    /// Everything that is read, and the sum.
+    /// Everything that a reader reads, and the sum.
     fn read(layout: &Layout, channels: &[&[Beat]], count: usize) -> (Vec<(Pose, Velocity)>, u32) {
         let mut reader = Reader::new(layout, channels);
         let mut records = vec![Record::default(); count];
@@ -191,7 +192,7 @@ mod tests {
         assert_eq!(read(&layout, &[&[], &[], &[]], 0).1, 0);
     }
 
-    /// In a unit of each profile and behind the last.
+    /// Covers numbers within units and, where a profile has such a rest, after the last unit.
     #[test]
     fn what_is_not_finite_is_found_wherever_it_is_and_nothing_else_is() {
         const COUNT: usize = 7;
@@ -221,7 +222,7 @@ mod tests {
         }
     }
 
-    /// So many others stand beside the one that all of a block but it are finite.
+    /// All other numbers are the largest finite one.
     #[test]
     fn what_is_not_finite_in_sixteen_bits_is_found_wherever_it_is_and_nothing_else_is() {
         for poses in [StreamFormat::Binary16, StreamFormat::Thesis16] {
@@ -271,12 +272,12 @@ mod tests {
         sign | magnitude.to_bits()
     }
 
-    /// Those of the sixteen words of a record that are numbers.
+    /// The words of a record that are numbers, out of its sixteen words.
     fn of_words<T: Copy>(words: &[T]) -> Vec<T> {
         [&words[0..3], &words[4..8], &words[8..11], &words[12..15]].concat()
     }
 
-    /// Lays out records of sixteen-bit words as `half` does, and compares the numbers read from them.
+    /// Lays out records of 16-bit words as `half` does, and compares the numbers read from them.
     fn read_sixteen_bit_results(words: &[[u16; 16]], thesis: bool) {
         // half: 0 0 1 1 2, two beats a record.
         let mut segments = vec![Vec::new(); 3];
@@ -336,7 +337,8 @@ mod tests {
             read_sixteen_bit_results(&words, thesis);
         }
 
-        /// Of the stripes of the profiles and of others, in every format, however many are read at a time.
+        /// Covers the stripes of the profiles and others, in every format, with reads of any
+        /// length.
         #[test]
         fn every_split_reads_what_the_definition_says(
             words in prop::collection::vec(any::<[u32; 16]>(), 0..40),
@@ -357,7 +359,7 @@ mod tests {
             let mut beats = words.iter().flat_map(|record| record.split_arrays().0).map(|it| Beat(*it));
             for at in 0..layout.beats(count) {
                 let Place { channel, slot } = layout.place(at);
-                // Padding is of any words.
+                // Padding may hold any words.
                 segments[channel][slot] = beats.next().unwrap_or(Beat([3; LANES]));
             }
             let expected: Vec<Record> = (0..count)

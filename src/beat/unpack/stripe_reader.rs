@@ -1,4 +1,5 @@
-//! Reads results from the channels, stripe by stripe. The compiler knows the stripes of the profiles.
+//! Reads results from the channels, stripe by stripe. The stripes of the profiles are constants of
+//! the compiler.
 //!
 //! The beats of a unit come from their places through registers into its records, on each channel
 //! upwards, with nothing in between.
@@ -13,7 +14,7 @@ use crate::record::finite::Finite;
 use crate::record::result::Record;
 use crate::simd::{Lanes, Vectors};
 
-/// What is known of what was read.
+/// The sum and the check for finite numbers of the records read so far.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tally {
     pub(crate) sum: Lanes,
@@ -21,7 +22,7 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// The record of these beats, which is counted.
+    /// Decodes the record of these beats, and counts it.
     #[inline(always)]
     pub(crate) fn record<V: Vectors, F: Format>(&mut self, vectors: V, beats: &[Beat]) -> Record {
         for beat in beats {
@@ -33,8 +34,8 @@ impl Tally {
     }
 }
 
-/// Reads as many records as fill whole units; how many these are. `rest` is what is not read yet of the
-/// channels, from the first of the stripe on.
+/// Reads records as long as they fill whole units; returns their number. `rest` is the unread part
+/// of the channels, from the first channel of the stripe on.
 #[inline(always)]
 pub(crate) fn read<V: Vectors, F: Format>(
     pattern: Pattern,
@@ -112,7 +113,7 @@ mod tests {
     use crate::record::sixteen::Sixteen;
     use crate::simd::{Work, in_wide_vectors};
 
-    /// How many records of a layout are read by units.
+    /// Counts the records of a layout that are read by units.
     struct Read(Layout);
 
     impl Work for Read {
@@ -132,7 +133,7 @@ mod tests {
         }
     }
 
-    /// Otherwise they would be as right, and slower.
+    /// Records outside of units would be as right, and slower.
     #[test]
     fn all_results_of_the_profiles_are_read_by_units() {
         for profile in PROFILES {
