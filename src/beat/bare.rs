@@ -216,7 +216,7 @@ mod tests {
         }
     }
 
-    /// A caller's container may say two things.
+    /// A caller's container may contradict itself.
     #[test]
     fn what_lies_there_is_as_many_as_are_told() {
         struct Wrong(Vec<Collision>);

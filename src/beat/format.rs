@@ -88,7 +88,7 @@ impl<V: Vectors, F: Join> Beats<V, F> {
     }
 }
 
-/// Does `$work` in the format that the words of a stream have, which it knows as `$name`.
+/// Does `$work` for the format of a stream's words, which is the type `$name` in `$work`.
 macro_rules! in_format {
     ($format:expr, $name:ident => $work:expr) => {
         // A loop for each format, so that no loop tests the format.
@@ -140,7 +140,7 @@ impl Format for Whole {
 /// Words of binary16.
 pub(crate) struct Binary16;
 
-/// Words of the thesis' sixteen bits.
+/// Words of the thesis' 16-bit format.
 pub(crate) struct Thesis16;
 
 /// A format of two rows a beat.

@@ -131,7 +131,7 @@ pub(super) struct Deal {
 }
 
 impl Deal {
-    /// From the first beat on.
+    /// Begins with the first beat.
     pub(super) const fn new(stripe: Stripe) -> Self {
         Self { group: stripe.streams, at: 0 }
     }

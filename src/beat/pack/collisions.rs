@@ -42,8 +42,8 @@ pub(crate) struct Entries<'a, C: ?Sized> {
 /// bodies, the packer writes nothing and refuses every collision.
 ///
 /// A caller's [`Collisions`] may answer differently from one read to the next. The check applies to
-/// the collisions as written, and the number that look like padding must be the number that the
-/// order added.
+/// the collisions as written. The number of collisions that look like padding must be the number of
+/// entries that the order added.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
@@ -94,7 +94,7 @@ impl Seen {
 ///
 /// Only this function depends on the caller's container: it finds where the collisions lie. It
 /// copies them one by one if they do not lie in memory as structures, or if the number of
-/// structures is another.
+/// structures is not `count`.
 fn pack_range<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
@@ -132,7 +132,7 @@ fn pack_range<C: Collisions + ?Sized>(
     (packer.finish(), seen)
 }
 
-/// Properties of collisions beside their own values.
+/// Properties of collisions that their own values do not tell.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Marks<'a> {
     /// Whether they are in an order that was made for them, which may have added entries.
@@ -152,8 +152,8 @@ pub(crate) struct CollisionPacker<'a, 'b> {
     geometry: Geometry,
     /// The index of the next collision.
     next: usize,
-    /// Whether most collisions are expected to have all contact points. The last block decides; for
-    /// the first block it is true.
+    /// Whether most collisions are expected to have all contact points. The block written last
+    /// decides; the first block expects it.
     most_full: bool,
 }
 
@@ -266,8 +266,8 @@ impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Writing<'p, '
             return Seen::REFUSED;
         };
         let mut seen = Seen::NOTHING;
-        // Validation goes by blocks. Packing without validation, as in a benchmark of packing
-        // alone, has no work that would be worth a block of its own.
+        // Validation goes by blocks. Packing without validation, as a benchmark measures it, gains
+        // nothing from small blocks.
         let size = if quick.is_some() { CHECKED } else { MANY };
         for at in (0..all.collisions.len()).step_by(size) {
             let collisions = all.collisions.part(at..at + size);

@@ -153,7 +153,7 @@ fn added([first, second, third, fourth]: [Lanes; CONTACT_POINTS]) -> Lanes {
     first.plus_f32(second).plus_f32(third.plus_f32(fourth))
 }
 
-/// The bits of the magnitude of a vec3, and none beside it.
+/// The mask of the magnitudes of a vec3. It clears the word beside the vec3.
 #[inline(always)]
 fn magnitude_of_vec3() -> Lanes {
     Lanes::new([MAGNITUDE, MAGNITUDE, MAGNITUDE, 0])

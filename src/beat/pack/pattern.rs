@@ -17,7 +17,7 @@ pub(crate) enum Pattern {
     Four,
 }
 
-/// Where the beats of a unit go, by channels from the first of the stripe on.
+/// The places of a unit's beats. Channels count from the first channel of the stripe.
 pub(crate) trait Places<const BEATS: usize> {
     const PLACES: [Place; BEATS];
 }

@@ -155,7 +155,7 @@ pub(crate) struct ChannelChunks<S> {
 }
 
 impl<S: Stretch> ChannelChunks<S> {
-    /// For ranges of `size` records, whole blocks.
+    /// Cuts the channels into ranges of `size` records, which are whole blocks.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says of all records.
     pub(crate) fn new(layout: &Layout, size: usize, channels: PieceOf<S>) -> Self {

@@ -40,7 +40,7 @@ pub(crate) struct StripeWriter<'a, 'b> {
     /// The beats that are not written yet.
     channels: &'a mut [&'b mut [Beat]],
     format: Option<Sixteen>,
-    /// The stripe, if it is known, and its first channel.
+    /// The pattern of the stripe, if a profile has it, and its first channel.
     pattern: Option<(Pattern, usize)>,
     deal: Deal,
     padded: bool,
@@ -48,7 +48,7 @@ pub(crate) struct StripeWriter<'a, 'b> {
 }
 
 impl<'a, 'b> StripeWriter<'a, 'b> {
-    /// From the first record on.
+    /// Begins with the first record.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
     pub(crate) fn new(layout: &Layout, channels: &'a mut [&'b mut [Beat]]) -> Self {
@@ -72,7 +72,7 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
         in_format!(self.format, F => self.write_as::<V, F, R, ROWS>(vectors, records));
     }
 
-    /// The format in which they are written, if its words have sixteen bits.
+    /// The 16-bit format of the words; `None` for f32.
     #[inline(always)]
     pub(crate) const fn format(&self) -> Option<Sixteen> {
         self.format
@@ -216,7 +216,7 @@ mod tests {
             }
             let sum = dealer.finish();
 
-            // Row by row, with the conversion of one row alone.
+            // The expected beats are made row by row, and each conversion has one row alone.
             let rows: Vec<[u32; LANES]> = records.iter().flatten().copied().collect();
             let mut beats = vec![Beat::default(); layout.beats(records.len())];
             for (at, row) in rows.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Writes records to the channels, stripe by stripe, in loops that the compiler unrolls.
 //!
 //! A *unit* is a number of records that fills whole groups of a stripe. Its rows go from registers
-//! to their places in whole beats, on each channel upwards, with nothing in between.
+//! to the channels in whole beats, upwards on each channel, without a copy in between.
 
 use std::mem;
 
@@ -14,9 +14,9 @@ use crate::beat::stripe::Place;
 use crate::record::{Row, Rows};
 use crate::simd::{Lanes, Vectors};
 
-/// Writes records as long as they fill whole units, and adds the words written to `sum`; returns
-/// the number of these records. `rest` is the unwritten part of the channels, from the first
-/// channel of the stripe on.
+/// Writes the records that fill whole units, adds the words written to `sum`, and returns the
+/// number of these records. `rest` is the unwritten part of the channels, from the first channel of
+/// the stripe on.
 #[inline(always)]
 pub(crate) fn write<V: Vectors, F: Join, R: Records<ROWS>, const ROWS: usize>(
     pattern: Pattern,

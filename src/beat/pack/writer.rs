@@ -109,8 +109,8 @@ impl<'a> Writer<'a> {
         self.refused.get_or_insert(InputError::MoreThanAnnounced { announced: self.room });
     }
 
-    /// Makes the records of the held collisions. All computation of a writer happens here, on the
-    /// call of the caller's narrow phase.
+    /// Makes the records of the held collisions. All computation of a writer happens here, called
+    /// from the caller's narrow phase.
     fn flush(&mut self) {
         standard(|| self.make_records());
     }

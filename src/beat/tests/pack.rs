@@ -152,7 +152,7 @@ fn any_spec() -> impl Strategy<Value = Spec> {
     })
 }
 
-/// The word of a number in sixteen bits, or all thirty-two.
+/// The word of a number, in sixteen bits or thirty-two.
 fn word(words: Words, value: f32) -> u32 {
     match words {
         Words::F32 => value.to_bits(),
@@ -177,7 +177,7 @@ fn thesis(value: f32) -> u32 {
     sign | (u32::try_from(f).expect("0 to 30") << 10) | mantissa
 }
 
-/// The rows of a segment in their order, and how many beats there were.
+/// The rows of a segment in their order, and the number of beats.
 fn rows(buffers: &[Vec<Beat>], group: &[usize], words: Words) -> (Vec<[u32; 4]>, usize) {
     let total: usize = buffers.iter().map(Vec::len).sum();
     let mut channels: Vec<_> = buffers.iter().map(|beats| beats.iter()).collect();
@@ -239,7 +239,7 @@ impl Reader {
     }
 }
 
-/// Packs into buffers full of ones, so that a beat left out is seen; checks the sum.
+/// Packs into buffers full of ones, so that a missing beat shows; checks the sum.
 fn packed(
     spec: &Spec,
     segment: Segment,

@@ -187,7 +187,7 @@ impl Input {
         (records, seen)
     }
 
-    /// Full of ones, so that a beat left out is seen.
+    /// The buffers are full of ones, so that a missing beat shows.
     fn buffers(&self, segment: Segment, records: usize) -> Vec<Vec<Beat>> {
         let layout = segment.layout(&self.limits.variant);
         let beats = |channel| layout.beats_on_channel(records, channel);

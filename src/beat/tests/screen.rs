@@ -315,7 +315,7 @@ fn what_is_wrong_beside_padding_is_noticed() {
                 assert!(!said(Some(wrong), at, empty), "{} {empty:?}: {what}", profile.name);
             }
         }
-        // A collision that only looks like padding counts as padding.
+        // A collision that only looks like padding counts, so the step has one padding too many.
         let alike = Collision { body_b: 3, count: 0, ..COLLISION };
         assert!(!said(Some(alike), 50, &[40]), "{}", profile.name);
     }
@@ -350,8 +350,8 @@ fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
     }
 }
 
-/// Only the last contact point has too long a lever arm about a body that turns. The other body may
-/// turn, too.
+/// The lever arm of the last contact point alone is too long about one body, which turns. The other
+/// body may turn, too.
 #[test]
 fn an_arm_that_is_too_long_is_noticed_about_whichever_body() {
     let at = |x, shape| Body {

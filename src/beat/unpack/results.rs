@@ -53,14 +53,14 @@ pub(crate) struct Reader<'a> {
     /// The beats that are not read yet.
     channels: PieceRead<'a>,
     format: Option<Sixteen>,
-    /// The stripe, if it is known, and its first channel.
+    /// The pattern of the stripe, if a profile has it, and its first channel.
     pattern: Option<(Pattern, usize)>,
     deal: Deal,
     sum: Lanes,
 }
 
 impl<'a> Reader<'a> {
-    /// From the first record on.
+    /// Begins with the first record.
     ///
     /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
     pub(crate) fn new(layout: &Layout, channels: &[&'a [Beat]]) -> Self {
@@ -116,7 +116,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Reading of records, which is compiled for the vectors of this processor.
+/// The read of some records. It is compiled for the vectors of this processor.
 struct Reading<'r, 'a> {
     reader: &'r mut Reader<'a>,
     records: &'r mut [Record],
@@ -137,7 +137,7 @@ pub(crate) fn sum_of_words(beats: &[Beat]) -> u32 {
     total(beats.iter().fold(Lanes::all(0), plus))
 }
 
-/// Word by word, modulo 2^32.
+/// Adds a beat word by word, modulo 2^32.
 fn plus(sum: Lanes, beat: &Beat) -> Lanes {
     sum.plus((*beat).into())
 }

@@ -1,8 +1,8 @@
 //! Reads results from the channels, stripe by stripe. The stripes of the profiles are constants of
 //! the compiler.
 //!
-//! The beats of a unit come from their places through registers into its records, on each channel
-//! upwards, with nothing in between.
+//! The beats of a unit go from the channels through registers into its records, upwards on each
+//! channel, without a copy in between.
 
 use pgs_interface::record::{Beat, result};
 use pgs_support::chunks::Chunks;
@@ -34,8 +34,8 @@ impl Tally {
     }
 }
 
-/// Reads records as long as they fill whole units; returns their number. `rest` is the unread part
-/// of the channels, from the first channel of the stripe on.
+/// Reads the records that fill whole units, and returns their number. `rest` is the unread part of
+/// the channels, from the first channel of the stripe on.
 #[inline(always)]
 pub(crate) fn read<V: Vectors, F: Format>(
     pattern: Pattern,
