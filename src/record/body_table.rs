@@ -22,7 +22,7 @@ pub(crate) struct End {
     tag: u32,
 }
 
-/// The tag of a static body has the top bit, which [`End::with_tag`] promises.
+/// The top bit marks the tag of a static body, as [`End::with_tag`] promises.
 const STATIC: u32 = 1 << 31;
 const SHAPELESS: u32 = 1 << 30;
 /// The tag of a body without a shape, which counts as static.

@@ -68,7 +68,7 @@ mod tests {
                 record[at / 4].0[at % 4] = value.to_bits();
                 let beside = [3, 11, 15].contains(&at);
                 assert_eq!(finite(&record), beside, "{value} {at}");
-                // Two infinities or NaNs in one sequence, too.
+                // One such record among others, or two.
                 for records in [&[good, record, good][..], &[record, good, record]] {
                     assert_eq!(all(records), beside, "{value} {at}");
                 }

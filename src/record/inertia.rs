@@ -13,9 +13,9 @@ pub(crate) struct Inverse {
 
 /// The inverse inertia of a body of that shape and orientation: M diag(k) M^T, M the rotation.
 ///
-/// If its three components are equal, the inverse inertia is the same about any axes. It stays as
-/// it is, without the rounding of M: the results match a bitstream that supports equal components
-/// only. A static shape has zeros.
+/// If the shape's three components are equal, the inverse inertia is the same about any axes. It
+/// stays as it is, without the rounding of M: the results match a bitstream that supports equal
+/// components only. A static shape has zeros.
 ///
 /// The orientation x, y, z, w need not have unit length.
 ///

@@ -76,7 +76,7 @@ impl<const ROWS: usize> Record<ROWS> {
     /// Gives all rows to `to`, one after the other.
     #[inline(always)]
     pub(crate) fn give(&self, to: &mut impl Rows) {
-        // Written out: the compiler unrolls a loop only in part, and its rows go through memory.
+        // Written out: a loop is unrolled only in part, which sends its rows through memory.
         macro_rules! each {
             ($($at:literal)*) => {
                 const { assert!(ROWS <= [$($at),*].len(), "all of them are written out") };
@@ -173,7 +173,8 @@ pub(crate) fn contact_rows(collision: &Collision) -> [Lanes; CONTACT_POINTS] {
     collision.contacts.each_ref().map(row)
 }
 
-/// A collision, and whether it is known to use all four contact points. No point is masked then.
+/// A collision, and whether it is known to use all four contact points. If so, no point needs a
+/// mask.
 #[derive(Clone, Copy)]
 pub(crate) struct Counted<'a> {
     pub(crate) collision: &'a Collision,
@@ -223,8 +224,8 @@ pub(crate) fn used(count: u32) -> [Lanes; CONTACT_POINTS] {
 }
 
 /// The masks of [`used`] without the sign bits. A table is faster here: it takes fewer instructions
-/// than a comparison and the removal of the sign. A count beyond four, which validation refuses,
-/// gives a mask of any points.
+/// than a comparison and the removal of the sign. The masks of a count beyond four, which
+/// validation refuses, are unspecified.
 #[inline(always)]
 pub(crate) fn used_magnitudes(count: u32) -> [Lanes; CONTACT_POINTS] {
     USED_MAGNITUDES[count as usize % USED_MAGNITUDES.len()].map(Lanes::from)
@@ -269,7 +270,7 @@ mod tests {
             let magnitudes = used_magnitudes(count).map(Lanes::words);
             assert_eq!(magnitudes, used(count).map(|used| used.and(Lanes::all(MAGNITUDE)).words()));
         }
-        // A count beyond four may give any masks, but only whole rows or zeros.
+        // The masks of larger counts are unspecified, but each is whole or zero.
         for count in [5, 7, 8, u32::MAX] {
             for row in used_magnitudes(count).map(Lanes::words) {
                 assert!([[0; LANES], [MAGNITUDE; LANES]].contains(&row), "{count}: {row:x?}");

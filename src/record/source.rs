@@ -69,7 +69,7 @@ const NEARBY_SOON: usize = 14;
 /// caches hold fewer collisions.
 const NEARBY: usize = 4096;
 
-/// Distance of the entries that are sampled to tell a nearby order.
+/// One entry in this many is sampled to detect a nearby order.
 const SAMPLED: usize = 64;
 
 /// The elements of a range; a range past the end is cut.
@@ -130,7 +130,7 @@ impl<'a> Indexed<'a> {
         match self.all.get(place as usize) {
             Some(collision) => collision,
             None => {
-                // As in `Ends::get`.
+                // A predicted branch, as in `Ends::get`.
                 pgs_support::cold_path();
                 &Collision::NOTHING
             }

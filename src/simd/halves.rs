@@ -1,9 +1,10 @@
 //! Converts rows of numbers between f32 and binary16 with the conversion instructions of the
 //! processor.
 //!
-//! The crate `half` knows the instructions, too. On aarch64 it requires an extension that a
-//! Cortex-A53 lacks, although that processor has the conversions, and computes with integers there.
-//! Without conversion instructions, this module uses the integer code of `half`.
+//! The crate `half` knows the instructions, too. On aarch64 it uses them only with an extension
+//! that a Cortex-A53 lacks, although that processor has the conversions: there it computes with
+//! integers. On processors without conversion instructions, this module uses the integer code of
+//! `half`.
 #![allow(
     unsafe_code,
     reason = "not every processor has the instructions, vectors are cast, and one is made opaque"
@@ -138,8 +139,8 @@ pub(crate) mod x86 {
         _mm_blend_epi16::<OTHERS>(numbers, _mm_or_si128(first, second))
     }
 
-    /// Returns the vector, opaque to the compiler. Otherwise, a result that is stored and used is
-    /// converted once for each, and a conversion to memory takes twice as long.
+    /// Returns the vector, opaque to the compiler. Otherwise, the compiler converts a result that
+    /// is stored and used once for each, and a conversion to memory takes twice as long.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn computed_once(mut vector: __m128i) -> __m128i {

@@ -267,7 +267,7 @@ pub(crate) struct Integer {
 }
 
 impl Integer {
-    /// Word `AT` of these.
+    /// Word `AT` of `words`.
     #[inline(always)]
     pub(crate) const fn new<const AT: usize>(words: Lanes) -> Self {
         const { assert!(AT < LANES, "it is one of four") };
@@ -330,7 +330,7 @@ mod tests {
             prop_assert_eq!(a.plus_f32(b).words(), of(|a, b| a + b));
             prop_assert_eq!(a.minus_f32(b).words(), of(|a, b| a - b));
             prop_assert_eq!(a.times_f32(b).words(), of(|a, b| a * b));
-            // Of 0 and -0, either may be the larger.
+            // Either of 0 and -0 may be the larger.
             let unsigned_zero = |word| (f32::from_bits(word) + 0.0).to_bits();
             let larger = a.larger_f32(b).words().map(unsigned_zero);
             prop_assert_eq!(larger, of(f32::max).map(unsigned_zero));

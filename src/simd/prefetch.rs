@@ -13,8 +13,8 @@ pub(crate) fn soon_alone<T>(values: &[T], at: usize) {
     lines_of(values.as_ptr().wrapping_add(at));
 }
 
-/// Prefetches `N` of these values from index `at` on, for a caller that prefetches the values after
-/// them next. Few lines are prefetched twice.
+/// Prefetches `N` of these values from index `at` on. The line of the last byte may be left out:
+/// the caller prefetches the values after it next, and few lines are prefetched twice.
 #[inline(always)]
 pub(crate) fn soon_with_those_behind<const N: usize, T>(values: &[T], at: usize) {
     first_lines_of::<FIRST, [T; N]>(values.as_ptr().wrapping_add(at).cast());
@@ -66,16 +66,17 @@ fn fetch_into<const CACHE: usize, T>(at: *const T) {
         use core::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
         match CACHE {
             // SAFETY: every x86-64 has PREFETCHT0. The address is a hint: nothing is loaded from it
-            // into a register or stored, and none faults, mapped or not.
+            // into a register or stored, and no address faults, mapped or not.
             FIRST => unsafe { _mm_prefetch::<_MM_HINT_T0>(at) },
             // SAFETY: every x86-64 has PREFETCHT1. The address is a hint: nothing is loaded from it
-            // into a register or stored, and none faults, mapped or not.
+            // into a register or stored, and no address faults, mapped or not.
             _ => unsafe { _mm_prefetch::<_MM_HINT_T1>(at) },
         }
     }
     #[cfg(target_arch = "aarch64")]
     // SAFETY: every aarch64 has PRFM for the first and the second cache, and `CACHE` is 1 or 2. The
-    // address is a hint: no register, flag or memory is changed, and none faults, mapped or not.
+    // address is a hint: no register, flag or memory is changed, and no address faults, mapped or
+    // not.
     unsafe {
         core::arch::asm!(
             "prfm pldl{}keep, [{}]", const CACHE, in(reg) at,

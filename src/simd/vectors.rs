@@ -53,7 +53,8 @@ impl Vectors for Baseline {
     }
 }
 
-/// Runs `work` in vectors of AVX2 with the conversions of F16C, if the processor has both.
+/// Runs `work` in vectors of AVX2 with the conversions of F16C if the processor has both, else in
+/// the [`Baseline`].
 #[inline]
 pub(crate) fn in_wide_vectors<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
@@ -92,8 +93,8 @@ mod x86 {
 
         #[inline(always)]
         fn apart<T, W: FnOnce() -> T>(self, work: W) -> T {
-            // This function declares no vectors: without `black_box`, the compiler inlines `apart`
-            // here.
+            // This function enables no target features: without `black_box`, the compiler inlines
+            // `apart` here.
             let apart: unsafe fn(W) -> T = black_box(apart::<T, W>);
             // SAFETY: `apart` needs AVX2 and F16C. Only `run` makes a `Wide`, and `run` is called
             // only where both were found.

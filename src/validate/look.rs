@@ -83,7 +83,8 @@ impl<const REACHES: bool> Look<REACHES> {
         // `alone` removes the count: as an f32 it is subnormal, and its product is slow.
         let normal = alone(normal);
         let square = normal.times_f32(normal).sum_f32();
-        // The bits of positive f32 are in their order: a difference is negative beyond a bound.
+        // The bits of positive f32 order like the numbers: a difference is negative if the square
+        // is beyond a bound.
         let off = square.minus(in_last(SHORTEST)).or(in_last(LONGEST).minus(square));
         self.wrong = self.wrong.or(off).or(a.and(b));
         // A NaN may have either sign, so the bits of the sum are taken, too.
@@ -95,9 +96,8 @@ impl<const REACHES: bool> Look<REACHES> {
         }
     }
 
-    /// Whether validation accepts every collision of the block, and how many look like padding. All
-    /// collisions of the block were taken, at these `locations`, with their bodies looked up in
-    /// `ends`.
+    /// Whether validation accepts every collision of the block, and how many look like padding. The
+    /// look has taken all of them at these `locations`, with their bodies looked up in `ends`.
     #[inline(always)]
     pub(crate) fn good<'b, L: CollisionSource<'b>, E: Lookup<'b>>(
         self,
@@ -120,8 +120,8 @@ impl<const REACHES: bool> Look<REACHES> {
         }
         good = good && self.beyond.words().iter().all(|word| word >> 31 == 0);
         if let Some(bounds) = quick.bounds_of_rows() {
-            // If a shape of the table rules out a common bound, each collision is checked by
-            // itself.
+            // Each collision is checked by itself if the common bound fails or a shape of the table
+            // rules it out.
             good = good
                 && (REACHES && self.furthest.all_surely_fit(bounds)
                     || quick.rows_fit(block, locations));

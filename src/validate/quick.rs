@@ -23,7 +23,8 @@ use crate::record::{self, FULL};
 use crate::scene::{Body, Collision};
 use crate::simd::Lanes;
 
-/// Accepted distance of a normal's squared length from 1. The length itself is half as far from 1.
+/// Distance of a normal's squared length from 1 that is surely accepted. The length itself is half
+/// as far from 1.
 pub(crate) const OFF_UNIT: f32 = InputError::NORMAL_TOLERANCE;
 /// Square of twice the length that an orientation must have.
 const ORIENTATION: f32 = 4.0 * InputError::SHORTEST_ORIENTATION * InputError::SHORTEST_ORIENTATION;

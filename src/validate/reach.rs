@@ -56,7 +56,7 @@ impl Reach {
     }
 }
 
-/// An arm and the loss at both of its ends, m.
+/// An arm plus the loss at both of its ends, m.
 #[inline(always)]
 fn with_loss(arm: Lanes, sum: Lanes) -> Lanes {
     arm.plus_f32(sum.times_f32(Lanes::all(LOSS.to_bits())))
