@@ -11,75 +11,78 @@ use crate::simd::{Lanes, fetch};
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{Beat, WORD_LANE};
 
-/// A body as a collision's end: sixteen bytes, so that those of a whole scene lie in a cache.
+/// A body as one end of a collision: sixteen bytes, so that the ends of a whole scene fit in a
+/// cache.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub(crate) struct End {
     /// Centre of mass, m.
     pub(crate) position: [f32; 3],
-    /// The shape's index, and above it whether it is static, and whether there is a shape.
+    /// The index of the body's shape, below the bits [`STATIC`] and [`SHAPELESS`].
     tag: u32,
 }
 
-/// The top bit, as [`End::with_tag`] says.
+/// The top bit marks the tag of a static body, as [`End::with_tag`] promises.
 const STATIC: u32 = 1 << 31;
 const SHAPELESS: u32 = 1 << 30;
-/// One without a shape is static.
+/// The tag of a body without a shape, which counts as static.
 const NO_SHAPE: u32 = u32::MAX;
 
 impl End {
     /// Stands in for a body that does not exist.
     pub(crate) const MISSING: Self = Self { position: [0.0; 3], tag: NO_SHAPE };
 
-    /// At a position, without a shape.
+    /// A body at a position, without a shape.
     #[cfg(test)]
     pub(crate) const fn at(position: [f32; 3]) -> Self {
         Self { position, ..Self::MISSING }
     }
 
-    /// That of a body.
+    /// The end of a body with this tag.
     #[inline(always)]
     fn of(body: &Body, tag: u32) -> Self {
         bytemuck::cast(Beat::from(row_of::<POSITION, _>(body).beside(tag)))
     }
 
-    /// Its position beside its tag, which is no part of a record: the top bit says that it never moves.
+    /// The position beside the tag, which is no part of a record. The top bit of the tag marks a
+    /// static body.
     #[inline(always)]
     pub(crate) fn with_tag(&self) -> Lanes {
         Lanes::from(bytemuck::cast::<_, Beat>(*self))
     }
 
-    /// Its position beside zero.
+    /// The position beside zero.
     #[inline(always)]
     pub(crate) fn alone(&self) -> Lanes {
         alone(self.with_tag())
     }
 
-    /// Whether it never moves.
+    /// Whether the body is static.
     #[inline(always)]
     pub(crate) const fn is_static(&self) -> bool {
         self.tag & STATIC != 0
     }
 
-    /// Whether it has a shape.
+    /// Whether the body has a shape.
     #[inline(always)]
     pub(crate) const fn has_shape(&self) -> bool {
         self.tag & SHAPELESS == 0
     }
 
-    /// Whether one of some has no shape; in `tags` are the bits of [`Self::with_tag`] that any has.
+    /// Whether any of several ends has no shape. `tags` is the bitwise OR of their
+    /// [`Self::with_tag`].
     #[inline(always)]
     pub(crate) fn any_shapeless(tags: Lanes) -> bool {
         tags.words()[WORD_LANE] & SHAPELESS != 0
     }
 
-    /// All bits if it never moves, else none.
+    /// All bits if the body is static, else none.
     #[inline(always)]
     pub(crate) fn still(&self) -> Lanes {
         self.with_tag().top_of_last()
     }
 
-    /// Its shape; a static one, if it has none.
+    /// The shape of the body; [`Shape::STATIC`] if it has none.
     #[inline]
     pub(crate) fn shape<'s>(&self, shapes: &'s [Shape]) -> &'s Shape {
         let shape = usize::try_from(self.tag & !STATIC).ok().and_then(|shape| shapes.get(shape));
@@ -87,10 +90,10 @@ impl End {
     }
 }
 
-/// Shapes whose tags are looked up: all that a profile has room for. A bitstream may have more.
+/// Size of the table of tags: no profile has room for more shapes. A bitstream may have more.
 const LOOKED_UP: usize = 64;
 
-/// What is said of bodies of each shape.
+/// The tag of the bodies of each shape.
 #[derive(Debug)]
 pub(crate) struct Tags<'a> {
     first: [u32; LOOKED_UP],
@@ -106,12 +109,13 @@ impl<'a> Tags<'a> {
         Self { first, shapes }
     }
 
-    /// Makes the ends of bodies; whether any of these never moves, as one without a shape does not.
+    /// Makes the ends of bodies. Returns whether any body is static; a body without a shape is
+    /// static.
     #[inline(always)]
     pub(crate) fn ends(&self, bodies: &[Body], ends: &mut [End]) -> bool {
         let (mut tags, mut shapes) = (0, 0);
         for (end, body) in ends.iter_mut().zip(bodies) {
-            // Without a jump; a shape that is not looked up is seen behind the loop.
+            // No branch: a shape beyond the table is found after the loop.
             let tag = self.first[body.shape as usize % LOOKED_UP];
             *end = End::of(body, tag);
             tags |= tag;
@@ -123,7 +127,7 @@ impl<'a> Tags<'a> {
         tags & STATIC != 0
     }
 
-    /// The same of any shapes; the bits of all tags.
+    /// Makes the ends of bodies with any shape indices. Returns the bitwise OR of all tags.
     #[cold]
     #[inline(never)]
     fn each(&self, bodies: &[Body], ends: &mut [End]) -> u32 {
@@ -137,30 +141,31 @@ impl<'a> Tags<'a> {
     }
 }
 
-/// The tag of bodies of a shape.
+/// The tag of the bodies of a shape.
 fn tag_of(shape: u32, shapes: &[Shape]) -> u32 {
     match usize::try_from(shape).ok().and_then(|shape| shapes.get(shape)) {
         Some(of) if shape < SHAPELESS => shape | if of.is_static() { STATIC } else { 0 },
-        // No bitstream has room for more.
+        // The shape is missing, or its index collides with the flag bits: no bitstream has room for
+        // it.
         _ => NO_SHAPE,
     }
 }
 
-/// Bodies that an index of sixteen bits may name.
+/// Number of bodies that an index of sixteen bits can name.
 const LOW: usize = 1 << u16::BITS;
 const _: () = assert!(StreamFormat::Binary16.largest_index() as usize == LOW - 1);
 const _: () = assert!(StreamFormat::Thesis16.largest_index() as usize == LOW - 1);
 
-/// The ends of all bodies of a step. Kept, so that a step allocates nothing.
+/// The ends of all bodies of a step. The table is kept, so that a step allocates nothing.
 #[derive(Default, PartialEq)]
 pub(crate) struct Table {
-    /// At least [`LOW`] of them, a megabyte, from the first step on; [`End::MISSING`] where there is no body.
+    /// From the first step on at least [`LOW`] ends, a megabyte. [`End::MISSING`] fills the rest.
     ends: Vec<End>,
-    /// How many bodies there are.
+    /// The number of bodies.
     count: usize,
 }
 
-/// Without the ends, which are many.
+/// Leaves out the ends, which are many.
 impl fmt::Debug for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Table").field("count", &self.count).finish_non_exhaustive()
@@ -168,7 +173,7 @@ impl fmt::Debug for Table {
 }
 
 impl Table {
-    /// Those of so many bodies, all of which are written now.
+    /// The ends of `count` bodies. The caller writes all of them.
     fn anew(&mut self, count: usize) -> &mut [End] {
         if let Some(gone) = self.ends.get_mut(count..self.count) {
             gone.fill(End::MISSING);
@@ -178,59 +183,59 @@ impl Table {
         &mut self.ends[..count]
     }
 
-    /// To look up.
+    /// The ends, for a look-up.
     pub(crate) fn ends(&self) -> Ends<'_> {
         Ends { all: &self.ends, count: self.count }
     }
 
-    /// That of each body.
+    /// The end of each body.
     #[cfg(test)]
     pub(crate) fn of_bodies(&self) -> &[End] {
         &self.ends[..self.count]
     }
 }
 
-/// What is remembered of the bodies of a step while they are packed. Kept, so that a step allocates
+/// Data on the bodies of a step that packing collects. It is kept, so that a step allocates
 /// nothing.
 #[derive(Debug)]
 pub(crate) struct Survey<'a> {
-    /// What the records of collisions take of each.
+    /// The ends that collision records are made from.
     pub(crate) ends: &'a mut Table,
-    /// Indices of those that never move, upwards.
+    /// The indices of static bodies, in ascending order.
     pub(crate) statics: &'a mut Vec<u32>,
 }
 
 impl Survey<'_> {
-    /// The ends of so many bodies, all of which are written before [`Self::settle`].
+    /// The ends of `count` bodies. The caller writes all of them before [`Self::settle`].
     pub(crate) fn ends(&mut self, count: usize) -> &mut [End] {
         self.statics.clear();
         self.ends.anew(count)
     }
 
-    /// Finds those that never move, which are all among these.
+    /// Collects the indices of static bodies, which are all in the range `among`.
     pub(crate) fn settle(&mut self, among: Range<usize>) {
         let ends = self.ends.ends.get(among.clone()).unwrap_or_default();
-        // No bitstream has more bodies than u32 counts.
+        // A `u32` counts the bodies of every bitstream.
         let still = among.zip(ends).filter(|(_, end)| end.is_static());
         self.statics.extend(still.filter_map(|(at, _)| u32::try_from(at).ok()));
     }
 }
 
-/// Ends to look up by the indices of a collision's bodies.
+/// Looks up ends by the indices of a collision's bodies.
 ///
-/// All of it is a part of the loop that asks: an `#[inline(always)]` belongs to every implementation.
+/// Every implementation carries `#[inline(always)]`: it becomes a part of the packing loop.
 pub(crate) trait Lookup<'a>: Copy {
-    /// Among the ends of all bodies; none if some of these would never be found.
+    /// A look-up among the ends of all bodies; `None` if it cannot reach every body.
     fn of(all: Ends<'a>) -> Option<Self>;
 
-    /// Whether bodies that have no other bits than these are looked up by all their bits; else what is found
-    /// may be another body's.
+    /// Whether an index with no other bits than these is looked up by all its bits. Otherwise the
+    /// look-up may return the end of another body.
     fn by_all_bits(self, bodies: [u32; 2]) -> bool;
 
-    /// That of one body.
+    /// The end of one body.
     fn get(self, body: u32) -> &'a End;
 
-    /// Says that those of these bodies are asked for soon.
+    /// Prefetches the ends of these bodies.
     fn soon(self, bodies: [u32; 2]);
 }
 
@@ -238,7 +243,7 @@ pub(crate) trait Lookup<'a>: Copy {
 #[derive(Clone, Copy)]
 pub(crate) struct Ends<'a> {
     all: &'a [End],
-    /// How many bodies there are.
+    /// The number of bodies.
     count: usize,
 }
 
@@ -248,7 +253,7 @@ impl<'a> Lookup<'a> for Ends<'a> {
         Some(all)
     }
 
-    /// Where there is no body, [`End::MISSING`] is.
+    /// An index without a body finds [`End::MISSING`].
     #[inline(always)]
     fn by_all_bits(self, _: [u32; 2]) -> bool {
         true
@@ -259,7 +264,7 @@ impl<'a> Lookup<'a> for Ends<'a> {
         match usize::try_from(body).ok().and_then(|body| self.all.get(body)) {
             Some(end) => end,
             None => {
-                // A jump that is foreseen costs less than to choose.
+                // A predicted branch costs less than a selection.
                 pgs_support::cold_path();
                 &End::MISSING
             }
@@ -274,20 +279,20 @@ impl<'a> Lookup<'a> for Ends<'a> {
     }
 }
 
-/// Says that the end of a body is asked for soon.
+/// Prefetches the end of a body.
 #[inline(always)]
 fn soon_in(ends: &[End], body: u32) {
     fetch(ends.as_ptr().wrapping_add(body as usize));
 }
 
-/// The ends of all bodies of a step that has no more than indices of sixteen bits may name. Of an index the
-/// lower half is taken, as in the records of such indices, so that there is one for each without a look at
-/// how many there are.
+/// The ends of all bodies of a step, if indices of sixteen bits can name every body. A look-up
+/// takes the lower half of an index, as records with such indices do. So every index has an end,
+/// and no look-up compares it with the number of bodies.
 #[derive(Clone, Copy)]
 pub(crate) struct LowEnds<'a>(&'a [End; LOW]);
 
 impl<'a> Lookup<'a> for LowEnds<'a> {
-    /// There is none before the first [`Survey`], either.
+    /// `None` also before the first [`Survey`].
     #[inline(always)]
     fn of(Ends { all, count }: Ends<'a>) -> Option<Self> {
         all.first_chunk().filter(|_| count <= LOW).map(Self)
@@ -315,7 +320,7 @@ impl<'a> Lookup<'a> for LowEnds<'a> {
 mod tests {
     use super::*;
 
-    /// A step whose bodies are at these places.
+    /// Writes the table of a step whose bodies are at these places.
     fn surveyed(table: &mut Table, places: impl ExactSizeIterator<Item = f32>) {
         let mut statics = Vec::new();
         let mut survey = Survey { ends: table, statics: &mut statics };
@@ -347,7 +352,7 @@ mod tests {
         assert!(LowEnds::of(Table::default().ends()).is_none());
     }
 
-    /// A bitstream may have more shapes than are looked up.
+    /// A bitstream may have more shapes than the table of tags.
     #[test]
     fn every_body_has_the_tag_of_its_shape() {
         for count in [0, 1, LOOKED_UP - 1, LOOKED_UP, LOOKED_UP + 1, 3 * LOOKED_UP] {

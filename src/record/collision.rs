@@ -10,8 +10,8 @@ use pgs_interface::record::{CONTACT_POINTS, WORD_LANE, collision};
 
 /// The collision record: normal and count, positions and indices of both bodies, contact points.
 ///
-/// Contact points from the count on are zeros, whatever the caller left there: they may hold anything
-/// (NaN too), and what is sent must not depend on it.
+/// Contact points from the count on are zeros: the caller may leave anything there (NaN too), and
+/// the record must not depend on it.
 ///
 /// Shape: 7 rows. Units: metres, world frame; distance negative = penetrating.
 ///
@@ -34,7 +34,7 @@ pub(crate) fn encode(of: Counted<'_>, [a, b]: [&End; 2]) -> Record<{ collision::
 }
 
 const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::ROWS);
-// Beside the normal of a collision is its count.
+// The count of a collision follows its normal.
 const _: () = assert!(offset_of!(Collision, count) == 4 * (NORMAL + WORD_LANE));
 
 #[cfg(test)]

@@ -4,20 +4,21 @@ use super::result::Record;
 use crate::simd::Lanes;
 use pgs_interface::record::{Beat, LANES, WORD_LANE, result};
 
-/// What has been seen of results.
+/// Accumulates whether all numbers of results are finite.
 ///
-/// Zero times a finite number is zero. Times any other it is NaN, and that stays.
+/// Zero times a finite number is zero. Zero times infinity or NaN is NaN, and later products keep
+/// it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Finite([Lanes; result::ROWS]);
 
 impl Finite {
-    /// Nothing yet.
+    /// No results yet.
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self([Lanes::all(0); result::ROWS])
     }
 
-    /// Sees one more.
+    /// Takes one more result.
     #[inline(always)]
     pub(crate) fn see(&mut self, rows: &[Lanes; result::ROWS]) {
         for (product, row) in self.0.iter_mut().zip(rows) {
@@ -31,7 +32,7 @@ impl Finite {
     }
 }
 
-/// Lanes of a record that are numbers: what lies beside a vec3 is nobody's.
+/// The lanes of a record that hold numbers. The word beside a vec3 holds none.
 const NUMBERS: [[bool; LANES]; result::ROWS] = {
     let mut numbers = [[true; LANES]; result::ROWS];
     numbers[result::POSITION][WORD_LANE] = false;
@@ -67,7 +68,7 @@ mod tests {
                 record[at / 4].0[at % 4] = value.to_bits();
                 let beside = [3, 11, 15].contains(&at);
                 assert_eq!(finite(&record), beside, "{value} {at}");
-                // Two of them, too.
+                // One such record among others, or two.
                 for records in [&[good, record, good][..], &[record, good, record]] {
                     assert_eq!(all(records), beside, "{value} {at}");
                 }

@@ -13,9 +13,9 @@ pub(crate) struct Inverse {
 
 /// The inverse inertia of a body of that shape and orientation: M diag(k) M^T, M the rotation.
 ///
-/// One whose three components are equal is the same about any axes and is sent as it is, without
-/// the rounding of M: the results are those of a bitstream that knows no other. A static shape has
-/// zeros.
+/// If the shape's three components are equal, the inverse inertia is the same about any axes. It
+/// stays as it is, without the rounding of M: the results match a bitstream that supports equal
+/// components only. A static shape has zeros.
 ///
 /// The orientation x, y, z, w need not have unit length.
 ///
@@ -78,7 +78,7 @@ mod tests {
     fn an_eighth_of_a_turn_about_z_mixes_x_and_y() {
         let (sine, cosine) = std::f32::consts::FRAC_PI_8.sin_cos();
         let Inverse { diagonal, off_diagonal } = about_world_axes(&BOX, [0.0, 0.0, sine, cosine]);
-        // c²k0 + s²k1 = 1.5 on both, cs(k0 - k1) = -0.5 beside them.
+        // xx and yy are c²k0 + s²k1 = 1.5, xy is cs(k0 - k1) = -0.5.
         for (found, expected) in
             diagonal.into_iter().chain(off_diagonal).zip([1.5, 1.5, 4.0, -0.5, 0.0, 0.0])
         {
@@ -102,7 +102,7 @@ mod tests {
             prop_assert_eq!(found.off_diagonal.map(f32::to_bits), [0; 3]);
         }
 
-        /// Trace and determinant of a rotated tensor are those of its diagonal form.
+        /// A rotation keeps the trace and the determinant of a tensor.
         #[test]
         fn rotation_keeps_the_invariants(orientation in prop::array::uniform4(-1.0_f32..1.0)) {
             let length: f32 = orientation.iter().fold(0.0, |sum, q| sum + q * q);

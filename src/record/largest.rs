@@ -3,16 +3,16 @@
 use crate::simd::Lanes;
 use pgs_interface::record::{Beat, LANES, WORD_LANE};
 
-/// An f32 without its sign; as a limit, any word at all.
+/// An f32 without its sign; as a limit, it allows every word.
 pub(crate) const MAGNITUDE: u32 = u32::MAX >> 1;
 
-/// Largest magnitudes of the words of a record, as bits: magnitudes are in the order of their bits,
-/// and infinity and NaN are beyond all numbers.
+/// Largest magnitudes of the words of a record, as bits. The bits of magnitudes are in the order of
+/// the magnitudes, and infinity and NaN are above all numbers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Largest<const ROWS: usize>(pub(crate) [Beat; ROWS]);
 
 impl<const ROWS: usize> Largest<ROWS> {
-    /// Numbers of at most `limit`, but what lies beside the vec3 of these rows.
+    /// Limits every number to `limit`, and the last word of each row to its word of `beside`.
     pub(crate) const fn new(limit: f32, beside: [u32; ROWS]) -> Self {
         let mut rows = [Beat([limit.to_bits(); LANES]); ROWS];
         let mut row = 0;
@@ -23,7 +23,7 @@ impl<const ROWS: usize> Largest<ROWS> {
         Self(rows)
     }
 
-    /// Bits where a word of any row of a record is beyond its limit, lane by lane; none if none is.
+    /// All bits of each lane in which a word of any row is above its limit, else none.
     #[inline(always)]
     pub(crate) fn beyond(&self, record: &[Lanes; ROWS]) -> Lanes {
         let each = record

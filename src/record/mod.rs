@@ -1,9 +1,8 @@
 //! Turns a caller's values into the rows of a record, and a result record back.
 //!
-//! One file a record kind makes rows of 32-bit words, each of which is a beat of an f32 stream;
-//! `sixteen` narrows rows for the streams of sixteen bits and widens what comes back. The layout is
-//! that of [`interface::record`](pgs_interface::record); which channel a beat travels on is
-//! decided elsewhere (`beat`).
+//! One file per record kind makes rows of 32-bit words; a row is one beat of an f32 stream.
+//! `sixteen` narrows rows for streams of sixteen bits and widens results. The layout is that of
+//! [`interface::record`](pgs_interface::record). `beat` decides which channel a beat travels on.
 
 pub(crate) mod body_table;
 pub(crate) mod collision;
@@ -29,26 +28,27 @@ use pgs_interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
 
 use self::largest::MAGNITUDE;
 
-/// A record on its way, in f32.
+/// A record in f32, before it is streamed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Record<const ROWS: usize> {
-    /// The last word of a row in which an integer belongs means nothing.
+    /// In a row with an integer, the last word has no meaning.
     pub(crate) rows: [Lanes; ROWS],
-    /// The unsigned integers in which rows end. They stay where they were found until they stand in their
-    /// beat: into a row of numbers and out of a narrowed one they would go twice.
+    /// The unsigned integers at the ends of rows. An integer stays in its source vector until its
+    /// beat is written: a way through the row of numbers and out of the narrowed row would move it
+    /// twice.
     pub(crate) integers: [Option<Integer>; ROWS],
 }
 
 /// A row of a record.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
-    /// The last is a number only where there is no integer.
+    /// The last word is a number only in a row without an integer.
     pub(crate) numbers: Lanes,
     pub(crate) integer: Option<Integer>,
 }
 
 impl Row {
-    /// Four times zero.
+    /// Four zeros.
     #[inline(always)]
     pub(crate) fn zero() -> Self {
         Self { numbers: Lanes::all(0), integer: None }
@@ -76,11 +76,11 @@ impl<const ROWS: usize> Record<ROWS> {
     /// Gives all rows to `to`, one after the other.
     #[inline(always)]
     pub(crate) fn give(&self, to: &mut impl Rows) {
-        // Not all of a loop would be unrolled, and then its rows would go through memory.
+        // Written out: a loop is unrolled only in part, which sends its rows through memory.
         macro_rules! each {
             ($($at:literal)*) => {
                 const { assert!(ROWS <= [$($at),*].len(), "all of them are written out") };
-                // What there is not is not compiled.
+                // A row that the record does not have is not compiled.
                 $(if const { $at < ROWS } {
                     to.row(Row { numbers: self.rows[$at], integer: self.integers[$at] });
                 })*
@@ -89,18 +89,19 @@ impl<const ROWS: usize> Record<ROWS> {
         each!(0 1 2 3 4 5 6);
     }
 
-    /// Its rows, all of each.
+    /// The rows with their integers in place.
     #[cfg(test)]
     pub(crate) fn whole(self) -> [Lanes; ROWS] {
         std::array::from_fn(|at| Row { numbers: self.rows[at], integer: self.integers[at] }.whole())
     }
 }
 
-/// Where the rows of records go.
+/// The destination of a record's rows.
 ///
-/// It is a part of the loop that gives: an `#[inline(always)]` belongs to every implementation.
+/// Every implementation carries `#[inline(always)]`: it becomes a part of the loop that gives the
+/// rows.
 pub(crate) trait Rows {
-    /// Takes the next.
+    /// Takes the next row.
     fn row(&mut self, row: Row);
 }
 
@@ -110,7 +111,7 @@ fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Lanes {
     Lanes::new([x.to_bits(), y.to_bits(), z.to_bits(), word])
 }
 
-/// Four words of a structure, from its word `AT` on: a vec4, or a vec3 and whatever follows it.
+/// Four words of a structure, from its word `AT` on: a vec4, or a vec3 and the word after it.
 #[inline(always)]
 fn row_of<const AT: usize, T: Pod>(structure: &T) -> Lanes {
     const { assert!(4 * (AT + LANES) <= size_of::<T>(), "they are its words") };
@@ -131,7 +132,7 @@ pub(crate) fn bodies(collision: &Collision) -> [Integer; 2] {
     [Integer::new::<0>(words), Integer::new::<1>(words)]
 }
 
-/// The same, as the first two of four words.
+/// The indices of the bodies of a collision, as the first two of four words.
 #[inline(always)]
 pub(crate) fn body_words(collision: &Collision) -> Lanes {
     row_of::<BODIES, _>(collision)
@@ -143,23 +144,23 @@ pub(crate) fn normal_and_count(collision: &Collision) -> Lanes {
     row_of::<NORMAL, _>(collision)
 }
 
-/// The word with which the indices of a collision's bodies begin, B's behind A's.
+/// The first of the two words with the indices of a collision's bodies: A, then B.
 const BODIES: usize = offset_of!(Collision, body_a) / 4;
 const _: () = assert!(offset_of!(Collision, body_b) == 4 * (BODIES + 1));
 
-/// The word with which the normal of a collision begins.
+/// The first word of a collision's normal.
 const NORMAL: usize = offset_of!(Collision, normal) / 4;
 
-/// Where a row with the angular velocity of a body has its shape.
+/// The lane of the shape index in the row that begins with a body's angular velocity.
 const SHAPE: usize = offset_of!(Body, shape) / 4 - ANGULAR;
 
-/// The words with which the vectors of a body begin.
+/// The first words of the vectors of a body.
 const POSITION: usize = offset_of!(Body, pose.position) / 4;
 const ORIENTATION: usize = offset_of!(Body, pose.orientation) / 4;
 const LINEAR: usize = offset_of!(Body, velocity.linear) / 4;
 const ANGULAR: usize = offset_of!(Body, velocity.angular) / 4;
 
-/// Four numbers, one a lane.
+/// Four numbers, one per lane.
 #[inline(always)]
 fn vec4(value: [f32; 4]) -> Lanes {
     Lanes::new(value.map(f32::to_bits))
@@ -172,7 +173,8 @@ pub(crate) fn contact_rows(collision: &Collision) -> [Lanes; CONTACT_POINTS] {
     collision.contacts.each_ref().map(row)
 }
 
-/// A collision, and whether it is known to have all contact points: nothing is masked of it then.
+/// A collision, and whether it is known to use all four contact points. If so, no point needs a
+/// mask.
 #[derive(Clone, Copy)]
 pub(crate) struct Counted<'a> {
     pub(crate) collision: &'a Collision,
@@ -180,38 +182,38 @@ pub(crate) struct Counted<'a> {
 }
 
 impl<'a> Counted<'a> {
-    /// One that is known to have all.
+    /// A collision that is known to use all contact points.
     #[inline(always)]
     pub(crate) fn full(collision: &'a Collision) -> Self {
         debug_assert_eq!(collision.count, FULL, "it has all");
         Self { collision, full: true }
     }
 
-    /// How many it has.
+    /// The number of contact points in use.
     #[inline(always)]
     pub(crate) const fn count(self) -> u32 {
-        // Where it is known, all that depends on it is known when it is compiled.
+        // A constant after inlining where `full` is known: the code that depends on it folds, too.
         if self.full { FULL } else { self.collision.count }
     }
 }
 
 impl<'a> From<&'a Collision> for Counted<'a> {
-    /// One of any count.
+    /// A collision with any number of contact points.
     #[inline(always)]
     fn from(collision: &'a Collision) -> Self {
         Self { collision, full: false }
     }
 }
 
-/// As many contact points as a collision may have.
+/// The largest number of contact points of a collision.
 #[expect(clippy::cast_possible_truncation, reason = "four")]
 pub(crate) const FULL: u32 = CONTACT_POINTS as u32;
 
-/// The bits of the contact points of a collision that are used: all of each, or none. Of a count beyond
-/// `i32`, which validation refuses, none are.
+/// One mask per contact point: all bits if the point is in use, else none. A count beyond `i32`,
+/// which validation refuses, gives no bits.
 ///
-/// Without a branch: where it is not known that a collision has all ([`Counted`]), counts follow no pattern that
-/// could be predicted.
+/// The code has no branch: unless a collision is known to use all points ([`Counted`]), counts
+/// follow no pattern that a processor can predict.
 #[inline(always)]
 pub(crate) fn used(count: u32) -> [Lanes; CONTACT_POINTS] {
     let mut used = [Lanes::all(count); CONTACT_POINTS];
@@ -221,9 +223,9 @@ pub(crate) fn used(count: u32) -> [Lanes; CONTACT_POINTS] {
     used
 }
 
-/// The bits of the magnitudes of the contact points that are used, as [`used`]. These are looked up: it takes
-/// fewer instructions than to compare, and to take the sign off. Of a count beyond four, which validation
-/// refuses, it is not said which.
+/// The masks of [`used`] without the sign bits. A table is faster here: it takes fewer instructions
+/// than a comparison and the removal of the sign. The masks of a count beyond four, which
+/// validation refuses, are unspecified.
 #[inline(always)]
 pub(crate) fn used_magnitudes(count: u32) -> [Lanes; CONTACT_POINTS] {
     USED_MAGNITUDES[count as usize % USED_MAGNITUDES.len()].map(Lanes::from)
@@ -243,7 +245,7 @@ static USED_MAGNITUDES: [[Beat; CONTACT_POINTS]; (CONTACT_POINTS + 1).next_power
     table
 };
 
-/// The vec3 of a beat, whatever the word beside it.
+/// The vec3 of a beat. The word beside it is ignored.
 #[inline]
 fn to_vec3(Beat([x, y, z, _]): Beat) -> [f32; 3] {
     [f32::from_bits(x), f32::from_bits(y), f32::from_bits(z)]
@@ -268,7 +270,7 @@ mod tests {
             let magnitudes = used_magnitudes(count).map(Lanes::words);
             assert_eq!(magnitudes, used(count).map(|used| used.and(Lanes::all(MAGNITUDE)).words()));
         }
-        // Whatever they are of others, they are all of a row, or none.
+        // The masks of larger counts are unspecified, but each is whole or zero.
         for count in [5, 7, 8, u32::MAX] {
             for row in used_magnitudes(count).map(Lanes::words) {
                 assert!([[0; LANES], [MAGNITUDE; LANES]].contains(&row), "{count}: {row:x?}");

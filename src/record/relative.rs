@@ -6,14 +6,14 @@ use crate::scene::Collision;
 use crate::simd::{Integer, Lanes};
 use pgs_interface::record::{CONTACT_POINTS, LANES, relative};
 
-/// The row of a contact point which is not there.
+/// The row of an unused contact point.
 const FAR: [u32; LANES] = [0, 0, 0, f32::INFINITY.to_bits()];
 
 /// The collision record: normal, offset from body A to body B, contact points from body A.
 ///
-/// Differences are rounded to f32 before anything else happens to them. Contact points from the count
-/// on are zeros at infinite distance, whatever the caller left there. The indices of the bodies are
-/// `bodies`: where only live bodies are kept, others than the caller's.
+/// Differences are rounded to f32 first. Contact points from the count on are zeros at infinite
+/// distance: the record does not depend on the caller's values there. `bodies` are the indices in
+/// the record, which differ from the caller's where only live bodies are kept.
 ///
 /// Shape: 6 rows. Units: metres, world axes; distance negative = penetrating.
 ///
@@ -38,18 +38,19 @@ pub(crate) fn encode(
     Record { rows, integers }
 }
 
-/// Body B from body A, and from there all four contact points beside their distances.
+/// The offset from body A to body B, and all four contact points from body A beside their
+/// distances.
 #[inline(always)]
 pub(crate) fn seen(from: &Collision, [a, b]: [&End; 2]) -> (Lanes, [Lanes; CONTACT_POINTS]) {
     let [a, b] = [a, b].map(End::alone);
-    // Beside the position is a zero, which takes nothing from the distance.
+    // The word beside a position is zero, so the distance stays as it is.
     (b.minus_f32(a), contact_rows(from).map(|point| point.minus_f32(a)))
 }
 
 /// The positions of bodies A and B that a record is made from.
 ///
-/// A static body has no lever arm that anything comes of, and its centre may be far away, which
-/// sixteen bits pay for with every contact point on it: the other body's position stands in for its.
+/// The lever arm of a static body has no effect, and its centre may be far away. In sixteen bits, a
+/// far centre costs every contact point precision. So the other body's position replaces it.
 #[inline(always)]
 pub(crate) fn anchors<T: Copy>([a, b]: [T; 2], [a_moves, b_moves]: [bool; 2]) -> [T; 2] {
     let from = if a_moves { a } else { b };

@@ -4,10 +4,10 @@ use super::{to_vec3, to_vec4, vec3_and_word, vec4};
 use crate::scene::{Pose, Velocity};
 use pgs_interface::record::{Beat, result};
 
-/// A record of results, in f32.
+/// A result record, in f32.
 pub(crate) type Record = [Beat; result::ROWS];
 
-/// The new state of a body from its result record; the words beside the vec3 are not looked at.
+/// The new state of a body from its result record. The words beside each vec3 are ignored.
 ///
 /// Shape: 4 rows. Units: metres, unit quaternion, m/s, rad/s, world frame.
 ///
@@ -25,7 +25,7 @@ pub(crate) fn decode(beats: &Record) -> (Pose, Velocity) {
     (pose, velocity)
 }
 
-/// The record of which [`decode`] makes this state again.
+/// The record that [`decode`] turns back into this state.
 #[inline]
 pub(crate) fn of(pose: Pose, velocity: Velocity) -> Record {
     let mut beats = Record::default();

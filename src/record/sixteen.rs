@@ -11,11 +11,12 @@ use crate::simd::{Integer, Lanes, Narrow, Vectors};
 pub(crate) enum Sixteen {
     /// Binary16, rounded to nearest even.
     Binary16,
-    /// The thesis', cut off.
+    /// The thesis' format, truncated.
     Thesis16,
 }
 
-/// As [`Sixteen::narrow`], of [`Sixteen::Thesis16`]. Word by word it is too much to stand in every loop.
+/// [`Sixteen::narrow`] for [`Sixteen::Thesis16`]. Its code goes word by word and is too long to
+/// inline into every loop.
 #[inline(never)]
 fn cut(numbers: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
     let mut narrow = numbers.map(|row| row.words().map(thesis16::narrow));
@@ -37,8 +38,8 @@ impl Sixteen {
         }
     }
 
-    /// Two rows of f32 as a beat of this format. Of an unsigned integer the lower half is taken: what is
-    /// more than that validation refuses.
+    /// Two rows of f32 as a beat of this format. An unsigned integer keeps its lower half:
+    /// validation refuses larger integers.
     #[inline(always)]
     pub(crate) fn narrow<V: Vectors>(self, vectors: V, rows: [Row; 2]) -> [Narrow; 2] {
         let numbers = rows.map(|row| row.numbers);
@@ -74,11 +75,11 @@ mod tests {
         in_wide_vectors(Narrowing { format, rows, ends })
     }
 
-    /// Two rows, which end in integers of words beside them.
+    /// Two rows, which may end in integers.
     struct Narrowing {
         format: Sixteen,
         rows: [[u32; LANES]; 2],
-        /// Which of [`INTEGERS`].
+        /// Indices into [`INTEGERS`].
         ends: [Option<usize>; 2],
     }
 
@@ -156,8 +157,8 @@ mod tests {
         }
     }
 
-    /// Every word comes back, and between two neighbours the nearer one is taken, the even one in
-    /// the middle.
+    /// Every word comes back unchanged. A number between two words goes to the nearer one, and from
+    /// the middle to the even one.
     #[test]
     fn binary16_is_rounded_to_nearest_even_over_its_whole_range() {
         for bits in 0..0x7BFF_u16 {

@@ -9,7 +9,8 @@ use pgs_support::chunks::Chunks;
 
 /// Collisions in the order in which they are sent, looked up where the caller keeps them.
 ///
-/// Every implementation carries `#[inline(always)]`: each look-up becomes a part of the packing loop.
+/// Every implementation carries `#[inline(always)]`: each look-up becomes a part of the packing
+/// loop.
 pub(crate) trait CollisionSource<'a>: Copy {
     /// The number of collisions.
     fn len(self) -> usize;
@@ -17,8 +18,7 @@ pub(crate) trait CollisionSource<'a>: Copy {
     /// The `nth` chunk of `N` collisions, if it is complete.
     fn some<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]>;
 
-    /// The `nth` chunk of `N` collisions, if it is complete. Prefetches collisions that a later chunk
-    /// needs.
+    /// The `nth` chunk of `N` collisions, if it is complete. Prefetches collisions of later chunks.
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>>;
 
     /// The collisions of a range; a range past the end is cut.
@@ -40,37 +40,39 @@ pub(crate) trait CollisionSource<'a>: Copy {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Next<'a, const N: usize> {
     pub(crate) these: [&'a Collision; N],
-    /// A later chunk, whose bodies the caller prefetches. `None` near the end, and where a prefetch costs
-    /// more than it saves: the bodies of adjacent collisions are adjacent, too.
+    /// A later chunk, whose bodies the caller prefetches. `None` near the end, and where a prefetch
+    /// costs more than it saves: the bodies of adjacent collisions are adjacent, too.
     pub(crate) soon: Option<[&'a Collision; N]>,
 }
 
-/// How far behind a collision is asked for: so far that it is there in time, so near that it is not gone
-/// again.
+/// Prefetch distance in collisions: long enough for a collision to arrive in time, short enough
+/// that it is not evicted before its turn.
 const SOON: usize = 30;
 
-/// The same in an array, which comes without being looked up, and so sooner.
+/// The prefetch distance in an array, which needs no look-up of the index and may start earlier.
 const SOON_IN_ARRAY: usize = 70;
 
-/// The same of its bodies, which it has to say by then.
+/// The prefetch distance of bodies. The collision must have arrived by then: it holds their
+/// indices.
 const BODIES_SOON: usize = SOON / 2;
 
-/// How far behind what lies about there is fetched, where the order is near to that in memory: line by line
-/// into the second cache. As far as nearly all go astray, and so few that they lie there until it is their
-/// turn; at the end of a part that a thread has, what the next one begins with is on its way, too.
+/// Prefetch distance into the second cache, line by line in memory order, for an order close to
+/// memory order. Nearly all collisions are displaced by less than this distance, and lines this far
+/// ahead stay in the cache until their turn. At the end of a thread's part, the prefetch covers the
+/// beginning of the next part.
 const NEARBY_LATER: usize = 1100;
 
-/// How far behind a collision is asked for there, by its place: most come from the second cache then.
+/// Prefetch distance by index in such an order: most collisions come from the second cache then.
 const NEARBY_SOON: usize = 14;
 
-/// Entries from which on one is no longer where it would lie in an array: so many collisions are in
-/// none of the inner caches.
+/// A collision is near its place in an array if its index differs by less than this. The inner
+/// caches hold fewer collisions.
 const NEARBY: usize = 4096;
 
-/// Every so many entries one is looked at to find out.
+/// One entry in this many is sampled to detect a nearby order.
 const SAMPLED: usize = 64;
 
-/// Those of a range, as many as there are.
+/// The elements of a range; a range past the end is cut.
 #[inline(always)]
 fn part<T>(all: &[T], range: Range<usize>) -> &[T] {
     let until = range.end.min(all.len());
@@ -95,7 +97,7 @@ impl<'a> CollisionSource<'a> for Contiguous<'a> {
     #[inline(always)]
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
         let these = self.some(nth)?;
-        // Beyond the end, too: that is memory of somebody else's, which stays as it is.
+        // The address may be past the end: a prefetch does not change the memory there.
         soon_with_those_behind::<N, _>(self.0, nth * N + SOON_IN_ARRAY);
         Some(Next { these, soon: None })
     }
@@ -110,33 +112,34 @@ impl<'a> CollisionSource<'a> for Contiguous<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Indexed<'a> {
     all: &'a [Collision],
-    /// Places of these, and of what is behind them.
+    /// Indices of these collisions in `all`, followed by the indices of later parts.
     order: &'a [u32],
-    /// How many these are.
+    /// The number of these collisions.
     count: usize,
 }
 
 impl<'a> Indexed<'a> {
-    /// Those at all places of an order.
+    /// The collisions of a whole order.
     pub(crate) fn new(all: &'a [Collision], order: &'a [u32]) -> Self {
         Self { all, order, count: order.len() }
     }
 
-    /// That at a place; one without contact points beyond the end.
+    /// The collision at a place; past the end, a collision without contact points.
     #[inline(always)]
     fn at(self, place: u32) -> &'a Collision {
         match self.all.get(place as usize) {
             Some(collision) => collision,
             None => {
-                // As in `Ends::get`.
+                // A predicted branch, as in `Ends::get`.
                 pgs_support::cold_path();
                 &Collision::NOTHING
             }
         }
     }
 
-    /// Has those fetched whose turn it is `soon` entries behind the `nth` so many; the places of these and of all
-    /// up to there. None if there are fewer.
+    /// Prefetches the `N` collisions that are `soon` entries after the start of the `nth` chunk.
+    /// Returns the places from that start on, up to the last prefetched one; `None` if fewer are
+    /// left.
     #[inline(always)]
     fn fetch_behind<const N: usize>(self, nth: usize, soon: usize) -> Option<&'a [u32]> {
         let places = self.order.get(nth * N..)?.get(..soon + N)?;
@@ -146,13 +149,13 @@ impl<'a> Indexed<'a> {
         Some(places)
     }
 
-    /// The `nth` so many, behind which there are too few for anything to be fetched.
+    /// The `nth` chunk of `N` collisions, near the end, where too few follow for a prefetch.
     #[inline(always)]
     fn last<const N: usize>(self, nth: usize) -> Option<[&'a Collision; N]> {
         Some(self.those(self.order.get(nth * N..)?.first_chunk()?))
     }
 
-    /// Those at these places.
+    /// The collisions at these places.
     #[inline(always)]
     fn those<const N: usize>(self, places: &[u32; N]) -> [&'a Collision; N] {
         let mut those = [&Collision::NOTHING; N];
@@ -177,7 +180,7 @@ impl<'a> CollisionSource<'a> for Indexed<'a> {
 
     #[inline(always)]
     fn next<const N: usize>(self, nth: usize) -> Option<Next<'a, N>> {
-        // It is looked at once how many there are, for all of them.
+        // One check of the length serves the chunk and both prefetches.
         let Some(places) = self.fetch_behind::<N>(nth, SOON) else {
             return Some(Next { these: self.last(nth)?, soon: None });
         };
@@ -192,17 +195,17 @@ impl<'a> CollisionSource<'a> for Indexed<'a> {
     }
 }
 
-/// [`Structures::Ordered`], where each lies about where it would in an array.
+/// [`Structures::Ordered`] in an order close to memory order.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InNearbyOrder<'a> {
     order: Indexed<'a>,
-    /// The index of the first of these.
+    /// The index of the first of these collisions in the whole order.
     first: usize,
 }
 
 impl<'a> Indexed<'a> {
-    /// The same, if nearly all of these lie about where they would in an array; entry `first` is the first
-    /// of them. Those that are not there lie nowhere.
+    /// These collisions, if nearly all are near their place in an array; `first` is the index of
+    /// the first in the whole order. A place past the end does not count as far.
     pub(crate) fn nearby(self, first: usize) -> Option<InNearbyOrder<'a>> {
         let order = self.order.get(..self.count)?;
         let sampled = (first..).step_by(SAMPLED).zip(order.iter().step_by(SAMPLED));
@@ -250,7 +253,7 @@ impl<'a> CollisionSource<'a> for InNearbyOrder<'a> {
 mod tests {
     use super::*;
 
-    /// So many collisions, which name their place.
+    /// `count` collisions; each holds its place in `body_a`.
     fn collisions(count: u32) -> Vec<Collision> {
         (0..count).map(|body_a| Collision { body_a, ..Collision::NOTHING }).collect()
     }
@@ -259,7 +262,7 @@ mod tests {
         some.into_iter().map(|collision| collision.body_a).collect()
     }
 
-    /// A part ends where it says, also if there is more behind it.
+    /// Checks that a part ends at its own end, even if more collisions follow.
     fn parts_are_as_long_as_they_say<'a>(all: impl CollisionSource<'a>, expected: &[u32]) {
         let whole = all.part(10..90).part(15..200);
         assert_eq!(names(whole.iter()), expected[25..90]);
@@ -280,7 +283,7 @@ mod tests {
         let all = collisions(100);
         let in_turn: Vec<u32> = (0..100).collect();
         parts_are_as_long_as_they_say(Contiguous(&all), &in_turn);
-        // Backwards, with one that is not there.
+        // Backwards, with one place past the end.
         let mut order: Vec<u32> = in_turn.into_iter().rev().collect();
         order[40] = u32::MAX;
         let mut expected = order.clone();
@@ -288,7 +291,7 @@ mod tests {
         parts_are_as_long_as_they_say(Indexed::new(&all, &order), &expected);
         let near = Indexed::new(&all, &order).nearby(0).expect("a hundred lie near each other");
         parts_are_as_long_as_they_say(near, &expected);
-        // What is fetched goes by the entry.
+        // The prefetch in memory order starts from the index of the entry.
         let part = near.part(10..90).part(15..200);
         assert_eq!(part.first, 25);
         assert!(part.next::<2>(3).expect("as many").soon.is_none());
@@ -303,7 +306,7 @@ mod tests {
             Indexed::new(&all, order).part(range).nearby(first).is_some()
         };
         assert!(nearby(&in_turn, 0..100_000) && nearby(&in_turn, 90_000..100_000));
-        // Swapped in pairs, and with some that are not there.
+        // Swapped in pairs; every third place is past the end.
         let mut swapped: Vec<u32> = in_turn.iter().map(|place| place ^ 1).collect();
         swapped.iter_mut().step_by(3).for_each(|place| *place = u32::MAX);
         assert!(nearby(&swapped, 0..100_000));
@@ -323,10 +326,10 @@ mod tests {
         let order: Vec<u32> = (0..100).rev().collect();
         let part = Indexed::new(&all, &order).part(30..60);
         let soon = |nth| part.next::<2>(nth).expect("as many").soon.map(names);
-        // Entries 30 + 15 and the next; beyond the part, too.
+        // Entries 30 + 15 and the next, even if they are past the end of the part.
         assert_eq!(soon(0), Some(vec![54, 53]));
         assert_eq!(soon(14), Some(vec![26, 25]));
-        // Of the last none are.
+        // The last chunks prefetch no bodies.
         let last = Indexed::new(&all, &order).part(90..100);
         assert!(last.next::<2>(0).expect("as many").soon.is_none());
         assert!(Contiguous(&all).next::<2>(0).expect("as many").soon.is_none());

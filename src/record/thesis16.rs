@@ -6,9 +6,10 @@
 //! word    s  fffff  mmmmmmmmmm          (1 + m / 1024) x 2^(F - 15), F = E - 112, for every F
 //! ```
 //!
-//! There is no zero, no subnormal, no infinity. A smaller magnitude than 2^-15, zero among them,
-//! becomes the word 0 with its sign, which reads as 2^-15. 2^16 and more become F = 31, which the
-//! accelerator makes of everything that it cannot hold: it is read as infinite here.
+//! There is no zero, no subnormal, no infinity. A magnitude below 2^-15, zero included, becomes the
+//! word 0 with its sign, which reads as 2^-15. A magnitude of 2^16 or more becomes F = 31. The
+//! accelerator writes F = 31 for every number that it cannot hold, and this module reads it as
+//! infinite.
 //!
 //! Source: thesis §4.6.4; interface specification, sixteen-bit numbers.
 
@@ -26,8 +27,8 @@ const OVERFLOW: u32 = (LOWEST + 31) << 23;
 /// The word of a number, given and made as bits.
 #[inline(always)]
 pub(super) fn narrow(bits: u32) -> u16 {
-    // Clamped as integers: the order of magnitudes is that of their bits, and infinity and NaN are
-    // beyond all of them.
+    // Clamped as integers: the bits of magnitudes are in the order of the magnitudes, and infinity
+    // and NaN are above all numbers.
     let magnitude = (bits & !SIGN).clamp(SMALLEST, OVERFLOW) - SMALLEST;
     let word = ((bits & SIGN) >> 16) | (magnitude >> CUT);
     #[expect(
@@ -55,8 +56,8 @@ mod tests {
         narrow(value.to_bits())
     }
 
-    /// The written definition, in numbers: every word but those of F = 31 comes back as it was, and
-    /// every f32 from it up to the next is cut off to it.
+    /// Compares with the written definition, in numbers. Every word except F = 31 comes back
+    /// unchanged, and every f32 from it up to the next word is truncated to it.
     #[test]
     fn every_word_is_its_own_number_and_what_lies_above_it_is_cut_off() {
         for bits in 0..=u16::MAX {
@@ -70,7 +71,7 @@ mod tests {
             }
             assert_eq!(f64::from(found).to_bits(), value.to_bits(), "{bits:#06x}");
             assert_eq!(word(found), bits, "{bits:#06x}");
-            // The last f32 before the next word's.
+            // The last f32 before the next word.
             assert_eq!(narrow(found.to_bits() + 0x1FFF), bits, "{bits:#06x}");
         }
     }

@@ -21,7 +21,8 @@ pub(crate) fn encode(body: &Body) -> Record<{ velocity::ROWS }> {
     record
 }
 
-/// The velocity record with world inertia: the two rows above, and the inverse inertia of the body.
+/// The velocity record with world inertia: the rows of [`encode`], and the inverse inertia of the
+/// body.
 ///
 /// Shape: 4 rows. Units: m/s, rad/s, 1/(kg m²), world frame.
 ///

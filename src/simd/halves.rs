@@ -1,7 +1,10 @@
-//! Converts rows of numbers between f32 and binary16 with the conversion instructions of the processor.
+//! Converts rows of numbers between f32 and binary16 with the conversion instructions of the
+//! processor.
 //!
-//! `half` knows them, too, but on aarch64 it wants more than every processor has: on a Cortex-A53, whose
-//! instructions these are, it would compute with integers. It does so where there are none.
+//! The crate `half` knows the instructions, too. On aarch64 it uses them only with an extension
+//! that a Cortex-A53 lacks, although that processor has the conversions: there it computes with
+//! integers. On processors without conversion instructions, this module uses the integer code of
+//! `half`.
 #![allow(
     unsafe_code,
     reason = "not every processor has the instructions, vectors are cast, and one is made opaque"
@@ -13,8 +16,8 @@ use pgs_interface::record::{LANES, WORD_LANE};
 
 use super::lanes::{Integer, Lanes};
 
-/// Rounds the numbers of two rows to binary16, to nearest even. The lower half of an integer, where there
-/// is one, is what such a row ends in.
+/// Rounds the numbers of two rows to binary16, to nearest even. A row with an integer ends in the
+/// integer's lower half.
 #[inline(always)]
 pub(crate) fn to_binary16(rows: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
     let [first, second] = rows.map(Lanes::words);
@@ -62,8 +65,8 @@ pub(crate) mod x86 {
 
     /// As [`to_binary16`](super::to_binary16).
     ///
-    /// What is written for all four cases is too much to become a part of a loop by itself, so it is made
-    /// one; what is left there of each is an instruction or two.
+    /// The code of all four cases is too long for the compiler to inline by itself, so inlining is
+    /// forced. One or two instructions per case remain in the loop.
     ///
     /// # Safety
     /// The processor has AVX2 and F16C.
@@ -78,16 +81,18 @@ pub(crate) mod x86 {
         let [first, second] = integers;
         let first = first.map(half::<FIRST>);
         let second = second.map(half::<SECOND>);
-        // SAFETY: `numbers` wants AVX2 and F16C, which the caller promises; it computes in registers.
+        // SAFETY: `numbers` needs AVX2 and F16C, which the caller promises. It computes in
+        // registers.
         let numbers = unsafe { numbers(rows) };
-        // What the last words of such rows became as numbers is nothing.
+        // In a row with an integer, the last number is discarded.
         bytemuck::cast(match (first, second) {
             (None, None) => numbers,
-            // SAFETY: `beside` wants AVX2, which the caller promises; it computes in registers.
+            // SAFETY: `beside` needs AVX2, which the caller promises. It computes in registers.
             (Some(first), None) => unsafe { beside::<{ 1 << FIRST }>(numbers, first) },
-            // SAFETY: `beside` wants AVX2, which the caller promises; it computes in registers.
+            // SAFETY: `beside` needs AVX2, which the caller promises. It computes in registers.
             (None, Some(second)) => unsafe { beside::<{ 1 << SECOND }>(numbers, second) },
-            // SAFETY: `beside_both` wants AVX2, which the caller promises; it computes in registers.
+            // SAFETY: `beside_both` needs AVX2, which the caller promises. It computes in
+            // registers.
             (Some(first), Some(second)) => unsafe {
                 beside_both::<{ 1 << FIRST | 1 << SECOND }>(numbers, first, second)
             },
@@ -102,7 +107,8 @@ pub(crate) mod x86 {
         computed_once(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(both))
     }
 
-    /// Bytes, and which of them each byte of what they are shuffled to is; it is zero where that is above 127.
+    /// Bytes, and for each byte of the shuffled result its index in them. An index above 127 gives
+    /// zero.
     type Shuffle = (__m128i, [u8; 16]);
 
     /// The lower half of an integer as half `TO` of eight, beside zeros.
@@ -113,14 +119,14 @@ pub(crate) mod x86 {
         (words.0, from)
     }
 
-    /// Halves of an integer where `OTHERS` has a bit, of `numbers` elsewhere.
+    /// The halves of an integer where `OTHERS` has a bit, and of `numbers` elsewhere.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn beside<const OTHERS: i32>(numbers: __m128i, (words, from): Shuffle) -> __m128i {
         _mm_blend_epi16::<OTHERS>(numbers, _mm_shuffle_epi8(words, bytemuck::cast(from)))
     }
 
-    /// The same of two integers.
+    /// [`beside`] for two integers.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn beside_both<const OTHERS: i32>(
@@ -133,13 +139,13 @@ pub(crate) mod x86 {
         _mm_blend_epi16::<OTHERS>(numbers, _mm_or_si128(first, second))
     }
 
-    /// This vector. Otherwise the compiler narrows what is stored and used, too, once for either, and to
-    /// memory it takes twice as long.
+    /// Returns the vector, opaque to the compiler. Otherwise, the compiler converts a result that
+    /// is stored and used once for each, and a conversion to memory takes twice as long.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn computed_once(mut vector: __m128i) -> __m128i {
-        // SAFETY: the template is a comment: no instruction is run. So the register holds what it held,
-        // and there is no memory, stack or flag that the options could be wrong about.
+        // SAFETY: the template is a comment: no instruction is run. So the register keeps its
+        // value, and there is no memory, stack or flag that the options could be wrong about.
         unsafe {
             asm!("/* {0} */", inout(xmm_reg) vector, options(pure, nomem, nostack, preserves_flags));
         }
@@ -173,11 +179,13 @@ mod aarch64 {
 
     #[inline(always)]
     pub(crate) fn to_f32(from: Narrow) -> Wide {
-        // SAFETY: both are four words of sixteen bits, eight bytes, and the vector may hold any bits.
+        // SAFETY: both are four words of sixteen bits, eight bytes, and the vector may hold any
+        // bits.
         let narrow = unsafe { std::mem::transmute::<Narrow, float16x4_t>(from) };
         // SAFETY: every aarch64 that Linux runs on has the instruction.
         let wide = unsafe { vcvt_f32_f16(narrow) };
-        // SAFETY: both are four words of 32 bits, sixteen bytes, and those of `Wide` may hold any bits.
+        // SAFETY: both are four words of 32 bits, sixteen bytes, and the words of `Wide` may hold
+        // any bits.
         unsafe { std::mem::transmute::<float32x4_t, Wide>(wide) }
     }
 }
@@ -188,7 +196,7 @@ mod tests {
     use super::*;
     use pgs_support::chunks::Chunks;
 
-    /// Numbers around every border of binary16, and others.
+    /// Numbers around every rounding border of binary16, and others.
     fn wide() -> Vec<f32> {
         let mut all = vec![f32::MIN_POSITIVE, f32::from_bits(1), 65_519.9, 65_520.0, f32::MAX];
         for word in 0..0x7C00 {
@@ -202,14 +210,14 @@ mod tests {
         all.iter().flat_map(|number| [*number, -*number]).collect()
     }
 
-    /// What two rows end in: the lower halves of these words, or none.
+    /// The integers at the ends of two rows: four words and the index of one, or `None`.
     type Ends = [Option<([u32; LANES], usize)>; 2];
 
     fn lanes(ends: Ends) -> [Option<Integer>; 2] {
         ends.map(|end| end.map(|(words, at)| Integer { words: Lanes::new(words), at }))
     }
 
-    /// Pairs of rows through the vectors of a loop.
+    /// Rounds pairs of rows in the vectors of a loop.
     struct Rounding<'a>(&'a [[Wide; 2]], Ends);
 
     impl Work for Rounding<'_> {
@@ -223,7 +231,7 @@ mod tests {
         }
     }
 
-    /// In the widest vectors and in those that every processor has, integers beside them or not.
+    /// Runs in the widest vectors and in the baseline, with and without integers.
     #[test]
     fn numbers_are_rounded_as_by_integers_and_integers_are_cut() {
         let mut wide: Vec<u32> = wide().into_iter().map(f32::to_bits).collect();
@@ -232,7 +240,7 @@ mod tests {
         let words = [0x1234_5678, 0x9ABC_DEF0, 0x0FED_CBA9, 0x8765_4321];
         let any = |words| (0..LANES).map(move |at| Some((words, at))).chain([None]);
         let ends = any(words).flat_map(|first| {
-            // Of the same words, and of others.
+            // The second integer is from the same words or from others.
             let others = words.map(u32::reverse_bits);
             any(words).chain(any(others)).map(move |second| [first, second])
         });
@@ -255,7 +263,7 @@ mod tests {
         }
     }
 
-    /// Rows of binary16 through the vectors of a loop.
+    /// Widens rows of binary16 in the vectors of a loop.
     struct Widening<'a>(&'a [[Narrow; 2]]);
 
     impl Work for Widening<'_> {

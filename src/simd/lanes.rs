@@ -1,7 +1,7 @@
 //! Computes with the four words of a beat at once.
 //!
-//! Every x86-64 and every aarch64 has the instructions. Written as loops over four words the compiler
-//! finds them only now and then.
+//! Every x86-64 and every aarch64 has the instructions. The compiler rarely finds them in loops
+//! over four words.
 #![allow(unsafe_code, reason = "instructions of a processor, and vectors of aarch64 are cast")]
 
 use pgs_interface::record::{Beat, LANES};
@@ -35,11 +35,12 @@ macro_rules! each {
     }};
 }
 
-/// The same of words that are f32.
+/// One instruction for all four words as f32, or the same word by word.
 macro_rules! each_f32 {
     ($x86:ident, $arm:ident, $number:expr, $one:expr, $other:expr) => {{
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: every x86-64 has the instructions, which compute or take one register for another.
+        // SAFETY: every x86-64 has the instructions, which compute or take one register for
+        // another.
         let vector = unsafe {
             let [one, other] = [$one.0, $other.0].map(|vector| arch::_mm_castsi128_ps(vector));
             arch::_mm_castps_si128(arch::$x86(one, other))
@@ -65,7 +66,7 @@ macro_rules! each_f32 {
 pub(crate) struct Lanes(pub(crate) Vector);
 
 impl Lanes {
-    /// These words.
+    /// Takes four words.
     #[inline(always)]
     pub(crate) fn new(words: [u32; LANES]) -> Self {
         #[cfg(not(target_arch = "aarch64"))]
@@ -76,13 +77,13 @@ impl Lanes {
         Self(vector)
     }
 
-    /// The same word four times.
+    /// The same word in all four lanes.
     #[inline(always)]
     pub(crate) fn all(word: u32) -> Self {
         Self::new([word; LANES])
     }
 
-    /// As words.
+    /// The four words.
     #[inline(always)]
     pub(crate) fn words(self) -> [u32; LANES] {
         #[cfg(not(target_arch = "aarch64"))]
@@ -92,20 +93,20 @@ impl Lanes {
         return unsafe { std::mem::transmute::<Vector, [u32; LANES]>(self.0) };
     }
 
-    /// The first three words beside another last one.
+    /// The first three words, and `last` in place of the fourth.
     #[inline(always)]
     pub(crate) fn beside(self, last: u32) -> Self {
         let [first, second, third, _] = self.words();
         Self::new([first, second, third, last])
     }
 
-    /// Word by word, modulo 2^32.
+    /// Sums of words, modulo 2^32.
     #[inline(always)]
     pub(crate) fn plus(self, other: Self) -> Self {
         each!(_mm_add_epi32, vaddq_u32, u32::wrapping_add, self, other)
     }
 
-    /// The same less the other's.
+    /// Differences of words, modulo 2^32.
     #[inline(always)]
     pub(crate) fn minus(self, other: Self) -> Self {
         each!(_mm_sub_epi32, vsubq_u32, u32::wrapping_sub, self, other)
@@ -121,11 +122,11 @@ impl Lanes {
     #[inline(always)]
     pub(crate) fn without(self, other: Self) -> Self {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: SSE2, whose instruction it is, belongs to every x86-64; it works on registers alone.
+        // SAFETY: the instruction is of SSE2, which every x86-64 has. It works on registers alone.
         return Self(unsafe { arch::_mm_andnot_si128(other.0, self.0) });
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: NEON, whose instruction it is, belongs to every aarch64 that Linux runs on; it works on
-        // registers alone.
+        // SAFETY: the instruction is of NEON, which every aarch64 that Linux runs on has. It works
+        // on registers alone.
         return Self(unsafe { arch::vbicq_u32(self.0, other.0) });
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return Self::new(std::array::from_fn(|k| self.0[k] & !other.0[k]));
@@ -154,11 +155,11 @@ impl Lanes {
     #[inline(always)]
     fn last(self) -> Self {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: SSE2, whose instruction it is, belongs to every x86-64; it works on registers alone.
+        // SAFETY: the instruction is of SSE2, which every x86-64 has. It works on registers alone.
         return Self(unsafe { arch::_mm_shuffle_epi32::<0xFF>(self.0) });
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: NEON, whose instruction it is, belongs to every aarch64 that Linux runs on; it works on
-        // registers alone.
+        // SAFETY: the instruction is of NEON, which every aarch64 that Linux runs on has. It works
+        // on registers alone.
         return Self(unsafe { arch::vdupq_laneq_u32::<3>(self.0) });
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return Self::all(self.0[3]);
@@ -174,11 +175,11 @@ impl Lanes {
     #[inline(always)]
     fn neighbours(self) -> Self {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: SSE2, whose instruction it is, belongs to every x86-64; it works on registers alone.
+        // SAFETY: the instruction is of SSE2, which every x86-64 has. It works on registers alone.
         return Self(unsafe { arch::_mm_shuffle_epi32::<0b10_11_00_01>(self.0) });
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: NEON, whose instruction it is, belongs to every aarch64 that Linux runs on; it works on
-        // registers alone.
+        // SAFETY: the instruction is of NEON, which every aarch64 that Linux runs on has. It works
+        // on registers alone.
         return Self(unsafe { arch::vrev64q_u32(self.0) });
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return Self(std::array::from_fn(|k| self.0[k ^ 1]));
@@ -188,18 +189,18 @@ impl Lanes {
     #[inline(always)]
     fn halves(self) -> Self {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: SSE2, whose instruction it is, belongs to every x86-64; it works on registers alone.
+        // SAFETY: the instruction is of SSE2, which every x86-64 has. It works on registers alone.
         return Self(unsafe { arch::_mm_shuffle_epi32::<0b01_00_11_10>(self.0) });
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: NEON, whose instruction it is, belongs to every aarch64 that Linux runs on; it works on
-        // registers alone.
+        // SAFETY: the instruction is of NEON, which every aarch64 that Linux runs on has. It works
+        // on registers alone.
         return Self(unsafe { arch::vextq_u32::<2>(self.0, self.0) });
         #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
         return Self(std::array::from_fn(|k| self.0[k ^ 2]));
     }
 
-    /// The sum of all four f32, in each word: of the first two and of the last two, and of these, rounded to
-    /// nearest even each.
+    /// The sum of all four f32, in each word. The first two and the last two are added, then both
+    /// sums. Each sum is rounded to nearest even.
     #[inline(always)]
     pub(crate) fn sum_f32(self) -> Self {
         let pairs = self.plus_f32(self.neighbours());
@@ -224,13 +225,13 @@ impl Lanes {
         each_f32!(_mm_mul_ps, vmulq_f32, f32::mul, self, other)
     }
 
-    /// The larger ones of f32. Beside a NaN it is not said which.
+    /// The larger f32 of each pair. Beside a NaN the result depends on the processor.
     #[inline(always)]
     pub(crate) fn larger_f32(self, other: Self) -> Self {
         each_f32!(_mm_max_ps, vmaxq_f32, f32::max, self, other)
     }
 
-    /// The smaller ones of f32. Likewise.
+    /// The smaller f32 of each pair. Beside a NaN the result depends on the processor.
     #[inline(always)]
     pub(crate) fn smaller_f32(self, other: Self) -> Self {
         each_f32!(_mm_min_ps, vminq_f32, f32::min, self, other)
@@ -257,24 +258,23 @@ impl From<Lanes> for Beat {
     }
 }
 
-/// An unsigned integer that stands in a row: one of four words, of which it is not taken out before it is
-/// written.
+/// An unsigned integer of a row. It stays one of four words until it is written.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Integer {
     pub(crate) words: Lanes,
-    /// Which of them.
+    /// The index of the integer in `words`.
     pub(crate) at: usize,
 }
 
 impl Integer {
-    /// Word `AT` of these.
+    /// Word `AT` of `words`.
     #[inline(always)]
     pub(crate) const fn new<const AT: usize>(words: Lanes) -> Self {
         const { assert!(AT < LANES, "it is one of four") };
         Self { words, at: AT }
     }
 
-    /// Its lower half.
+    /// The lower half of the integer.
     #[inline(always)]
     pub(crate) fn low(self) -> u16 {
         let [low, high, ..] = u32::from(self).to_le_bytes();
@@ -330,7 +330,7 @@ mod tests {
             prop_assert_eq!(a.plus_f32(b).words(), of(|a, b| a + b));
             prop_assert_eq!(a.minus_f32(b).words(), of(|a, b| a - b));
             prop_assert_eq!(a.times_f32(b).words(), of(|a, b| a * b));
-            // Which of 0 and -0 is the larger is not said.
+            // Either of 0 and -0 may be the larger.
             let unsigned_zero = |word| (f32::from_bits(word) + 0.0).to_bits();
             let larger = a.larger_f32(b).words().map(unsigned_zero);
             prop_assert_eq!(larger, of(f32::max).map(unsigned_zero));

@@ -4,34 +4,35 @@
 use super::halves::{self, Narrow};
 use super::lanes::{Integer, Lanes};
 
-/// Loops that are compiled anew for wider vectors.
+/// A loop that is compiled again for wider vectors.
 ///
-/// What is in them is so compiled only where it becomes a part of them: what they call for every record
-/// is inlined always. The bits are the same: nothing is fused and no sum of numbers reordered.
+/// Only inlined code is compiled for them: every function that the loop calls per record is
+/// `#[inline(always)]`. The result bits are the same: no operation is fused and no sum is
+/// reordered.
 pub(crate) trait Work {
     type Output;
 
-    /// Does it. An `#[inline(always)]` belongs to every implementation.
+    /// Runs the loop. Every implementation carries `#[inline(always)]`.
     fn run<V: Vectors>(self, vectors: V) -> Self::Output;
 }
 
-/// What the vectors that a loop is compiled for can do. Whoever has one knows that the processor has
-/// them.
+/// The operations of the vectors that a loop is compiled for. A value of such a type exists only
+/// where the processor has the instructions.
 pub(crate) trait Vectors: Copy {
-    /// Rounds the numbers of two rows to binary16, to nearest even. Where a row ends in an unsigned integer
-    /// its lower half is taken.
+    /// Rounds the numbers of two rows to binary16, to nearest even. A row with an unsigned integer
+    /// ends in the integer's lower half.
     fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2];
 
     /// The numbers of two rows of binary16, in f32.
     fn to_f32(self, rows: [Narrow; 2]) -> [Lanes; 2];
 
-    /// Does it as a function of its own, which is compiled for these vectors, too: a loop that is no part of
-    /// others shares no registers with them. Each closure is called from one such function alone, and becomes
-    /// a part of it; should it not, the bits are the same.
+    /// Runs `work` in a function of its own, which is compiled for these vectors, too. A loop in
+    /// its own function shares no registers with others. The compiler inlines each closure into its
+    /// only caller; without that, the result bits are the same.
     fn apart<T, W: FnOnce() -> T>(self, work: W) -> T;
 }
 
-/// Those that every processor has.
+/// The vectors that every processor has.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Baseline;
 
@@ -52,7 +53,8 @@ impl Vectors for Baseline {
     }
 }
 
-/// Does it in the vectors of AVX2 and with the conversions of F16C, where there are both.
+/// Runs `work` in vectors of AVX2 with the conversions of F16C if the processor has both, else in
+/// the [`Baseline`].
 #[inline]
 pub(crate) fn in_wide_vectors<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
@@ -70,31 +72,32 @@ mod x86 {
 
     use super::{Integer, Lanes, Narrow, Vectors, Work, halves};
 
-    /// Those of AVX2, and the conversions of F16C. There is one in [`run`] alone.
+    /// The vectors of AVX2 and the conversions of F16C. Only [`run`] makes a value.
     #[derive(Debug, Clone, Copy)]
     struct Wide(());
 
     impl Vectors for Wide {
         #[inline(always)]
         fn to_binary16(self, rows: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
-            // SAFETY: the function wants AVX2 and F16C. A `Wide` is made in `run` alone, which is called
-            // only where both were found.
+            // SAFETY: the function needs AVX2 and F16C. Only `run` makes a `Wide`, and `run` is
+            // called only where both were found.
             unsafe { halves::x86::to_binary16(rows, integers) }
         }
 
         #[inline(always)]
         fn to_f32(self, rows: [Narrow; 2]) -> [Lanes; 2] {
-            // SAFETY: there is one of these only where the processor has the instructions that the
+            // SAFETY: a `Wide` exists only where the processor has the instructions that the
             // function is compiled for.
             unsafe { halves::x86::to_f32(rows) }
         }
 
         #[inline(always)]
         fn apart<T, W: FnOnce() -> T>(self, work: W) -> T {
-            // From here, where the vectors are not said, the compiler would inline it nevertheless.
+            // This function enables no target features: without `black_box`, the compiler inlines
+            // `apart` here.
             let apart: unsafe fn(W) -> T = black_box(apart::<T, W>);
-            // SAFETY: `apart` wants AVX2 and F16C. A `Wide` is made in `run` alone, which is called only
-            // where both were found.
+            // SAFETY: `apart` needs AVX2 and F16C. Only `run` makes a `Wide`, and `run` is called
+            // only where both were found.
             unsafe { apart(work) }
         }
     }

@@ -9,7 +9,7 @@ use crate::record::source::CollisionSource;
 use crate::record::{Counted, FULL, alone, body_words, normal_and_count};
 use crate::simd::Lanes;
 
-/// Bits that a count less one has none of.
+/// Bits that are zero in every valid count less one.
 const BEYOND_COUNTS: u32 = !(FULL - 1);
 const _: () = assert!(FULL.is_power_of_two());
 
@@ -17,7 +17,7 @@ const _: () = assert!(FULL.is_power_of_two());
 const SHORTEST: u32 = (1.0 - OFF_UNIT).to_bits();
 const LONGEST: u32 = (1.0 + OFF_UNIT).to_bits();
 
-// What is no longer than that is no number beyond what a stream holds, either.
+// A normal within these bounds has no number beyond a stream's range.
 const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Binary16.largest());
 const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Thesis16.largest());
 
@@ -27,30 +27,31 @@ fn in_last(word: u32) -> Lanes {
     Lanes::new([0, 0, 0, word])
 }
 
-/// What has been seen of the collisions of a block.
+/// Findings about the collisions of a block.
 ///
-/// Nothing is decided of any before the end: bits gather. `REACHES` says whether it matters how far they reach.
+/// Bits accumulate, and the verdict comes at the end. `REACHES` says whether lever arms are
+/// bounded, too.
 #[derive(Clone, Copy)]
 pub(crate) struct Look<const REACHES: bool> {
     /// The top bit where both bodies are the same.
     alike: u32,
-    /// Of the indices of bodies A and B, in the first two words.
+    /// Bits of the indices of bodies A and B, in the first two words.
     named: Lanes,
-    /// Of counts less one, in the last word.
+    /// Bits of the counts less one, in the last word.
     counts: Lanes,
-    /// Of the tags of all ends.
+    /// Bits of the tags of all ends.
     tags: Lanes,
-    /// The top bit of the last word where both bodies are static or the length of a normal is wrong.
+    /// The top bit of the last word if both bodies are static or the length of a normal is wrong.
     wrong: Lanes,
     /// The top bits where a number may be beyond what the stream holds.
     beyond: Lanes,
-    /// What it holds.
+    /// The largest number that the stream holds.
     limit: Lanes,
     furthest: Furthest,
 }
 
 impl<const REACHES: bool> Look<REACHES> {
-    /// At none yet.
+    /// No collision yet.
     #[inline(always)]
     pub(crate) fn new(quick: &Quick<'_>) -> Self {
         let none = Lanes::all(0);
@@ -66,25 +67,27 @@ impl<const REACHES: bool> Look<REACHES> {
         }
     }
 
-    /// Looks at the next, whose bodies were looked up and have these ends. Those that its record is made from
-    /// may be others; the `locations` are the record's.
+    /// Takes the next collision. `ends` are the ends of its bodies, as looked up; its record may be
+    /// made from others. `locations` are the locations in the record.
     #[inline(always)]
     pub(crate) fn take(&mut self, of: Counted<'_>, ends: [&End; 2], locations: &Locations) {
         let collision = of.collision;
-        // Not below zero, unless they are alike or much is wrong with them.
+        // The top bit stays clear, unless the indices are the same or one of them is far out of
+        // range.
         self.alike |= (collision.body_a ^ collision.body_b).wrapping_sub(1);
         self.named = self.named.or(body_words(collision));
         let normal = normal_and_count(collision);
         self.counts = self.counts.or(normal.plus(in_last(u32::MAX)));
         let [a, b] = ends.map(End::with_tag);
         self.tags = self.tags.or(a).or(b);
-        // All four are multiplied, none of which is the count: it would be subnormal, which is slow.
+        // `alone` removes the count: as an f32 it is subnormal, and its product is slow.
         let normal = alone(normal);
         let square = normal.times_f32(normal).sum_f32();
-        // As bits, which are in the order of the numbers: below zero where one is larger.
+        // The bits of positive f32 order like the numbers: a difference is negative if the square
+        // is beyond a bound.
         let off = square.minus(in_last(SHORTEST)).or(in_last(LONGEST).minus(square));
         self.wrong = self.wrong.or(off).or(a.and(b));
-        // The sign of NaN is not said.
+        // A NaN may have either sign, so the bits of the sum are taken, too.
         self.beyond = self.beyond.or(self.limit.minus(locations.sum)).or(locations.sum);
         if const { REACHES } {
             let [a, b] = ends;
@@ -93,8 +96,8 @@ impl<const REACHES: bool> Look<REACHES> {
         }
     }
 
-    /// Whether validation refuses nothing of the block, whose collisions all these were, at these
-    /// `locations`, with their bodies looked up in `ends`; and how many of it look like padding.
+    /// Whether validation accepts every collision of the block, and how many look like padding. The
+    /// look has taken all of them at these `locations`, with their bodies looked up in `ends`.
     #[inline(always)]
     pub(crate) fn good<'b, L: CollisionSource<'b>, E: Lookup<'b>>(
         self,
@@ -117,7 +120,8 @@ impl<const REACHES: bool> Look<REACHES> {
         }
         good = good && self.beyond.words().iter().all(|word| word >> 31 == 0);
         if let Some(bounds) = quick.bounds_of_rows() {
-            // Where one shape of the table forbids it, nothing is found of all at once.
+            // Each collision is checked by itself if the common bound fails or a shape of the table
+            // rules it out.
             good = good
                 && (REACHES && self.furthest.all_surely_fit(bounds)
                     || quick.rows_fit(block, locations));

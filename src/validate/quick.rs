@@ -1,9 +1,9 @@
 //! Screens the input of a step block by block while it is packed: a conservative test that never
 //! accepts input that [`validate`](super::validate) refuses.
 //!
-//! Without a branch per number it is found out whether everything of a block is surely right. One
-//! of which that cannot be said is checked as [`validate`](super::validate) does; what that refuses
-//! is refused there, by its own words and in its own order.
+//! The test has no branch per number. A block that it cannot accept is checked as
+//! [`validate`](super::validate) does. If this check refuses the block,
+//! [`validate`](super::validate) names the error, in its own words and order.
 
 #[cfg(test)]
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -23,25 +23,26 @@ use crate::record::{self, FULL};
 use crate::scene::{Body, Collision};
 use crate::simd::Lanes;
 
-/// How far from 1 the square of a normal's length surely may be: the length itself is half as far.
+/// Distance of a normal's squared length from 1 that is surely accepted. The length itself is half
+/// as far from 1.
 pub(crate) const OFF_UNIT: f32 = InputError::NORMAL_TOLERANCE;
 /// Square of twice the length that an orientation must have.
 const ORIENTATION: f32 = 4.0 * InputError::SHORTEST_ORIENTATION * InputError::SHORTEST_ORIENTATION;
 
-/// Looks at the bodies and collisions of one step.
+/// Screens the bodies and collisions of one step.
 #[derive(Debug)]
 pub(crate) struct Quick<'a> {
     scene: Scene<'a>,
-    /// What bounds the rows, where they are computed in sixteen bits.
+    /// Bounds on the rows, if they are computed in sixteen bits.
     short_rows: Option<Extremes>,
     bodies: Largest<4>,
-    /// Blocks that were not found good at once.
+    /// Number of blocks that the quick test did not accept.
     #[cfg(test)]
     pub(crate) doubted: AtomicUsize,
 }
 
 impl<'a> Quick<'a> {
-    /// For what passed [`preflight`](super::preflight).
+    /// The screen of a scene that passed [`preflight`](super::preflight).
     pub(crate) fn new(scene: Scene<'a>) -> Self {
         let held = scene.held;
         let any = MAGNITUDE;
@@ -60,8 +61,8 @@ impl<'a> Quick<'a> {
         }
     }
 
-    /// Whether validation refuses nothing of these bodies, the first of which has the index `first`;
-    /// `ends` are theirs, and `any_still` says whether any of these is static.
+    /// Whether validation accepts all of these bodies. `first` is the index of the first, `ends`
+    /// are their ends, and `any_still` says whether any of them is static.
     #[inline(always)]
     pub(crate) fn bodies(
         &self,
@@ -72,12 +73,12 @@ impl<'a> Quick<'a> {
     ) -> bool {
         let (mut beyond, mut length) = (Lanes::all(0), Lanes::all(0));
         for body in bodies {
-            // What is beside the vectors, whatever it is, is not bounded.
+            // The words beside the vectors have no bound.
             let [linear, angular] = record::velocity::encode(body).rows;
             let [position, orientation] = record::pose::encode(body);
             beyond = beyond.or(self.bodies.beyond(&[linear, angular, position, orientation]));
             let square = orientation.times_f32(orientation).sum_f32();
-            // As bits, as a normal's.
+            // As bits, as for a normal.
             let [least, most] =
                 [ORIENTATION, f32::MAX / 2.0].map(|bound| Lanes::all(bound.to_bits()));
             length = length.or(square.minus(least)).or(most.minus(square));
@@ -85,7 +86,7 @@ impl<'a> Quick<'a> {
         let [length, ..] = length.words();
         let mut good = (beyond.words() == [0; LANES]) & (length >> 31 == 0);
         if any_still {
-            // One without a shape is among them.
+            // A body without a shape counts as static, too.
             good &= bodies.iter().zip(ends).all(|(body, end)| {
                 let speeds = [body.velocity.linear, body.velocity.angular];
                 let moves = speeds.as_flattened().iter().fold(0, |bits, v| bits | v.to_bits());
@@ -95,26 +96,26 @@ impl<'a> Quick<'a> {
         good || self.bodies_exactly(first, bodies)
     }
 
-    /// Looks at bodies as validation does.
+    /// Checks bodies as validation does.
     #[cold]
     fn bodies_exactly(&self, first: usize, bodies: &[Body]) -> bool {
         self.doubt();
         (first..).zip(bodies).all(|(at, body)| check_body(at, body, &self.scene).is_ok())
     }
 
-    /// Counts a block that was not found good at once.
+    /// Counts a block that the quick test did not accept.
     fn doubt(&self) {
         #[cfg(test)]
         self.doubted.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// What bounds the rows, where they are computed in sixteen bits.
+    /// Bounds on the rows, if they are computed in sixteen bits.
     #[inline(always)]
     pub(crate) const fn bounds_of_rows(&self) -> Option<&Extremes> {
         self.short_rows.as_ref()
     }
 
-    /// Whether it matters how far collisions reach, and may be found of many at once.
+    /// Whether the reach of collisions matters, and one bound may serve many collisions.
     #[inline(always)]
     pub(crate) fn asks_how_far(&self) -> bool {
         self.short_rows.as_ref().is_some_and(Extremes::allow)
@@ -126,8 +127,8 @@ impl<'a> Quick<'a> {
         self.scene.held.collisions.largest()
     }
 
-    /// Whether a bitstream that computes rows in sixteen bits surely computes those of each collision of
-    /// a block, which are at these `locations`.
+    /// Whether a bitstream that computes rows in sixteen bits surely computes the rows of each
+    /// collision of a block. The collisions are at these `locations`.
     pub(crate) fn rows_fit<'b, L: CollisionSource<'b>>(
         &self,
         block: &Block<'b, L>,
@@ -142,9 +143,9 @@ impl<'a> Quick<'a> {
         })
     }
 
-    /// Whether normals, counts and bodies of all of a block but padding are surely right, and how many look
-    /// like padding.
-    // Out of the way of blocks without padding, which most are.
+    /// Whether normals, counts and bodies of all collisions in a block but padding are surely
+    /// right, and how many collisions look like padding.
+    // Not inlined: most blocks have no padding.
     #[inline(never)]
     pub(crate) fn heads<'b, L: CollisionSource<'b>>(&self, block: &Block<'b, L>) -> (bool, usize) {
         let (mut good, mut paddings) = (true, 0);
@@ -157,17 +158,17 @@ impl<'a> Quick<'a> {
         (good, paddings)
     }
 
-    /// Looks at a block as validation does.
+    /// Checks a block as validation does.
     #[cold]
     pub(crate) fn exactly<'b, L: CollisionSource<'b>>(&self, block: &Block<'b, L>) -> bool {
         self.doubt();
         self.refusal(block).is_ok()
     }
 
-    /// What validation refuses of a block.
+    /// Checks a block as validation does.
     ///
     /// # Errors
-    /// That of the first collision that it refuses.
+    /// The error of the first collision that validation refuses.
     pub(crate) fn refusal<'b, L: CollisionSource<'b>>(
         &self,
         block: &Block<'b, L>,
@@ -185,15 +186,15 @@ impl<'a> Quick<'a> {
     }
 }
 
-/// Collisions that are looked at together.
+/// Collisions that are checked together.
 pub(crate) struct Block<'a, L> {
-    /// Index of the first.
+    /// Index of the first collision.
     pub(crate) first: usize,
     pub(crate) collisions: L,
-    /// Of all bodies.
+    /// The ends of all bodies.
     pub(crate) ends: Ends<'a>,
-    /// Whether they are in an order that was made for them. What looks like padding may be of the
-    /// order's making then: whoever looks at all of them counts it.
+    /// Whether the collisions are in the order of a schedule. A collision that looks like padding
+    /// may come from the schedule then. The caller counts such collisions over all blocks.
     pub(crate) scheduled: bool,
 }
 
@@ -210,7 +211,7 @@ fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
         & !(a.is_static() & b.is_static())
 }
 
-/// Whether an order may have made it.
+/// Whether a collision looks like padding of a schedule.
 #[inline(always)]
 fn is_padding(collision: &Collision) -> bool {
     (collision.count == 0) & (collision.body_a == collision.body_b)

@@ -9,67 +9,67 @@ use crate::record::used;
 use crate::scene::Shape;
 use crate::simd::Lanes;
 
-/// Where the bodies and the contact points of a collision are, as they are streamed.
+/// The places of a collision's bodies and contact points, as they are streamed.
 #[derive(Clone, Copy)]
 pub(crate) struct Locations {
-    /// Of body A and body B, m. What is beside them does not matter.
+    /// Positions of bodies A and B, m. The word beside each has no meaning.
     pub(crate) positions: [Lanes; 2],
-    /// Beside their distances, m. Those that are not used do not matter.
+    /// Contact points beside their distances, m. An unused point may hold anything.
     pub(crate) points: [Lanes; CONTACT_POINTS],
-    /// The magnitudes of both positions and of the contact points in use, added up component by component, and
-    /// of their distances beside them: at least as large as each of them; infinite or NaN if one is. It takes
-    /// less than to bound each by itself, and finds less: records some kilometres from the origin are looked at
-    /// again.
+    /// Sums by component: the magnitudes of both positions and of the contact points in use, and
+    /// beside them the magnitudes of the distances. A sum is at least as large as each term, and
+    /// infinite or NaN if a term is. One bound on the sum costs less than a bound on each term, but
+    /// accepts less: records some kilometres from the origin are checked again.
     pub(crate) sum: Lanes,
 }
 
-/// How far the contact points of a collision are that are in use, at most.
+/// Upper bounds on the distances of a collision's contact points in use.
 ///
-/// What is longer in any component is no shorter after any of the roundings, so that what is found
-/// to fit here fits each point by itself. Whole rows, without a branch: what lies beside a vec3 is
-/// left out at the end. What NaN makes of it does not matter: the bound on numbers refuses that.
+/// A component that is longer is no shorter after any of the roundings, so a collision that fits
+/// here fits with each point by itself. The code handles whole rows without a branch, and drops the
+/// word beside a vec3 at the end. A NaN may give any result here: the bound on numbers refuses it.
 pub(crate) struct Reach {
-    /// Lever arms about body A and body B, m, but for what is lost of their two ends.
+    /// Lever arms about bodies A and B, m, without the loss at their two ends.
     arms: [Lanes; 2],
-    /// [That](Locations::sum) of the locations: neither an arm nor the sum of the points is longer, and no end of an
-    /// arm is farther.
+    /// The [sum](Locations::sum) of the locations. It bounds each arm, each end of an arm, and the
+    /// sum of the points.
     sum: Lanes,
 }
 
 impl Reach {
-    /// Of these locations, the first `count` points of which are in use.
+    /// The reach at these locations. The first `count` points are in use.
     #[inline(always)]
     pub(crate) fn new(locations: &Locations, count: u32) -> Self {
         let [first, rest @ ..] = locations.points;
         let [any, used @ ..] = used(count);
         let (mut least, mut most) = (first, first);
         for (point, used) in rest.into_iter().zip(used) {
-            // One that is not used is where the first is.
+            // The first point replaces an unused one.
             let point = point.and(used).or(first.without(used));
             least = least.smaller_f32(point);
             most = most.larger_f32(point);
         }
-        // The larger one is not below zero: the most is no less than the least.
+        // The larger difference is not negative, as `most` is at least `least`.
         let arm = |at: Lanes| most.minus_f32(at).larger_f32(at.minus_f32(least)).and(any);
         let [a, b] = locations.positions;
         Self { arms: [arm(a), arm(b)], sum: locations.sum }
     }
 }
 
-/// What may be lost of both ends of an arm, m.
+/// An arm plus the loss at both of its ends, m.
 #[inline(always)]
 fn with_loss(arm: Lanes, sum: Lanes) -> Lanes {
     arm.plus_f32(sum.times_f32(Lanes::all(LOSS.to_bits())))
 }
 
-/// How much of the longest arm the sum of all may be: a little less, for what is lost of its ends, and for the
-/// roundings.
+/// The limit of the sum, as a share of the longest arm. It leaves room for the loss at an arm's
+/// ends and for the roundings.
 const SHARE: f32 = 0.99;
 const _: () = assert!(SHARE * (1.0 + LOSS) < 0.999, "what is lost belongs to an arm");
 const _: () =
     assert!(SHARE * LONGEST_ARM < 0.999 * LARGEST, "so that it bounds the sum of the points, too");
 
-/// Whether arms and sums of contact points are in range, whatever the masses.
+/// Whether arms and sums of contact points are in range, for any masses.
 #[inline(always)]
 fn near(sum: Lanes) -> bool {
     let limit = (SHARE * LONGEST_ARM).to_bits();
@@ -83,8 +83,8 @@ fn square(arm: Lanes) -> f32 {
     x + y + z
 }
 
-/// Whether a bitstream that computes rows in binary16 surely computes those of a collision of bodies
-/// of these shapes, whose numbers are in range.
+/// Whether a bitstream that computes rows in binary16 surely computes the rows of a collision. Its
+/// bodies have these shapes, and its numbers are in range.
 #[inline]
 pub(crate) fn surely_fit(reach: &Reach, shapes: [&Shape; 2], flush: bool) -> bool {
     let [a, b] = shapes;
@@ -96,23 +96,23 @@ pub(crate) fn surely_fit(reach: &Reach, shapes: [&Shape; 2], flush: bool) -> boo
     near(reach.sum) & (mass >= 1.0 / LARGEST) & (mass + turning[0] + turning[1] <= largest(flush))
 }
 
-/// The furthest that any of some collisions reaches.
+/// The furthest reach of several collisions.
 #[derive(Clone, Copy)]
 pub(crate) struct Furthest {
-    /// The arms about bodies that move.
+    /// The longest arms about moving bodies.
     turning: Lanes,
     sum: Lanes,
 }
 
 impl Furthest {
-    /// Of none.
+    /// The reach of no collision.
     #[inline(always)]
     pub(crate) fn new() -> Self {
         let none = Lanes::all(0);
         Self { turning: none, sum: none }
     }
 
-    /// Takes one more; all bits of `still` say that one of its bodies does not move.
+    /// Takes one more collision. A static body has all bits of its `still`.
     #[inline(always)]
     pub(crate) fn take(&mut self, reach: &Reach, still: [Lanes; 2]) {
         let [a, b] = reach.arms;
@@ -122,8 +122,9 @@ impl Furthest {
         self.sum = self.sum.larger_f32(reach.sum);
     }
 
-    /// Whether a bitstream that computes rows in binary16 surely computes those of all of them, which
-    /// are of bodies of any of these shapes, not both static. No if those do not [allow](Extremes::allow) it.
+    /// Whether a bitstream that computes rows in binary16 surely computes the rows of all
+    /// collisions. Each body has any of these shapes, and no collision has two static bodies.
+    /// `false` if the shapes do not [allow](Extremes::allow) a common bound.
     #[inline(always)]
     pub(crate) fn all_surely_fit(&self, shapes: &Extremes) -> bool {
         let turning = shapes.inertia * square(with_loss(self.turning, self.sum));
@@ -131,20 +132,20 @@ impl Furthest {
     }
 }
 
-/// What two bodies can have between them of a table of shapes, and the bound on it.
+/// Extreme values of two bodies with shapes from a table, and the bound on their rows.
 #[derive(Debug)]
 pub(crate) struct Extremes {
-    /// Sums of the inverse masses, 1/kg.
+    /// The smallest and the largest sum of two bodies' inverse masses, 1/kg.
     smallest_mass: f32,
     mass: f32,
-    /// Of a component of the inverse inertia, 1/(kg m²).
+    /// The largest component of an inverse inertia, 1/(kg m²).
     inertia: f32,
     /// The largest inverse effective mass whose reciprocal is not 0, 1/kg.
     largest: f32,
 }
 
 impl Extremes {
-    /// Of these shapes.
+    /// The extremes of these shapes.
     pub(crate) fn new(shapes: &[Shape], flush: bool) -> Self {
         let moving = shapes.iter().filter(|shape| !shape.is_static());
         let start =
@@ -192,7 +193,7 @@ mod tests {
     const PEBBLE: Shape = Shape::isotropic(8_000.0, 30_000.0);
     const POINT_MASS: Shape = Shape::isotropic(1.0, 0.0);
 
-    /// Rows in binary16 of records in world coordinates, and of those relative to body A.
+    /// Computes rows in binary16, from records in world coordinates or relative to body A.
     fn variant(geometry: Geometry) -> Variant {
         match geometry {
             Geometry::Absolute => HALF.default_variant(),
@@ -205,7 +206,7 @@ mod tests {
 
     const GEOMETRIES: [Geometry; 2] = [Geometry::Absolute, Geometry::Relative];
 
-    /// A collision, the positions of its bodies, and which of the shapes they have.
+    /// A collision, the positions of its bodies, and the indices of their shapes.
     #[derive(Debug, Clone)]
     struct One {
         collision: Collision,
@@ -220,7 +221,7 @@ mod tests {
                 let [x, y, z] = difference(vec3, origin);
                 Lanes::new([x, y, z, w].map(f32::to_bits))
             };
-            // Whatever stands beside a vec3.
+            // The word beside a vec3 may be anything.
             let positions = self.positions.map(|position| row(position, f32::NAN));
             let count = self.collision.count;
             let points = self.collision.contacts.map(|contact| row(contact.point, f32::INFINITY));
@@ -239,7 +240,7 @@ mod tests {
             surely_fit(&self.reach(geometry), self.shapes(table), flush)
         }
 
-        /// What validation says.
+        /// The verdict of validation.
         fn fits(&self, geometry: Geometry, table: &[Shape], flush: bool) -> bool {
             let (collision, positions) = (&self.collision, self.positions);
             let rows = Rows { index: 0, collision, positions, shapes: self.shapes(table) };
@@ -275,7 +276,7 @@ mod tests {
         }
     }
 
-    /// A pebble on a boulder's arm would not fit; but there is none.
+    /// A pebble's inertia with a cube's arm does not fit, but no collision has both.
     #[test]
     fn bodies_of_different_size_are_found_to_fit_one_by_one() {
         let table = [GROUND, CUBE, PEBBLE];
@@ -288,7 +289,7 @@ mod tests {
         }
     }
 
-    /// Four of them are added up; the lever arms are short.
+    /// The sum of the four points is out of range, although the lever arms are short.
     #[test]
     fn contact_points_far_out_are_found() {
         let table = [GROUND, POINT_MASS];
@@ -301,7 +302,7 @@ mod tests {
         }
     }
 
-    /// Of shapes that would be too heavy or too light for each other nothing is found at once.
+    /// A shape that is too heavy or too light rules out a common bound.
     #[test]
     fn shapes_may_forbid_it() {
         let heavy = Shape::isotropic(1e-5, 0.0);
@@ -315,7 +316,7 @@ mod tests {
         }
     }
 
-    /// It bounds how easily a body is turned, whichever axis it belongs to.
+    /// The largest component bounds the turning of a body about every axis.
     #[test]
     fn whichever_component_of_the_inertia_is_largest_counts() {
         for component in 0..3 {
@@ -332,7 +333,7 @@ mod tests {
         }
     }
 
-    /// So that both sides of every limit are met.
+    /// Lengths on both sides of every limit.
     fn length() -> impl Strategy<Value = f32> {
         let magnitude = prop_oneof![
             0.0_f32..4.0,
@@ -347,7 +348,7 @@ mod tests {
         let near = prop::array::uniform3(prop_oneof![12 => Just(0.0), 1 => length()]);
         let bodies = prop::array::uniform2(near.clone());
         let points = prop::array::uniform4(near.clone());
-        // All of it may be somewhere else.
+        // The whole collision may be far from the origin.
         let place = prop_oneof![3 => Just([0.0; 3]), 1 => near];
         // Not both static.
         let pair = (0..shapes, 1..shapes, any::<bool>());
