@@ -9,6 +9,8 @@ mod process;
 pub use model::ModelAccelerator;
 pub use process::SimulatorProcess;
 
+pub use crate::stream::StreamBeat;
+
 use std::fmt;
 
 use crate::accelerator::defer::Deferral;
@@ -18,7 +20,6 @@ use crate::memory::Memory;
 use crate::stream::Stream;
 use crate::violation::Log;
 use pgs_interface::control::{AP_CTRL, RESET, ap_ctrl};
-use pgs_interface::record::Beat;
 
 /// Beats of each stream that are offered at once.
 const OFFERED_BEATS: usize = 64;
@@ -29,18 +30,7 @@ const RESET_CLOCKS: u32 = 80;
 /// Clocks after a register access of an accelerator that does nothing else.
 const SETTLE_CLOCKS: u32 = 4;
 
-/// A beat of a stream with its marks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StreamBeat {
-    /// The beat.
-    pub beat: Beat,
-    /// TLAST.
-    pub last: bool,
-    /// Some of its bytes are invalid (TKEEP).
-    pub partial: bool,
-}
-
-/// What the streams offer for some clocks.
+/// Beats and space that the streams offer for a number of clocks.
 #[derive(Debug, Clone, Default)]
 pub struct Offer {
     /// For each MM2S stream the next beats, the oldest first.
@@ -49,7 +39,7 @@ pub struct Offer {
     pub space: Vec<usize>,
 }
 
-/// What an accelerator did in some clocks.
+/// The work of an accelerator in a number of clocks.
 #[derive(Debug, Clone, Default)]
 pub struct Clocked {
     /// Clocks that have passed.
@@ -79,7 +69,7 @@ pub enum ExternalError {
     /// It has ended, or its pipes are closed.
     #[error("the simulator has ended in the middle of a request ({act})")]
     Ended {
-        /// What was asked.
+        /// The request.
         act: &'static str,
         /// The operating system's reason.
         source: std::io::Error,
@@ -87,7 +77,7 @@ pub enum ExternalError {
     /// It did not answer in time.
     #[error("the simulator has not answered for {seconds} s ({act})")]
     Silent {
-        /// What was asked.
+        /// The request.
         act: &'static str,
         /// The deadline.
         seconds: u64,
@@ -97,7 +87,7 @@ pub enum ExternalError {
         "the simulator answers {what} {found}, expected at most {most}; is it one of this version?"
     )]
     Answer {
-        /// What the answer counts.
+        /// The name of the count.
         what: &'static str,
         /// The answer.
         found: u32,

@@ -11,9 +11,19 @@ use std::fmt;
 
 use self::span::Spans;
 use crate::cast::index;
-use crate::external::StreamBeat;
 use crate::memory::{Memory, Source};
 use pgs_interface::record::Beat;
+
+/// A beat of a stream with its marks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StreamBeat {
+    /// The beat.
+    pub beat: Beat,
+    /// TLAST.
+    pub last: bool,
+    /// Some of its bytes are invalid (TKEEP).
+    pub partial: bool,
+}
 
 /// A FIFO of beats between a DMA channel and the accelerator.
 pub(crate) struct Stream {

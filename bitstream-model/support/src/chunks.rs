@@ -9,7 +9,7 @@ pub trait Chunks {
     /// Element of the slice.
     type Item;
 
-    /// As many arrays of `N` elements as there are, and the elements that are left. `N` is above 0.
+    /// All whole arrays of `N` elements, and the elements that are left. `N` is above 0.
     fn split_arrays<const N: usize>(&self) -> (&[[Self::Item; N]], &[Self::Item]);
 
     /// The same, to be changed.

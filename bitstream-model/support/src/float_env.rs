@@ -17,7 +17,7 @@
 //! The compiler knows of no environment: nothing that it sees orders arithmetic and the instructions that
 //! set one, and it may move the one across the other. So the work is done in a function of its own that is
 //! never inlined: arithmetic does not leave it. The call of that function in turn stays between the
-//! instructions before and after it, because all three have effects of which the compiler keeps the order:
+//! instructions before and after it, because all three have effects whose order the compiler keeps:
 //! each is an `asm!` that may touch memory, and the function begins with an empty one.
 
 use std::cell::Cell;

@@ -1,7 +1,7 @@
 //! Threads that share work which borrows from the caller. They wait from one time to the next:
 //! nothing is started and nothing allocated in between.
 //!
-//! Nobody waits for a thread that has not begun: one that comes late finds nothing to do.
+//! The caller waits only for threads that have begun: a late one finds nothing to do.
 //!
 //! All work is done in the [standard floating-point environment](float_env), on every thread: what is
 //! computed depends neither on the thread that computes it nor on who started that.
@@ -15,11 +15,12 @@
 
 #![allow(
     unsafe_code,
-    reason = "threads that outlive a call borrow what it borrows; a register has no other access"
+    reason = "threads that outlive a call borrow from its caller; registers and SIMD instructions"
 )]
 
 pub mod chunks;
 pub mod float_env;
+pub mod lanes;
 #[cfg(test)]
 mod tests;
 
@@ -36,7 +37,7 @@ use float_env::standard;
 #[inline]
 pub const fn cold_path() {}
 
-/// What every thread does that comes in time; it is told its number, the caller 0.
+/// The work of every thread that comes in time; the argument is the thread's number, the caller's 0.
 type Work = dyn Fn(usize) + Sync;
 
 #[derive(Default)]
@@ -46,7 +47,7 @@ struct State {
     times: u64,
     /// Helpers that are at work.
     busy: usize,
-    /// What a helper panicked with.
+    /// The first panic of a helper.
     panic: Option<Box<dyn Any + Send>>,
     end: bool,
 }
@@ -64,7 +65,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What a helper does as long as there is a crew.
+    /// The loop of a helper, until the crew ends.
     fn help(&self, number: usize) {
         let mut seen = 0;
         let mut state = self.state();
@@ -88,11 +89,11 @@ impl Shared {
                     None
                 }
             });
-            // Nobody but the caller waits for it.
+            // Only the caller waits for it.
             self.left.notify_one();
             if another.is_some() {
                 drop(state);
-                // What it carried may panic, too.
+                // Dropping its payload may panic, too.
                 let _ = catch_unwind(AssertUnwindSafe(|| drop(another)));
                 state = self.state();
             }
@@ -115,8 +116,8 @@ impl fmt::Debug for Crew {
 }
 
 impl Crew {
-    /// The caller and so many helpers, or as many as the system gives. The helpers' threads are
-    /// called `name` and their number, from 1.
+    /// A crew of the caller and `helpers` helpers, or fewer if the system refuses a thread. The
+    /// helpers' threads are called `name` and their number, from 1.
     #[must_use]
     pub fn new(name: &str, helpers: usize) -> Self {
         let mut crew = Self::default();
@@ -134,7 +135,7 @@ impl Crew {
         crew
     }
 
-    /// How many threads there are, the caller's among them.
+    /// The number of threads, the caller's included.
     #[must_use]
     pub fn threads(&self) -> usize {
         self.helpers.len() + 1
@@ -146,18 +147,18 @@ impl Crew {
         self.helpers.is_empty()
     }
 
-    /// Why there are fewer helpers than were asked for; `None` if all came.
+    /// The error that left the crew with fewer helpers than requested, if any.
     #[must_use]
     pub fn refused(&self) -> Option<&io::Error> {
         self.refused.as_ref()
     }
 
-    /// Does something with each of some shares, whichever thread comes first; all are done when it
-    /// returns. For a single one nobody is woken.
+    /// Calls `work` for each share, on the first thread that is free, and returns when all shares are
+    /// done. A single share wakes no helper.
     ///
     /// # Panics
     ///
-    /// As `work` does, on whichever thread; then some shares may be left out. The crew works on.
+    /// If `work` panics, on any thread; some shares may then be left out. The crew stays usable.
     pub fn each<T>(&mut self, shares: impl Iterator<Item = T> + Send, work: impl Fn(T) + Sync) {
         if self.is_alone() || matches!(shares.size_hint().1, Some(0 | 1)) {
             standard(|| shares.for_each(work));
@@ -173,12 +174,12 @@ impl Crew {
         });
     }
 
-    /// Has the caller, who is number 0, and every helper that comes in time do some work, each once;
-    /// returns when the caller's has ended and no helper is at it.
+    /// Calls `work` once on the caller's thread, number 0, and on every helper that comes in time.
+    /// Returns when the caller's call has ended and no helper is in one.
     ///
     /// # Panics
     ///
-    /// As `work` does, on whichever thread, when all have ended. The crew works on.
+    /// If `work` panics on any thread, after all threads have ended. The crew stays usable.
     pub fn run(&mut self, work: &(dyn Fn(usize) + Sync)) {
         if self.is_alone() {
             standard(|| work(0));
@@ -190,7 +191,7 @@ impl Crew {
         let leave = Leave(&self.shared);
         let mut state = self.shared.state();
         state.work = Some(lent);
-        // One that nobody was told of, because the caller panicked too.
+        // A panic that was never reported, because the caller panicked too.
         let untold = state.panic.take();
         state.times += 1;
         drop(state);
@@ -205,7 +206,7 @@ impl Crew {
     }
 }
 
-/// Ends the work: no helper begins it any more, and those that have are waited for.
+/// Ends the work: no helper begins it any more, and the busy ones are waited for.
 struct Leave<'a>(&'a Shared);
 
 impl Drop for Leave<'_> {
@@ -223,7 +224,7 @@ impl Drop for Crew {
         self.shared.state().end = true;
         self.shared.begun.notify_all();
         for helper in self.helpers.drain(..) {
-            // What it panicked with was passed on.
+            // Its panic was passed on already.
             let _ = helper.join();
         }
     }

@@ -116,7 +116,7 @@ fn threads_are_numbered_and_named_and_the_caller_is_the_first() {
     });
 }
 
-/// What a crew's work panicked with, which is the number of a share, a thread or a time.
+/// The panic of a crew's work: the number of a share, a thread or a time.
 fn panic_of(work: impl FnOnce()) -> usize {
     let panic = catch_unwind(AssertUnwindSafe(work)).expect_err("a panic");
     *panic.downcast().expect("a number")
@@ -157,7 +157,7 @@ fn a_panic_of_any_thread_is_the_callers() {
                     ended.fetch_add(1, Ordering::AcqRel);
                 });
             });
-            // The others have ended before the caller is told.
+            // The others have ended before the caller panics.
             assert_eq!((panic, ended.into_inner()), (culprit, 2));
         }
         crew.run(&|_| {});
@@ -169,7 +169,7 @@ fn a_panic_of_a_helper_is_the_callers_at_once_and_never_again() {
     in_time(|| {
         let mut crew = Crew::new("test", 2);
         let all = Barrier::new(crew.threads());
-        // Either helper, then all threads: of those the caller has a panic of its own.
+        // Either helper, then all threads: then the caller has a panic of its own.
         let culprits = [Some("test 1"), Some("test 2"), None];
         for (time, culprit) in culprits.into_iter().cycle().enumerate().take(12) {
             let mut shares = [0; 3];

@@ -11,7 +11,7 @@ use bitstream_model::external::{ExternalAccelerator, ModelAccelerator, Simulator
 use bitstream_model::{BoardConfig, Hazards, Subnormals};
 use clap::{Parser, Subcommand, ValueEnum};
 use cosim::mutation::MUTATIONS;
-use cosim::outcome::{self, Outcome, difference};
+use cosim::outcome::{self, Arrival, Outcome, difference};
 use cosim::packets::packets;
 use cosim::{random, recorded};
 use rtlgen::design::{Design, Parameters};
@@ -37,7 +37,7 @@ Examples:
 Exit codes: 0 done; 1 a difference, or a mutation that nothing found; 2 wrong usage or an error; 77 a
 tool that the verb needs is not installed.";
 
-/// What the hardware does on a hazard.
+/// The behaviour of the hardware on a hazard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum HazardMode {
     /// Waits for the velocity.
@@ -132,6 +132,7 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
 
 /// The Verilog and the model side by side.
 struct Bench {
+    arrival: Arrival,
     rtl: Box<dyn ExternalAccelerator>,
     model: Box<dyn ExternalAccelerator>,
 }
@@ -146,7 +147,9 @@ impl Bench {
             HazardMode::Unchecked => Hazards::Unchecked,
         };
         let config = BoardConfig { hazards, subnormals: Subnormals::Flush, ..Default::default() };
-        Ok(Self { rtl: Box::new(rtl), model: Box::new(ModelAccelerator::new(&config)?) })
+        let steady = *gaps == 0 && *stalls == 0;
+        let arrival = if steady { Arrival::Steady } else { Arrival::Disturbed };
+        Ok(Self { arrival, rtl: Box::new(rtl), model: Box::new(ModelAccelerator::new(&config)?) })
     }
 }
 
@@ -170,7 +173,7 @@ fn run_recorded(
             good &= differ == 0;
         }
         writeln!(out, "  {}", counters(&rtl, &model))?;
-        if let Some(difference) = difference(&model, &rtl) {
+        if let Some(difference) = difference(&model, &rtl, bench.arrival) {
             writeln!(out, "  not the model's: {difference}")?;
             good = false;
         }
@@ -199,7 +202,7 @@ fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<S
         let beats = packets(&case.scene, case.fault);
         let model = outcome::run(&mut *bench.model, &case.scene, &beats)?;
         let rtl = outcome::run(&mut *bench.rtl, &case.scene, &beats)?;
-        if let Some(difference) = difference(&model, &rtl) {
+        if let Some(difference) = difference(&model, &rtl, bench.arrival) {
             return Ok(Some(format!("seed {seed}: {difference}")));
         }
     }

@@ -5,7 +5,7 @@ use rtlgen::emit::File;
 /// A mistake: a text that stands once in a file, and the wrong text in its place.
 #[derive(Debug, Clone, Copy)]
 pub struct Mutation {
-    /// What is wrong.
+    /// A description of the mistake.
     pub name: &'static str,
     /// The file of the generated folder.
     pub file: &'static str,

@@ -23,7 +23,7 @@ pub enum Fault {
 /// The place of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaultAt {
-    /// What is wrong.
+    /// The kind.
     pub fault: Fault,
     /// The segment, from 0: velocities, passes, poses.
     pub segment: usize,

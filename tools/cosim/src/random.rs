@@ -95,7 +95,7 @@ impl Draw {
         parts.map(|x| (x / length).to_bits())
     }
 
-    /// A collision of two bodies, at least one of which moves; unused slots hold anything.
+    /// A collision of two bodies that are not both static; unused slots hold anything.
     fn collision(&mut self, scene: &Scene) -> Collision {
         let count = if self.one_in(12) { 0 } else { 1 + self.below(4) };
         let bodies = self.pair(scene);

@@ -37,7 +37,7 @@ pub struct Collision {
     pub normal: [u32; 3],
     /// Number of contact points; 0 is padding.
     pub count: u32,
-    /// Points and distances; those from `count` on mean nothing.
+    /// Points and distances; the slots from `count` on mean nothing.
     pub points: [[u32; 4]; CONTACT_POINTS],
 }
 

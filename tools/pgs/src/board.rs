@@ -106,7 +106,7 @@ pub(crate) struct ChosenBoard {
 }
 
 /// Builds an emulated board with the accelerator that was chosen.
-fn emulated_board(
+pub(crate) fn emulated_board(
     config: BoardConfig,
     accelerator: &AcceleratorChoice,
 ) -> Result<EmulatedBoard, Failure> {

@@ -7,7 +7,7 @@ use crate::equations;
 use crate::graph::Graph;
 use crate::schedule::Schedule;
 
-/// What a user chooses.
+/// The choices of a build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Parameters {
     /// Bodies that the memories hold.
@@ -81,6 +81,11 @@ pub struct Design {
 /// the first issue that sees them: record registers, write registers.
 const AROUND_A_PASS: u32 = 8;
 
+/// Cycles of a step in which nothing is loaded, passed or integrated, beside the way of the last body
+/// through the integration: set-up in front of the first pass (10), the end of the load (2), the entry
+/// into the integration (1), the result FIFOs and their end (4), the sums and the end (4).
+const AROUND_A_STEP: u32 = 21;
+
 impl Design {
     /// Schedules the three pipelines.
     #[must_use]
@@ -122,7 +127,56 @@ impl Design {
     }
 }
 
+impl Design {
+    /// Cycles that every step takes beside load, passes and one cycle a body: the way of the last
+    /// body through the integration, and the control around the step.
+    #[must_use]
+    pub fn step_fill(&self) -> u32 {
+        unsigned(self.integration.schedule.depth) + self.parameters.read_latency() + AROUND_A_STEP
+    }
+}
+
 /// A cycle of a schedule, which is never negative.
 fn unsigned(cycle: i32) -> u32 {
     u32::try_from(cycle).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::{Kind, Operation, Source};
+
+    /// The table entry of the profile holds the figures of this schedule.
+    #[test]
+    fn the_profile_has_the_depths_of_the_schedule() {
+        let design = Design::new(Parameters::default());
+        assert_eq!(design.depth(&design.contact), FLOAT.contact);
+        assert_eq!(design.depth(&design.friction), FLOAT.friction);
+    }
+
+    /// Nothing waits for the numbers that `step/constants.v` computes while bodies load.
+    #[test]
+    fn the_constants_of_a_step_are_there_before_a_pipeline_reads_one() {
+        // The slowest one: the second quotient, with registers before and behind the divider.
+        let ready = Operation::Divide.operator().latency + 3;
+        // One pair of bodies, the set-up, and the registers in front of a pipeline.
+        let at_least = 1 + 10 + 2;
+        let given = ["time_step", "drift", "coefficient", "friction", "damping"];
+        let design = Design::new(Parameters::default());
+        let mut computed = 0;
+        for Pipeline { graph, schedule, .. } in design.pipelines() {
+            for id in graph.ids() {
+                for read in graph.node(id).reads() {
+                    let node = graph.node(read);
+                    let argument = node.kind == Kind::Input(Source::Argument);
+                    if argument && !given.contains(&node.name.as_str()) {
+                        let at = at_least + schedule.starts[id.index()];
+                        assert!(at >= ready, "{} is read at {at}, there at {ready}", node.name);
+                        computed += 1;
+                    }
+                }
+            }
+        }
+        assert!(computed >= 7, "per_second, speed_limit, half_step, series and gravity are read");
+    }
 }

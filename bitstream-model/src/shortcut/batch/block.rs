@@ -1,8 +1,8 @@
 //! Lays sixteen collisions out side by side, word by word, as SIMD lanes read them.
 //!
-//! A block is what one collision record is, times sixteen: a row of sixteen numbers for each word of
-//! the record, then the accumulated impulses. The collisions of a block share no moving body, but
-//! for those of a serial one, which are taken one after the other.
+//! A block is sixteen collision records: a row of sixteen numbers for each word of
+//! the record, then the accumulated impulses. The collisions of a block share no moving body. Only a
+//! serial block's may; they are taken one after the other.
 
 use crate::accelerator::hazards::Entry;
 use crate::accelerator::records::array::Row;
@@ -12,7 +12,7 @@ use crate::config::THREADS_MAX;
 use pgs_interface::record::{CONTACT_POINTS, WORD_LANE, collision};
 
 /// Collisions of a block.
-pub(crate) const LANES: usize = 16;
+pub(crate) use pgs_support::lanes::LANES;
 
 /// One word of the collisions of a block.
 pub(crate) type Words<T = f32> = [T; LANES];
@@ -25,7 +25,7 @@ pub(crate) const EMPTY_ROW: u32 = 0;
 // One for each thread.
 const _: () = assert!(ROWS_APART as usize / 2 > THREADS_MAX);
 
-/// What a lane is: bits.
+/// The bits that describe a lane.
 pub(crate) mod kind {
     /// The number of contact points; 0 in an empty lane.
     pub(crate) const COUNT: u32 = 7;
@@ -36,7 +36,7 @@ pub(crate) mod kind {
     /// In the first lane: the collisions are taken one after the other.
     pub(crate) const SERIAL: u32 = 1 << 11;
 
-    /// That of a collision.
+    /// The kind of a collision.
     #[inline(always)]
     pub(crate) fn of(count: u32, moving: [bool; 2], serial: bool) -> u32 {
         let sides = (u32::from(moving[0]) * MOVES[0]) | (u32::from(moving[1]) * MOVES[1]);

@@ -6,17 +6,17 @@
 //! blocks are full and the order is the one received.
 
 use super::block::{LANES, Words, kind};
-use super::lanes::prefetch;
 use crate::cast::register;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::record::CONTACT_POINTS;
+use pgs_support::lanes::prefetch;
 
 /// No block, no collision.
 const NONE: u32 = u32::MAX;
-/// First collisions with static bodies that are a run.
+/// The number of first collisions with static bodies that form a run.
 const RUN: u8 = 4;
-/// Empty lanes that may be left behind beside one for every two collisions: few serial blocks in
-/// small scenes, at most three times the memory of full blocks in any.
+/// Empty lanes allowed in addition to one for every two collisions: it keeps serial blocks rare in
+/// small scenes, and the memory of any scene below three times that of full blocks.
 const EMPTY_MAX: usize = 64 * LANES;
 
 /// A body and where it is used; a static one is used nowhere.
@@ -47,9 +47,9 @@ pub(crate) struct Places {
     bodies: Vec<Body>,
     /// Lanes taken of each block.
     taken: Vec<u8>,
-    /// And how many of them by the first collision of a body with a static one.
+    /// Lanes of each block taken by the first collision of a body with a static one.
     firsts: Vec<u8>,
-    /// Where to look for an empty lane: the block itself while it has one, else one behind it.
+    /// Where to look for an empty lane: the block itself while it has one, else a later block.
     next: Vec<u32>,
     /// The first later block that uses a body of each block again, from the second entry on.
     again: Vec<u32>,
@@ -62,7 +62,7 @@ pub(crate) struct Places {
 }
 
 impl Places {
-    /// Of collisions that enter so many together: a power of two.
+    /// No blocks, for collisions of which `together`, a power of two, enter as one issue.
     pub(crate) fn of_issues(together: usize) -> Self {
         Self { together: together.ilog2(), ..Self::default() }
     }
@@ -85,7 +85,7 @@ impl Places {
         self.distance = u32::MAX;
     }
 
-    /// Makes room for so many bodies, of which `moves` says which move.
+    /// Makes room for `bodies` bodies; `moves` tells whether a body moves.
     pub(crate) fn bodies(&mut self, bodies: usize, moves: impl Fn(usize) -> bool) {
         let body = |body| Body { first: NONE, behind: 0, issue: 0, moves: moves(body) };
         self.bodies.extend((self.bodies.len()..bodies).map(body));
@@ -113,7 +113,7 @@ impl Places {
         used.map(|body| [body.first, body.behind - 1])
     }
 
-    /// Asks the cache for bodies that are looked at soon, be they there or not.
+    /// Prefetches two bodies. An index past the end is ignored.
     #[inline(always)]
     pub(crate) fn fetch(&self, bodies: [u32; 2]) {
         for body in bodies {
@@ -140,10 +140,10 @@ impl Places {
         Ok([a.moves, b.moves])
     }
 
-    /// Places as many of the next collisions, of which the first is `number`, as are a block in their
-    /// order: all, if they share no body and nothing is wrong with them. `heads` are their counts and
-    /// bodies; their kinds are added to `kinds`. Returns the block, or `None` if there is an empty lane
-    /// elsewhere.
+    /// Places the next collisions, from `number` on, in one block until one shares a body with an
+    /// earlier one or is invalid. `heads` are their counts and bodies; their kinds are added to
+    /// `kinds`. Returns the block and the number of collisions placed, or `None` if another block has an
+    /// empty lane.
     #[inline]
     pub(crate) fn place_together(
         &mut self,
@@ -201,7 +201,7 @@ impl Places {
         Some((block as usize, usize::from(lanes)))
     }
 
-    /// Places collision `number`, larger than those before, between two of the bodies.
+    /// Places collision `number` between two bodies. Numbers must rise from call to call.
     #[inline]
     pub(crate) fn place(&mut self, number: u32, bodies: [u32; 2], moving: [bool; 2]) -> Place {
         let mut from = 0;
@@ -262,8 +262,7 @@ impl Places {
         Place { block, lane, serial }
     }
 
-    /// Whether a block is for first collisions with static bodies alone: such a run of them can be
-    /// put off.
+    /// Whether a block holds a run of first collisions with static bodies only, which can be put off.
     #[inline]
     fn of_firsts(&self, block: usize) -> bool {
         let full = |firsts: u8| usize::from(firsts) == LANES;
@@ -282,7 +281,7 @@ impl Places {
             if next == at {
                 break;
             }
-            // What lies behind is looked through once.
+            // Shortens the path, so that full blocks are searched once.
             let beyond = self.next.get(next).copied().unwrap_or(register(next));
             self.next[at] = beyond;
             at = beyond as usize;

@@ -1,18 +1,23 @@
 //! The passes over the collisions of a block, side by side: the formulae and the order of evaluation of
 //! `solver.rs`, SIMD lane by SIMD lane.
 //!
-//! What a lane's collision lacks (a contact point, a static body's answer) is computed and not
-//! taken.
+//! A contact point that a lane's collision lacks, or the answer of a static body, is computed and
+//! discarded.
 
 #![allow(unsafe_code, reason = "rows of velocities are shared by threads")]
 
 use super::Stage;
-use super::block::{Block, LANES, Words, kind};
-use super::lanes::{Lanes, Mask, Numbers, Quad};
+use super::block::{Block, Words, kind};
+use super::numbers::Numbers;
 use pgs_interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
+use pgs_support::lanes::{F32x16, Instructions, LANES, Mask, Quad};
 
 use crate::accelerator::solver::SolverParameters;
+
+/// A body in memory: the linear velocity and the inverse mass, then the angular velocity
+/// and the inverse inertia.
+pub(crate) type BodyRow = [Quad; 2];
 
 type Vector<N> = [N; 3];
 
@@ -48,7 +53,7 @@ fn cross<N: Numbers>(a: Vector<N>, b: Vector<N>) -> Vector<N> {
 
 /// `a` where the mask says yes, and `b` elsewhere.
 #[inline(always)]
-fn either<N: Numbers>(mask: N::Mask, a: Vector<N>, b: Vector<N>) -> Vector<N> {
+fn either<N: Numbers>(mask: Mask, a: Vector<N>, b: Vector<N>) -> Vector<N> {
     [a[0].or(mask, b[0]), a[1].or(mask, b[1]), a[2].or(mask, b[2])]
 }
 
@@ -104,7 +109,7 @@ impl<N: Numbers> Row<N> {
     fn apply(
         &self,
         impulse: N,
-        active: Option<N::Mask>,
+        active: Option<Mask>,
         [push_a, push_b]: [Vector<N>; 2],
         a: &mut Side<N>,
         b: &mut Side<N>,
@@ -125,13 +130,13 @@ impl<N: Numbers> Row<N> {
 
 /// Two unit vectors across each `n`, with one root and one quotient for both branches.
 #[inline(always)]
-fn tangents<L: Lanes>(lanes: L, n: Vector<L::Numbers>) -> [Vector<L::Numbers>; 2] {
-    let zero = lanes.splat(0.0);
+fn tangents<N: Numbers>(n: Vector<N>) -> [Vector<N>; 2] {
+    let zero = N::splat(0.0);
     let [x, y, z] = n;
-    let steep = z.abs().above(lanes.splat(TANGENT_Z));
+    let steep = z.abs().above(N::splat(TANGENT_Z));
     let (p, q, r) = (y.or(steep, x), z.or(steep, y), x.or(steep, z));
     let s = p * p + q * q;
-    let k = lanes.splat(1.0) / s.sqrt();
+    let k = N::splat(1.0) / s.sqrt();
     let (u, v, w) = ((-q) * k, p * k, s * k);
     let (g, h) = ((-r) * v, r * u);
     let t0 = either(steep, [zero, u, v], [u, v, zero]);
@@ -140,11 +145,11 @@ fn tangents<L: Lanes>(lanes: L, n: Vector<L::Numbers>) -> [Vector<L::Numbers>; 2
 }
 
 #[inline(always)]
-fn unit<L: Lanes>(lanes: L, a: Vector<L::Numbers>) -> Vector<L::Numbers> {
-    times(a, lanes.splat(1.0) / dot(a, a).sqrt())
+fn unit<N: Numbers>(a: Vector<N>) -> Vector<N> {
+    times(a, N::splat(1.0) / dot(a, a).sqrt())
 }
 
-/// What a pass needs beside the collisions.
+/// The input of a pass beside the collisions.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pass<'a> {
     pub(crate) stage: Stage,
@@ -156,158 +161,164 @@ pub(crate) struct Pass<'a> {
 }
 
 #[inline(always)]
-fn vector<L: Lanes>(lanes: L, words: &[Words; 3], at: usize) -> Vector<L::Numbers> {
-    [lanes.load(&words[0], at), lanes.load(&words[1], at), lanes.load(&words[2], at)]
+fn vector<N: Numbers>(words: &[Words; 3]) -> Vector<N> {
+    [N::load(&words[0]), N::load(&words[1]), N::load(&words[2])]
 }
 
+/// Whether a bit is set in each lane's kind.
+#[inline(always)]
+fn tested(block: &Block, bit: u32) -> Mask {
+    Mask::from_fn(|lane| block.kind[lane] & bit != 0)
+}
+
+/// Reads the bodies of one side.
+///
 /// # Safety
 ///
-/// As for [`solve`].
+/// The rows exist, and no other thread writes them at the same time.
 #[inline(always)]
-unsafe fn side<L: Lanes>(
-    lanes: L,
-    quads: *const Quad,
+unsafe fn side<N: Numbers>(
+    instructions: impl Instructions,
+    bodies: *const BodyRow,
     rows: &Words<u32>,
-    at: usize,
-) -> Side<L::Numbers> {
-    // SAFETY: the caller promises that the rows exist and are nobody else's.
-    let [x, y, z, m] = unsafe { lanes.gather(quads, rows, at, 0) };
-    // SAFETY: the same.
-    let [p, q, r, k] = unsafe { lanes.gather(quads, rows, at, 1) };
+) -> Side<N> {
+    let (mut linear, mut angular) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
+    for (lane, row) in rows.iter().enumerate() {
+        // SAFETY: the caller promises that the row exists.
+        let body = unsafe { bodies.add(*row as usize) };
+        // SAFETY: the caller promises that it can be read.
+        [linear[lane], angular[lane]] = unsafe { *body };
+    }
+    let [x, y, z, m] = instructions.columns(linear).map(N::of);
+    let [p, q, r, k] = instructions.columns(angular).map(N::of);
     Side { v: [x, y, z], m, w: [p, q, r], k }
 }
 
+/// Writes the bodies of one side, in the order of the lanes.
+///
 /// # Safety
 ///
-/// As for [`solve`].
+/// The rows exist, and no other thread accesses them at the same time.
 #[inline(always)]
-unsafe fn put_side<L: Lanes>(
-    lanes: L,
-    quads: *mut Quad,
+unsafe fn put_side<N: Numbers>(
+    instructions: impl Instructions,
+    bodies: *mut BodyRow,
     rows: &Words<u32>,
-    at: usize,
-    side: &Side<L::Numbers>,
+    side: &Side<N>,
 ) {
     let ([x, y, z], [p, q, r]) = (side.v, side.w);
-    // SAFETY: the caller promises that the rows exist and are nobody else's.
-    unsafe { lanes.scatter([x, y, z, side.m], quads, rows, at, 0) };
-    // SAFETY: the same.
-    unsafe { lanes.scatter([p, q, r, side.k], quads, rows, at, 1) };
-}
-
-/// One pass over the collisions of a block that is not serial. `quads` are the rows of velocities,
-/// two each: linear and inverse mass, angular and inverse inertia.
-///
-/// # Safety
-///
-/// The rows of the block and the spare one exist. Nobody writes those while this runs, nor reads
-/// those of moving bodies and the spare one.
-#[inline(always)]
-pub(crate) unsafe fn solve<L: Lanes>(
-    lanes: L,
-    pass: &Pass<'_>,
-    block: &mut Block,
-    quads: *mut Quad,
-) {
-    let mut at = 0;
-    while at < LANES {
-        let moves = kind::MOVES.map(|bit| lanes.tested(&block.kind, at, bit));
-        let counts = lanes.counts(&block.kind, at, kind::COUNT);
-        let taken = counts.above(lanes.splat(0.0));
-        if taken.bits() != 0 {
-            // SAFETY: the caller promises it.
-            let mut a = unsafe { side(lanes, quads, &block.rows[0], at) };
-            // SAFETY: the same.
-            let mut b = unsafe { side(lanes, quads, &block.rows[1], at) };
-            if pass.stage.contact {
-                contact(lanes, pass, block, at, counts, &mut a, &mut b);
-            } else {
-                friction(lanes, pass, block, at, counts, &mut a, &mut b);
-            }
-            let answers = [a, b];
-            for each in 0..2 {
-                let mut written = block.rows[each];
-                if moves[each].bits() != (1 << L::WIDTH) - 1 {
-                    for (row, kind) in written.iter_mut().zip(&block.kind) {
-                        *row = if kind & kind::MOVES[each] == 0 { pass.spare } else { *row };
-                    }
-                }
-                // SAFETY: the same; the rows are of moving bodies, or the spare one.
-                unsafe { put_side(lanes, quads, &written, at, &answers[each]) };
-            }
-        }
-        at += L::WIDTH;
+    let linear = instructions.quads([x, y, z, side.m].map(N::lanes));
+    let angular = instructions.quads([p, q, r, side.k].map(N::lanes));
+    for (lane, row) in rows.iter().enumerate() {
+        // SAFETY: the caller promises that the row exists.
+        let body = unsafe { bodies.add(*row as usize) };
+        // SAFETY: the caller promises that it can be written.
+        unsafe { *body = [linear[lane], angular[lane]] };
     }
 }
 
-/// Where not all lanes are active, which.
+/// One pass over the collisions of a block that is not serial. `bodies` are the rows of all bodies.
+///
+/// # Safety
+///
+/// The rows of the block and the spare one exist. While this runs, no other thread writes the block's
+/// rows, and none reads the rows of its moving bodies or the spare one.
 #[inline(always)]
-fn some<L: Lanes>(_: L, active: L::Mask) -> Option<L::Mask> {
-    (active.bits() != (1 << L::WIDTH) - 1).then_some(active)
+pub(crate) unsafe fn solve<N: Numbers>(
+    instructions: impl Instructions,
+    pass: &Pass<'_>,
+    block: &mut Block,
+    bodies: *mut BodyRow,
+) {
+    let moves = kind::MOVES.map(|bit| tested(block, bit));
+    let counts = F32x16::from_fn(|lane| (block.kind[lane] & kind::COUNT) as f32);
+    let counts = N::of(counts);
+    // SAFETY: the caller promises that the rows exist and that no other thread writes them.
+    let mut a = unsafe { side(instructions, bodies, &block.rows[0]) };
+    // SAFETY: the caller promises that the rows exist and that no other thread writes them.
+    let mut b = unsafe { side(instructions, bodies, &block.rows[1]) };
+    if pass.stage.contact {
+        contact(pass, block, counts, &mut a, &mut b);
+    } else {
+        friction(pass, block, counts, &mut a, &mut b);
+    }
+    for (each, side) in [a, b].iter().enumerate() {
+        let mut written = block.rows[each];
+        if !moves[each].all() {
+            for (row, kind) in written.iter_mut().zip(&block.kind) {
+                *row = if kind & kind::MOVES[each] == 0 { pass.spare } else { *row };
+            }
+        }
+        // SAFETY: the rows are of moving bodies, or the spare one: the caller promises that no other
+        // thread accesses them.
+        unsafe { put_side(instructions, bodies, &written, side) };
+    }
+}
+
+/// The active lanes, or `None` if all are.
+#[inline(always)]
+fn some(active: Mask) -> Option<Mask> {
+    (!active.all()).then_some(active)
 }
 
 #[inline(always)]
-fn contact<L: Lanes>(
-    lanes: L,
+fn contact<N: Numbers>(
     pass: &Pass<'_>,
     block: &mut Block,
-    at: usize,
-    counts: L::Numbers,
-    a: &mut Side<L::Numbers>,
-    b: &mut Side<L::Numbers>,
+    counts: N,
+    a: &mut Side<N>,
+    b: &mut Side<N>,
 ) {
-    let zero = lanes.splat(0.0);
-    let minus_one = lanes.splat(-1.0);
-    let per_second = lanes.splat(1.0 / pass.parameters.time_step);
-    let drift = lanes.splat(pass.parameters.drift);
-    let coefficient = lanes.splat(pass.parameters.coefficient);
-    let n = vector(lanes, &block.normal, at);
-    let position_a = vector(lanes, &block.position_a, at);
-    let position_b = vector(lanes, &block.position_b, at);
+    let zero = N::splat(0.0);
+    let minus_one = N::splat(-1.0);
+    let per_second = N::splat(1.0 / pass.parameters.time_step);
+    let drift = N::splat(pass.parameters.drift);
+    let coefficient = N::splat(pass.parameters.coefficient);
+    let n = vector(&block.normal);
+    let position_a = vector(&block.position_a);
+    let position_b = vector(&block.position_b);
     let pushes = [times(n, a.m), times(neg(n), b.m)];
     for k in 0..CONTACT_POINTS {
         let [x, y, z, distance] = &block.contacts[k];
-        let point = [lanes.load(x, at), lanes.load(y, at), lanes.load(z, at)];
-        let distance = lanes.load(distance, at);
+        let point = [N::load(x), N::load(y), N::load(z)];
+        let distance = N::load(distance);
         let arms = (sub(point, position_a), sub(point, position_b));
         let row = Row::new(minus_one, n, arms.0, arms.1, a, b);
-        let reached = counts.above(lanes.splat(k as f32));
-        let active = some(lanes, reached.without(row.jacobian.is_zero()));
+        let reached = counts.above(N::splat(k as f32));
+        let active = some(reached.without(row.jacobian.is_zero()));
         let bias = ((distance + drift) * coefficient) * per_second;
         let wanted = (row.speed(a, b) + bias) * row.jacobian;
-        let before = lanes.load(&block.impulses[k], at);
+        let before = N::load(&block.impulses[k]);
         let after = (before + wanted).larger(zero);
         let stored = match active {
             None => after,
             Some(active) => after.or(active, before),
         };
-        lanes.store(stored, &mut block.impulses[k], at);
+        Numbers::store(stored, &mut block.impulses[k]);
         row.apply(after - before, active, pushes, a, b);
     }
 }
 
 #[inline(always)]
-fn friction<L: Lanes>(
-    lanes: L,
+fn friction<N: Numbers>(
     pass: &Pass<'_>,
     block: &mut Block,
-    at: usize,
-    counts: L::Numbers,
-    a: &mut Side<L::Numbers>,
-    b: &mut Side<L::Numbers>,
+    counts: N,
+    a: &mut Side<N>,
+    b: &mut Side<N>,
 ) {
-    let one = lanes.splat(1.0);
-    let minus_one = lanes.splat(-1.0);
-    let q = neg(vector(lanes, &block.normal, at));
-    let position_a = vector(lanes, &block.position_a, at);
-    let position_b = vector(lanes, &block.position_b, at);
-    let taken = counts.above(lanes.splat(0.0));
+    let one = N::splat(1.0);
+    let minus_one = N::splat(-1.0);
+    let q = neg(vector(&block.normal));
+    let position_a = vector(&block.position_a);
+    let position_b = vector(&block.position_b);
+    let taken = counts.above(N::splat(0.0));
     let [x, y, z, _] = &block.contacts[0];
-    let mut sum = [lanes.load(x, at), lanes.load(y, at), lanes.load(z, at)];
+    let mut sum = [N::load(x), N::load(y), N::load(z)];
     for k in 1..CONTACT_POINTS {
         let [x, y, z, _] = &block.contacts[k];
-        let more = add(sum, [lanes.load(x, at), lanes.load(y, at), lanes.load(z, at)]);
-        sum = match some(lanes, counts.above(lanes.splat(k as f32))) {
+        let more = add(sum, [N::load(x), N::load(y), N::load(z)]);
+        sum = match some(counts.above(N::splat(k as f32))) {
             None => more,
             Some(reached) => either(reached, more, sum),
         };
@@ -317,46 +328,46 @@ fn friction<L: Lanes>(
     let arm_b = sub(centre, position_b);
     if pass.stage.turning {
         let [l0, l1, l2, l3] = &block.impulses;
-        let (l0, l1) = (lanes.load(l0, at), lanes.load(l1, at));
-        let (l2, l3) = (lanes.load(l2, at), lanes.load(l3, at));
-        lanes.store(((l0 + l1) + l2) + l3, &mut block.impulses[0], at);
+        let (l0, l1) = (N::load(l0), N::load(l1));
+        let (l2, l3) = (N::load(l2), N::load(l3));
+        Numbers::store(((l0 + l1) + l2) + l3, &mut block.impulses[0]);
         for k in 1..CONTACT_POINTS {
-            lanes.store(lanes.splat(0.0), &mut block.impulses[k], at);
+            Numbers::store(N::splat(0.0), &mut block.impulses[k]);
         }
     }
-    let limit = lanes.splat(pass.parameters.friction) * lanes.load(&block.impulses[0], at);
-    let tangents = tangents(lanes, q);
+    let limit = N::splat(pass.parameters.friction) * N::load(&block.impulses[0]);
+    let tangents = tangents(q);
     for (k, t) in tangents.into_iter().enumerate() {
         let row = Row::new(minus_one, t, arm_a, arm_b, a, b);
-        let active = some(lanes, taken.without(row.jacobian.is_zero()));
+        let active = some(taken.without(row.jacobian.is_zero()));
         let wanted = row.speed(a, b) * row.jacobian;
-        let before = lanes.load(&block.impulses[1 + k], at);
+        let before = N::load(&block.impulses[1 + k]);
         let after = (before + wanted).larger(-limit).smaller(limit);
         let stored = match active {
             None => after,
             Some(active) => after.or(active, before),
         };
-        lanes.store(stored, &mut block.impulses[1 + k], at);
+        Numbers::store(stored, &mut block.impulses[1 + k]);
         let pushes = [times(t, a.m), times(neg(t), b.m)];
         row.apply(after - before, active, pushes, a, b);
     }
     let spins = if pass.finds {
-        let apart = unit(lanes, sub(position_b, position_a));
-        let cosine = dot(apart, unit(lanes, arm_a));
-        // By the numbers that it computes with: a small inverse mass may be none in sixteen bits.
+        let apart = unit(sub(position_b, position_a));
+        let cosine = dot(apart, unit(arm_a));
+        // By the rounded inverse mass: a small one may be zero in sixteen bits.
         let static_side = taken.and(a.m.is_zero().either(b.m.is_zero()));
-        let spins = cosine.above(lanes.splat(SPIN_COSINE)).either(static_side);
+        let spins = cosine.above(N::splat(SPIN_COSINE)).either(static_side);
         let bits = spins.bits();
-        for lane in 0..L::WIDTH {
+        for (lane, kind) in block.kind.iter_mut().enumerate() {
             let bit = if bits >> lane & 1 != 0 { kind::SPINS } else { 0 };
-            block.kind[at + lane] = block.kind[at + lane] & !kind::SPINS | bit;
+            *kind = *kind & !kind::SPINS | bit;
         }
         spins
     } else {
-        lanes.tested(&block.kind, at, kind::SPINS)
+        tested(block, kind::SPINS)
     };
-    if spins.bits() != 0 {
-        let share = lanes.splat(SPIN_DAMPING);
+    if spins.any() {
+        let share = N::splat(SPIN_DAMPING);
         let spin_a = dot(q, a.w);
         let spin_b = dot(q, b.w);
         a.w = either(spins, sub(a.w, times(q, spin_a * share)), a.w);

@@ -1,8 +1,8 @@
-//! The collisions of a step decoded once, and the passes over them, many at a time.
+//! Decodes the collisions of a step once, and runs the passes over many of them at a time.
 //!
 //! ```text
-//! beats -> intake.rs: place.rs (which are independent), block.rs (side by side) -> passes
-//!   translation.rs, if they are those of another design
+//! beats -> decode: grouping.rs (which are independent), block.rs (side by side) -> wavefront.rs
+//!   convert, if they are records of another design
 //! ```
 //!
 //! Only collisions that share no moving body change places, so that every bit is that of
@@ -14,8 +14,8 @@ mod convert;
 mod decode;
 mod grouping;
 mod kernel;
-mod lanes;
 mod motion;
+mod numbers;
 mod order;
 mod queue;
 mod records;
@@ -54,12 +54,12 @@ const NO_SLOT: u32 = u32::MAX;
 /// Bodies that a thread copies at once.
 const COPIED_TOGETHER: usize = 2048;
 
-/// What a pass is.
+/// The kind of a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Stage {
     contact: bool,
-    /// The last contact pass, of which the impulses are counted, or the first friction pass, which
-    /// finds their sums.
+    /// The last contact pass, which counts its impulses, or the first friction pass, which adds the
+    /// impulses of each collision.
     turning: bool,
 }
 
@@ -96,32 +96,32 @@ impl Stage {
 /// The collisions of a step.
 #[derive(Debug)]
 pub(crate) struct Batch {
-    /// Those of the places, then what earlier steps have left.
+    /// The blocks of this step, then unused blocks of earlier steps.
     blocks: Vec<Block>,
     places: Places,
     /// Block and lane of each collision.
     slots: Vec<u32>,
     impulse_sum: u64,
     width: Width,
-    /// Of the arithmetic.
+    /// Precision of the arithmetic.
     precision: Precision,
     crew: Crew,
     fronts: Fronts,
-    /// Whether the fronts know all that is decoded.
+    /// Whether the fronts are measured for all decoded collisions.
     measured: bool,
     /// Whether the blocks say which spins are damped.
     spins: bool,
-    /// Bodies that the collisions are about.
+    /// Number of bodies.
     bodies: usize,
     lines: Vec<Line>,
     /// Whether the lines have the velocities of all bodies.
     entered: bool,
-    /// Records that wait for their blocks while these are filled.
+    /// Records that are put into their blocks when the threads have ended.
     put_off: Vec<Group>,
 }
 
 impl Batch {
-    /// Takes at most `threads` threads, of which one is the caller's, and SIMD lanes or not.
+    /// Computes on at most `threads` threads, the caller's included, with SIMD lanes if `lanes` is set.
     pub(crate) fn new(threads: usize, lanes: bool) -> Self {
         Self::with_width(threads, if lanes { Width::found() } else { Width::One })
     }
@@ -149,16 +149,16 @@ impl Batch {
         }
     }
 
-    /// The same in arithmetic of a precision, of collisions that enter so many together.
+    /// Sets the precision of the arithmetic, and the number of collisions that enter together.
     pub(crate) fn of(mut self, precision: Precision, together: usize) -> Self {
         self.precision = precision;
         self.places = Places::of_issues(together);
         self
     }
 
-    /// Begins a step: forgets the last one's collisions and makes room for so many.
+    /// Begins a step: forgets the last step's collisions and makes room for `collisions`.
     pub(crate) fn begin(&mut self, collisions: usize) {
-        // Decoded in parts they want some more at the end of each.
+        // Each part that is decoded needs some spare blocks at its end.
         let blocks = collisions.div_ceil(LANES) + 2 * LANES;
         self.blocks.reserve(blocks.saturating_sub(self.blocks.len()));
         self.slots.clear();
@@ -176,7 +176,7 @@ impl Batch {
         self.slots.len()
     }
 
-    /// Takes the velocities of all bodies, unless it has them.
+    /// Copies the velocities of all bodies into the lines, unless they are there already.
     pub(crate) fn enter(&mut self, velocities: &[Velocity], shape_of: &[u8], masses: &[Mass]) {
         if self.entered {
             return;
@@ -205,7 +205,7 @@ impl Batch {
         self.entered = true;
     }
 
-    /// Does something with each of some things on all threads, in no particular order.
+    /// Calls `with` for each of `things`, on all threads and in no particular order.
     pub(crate) fn share<T>(
         &mut self,
         things: impl Iterator<Item = T> + Send,
@@ -236,8 +236,8 @@ impl Batch {
         self.places.distance()
     }
 
-    /// Runs whole passes over all collisions. Of the step's passes, numbered from 0, the first
-    /// `contact` are contact passes. `velocities` are those of all bodies.
+    /// Runs whole passes over all collisions. A step's passes are numbered from 0; the first `contact`
+    /// are contact passes. `velocities` has an entry for every body.
     pub(crate) fn run(
         &mut self,
         passes: Range<u32>,
@@ -280,7 +280,7 @@ impl Batch {
     }
 
     /// Runs a part of one pass, one collision after the other in the order received.
-    #[expect(clippy::too_many_arguments, reason = "those of `run` and which part")]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of `run`, and the part")]
     pub(crate) fn run_part(
         &mut self,
         pass: u32,
@@ -323,7 +323,7 @@ impl Batch {
             .map_or([0.0; CONTACT_POINTS], |(block, lane)| self.blocks[block].impulses(lane))
     }
 
-    /// What the last contact pass has added to the accelerator's impulse sum.
+    /// The last contact pass's share of the accelerator's impulse sum.
     pub(crate) fn impulse_sum(&self) -> u64 {
         self.impulse_sum
     }

@@ -14,12 +14,13 @@ const NONE: u32 = u32::MAX;
 /// The order in which blocks are taken.
 #[derive(Debug, Default)]
 pub(crate) struct Order {
-    /// All blocks, each once; those of a body in the order of their numbers.
+    /// All blocks, each once; the blocks of a body keep the order of their numbers.
     pub(crate) blocks: Vec<u32>,
     /// The place of each block in it.
     pub(crate) places: Vec<u32>,
-    /// Of the blocks put off until before a block, the first, and to each the next.
+    /// The first block of each list of blocks that are put off until just before a block.
     put_off: Vec<u32>,
+    /// The next block of the same list.
     next: Vec<u32>,
 }
 
@@ -99,7 +100,7 @@ mod tests {
             for (block, again) in again.iter().enumerate() {
                 let place = order.places[block];
                 prop_assert_eq!(order.blocks[place as usize], register(block));
-                // Whatever uses a body of it again has that number or a larger one.
+                // A block that uses one of its bodies again has that number or a larger one.
                 prop_assert!(order.places.iter().skip(*again as usize).all(|later| *later > place));
             }
         }

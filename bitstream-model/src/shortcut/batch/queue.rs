@@ -18,7 +18,7 @@ struct Ring<T, const N: usize> {
 #[derive(Debug)]
 pub(crate) struct Queue<T, const N: usize> {
     ring: Mutex<Ring<T, N>>,
-    /// How many wait, for those who look only.
+    /// The number of waiting pieces, readable without the lock.
     waiting: AtomicUsize,
     ended: AtomicBool,
 }
@@ -30,7 +30,7 @@ impl<T, const N: usize> Queue<T, N> {
     }
 
     fn with<R>(&self, change: impl FnOnce(&mut Ring<T, N>) -> R) -> R {
-        // No code of others runs under the lock.
+        // Only code of this module runs under the lock.
         let mut ring = self.ring.lock().unwrap_or_else(PoisonError::into_inner);
         let result = change(&mut ring);
         self.waiting.store(ring.count, Ordering::Release);
@@ -69,7 +69,7 @@ impl<T, const N: usize> Queue<T, N> {
     pub(crate) fn work(&self, mut on: impl FnMut(T)) {
         let mut idle = 0;
         loop {
-            // What was put in before the end is found behind this.
+            // Read first: a piece that was put in before the end is found below.
             let ended = self.ended.load(Ordering::Acquire);
             if let Some(piece) = self.take() {
                 on(piece);
@@ -85,7 +85,7 @@ impl<T, const N: usize> Queue<T, N> {
         }
     }
 
-    /// What says that no piece will come any more, when it goes.
+    /// A guard that ends the queue when it is dropped: no piece comes any more.
     pub(crate) fn ends(&self) -> Ends<'_> {
         Ends(&self.ended)
     }

@@ -1,10 +1,10 @@
 //! Reads collision records in place from their beats, and sets sixteen of them side by side.
 
 use super::block::{Block, LANES, ROWS_APART, Words};
-use super::lanes::{Lanes, Numbers, Quad, Work};
 use crate::accelerator::records::array::Row;
 use pgs_interface::record::{Beat, WORD_LANE, collision};
 use pgs_support::chunks::Chunks;
+use pgs_support::lanes::{F32x16, Instructions, Quad, Work};
 
 /// Streams that records come on.
 pub(crate) const STREAMS: usize = 4;
@@ -62,56 +62,58 @@ pub(crate) fn sum(rows: &[Row; collision::ROWS]) -> u32 {
     rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
 }
 
-/// A row of records, one for each lane, from record `first` on.
+/// A row of sixteen records, from record `first` on, by words.
 #[inline(always)]
-fn columns<L: Lanes>(lanes: L, records: &Records<'_>, first: usize, row: usize) -> [L::Numbers; 4] {
+fn columns(
+    instructions: impl Instructions,
+    records: &Records<'_>,
+    first: usize,
+    row: usize,
+) -> [F32x16; 4] {
     let stream = row % STREAMS;
     let first = first * BEATS[stream] + row / STREAMS;
     let quads: &[Quad] = bytemuck::cast_slice(&records.streams[stream][first..]);
-    lanes.transposed(quads, BEATS[stream])
+    instructions.load(quads, BEATS[stream])
 }
 
 #[inline(always)]
-fn store<L: Lanes>(lanes: L, columns: [L::Numbers; 4], words: &mut [Words], at: usize) {
+fn store(columns: [F32x16; 4], words: &mut [Words]) {
     for (words, column) in words.iter_mut().zip(columns) {
-        lanes.store(column, words, at);
+        *words = column.to_array();
     }
 }
 
 #[inline(always)]
-fn added<N: Numbers>([a, b, c, d]: [N; 4]) -> N {
+fn added([a, b, c, d]: [F32x16; 4]) -> F32x16 {
     a.with_words(b).with_words(c.with_words(d))
 }
 
 impl Work for Fill<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn with<L: Lanes>(self, lanes: L) {
+    fn run(self, instructions: impl Instructions) {
         let Self { records, first, kinds, blocks, sums } = self;
-        let apart = lanes.splat(f32::from_bits(ROWS_APART));
+        let apart = F32x16::splat(f32::from_bits(ROWS_APART));
         let sums = sums.split_arrays_mut::<LANES>().0;
         for (number, ((block, kinds), sums)) in blocks.iter_mut().zip(kinds).zip(sums).enumerate() {
             block.begin(kinds);
-            let mut at = 0;
-            while at < LANES {
-                let row = |row| columns(lanes, records, first + number * LANES + at, row);
-                let normal = row(collision::NORMAL);
-                store(lanes, normal, &mut block.normal, at);
-                let [body_a, body_b] = [row(collision::BODY_A), row(collision::BODY_B)];
-                store(lanes, body_a, &mut block.position_a, at);
-                store(lanes, body_b, &mut block.position_b, at);
-                for (rows, body) in block.rows.iter_mut().zip([body_a, body_b]) {
-                    let rows = bytemuck::cast_mut(rows);
-                    lanes.store(body[WORD_LANE].with_words(apart), rows, at);
-                }
-                let mut sum = added(normal).with_words(added(body_a)).with_words(added(body_b));
-                for (contact, words) in block.contacts.iter_mut().enumerate() {
-                    let contact = row(collision::CONTACTS + contact);
-                    store(lanes, contact, words, at);
-                    sum = sum.with_words(added(contact));
-                }
-                lanes.store(sum, bytemuck::cast_mut(sums), at);
-                at += L::WIDTH;
+            let row = |row| columns(instructions, records, first + number * LANES, row);
+            let normal = row(collision::NORMAL);
+            store(normal, &mut block.normal);
+            let [body_a, body_b] = [row(collision::BODY_A), row(collision::BODY_B)];
+            store(body_a, &mut block.position_a);
+            store(body_b, &mut block.position_b);
+            for (rows, body) in block.rows.iter_mut().zip([body_a, body_b]) {
+                *rows = bytemuck::cast(body[WORD_LANE].with_words(apart).to_array());
             }
+            let mut sum = added(normal).with_words(added(body_a)).with_words(added(body_b));
+            for (contact, words) in block.contacts.iter_mut().enumerate() {
+                let contact = row(collision::CONTACTS + contact);
+                store(contact, words);
+                sum = sum.with_words(added(contact));
+            }
+            *sums = bytemuck::cast(sum.to_array());
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What a batch does, against `solver.rs` taking one collision after the other.
+//! Compares a batch with `solver.rs`, which takes one collision after the other.
 
 use proptest::prelude::*;
 
@@ -36,7 +36,7 @@ const fn mass(inverse_mass: f32, inverse_inertia: f32) -> Mass {
 }
 
 /// Static, three that move, a static one of a negative zero, one that moves although sixteen bits have
-/// no such number, and one of infinite inverse inertia, of which rows have an effective mass of zero.
+/// no such number, and one of infinite inverse inertia, whose rows have an effective mass of zero.
 pub(crate) const MASSES: [Mass; 7] = [
     mass(0.0, 0.0),
     mass(1.0, 6.0),
@@ -253,7 +253,7 @@ fn steps(collisions: usize, special: bool) -> impl Strategy<Value = Step> {
         })
 }
 
-/// A batch of one of the widths that there are.
+/// A batch of one of the widths.
 pub(crate) fn batch(threads: usize, width: prop::sample::Index) -> Batch {
     let widths: Vec<Width> = Width::all().collect();
     Batch::with_width(threads, *width.get(&widths))
@@ -294,7 +294,7 @@ fn check_parts<F: Tested>(step: &Step, batch: Batch, cut: usize) {
     assert_eq!(batch.impulse_sum(), sum);
 }
 
-/// The smallest distance of collisions with a moving body in common, in issues of so many, by comparing
+/// The smallest distance of collisions with a moving body in common, in issues of `together`, by comparing
 /// all.
 fn distance(step: &Step, together: usize) -> u32 {
     let moving = |rows: &[Row; collision::ROWS]| {

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! So the collisions are read from memory once for several passes, and threads take different ones.
-//! Each thread takes the next few passes that nobody has. While these have to wait for the pass before
-//! them, and when there are no more, it helps with the passes of others, the last ones first.
+//! Each thread takes the next few passes that no thread has. While they have to wait for the pass
+//! before them, and when none are left, it helps with the passes of others, the last ones first.
 
 #![allow(unsafe_code, reason = "threads share blocks and rows and take turns by passes")]
 
@@ -19,12 +19,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use bytemuck::{Pod, Zeroable};
 use pgs_support::Crew;
+use pgs_support::lanes::{Instructions, Work, prefetch};
 
 use super::Stage;
 use super::block::{Block, LANES, kind};
 use super::grouping::Places;
-use super::kernel::{self, Pass};
-use super::lanes::{Computed, Lanes, Quad, Work, prefetch};
+use super::kernel::{self, BodyRow, Pass};
+use super::numbers::Computed;
 use super::order::Order;
 use super::width::Width;
 use crate::accelerator::arithmetic::number::{Half, Single};
@@ -49,7 +50,7 @@ struct Progress {
     taken: AtomicBool,
 }
 
-/// What the fronts are made of, kept from step to step.
+/// The order, the reach and the progress of the fronts, kept from step to step.
 #[derive(Debug, Default)]
 pub(crate) struct Fronts {
     order: Order,
@@ -67,7 +68,7 @@ pub(crate) struct Passes<'a> {
     pub(crate) finding: Option<u32>,
     pub(crate) parameters: &'a SolverParameters,
     pub(crate) width: Width,
-    /// Of the arithmetic.
+    /// Precision of the arithmetic.
     pub(crate) precision: Precision,
 }
 
@@ -104,7 +105,7 @@ impl Fronts {
             passes,
             blocks: blocks.as_mut_ptr(),
             order: &self.order.blocks,
-            quads: lines.as_mut_ptr().cast(),
+            bodies: lines.as_mut_ptr().cast(),
             needs: &self.needs,
             progress: &self.progress[..count],
             next: AtomicUsize::new(0),
@@ -121,38 +122,36 @@ impl Fronts {
 /// the angular velocity and the inverse inertia.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C, align(64))]
-pub(crate) struct Line([Quad; 4]);
+pub(crate) struct Line([BodyRow; 2]);
 
 impl Line {
     pub(crate) fn put(&mut self, second: bool, velocity: &Velocity, mass: &Mass) {
         let ([x, y, z], [p, q, r]) = (velocity.linear, velocity.angular);
-        let at = 2 * usize::from(second);
-        self.0[at] = [x, y, z, mass.inverse_mass];
-        self.0[at + 1] = [p, q, r, mass.inverse_inertia[0]];
+        let row = [[x, y, z, mass.inverse_mass], [p, q, r, mass.inverse_inertia[0]]];
+        self.0[usize::from(second)] = row;
     }
 
     pub(crate) fn velocity(&self, second: bool) -> Velocity {
-        let at = 2 * usize::from(second);
-        let ([x, y, z, _], [p, q, r, _]) = (self.0[at], self.0[at + 1]);
+        let [[x, y, z, _], [p, q, r, _]] = self.0[usize::from(second)];
         Velocity { linear: [x, y, z], angular: [p, q, r] }
     }
 
     /// Whether a body moves.
     pub(crate) fn moves(&self, second: bool) -> bool {
-        self.0[2 * usize::from(second)][3] != 0.0
+        self.0[usize::from(second)][0][3] != 0.0
     }
 }
 
-/// What the threads of a run share.
+/// The state that the threads of a run share.
 struct Field<'a> {
     passes: Passes<'a>,
     blocks: *mut Block,
     /// All blocks, each once.
     order: &'a [u32],
-    quads: *mut Quad,
+    bodies: *mut BodyRow,
     needs: &'a [u32],
     progress: &'a [Progress],
-    /// The next pass that nobody has taken.
+    /// The next pass that no thread has taken.
     next: AtomicUsize,
     sum: AtomicU64,
     /// A thread has panicked: its fronts stand still.
@@ -162,11 +161,11 @@ struct Field<'a> {
 }
 
 // SAFETY: blocks and rows are accessed in `chunk` alone, for the next chunk of a pass that one thread
-// has taken. Those of the pass before over the same bodies or blocks have ended, which `progress` says
-// with release and acquire, and so have those of this pass that came before.
+// has taken. The chunks of the pass before over the same bodies or blocks have ended, and so have this
+// pass's earlier chunks: `progress` tells it with release and acquire.
 unsafe impl Sync for Field<'_> {}
 
-/// Marks the field as broken when it goes, unless it was taken off before.
+/// Marks the field as broken when dropped, unless it was cleared before.
 struct Breaks<'a>(Option<&'a AtomicBool>);
 
 impl Drop for Breaks<'_> {
@@ -178,7 +177,7 @@ impl Drop for Breaks<'_> {
 }
 
 impl Field<'_> {
-    /// What a thread does: takes passes while there are any, then helps.
+    /// The work of a thread: takes passes while any are left, then helps.
     fn work(&self, thread: usize) {
         let mut breaks = Breaks(Some(&self.broken));
         let mut own = 0..0;
@@ -207,7 +206,7 @@ impl Field<'_> {
         breaks.0 = None;
     }
 
-    /// The next passes that nobody has.
+    /// The next passes that no thread has.
     fn next_bundle(&self) -> Range<usize> {
         let count = self.progress.len();
         if self.next.load(Ordering::Relaxed) >= count {
@@ -315,9 +314,10 @@ struct ChunkWork<'a, F> {
 }
 
 impl<F: Computed> Work for ChunkWork<'_, F> {
+    type Output = ();
+
     #[inline(always)]
-    fn with<L: Lanes>(self, lanes: L) {
-        let lanes = F::of(lanes);
+    fn run(self, instructions: impl Instructions) {
         for (at, &index) in self.blocks.iter().enumerate() {
             if let Some(ahead) = self.blocks.get(at + 1) {
                 let ahead = self.field.blocks.wrapping_add(*ahead as usize);
@@ -329,13 +329,15 @@ impl<F: Computed> Work for ChunkWork<'_, F> {
             let block = unsafe { &mut *block };
             if block.serial() {
                 // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
-                // has the chunk those of its bodies are its own: see `Sync`.
-                let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.quads) };
+                // has the chunk, the rows of its bodies are its own: see `Sync`.
+                let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.bodies) };
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
             }
             // SAFETY: the same holds for the rows of its bodies, and for the spare one.
-            unsafe { kernel::solve(lanes, &self.pass, block, self.field.quads) };
+            unsafe {
+                kernel::solve::<F::Numbers>(instructions, &self.pass, block, self.field.bodies);
+            }
             if self.pass.stage.contact && self.pass.stage.turning {
                 *self.sum = self.sum.saturating_add(counted::<F>(block));
             }
@@ -351,8 +353,8 @@ impl<F: Computed> ChunkWork<'_, F> {
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
             // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
-            // has the chunk those of its bodies are its own: see `Sync`.
-            let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.quads) };
+            // has the chunk, the rows of its bodies are its own: see `Sync`.
+            let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.bodies) };
             *self.sum = self.sum.saturating_add(sum);
         }
     }
@@ -368,8 +370,9 @@ fn counted<F: Computed>(block: &Block) -> u64 {
 ///
 /// # Safety
 ///
-/// The rows of the block exist. Nobody writes those while this runs, nor reads those of moving bodies.
-unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, quads: *mut Quad) -> u64 {
+/// The rows of the block exist. While this runs, no other thread writes them, and none reads the rows
+/// of moving bodies.
+unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, bodies: *mut BodyRow) -> u64 {
     let mut sum = 0_u64;
     for lane in 0..LANES {
         let collision = block.collision(lane);
@@ -380,7 +383,7 @@ unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, quads: *mu
         let mut velocities = [Velocity::default(); 2];
         for side in 0..2 {
             // SAFETY: the caller promises that the row exists.
-            let row = unsafe { quads.cast::<[Quad; 2]>().add(block.rows[side][lane] as usize) };
+            let row = unsafe { bodies.add(block.rows[side][lane] as usize) };
             // SAFETY: the caller promises that it can be read.
             let [[x, y, z, m], [p, q, r, k]] = unsafe { row.read() };
             velocities[side] = Velocity { linear: [x, y, z], angular: [p, q, r] };
@@ -398,7 +401,7 @@ unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, quads: *mu
                     (velocities[side], masses[side]);
                 let row = [[x, y, z, mass.inverse_mass], [p, q, r, mass.inverse_inertia[0]]];
                 // SAFETY: the caller promises that the row exists.
-                let at = unsafe { quads.cast::<[Quad; 2]>().add(block.rows[side][lane] as usize) };
+                let at = unsafe { bodies.add(block.rows[side][lane] as usize) };
                 // SAFETY: the caller promises that a moving body's can be written.
                 unsafe { at.write(row) };
             }

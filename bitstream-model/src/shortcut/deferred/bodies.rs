@@ -238,7 +238,7 @@ impl Deferred {
         batch.integrate(integrate.then_some(integration), bodies, poses, places)
     }
 
-    /// Of the next bodies to load, the ones within `cycles` that have a shape. `sources` say where
+    /// The part of the next bodies to load within `cycles` that have a shape. `sources` say where
     /// their beats are.
     pub(crate) fn bodies_with_shape(
         &self,

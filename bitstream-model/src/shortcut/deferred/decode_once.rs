@@ -2,7 +2,7 @@
 //! same ones.
 //!
 //! Two passes bring the same bytes if the beats come from the same place of the same hand-over of a
-//! buffer: the device owns it, and nobody writes to it.
+//! buffer: the device owns it, and no one else writes to it.
 
 use super::eligible::{BEATS_MAX, Layout};
 use crate::accelerator::control::Shape;

@@ -23,7 +23,7 @@ type Sources = [(Source, usize); STREAMS_MAX];
 #[derive(Debug)]
 pub(crate) struct FastForward {
     deferred: Deferred,
-    /// What is known of how collisions flow.
+    /// The recorded flow of the collisions.
     periods: Periods,
 }
 

@@ -21,7 +21,7 @@ use records::Records;
 /// A count for each engine, in their order: MM2S and S2MM of each core.
 type PerEngine = [usize; 2 * STREAMS_MAX];
 
-/// What stays the same.
+/// The constants of a flow.
 #[derive(Debug, Clone, Copy)]
 struct Rules {
     /// The number of cores.
@@ -41,7 +41,7 @@ struct Limits {
     beats: PerEngine,
 }
 
-/// What has flowed.
+/// The progress of a flow.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Flowed {
     cycles: u64,
@@ -51,7 +51,7 @@ struct Flowed {
     beats: PerEngine,
 }
 
-/// What decides how the flow goes on.
+/// The state that decides how the flow goes on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct FlowState {
     /// Beats in the FIFO of each engine, to or from the accelerator.

@@ -1,6 +1,6 @@
 //! Passes over whole periods of a flow whose state recurs.
 //!
-//! What flows settles soon: FIFOs, the memory's credit and its turns come to the same state again, and
+//! A flow settles soon: FIFOs, the memory's credit and its turns come to the same state again, and
 //! from then on the same slices follow. A period that is found serves the flows after it, which settle
 //! in the same way as a rule.
 
@@ -26,7 +26,7 @@ pub(super) struct Periods {
 }
 
 impl Flowed {
-    /// What has flowed since then.
+    /// The flow since then.
     fn since(&self, then: &Self) -> Self {
         Self {
             cycles: self.cycles - then.cycles,

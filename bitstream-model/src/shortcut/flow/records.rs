@@ -1,4 +1,4 @@
-//! What the accelerator does with records that flow undisturbed, phase by phase.
+//! Computes the accelerator's work on records that flow undisturbed, phase by phase.
 
 use super::PerEngine;
 use crate::accelerator::Accelerator;

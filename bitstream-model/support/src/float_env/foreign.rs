@@ -5,12 +5,12 @@
 use super::apart;
 use super::registers::Registers;
 
-/// What a thread's registers hold: how it computes, and the exception flags.
+/// The contents of a thread's registers: the control bits and the exception flags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Environment(pub(super) Registers);
 
-/// Environments that callers have, by name, with exception flags up in some. None on a processor whose
-/// environment is not known.
+/// Environments that callers have, by name, with exception flags up in some. Empty on a
+/// processor whose environment is unknown.
 pub fn environments() -> impl Iterator<Item = (&'static str, Environment)> {
     Registers::FOREIGN.iter().map(|&(name, registers)| (name, Environment(registers)))
 }
@@ -29,7 +29,7 @@ impl Environment {
     }
 }
 
-/// Does some work in an environment, and restores what there was.
+/// Does some work in an environment, and restores the previous one.
 ///
 /// # Safety
 /// The work computes nothing in floating point but in [`standard`](super::standard), and nothing that it

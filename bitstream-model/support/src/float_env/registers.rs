@@ -2,7 +2,7 @@
 //!
 //! # Safety
 //!
-//! Two invariants make every write sound. What is written was read from the registers before, or is
+//! Two invariants make every write sound. A written value was read from the registers before, or is
 //! [`Registers::STANDARD`], or was given to [`foreign::under`](super::foreign::under), whose caller answers
 //! for it: no reserved bit is set. And Rust's own requirement, that its code runs in the standard
 //! environment, is established by a write, or given up to code that was in another one already.
@@ -58,7 +58,7 @@ mod arch {
             ("every exception traps", Self(0)),
         ];
 
-        /// What this thread has.
+        /// The registers of this thread.
         #[inline]
         pub(in crate::float_env) fn read() -> Self {
             let mut mxcsr = 0_u32;
@@ -69,13 +69,13 @@ mod arch {
             Self(mxcsr)
         }
 
-        /// What decides results and traps.
+        /// The bits that decide results and traps.
         #[inline]
         pub(in crate::float_env) const fn control(self) -> u32 {
             self.0 & !Self::FLAGS
         }
 
-        /// Sets this in place of what this thread has now.
+        /// Writes these registers over the current ones, `now`, where they differ.
         #[inline]
         pub(super) fn write_over(self, now: Self) {
             if self != now {
@@ -123,7 +123,7 @@ mod arch {
             Self { control, status }
         }
 
-        /// What this thread has.
+        /// The registers of this thread.
         #[inline]
         pub(in crate::float_env) fn read() -> Self {
             let (control, status);
@@ -134,13 +134,13 @@ mod arch {
             Self { control, status }
         }
 
-        /// What decides results and traps.
+        /// The bits that decide results and traps.
         #[inline]
         pub(in crate::float_env) const fn control(self) -> u64 {
             self.control
         }
 
-        /// Sets this in place of what this thread has now.
+        /// Writes these registers over the current ones, `now`, where they differ.
         #[inline]
         pub(super) fn write_over(self, now: Self) {
             if self.control != now.control {
@@ -166,7 +166,7 @@ mod arch {
 
 #[cfg(any(miri, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
 mod arch {
-    /// None that this crate knows.
+    /// Empty: the registers of this processor are unknown.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub(in crate::float_env) struct Registers;
 

@@ -16,7 +16,7 @@ fn computed() -> [u32; 4] {
 /// That of the standard environment, by hand: 1/3 is 0xAAAAAA.AA... 2^-25, the subnormals in units of 2^-149.
 const EXPECTED: [u32; 4] = [0x3EAA_AAAB, 0xBEAA_AAAB, 0x002A_AAAB, 0x0080_0000];
 
-/// Does something in every environment of a caller, and in the one that there is; each is left as it was.
+/// Does something in the present environment and in every caller's; each must stay as it was.
 fn everywhere(work: impl Fn(&str)) {
     work("as it is");
     for (name, environment) in environments() {
@@ -33,7 +33,7 @@ fn everywhere(work: impl Fn(&str)) {
 fn other_environments_compute_something_else() {
     assert_eq!(computed(), EXPECTED);
     for (name, environment) in environments() {
-        // What traps would end the test, and of NaNs nothing is computed.
+        // A trap would end the test, and no NaN is computed.
         if !["every exception traps", "default NaN"].contains(&name) {
             // SAFETY: the operands of this arithmetic are hidden from the compiler, and whatever comes of it
             // is taken.
@@ -108,7 +108,7 @@ fn a_crew_computes_in_the_standard_environment_whoever_started_it_and_calls_it()
         });
         // Started here, called from elsewhere.
         for (name, environment) in environments() {
-            // SAFETY: all that is computed is work of the crew.
+            // SAFETY: only the crew computes.
             unsafe { under(environment, || all_compute_alike(&mut started, name)) };
         }
     }

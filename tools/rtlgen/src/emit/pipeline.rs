@@ -34,7 +34,7 @@ pub(super) fn pipeline(name: &str, graph: &Graph, schedule: &Schedule) -> String
     format!("{}{}endmodule\n\n`default_nettype wire\n", text.into_string(), body.into_string())
 }
 
-/// The name of what drives each node: a unit, or the input ports.
+/// The driver of each node: the name of a unit, or `inputs`.
 fn driver_of(graph: &Graph, schedule: &Schedule) -> Vec<String> {
     let mut driver = vec![String::from("inputs"); graph.nodes().len()];
     for unit in &schedule.units {

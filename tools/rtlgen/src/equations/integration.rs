@@ -7,7 +7,7 @@
 //! r = (h, cos((a*dt)*0.5)) * q;  q = r * (1 / |r|);  p = p + v*dt;  v = v + g*dt
 //! ```
 //!
-//! What depends on the arguments alone is computed once a step, by the unit `constants`:
+//! Numbers that depend on the arguments alone are computed once a step, by the unit `constants`:
 //! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt and the
 //! three components of g*dt. The arguments of the sine and of the cosine are the same number, for
 //! a factor of 0.5 is exact.

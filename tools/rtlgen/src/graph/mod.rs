@@ -65,7 +65,7 @@ pub enum Operation {
     Or,
 }
 
-/// What a node is.
+/// The kind of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// An input of the pipeline.
@@ -147,7 +147,7 @@ impl Operand {
 /// A node: what it is, what it reads, and a name that leads back to the equations.
 #[derive(Debug, Clone)]
 pub struct Node {
-    /// What the node is.
+    /// Its kind.
     pub kind: Kind,
     /// The values that it reads, in the order of the operator's ports.
     pub operands: Vec<Operand>,

@@ -82,7 +82,7 @@ struct Units {
 }
 
 impl Units {
-    /// As many units of every operation as its number of operations needs at least.
+    /// The smallest number of units that can carry out all operations of each kind.
     fn new(graph: &Graph, interval: i32) -> Self {
         let mut operations = HashMap::<_, usize>::new();
         for operation in graph.nodes().iter().filter_map(|node| node.kind.operation()) {

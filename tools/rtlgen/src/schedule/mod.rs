@@ -15,7 +15,7 @@ use crate::graph::{Graph, Kind, NodeId, Operation, Source};
 /// A unit of the library, and the operations that it carries out.
 #[derive(Debug, Clone)]
 pub struct Unit {
-    /// What the unit does.
+    /// The operation of the unit.
     pub operation: Operation,
     /// Number among the units of its operation.
     pub number: usize,

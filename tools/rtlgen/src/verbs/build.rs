@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use rtlgen::design::{Design, Parameters};
 
-/// What the hardware does on a hazard.
+/// The behaviour of the hardware on a hazard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Hazards {
     /// Waits for the velocity.

@@ -1,11 +1,11 @@
 //! Converts collisions of other designs to the batch's own format: f32, in world coordinates, on four
-//! streams. It converts as many at a time as the cache holds.
+//! streams, as many at a time as fit into the cache.
 //!
-//! A record relative to body A is one whose body A stands at the origin. Of two records of three and a
-//! half beats the first takes the sum of the words of both, and what pads the last one up.
+//! A record relative to body A becomes a record whose body A stands at the origin. Two records of
+//! three and a half beats share a beat: the sum of all their words, padding included, counts for the
+//! first one.
 
 use super::Batch;
-use super::lanes::{Lanes, Work};
 use super::records::{BEATS, STREAMS};
 use crate::accelerator::records::array::{Row, half_of};
 use crate::accelerator::records::decode::{self, Collision};
@@ -17,10 +17,11 @@ use crate::shortcut::deferred::eligible::Layout;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{Beat, LANES, WORD_LANE, collision, relative};
 use pgs_support::chunks::Chunks;
+use pgs_support::lanes::{Instructions, Work};
 
 /// Records that are translated at once.
 const TOGETHER: usize = 4096;
-/// And by one thread.
+/// Records that one thread translates at once.
 const OF_THREAD: usize = 512;
 
 /// Records that share a beat.
@@ -32,7 +33,7 @@ const _: () = assert!(TOGETHER.is_multiple_of(PAIR) && OF_THREAD.is_multiple_of(
 pub(crate) struct Translation {
     layout: Layout,
     streams: [Box<[Beat]>; STREAMS],
-    /// The sum of the words of each as it came.
+    /// The sum of the words of each record as received.
     sums: Box<[u32]>,
 }
 
@@ -59,7 +60,7 @@ impl Translation {
         }
     }
 
-    /// As [`Batch::decode`], of records as the design has them.
+    /// As [`Batch::decode`], for records in the design's own layout.
     pub(crate) fn decode(
         &mut self,
         batch: &mut Batch,
@@ -108,7 +109,7 @@ impl Translation {
     }
 }
 
-/// Records that one thread translates, as many as there are sums, and where they go.
+/// Records that one thread translates, one for each sum, and their destination.
 struct Part<'a> {
     layout: &'a Layout,
     streams: [&'a [Beat]; STREAMS_MAX],
@@ -119,9 +120,11 @@ struct Part<'a> {
 }
 
 impl Work for Part<'_> {
-    /// The same instructions, of which the processor has more.
+    type Output = ();
+
+    /// The same code: the compiler vectorises it.
     #[inline(always)]
-    fn with<L: Lanes>(self, _: L) {
+    fn run(self, _: impl Instructions) {
         self.translate();
     }
 }
@@ -145,7 +148,7 @@ impl Part<'_> {
         }
     }
 
-    /// The same of a format, in which a record takes so many beats.
+    /// Translates records of a format, each of `COUNT` beats.
     #[inline(always)]
     fn translate_of<const COUNT: usize>(self, format: StreamFormat) {
         let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
@@ -168,7 +171,7 @@ impl Part<'_> {
 }
 
 impl Part<'_> {
-    /// The same of pairs of records in world coordinates of sixteen-bit words.
+    /// Translates pairs of records in world coordinates with sixteen-bit words.
     #[inline(always)]
     fn translate_pairs(self, format: StreamFormat) {
         let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
@@ -200,7 +203,7 @@ fn rows_of_pair(
     format: StreamFormat,
     beats: &[Beat; collision::ROWS],
 ) -> [Row; PAIR * collision::ROWS] {
-    // All words alike, for the compiler to take several at once; then those that are no numbers.
+    // First all words as numbers, which the compiler vectorises; then the words that are none.
     let mut rows = [[0; LANES]; PAIR * collision::ROWS];
     for (rows, beat) in rows.split_arrays_mut::<2>().0.iter_mut().zip(beats) {
         let words: [u16; 2 * LANES] = bytemuck::cast(*beat);

@@ -1,4 +1,4 @@
-//! What a batch takes in of other designs, against the decoder's fields.
+//! Compares collisions converted from other designs with the decoder's.
 
 use super::*;
 use crate::accelerator::records::array::beat_of;
@@ -9,7 +9,7 @@ use pgs_interface::profile::{HALF, MIXED, Profile};
 use pgs_support::chunks::Chunks;
 
 static RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
-/// Bodies, of which the first is static.
+/// Number of bodies; the first is static.
 const BODIES: u32 = 3000;
 
 fn layout(profile: &'static Profile) -> Layout {
@@ -133,7 +133,7 @@ fn what_comes_before_a_refused_record_is_there() {
     }
 }
 
-/// Records in pairs, of any words, between bodies that exist, with no more points than there are.
+/// Pairs of records of any words, with valid bodies and numbers of points.
 fn pairs(records: usize, seed: &mut u64) -> Vec<[Row; collision::ROWS]> {
     let mut random = || {
         *seed = seed.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);

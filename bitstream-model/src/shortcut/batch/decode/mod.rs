@@ -1,7 +1,7 @@
 //! Decodes records into blocks: one thread assigns the blocks in order, and all threads fill them.
 //!
-//! Where sixteen neighbours are a block in their order, the block is theirs alone, and whoever fills
-//! it has it to himself. All others are put in when the threads have ended.
+//! Sixteen neighbouring records that form a block in their order share it with no others, so that any
+//! thread can fill it. All other records are put in when the threads have ended.
 
 use std::mem;
 use std::ops::Range;
@@ -22,7 +22,7 @@ use pgs_interface::record::Beat;
 
 /// Blocks that a thread fills at once.
 const RUN: usize = 16;
-/// Records that one thread takes in alone.
+/// Up to this number of records, one thread decodes alone.
 const FEW: usize = 2 * RUN * LANES;
 /// Runs that wait for a thread, at most.
 const WAITING: usize = 8;
@@ -55,14 +55,14 @@ pub(crate) struct Group {
     /// The first record on the streams, and how many.
     first: usize,
     count: usize,
-    /// The first one's slot.
+    /// The slot of the first record.
     slot: usize,
     /// The blocks that begin with them.
     blocks: Range<usize>,
     kinds: Words<u32>,
 }
 
-/// What the thread does that finds the blocks.
+/// The state of the thread that assigns the blocks.
 struct Intake<'a, 'b> {
     records: Records<'b>,
     count: usize,
@@ -70,10 +70,10 @@ struct Intake<'a, 'b> {
     places: &'b mut Places,
     slots: &'b mut Vec<u32>,
     put_off: &'b mut Vec<Group>,
-    /// Records that have their blocks.
+    /// Number of records that have their blocks.
     at: usize,
     refused: Option<PacketError>,
-    /// The blocks and sums behind those that were given away, and the first one's number and record.
+    /// The blocks and sums behind the ones given away, and the number of the first block and record.
     blocks: &'a mut [Block],
     first_block: usize,
     sums: &'a mut [u32],
@@ -84,7 +84,7 @@ struct Intake<'a, 'b> {
 }
 
 impl<'a> Intake<'a, '_> {
-    /// Finds blocks as long as there are enough of them, and fills those that `give` gives back.
+    /// Assigns blocks while enough are left, and fills the runs that `give` gives back.
     fn work(&mut self, give: impl Fn(Run<'a>) -> Option<Run<'a>>) {
         let end = self.first_block + self.blocks.len();
         while self.at < self.count
@@ -111,7 +111,7 @@ impl<'a> Intake<'a, '_> {
         self.give(&give);
     }
 
-    /// Gives the run away that was gathered.
+    /// Gives the gathered run away.
     fn give(&mut self, give: impl Fn(Run<'a>) -> Option<Run<'a>>) {
         let (first, block, blocks) = mem::take(&mut self.run);
         if blocks == 0 {
@@ -128,8 +128,8 @@ impl<'a> Intake<'a, '_> {
         }
     }
 
-    /// Finds the next records their blocks: in hazard-free order as many as the block begun last has
-    /// empty lanes. Returns the block if they are one in their order.
+    /// Assigns blocks to the next records: in hazard-free order to one for each empty lane of the last
+    /// block. Returns the block if the records form one in their order.
     fn group(&mut self) -> (Group, Option<usize>) {
         let last = self.slots.last().filter(|slot| **slot != NO_SLOT);
         let taken = last.map_or(0, |slot| (*slot as usize + 1) % LANES);
@@ -169,7 +169,7 @@ impl<'a> Intake<'a, '_> {
         (group, None)
     }
 
-    /// Places the next collision; returns what its lane is, 0 for a padding entry.
+    /// Places the next collision; returns the kind of its lane, 0 for a padding entry.
     fn place(&mut self, count: u32, bodies: [u32; 2]) -> Result<u32, PacketError> {
         let index = register(self.slots.len());
         if count == 0 {
@@ -185,12 +185,12 @@ impl<'a> Intake<'a, '_> {
 }
 
 impl Batch {
-    /// Decodes the next `count` records, of 2, 2, 2 and 1 beats on the four streams. `sums` are as
-    /// many: the sums of the words of each record.
+    /// Decodes the next `count` records, of 2, 2, 2 and 1 beats on the four streams. `sums` receives
+    /// the sum of the words of each record.
     ///
     /// # Errors
     ///
-    /// The first collision that the decoder refuses; those before it stay.
+    /// The first collision that the decoder refuses; the collisions before it stay.
     pub(crate) fn decode(
         &mut self,
         streams: [&[Beat]; 4],
@@ -207,7 +207,7 @@ impl Batch {
         let records = Records { streams };
         let mut at = 0;
         while at < count {
-            // A group begins one for each of its records at most.
+            // A group begins at most one block for each of its records.
             let blocks = self.places.blocks() + (count - at).div_ceil(LANES) + LANES;
             if self.blocks.len() < blocks {
                 self.blocks.resize(blocks, Block::EMPTY);
@@ -240,7 +240,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Puts the records in that were put off.
+    /// Puts the records into their blocks that were put off.
     fn put(&mut self, records: &Records<'_>, sums: &mut [u32]) {
         for Group { first, count, slot, blocks, kinds } in self.put_off.drain(..) {
             self.blocks[blocks].fill(Block::EMPTY);
@@ -257,7 +257,7 @@ impl Batch {
     }
 }
 
-/// Lets all threads of a crew do what is to do, if it is worth waking them.
+/// Shares the intake among all threads of a crew, if there are enough records to wake them.
 fn share(intake: &mut Intake<'_, '_>, crew: &mut Crew) {
     if crew.is_alone() || intake.count - intake.at <= FEW {
         intake.work(Some);
@@ -269,7 +269,7 @@ fn share(intake: &mut Intake<'_, '_>, crew: &mut Crew) {
     crew.run(&|thread| {
         if thread == 0 {
             let _ends = queue.ends();
-            // Nobody else locks it.
+            // The other threads never lock it.
             let mut intake = intake.lock().unwrap_or_else(PoisonError::into_inner);
             intake.work(|run| queue.put(run));
         }

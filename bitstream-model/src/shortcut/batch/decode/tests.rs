@@ -1,4 +1,4 @@
-//! What is filled by threads, against records placed and put in one after the other.
+//! Compares blocks that threads fill with records put in one after the other.
 
 use proptest::prelude::*;
 
@@ -18,9 +18,9 @@ struct Scene {
 /// How collisions follow each other.
 #[derive(Debug, Clone, Copy)]
 struct Order {
-    /// Bodies come again after so many.
+    /// Collisions after which a body returns.
     period: u32,
-    /// Of 256, so many are of any bodies, and so many are padding.
+    /// Collisions in 256 between random bodies, and padding entries in 256.
     odd: u32,
     padding: u32,
 }
@@ -32,7 +32,7 @@ fn scatter(seed: u64, number: u64) -> u64 {
     x ^ (x >> 27)
 }
 
-/// Records of any words, between bodies of which the last eight are static.
+/// Records of any words; the last eight bodies are static.
 fn scene(seed: u64, count: u32, order: Order) -> Scene {
     let Order { period, odd, padding } = order;
     let moving = 2 * period;
@@ -142,7 +142,7 @@ proptest! {
         width: prop::sample::Index,
         threads in 1_usize..5,
     ) {
-        // What a step leaves behind is not there in the next one.
+        // A step leaves nothing behind for the next one.
         let mut batch = batch(threads, width);
         for (step, (count, order)) in (0..).zip(counts) {
             let scene = scene(seed ^ step, count, order);
@@ -166,7 +166,7 @@ proptest! {
         let record = &mut scene.records[at];
         let first = record[collision::BODY_A][WORD_LANE];
         let (row, word, code) = [
-            // Of what is wrong at once, the one that is looked at first.
+            // Several errors at once: the one checked first is reported.
             (collision::NORMAL, 5, ErrorCode::ContactCount),
             (collision::BODY_B, register(bodies), ErrorCode::BodyIndex),
             (collision::BODY_B, first, ErrorCode::SelfCollision),

@@ -1,16 +1,15 @@
 //! Integrates bodies side by side: the formulae and the order of evaluation of `integrate.rs`, SIMD
 //! lane by SIMD lane.
 //!
-//! The bodies come and go on streams that take turns: the first body of each period is found at every
-//! so many beats of its streams, the next one likewise.
+//! The bodies come and go on streams that take turns. Bodies at the same place in successive periods
+//! lie at a constant distance on their streams.
 
 use std::mem;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::Batch;
-use super::block::{LANES, ROWS_APART, Words};
-use super::lanes::{Lanes, Mask, Numbers, Quad, Work};
+use super::block::{LANES, ROWS_APART};
 use super::wavefront::Line;
 use super::width::Width;
 use crate::accelerator::arithmetic::number::Single;
@@ -22,6 +21,7 @@ use crate::shortcut::deferred::bodies::{BodyRows, beats_of_results, period};
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
 use pgs_interface::record::Beat;
+use pgs_support::lanes::{F32x16, Instructions, Quad, Work};
 
 /// Bodies that a thread integrates at once.
 const INTEGRATED_TOGETHER: usize = 512;
@@ -33,7 +33,7 @@ fn added(rows: &[Row]) -> u32 {
     rows.as_flattened().iter().copied().fold(0, u32::wrapping_add)
 }
 
-/// Bodies and what becomes of them, if anything does.
+/// Bodies, and their integration if they are integrated.
 #[derive(Clone, Copy)]
 struct Bodies<'a> {
     integration: Option<&'a Integration>,
@@ -64,7 +64,7 @@ impl Bodies<'_> {
         }
     }
 
-    /// The same from and to so many streams.
+    /// The same, from and to `STREAMS` streams.
     fn results_on<const STREAMS: usize>(
         &self,
         bodies: Range<usize>,
@@ -72,7 +72,7 @@ impl Bodies<'_> {
     ) -> [u32; 2] {
         let turns = Turns { streams: STREAMS };
         let period = const { period(STREAMS) };
-        // Those of each place in a period fill the widest lanes.
+        // In a group, the bodies at each place of a period fill all lanes.
         let group = period * LANES;
         let mut sums = [0; 2];
         let Range { start, end } = bodies;
@@ -91,7 +91,7 @@ impl Bodies<'_> {
         sums
     }
 
-    /// Whole groups of bodies, of which the first one begins a period.
+    /// Whole groups of bodies; the first body begins a period.
     fn groups<'a, const STREAMS: usize>(
         &'a self,
         integration: &'a Integration,
@@ -140,7 +140,7 @@ impl Bodies<'_> {
     }
 }
 
-/// Bodies side by side: those of the same place in a period, as many as fill the lanes.
+/// Bodies side by side: the lanes hold bodies at the same place in their periods.
 struct Groups<'a, const STREAMS: usize> {
     integration: &'a Integration,
     /// Two quads of a body.
@@ -151,28 +151,28 @@ struct Groups<'a, const STREAMS: usize> {
     sums: &'a mut [u32; 2],
 }
 
-/// What is the same for all bodies.
+/// The constants of an integration.
 #[derive(Clone, Copy)]
-struct Constants<N> {
-    zero: N,
-    one: N,
-    half: N,
-    time_step: N,
-    damping: N,
-    /// What gravity adds to the velocity.
-    fall: [N; 3],
-    rotation_limit: N,
-    speed_limit: N,
-    series_below: N,
-    series_first: N,
-    series_second: N,
+struct Constants {
+    zero: F32x16,
+    one: F32x16,
+    half: F32x16,
+    time_step: F32x16,
+    damping: F32x16,
+    /// The change of the velocity by gravity.
+    fall: [F32x16; 3],
+    rotation_limit: F32x16,
+    speed_limit: F32x16,
+    series_below: F32x16,
+    series_first: F32x16,
+    series_second: F32x16,
 }
 
-impl<N: Numbers> Constants<N> {
+impl Constants {
     #[inline(always)]
-    fn new<L: Lanes<Numbers = N>>(lanes: L, integration: &Integration) -> Self {
+    fn new(integration: &Integration) -> Self {
         let Integration { time_step: dt, angular_damping, gravity } = *integration;
-        let n = |number| lanes.splat(number);
+        let n = F32x16::splat;
         Self {
             zero: n(0.0),
             one: n(1.0),
@@ -188,37 +188,36 @@ impl<N: Numbers> Constants<N> {
         }
     }
 
-    /// By what the angular velocity is multiplied to give the rotation, and the cosine of half its
-    /// angle.
+    /// The factor from the angular velocity to the rotation, and the cosine of half the angle.
     #[inline(always)]
-    fn rotation<L: Lanes<Numbers = N>>(&self, lanes: L, w: [N; 3]) -> [N; 2] {
+    fn rotation(&self, w: [F32x16; 3]) -> [F32x16; 2] {
         let Self { half, time_step, .. } = *self;
         let speed = ((w[0] * w[0] + w[1] * w[1]) + w[2] * w[2]).sqrt();
         let fast = (speed * time_step).above(self.rotation_limit);
         let speed = self.speed_limit.or(fast, speed);
         let slow = self.series_below.above(speed);
         let series = self.series_first - (self.series_second * speed) * speed;
-        let (mut sines, mut cosines): (Words, Words) = ([0.0; LANES], [0.0; LANES]);
-        lanes.store((half * speed) * time_step, &mut sines, 0);
-        lanes.store((speed * time_step) * half, &mut cosines, 0);
+        let mut sines = ((half * speed) * time_step).to_array();
+        let mut cosines = ((speed * time_step) * half).to_array();
         let lacking = slow.bits();
-        for (lane, (sine, cosine)) in sines.iter_mut().zip(&mut cosines).take(L::WIDTH).enumerate()
-        {
+        for (lane, (sine, cosine)) in sines.iter_mut().zip(&mut cosines).enumerate() {
             if lacking & (1 << lane) == 0 {
                 *sine = libm::sinf(*sine);
             }
             *cosine = libm::cosf(*cosine);
         }
-        let factor = series.or(slow, lanes.load(&sines, 0) / speed);
-        [factor, lanes.load(&cosines, 0)]
+        let factor = series.or(slow, F32x16::from_array(sines) / speed);
+        [factor, F32x16::from_array(cosines)]
     }
 }
 
 impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
+    type Output = ();
+
     #[inline(always)]
-    fn with<L: Lanes>(self, lanes: L) {
+    fn run(self, instructions: impl Instructions) {
         let Self { integration, rows, poses, places, sums } = self;
-        let constants = Constants::new(lanes, integration);
+        let constants = Constants::new(integration);
         let Constants { zero, one, time_step: dt, damping, fall, .. } = constants;
         let period = const { period(STREAMS) };
         // Beats of a period on each stream.
@@ -227,18 +226,18 @@ impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
         let periods = rows.len() / (ROWS_IN * period);
         let mut totals = [zero; 2];
         for (at, body) in
-            (0..periods).step_by(L::WIDTH).flat_map(|at| (0..period).map(move |body| (at, body)))
+            (0..periods).step_by(LANES).flat_map(|at| (0..period).map(move |body| (at, body)))
         {
             let first = ROWS_IN * (period * at + body);
-            let [vx, vy, vz, m] = lanes.transposed(&rows[first..], ROWS_IN * period);
-            let before = lanes.transposed(&rows[first + 1..], ROWS_IN * period);
+            let [vx, vy, vz, m] = instructions.load(&rows[first..], ROWS_IN * period);
+            let before = instructions.load(&rows[first + 1..], ROWS_IN * period);
             let (k, number) = turns.place(ROWS_IN * body);
-            let [px, py, pz, unused] = lanes.transposed(&poses[k][came * at + number..], came);
+            let [px, py, pz, unused] = instructions.load(&poses[k][came * at + number..], came);
             let (k, number) = turns.place(ROWS_IN * body + 1);
-            let [qx, qy, qz, qw] = lanes.transposed(&poses[k][came * at + number..], came);
+            let [qx, qy, qz, qw] = instructions.load(&poses[k][came * at + number..], came);
             let [wx, wy, wz] = [before[0] * damping, before[1] * damping, before[2] * damping];
 
-            let [factor, c] = constants.rotation(lanes, [wx, wy, wz]);
+            let [factor, c] = constants.rotation([wx, wy, wz]);
             let (x, y, z) = (wx * factor, wy * factor, wz * factor);
             let rx = ((c * qx + x * qw) + y * qz) - z * qy;
             let ry = ((c * qy + y * qw) + z * qx) - x * qz;
@@ -246,7 +245,7 @@ impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
             let rw = ((c * qw - x * qx) - y * qy) - z * qz;
             let scale = one / (((rx * rx + ry * ry) + rz * rz) + rw * rw).sqrt();
 
-            let rests = m.is_zero();
+            let rests = m.is(zero);
             let results = [
                 [
                     px.or(rests, px + vx * dt),
@@ -269,26 +268,25 @@ impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
                 [before[0].or(rests, wx), before[1].or(rests, wy), before[2].or(rests, wz), zero],
             ];
             for row in [[px, py, pz, unused], [qx, qy, qz, qw]] {
-                totals[0] = row.into_iter().fold(totals[0], Numbers::with_words);
+                totals[0] = row.into_iter().fold(totals[0], F32x16::with_words);
             }
             for (row, words) in results.into_iter().enumerate() {
-                totals[1] = words.into_iter().fold(totals[1], Numbers::with_words);
+                totals[1] = words.into_iter().fold(totals[1], F32x16::with_words);
                 let (k, number) = turns.place(ROWS_OUT * body + row);
-                lanes.spread(words, &mut places[k][goes * at + number..], goes);
+                instructions.store(words, &mut places[k][goes * at + number..], goes);
             }
         }
         for (sum, total) in sums.iter_mut().zip(totals) {
-            let mut words: Words<u32> = [0; LANES];
-            lanes.store(total, bytemuck::cast_mut(&mut words), 0);
+            let words = total.to_array().map(f32::to_bits);
             *sum = words.into_iter().fold(*sum, u32::wrapping_add);
         }
     }
 }
 
 impl Batch {
-    /// Integrates bodies, or only sends them back, where the places have room. The velocities
-    /// are those that were entered or that passes have left. Returns the sums of the words of their
-    /// poses and of their results.
+    /// Integrates bodies, or only sends them back, into the room that `places` has. The velocities are
+    /// the entered ones as the passes have left them. Returns the sums of the words of the poses and of
+    /// the results.
     pub(crate) fn integrate(
         &mut self,
         integration: Option<&Integration>,

@@ -83,7 +83,7 @@ fn results(
 fn bodies_side_by_side_move_as_one_by_one() {
     let slow =
         Integration { time_step: 1.0 / 60.0, angular_damping: 0.99, gravity: [0.0, -9.8, 0.1] };
-    // A step so long that many bodies turn further than a step may turn them.
+    // In a step this long, many bodies turn further than the limit.
     let long = Integration { time_step: 0.5, ..slow };
     // Parts of one chunk and of several, from even and odd bodies on.
     let parts = [

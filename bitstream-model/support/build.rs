@@ -9,7 +9,7 @@ const AVX512: u32 = 89;
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(avx512)");
     println!("cargo::rerun-if-changed=build.rs");
-    // With an unknown version the build has AVX2 lanes only: no result depends on the lanes.
+    // Where the version is unknown, the lanes do without AVX-512: no result depends on it.
     if minor_version().is_some_and(|minor| minor >= AVX512) {
         println!("cargo::rustc-cfg=avx512");
     }

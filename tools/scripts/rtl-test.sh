@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# The generated accelerator, verified in simulation: the operators against integer arithmetic and libm,
+# then whole steps against Bullet's recorded bits and, beat by beat, against the model.
+#
+# usage: tools/scripts/rtl-test.sh             a few minutes
+#        tools/scripts/rtl-test.sh mutations   seeded mistakes in the Verilog instead: each must be found
+#        tools/scripts/rtl-test.sh --help
+#
+# Installs Verilator and a C++ compiler (Debian's packages) where it may.
+#
+# environment: VECTORS (for each operator, 1000000), CASES (random steps, 1000), PGS_VECTORS (a folder
+#              of recorded steps beside tests/golden)
+# Exit code: 0 passed, 1 failed, 2 wrong usage, 77 skipped.
+set -euo pipefail
+. "$(dirname "$0")/lib.sh"
+cd "$repository"
+
+mode=${1-}
+case $mode in
+-h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0"; exit 0 ;;
+'' | mutations) ;;
+*) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
+esac
+
+need_packages verilator g++ make
+# Optimised: a step of random words costs the model as much as the simulator.
+cargo build --release --quiet --locked -p rtlgen -p zynq-pgs-cosim
+built=$target_root/release
+
+if [ "$mode" = mutations ]; then
+	attend "$built/cosim" mutations
+	exit
+fi
+
+folder=$(mktemp -d)
+litter+=("$folder")
+attend "$built/rtlgen" operators --vectors "${VECTORS:-1000000}"
+attend "$built/rtlgen" sincos --all
+attend "$built/rtlgen" schedule
+
+# Both hazard modes are built side by side.
+begin "$built/rtlgen" simulator --out "$folder/interlocked"
+interlocked=$!
+begin "$built/rtlgen" simulator --out "$folder/unchecked" --hazards unchecked
+unchecked=$!
+await "$interlocked"
+await "$unchecked"
+
+recorded=(tests/golden/*/)
+if [ -n "${PGS_VECTORS-}" ]; then recorded+=("$PGS_VECTORS"/pile10*/); fi
+cases=${CASES:-1000}
+for hazards in interlocked unchecked; do
+	cosim=(--simulator "$folder/$hazards/pgs-rtl" --hazards "$hazards")
+	attend "$built/cosim" recorded "${cosim[@]}" "${recorded[@]}"
+	attend "$built/cosim" random "${cosim[@]}" --cases "$cases"
+done
+# Without the interlock the bits depend on the time at which beats come.
+attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $((cases / 5)) --seed 1000000 \
+	--gaps 300 --stalls 700
