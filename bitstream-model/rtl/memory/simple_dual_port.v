@@ -4,7 +4,8 @@
 // bits, so that wide words fill them.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles; a write passes the same
-// ADDRESS_STAGES. An address must not be read in the cycle in which it is written.
+// ADDRESS_STAGES. What is read at an address that is written in the same cycle is
+// not defined (`no_rw_check` tells Yosys).
 `default_nettype none
 
 module simple_dual_port #(
@@ -40,7 +41,8 @@ module simple_dual_port #(
     for (i = 0; i < WIDTH; i = i + 9) begin : g_lane
       localparam BITS = (WIDTH - i < 9) ? WIDTH - i : 9;
 
-      (* ram_style = "block", ram_decomp = "area" *) reg [BITS-1:0] words [0:DEPTH-1];
+      (* ram_style = "block", ram_decomp = "area", no_rw_check *)
+      reg [BITS-1:0] words [0:DEPTH-1];
       reg [BITS-1:0] read_lane;
 
       always @(posedge clk) begin

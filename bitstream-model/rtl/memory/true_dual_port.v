@@ -1,8 +1,8 @@
 // Block RAM with two ports that read or write a word each in every cycle. It consists of lanes of
 // nine bits, as simple_dual_port.v does.
 //
-// A port reads the old word where it writes. Both ports must not write one address in one cycle,
-// and a port must not read the address that the other writes in the same cycle.
+// What a port reads where a port writes in the same cycle is not defined (`no_rw_check` tells Yosys).
+// Both ports must not write one address in one cycle.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles. A write passes the same
 // ADDRESS_STAGES, so that accesses take effect in the order in which they are made.
@@ -48,7 +48,8 @@ module true_dual_port #(
     for (i = 0; i < WIDTH; i = i + 9) begin : g_lane
       localparam BITS = (WIDTH - i < 9) ? WIDTH - i : 9;
 
-      (* ram_style = "block", ram_decomp = "area" *) reg [BITS-1:0] words [0:DEPTH-1];
+      (* ram_style = "block", ram_decomp = "area", no_rw_check *)
+      reg [BITS-1:0] words [0:DEPTH-1];
       reg [BITS-1:0] read_lane_a, read_lane_b;
 
       always @(posedge clk) begin
