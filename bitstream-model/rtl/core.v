@@ -131,7 +131,12 @@ module core (
       );
     end
   endgenerate
-  always @(posedge clk) sum_received <= (received[0] + received[1]) + (received[2] + received[3]);
+  reg [31:0] received_low, received_high;
+  always @(posedge clk) begin
+    received_low  <= received[0] + received[1];
+    received_high <= received[2] + received[3];
+    sum_received  <= received_low + received_high;
+  end
 
   // ---- Load, and the properties of the bodies
 
@@ -413,7 +418,12 @@ module core (
       );
     end
   endgenerate
-  always @(posedge clk) sum_sent <= (sent[0] + sent[1]) + (sent[2] + sent[3]);
+  reg [31:0] sent_low, sent_high;
+  always @(posedge clk) begin
+    sent_low  <= sent[0] + sent[1];
+    sent_high <= sent[2] + sent[3];
+    sum_sent  <= sent_low + sent_high;
+  end
 
   // ---- Errors: the first one stays
 

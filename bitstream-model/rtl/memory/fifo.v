@@ -1,4 +1,4 @@
-// FIFO of 2^ADDRESS words whose oldest word is visible at `head` while `count` is not 0.
+// FIFO of 2^ADDRESS words in LUT memory whose oldest word is visible at `head` while `count` is not 0.
 //
 // The user pushes only while there is room and pops only while there is a word.
 `default_nettype none
@@ -15,7 +15,7 @@ module fifo #(
   output wire [WIDTH-1:0] head,
   output reg  [ADDRESS:0] count
 );
-  reg [WIDTH-1:0]   words [0:(1<<ADDRESS)-1];
+  (* ram_style = "distributed" *) reg [WIDTH-1:0] words [0:(1<<ADDRESS)-1];
   reg [ADDRESS-1:0] newest, oldest;
 
   assign head = words[oldest];

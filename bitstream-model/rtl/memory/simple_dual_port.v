@@ -1,51 +1,61 @@
-// Block RAM of WORDS words of 32 bits an address, with one write port, which has a strobe for each
-// word, and one read port.
+// Block RAM with one write port and one read port.
+//
+// It consists of lanes of nine bits: the RAM blocks of the device are that wide with their parity
+// bits, so that wide words fill them.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles; a write passes the same
-// ADDRESS_STAGES. An address must not be read in the cycle in which it is written.
+// ADDRESS_STAGES. What is read at an address that is written in the same cycle is
+// not defined (`no_rw_check` tells Yosys).
 `default_nettype none
 
 module simple_dual_port #(
-  parameter WORDS          = 4,
+  parameter WIDTH          = 64,
   parameter DEPTH          = 1024,
   parameter ADDRESS        = 10,
   parameter ADDRESS_STAGES = 0,
   parameter OUTPUT_STAGES  = 0
 ) (
-  input  wire                clk,
-  input  wire [WORDS-1:0]    write,
-  input  wire [ADDRESS-1:0]  write_address,
-  input  wire [32*WORDS-1:0] in,
-  input  wire [ADDRESS-1:0]  read_address,
-  output wire [32*WORDS-1:0] out
+  input  wire               clk,
+  input  wire               write,
+  input  wire [ADDRESS-1:0] write_address,
+  input  wire [WIDTH-1:0]   in,
+  input  wire [ADDRESS-1:0] read_address,
+  output wire [WIDTH-1:0]   out
 );
+  wire               write_late;
+  wire [ADDRESS-1:0] write_address_late, read_address_late;
+  wire [WIDTH-1:0]   in_late;
+  wire [WIDTH-1:0]   read;
+
+  pipeline_register #(.WIDTH(1 + ADDRESS + WIDTH), .STAGES(ADDRESS_STAGES)) write_access (
+    .clk(clk),
+    .d({write, write_address, in}),
+    .q({write_late, write_address_late, in_late})
+  );
+  pipeline_register #(.WIDTH(ADDRESS), .STAGES(ADDRESS_STAGES)) read_access (
+    .clk(clk), .d(read_address), .q(read_address_late)
+  );
+
   genvar i;
   generate
-    for (i = 0; i < WORDS; i = i + 1) begin : g_word
-      (* ram_style = "block" *) reg [31:0] words [0:DEPTH-1];
+    for (i = 0; i < WIDTH; i = i + 9) begin : g_lane
+      localparam BITS = (WIDTH - i < 9) ? WIDTH - i : 9;
 
-      wire               write_late;
-      wire [ADDRESS-1:0] write_address_late, read_address_late;
-      wire [31:0]        in_late;
-      reg  [31:0]        read;
+      (* ram_style = "block", ram_decomp = "area", no_rw_check *)
+      reg [BITS-1:0] words [0:DEPTH-1];
+      reg [BITS-1:0] read_lane;
 
-      pipeline_register #(.WIDTH(1 + ADDRESS + 32), .STAGES(ADDRESS_STAGES)) write_access (
-        .clk(clk),
-        .d({write[i], write_address, in[32*i +: 32]}),
-        .q({write_late, write_address_late, in_late})
-      );
-      pipeline_register #(.WIDTH(ADDRESS), .STAGES(ADDRESS_STAGES)) read_access (
-        .clk(clk), .d(read_address), .q(read_address_late)
-      );
       always @(posedge clk) begin
-        if (write_late) words[write_address_late] <= in_late;
-        read <= words[read_address_late];
+        if (write_late) words[write_address_late] <= in_late[i +: BITS];
+        read_lane <= words[read_address_late];
       end
-      pipeline_register #(.WIDTH(32), .STAGES(OUTPUT_STAGES)) output_stage (
-        .clk(clk), .d(read), .q(out[32*i +: 32])
-      );
+      assign read[i +: BITS] = read_lane;
     end
   endgenerate
+
+  pipeline_register #(.WIDTH(WIDTH), .STAGES(OUTPUT_STAGES)) output_stage (
+    .clk(clk), .d(read), .q(out)
+  );
 endmodule
 
 `default_nettype wire

@@ -1,7 +1,8 @@
-// Block RAM with two ports that read or write a word each in every cycle.
+// Block RAM with two ports that read or write a word each in every cycle. It consists of lanes of
+// nine bits, as simple_dual_port.v does.
 //
-// A port reads the old word where it writes. Both ports must not write one address in one cycle,
-// and a port must not read the address that the other writes in the same cycle.
+// What a port reads where a port writes in the same cycle is not defined (`no_rw_check` tells Yosys).
+// Both ports must not write one address in one cycle.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles. A write passes the same
 // ADDRESS_STAGES, so that accesses take effect in the order in which they are made.
@@ -26,8 +27,6 @@ module true_dual_port #(
 );
   localparam ACCESS = 1 + ADDRESS + WIDTH;
 
-  (* ram_style = "block" *) reg [WIDTH-1:0] words [0:DEPTH-1];
-
   wire               write_a_late, write_b_late;
   wire [ADDRESS-1:0] address_a_late, address_b_late;
   wire [WIDTH-1:0]   in_a_late, in_b_late;
@@ -43,16 +42,28 @@ module true_dual_port #(
     .q({write_b_late, address_b_late, in_b_late})
   );
 
-  reg [WIDTH-1:0] read_a, read_b;
+  wire [WIDTH-1:0] read_a, read_b;
+  genvar i;
+  generate
+    for (i = 0; i < WIDTH; i = i + 9) begin : g_lane
+      localparam BITS = (WIDTH - i < 9) ? WIDTH - i : 9;
 
-  always @(posedge clk) begin
-    if (write_a_late) words[address_a_late] <= in_a_late;
-    read_a <= words[address_a_late];
-  end
-  always @(posedge clk) begin
-    if (write_b_late) words[address_b_late] <= in_b_late;
-    read_b <= words[address_b_late];
-  end
+      (* ram_style = "block", ram_decomp = "area", no_rw_check *)
+      reg [BITS-1:0] words [0:DEPTH-1];
+      reg [BITS-1:0] read_lane_a, read_lane_b;
+
+      always @(posedge clk) begin
+        if (write_a_late) words[address_a_late] <= in_a_late[i +: BITS];
+        read_lane_a <= words[address_a_late];
+      end
+      always @(posedge clk) begin
+        if (write_b_late) words[address_b_late] <= in_b_late[i +: BITS];
+        read_lane_b <= words[address_b_late];
+      end
+      assign read_a[i +: BITS] = read_lane_a;
+      assign read_b[i +: BITS] = read_lane_b;
+    end
+  endgenerate
 
   pipeline_register #(.WIDTH(WIDTH), .STAGES(OUTPUT_STAGES)) output_a (
     .clk(clk), .d(read_a), .q(out_a)

@@ -33,9 +33,9 @@ module impulses #(
   input  wire [63:0]  friction_impulses // G_1, G_0
 );
   reg  [COLLISION-1:0] next_read, next_write, write_address;
-  reg  [3:0]           write_words;
-  reg  [127:0]         in;
-  wire [127:0]         out;
+  reg                  write_outer, write_inner;
+  reg  [63:0]          outer_in, inner_in;      // words 3 and 0; words 2 and 1
+  wire [63:0]          outer, inner;
 
   always @(posedge clk) begin
     if (begin_pass) next_read <= {COLLISION{1'b0}};
@@ -43,23 +43,33 @@ module impulses #(
     if (begin_pass) next_write <= {COLLISION{1'b0}};
     else if (write) next_write <= next_write + 1'b1;
     write_address <= next_write;
-    write_words   <= ~write ? 4'b0000 : friction ? 4'b0110 : 4'b1111;
-    in            <= friction ? {32'd0, friction_impulses, 32'd0}
-                              : {contact_impulses[127:32], last_contact ? contact_total : contact_impulses[31:0]};
+    write_outer   <= write & ~friction;
+    write_inner   <= write;
+    outer_in      <= {contact_impulses[127:96], last_contact ? contact_total : contact_impulses[31:0]};
+    inner_in      <= friction ? friction_impulses : contact_impulses[95:32];
   end
 
+  // A pass writes both words of a memory or none.
   simple_dual_port #(
-    .WORDS(4), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
+    .WIDTH(64), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
     .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
-  ) memory (
-    .clk(clk), .write(write_words), .write_address(write_address), .in(in), .read_address(next_read), .out(out)
+  ) outer_words (
+    .clk(clk), .write(write_outer), .write_address(write_address), .in(outer_in),
+    .read_address(next_read), .out(outer)
+  );
+  simple_dual_port #(
+    .WIDTH(64), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
+    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
+  ) inner_words (
+    .clk(clk), .write(write_inner), .write_address(write_address), .in(inner_in),
+    .read_address(next_read), .out(inner)
   );
 
   wire total_is_zero = friction ? no_contacts : first_of_kind;
-  assign impulse0 = total_is_zero ? 32'd0 : out[31:0];
-  assign impulse1 = first_of_kind ? 32'd0 : out[63:32];
-  assign impulse2 = first_of_kind ? 32'd0 : out[95:64];
-  assign impulse3 = first_of_kind ? 32'd0 : out[127:96];
+  assign impulse0 = total_is_zero ? 32'd0 : outer[31:0];
+  assign impulse1 = first_of_kind ? 32'd0 : inner[31:0];
+  assign impulse2 = first_of_kind ? 32'd0 : inner[63:32];
+  assign impulse3 = first_of_kind ? 32'd0 : outer[63:32];
 endmodule
 
 `default_nettype wire

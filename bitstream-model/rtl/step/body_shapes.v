@@ -26,8 +26,8 @@ module body_shapes #(
   input  wire [SHAPE-1:0] lookup_b,
   output reg  [63:0]      properties_b
 );
-  reg [31:0] inverse_mass [0:(1<<SHAPE)-1];
-  reg [31:0] inverse_inertia [0:(1<<SHAPE)-1];
+  (* ram_style = "distributed" *) reg [31:0] inverse_mass [0:(1<<SHAPE)-1];
+  (* ram_style = "distributed" *) reg [31:0] inverse_inertia [0:(1<<SHAPE)-1];
   always @(posedge clk) begin
     if (table_write[0]) inverse_mass[table_address] <= table_in;
     if (table_write[1]) inverse_inertia[table_address] <= table_in;

@@ -61,7 +61,7 @@ module sender #(
     end
   end
 
-  fifo #(.WIDTH(129), .ADDRESS(ADDRESS)) rows (
+  block_fifo #(.WIDTH(129), .ADDRESS(ADDRESS)) rows (
     .clk(clk), .clear(reset | start), .push(push), .in({row_is_last, row}), .pop(leaves),
     .head({tlast, tdata}), .count(count)
   );

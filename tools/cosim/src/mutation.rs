@@ -62,8 +62,8 @@ pub const MUTATIONS: &[Mutation] = &[
     Mutation {
         name: "the friction impulses do not start at 0",
         file: "impulses.v",
-        right: "assign impulse1 = first_of_kind ? 32'd0 : out[63:32];",
-        wrong: "assign impulse1 = out[63:32];",
+        right: "assign impulse1 = first_of_kind ? 32'd0 : inner[31:0];",
+        wrong: "assign impulse1 = inner[31:0];",
     },
     Mutation {
         name: "the adder loses its sticky bit",

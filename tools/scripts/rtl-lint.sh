@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Reads the generated Verilog with three tools, none of which may have a warning: Icarus as plain
+# Verilog-2001, Verilator with all its checks, and Yosys.
+#
+# usage: rtl-lint.sh [OPTION...]     options of `rtlgen generate`, such as --hazards unchecked
+#
+# Verilator's complaints about constants of the headers that a module does not use are switched off
+# there; no other warning is.
+#
+# Exit code: 0 done, 1 a tool has a warning, 77 skipped: not on this machine.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+cd "$repository"
+need_packages iverilog verilator yosys
+
+mkdir -p "$target_root"
+work=$(mktemp -d "$target_root/rtl-lint.XXXXXX")
+litter+=("$work")
+attend cargo run --quiet --locked -p rtlgen -- generate --out "$work" "$@"
+cd "$work"
+files=$(tr '\n' ' ' < pgs.f)
+
+# Runs a tool, which has nothing to say unless it has a warning.
+failed=
+quietly() {
+	local tool=$1
+	shift
+	attend timeout 300 "$@" > "$tool.log" 2>&1 || echo "$tool ends with exit code $?" >> "$tool.log"
+	if [ -s "$tool.log" ]; then
+		echo "$tool:" >&2
+		cat "$tool.log" >&2
+		failed=yes
+	else
+		echo "$tool: no warning"
+	fi
+}
+quietly iverilog iverilog -g2001 -Wall -s pgs_top -o /dev/null -f pgs.f
+quietly verilator verilator --lint-only -Wall --top-module pgs_top -f pgs.f
+quietly yosys yosys -q -p "read_verilog $files; hierarchy -check -top pgs_top"
+[ -z "$failed" ] || fail "the Verilog has warnings"

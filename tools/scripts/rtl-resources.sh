@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# Counts what the accelerator takes of the ZCU102's device, part by part, by Yosys' synthesis for
+# UltraScale+, and holds the sums against limits. Nothing is placed or routed.
+#
+# usage: rtl-resources.sh [OPTION...]     options of `rtlgen generate`, such as --collisions 100000
+# environment: YOSYS (the program; yosys)
+#
+# Without options there are two tables: the default build, and the one with the most collisions that
+# leaves room for four DMA engines. The pipelines are synthesised once, which takes minutes.
+#
+# Exit code: 0 done, 1 a build is too large, 77 skipped: not on this machine.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+cd "$repository"
+yosys=${YOSYS:-yosys}
+command -v "$yosys" >/dev/null || need_packages yosys
+readonly MOST_COLLISIONS=172032
+
+mkdir -p "$target_root"
+work=$(mktemp -d "$target_root/rtl-resources.XXXXXX")
+litter+=("$work")
+
+# Writes a build into the folder `$1`.
+generate() {
+	local folder=$1
+	shift
+	attend cargo run --quiet --locked -p rtlgen -- generate --out "$work/$folder" "$@" >/dev/null
+}
+
+# Synthesises the module `$2` of the folder `$1`, without the modules that follow. Yosys takes paths below
+# its own folder alone if it comes from PyPI.
+synthesise() {
+	local folder=$1 top=$2
+	shift 2
+	cd "$work/$folder"
+	attend timeout 3600 "$yosys" -q -p "
+		read_verilog $(tr '\n' ' ' < pgs.f)
+		${*:+blackbox $*}
+		synth_xilinx -family xcup -noiopad -noclkbuf -top $top
+		tee -q -o $top.json stat -json" > "$top.log" 2>&1 || { tail -n 5 "$top.log" >&2; fail "Yosys on $top"; }
+	cd "$repository"
+}
+
+# Prints the table of the folder `$1`, of which BRAM36 `$2` are allowed.
+table() {
+	attend python3 tools/scripts/rtl_resources.py --brams "$2" \
+		"$work/$1/pgs_top.json" "$work"/base/{contact,friction,integration}.json
+}
+
+pipelines=(contact friction integration)
+generate base "$@"
+synthesise base pgs_top "${pipelines[@]}"
+for pipeline in "${pipelines[@]}"; do synthesise base "$pipeline"; done
+echo "$("$yosys" -V | cut -d '(' -f 1), not placed: ${*:-the default build}"
+table base 800
+if [ $# = 0 ]; then
+	generate most --collisions "$MOST_COLLISIONS"
+	synthesise most pgs_top "${pipelines[@]}"
+	echo
+	echo "The same with $MOST_COLLISIONS collisions"
+	table most 880
+fi

