@@ -61,7 +61,8 @@ pub(crate) fn parse(
     if let Some(verb) = matches.subcommand_name() {
         // `run`'s options are accepted here as well; before another verb they would have no effect.
         let stray = matches.ids().find(|id| {
-            let common = matches!(id.as_str(), "json" | "board" | "memory" | "manager");
+            let common =
+                matches!(id.as_str(), "json" | "board" | "memory" | "manager" | "accelerator");
             let is_argument = command.get_arguments().any(|argument| argument.get_id() == *id);
             let given = || matches.value_source(id.as_str()) == Some(ValueSource::CommandLine);
             !common && is_argument && given()
