@@ -110,7 +110,7 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
 #[test]
 fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
     let scene =
-        ["run", "--hazards", "unchecked", "--grid", "9x9x9", "--steps", "66", "--drop", "5"];
+        ["run", "--hazards", "unchecked", "--grid", "9x9x10", "--steps", "70", "--drop", "5"];
     let ran = run([&["--json"], &scene[..]].concat());
     let document = ran.json();
     let steps = document["steps"].as_array().expect("steps");
@@ -122,7 +122,7 @@ fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
         }
     }
     let [(first, some), (other, rest)] = counted[..] else { panic!("{counted:?}") };
-    let expected = format!("\norders     of 66 steps {first} in {some}, {other} in {rest}\n");
+    let expected = format!("\norders     of 70 steps {first} in {some}, {other} in {rest}\n");
     let text = run(scene).stdout;
     assert!(text.contains(&expected), "{text}");
 
