@@ -147,7 +147,7 @@ instructions! {
     Avx2: [__m256; 2], "avx2", _mm256_unpacklo_ps _mm256_unpackhi_ps _mm256_shuffle_ps
 }
 
-#[cfg(all(target_arch = "x86_64", avx512))]
+#[cfg(target_arch = "x86_64")]
 instructions! {
     /// The part of AVX-512 that all its server and desktop processors have: a register holds all
     /// lanes.
@@ -164,7 +164,7 @@ enum Kind {
     Target(Target),
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
-    #[cfg(all(target_arch = "x86_64", avx512))]
+    #[cfg(target_arch = "x86_64")]
     Avx512(Avx512),
 }
 
@@ -176,13 +176,13 @@ impl InstructionSet {
         let avx2 = is_x86_feature_detected!("avx2").then_some(Kind::Avx2(Avx2(())));
         #[cfg(not(target_arch = "x86_64"))]
         let avx2 = None;
-        #[cfg(all(target_arch = "x86_64", avx512))]
+        #[cfg(target_arch = "x86_64")]
         let avx512 = (is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512bw")
             && is_x86_feature_detected!("avx512dq")
             && is_x86_feature_detected!("avx512vl"))
         .then_some(Kind::Avx512(Avx512(())));
-        #[cfg(not(all(target_arch = "x86_64", avx512)))]
+        #[cfg(not(target_arch = "x86_64"))]
         let avx512 = None;
         [avx512, avx2, target].into_iter().flatten().map(Self)
     }
@@ -201,7 +201,7 @@ impl InstructionSet {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: a value is made in `all` alone, where the processor has the features.
             Kind::Avx2(avx2) => unsafe { avx2.enabled(work) },
-            #[cfg(all(target_arch = "x86_64", avx512))]
+            #[cfg(target_arch = "x86_64")]
             // SAFETY: a value is made in `all` alone, where the processor has the features.
             Kind::Avx512(avx512) => unsafe { avx512.enabled(work) },
         }
