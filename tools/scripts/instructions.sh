@@ -130,9 +130,9 @@ while read -r profile limit; do
 	collisions=$(some ' NUMBER collisions,')
 	hold "$what" $((instructions * 10 / collisions)) "a collision" "$limit"
 done <<'LIMITS'
-float 3130
-half 4560
-mixed 2400
+float 3390
+half 13400
+mixed 2600
 LIMITS
 
 [ $held = 15 ] || fail "$held of 15 were counted"
