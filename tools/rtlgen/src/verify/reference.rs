@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn square_roots_are_the_standard_librarys() {
+    fn square_roots_are_those_of_the_standard_library() {
         // Its square root is correctly rounded everywhere.
         for bits in (SMALLEST..INFINITY).step_by(9_973) {
             assert_eq!(sqrt(bits), f32::from_bits(bits).sqrt().to_bits(), "{bits:08x}");
