@@ -103,7 +103,7 @@ module control_block (
   wire shape_space_r = araddr[11:10] == SHAPE_TABLE[11:10];
 
   always @(posedge clk) begin
-    // What the arguments need, registered; both are right long before a start.
+    // The memory that the arguments need, and their checks, in registers: settled long before a start.
     bytes_bodies     <= bodies * BYTES_PER_BODY;
     bytes_collisions <= collisions * BYTES_PER_COLLISION;
     bodies_wrong     <= (bodies == 32'd0) | (bodies > BODIES_MAX);

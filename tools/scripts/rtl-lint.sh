@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Reads the generated Verilog with three tools, none of which may have a warning: Icarus as plain
-# Verilog-2001, Verilator with all its checks, and Yosys.
+# Reads the generated Verilog with Icarus as plain Verilog-2001, with Verilator and all its checks, and with
+# Yosys. A warning fails it.
 #
 # usage: rtl-lint.sh [OPTION...]     options of `rtlgen generate`, such as --hazards unchecked
 #

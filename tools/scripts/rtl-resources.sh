@@ -41,7 +41,7 @@ synthesise() {
 	cd "$repository"
 }
 
-# Prints the table of the folder `$1`, of which BRAM36 `$2` are allowed.
+# Prints the table of the folder `$1`; `$2` is the largest allowed number of BRAM36.
 table() {
 	attend python3 tools/scripts/rtl_resources.py --brams "$2" \
 		"$work/$1/pgs_top.json" "$work"/base/{contact,friction,integration}.json

@@ -34,7 +34,7 @@ for pipeline in contact friction integration; do
 done
 for pipeline in contact friction integration; do mv "$pipeline.stub" "$pipeline.v"; done
 
-# Sets `mhz` to what the module `$1` reaches, behind shift registers.
+# Sets `mhz` to the routed clock of the module `$1` behind shift registers.
 route() {
 	local top=$1
 	python3 "$scripts/rtl_timing_wrap.py" wrap "$top.v" "$top" > wrap.v

@@ -59,7 +59,7 @@ said=$(mock tools/vivado/zcu102.tcl --clock-khz 250000 -until design) || fail "a
 said=$(mock tools/vivado/zcu102.tcl -help) || fail "-help: $said"
 [[ $said = usage:* ]] || fail "-help: $said"
 
-# A design that misses its timing makes no bitstream, unless it is asked for.
+# A design that misses its timing makes no bitstream without `-negative-slack allow`.
 rm "$folder"/out/zynq-pgs.*
 export MOCK_SLACK=-0.05
 refused "timing" "misses its timing" tools/vivado/zcu102.tcl

@@ -28,7 +28,7 @@ proc leave {code} { exit $code }
 # ---------------------------------------------------------------------------------------------------------
 # The IP: parameters with the pattern of their values, pins, buses
 
-# Parameters and what they are without being set. The processing system's are those of the board's preset.
+# Parameters and their defaults. The processing system has the board's preset.
 set parameters(zynq_ultra_ps_e) {
 	PSU__USE__M_AXI_GP0 1 PSU__USE__M_AXI_GP1 1 PSU__USE__M_AXI_GP2 0
 	PSU__MAXIGP0__DATA_WIDTH 128 PSU__MAXIGP1__DATA_WIDTH 128 PSU__MAXIGP2__DATA_WIDTH 32
@@ -227,7 +227,7 @@ proc all {what} {
 proc cells_of {kind} {
 	return [lsort [lmap {cell of} [array get ::cells] { if {$of ne $kind} continue; set cell }]]
 }
-# What a clock or reset pin is connected with.
+# The source of a clock or reset pin.
 proc source_of {pin} { return [expr {[info exists ::driver($pin)] ? $::driver($pin) : "nothing"}] }
 
 # The address spaces and segments, each with its bus.
@@ -597,7 +597,7 @@ proc check_addresses {} {
 				dict set expected [list $space $segment] [dict get $home $segment]
 			}
 		}
-		# What is neither assigned nor excluded, Vivado complains of.
+		# Vivado complains of a segment that is neither assigned nor excluded.
 		foreach {segment slave} [segments] {
 			set key [list $space $segment]
 			if {$slave in $slaves && ![dict exists $home $segment] && $key ni $::excluded} {
@@ -675,7 +675,7 @@ set argv [lassign $argv script]
 if {$script eq ""} { refuse "usage: tclsh mock.tcl SCRIPT \[OPTION VALUE\]..." }
 if {![file exists $script]} { refuse "no script $script" }
 
-# What the script is asked for, read a second time.
+# The script's own options, read a second time.
 set rtl rtl
 foreach {name value} $argv {
 	switch [regsub {^--} $name -] {
@@ -684,7 +684,7 @@ foreach {name value} $argv {
 		-clock-khz { set expected_khz $value }
 	}
 }
-# The files that stand for Vivado's go away with the process, unless a folder was asked for.
+# The stand-ins for Vivado's files go away with the process, unless the command line names a folder.
 set keep [info exists scratch]
 if {!$keep} {
 	close [file tempfile scratch vivado-mock]

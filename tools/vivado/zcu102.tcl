@@ -121,8 +121,8 @@ proc zcu102::add_processor {} {
 	add_ip zynq_ultra_ps_e processor
 	apply_bd_automation -rule xilinx.com:bd_rule:zynq_ultra_ps_e -config {apply_board_preset "1"} \
 		[get_bd_cells processor]
-	# M_AXI_GP0 is M_AXI_HPM0_FPD. S_AXI_GP2 to 5 are S_AXI_HP0_FPD to HP3. The widths are those that the node
-	# pgs-ports of the overlays sets.
+	# M_AXI_GP0 is M_AXI_HPM0_FPD. S_AXI_GP2 to 5 are S_AXI_HP0_FPD to HP3. The node pgs-ports of the
+	# overlays sets the same widths.
 	configure processor {
 		PSU__USE__M_AXI_GP0 1 PSU__USE__M_AXI_GP1 0 PSU__USE__M_AXI_GP2 0
 		PSU__MAXIGP0__DATA_WIDTH 128

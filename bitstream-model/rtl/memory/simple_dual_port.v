@@ -4,8 +4,8 @@
 // bits, so that wide words fill them.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles; a write passes the same
-// ADDRESS_STAGES. What is read at an address that is written in the same cycle is
-// not defined (`no_rw_check` tells Yosys).
+// ADDRESS_STAGES. A read of an address that is written in the same cycle gives an undefined word
+// (`no_rw_check` tells Yosys).
 `default_nettype none
 
 module simple_dual_port #(

@@ -1,4 +1,4 @@
-// A flag that comes out STAGES cycles later; `clear` forgets all that are under way.
+// A flag that comes out STAGES cycles later; `clear` forgets the flags under way.
 `default_nettype none
 
 module timed_flag #(

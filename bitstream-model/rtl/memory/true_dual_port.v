@@ -1,7 +1,8 @@
 // Block RAM with two ports that read or write a word each in every cycle. It consists of lanes of
 // nine bits, as simple_dual_port.v does.
 //
-// What a port reads where a port writes in the same cycle is not defined (`no_rw_check` tells Yosys).
+// A read of an address that is written in the same cycle gives an undefined word (`no_rw_check` tells
+// Yosys).
 // Both ports must not write one address in one cycle.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles. A write passes the same

@@ -10,7 +10,7 @@ module fbelow (
   output wire        y
 );
 
-  // Of two negative numbers the one of the larger magnitude is less.
+  // The order of two negative numbers is the reverse of the order of their magnitudes.
   wire same_sign       = a[31] == b[31];
   wire magnitude_below = a[30:0] < b[30:0];
   wire magnitude_above = a[30:0] > b[30:0];

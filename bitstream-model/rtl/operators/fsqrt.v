@@ -34,8 +34,8 @@ module fsqrt (
   wire        infinite = (&a[30:23]) & (~|a[22:0]) & ~a[31];
   wire        nan      = ((&a[30:23]) & (|a[22:0])) | (a[31] & ~zero);
 
-  // Shift registers beside the rows: the radicand, of which row r takes the two bits r, and the
-  // rest of the result. From row 13 on the radicand's bits are zeros.
+  // Two shift registers run beside the rows: the radicand and the rest of the result. Row r takes
+  // bit pair r of the radicand. From row 13 on the bits of the radicand are zeros.
   localparam RADICAND_ROWS = 13;
   localparam NOTES         = 12;
 

@@ -58,8 +58,8 @@ module finder #(
 );
 `include "pgs_interface.vh"
 
-  // Words of a record, with all that a check needs of them: an index too long for a body's number, a
-  // count too large for three bits.
+  // The words of a record, shortened. An extra bit keeps an index that is too long for a body's
+  // number; a count that is too large for three bits becomes 7.
   wire [BODY:0] next_a, next_b;
   wire [2:0]    next_count;
   wire [5:0]    waiting_a, waiting_b, waiting_count;

@@ -1,8 +1,8 @@
 // Load: the velocities and the shapes of all bodies go from the streams into the memories, a pair of
 // bodies a cycle: the even one from streams 0 and 1 through port A, the odd one from streams 2 and 3
-// through port B. Both enter together, so that a load takes as many cycles as there are pairs.
+// through port B. Both enter together: a load takes one cycle a pair.
 //
-// A static body is at rest because of its shape: 0 is stored, whatever its words are.
+// A static body is at rest because of its shape: its stored velocity is 0.
 `default_nettype none
 
 module loader #(
@@ -19,7 +19,7 @@ module loader #(
   input  wire [127:0]    linear,
   input  wire            angular_there,
   input  wire [127:0]    angular,
-  output wire            ready,           // the body is there, or there is none on this side
+  output wire            ready,           // the body is there, or this side has no more
   input  wire            other_ready,
   output wire            pop,
   output reg             finished,        // all bodies have been taken

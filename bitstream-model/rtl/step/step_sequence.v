@@ -1,5 +1,5 @@
 // The sequence of a step: load, setup, the passes with the drain of each, integration, end. It counts
-// the cycles by what they were used for.
+// the cycles of work and the cycles of waiting.
 //
 //             cycles                         ends when
 //   load      ceil(B / 2)                    all bodies are taken

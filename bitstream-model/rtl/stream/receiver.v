@@ -1,5 +1,5 @@
-// One stream into the accelerator: checks that its packets are those of the step, adds up its
-// words, and keeps the beats in a FIFO until a record takes them.
+// One stream into the accelerator: checks its packets against the step, adds up its words,
+// and keeps the beats in a FIFO until a record takes them.
 //
 // A step has a packet of velocities, one of collisions in every pass, and one of poses. Beats of a
 // body are dealt to the four streams in turn, two a body; of the seven beats of a collision streams

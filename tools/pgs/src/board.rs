@@ -253,6 +253,11 @@ impl OpenBoard {
             true => next.to_owned(),
             false => format!("{next}; the emulated board saw this misuse:{seen}"),
         };
+        let ended = self.observer.as_ref().and_then(EmulatedBoard::accelerator_error);
+        let next = match ended {
+            Some(reason) => format!("start the simulator anew: {reason}"),
+            None => next,
+        };
         let failure = diagnosis::hardware(error).next(next);
         match &self.injected {
             Some(injected) => failure.planned(&injected.text(), injected.to_json()),

@@ -38,7 +38,34 @@ impl Default for Parameters {
     }
 }
 
+/// A build that the hardware cannot be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{address_stages} registers in front of the memories and {output_stages} behind them give a read \
+     latency of {latency} cycles, expected an even number: a port reads in one cycle of a slot and \
+     writes in the other; add a register on either side"
+)]
+pub struct OddReadLatency {
+    address_stages: u32,
+    output_stages: u32,
+    latency: u32,
+}
+
 impl Parameters {
+    /// Refuses parameters that contradict the hand-written modules.
+    ///
+    /// # Errors
+    ///
+    /// [`OddReadLatency`], with which a collision would take the velocities of the one before it.
+    pub fn check(&self) -> Result<(), OddReadLatency> {
+        let latency = self.read_latency();
+        if latency.is_multiple_of(FLOAT.initiation_interval) {
+            return Ok(());
+        }
+        let Self { address_stages, output_stages, .. } = *self;
+        Err(OddReadLatency { address_stages, output_stages, latency })
+    }
+
     /// Cycles from an address to the velocity or the impulses.
     #[must_use]
     pub fn read_latency(&self) -> u32 {
@@ -153,6 +180,19 @@ mod tests {
         assert_eq!(design.depth(&design.contact), FLOAT.contact);
         assert_eq!(design.depth(&design.friction), FLOAT.friction);
         assert_eq!(design.step_fill(), FLOAT.integration_fill);
+    }
+
+    #[test]
+    fn a_read_latency_that_ends_in_the_wrong_cycle_of_a_slot_is_refused() {
+        let with = |address_stages, output_stages| Parameters {
+            address_stages,
+            output_stages,
+            ..Parameters::default()
+        };
+        assert_eq!(Parameters::default().check(), Ok(()));
+        assert_eq!(with(3, 4).check(), Ok(()));
+        let error = with(3, 3).check().expect_err("a latency of 7");
+        assert!(error.to_string().contains("a read latency of 7 cycles"), "{error}");
     }
 
     /// Nothing waits for the numbers that `step/constants.v` computes while bodies load.

@@ -1,9 +1,9 @@
 //! The table of profiles.
 //!
-//! The thesis gives no pipeline depths. The depths of `float`, and the fill of its integration, are
-//! those of the generated Verilog in `bitstream-model/rtl`, memories included. No other profile has
-//! Verilog. Their depths are assumptions, taken from an earlier pipeline of two cycles a collision;
-//! `float`'s fill of the integration is assumed for all of them.
+//! The thesis gives no pipeline depths. The generated Verilog in `bitstream-model/rtl` gives the
+//! depths of `float` and the fill of its integration, memories included. The other profiles have no
+//! Verilog: their depths are assumed, from an earlier pipeline of two cycles a collision, and so is
+//! their fill of the integration, from `float`.
 
 use super::{Depth, Flow, Geometry, OnChipMemory, Profile, Window};
 use crate::number::{Numbers, StreamFormat};

@@ -88,10 +88,6 @@ macro_rules! instructions {
             }
 
             /// Exchanges rows and columns of each four lanes.
-            #[allow(
-                clippy::incompatible_msrv,
-                reason = "AVX-512 is left out where the compiler is too old for it"
-            )]
             #[inline]
             #[target_feature(enable = $features)]
             fn transposed_part([a, b, c, d]: [$register; 4]) -> [$register; 4] {

@@ -1,7 +1,7 @@
 //! The options that describe a build of the accelerator.
 
 use clap::{Args, ValueEnum};
-use rtlgen::design::{Design, Parameters};
+use rtlgen::design::{Design, OddReadLatency, Parameters};
 
 /// The behaviour of the hardware on a hazard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -42,14 +42,16 @@ pub(crate) struct BuildArgs {
 
 impl BuildArgs {
     /// The design that the options describe.
-    pub(crate) fn design(&self) -> Design {
-        Design::new(Parameters {
+    pub(crate) fn design(&self) -> Result<Design, OddReadLatency> {
+        let parameters = Parameters {
             bodies: self.bodies,
             collisions: self.collisions,
             interlocked: self.hazards == Hazards::Interlocked,
             address_stages: self.address_stages,
             output_stages: self.output_stages,
             clock_khz: self.clock_khz,
-        })
+        };
+        parameters.check()?;
+        Ok(Design::new(parameters))
     }
 }

@@ -26,7 +26,7 @@ pub(crate) struct Generate {
 
 /// Writes the files.
 pub(crate) fn run(args: &Generate, out: &mut dyn Write) -> Result<ExitCode, Error> {
-    let files = emit::files(&args.build.design());
+    let files = emit::files(&args.build.design()?);
     simulator::write(&args.out, &files)?;
     let lines: usize = files.iter().map(|file| file.text.lines().count()).sum();
     writeln!(

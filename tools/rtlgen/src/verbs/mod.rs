@@ -3,6 +3,7 @@
 use std::io;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use rtlgen::design::OddReadLatency;
 use rtlgen::verify;
 
 pub(crate) mod build;
@@ -18,6 +19,9 @@ pub(crate) enum Error {
     /// The result reaches no reader.
     #[error("standard output cannot be written")]
     Output(#[from] io::Error),
+    /// The options describe no build.
+    #[error(transparent)]
+    Build(#[from] OddReadLatency),
     /// A check could not be made.
     #[error(transparent)]
     Verify(#[from] verify::Error),

@@ -30,7 +30,7 @@ fn least(usage: &Usage, interval: i32) -> usize {
 
 /// Prints the schedules.
 pub(crate) fn run(args: &Schedule, out: &mut dyn Write) -> Result<ExitCode, Error> {
-    let design = args.build.design();
+    let design = args.build.design()?;
     if args.json {
         let pipelines: Vec<Value> =
             design.pipelines().map(|pipeline| document(&design, pipeline)).into();

@@ -24,7 +24,7 @@ pub(crate) struct Simulator {
 
 /// Builds it and prints its path.
 pub(crate) fn run(args: &Simulator, out: &mut dyn Write) -> Result<ExitCode, Error> {
-    let program = simulator::build(&args.build.design(), &args.out)?;
+    let program = simulator::build(&args.build.design()?, &args.out)?;
     writeln!(out, "{}", program.display())?;
     Ok(ExitCode::SUCCESS)
 }

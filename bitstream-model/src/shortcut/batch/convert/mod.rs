@@ -1,5 +1,5 @@
 //! Converts collisions of other designs to the batch's own format: f32, in world coordinates, on four
-//! streams, as many at a time as fit into the cache.
+//! streams. A portion fits into the cache.
 //!
 //! A record relative to body A becomes a record whose body A stands at the origin. Two records of
 //! three and a half beats share a beat: the sum of all their words, padding included, counts for the
