@@ -15,7 +15,8 @@ use cosim::outcome::{self, Arrival, Outcome, difference};
 use cosim::packets::packets;
 use cosim::{random, recorded};
 use rtlgen::design::{Design, Parameters};
-use rtlgen::{emit, simulator, verify};
+use rtlgen::emit::{self, File};
+use rtlgen::{simulator, verify};
 use step_folder::folder::Folder;
 
 /// Runs the generated Verilog beside the model, beat by beat.
@@ -209,24 +210,34 @@ fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<S
     Ok(None)
 }
 
+/// Whether the design as it is shows no difference, and each mutant one.
 fn run_mutations(cases: u64, out: &mut dyn Write) -> Result<bool, Failure> {
     let files = emit::files(&Design::new(Parameters::default()));
+    if let Some(difference) = difference_of(&files, cases)? {
+        writeln!(out, "the design without a mutation: {difference}")?;
+        return Ok(false);
+    }
+    writeln!(out, "the design without a mutation: no difference in {cases} steps")?;
     let mut all_found = true;
     for mutation in MUTATIONS {
-        let folder = tempfile::tempdir()?;
         let mutant = mutation.apply(&files).ok_or("the text of a mutation is not in its file")?;
-        let program = simulator::build_files(&mutant, folder.path())?;
-        let simulator = SimulatorArgs {
-            simulator: program,
-            hazards: HazardMode::Interlocked,
-            gaps: 0,
-            stalls: 0,
-        };
-        let found = first_difference(&mut Bench::new(&simulator)?, 1, cases)?;
+        let found = difference_of(&mutant, cases)?;
         let by = found.as_deref().unwrap_or("NOT FOUND");
         writeln!(out, "{}: {by}", mutation.name)?;
         out.flush()?;
         all_found &= found.is_some();
     }
     Ok(all_found)
+}
+
+/// Builds a simulator of these files; the first random step on which it and the model differ.
+fn difference_of(files: &[File], cases: u64) -> Result<Option<String>, Failure> {
+    let folder = tempfile::tempdir()?;
+    let simulator = SimulatorArgs {
+        simulator: simulator::build_files(files, folder.path())?,
+        hazards: HazardMode::Interlocked,
+        gaps: 0,
+        stalls: 0,
+    };
+    first_difference(&mut Bench::new(&simulator)?, 1, cases)
 }
