@@ -59,7 +59,7 @@ pub struct Clocked {
 #[non_exhaustive]
 pub enum ExternalError {
     /// It cannot be started.
-    #[error("the simulator {path} cannot be started ({source}); build one with `rtlgen simulator`")]
+    #[error("the simulator {path} cannot be started; build one with `rtlgen simulator`")]
     Start {
         /// Its path.
         path: String,

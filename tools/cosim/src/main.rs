@@ -107,6 +107,11 @@ fn main() -> ExitCode {
         return ExitCode::from(SKIPPED);
     }
     eprintln!("error: {error}");
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        eprintln!("  because: {error}");
+        cause = error.source();
+    }
     ExitCode::from(USAGE)
 }
 
