@@ -1,8 +1,10 @@
 // The Verilated accelerator as a process: requests on standard input, answers on standard output.
 // bitstream-model/src/external/process.rs has the protocol and is the other end.
 //
-// usage: SIMULATOR [GAPS STALLS SEED]   GAPS and STALLS: TVALID gaps in front of the accelerator and
-//                                       TREADY stalls behind it, in a thousand cycles, at random
+// usage: SIMULATOR [GAPS STALLS SEED [WAVEFORM]]
+//
+// GAPS and STALLS: TVALID gaps in front of the accelerator and TREADY stalls behind it, in a thousand
+// cycles, at random. WAVEFORM: the VCD file that a `record` request begins.
 #include <unistd.h>
 
 #include <cstdint>
@@ -13,6 +15,9 @@
 #include "Vpgs_top.h"
 #include "Vpgs_top___024root.h"
 #include "verilated.h"
+#if VM_TRACE
+#include "verilated_vcd_c.h"
+#endif
 
 static const int STREAMS = 4;
 static const size_t BEAT_WORDS = 5;  // four words and the marks
@@ -46,11 +51,42 @@ static void answer(const void *from, size_t bytes) {
   }
 }
 
+#if VM_TRACE
+// Modules below the top one whose signals a waveform shows.
+static const int WAVEFORM_LEVELS = 3;
+static const char *waveform_path;
+static VerilatedVcdC *waveform;
+static uint64_t edges;
+
+static bool record(bool on) {
+  if (on && waveform == nullptr && waveform_path != nullptr) {
+    waveform = new VerilatedVcdC;
+    top->trace(waveform, WAVEFORM_LEVELS);
+    waveform->open(waveform_path);
+  } else if (!on && waveform != nullptr) {
+    waveform->close();
+    delete waveform;
+    waveform = nullptr;
+  }
+  return waveform_path != nullptr;
+}
+
+static void dump() {
+  if (waveform != nullptr) waveform->dump(edges);
+  edges++;
+}
+#else
+static bool record(bool) { return false; }
+static void dump() {}
+#endif
+
 static void rising_edge() {
   top->aclk = 1;
   top->eval();
+  dump();
   top->aclk = 0;
   top->eval();
+  dump();
 }
 
 struct Stream {
@@ -127,7 +163,7 @@ static void run(uint32_t limit, uint32_t gaps, uint32_t stalls) {
     for (int k = 0; k < STREAMS; k++) {
       if (*outputs[k].tvalid && *outputs[k].tready) {
         sent[k].insert(sent[k].end(), outputs[k].tdata, outputs[k].tdata + 4);
-        sent[k].push_back(*outputs[k].tlast);
+        sent[k].push_back(*outputs[k].tlast | clocks << 8);
       }
       if (*inputs[k].tvalid && *inputs[k].tready) {
         taken[k]++;
@@ -151,6 +187,10 @@ int main(int argc, char **argv) {
   const uint32_t gaps = argc > 1 ? atoi(argv[1]) : 0;
   const uint32_t stalls = argc > 2 ? atoi(argv[2]) : 0;
   random_state = (argc > 3 ? strtoull(argv[3], nullptr, 10) : 1) * 0x9E3779B97F4A7C15ull | 1;
+#if VM_TRACE
+  Verilated::traceEverOn(true);
+  waveform_path = argc > 4 ? argv[4] : nullptr;
+#endif
   top = new Vpgs_top;
   connect();
   idle_streams();
@@ -175,6 +215,10 @@ int main(int argc, char **argv) {
         break;
       case 3:
         run(request[1], gaps, stalls);
+        break;
+      case 4:
+        value = record(request[1] != 0);
+        answer(&value, 4);
         break;
       default:
         return 2;

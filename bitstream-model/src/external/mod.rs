@@ -3,15 +3,20 @@
 //! The board keeps a model beside it, which computes nothing: it knows which registers exist, which
 //! accesses are violations, and which packets a step has, so that faults can be placed in them.
 
+mod lock_step;
 mod model;
 mod process;
+mod serve;
 
+pub use lock_step::{Difference, DifferencePlace, LockStep, same_number};
 pub use model::ModelAccelerator;
 pub use process::SimulatorProcess;
+pub use serve::{ServeError, serve};
 
 pub use crate::stream::StreamBeat;
 
 use std::fmt;
+use std::time::Duration;
 
 use crate::accelerator::defer::Deferral;
 use crate::accelerator::{Accelerator, Ran};
@@ -25,8 +30,9 @@ use pgs_interface::control::{AP_CTRL, RESET, ap_ctrl};
 const OFFERED_BEATS: usize = 64;
 /// Clocks that the accelerator runs before the DMAs move beats again.
 const BATCH_CLOCKS: u64 = 64;
-/// Clocks of its reset.
-const RESET_CLOCKS: u32 = 80;
+/// Clocks of its reset at most, and between two looks at it.
+const RESET_CLOCKS: u32 = 8192;
+const RESET_BATCH: u32 = 64;
 /// Clocks after a register access of an accelerator that does nothing else.
 const SETTLE_CLOCKS: u32 = 4;
 
@@ -52,6 +58,8 @@ pub struct Clocked {
     pub taken: Vec<usize>,
     /// Beats that it sent on each S2MM stream.
     pub sent: Vec<Vec<StreamBeat>>,
+    /// The clock, from 0, in which each of them was sent; empty where that is not known.
+    pub sent_at: Vec<Vec<u32>>,
 }
 
 /// An accelerator that does not answer as one.
@@ -75,12 +83,12 @@ pub enum ExternalError {
         source: std::io::Error,
     },
     /// It did not answer in time.
-    #[error("the simulator has not answered for {seconds} s ({act})")]
+    #[error("the simulator has not answered for {deadline:?} ({act})")]
     Silent {
         /// The request.
         act: &'static str,
         /// The deadline.
-        seconds: u64,
+        deadline: Duration,
     },
     /// It answers, and is no accelerator of this interface.
     #[error(
@@ -105,6 +113,9 @@ pub enum ExternalError {
         /// The largest sensible answer.
         most: u32,
     },
+    /// It is not the model's equal.
+    #[error("hardware and model differ: {0}")]
+    Difference(Box<Difference>),
 }
 
 /// An accelerator: registers, a clock, streams and an interrupt.
@@ -165,7 +176,6 @@ impl External {
         match answer {
             Ok(answer) => Some(answer),
             Err(error) => {
-                log::error!("{error}");
                 self.error.get_or_insert(error);
                 None
             }
@@ -199,9 +209,22 @@ impl External {
         if resets {
             self.busy = false;
             self.starts = false;
-            self.settle(RESET_CLOCKS);
+            self.reset();
         } else if !starts {
             self.settle(SETTLE_CLOCKS);
+        }
+    }
+
+    /// Lets clocks pass until its reset has ended.
+    fn reset(&mut self) {
+        let mut clocks = 0;
+        while clocks < RESET_CLOCKS && self.alive() {
+            self.settle(RESET_BATCH);
+            clocks += RESET_BATCH;
+            let reset = self.accelerator.read(RESET.offset);
+            if self.answer(reset) == Some(0) {
+                break;
+            }
         }
     }
 

@@ -102,6 +102,7 @@ impl ExternalAccelerator for ModelAccelerator {
             busy: self.accelerator.running(),
             taken,
             sent,
+            sent_at: Vec::new(),
         })
     }
 }

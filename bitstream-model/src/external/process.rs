@@ -9,11 +9,15 @@
 //! run     3, clocks, 0,            clocks, level, taken of 4, sent of 4,
 //!         offered of 4,              then each beat sent: 4 words, TLAST
 //!         space of 4,              level: bit 0 interrupt, bit 1 busy
-//!         each beat offered: 4 words, marks
-//!                                  marks: bit 0 TLAST, bit 1 invalid bytes
+//!         each beat offered:
+//!         4 words, marks             marks: bit 0 TLAST, bit 1 invalid bytes
+//! record  4, 1 or 0, 0             1, or 0 from a simulator without waveforms
 //! ```
 //!
-//! `bitstream-model/rtl/simulator/main.cpp` is the other end.
+//! The marks of a beat that was sent hold in bits 31:8 the clock of the request in which it was sent.
+//! `record` begins and ends a waveform in the file that is the program's fourth argument.
+//!
+//! `bitstream-model/rtl/simulator/main.cpp` is the other end, and `serve.rs` the same in Rust.
 
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -26,18 +30,21 @@ use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use pgs_interface::control::{IDENTIFICATION, IDENTIFICATION_VALUE};
 use pgs_interface::record::Beat;
 
-const STREAMS: usize = 4;
-const READ: u32 = 1;
-const WRITE: u32 = 2;
-const RUN: u32 = 3;
+pub(super) const STREAMS: usize = 4;
+pub(super) const READ: u32 = 1;
+pub(super) const WRITE: u32 = 2;
+pub(super) const RUN: u32 = 3;
+pub(super) const RECORD: u32 = 4;
 /// Marks of a beat that is offered.
-const LAST: u32 = 1;
-const PARTIAL: u32 = 2;
+pub(super) const LAST: u32 = 1;
+pub(super) const PARTIAL: u32 = 2;
+/// Lowest bit of the clock in the marks of a beat that was sent.
+pub(super) const CLOCK_LSB: u32 = 8;
 /// Bits of the level.
-const INTERRUPT: u32 = 1;
-const BUSY: u32 = 2;
+pub(super) const INTERRUPT: u32 = 1;
+pub(super) const BUSY: u32 = 2;
 
-/// An answer is computed in milliseconds.
+/// Deadline of an answer, which is computed in milliseconds.
 const DEADLINE: Duration = Duration::from_secs(20);
 /// Bytes that the reading thread passes on at once.
 const CHUNK: usize = 1 << 16;
@@ -50,6 +57,7 @@ pub struct SimulatorProcess {
     answers: Receiver<io::Result<Vec<u8>>>,
     /// Bytes that have come and were not read.
     rest: Vec<u8>,
+    deadline: Duration,
 }
 
 impl SimulatorProcess {
@@ -90,12 +98,25 @@ impl SimulatorProcess {
                 }
             });
         }
-        let mut process = Self { child, requests, answers, rest: Vec::new() };
+        let mut process = Self { child, requests, answers, rest: Vec::new(), deadline: DEADLINE };
         let expected = IDENTIFICATION_VALUE;
         match process.read(IDENTIFICATION.offset)? {
             found if found == expected => Ok(process),
             found => Err(ExternalError::Identification { found, expected }),
         }
+    }
+
+    /// Sets the deadline of an answer, 20 s by default.
+    pub fn set_deadline(&mut self, deadline: Duration) {
+        self.deadline = deadline;
+    }
+
+    /// Begins or ends a waveform; false from a simulator that writes none.
+    pub(super) fn record(&mut self, on: bool) -> Result<bool, ExternalError> {
+        let act = "begin or end of a waveform";
+        self.request(&[RECORD, on.into(), 0], act)?;
+        let [recorded] = self.answer(act)?;
+        Ok(recorded == 1)
     }
 
     fn request(&mut self, words: &[u32], act: &'static str) -> Result<(), ExternalError> {
@@ -109,11 +130,11 @@ impl SimulatorProcess {
 
     fn answer<const N: usize>(&mut self, act: &'static str) -> Result<[u32; N], ExternalError> {
         while self.rest.len() < 4 * N {
-            match self.answers.recv_timeout(DEADLINE) {
+            match self.answers.recv_timeout(self.deadline) {
                 Ok(Ok(bytes)) => self.rest.extend(bytes),
                 Ok(Err(source)) => return Err(ExternalError::Ended { act, source }),
                 Err(RecvTimeoutError::Timeout) => {
-                    return Err(ExternalError::Silent { act, seconds: DEADLINE.as_secs() });
+                    return Err(ExternalError::Silent { act, deadline: self.deadline });
                 }
                 Err(RecvTimeoutError::Disconnected) => {
                     let source = io::ErrorKind::UnexpectedEof.into();
@@ -184,13 +205,15 @@ impl ExternalAccelerator for SimulatorProcess {
             clocked.taken.push(count("beats taken", taken, offered.len())?);
         }
         for (sent, space) in sent.into_iter().zip(space) {
-            let mut beats = Vec::new();
+            let (mut beats, mut clocks) = (Vec::new(), Vec::new());
             for _ in 0..count("beats sent", sent, space)? {
-                let [a, b, c, d, last] = self.answer(act)?;
-                let last = last & LAST != 0;
+                let [a, b, c, d, marks] = self.answer(act)?;
+                let last = marks & LAST != 0;
                 beats.push(StreamBeat { beat: Beat([a, b, c, d]), last, partial: false });
+                clocks.push(marks >> CLOCK_LSB);
             }
             clocked.sent.push(beats);
+            clocked.sent_at.push(clocks);
         }
         Ok(clocked)
     }

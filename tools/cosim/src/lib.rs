@@ -9,9 +9,12 @@
 //! mistake with the driver.
 #![forbid(unsafe_code)]
 
+pub mod accesses;
+pub mod flaws;
 pub mod mutation;
 pub mod outcome;
 pub mod packets;
 pub mod random;
 pub mod recorded;
+pub mod refusal;
 pub mod scene;

@@ -7,15 +7,23 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use bitstream_model::external::{ExternalAccelerator, ModelAccelerator, SimulatorProcess};
+use bitstream_model::external::{
+    ExternalAccelerator, LockStep, ModelAccelerator, SimulatorProcess, serve,
+};
 use bitstream_model::{BoardConfig, Hazards, Subnormals};
 use clap::{Parser, Subcommand, ValueEnum};
+use cosim::accesses;
+use cosim::flaws::{Flawed, Flaws};
 use cosim::mutation::MUTATIONS;
 use cosim::outcome::{self, Arrival, Outcome, difference};
 use cosim::packets::packets;
+use cosim::refusal::{Refusal, refusals};
 use cosim::{random, recorded};
+use pgs_interface::control::{BODY_CAPACITY, COLLISION_CAPACITY, error};
+use pgs_interface::register::Register;
 use rtlgen::design::{Design, Parameters};
 use rtlgen::emit::{self, File};
+use rtlgen::simulator::Waveform;
 use rtlgen::{simulator, verify};
 use step_folder::folder::Folder;
 
@@ -33,6 +41,7 @@ Examples:
   cosim recorded --simulator target/rtl/pgs-rtl tests/golden/*/
   cosim random --simulator target/rtl/pgs-rtl --cases 1000
   cosim random --simulator target/rtl/pgs-rtl --gaps 300 --stalls 700
+  cosim errors --simulator target/rtl/pgs-rtl
   cosim mutations                      builds a simulator for each: about a minute and a half each
 
 Exit codes: 0 done; 1 a difference, or a mutation that nothing found; 2 wrong usage or an error; 77 a
@@ -64,6 +73,24 @@ struct SimulatorArgs {
     stalls: u32,
 }
 
+impl SimulatorArgs {
+    /// The arguments of the simulator's program.
+    fn disturbance(&self) -> [String; 3] {
+        [self.gaps, self.stalls, 1].map(|number| number.to_string())
+    }
+}
+
+impl HazardMode {
+    /// The configuration of a model that equals the generated hardware.
+    fn config(self) -> BoardConfig {
+        let hazards = match self {
+            Self::Interlocked => Hazards::Interlocked,
+            Self::Unchecked => Hazards::Unchecked,
+        };
+        BoardConfig { hazards, subnormals: Subnormals::Flush, ..Default::default() }
+    }
+}
+
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Recorded steps: the results against the folders' own, counters against the model
@@ -84,6 +111,42 @@ enum Verb {
         /// Seed of the first step
         #[arg(long, value_name = "S", default_value_t = 1)]
         seed: u64,
+    },
+    /// Every error code of the accelerator: the model's report and the hardware's
+    Errors {
+        #[command(flatten)]
+        simulator: SimulatorArgs,
+    },
+    /// Random register accesses before, in and after a step, in lock step with the model
+    Registers {
+        #[command(flatten)]
+        simulator: SimulatorArgs,
+        /// Steps
+        #[arg(long, value_name = "N", default_value_t = 200)]
+        cases: u64,
+        /// Seed of the first step
+        #[arg(long, value_name = "S", default_value_t = 1)]
+        seed: u64,
+    },
+    /// The model as a simulator: requests on standard input, answers on standard output
+    ///
+    /// For tests of boards with an accelerator in another process, where no simulator can be built.
+    Model {
+        /// Behaviour on a hazard
+        #[arg(long, value_enum, default_value_t = HazardMode::Interlocked)]
+        hazards: HazardMode,
+        /// A mistake: the first word of this body's linear velocity has a wrong lowest bit
+        #[arg(long, value_name = "BODY")]
+        wrong: Option<usize>,
+        /// A death: the process ends after this number of exchanges of beats
+        #[arg(long, value_name = "N")]
+        dies_after: Option<u64>,
+        /// A hang: it answers no more after this number of exchanges of beats
+        #[arg(long, value_name = "N")]
+        hangs_after: Option<u64>,
+        /// GAPS, STALLS, SEED and WAVEFORM of a real simulator; without effect here
+        #[arg(hide = true)]
+        ignored: Vec<String>,
     },
     /// Seeded mistakes in the Verilog: each must be found
     Mutations {
@@ -131,6 +194,27 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
                 }
             }
         }
+        Verb::Registers { simulator, cases, seed } => {
+            let rtl = SimulatorProcess::start_with(&simulator.simulator, &simulator.disturbance())?;
+            let mut both = LockStep::new(&simulator.hazards.config(), Box::new(rtl), None)?;
+            for seed in *seed..*seed + *cases {
+                accesses::run(&mut both, seed).map_err(|error| format!("seed {seed}: {error}"))?;
+            }
+            writeln!(
+                out,
+                "{cases} steps among random register accesses from seed {seed}: as the model"
+            )?;
+            true
+        }
+        Verb::Errors { simulator } => run_errors(simulator, out)?,
+        Verb::Model { hazards, wrong, dies_after, hangs_after, .. } => {
+            let model = ModelAccelerator::new(&hazards.config())?;
+            let [dies_after, hangs_after] =
+                [dies_after, hangs_after].map(|n| n.unwrap_or(u64::MAX));
+            let mut flawed = Flawed::new(model, Flaws { wrong: *wrong, dies_after, hangs_after });
+            serve(&mut flawed, &mut io::stdin().lock(), out)?;
+            true
+        }
         Verb::Mutations { cases } => run_mutations(*cases, out)?,
     };
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
@@ -146,16 +230,11 @@ struct Bench {
 impl Bench {
     fn new(args: &SimulatorArgs) -> Result<Self, Failure> {
         let SimulatorArgs { simulator, hazards, gaps, stalls } = args;
-        let disturbance = [*gaps, *stalls, 1].map(|number| number.to_string());
-        let rtl = SimulatorProcess::start_with(simulator, &disturbance)?;
-        let hazards = match hazards {
-            HazardMode::Interlocked => Hazards::Interlocked,
-            HazardMode::Unchecked => Hazards::Unchecked,
-        };
-        let config = BoardConfig { hazards, subnormals: Subnormals::Flush, ..Default::default() };
+        let rtl = SimulatorProcess::start_with(simulator, &args.disturbance())?;
         let steady = *gaps == 0 && *stalls == 0;
         let arrival = if steady { Arrival::Steady } else { Arrival::Disturbed };
-        Ok(Self { arrival, rtl: Box::new(rtl), model: Box::new(ModelAccelerator::new(&config)?) })
+        let model = ModelAccelerator::new(&hazards.config())?;
+        Ok(Self { arrival, rtl: Box::new(rtl), model: Box::new(model) })
     }
 }
 
@@ -215,6 +294,32 @@ fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<S
     Ok(None)
 }
 
+/// Whether the Verilog reports each error as the model does.
+fn run_errors(args: &SimulatorArgs, out: &mut dyn Write) -> Result<bool, Failure> {
+    let mut bench = Bench::new(args)?;
+    let mut larger = |register: Register| -> Result<u32, Failure> {
+        Ok(bench.model.read(register.offset)?.max(bench.rtl.read(register.offset)?))
+    };
+    let all = refusals(larger(BODY_CAPACITY)?, larger(COLLISION_CAPACITY)?);
+    let mut good = true;
+    writeln!(out, "{:31} {:>4}  {:27} {:27}", "mistake", "code", "model", "hardware")?;
+    for Refusal { name, code, scene, fault, registers } in all {
+        let beats = packets(&scene, fault);
+        let report = |accelerator: &mut dyn ExternalAccelerator| -> Result<_, Failure> {
+            let outcome = outcome::run_with(accelerator, &scene, &beats, &registers)?;
+            Ok((outcome.error, outcome.ended))
+        };
+        let [model, rtl] = [report(&mut *bench.model)?, report(&mut *bench.rtl)?];
+        let text = |([code, detail], ended): ([u32; 2], bool)| {
+            let end = if ended { "" } else { ", does not end" };
+            format!("{code:#06x}, detail {detail}{end}")
+        };
+        writeln!(out, "{name:31} {:4}  {:27} {:27}", code as u32, text(model), text(rtl))?;
+        good &= model == rtl && model.1 && error::CODE.of(model.0[0]) == code as u32;
+    }
+    Ok(good)
+}
+
 /// Whether the design as it is shows no difference, and each mutant one.
 fn run_mutations(cases: u64, out: &mut dyn Write) -> Result<bool, Failure> {
     let files = emit::files(&Design::new(Parameters::default()));
@@ -239,7 +344,7 @@ fn run_mutations(cases: u64, out: &mut dyn Write) -> Result<bool, Failure> {
 fn difference_of(files: &[File], cases: u64) -> Result<Option<String>, Failure> {
     let folder = tempfile::tempdir()?;
     let simulator = SimulatorArgs {
-        simulator: simulator::build_files(files, folder.path())?,
+        simulator: simulator::build_files(files, folder.path(), Waveform::None)?,
         hazards: HazardMode::Interlocked,
         gaps: 0,
         stalls: 0,

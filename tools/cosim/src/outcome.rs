@@ -1,12 +1,16 @@
 //! The outcome of a step on an accelerator: results and counters.
 
-use bitstream_model::external::{ExternalAccelerator, ExternalError, Offer, StreamBeat};
+use bitstream_model::external::{
+    ExternalAccelerator, ExternalError, Offer, StreamBeat, same_number,
+};
 use pgs_interface::control::{
     self, ANGULAR_DAMPING, AP_CTRL, BODIES, COLLISIONS, CONTACT_ITERATIONS, CYCLES_LO, ERROR,
     ERROR_DETAIL, FLAGS, FRICTION, FRICTION_ITERATIONS, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS,
     IMPULSE_SUM_HI, IMPULSE_SUM_LO, POSITION_COEFFICIENT, POSITION_DRIFT, RESET, SHAPE_STRIDE,
     SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, WAIT_CYCLES, WORK_CYCLES, ap_ctrl,
 };
+
+use pgs_interface::register::Register;
 
 use crate::packets::{Beats, STREAMS};
 use crate::scene::Scene;
@@ -58,29 +62,30 @@ pub fn run(
     scene: &Scene,
     beats: &Beats,
 ) -> Result<Outcome, ExternalError> {
+    run_with(accelerator, scene, beats, &[])
+}
+
+/// Runs a step, with these values in these registers instead of the scene's.
+///
+/// # Errors
+/// The accelerator does not answer.
+pub fn run_with(
+    accelerator: &mut dyn ExternalAccelerator,
+    scene: &Scene,
+    beats: &Beats,
+    registers: &[(Register, u32)],
+) -> Result<Outcome, ExternalError> {
     reset(accelerator)?;
     set_up(accelerator, scene)?;
-    accelerator.write(AP_CTRL.offset, ap_ctrl::START.mask())?;
-    let mut at = [0; STREAMS];
-    let mut results: [Vec<StreamBeat>; STREAMS] = Default::default();
-    let mut clocks = 0_u64;
-    let mut busy = true;
-    while busy && clocks < CLOCKS_MAX {
-        let offered = |stream: usize| {
-            let beats = &beats[stream][at[stream]..];
-            beats[..beats.len().min(OFFERED)].to_vec()
-        };
-        let offer = Offer { beats: (0..STREAMS).map(offered).collect(), space: vec![256; STREAMS] };
-        let clocked = accelerator.run(BATCH, &offer)?;
-        for (at, taken) in at.iter_mut().zip(&clocked.taken) {
-            *at += taken;
-        }
-        for (results, sent) in results.iter_mut().zip(clocked.sent) {
-            results.extend(sent);
-        }
-        busy = clocked.busy;
-        clocks += u64::from(clocked.clocks);
+    for (register, value) in registers {
+        accelerator.write(register.offset, *value)?;
     }
+    accelerator.write(AP_CTRL.offset, ap_ctrl::START.mask())?;
+    let mut feed = Feed::new(beats);
+    while feed.busy && feed.clocks < CLOCKS_MAX {
+        feed.exchange(accelerator)?;
+    }
+    let Feed { results, busy, .. } = feed;
     let mut read = |offset: u32| accelerator.read(offset);
     Ok(Outcome {
         results,
@@ -96,7 +101,48 @@ pub fn run(
     })
 }
 
-fn reset(accelerator: &mut dyn ExternalAccelerator) -> Result<(), ExternalError> {
+/// The beats of a step on their way, and the results that have come.
+#[derive(Debug)]
+pub(crate) struct Feed<'a> {
+    beats: &'a Beats,
+    at: [usize; STREAMS],
+    results: [Vec<StreamBeat>; STREAMS],
+    /// Clocks since the start.
+    pub(crate) clocks: u64,
+    /// Whether the step is under way.
+    pub(crate) busy: bool,
+}
+
+impl<'a> Feed<'a> {
+    pub(crate) fn new(beats: &'a Beats) -> Self {
+        let results = Default::default();
+        Self { beats, at: [0; STREAMS], results, clocks: 0, busy: true }
+    }
+
+    /// Exchanges beats with the accelerator once.
+    pub(crate) fn exchange(
+        &mut self,
+        accelerator: &mut dyn ExternalAccelerator,
+    ) -> Result<(), ExternalError> {
+        let offered = |stream: usize| {
+            let beats = &self.beats[stream][self.at[stream]..];
+            beats[..beats.len().min(OFFERED)].to_vec()
+        };
+        let offer = Offer { beats: (0..STREAMS).map(offered).collect(), space: vec![256; STREAMS] };
+        let clocked = accelerator.run(BATCH, &offer)?;
+        for (at, taken) in self.at.iter_mut().zip(&clocked.taken) {
+            *at += taken;
+        }
+        for (results, sent) in self.results.iter_mut().zip(clocked.sent) {
+            results.extend(sent);
+        }
+        self.busy = clocked.busy;
+        self.clocks += u64::from(clocked.clocks);
+        Ok(())
+    }
+}
+
+pub(crate) fn reset(accelerator: &mut dyn ExternalAccelerator) -> Result<(), ExternalError> {
     const EXCHANGES: usize = 100;
     accelerator.write(RESET.offset, control::reset::RESET.mask())?;
     for _ in 0..EXCHANGES {
@@ -108,7 +154,10 @@ fn reset(accelerator: &mut dyn ExternalAccelerator) -> Result<(), ExternalError>
     Ok(())
 }
 
-fn set_up(accelerator: &mut dyn ExternalAccelerator, scene: &Scene) -> Result<(), ExternalError> {
+pub(crate) fn set_up(
+    accelerator: &mut dyn ExternalAccelerator,
+    scene: &Scene,
+) -> Result<(), ExternalError> {
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     let arguments = &scene.arguments;
     let [time_step, drift, coefficient, friction, damping] = arguments.numbers;
@@ -176,9 +225,8 @@ pub fn difference(expected: &Outcome, found: &Outcome, arrival: Arrival) -> Opti
                 return differs(&what, &expected.last, &found.last);
             }
             for (word, (e, f)) in expected.beat.0.into_iter().zip(found.beat.0).enumerate() {
-                let is_nan = |bits: u32| f32::from_bits(bits).is_nan();
-                nan |= is_nan(e);
-                if e != f && !(is_nan(e) && is_nan(f)) {
+                nan |= f32::from_bits(e).is_nan();
+                if !same_number(e, f) {
                     let what = format!("word {word} of body {body} on stream {stream}");
                     return differs(&what, &e, &f);
                 }

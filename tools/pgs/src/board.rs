@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use bitstream_model::external::SimulatorProcess;
+use bitstream_model::external::{ExternalAccelerator, LockStep, SimulatorProcess};
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{FLOAT, PROFILES, Variant};
@@ -110,8 +110,10 @@ pub(crate) fn emulated_board(
     config: BoardConfig,
     accelerator: &AcceleratorChoice,
 ) -> Result<EmulatedBoard, Failure> {
-    let AcceleratorChoice::Rtl(path) = accelerator else {
-        return EmulatedBoard::new(config).map_err(not_built);
+    let (path, with_model) = match accelerator {
+        AcceleratorChoice::Model => return EmulatedBoard::new(config).map_err(not_built),
+        AcceleratorChoice::Rtl(path) => (path, false),
+        AcceleratorChoice::Both(path) => (path, true),
     };
     if config.profile != &FLOAT {
         let error = format!(
@@ -120,8 +122,13 @@ pub(crate) fn emulated_board(
         );
         return Err(Failure::input(error).next("leave out --profile, or --accelerator"));
     }
-    let simulator = SimulatorProcess::start(path).map_err(Failure::input)?;
-    EmulatedBoard::with_accelerator(config, Box::new(simulator)).map_err(not_built)
+    let mut accelerator: Box<dyn ExternalAccelerator> =
+        Box::new(SimulatorProcess::start(path).map_err(Failure::input)?);
+    if with_model {
+        let both = LockStep::new(&config, accelerator, Some(path.clone())).map_err(not_built)?;
+        accelerator = Box::new(both);
+    }
+    EmulatedBoard::with_accelerator(config, accelerator).map_err(not_built)
 }
 
 /// Chooses a board. `given` is an option of the command line that only an emulated board has.
@@ -233,6 +240,10 @@ impl OpenBoard {
                 false => failure,
             };
         }
+        if let Some(reason) = self.observer.as_ref().and_then(EmulatedBoard::accelerator_error) {
+            return Failure::new(Cause::Hardware, reason)
+                .next("the step changed no body; the next command starts a new simulator");
+        }
         let diverged = matches!(&error, zynq_pgs::Error::Step { fault, .. }
             if matches!(**fault, Fault::NotFinite { .. }));
         if diverged && self.observer.is_some() {
@@ -252,11 +263,6 @@ impl OpenBoard {
         let next = match seen.is_empty() {
             true => next.to_owned(),
             false => format!("{next}; the emulated board saw this misuse:{seen}"),
-        };
-        let ended = self.observer.as_ref().and_then(EmulatedBoard::accelerator_error);
-        let next = match ended {
-            Some(reason) => format!("start the simulator anew: {reason}"),
-            None => next,
         };
         let failure = diagnosis::hardware(error).next(next);
         match &self.injected {

@@ -55,9 +55,10 @@ pub(crate) struct CommonOptions {
     manager: Option<ManagerChoice>,
     /// Accelerator of an emulated board.
     #[arg(
-        help = "Accelerator of an emulated board: model, or rtl:PATH, a simulator of the generated \
-                Verilog (`rtlgen simulator` builds one) [env: PGS_RTL, the PATH alone] \
-                [default: model]",
+        help = "Accelerator of an emulated board: model, rtl:PATH, a simulator of the generated \
+                Verilog (`rtlgen simulator` builds one), or both:PATH, the simulator with the model \
+                beside it on the same beats, up to the first difference [env: PGS_RTL, the PATH of \
+                rtl] [default: model]",
         long,
         global = true,
         value_name = "ACCELERATOR",
@@ -74,6 +75,8 @@ pub(crate) enum AcceleratorChoice {
     Model,
     /// A simulator of the generated Verilog, at this path.
     Rtl(PathBuf),
+    /// The simulator at this path, and the model in lock step with it.
+    Both(PathBuf),
 }
 
 /// The options of every verb, with the environment and the defaults filled in.
@@ -119,7 +122,8 @@ fn accelerator_choice(text: &str) -> Result<AcceleratorChoice, String> {
     match text.split_once(':') {
         None if text == "model" => Ok(AcceleratorChoice::Model),
         Some(("rtl", path)) if !path.is_empty() => Ok(AcceleratorChoice::Rtl(path.into())),
-        _ => Err("expected model or rtl:PATH".to_owned()),
+        Some(("both", path)) if !path.is_empty() => Ok(AcceleratorChoice::Both(path.into())),
+        _ => Err("expected model, rtl:PATH or both:PATH".to_owned()),
     }
 }
 

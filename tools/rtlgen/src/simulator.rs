@@ -27,13 +27,22 @@ pub fn write(folder: &Path, files: &[File]) -> Result<(), Error> {
     Ok(())
 }
 
+/// Whether a simulator can write waveforms, which makes it slower.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waveform {
+    /// It has none.
+    None,
+    /// It writes a VCD file on request.
+    Vcd,
+}
+
 /// Builds the simulator of a design in a folder; the path of the program.
 ///
 /// # Errors
 ///
 /// A tool is missing, or the build fails.
-pub fn build(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
-    build_files(&emit::files(design), folder)
+pub fn build(design: &Design, folder: &Path, waveform: Waveform) -> Result<PathBuf, Error> {
+    build_files(&emit::files(design), folder, waveform)
 }
 
 /// Builds the simulator from the files of a design, which may have been changed.
@@ -41,7 +50,7 @@ pub fn build(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
 /// # Errors
 ///
 /// As for [`build`].
-pub fn build_files(files: &[File], folder: &Path) -> Result<PathBuf, Error> {
+pub fn build_files(files: &[File], folder: &Path, waveform: Waveform) -> Result<PathBuf, Error> {
     verilator::require("a simulator of the accelerator")?;
     write(folder, files)?;
     fs::write(folder.join("main.cpp"), MAIN).map_err(Error::io("write the simulator's program"))?;
@@ -49,7 +58,8 @@ pub fn build_files(files: &[File], folder: &Path) -> Result<PathBuf, Error> {
     let mut names: Vec<String> = modules.map(|file| file.name.clone()).collect();
     names.push("main.cpp".into());
     // The simulation is hardly faster with -O2, and the build takes four times as long.
-    let build = verilator::Build { top: emit::TOP, flags: "-O1", files: &names };
+    let waveform = waveform == Waveform::Vcd;
+    let build = verilator::Build { top: emit::TOP, flags: "-O1", files: &names, waveform };
     verilator::build(folder, &build)?;
     let program = folder.join(PROGRAM);
     fs::copy(folder.join("obj").join(format!("V{}", emit::TOP)), &program)

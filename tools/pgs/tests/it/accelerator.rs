@@ -55,5 +55,5 @@ fn another_profile_than_the_generated_one_is_refused() {
 fn an_accelerator_is_the_model_or_a_simulator() {
     let (code, stderr) = solve("fpga", &[]);
     assert_eq!(code, Some(2), "{stderr}");
-    assert!(stderr.contains("expected model or rtl:PATH"), "{stderr}");
+    assert!(stderr.contains("expected model, rtl:PATH or both:PATH"), "{stderr}");
 }

@@ -100,7 +100,7 @@ fn verilate(folder: &Path) -> Result<(), Error> {
     let files = [TOP.file, "operators_main.cpp"].map(str::to_owned);
     verilator::build(
         folder,
-        &verilator::Build { top: "operators_top", flags: &sizes, files: &files },
+        &verilator::Build { top: "operators_top", flags: &sizes, files: &files, waveform: false },
     )
 }
 

@@ -14,6 +14,8 @@ pub struct Build<'a> {
     pub flags: &'a str,
     /// Names of the files, in the folder.
     pub files: &'a [String],
+    /// Whether the program can write waveforms.
+    pub waveform: bool,
 }
 
 /// Whether a program can be run.
@@ -48,6 +50,7 @@ pub fn build(folder: &Path, build: &Build<'_>) -> Result<(), Error> {
         // Smaller files of C++, which make compiles side by side.
         .args(["--output-split", "20000", "-j", "0"])
         .args(["--top-module", build.top, "-Mdir", "obj", "-CFLAGS", build.flags])
+        .args(build.waveform.then_some("--trace"))
         .args(build.files)
         .output()
         .map_err(Error::io("run verilator"))?;

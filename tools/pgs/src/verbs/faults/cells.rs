@@ -130,6 +130,36 @@ fn site_of(kind: FaultKind) -> Site {
     }
 }
 
+/// The cells that a simulator of the hardware tries: faults of the streams that the hardware can see, in
+/// the middle of each packet, and one error of a DMA, which resets it in the middle of a packet. All
+/// others happen outside of it, and each takes a simulator seconds.
+pub(super) fn for_simulator(bench: &Bench) -> Vec<Cell> {
+    use FaultKind as K;
+    let (cells, _) = of(bench);
+    let middle = |cell: &Cell| {
+        let fault = cell.plan.faults.last()?;
+        let packet = bench.packets.iter().find(|packet| {
+            Some((packet.core, packet.direction)) == cell.channel() && packet.phase == fault.phase
+        })?;
+        match fault.when {
+            Some(When::Beat(beat)) => Some(beat == packet.beats.saturating_sub(1) / 2),
+            _ => Some(true),
+        }
+    };
+    let seen = |kind| {
+        matches!(
+            kind,
+            K::ShortPacket
+                | K::LongPacket
+                | K::NoTlast
+                | K::Corrupt { .. }
+                | K::Stall
+                | K::DmaDecErr
+        )
+    };
+    cells.into_iter().filter(|cell| seen(cell.kind) && middle(cell) == Some(true)).collect()
+}
+
 /// All cells of a board, and the impossible combinations.
 pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
     let packets: Vec<_> = bench

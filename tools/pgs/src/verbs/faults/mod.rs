@@ -4,6 +4,7 @@
 
 mod cells;
 mod expected;
+mod hardware;
 mod table;
 mod trial;
 
@@ -19,7 +20,7 @@ use serde_json::{Value, json};
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
 use self::trial::{Bench, CellResult};
-use crate::common::CommonArgs;
+use crate::common::{AcceleratorChoice, CommonArgs};
 use crate::environment;
 use crate::failure::{Failure, Verdict};
 use crate::output::SCHEMA;
@@ -31,6 +32,7 @@ Examples:
   pgs faults --profile float
   pgs faults --list               the fault of each cell, without trying it
   pgs faults --json > faults.json
+  pgs faults --accelerator rtl:target/rtl/pgs-rtl     stream faults, on the generated hardware too
   pgs run --grid 3x3x3 --steps 2 --fault 'stall@dma1.mm2s,phase=contact2,beat=5'
 
 A cell is one fault at one place. It passes if the fault happened, and
@@ -67,6 +69,9 @@ pub(crate) fn run(
     if environment::variable(environment::LOG).is_none() {
         // The driver would warn of each of thousands of faults.
         log::set_max_level(log::LevelFilter::Off);
+    }
+    if common.accelerator != AcceleratorChoice::Model {
+        return hardware::run(args, common, out);
     }
     let profiles: Vec<_> = match args.profile {
         Some(profile) => vec![profile],

@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use bitstream_model::interface::profile::{Flow, Profile};
-use bitstream_model::{BoardConfig, Delays, Direction, EmulatedBoard, FaultKind, PacketCount};
+use bitstream_model::{
+    BoardConfig, Delays, Direction, EmulatedBoard, FaultKind, PacketCount, Subnormals,
+};
 use scene::{Grid, Scene, SceneOptions};
 use zynq_pgs::{
     Accelerator, Aftermath, BoardChoice, Body, Collision, Error, OpenOptions, Shape, StepParameters,
@@ -12,11 +14,13 @@ use zynq_pgs::{
 use super::cells::Cell;
 use super::expected::Expected;
 use crate::board;
+use crate::common::AcceleratorChoice;
 use crate::failure::Failure;
 
-/// Limits on the board's clock: for a step, for reading all registers after a timeout, and for the
-/// reset of all parts.
+/// Limits on the board's clock: for a step of the model and of a simulator, which needs seconds for a
+/// millisecond; for reading all registers after a timeout; and for the reset of all parts.
 const DEADLINE: Duration = Duration::from_millis(100);
+const SIMULATOR_DEADLINE: Duration = Duration::from_micros(200);
 const LOOKING: Duration = Duration::from_micros(100);
 const RECOVERY: Duration = Duration::from_millis(60);
 /// Length registers so narrow that a packet needs several descriptors.
@@ -46,6 +50,8 @@ pub(super) struct Bench {
     small: State,
     large: State,
     parameters: StepParameters,
+    accelerator: AcceleratorChoice,
+    deadline: Duration,
 }
 
 /// The results of a cell.
@@ -102,8 +108,12 @@ fn bits(bodies: &[Body]) -> Vec<[u32; 13]> {
 }
 
 /// An emulated board, and the driver on it.
-fn open(config: BoardConfig, shapes: &[Shape]) -> Result<(EmulatedBoard, Accelerator), Failure> {
-    let emulated = EmulatedBoard::new(config).map_err(Failure::input)?;
+fn open(
+    config: BoardConfig,
+    choice: &AcceleratorChoice,
+    shapes: &[Shape],
+) -> Result<(EmulatedBoard, Accelerator), Failure> {
+    let emulated = board::emulated_board(config, choice)?;
     let accelerator = reopen(&emulated).map_err(board::unusable);
     let mut accelerator = accelerator?;
     accelerator.set_shapes(shapes).map_err(Failure::input)?;
@@ -121,7 +131,7 @@ impl State {
         let grid = Grid::new(side, side, side).map_err(Failure::input)?;
         let options = SceneOptions { grid, drop: 0.05, ..SceneOptions::default() };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
-        let (emulated, mut accelerator) = open(config, scene.shapes())?;
+        let (emulated, mut accelerator) = open(config, &AcceleratorChoice::Model, scene.shapes())?;
         let parameters = StepParameters::default();
         for _ in 0..SETTLING {
             scene.detect();
@@ -150,18 +160,37 @@ impl State {
 }
 
 impl Bench {
-    /// The setting of a profile, with a pile of 27 cubes and one of 64.
+    /// The setting of a profile, with a pile of 27 cubes and one of 64, for the model.
     pub(super) fn new(profile: &'static Profile) -> Result<Self, Failure> {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
         let length_width = LENGTH_WIDTH;
         let config = BoardConfig { profile, length_width, delays, ..BoardConfig::default() };
+        Self::of(config, DEADLINE)
+    }
+
+    /// The setting of a board that equals one with a simulator, for the model.
+    pub(super) fn like_simulator(profile: &'static Profile) -> Result<Self, Failure> {
+        let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
+        let subnormals = Subnormals::Flush;
+        let config = BoardConfig { profile, delays, subnormals, ..BoardConfig::default() };
+        Self::of(config, SIMULATOR_DEADLINE)
+    }
+
+    fn of(config: BoardConfig, deadline: Duration) -> Result<Self, Failure> {
         let (small, large) = (State::settled(3, config)?, State::settled(4, config)?);
         let mut parameters = StepParameters::default();
-        parameters.deadline = Some(DEADLINE);
-        let (board, mut accelerator) = open(config, &small.shapes)?;
+        parameters.deadline = Some(deadline);
+        let accelerator = AcceleratorChoice::Model;
+        let (board, mut driver) = open(config, &accelerator, &small.shapes)?;
         let mut bodies = small.bodies.clone();
-        accelerator.step(&mut bodies, &small.collisions, &parameters).map_err(Failure::input)?;
-        Ok(Self { config, packets: board.packets(), small, large, parameters })
+        driver.step(&mut bodies, &small.collisions, &parameters).map_err(Failure::input)?;
+        let packets = board.packets();
+        Ok(Self { config, packets, small, large, parameters, accelerator, deadline })
+    }
+
+    /// The same setting with another accelerator.
+    pub(super) fn with(self, accelerator: AcceleratorChoice) -> Self {
+        Self { accelerator, ..self }
     }
 
     /// Contact and friction passes.
@@ -177,7 +206,8 @@ impl Bench {
 /// Tries a cell.
 pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
     let mut found = CellResult::default();
-    let Ok((board, mut accelerator)) = open(bench.config, &bench.small.shapes) else {
+    let Ok((board, mut accelerator)) = open(bench.config, &bench.accelerator, &bench.small.shapes)
+    else {
         return found;
     };
     let mut step = |accelerator: &mut Accelerator, state: &State| {
@@ -199,8 +229,8 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
     found.cause = result.as_ref().err().and_then(Error::fault).map(zynq_pgs::Fault::name);
     // The deadline ends the step itself; the reset follows.
     let until_error = result.as_ref().err().and_then(Error::diagnosis).map(|seen| seen.elapsed);
-    found.in_time = until_error.is_none_or(|time| time <= DEADLINE + LOOKING)
-        && found.elapsed <= DEADLINE + RECOVERY;
+    found.in_time = until_error.is_none_or(|time| time <= bench.deadline + LOOKING)
+        && found.elapsed <= bench.deadline + RECOVERY;
     let mut interrupts = 0;
     let lost = match (&result, cell.expected) {
         (Ok(report), Expected::SameBits) => {

@@ -1,0 +1,140 @@
+//! The place of a difference between hardware and model, and its words.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use super::StreamBeat;
+use crate::config::BoardConfig;
+use pgs_interface::control::{REGISTERS, SHAPE_TABLE};
+use pgs_interface::record::result;
+
+/// The first difference between the hardware and the model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Difference {
+    /// The place.
+    pub place: DifferencePlace,
+    /// Clock cycles from the start of the step to it.
+    pub cycle: u64,
+    /// The model's value.
+    pub model: u32,
+    /// The hardware's value.
+    pub hardware: u32,
+    /// The waveform of the cycles before it.
+    pub waveform: Option<PathBuf>,
+    /// Why there is no waveform, where one was asked for.
+    pub no_waveform: Option<String>,
+}
+
+/// A place at which hardware and model can differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DifferencePlace {
+    /// A word of a result record.
+    Word {
+        /// The body.
+        record: usize,
+        /// The row of its record.
+        row: usize,
+        /// The word of the row, 0 to 3.
+        word: usize,
+    },
+    /// TLAST of a row of a result record; the values are 0 and 1.
+    Last {
+        /// The body.
+        record: usize,
+        /// The row of its record.
+        row: usize,
+    },
+    /// The number of beats that the step sent.
+    Beats {
+        /// The stream.
+        stream: usize,
+    },
+    /// A register.
+    Register {
+        /// Its offset in the control block.
+        offset: u32,
+    },
+    /// The end of the step: one has ended, and the other has not. The values are 1 for one that is
+    /// busy.
+    End,
+}
+
+impl fmt::Display for DifferencePlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let row_name = |row: usize| match row {
+            result::POSITION => "position",
+            result::ORIENTATION => "orientation",
+            result::LINEAR => "linear velocity",
+            _ => "angular velocity",
+        };
+        match *self {
+            Self::Word { record, row, word } => {
+                write!(f, "results, record {record}, {}, word {word}", row_name(row))
+            }
+            Self::Last { record, row } => {
+                write!(f, "results, record {record}, {}, TLAST", row_name(row))
+            }
+            Self::Beats { stream } => write!(f, "results, beats on stream {stream}"),
+            Self::Register { offset } => {
+                match REGISTERS.iter().find(|register| register.offset == offset) {
+                    Some(register) => write!(f, "register {}", register.name),
+                    None if offset >= SHAPE_TABLE => {
+                        write!(f, "shape table, offset {offset:#x}")
+                    }
+                    None => write!(f, "register at {offset:#x}"),
+                }
+            }
+            Self::End => write!(f, "the end of the step (busy)"),
+        }
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { place, cycle, model, hardware, waveform, no_waveform } = self;
+        write!(f, "{place}: the model has {model:#010x}")?;
+        let number = matches!(place, DifferencePlace::Word { .. });
+        let float = |bits: u32| f32::from_bits(bits);
+        if number {
+            write!(f, " ({:e})", float(*model))?;
+        }
+        write!(f, ", the hardware {hardware:#010x}")?;
+        if number {
+            write!(f, " ({:e})", float(*hardware))?;
+        }
+        write!(f, ", {cycle} cycles after the start of the step")?;
+        match (waveform, no_waveform) {
+            (Some(path), _) => write!(f, "; waveform: {}", path.display()),
+            (None, Some(reason)) => write!(f, "; no waveform: {reason}"),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+/// Whether two words are the same number: a NaN equals every other NaN.
+#[must_use]
+pub fn same_number(a: u32, b: u32) -> bool {
+    a == b || (f32::from_bits(a).is_nan() && f32::from_bits(b).is_nan())
+}
+
+/// The first difference between the beats number `at` of a result stream.
+pub(super) fn first_difference(
+    config: &BoardConfig,
+    stream: usize,
+    at: usize,
+    model: &StreamBeat,
+    hardware: &StreamBeat,
+) -> Option<(DifferencePlace, [u32; 2])> {
+    let streams = config.profile.stripes.results.streams;
+    let turn = streams.iter().position(|of| usize::from(*of) == stream).unwrap_or(0);
+    let beat = at * streams.len() + turn;
+    let (record, row) = (beat / result::ROWS, beat % result::ROWS);
+    for (word, (m, h)) in model.beat.0.into_iter().zip(hardware.beat.0).enumerate() {
+        if !same_number(m, h) {
+            return Some((DifferencePlace::Word { record, row, word }, [m, h]));
+        }
+    }
+    let lasts = [model.last, hardware.last].map(u32::from);
+    (lasts[0] != lasts[1]).then_some((DifferencePlace::Last { record, row }, lasts))
+}

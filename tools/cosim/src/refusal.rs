@@ -1,0 +1,128 @@
+//! Steps that the accelerator refuses: for each of its error codes one that leads to it.
+
+use pgs_interface::control::{BODIES, COLLISIONS, CONTACT_ITERATIONS, ErrorCode};
+use pgs_interface::register::Register;
+
+use crate::packets::{Fault, FaultAt};
+use crate::scene::{Arguments, Body, Collision, Scene, Shape};
+
+/// A step that is refused.
+#[derive(Debug, Clone)]
+pub struct Refusal {
+    /// The mistake.
+    pub name: &'static str,
+    /// The error that it leads to.
+    pub code: ErrorCode,
+    /// The step.
+    pub scene: Scene,
+    /// A fault in its packets.
+    pub fault: Option<FaultAt>,
+    /// Registers that contradict the scene.
+    pub registers: Vec<(Register, u32)>,
+}
+
+/// The index of a collision or a body that is wrong.
+const WRONG: usize = 3;
+
+/// Five bodies in a row, of which the last is static, and a collision of each with its neighbour.
+fn scene() -> Scene {
+    let one = 1.0_f32.to_bits();
+    let moves = Shape { inverse_mass: one, inverse_inertia: one };
+    let fixed = Shape { inverse_mass: 0, inverse_inertia: 0 };
+    let bodies: Vec<Body> = [0.0_f32, 1.0, 2.0, 3.0, 4.0]
+        .iter()
+        .enumerate()
+        .map(|(index, x)| Body {
+            linear: [0; 3],
+            angular: [0; 3],
+            position: [x.to_bits(), 0, 0],
+            orientation: [0, 0, 0, one],
+            shape: u32::from(index == 4),
+        })
+        .collect();
+    let collisions = (0..4_u32).map(|body| {
+        let sides = [body + 1, body];
+        Collision {
+            bodies: sides,
+            positions: sides.map(|side| bodies[side as usize].position),
+            normal: [one, 0, 0],
+            count: 1,
+            points: [[0; 4]; 4],
+        }
+    });
+    let arguments = Arguments {
+        contact_iterations: 2,
+        friction_iterations: 2,
+        integrate: true,
+        numbers: [1.0_f32 / 60.0, 0.0, 0.2, 0.5, 0.9].map(f32::to_bits),
+        gravity: [0, (-9.8_f32).to_bits(), 0],
+    };
+    Scene { shapes: vec![moves, fixed], collisions: collisions.collect(), bodies, arguments }
+}
+
+/// At least one step for each error code of a design that streams the collisions once a pass.
+/// `collisions_max` and `bodies_max` are the larger of the capacities of the accelerators.
+#[must_use]
+pub fn refusals(bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
+    let plain = |name, code| Refusal { name, code, scene: scene(), fault: None, registers: vec![] };
+    let changed = |name, code, change: fn(&mut Scene)| {
+        let mut refusal = plain(name, code);
+        change(&mut refusal.scene);
+        refusal
+    };
+    let faulty = |name, code, fault, segment, stream, beat| {
+        let fault = Some(FaultAt { fault, segment, stream, beat });
+        Refusal { fault, ..plain(name, code) }
+    };
+    let told = |name, code, registers: &[(Register, u32)]| Refusal {
+        registers: registers.to_vec(),
+        ..plain(name, code)
+    };
+    vec![
+        changed("body index beyond the bodies", ErrorCode::BodyIndex, |scene| {
+            scene.collisions[WRONG].bodies[0] = 5;
+        }),
+        changed("five contact points", ErrorCode::ContactCount, |scene| {
+            scene.collisions[WRONG].count = 5;
+        }),
+        faulty("TLAST early, velocities", ErrorCode::TlastEarly, Fault::EarlyLast, 0, 1, 1),
+        faulty("TLAST early, contact pass 2", ErrorCode::TlastEarly, Fault::EarlyLast, 2, 0, 3),
+        faulty("TLAST early, poses", ErrorCode::TlastEarly, Fault::EarlyLast, 5, 3, 0),
+        faulty("no TLAST, velocities", ErrorCode::TlastMissing, Fault::NoLast, 0, 2, 0),
+        faulty("no TLAST, friction pass 1", ErrorCode::TlastMissing, Fault::NoLast, 3, 3, 0),
+        faulty("no TLAST, poses", ErrorCode::TlastMissing, Fault::NoLast, 5, 0, 0),
+        changed("shape index beyond the table", ErrorCode::ShapeIndex, |scene| {
+            scene.bodies[WRONG].shape = 64;
+        }),
+        told(
+            "more collisions than memory",
+            ErrorCode::Capacity,
+            &[(COLLISIONS, collisions_max + 1)],
+        ),
+        changed("two static bodies", ErrorCode::StaticPair, |scene| {
+            scene.bodies[WRONG].shape = 1;
+        }),
+        changed("a body with itself", ErrorCode::SelfCollision, |scene| {
+            scene.collisions[WRONG].bodies = [2; 2];
+        }),
+        told("no body", ErrorCode::Argument, &[(BODIES, 0)]),
+        told("more bodies than memory", ErrorCode::Argument, &[(BODIES, bodies_max + 1)]),
+        told("too many passes", ErrorCode::Argument, &[(CONTACT_ITERATIONS, 1 << 16)]),
+        faulty("invalid bytes, velocities", ErrorCode::PartialBeat, Fault::Partial, 0, 0, 1),
+        faulty("invalid bytes, contact pass 1", ErrorCode::PartialBeat, Fault::Partial, 1, 2, 2),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_that_a_design_with_passes_has_is_there() {
+        let all = refusals(1, 1);
+        for code in ErrorCode::ALL {
+            let windowed = matches!(code, ErrorCode::EmptyPlace | ErrorCode::Deadlock);
+            assert_eq!(all.iter().any(|refusal| refusal.code == code), !windowed, "{code:?}");
+        }
+    }
+}

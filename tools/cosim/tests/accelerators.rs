@@ -1,0 +1,140 @@
+//! Boards whose accelerator is another process or runs in lock step with the model. The model plays the
+//! hardware, with planted flaws: no simulator need be built.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use bitstream_model::external::{
+    Difference, DifferencePlace, ExternalAccelerator, ExternalError, LockStep, ModelAccelerator,
+    SimulatorProcess,
+};
+use bitstream_model::{BoardConfig, EmulatedBoard, Subnormals};
+use cosim::flaws::{Flawed, Flaws};
+use cosim::packets::packets;
+use cosim::{accesses, outcome, random};
+use pgs_interface::record::result;
+use step_folder::folder::Folder;
+use zynq_pgs::{Accelerator, BoardChoice, Error, OpenOptions, StepParameters};
+
+const NO_FLAWS: Flaws = Flaws { wrong: None, dies_after: u64::MAX, hangs_after: u64::MAX };
+
+fn config() -> BoardConfig {
+    BoardConfig { subnormals: Subnormals::Flush, ..BoardConfig::default() }
+}
+
+fn lock_step(flaws: Flaws) -> LockStep {
+    let model = ModelAccelerator::new(&config()).expect("a model");
+    LockStep::new(&config(), Box::new(Flawed::new(model, flaws)), None).expect("a lock step")
+}
+
+fn golden(name: &str) -> Folder {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden").join(name);
+    Folder::load(&path).expect("a folder of a recorded step")
+}
+
+/// A program that runs the model as a simulator with these options.
+fn program(folder: &Path, options: &str) -> PathBuf {
+    let path = folder.join("simulator");
+    let cosim = env!("CARGO_BIN_EXE_cosim");
+    fs::write(&path, format!("#!/bin/sh\nexec '{cosim}' model {options} \"$@\"\n"))
+        .expect("a file");
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("permissions");
+    path
+}
+
+fn board(accelerator: Box<dyn ExternalAccelerator>) -> EmulatedBoard {
+    EmulatedBoard::with_accelerator(config(), accelerator).expect("a board")
+}
+
+/// Steps a folder; the error, and whether the bodies are as before.
+fn step(board: &EmulatedBoard, folder: &Folder) -> (Option<Error>, bool) {
+    let choice = BoardChoice::Emulated(board.cpu_port());
+    let mut accelerator =
+        Accelerator::open(OpenOptions { board: choice, ..OpenOptions::default() }).expect("open");
+    accelerator.set_shapes(&folder.shapes).expect("shapes");
+    let mut bodies = folder.bodies.clone();
+    let parameters: &StepParameters = &folder.parameters;
+    let error = accelerator.step(&mut bodies, &folder.collisions, parameters).err();
+    (error, bodies == folder.bodies)
+}
+
+#[test]
+fn equals_run_random_steps_in_lock_step_without_a_difference() {
+    let mut both = lock_step(NO_FLAWS);
+    for seed in 1..=100 {
+        let case = random::case(seed);
+        let beats = packets(&case.scene, case.fault);
+        outcome::run(&mut both, &case.scene, &beats).unwrap_or_else(|e| panic!("{seed}: {e}"));
+    }
+}
+
+#[test]
+fn equals_take_random_register_accesses_alike() {
+    let mut both = lock_step(NO_FLAWS);
+    for seed in 1..=50 {
+        accesses::run(&mut both, seed).unwrap_or_else(|e| panic!("{seed}: {e}"));
+    }
+}
+
+#[test]
+fn a_wrong_word_is_named_with_its_record_and_its_values() {
+    let folder = golden("two_cubes");
+    let scene = cosim::recorded::scene(&folder);
+    let mut both = lock_step(Flaws { wrong: Some(1), ..NO_FLAWS });
+    let error = outcome::run(&mut both, &scene, &packets(&scene, None)).expect_err("a difference");
+    let ExternalError::Difference(difference) = error else { panic!("{error}") };
+    let Difference { place, cycle, model, hardware, .. } = *difference;
+    assert_eq!(place, DifferencePlace::Word { record: 1, row: result::LINEAR, word: 0 });
+    assert_eq!(model ^ hardware, 1);
+    assert!(cycle > 1000, "{cycle}");
+}
+
+#[test]
+fn the_driver_steps_on_an_accelerator_in_another_process() {
+    let files = tempfile::tempdir().expect("a folder");
+    let path = program(files.path(), "");
+    for both in [false, true] {
+        let mut accelerator: Box<dyn ExternalAccelerator> =
+            Box::new(SimulatorProcess::start(&path).expect("a simulator"));
+        if both {
+            accelerator =
+                Box::new(LockStep::new(&config(), accelerator, None).expect("a lock step"));
+        }
+        let board = board(accelerator);
+        let (error, untouched) = step(&board, &golden("two_cubes"));
+        assert!(error.is_none(), "{error:?} {:?}", board.accelerator_error());
+        assert!(!untouched);
+    }
+}
+
+#[test]
+fn a_simulator_that_dies_or_hangs_in_a_step_is_named_and_the_bodies_stay() {
+    let files = tempfile::tempdir().expect("a folder");
+    let folder = golden("two_cubes");
+    for (options, named) in
+        [("--dies-after 5", "has ended in the middle"), ("--hangs-after 5", "has not answered for")]
+    {
+        let path = program(files.path(), options);
+        let mut simulator = SimulatorProcess::start(&path).expect("a simulator");
+        simulator.set_deadline(Duration::from_millis(500));
+        let dead = board(Box::new(simulator));
+        let (error, untouched) = step(&dead, &folder);
+        assert!(error.is_some() && untouched);
+        let reason = dead.accelerator_error().expect("a reason");
+        assert!(reason.contains(named), "{reason}");
+    }
+    // Another one is not disturbed.
+    let simulator = SimulatorProcess::start(&program(files.path(), "")).expect("a simulator");
+    assert!(step(&board(Box::new(simulator)), &folder).0.is_none());
+}
+
+#[test]
+fn a_difference_ends_the_step_and_the_bodies_stay() {
+    let board = board(Box::new(lock_step(Flaws { wrong: Some(1), ..NO_FLAWS })));
+    let (error, untouched) = step(&board, &golden("two_cubes"));
+    assert!(error.is_some() && untouched);
+    let reason = board.accelerator_error().expect("a reason");
+    assert!(reason.contains("results, record 1, linear velocity, word 0"), "{reason}");
+}

@@ -1,0 +1,120 @@
+//! Tries the faults of the streams on a simulator of the hardware and on the model, and prints the
+//! driver's diagnoses side by side.
+
+use std::io::Write;
+
+use bitstream_model::interface::profile::FLOAT;
+use serde_json::json;
+
+use super::cells::{self, Cell};
+use super::trial::{Bench, CellResult};
+use super::{FaultsArgs, try_all};
+use crate::common::CommonArgs;
+use crate::failure::{Failure, Verdict};
+use crate::numbers::grouped;
+use crate::output::SCHEMA;
+use crate::output::table::{Column, heading, line};
+
+const COLUMNS: [Column; 6] = [
+    Column { name: "fault", unit: "", width: 14 },
+    Column { name: "on", unit: "", width: 5 },
+    Column { name: "tried", unit: "cells", width: 6 },
+    Column { name: "model's diagnosis", unit: "", width: 26 },
+    Column { name: "hardware's", unit: "", width: 26 },
+    Column { name: "equal", unit: "cells", width: 6 },
+];
+
+/// A cell, and its results on the model and on the hardware.
+struct Pair {
+    cell: Cell,
+    model: CellResult,
+    hardware: CellResult,
+}
+
+impl Pair {
+    /// Whether both passed with the same diagnosis.
+    fn equal(&self) -> bool {
+        self.model.passed() && self.hardware.passed() && self.model.cause == self.hardware.cause
+    }
+
+    /// The kind of fault, the direction of its channel and the diagnoses.
+    fn row(&self) -> [&'static str; 4] {
+        let way = match self.cell.channel() {
+            Some((_, bitstream_model::Direction::S2mm)) => "S2MM",
+            _ => "MM2S",
+        };
+        let cause = |found: &CellResult| found.cause.unwrap_or("none");
+        [self.cell.kind.name(), way, cause(&self.model), cause(&self.hardware)]
+    }
+}
+
+/// Tries all cells on both.
+pub(super) fn run(
+    args: &FaultsArgs,
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    let profile = args.profile.unwrap_or(&FLOAT);
+    let bench = Bench::like_simulator(profile)?;
+    let cells = cells::for_simulator(&bench);
+    if args.list {
+        for cell in &cells {
+            writeln!(out, "{:10} {}", profile.name, cell.plan)?;
+        }
+        return Ok(Verdict::Done);
+    }
+    let of_model = try_all(&bench, cells.clone());
+    let bench = bench.with(common.accelerator.clone());
+    let of_hardware = try_all(&bench, cells);
+    let pairs: Vec<Pair> = of_model
+        .into_iter()
+        .zip(of_hardware)
+        .map(|((cell, model), (_, hardware))| Pair { cell, model, hardware })
+        .collect();
+    if common.json {
+        let cells: Vec<_> = pairs
+            .iter()
+            .map(|pair| {
+                json!({
+                    "fault": pair.cell.plan.to_string(),
+                    "model": pair.model.cause,
+                    "hardware": pair.hardware.cause,
+                    "equal": pair.equal(),
+                })
+            })
+            .collect();
+        writeln!(out, "{:#}", json!({ "schema": SCHEMA, "verb": "faults", "cells": cells }))?;
+    } else {
+        print(&pairs, out)?;
+    }
+    let equal = !pairs.is_empty() && pairs.iter().all(Pair::equal);
+    Ok(if equal { Verdict::Done } else { Verdict::Differs })
+}
+
+fn print(pairs: &[Pair], out: &mut dyn Write) -> Result<(), Failure> {
+    heading(out, &COLUMNS)?;
+    let mut rows: Vec<[&str; 4]> = Vec::new();
+    for pair in pairs {
+        if !rows.contains(&pair.row()) {
+            rows.push(pair.row());
+        }
+    }
+    for row in rows {
+        let of_row = || pairs.iter().filter(|pair| pair.row() == row);
+        let [kind, way, model, hardware] = row.map(str::to_owned);
+        let equal = of_row().filter(|pair| pair.equal()).count();
+        let [tried, equal] = [of_row().count(), equal].map(|count| grouped(count as u64));
+        line(out, &COLUMNS, [kind, way, tried, model, hardware, equal])?;
+    }
+    for pair in pairs.iter().filter(|pair| !pair.equal()) {
+        writeln!(
+            out,
+            "FAILED '{}': model {}, hardware {} ({})",
+            pair.cell.plan,
+            pair.model.cause.unwrap_or("none"),
+            pair.hardware.cause.unwrap_or("none"),
+            pair.hardware.failed_checks().join(", "),
+        )?;
+    }
+    Ok(())
+}
