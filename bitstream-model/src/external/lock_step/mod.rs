@@ -69,6 +69,8 @@ pub struct LockStep {
     model_busy: bool,
     /// Whether one of them may still be in reset; its registers mean nothing then.
     resetting: bool,
+    /// Whether the last step ended with an error: its counters mean nothing then.
+    failed: bool,
     /// Whether a result was not a number: the sum of the words sent means nothing then.
     nan: bool,
 }
@@ -108,6 +110,7 @@ impl LockStep {
             busy: false,
             model_busy: false,
             resetting: false,
+            failed: false,
             nan: false,
         })
     }
@@ -187,7 +190,8 @@ impl LockStep {
         }
         self.compare_results()?;
         self.compare_registers(&[ERROR, ERROR_DETAIL])?;
-        if self.model.read(ERROR.offset)? != 0 {
+        self.failed = self.model.read(ERROR.offset)? != 0;
+        if self.failed {
             return Ok(());
         }
         for stream in 0..self.results.len() {
@@ -226,7 +230,9 @@ impl ExternalAccelerator for LockStep {
             self.resetting = reset != 0;
             return Ok(reset);
         }
-        let compared = !NOT_COMPARED.iter().any(|register| register.offset == offset);
+        let counters = if self.failed { COUNTERS } else { &[] };
+        let not_compared = || NOT_COMPARED.iter().chain(counters);
+        let compared = !not_compared().any(|register| register.offset == offset);
         if compared && !self.busy && !self.resetting && hardware != model {
             let place = DifferencePlace::Register { offset };
             return self.differs(place, self.cycle, [model, hardware]);
