@@ -3,7 +3,9 @@
 # then whole steps against Bullet's recorded bits and, beat by beat, against the model.
 #
 # usage: tools/scripts/rtl-test.sh             a few minutes
-#        tools/scripts/rtl-test.sh mutations   seeded mistakes in the Verilog instead: each must be found
+#        tools/scripts/rtl-test.sh steps       instead, the driver's whole steps through registers and DMA:
+#                                              all recorded ones, faults, 500 random ones in lock step
+#        tools/scripts/rtl-test.sh mutations   instead, seeded mistakes in the Verilog: each must be found
 #        tools/scripts/rtl-test.sh --help
 #
 # Installs Verilator and a C++ compiler (Debian's packages) where it may.
@@ -18,13 +20,13 @@ cd "$repository"
 mode=${1-}
 case $mode in
 -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0"; exit 0 ;;
-'' | mutations) ;;
+'' | steps | mutations) ;;
 *) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
 esac
 
 need_packages verilator g++ make
 # Optimised: a step of random words costs the model as much as the simulator.
-cargo build --release --quiet --locked -p rtlgen -p zynq-pgs-cosim
+cargo build --release --quiet --locked -p rtlgen -p zynq-pgs-cosim -p pgs
 built=$target_root/release
 
 if [ "$mode" = mutations ]; then
@@ -34,9 +36,11 @@ fi
 
 folder=$(mktemp -d)
 litter+=("$folder")
-attend "$built/rtlgen" operators --vectors "${VECTORS:-1000000}"
-attend "$built/rtlgen" sincos --all
-attend "$built/rtlgen" schedule
+if [ "$mode" = '' ]; then
+	attend "$built/rtlgen" operators --vectors "${VECTORS:-1000000}"
+	attend "$built/rtlgen" sincos --all
+	attend "$built/rtlgen" schedule
+fi
 
 # Both hazard modes are built side by side.
 begin "$built/rtlgen" simulator --out "$folder/interlocked"
@@ -47,13 +51,27 @@ await "$interlocked"
 await "$unchecked"
 
 recorded=(tests/golden/*/)
+simulators=("$folder/interlocked/pgs-rtl" "$folder/unchecked/pgs-rtl")
+if [ "$mode" = steps ]; then
+	if [ -n "${PGS_VECTORS-}" ]; then recorded+=("$PGS_VECTORS"/pile*/); fi
+	attend python3 tools/scripts/rtl_steps.py "$built/pgs" "${simulators[@]}" "${recorded[@]}"
+	attend "$built/pgs" check --board emulated --subnormals flush --accelerator "rtl:${simulators[0]}"
+	attend "$built/pgs" faults --accelerator "rtl:${simulators[0]}"
+	attend "$built/cosim" random --simulator "${simulators[0]}" --cases 500 --seed 5000000
+	attend "$built/cosim" registers --simulator "${simulators[0]}" --cases 500
+	exit
+fi
 if [ -n "${PGS_VECTORS-}" ]; then recorded+=("$PGS_VECTORS"/pile10*/); fi
 cases=${CASES:-400}
 for hazards in interlocked unchecked; do
 	cosim=(--simulator "$folder/$hazards/pgs-rtl" --hazards "$hazards")
 	attend "$built/cosim" recorded "${cosim[@]}" "${recorded[@]}"
 	attend "$built/cosim" random "${cosim[@]}" --cases "$cases"
+	attend "$built/cosim" errors "${cosim[@]}"
+	attend "$built/cosim" registers "${cosim[@]}" --cases $((cases / 4))
 done
 # Without the interlock the bits depend on the time at which beats come.
 attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $((cases / 5)) --seed 1000000 \
 	--gaps 300 --stalls 700
+attend "$built/pgs" solve tests/golden/two_cubes --compare --board emulated --subnormals flush \
+	--accelerator "both:${simulators[0]}"
