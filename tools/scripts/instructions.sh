@@ -131,7 +131,7 @@ while read -r profile limit; do
 	hold "$what" $((instructions * 10 / collisions)) "a collision" "$limit"
 done <<'LIMITS'
 float 3390
-half 13400
+half 5500
 mixed 2600
 LIMITS
 

@@ -40,21 +40,6 @@ pub(crate) fn round(value: f32) -> f32 {
     f32::from_bits((bits + half + odd) & !((1 << EXTRA_BITS) - 1))
 }
 
-/// As [`round`], in more operations and without a branch, so that the compiler vectorises it.
-#[inline(always)]
-pub(crate) fn round_without_branches(value: f32) -> f32 {
-    let magnitude = value.to_bits() & !SIGN;
-    let sign = value.to_bits() & SIGN;
-    let subnormal = ((f32::from_bits(magnitude) + 0.5) - 0.5).to_bits();
-    let odd = (magnitude >> EXTRA_BITS) & 1;
-    let half = (1 << (EXTRA_BITS - 1)) - 1;
-    let normal = (magnitude + half + odd) & !((1 << EXTRA_BITS) - 1);
-    let finite = if magnitude < SMALLEST_NORMAL { subnormal } else { normal };
-    let rounded = if magnitude < TOO_LARGE { finite } else { INFINITY };
-    // The sum overflows for a NaN alone.
-    f32::from_bits(if magnitude > INFINITY { f32::NAN.to_bits() } else { sign | rounded })
-}
-
 /// A binary16 word as a number. It has no branch, so that the compiler vectorises it.
 #[inline(always)]
 pub(crate) fn from_binary16(word: u32) -> f32 {

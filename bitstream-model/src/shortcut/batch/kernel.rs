@@ -8,7 +8,7 @@
 
 use super::Stage;
 use super::block::{Block, Words, kind};
-use super::numbers::Numbers;
+use super::numbers::{Arithmetic, Numbers};
 use pgs_interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 use pgs_support::lanes::{F32x16, Instructions, LANES, Mask, Quad};
@@ -19,74 +19,74 @@ use crate::accelerator::solver::SolverParameters;
 /// and the inverse inertia.
 pub(crate) type BodyRow = [Quad; 2];
 
-type Vector<N> = [N; 3];
+type Vector<A> = [Numbers<A>; 3];
 
 #[inline(always)]
-fn add<N: Numbers>(a: Vector<N>, b: Vector<N>) -> Vector<N> {
+fn add<A: Arithmetic>(a: Vector<A>, b: Vector<A>) -> Vector<A> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 #[inline(always)]
-fn sub<N: Numbers>(a: Vector<N>, b: Vector<N>) -> Vector<N> {
+fn sub<A: Arithmetic>(a: Vector<A>, b: Vector<A>) -> Vector<A> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-fn neg<N: Numbers>(a: Vector<N>) -> Vector<N> {
+fn neg<A: Arithmetic>(a: Vector<A>) -> Vector<A> {
     [-a[0], -a[1], -a[2]]
 }
 
 #[inline(always)]
-fn times<N: Numbers>(a: Vector<N>, s: N) -> Vector<N> {
+fn times<A: Arithmetic>(a: Vector<A>, s: Numbers<A>) -> Vector<A> {
     [a[0] * s, a[1] * s, a[2] * s]
 }
 
 #[inline(always)]
-fn dot<N: Numbers>(a: Vector<N>, b: Vector<N>) -> N {
+fn dot<A: Arithmetic>(a: Vector<A>, b: Vector<A>) -> Numbers<A> {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
 }
 
 #[inline(always)]
-fn cross<N: Numbers>(a: Vector<N>, b: Vector<N>) -> Vector<N> {
+fn cross<A: Arithmetic>(a: Vector<A>, b: Vector<A>) -> Vector<A> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// `a` where the mask says yes, and `b` elsewhere.
 #[inline(always)]
-fn either<N: Numbers>(mask: Mask, a: Vector<N>, b: Vector<N>) -> Vector<N> {
+fn either<A: Arithmetic>(mask: Mask, a: Vector<A>, b: Vector<A>) -> Vector<A> {
     [a[0].or(mask, b[0]), a[1].or(mask, b[1]), a[2].or(mask, b[2])]
 }
 
 /// The bodies of one side.
 #[derive(Clone, Copy)]
-struct Side<N> {
-    v: Vector<N>,
-    m: N,
-    w: Vector<N>,
-    k: N,
+struct Side<A> {
+    v: Vector<A>,
+    m: Numbers<A>,
+    w: Vector<A>,
+    k: Numbers<A>,
 }
 
 /// One constraint row of each collision.
 #[derive(Clone, Copy)]
-struct Row<N> {
-    direction: Vector<N>,
-    moment_a: Vector<N>,
-    moment_b: Vector<N>,
+struct Row<A> {
+    direction: Vector<A>,
+    moment_a: Vector<A>,
+    moment_b: Vector<A>,
     /// Products of the inverse inertias and the moments.
-    spin_a: Vector<N>,
-    spin_b: Vector<N>,
-    jacobian: N,
+    spin_a: Vector<A>,
+    spin_b: Vector<A>,
+    jacobian: Numbers<A>,
 }
 
-impl<N: Numbers> Row<N> {
+impl<A: Arithmetic> Row<A> {
     #[inline(always)]
     fn new(
-        minus_one: N,
-        direction: Vector<N>,
-        arm_a: Vector<N>,
-        arm_b: Vector<N>,
-        a: &Side<N>,
-        b: &Side<N>,
+        minus_one: Numbers<A>,
+        direction: Vector<A>,
+        arm_a: Vector<A>,
+        arm_b: Vector<A>,
+        a: &Side<A>,
+        b: &Side<A>,
     ) -> Self {
         let moment_a = cross(arm_a, direction);
         let moment_b = neg(cross(arm_b, direction));
@@ -98,7 +98,7 @@ impl<N: Numbers> Row<N> {
     }
 
     #[inline(always)]
-    fn speed(&self, a: &Side<N>, b: &Side<N>) -> N {
+    fn speed(&self, a: &Side<A>, b: &Side<A>) -> Numbers<A> {
         ((dot(self.direction, a.v) + dot(self.moment_a, a.w)) + dot(neg(self.direction), b.v))
             + dot(self.moment_b, b.w)
     }
@@ -108,11 +108,11 @@ impl<N: Numbers> Row<N> {
     #[inline(always)]
     fn apply(
         &self,
-        impulse: N,
+        impulse: Numbers<A>,
         active: Option<Mask>,
-        [push_a, push_b]: [Vector<N>; 2],
-        a: &mut Side<N>,
-        b: &mut Side<N>,
+        [push_a, push_b]: [Vector<A>; 2],
+        a: &mut Side<A>,
+        b: &mut Side<A>,
     ) {
         let before = (a.v, a.w, b.v, b.w);
         a.v = add(a.v, times(push_a, impulse));
@@ -130,13 +130,13 @@ impl<N: Numbers> Row<N> {
 
 /// Two unit vectors across each `n`, with one root and one quotient for both branches.
 #[inline(always)]
-fn tangents<N: Numbers>(n: Vector<N>) -> [Vector<N>; 2] {
-    let zero = N::splat(0.0);
+fn tangents<A: Arithmetic>(arithmetic: A, n: Vector<A>) -> [Vector<A>; 2] {
+    let zero = arithmetic.splat(0.0);
     let [x, y, z] = n;
-    let steep = z.abs().above(N::splat(TANGENT_Z));
+    let steep = z.abs().above(arithmetic.splat(TANGENT_Z));
     let (p, q, r) = (y.or(steep, x), z.or(steep, y), x.or(steep, z));
     let s = p * p + q * q;
-    let k = N::splat(1.0) / s.sqrt();
+    let k = arithmetic.splat(1.0) / s.sqrt();
     let (u, v, w) = ((-q) * k, p * k, s * k);
     let (g, h) = ((-r) * v, r * u);
     let t0 = either(steep, [zero, u, v], [u, v, zero]);
@@ -145,8 +145,8 @@ fn tangents<N: Numbers>(n: Vector<N>) -> [Vector<N>; 2] {
 }
 
 #[inline(always)]
-fn unit<N: Numbers>(a: Vector<N>) -> Vector<N> {
-    times(a, N::splat(1.0) / dot(a, a).sqrt())
+fn unit<A: Arithmetic>(arithmetic: A, a: Vector<A>) -> Vector<A> {
+    times(a, arithmetic.splat(1.0) / dot(a, a).sqrt())
 }
 
 /// The input of a pass beside the collisions.
@@ -161,8 +161,8 @@ pub(crate) struct Pass<'a> {
 }
 
 #[inline(always)]
-fn vector<N: Numbers>(words: &[Words; 3]) -> Vector<N> {
-    [N::load(&words[0]), N::load(&words[1]), N::load(&words[2])]
+fn vector<A: Arithmetic>(arithmetic: A, words: &[Words; 3]) -> Vector<A> {
+    [arithmetic.load(&words[0]), arithmetic.load(&words[1]), arithmetic.load(&words[2])]
 }
 
 /// Whether a bit is set in each lane's kind.
@@ -177,11 +177,12 @@ fn tested(block: &Block, bit: u32) -> Mask {
 ///
 /// The rows exist, and no other thread writes them at the same time.
 #[inline(always)]
-unsafe fn side<N: Numbers>(
+unsafe fn side<A: Arithmetic>(
+    arithmetic: A,
     instructions: impl Instructions,
     bodies: *const BodyRow,
     rows: &Words<u32>,
-) -> Side<N> {
+) -> Side<A> {
     let (mut linear, mut angular) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
     for (lane, row) in rows.iter().enumerate() {
         // SAFETY: the caller promises that the row exists.
@@ -189,8 +190,8 @@ unsafe fn side<N: Numbers>(
         // SAFETY: the caller promises that it can be read.
         [linear[lane], angular[lane]] = unsafe { *body };
     }
-    let [x, y, z, m] = instructions.columns(linear).map(N::of);
-    let [p, q, r, k] = instructions.columns(angular).map(N::of);
+    let [x, y, z, m] = instructions.columns(linear).map(|numbers| arithmetic.of(numbers));
+    let [p, q, r, k] = instructions.columns(angular).map(|numbers| arithmetic.of(numbers));
     Side { v: [x, y, z], m, w: [p, q, r], k }
 }
 
@@ -200,15 +201,15 @@ unsafe fn side<N: Numbers>(
 ///
 /// The rows exist, and no other thread accesses them at the same time.
 #[inline(always)]
-unsafe fn put_side<N: Numbers>(
+unsafe fn put_side<A: Arithmetic>(
     instructions: impl Instructions,
     bodies: *mut BodyRow,
     rows: &Words<u32>,
-    side: &Side<N>,
+    side: &Side<A>,
 ) {
     let ([x, y, z], [p, q, r]) = (side.v, side.w);
-    let linear = instructions.quads([x, y, z, side.m].map(N::lanes));
-    let angular = instructions.quads([p, q, r, side.k].map(N::lanes));
+    let linear = instructions.quads([x, y, z, side.m].map(Numbers::lanes));
+    let angular = instructions.quads([p, q, r, side.k].map(Numbers::lanes));
     for (lane, row) in rows.iter().enumerate() {
         // SAFETY: the caller promises that the row exists.
         let body = unsafe { bodies.add(*row as usize) };
@@ -224,7 +225,8 @@ unsafe fn put_side<N: Numbers>(
 /// The rows of the block and the spare one exist. While this runs, no other thread writes the block's
 /// rows, and none reads the rows of its moving bodies or the spare one.
 #[inline(always)]
-pub(crate) unsafe fn solve<N: Numbers>(
+pub(crate) unsafe fn solve<A: Arithmetic>(
+    arithmetic: A,
     instructions: impl Instructions,
     pass: &Pass<'_>,
     block: &mut Block,
@@ -232,15 +234,15 @@ pub(crate) unsafe fn solve<N: Numbers>(
 ) {
     let moves = kind::MOVES.map(|bit| tested(block, bit));
     let counts = F32x16::from_fn(|lane| (block.kind[lane] & kind::COUNT) as f32);
-    let counts = N::of(counts);
+    let counts = arithmetic.of(counts);
     // SAFETY: the caller promises that the rows exist and that no other thread writes them.
-    let mut a = unsafe { side(instructions, bodies, &block.rows[0]) };
+    let mut a = unsafe { side(arithmetic, instructions, bodies, &block.rows[0]) };
     // SAFETY: the caller promises that the rows exist and that no other thread writes them.
-    let mut b = unsafe { side(instructions, bodies, &block.rows[1]) };
+    let mut b = unsafe { side(arithmetic, instructions, bodies, &block.rows[1]) };
     if pass.stage.contact {
-        contact(pass, block, counts, &mut a, &mut b);
+        contact(arithmetic, pass, block, counts, &mut a, &mut b);
     } else {
-        friction(pass, block, counts, &mut a, &mut b);
+        friction(arithmetic, pass, block, counts, &mut a, &mut b);
     }
     for (each, side) in [a, b].iter().enumerate() {
         let mut written = block.rows[each];
@@ -262,63 +264,65 @@ fn some(active: Mask) -> Option<Mask> {
 }
 
 #[inline(always)]
-fn contact<N: Numbers>(
+fn contact<A: Arithmetic>(
+    arithmetic: A,
     pass: &Pass<'_>,
     block: &mut Block,
-    counts: N,
-    a: &mut Side<N>,
-    b: &mut Side<N>,
+    counts: Numbers<A>,
+    a: &mut Side<A>,
+    b: &mut Side<A>,
 ) {
-    let zero = N::splat(0.0);
-    let minus_one = N::splat(-1.0);
-    let per_second = N::splat(1.0 / pass.parameters.time_step);
-    let drift = N::splat(pass.parameters.drift);
-    let coefficient = N::splat(pass.parameters.coefficient);
-    let n = vector(&block.normal);
-    let position_a = vector(&block.position_a);
-    let position_b = vector(&block.position_b);
+    let zero = arithmetic.splat(0.0);
+    let minus_one = arithmetic.splat(-1.0);
+    let per_second = arithmetic.splat(1.0 / pass.parameters.time_step);
+    let drift = arithmetic.splat(pass.parameters.drift);
+    let coefficient = arithmetic.splat(pass.parameters.coefficient);
+    let n = vector(arithmetic, &block.normal);
+    let position_a = vector(arithmetic, &block.position_a);
+    let position_b = vector(arithmetic, &block.position_b);
     let pushes = [times(n, a.m), times(neg(n), b.m)];
     for k in 0..CONTACT_POINTS {
         let [x, y, z, distance] = &block.contacts[k];
-        let point = [N::load(x), N::load(y), N::load(z)];
-        let distance = N::load(distance);
+        let point = [arithmetic.load(x), arithmetic.load(y), arithmetic.load(z)];
+        let distance = arithmetic.load(distance);
         let arms = (sub(point, position_a), sub(point, position_b));
         let row = Row::new(minus_one, n, arms.0, arms.1, a, b);
-        let reached = counts.above(N::splat(k as f32));
+        let reached = counts.above(arithmetic.splat(k as f32));
         let active = some(reached.without(row.jacobian.is_zero()));
         let bias = ((distance + drift) * coefficient) * per_second;
         let wanted = (row.speed(a, b) + bias) * row.jacobian;
-        let before = N::load(&block.impulses[k]);
+        let before = arithmetic.load(&block.impulses[k]);
         let after = (before + wanted).larger(zero);
         let stored = match active {
             None => after,
             Some(active) => after.or(active, before),
         };
-        Numbers::store(stored, &mut block.impulses[k]);
+        stored.store(&mut block.impulses[k]);
         row.apply(after - before, active, pushes, a, b);
     }
 }
 
 #[inline(always)]
-fn friction<N: Numbers>(
+fn friction<A: Arithmetic>(
+    arithmetic: A,
     pass: &Pass<'_>,
     block: &mut Block,
-    counts: N,
-    a: &mut Side<N>,
-    b: &mut Side<N>,
+    counts: Numbers<A>,
+    a: &mut Side<A>,
+    b: &mut Side<A>,
 ) {
-    let one = N::splat(1.0);
-    let minus_one = N::splat(-1.0);
-    let q = neg(vector(&block.normal));
-    let position_a = vector(&block.position_a);
-    let position_b = vector(&block.position_b);
-    let taken = counts.above(N::splat(0.0));
+    let one = arithmetic.splat(1.0);
+    let minus_one = arithmetic.splat(-1.0);
+    let q = neg(vector(arithmetic, &block.normal));
+    let position_a = vector(arithmetic, &block.position_a);
+    let position_b = vector(arithmetic, &block.position_b);
+    let taken = counts.above(arithmetic.splat(0.0));
     let [x, y, z, _] = &block.contacts[0];
-    let mut sum = [N::load(x), N::load(y), N::load(z)];
+    let mut sum = [arithmetic.load(x), arithmetic.load(y), arithmetic.load(z)];
     for k in 1..CONTACT_POINTS {
         let [x, y, z, _] = &block.contacts[k];
-        let more = add(sum, [N::load(x), N::load(y), N::load(z)]);
-        sum = match some(counts.above(N::splat(k as f32))) {
+        let more = add(sum, [arithmetic.load(x), arithmetic.load(y), arithmetic.load(z)]);
+        sum = match some(counts.above(arithmetic.splat(k as f32))) {
             None => more,
             Some(reached) => either(reached, more, sum),
         };
@@ -328,35 +332,35 @@ fn friction<N: Numbers>(
     let arm_b = sub(centre, position_b);
     if pass.stage.turning {
         let [l0, l1, l2, l3] = &block.impulses;
-        let (l0, l1) = (N::load(l0), N::load(l1));
-        let (l2, l3) = (N::load(l2), N::load(l3));
-        Numbers::store(((l0 + l1) + l2) + l3, &mut block.impulses[0]);
+        let (l0, l1) = (arithmetic.load(l0), arithmetic.load(l1));
+        let (l2, l3) = (arithmetic.load(l2), arithmetic.load(l3));
+        (((l0 + l1) + l2) + l3).store(&mut block.impulses[0]);
         for k in 1..CONTACT_POINTS {
-            Numbers::store(N::splat(0.0), &mut block.impulses[k]);
+            arithmetic.splat(0.0).store(&mut block.impulses[k]);
         }
     }
-    let limit = N::splat(pass.parameters.friction) * N::load(&block.impulses[0]);
-    let tangents = tangents(q);
+    let limit = arithmetic.splat(pass.parameters.friction) * arithmetic.load(&block.impulses[0]);
+    let tangents = tangents(arithmetic, q);
     for (k, t) in tangents.into_iter().enumerate() {
         let row = Row::new(minus_one, t, arm_a, arm_b, a, b);
         let active = some(taken.without(row.jacobian.is_zero()));
         let wanted = row.speed(a, b) * row.jacobian;
-        let before = N::load(&block.impulses[1 + k]);
+        let before = arithmetic.load(&block.impulses[1 + k]);
         let after = (before + wanted).larger(-limit).smaller(limit);
         let stored = match active {
             None => after,
             Some(active) => after.or(active, before),
         };
-        Numbers::store(stored, &mut block.impulses[1 + k]);
+        stored.store(&mut block.impulses[1 + k]);
         let pushes = [times(t, a.m), times(neg(t), b.m)];
         row.apply(after - before, active, pushes, a, b);
     }
     let spins = if pass.finds {
-        let apart = unit(sub(position_b, position_a));
-        let cosine = dot(apart, unit(arm_a));
+        let apart = unit(arithmetic, sub(position_b, position_a));
+        let cosine = dot(apart, unit(arithmetic, arm_a));
         // By the rounded inverse mass: a small one may be zero in sixteen bits.
         let static_side = taken.and(a.m.is_zero().either(b.m.is_zero()));
-        let spins = cosine.above(N::splat(SPIN_COSINE)).either(static_side);
+        let spins = cosine.above(arithmetic.splat(SPIN_COSINE)).either(static_side);
         let bits = spins.bits();
         for (lane, kind) in block.kind.iter_mut().enumerate() {
             let bit = if bits >> lane & 1 != 0 { kind::SPINS } else { 0 };
@@ -367,7 +371,7 @@ fn friction<N: Numbers>(
         tested(block, kind::SPINS)
     };
     if spins.any() {
-        let share = N::splat(SPIN_DAMPING);
+        let share = arithmetic.splat(SPIN_DAMPING);
         let spin_a = dot(q, a.w);
         let spin_b = dot(q, b.w);
         a.w = either(spins, sub(a.w, times(q, spin_a * share)), a.w);

@@ -4,121 +4,150 @@
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use pgs_support::lanes::{F32x16, Mask};
+use pgs_support::lanes::{F32x16, Instructions, Mask};
 
 use super::block::Words;
-use crate::accelerator::arithmetic::number::{Format, Half, Number, Single};
-use crate::accelerator::arithmetic::sixteen;
+use crate::accelerator::arithmetic::number::{Format, Half, Single};
 
-/// One number of a format in each lane.
-pub(crate) trait Numbers:
-    Copy
-    + Debug
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-{
-    /// Takes numbers that are of the format already.
-    fn of(numbers: F32x16) -> Self;
+/// A format that the batch computes in.
+pub(crate) trait Computed: Format {
+    /// Its arithmetic by these instructions.
+    fn arithmetic(instructions: impl Instructions) -> impl Arithmetic;
+}
 
-    /// The numbers as f32.
-    fn lanes(self) -> F32x16;
+impl Computed for Single {
+    #[inline(always)]
+    fn arithmetic(_: impl Instructions) -> impl Arithmetic {
+        Singles
+    }
+}
+
+impl Computed for Half {
+    #[inline(always)]
+    fn arithmetic(instructions: impl Instructions) -> impl Arithmetic {
+        Halves(instructions)
+    }
+}
+
+/// The arithmetic of a format in all lanes.
+pub(crate) trait Arithmetic: Copy + Debug {
+    /// The format.
+    type Format: Format;
 
     /// The nearest number of the format in each lane.
-    fn splat(number: f32) -> Self;
+    fn round(self, numbers: F32x16) -> F32x16;
 
-    fn sqrt(self) -> Self;
+    /// Takes numbers that are of the format already.
+    #[inline(always)]
+    fn of(self, numbers: F32x16) -> Numbers<Self> {
+        Numbers(numbers, self)
+    }
+
+    /// The number of the format that is nearest to `number`, in every lane.
+    #[inline(always)]
+    fn splat(self, number: f32) -> Numbers<Self> {
+        self.of(F32x16::splat(Self::Format::round(number)))
+    }
+
+    /// Loads numbers that are of the format already.
+    #[inline(always)]
+    fn load(self, words: &Words) -> Numbers<Self> {
+        self.of(F32x16::from_array(*words))
+    }
+}
+
+/// The arithmetic of f32.
+#[derive(Debug, Clone, Copy)]
+struct Singles;
+
+impl Arithmetic for Singles {
+    type Format = Single;
 
     #[inline(always)]
-    fn load(words: &Words) -> Self {
-        Self::of(F32x16::from_array(*words))
+    fn round(self, numbers: F32x16) -> F32x16 {
+        numbers
+    }
+}
+
+/// The arithmetic of binary16. The instructions round the result of each operation.
+#[derive(Debug, Clone, Copy)]
+struct Halves<I>(I);
+
+impl<I: Instructions> Arithmetic for Halves<I> {
+    type Format = Half;
+
+    #[inline(always)]
+    fn round(self, numbers: F32x16) -> F32x16 {
+        self.0.round_to_halves(numbers)
+    }
+}
+
+/// One number of a format in each lane.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Numbers<A>(F32x16, A);
+
+impl<A: Arithmetic> Numbers<A> {
+    /// The numbers as f32.
+    #[inline(always)]
+    pub(crate) fn lanes(self) -> F32x16 {
+        self.0
     }
 
     #[inline(always)]
-    fn store(self, words: &mut Words) {
-        *words = self.lanes().to_array();
+    pub(crate) fn store(self, words: &mut Words) {
+        *words = self.0.to_array();
+    }
+
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        Self(self.1.round(self.0.sqrt()), self.1)
     }
 
     /// The absolute value.
     #[inline(always)]
-    fn abs(self) -> Self {
-        Self::of(self.lanes().abs())
+    pub(crate) fn abs(self) -> Self {
+        Self(self.0.abs(), self.1)
     }
 
     /// Whether it is larger; false for a NaN.
     #[inline(always)]
-    fn above(self, other: Self) -> Mask {
-        self.lanes().above(other.lanes())
+    pub(crate) fn above(self, other: Self) -> Mask {
+        self.0.above(other.0)
     }
 
     /// Whether it is a zero of either sign.
     #[inline(always)]
-    fn is_zero(self) -> Mask {
-        self.lanes().is(F32x16::splat(0.0))
+    pub(crate) fn is_zero(self) -> Mask {
+        self.0.is(F32x16::splat(0.0))
     }
 
     /// `if a > b then a else b`.
     #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        Self::of(self.lanes().larger(other.lanes()))
+    pub(crate) fn larger(self, other: Self) -> Self {
+        Self(self.0.larger(other.0), self.1)
     }
 
     /// `if a < b then a else b`.
     #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
-        Self::of(self.lanes().smaller(other.lanes()))
+    pub(crate) fn smaller(self, other: Self) -> Self {
+        Self(self.0.smaller(other.0), self.1)
     }
 
     /// Selects these lanes where the mask is set, and `other` elsewhere.
     #[inline(always)]
-    fn or(self, mask: Mask, other: Self) -> Self {
-        Self::of(self.lanes().or(mask, other.lanes()))
-    }
-}
-
-impl Numbers for F32x16 {
-    #[inline(always)]
-    fn of(numbers: Self) -> Self {
-        numbers
-    }
-
-    #[inline(always)]
-    fn lanes(self) -> Self {
-        self
-    }
-
-    #[inline(always)]
-    fn splat(number: f32) -> Self {
-        Self::splat(number)
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-}
-
-/// A binary16 number in each lane.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Sixteens(F32x16);
-
-impl Sixteens {
-    #[inline(always)]
-    fn rounded(numbers: F32x16) -> Self {
-        Self(numbers.map(sixteen::round_without_branches))
+    pub(crate) fn or(self, mask: Mask, other: Self) -> Self {
+        Self(self.0.or(mask, other.0), self.1)
     }
 }
 
 macro_rules! operators {
     ($($operator:ident $method:ident),*) => {$(
-        impl $operator for Sixteens {
+        impl<A: Arithmetic> $operator for Numbers<A> {
             type Output = Self;
 
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Self::rounded($operator::$method(self.0, other.0))
+                Self(self.1.round($operator::$method(self.0, other.0)), self.1)
             }
         }
     )*};
@@ -126,49 +155,13 @@ macro_rules! operators {
 
 operators!(Add add, Sub sub, Mul mul, Div div);
 
-impl Neg for Sixteens {
+impl<A: Arithmetic> Neg for Numbers<A> {
     type Output = Self;
 
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(-self.0)
+        Self(-self.0, self.1)
     }
-}
-
-impl Numbers for Sixteens {
-    #[inline(always)]
-    fn of(numbers: F32x16) -> Self {
-        Self(numbers)
-    }
-
-    #[inline(always)]
-    fn lanes(self) -> F32x16 {
-        self.0
-    }
-
-    #[inline(always)]
-    fn splat(number: f32) -> Self {
-        Self(F32x16::splat(Number::<Half>::new(number).value()))
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self::rounded(self.0.sqrt())
-    }
-}
-
-/// A format that the batch computes in.
-pub(crate) trait Computed: Format {
-    /// Its numbers, side by side.
-    type Numbers: Numbers;
-}
-
-impl Computed for Single {
-    type Numbers = F32x16;
-}
-
-impl Computed for Half {
-    type Numbers = Sixteens;
 }
 
 #[cfg(test)]
@@ -176,6 +169,8 @@ mod tests {
     use pgs_support::lanes::{InstructionSet, Instructions, LANES, Work};
 
     use super::*;
+    use crate::accelerator::arithmetic::number::Number;
+    use crate::accelerator::arithmetic::sixteen;
 
     /// All NaNs as one.
     fn bits(number: f32) -> u32 {
@@ -190,13 +185,14 @@ mod tests {
 
         #[inline(always)]
         fn run(self, instructions: impl Instructions) {
-            let read = |numbers: Sixteens| numbers.lanes().to_array();
+            let halves = Halves(instructions);
+            let read = |numbers: Numbers<_>| numbers.lanes().to_array();
             for pairs in self.0.chunks(LANES) {
                 let (mut a, mut b) = ([0.0; LANES], [0.0; LANES]);
                 for (lane, pair) in pairs.iter().enumerate() {
                     (a[lane], b[lane]) = *pair;
                 }
-                let (p, q) = (Sixteens::load(&a), Sixteens::load(&b));
+                let (p, q) = (halves.load(&a), halves.load(&b));
                 let [sums, differences] = [p + q, p - q].map(read);
                 let [products, quotients] = [p * q, p / q].map(read);
                 let [roots, opposites, absolutes] = [p.sqrt(), -p, p.abs()].map(read);
@@ -233,16 +229,17 @@ mod tests {
 
         #[inline(always)]
         fn run(self, instructions: impl Instructions) {
+            let halves = Halves(instructions);
             for numbers in self.0.chunks(LANES) {
                 let mut words = [0.0; LANES];
                 words[..numbers.len()].copy_from_slice(numbers);
-                let found = Sixteens::rounded(F32x16::from_array(words)).lanes().to_array();
+                let found = halves.round(F32x16::from_array(words)).to_array();
                 for (number, found) in numbers.iter().zip(found) {
                     let expected = Number::<Half>::new(*number).value();
-                    assert_eq!(bits(found), bits(expected), "{instructions:?} {number:e}");
+                    assert_eq!(found.to_bits(), expected.to_bits(), "{instructions:?} {number:e}");
                 }
             }
-            let [first, ..] = Sixteens::splat(0.1).lanes().to_array();
+            let [first, ..] = halves.splat(0.1).lanes().to_array();
             assert_eq!(first.to_bits(), Number::<Half>::new(0.1).value().to_bits());
         }
     }

@@ -334,9 +334,10 @@ impl<F: Computed> Work for ChunkWork<'_, F> {
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
             }
+            let arithmetic = F::arithmetic(instructions);
             // SAFETY: the same holds for the rows of its bodies, and for the spare one.
             unsafe {
-                kernel::solve::<F::Numbers>(instructions, &self.pass, block, self.field.bodies);
+                kernel::solve(arithmetic, instructions, &self.pass, block, self.field.bodies);
             }
             if self.pass.stage.contact && self.pass.stage.turning {
                 *self.sum = self.sum.saturating_add(counted::<F>(block));

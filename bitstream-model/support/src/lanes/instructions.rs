@@ -1,11 +1,12 @@
-//! The SIMD instructions that a processor may have: compiles work for each set, and turns quads
-//! into columns, for which the compiler finds no good instructions by itself.
+//! The SIMD instructions that a processor may have: compiles work for each set, turns quads into
+//! columns, and rounds to binary16. For the latter two the compiler finds no good instructions by
+//! itself.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
 use std::fmt::Debug;
 
-use super::{F32x16, LANES};
+use super::{F32x16, LANES, halves};
 
 /// Four numbers in memory.
 pub type Quad = [f32; 4];
@@ -26,6 +27,13 @@ pub trait Instructions: Copy + Debug {
 
     /// One quad for each lane, from the numbers by their place in it.
     fn quads(self, columns: [F32x16; 4]) -> [Quad; LANES];
+
+    /// The binary16 number nearest to each number, as the f32 of the same value.
+    ///
+    /// A tie goes to the even number. A magnitude of half a step or more beyond 65504 becomes
+    /// infinite. Subnormal numbers of binary16 are kept, and zeros keep their sign. Every NaN
+    /// becomes [`f32::NAN`]: sign and payload are lost.
+    fn round_to_halves(self, numbers: F32x16) -> F32x16;
 
     /// The columns of quads that lie `stride` quads apart.
     ///
@@ -67,6 +75,11 @@ impl Instructions for Target {
         let [a, b, c, d] = columns.map(F32x16::to_array);
         super::each(|lane| [a[lane], b[lane], c[lane], d[lane]])
     }
+
+    #[inline(always)]
+    fn round_to_halves(self, numbers: F32x16) -> F32x16 {
+        numbers.map(halves::nearest)
+    }
 }
 
 /// Defines a set of x86-64 instructions; `$parts` of its registers hold all lanes.
@@ -75,7 +88,7 @@ macro_rules! instructions {
     (
         $(#[$meta:meta])*
         $name:ident: [$register:ident; $parts:literal], $features:literal,
-        $low:ident $high:ident $shuffle:ident
+        $low:ident $high:ident $shuffle:ident $narrow:ident $widen:ident
     ) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy)]
@@ -99,6 +112,13 @@ macro_rules! instructions {
                     $shuffle::<0x44>(high_ab, high_cd),
                     $shuffle::<0xEE>(high_ab, high_cd),
                 ]
+            }
+
+            /// Rounds to binary16 and back. A NaN keeps its sign and the head of its payload.
+            #[inline]
+            #[target_feature(enable = $features)]
+            fn rounded_part(numbers: $register) -> $register {
+                $widen($narrow::<_MM_FROUND_TO_NEAREST_INT>(numbers))
             }
 
             #[inline(always)]
@@ -133,14 +153,27 @@ macro_rules! instructions {
                 let rows: [[Quad; 4]; 4] = rows.map(|row| bytemuck::cast(row.0));
                 super::each(|lane| rows[lane % 4][lane / 4])
             }
+
+            #[inline(always)]
+            fn round_to_halves(self, numbers: F32x16) -> F32x16 {
+                let mut parts: [$register; $parts] = bytemuck::cast(numbers.0);
+                for part in &mut parts {
+                    // SAFETY: a value of this type, such as `self`, is made in
+                    // `InstructionSet::all` alone, where the processor has the features.
+                    *part = unsafe { Self::rounded_part(*part) };
+                }
+                let rounded = F32x16(bytemuck::cast(parts));
+                rounded.or(numbers.is(numbers), F32x16::splat(f32::NAN))
+            }
         }
     };
 }
 
 #[cfg(target_arch = "x86_64")]
 instructions! {
-    /// AVX2: a register holds eight lanes.
-    Avx2: [__m256; 2], "avx2", _mm256_unpacklo_ps _mm256_unpackhi_ps _mm256_shuffle_ps
+    /// AVX2 with F16C, which all processors with AVX2 have: a register holds eight lanes.
+    Avx2: [__m256; 2], "avx2,f16c",
+    _mm256_unpacklo_ps _mm256_unpackhi_ps _mm256_shuffle_ps _mm256_cvtps_ph _mm256_cvtph_ps
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -148,7 +181,7 @@ instructions! {
     /// The part of AVX-512 that all its server and desktop processors have: a register holds all
     /// lanes.
     Avx512: [__m512; 1], "avx512f,avx512bw,avx512dq,avx512vl",
-    _mm512_unpacklo_ps _mm512_unpackhi_ps _mm512_shuffle_ps
+    _mm512_unpacklo_ps _mm512_unpackhi_ps _mm512_shuffle_ps _mm512_cvtps_ph _mm512_cvtph_ps
 }
 
 /// A set of instructions that the processor has.
@@ -169,7 +202,8 @@ impl InstructionSet {
     pub fn all() -> impl Iterator<Item = Self> {
         let target = Some(Kind::Target(Target));
         #[cfg(target_arch = "x86_64")]
-        let avx2 = is_x86_feature_detected!("avx2").then_some(Kind::Avx2(Avx2(())));
+        let avx2 = (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("f16c"))
+            .then_some(Kind::Avx2(Avx2(())));
         #[cfg(not(target_arch = "x86_64"))]
         let avx2 = None;
         #[cfg(target_arch = "x86_64")]

@@ -3,7 +3,8 @@
 //! Every operation is written lane by lane in plain Rust, and each lane has the bits of the same
 //! operation on one f32: one rounding, subnormals kept, nothing contracted. The numbers lie in a
 //! vector register type, from which the compiler sees that the sixteen operations are one: so the
-//! code has no intrinsics for arithmetic and is the same for every processor.
+//! code has no intrinsics for arithmetic and is the same for every processor. The exceptions are
+//! operations for which the compiler finds no good instructions: [`Instructions`] has them.
 //!
 //! ```text
 //! Work ── InstructionSet::run ──> the work, compiled for AVX-512, for AVX2, or for the target
@@ -12,6 +13,7 @@
 //! [`InstructionSet::run`] enables the instructions around some [`Work`]. All between must be
 //! `#[inline(always)]`: a function that is called apart is compiled for the target alone.
 
+mod halves;
 mod instructions;
 #[cfg(test)]
 mod tests;

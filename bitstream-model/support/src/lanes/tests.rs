@@ -148,3 +148,47 @@ fn quads_become_columns_and_columns_become_quads() {
         set.run(Columns);
     }
 }
+
+/// Rounds to binary16 in all lanes, and compares the bits with the bits of [`halves::nearest`].
+struct Halves<'a>(&'a [u32]);
+
+impl Work for Halves<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, instructions: impl Instructions) {
+        for words in self.0.chunks(LANES) {
+            let numbers = each(|lane| f32::from_bits(words[lane % words.len()]));
+            let found = instructions.round_to_halves(F32x16::from_array(numbers)).to_array();
+            for (found, number) in found.into_iter().zip(numbers) {
+                let (found, expected) = (found.to_bits(), halves::nearest(number).to_bits());
+                let number = number.to_bits();
+                assert_eq!(found, expected, "{instructions:?}: {number:#010x}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_number_is_rounded_to_the_same_half() {
+    // Sign, exponent and ten bits of the mantissa say where a number lies between two numbers of
+    // binary16 or on one of them; the tails are the lower number, the middle, and their neighbours.
+    const TAILS: [u32; 7] = [0, 1, 0x0FFF, 0x1000, 0x1001, 0x1FFE, 0x1FFF];
+    // Miri interprets, and takes a few.
+    let step = if cfg!(miri) { 4_001 } else { 1 };
+    let heads = (0..1_u32 << 19).step_by(step);
+    let mut words: Vec<u32> = heads.flat_map(|head| TAILS.map(|tail| head << 13 | tail)).collect();
+    // Below 2^-14 the numbers of binary16 are multiples of 2^-24, and the middles are odd
+    // multiples of 2^-25.
+    for multiple in (0..=1_u32 << 11).step_by(step) {
+        let middle = (multiple as f32 * f32::from_bits((127 - 25) << 23)).to_bits();
+        let near = [middle.saturating_sub(1), middle, middle + 1];
+        words.extend(near.iter().flat_map(|word| [*word, word | 0x8000_0000]));
+    }
+    // Words without an order: the multiplier is odd, so that none comes twice.
+    let scattered = |at: u32| at.wrapping_mul(0x9E37_79B1).rotate_left(9);
+    words.extend((0..1 << 20).step_by(step).map(scattered));
+    for set in InstructionSet::all() {
+        set.run(Halves(&words));
+    }
+}
