@@ -28,8 +28,9 @@ use pgs_interface::control::{AP_CTRL, RESET, ap_ctrl};
 
 /// Beats of each stream that are offered at once.
 const OFFERED_BEATS: usize = 64;
-/// Clocks that the accelerator runs before the DMAs move beats again.
-const BATCH_CLOCKS: u64 = 64;
+/// Clocks that the accelerator runs before the DMAs move beats again. A simulated clock takes longer than
+/// an exchange with the simulator's process.
+const BATCH_CLOCKS: u64 = 8;
 /// Clocks of its reset at most, and between two looks at it.
 const RESET_CLOCKS: u32 = 8192;
 const RESET_BATCH: u32 = 64;

@@ -8,8 +8,8 @@ use pgs_interface::control::{AP_CTRL, ISR, RESET};
 
 /// Beats that are kept: with more in a step, it cannot be played again.
 const BEATS_MAX: usize = 4 << 20;
-/// Requests of up to 64 clocks each that the waveform shows.
-const SHOWN: usize = 8;
+/// Clocks that the waveform shows.
+const SHOWN_CLOCKS: u64 = 400;
 
 #[derive(Debug)]
 enum Request {
@@ -72,6 +72,18 @@ impl History {
         }
     }
 
+    /// The first request that the waveform shows.
+    fn shown_from(&self) -> usize {
+        let mut clocks = 0;
+        let before = self.step.iter().rposition(|request| {
+            if let Request::Run(more, _) = request {
+                clocks += u64::from(*more);
+            }
+            clocks > SHOWN_CLOCKS
+        });
+        before.unwrap_or(0)
+    }
+
     /// Plays the step again; the path of the waveform of its last clocks.
     pub(super) fn waveform(&self, simulator: &Path) -> Result<PathBuf, NoWaveform> {
         if self.beats > BEATS_MAX {
@@ -85,7 +97,7 @@ impl History {
         for (offset, value) in &self.registers {
             process.write(*offset, *value)?;
         }
-        let shown_from = self.step.len().saturating_sub(SHOWN);
+        let shown_from = self.shown_from();
         for (number, request) in self.step.iter().enumerate() {
             if number == shown_from && !process.record(true)? {
                 return Err(NoWaveform::NotBuilt);
