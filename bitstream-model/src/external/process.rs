@@ -23,7 +23,9 @@ use std::thread;
 use std::time::Duration;
 
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
+use crate::config::BoardConfig;
 use pgs_interface::control::{IDENTIFICATION, IDENTIFICATION_VALUE};
+use pgs_interface::profile::FLOAT;
 use pgs_interface::record::Beat;
 
 const STREAMS: usize = 4;
@@ -59,6 +61,19 @@ impl SimulatorProcess {
     /// [`ExternalError`] if the program cannot be started or does not answer as an accelerator.
     pub fn start(path: &Path) -> Result<Self, ExternalError> {
         Self::start_with(path, &[])
+    }
+
+    /// Starts a simulator as the accelerator of a board that is built as `config` says.
+    ///
+    /// # Errors
+    /// [`ExternalError::Profile`] for a profile that is not generated; else as for
+    /// [`start`](Self::start).
+    pub fn start_for(config: &BoardConfig, path: &Path) -> Result<Self, ExternalError> {
+        if config.profile != &FLOAT {
+            let (generated, asked) = (FLOAT.name, config.profile.name);
+            return Err(ExternalError::Profile { generated, asked });
+        }
+        Self::start(path)
     }
 
     /// Starts a simulator with arguments of its own.

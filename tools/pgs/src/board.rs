@@ -2,10 +2,10 @@
 
 use std::io::{self, Write};
 
-use bitstream_model::external::SimulatorProcess;
+use bitstream_model::external::{ExternalAccelerator, ExternalError, SimulatorProcess};
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
-use bitstream_model::interface::profile::{FLOAT, PROFILES, Variant};
+use bitstream_model::interface::profile::{PROFILES, Variant};
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::platform::{System, uio_listing};
@@ -105,23 +105,32 @@ pub(crate) struct ChosenBoard {
     pub(crate) reason: String,
 }
 
+/// Starts the accelerator that was chosen for a board that is built as `config` says; none for the
+/// built-in model.
+pub(crate) fn external_accelerator(
+    config: &BoardConfig,
+    accelerator: &AcceleratorChoice,
+) -> Result<Option<Box<dyn ExternalAccelerator>>, Failure> {
+    let AcceleratorChoice::Rtl(path) = accelerator else { return Ok(None) };
+    match SimulatorProcess::start_for(config, path) {
+        Ok(simulator) => Ok(Some(Box::new(simulator))),
+        Err(error @ ExternalError::Profile { .. }) => {
+            Err(Failure::input(error).next("leave out --profile, or --accelerator"))
+        }
+        Err(error) => Err(Failure::input(error)),
+    }
+}
+
 /// Builds an emulated board with the accelerator that was chosen.
-pub(crate) fn emulated_board(
+fn emulated_board(
     config: BoardConfig,
     accelerator: &AcceleratorChoice,
 ) -> Result<EmulatedBoard, Failure> {
-    let AcceleratorChoice::Rtl(path) = accelerator else {
-        return EmulatedBoard::new(config).map_err(not_built);
-    };
-    if config.profile != &FLOAT {
-        let error = format!(
-            "the generated accelerator is of profile {}, not {}",
-            FLOAT.name, config.profile.name
-        );
-        return Err(Failure::input(error).next("leave out --profile, or --accelerator"));
+    match external_accelerator(&config, accelerator)? {
+        Some(external) => EmulatedBoard::with_accelerator(config, external),
+        None => EmulatedBoard::new(config),
     }
-    let simulator = SimulatorProcess::start(path).map_err(Failure::input)?;
-    EmulatedBoard::with_accelerator(config, Box::new(simulator)).map_err(not_built)
+    .map_err(not_built)
 }
 
 /// Chooses a board. `given` is an option of the command line that only an emulated board has.
